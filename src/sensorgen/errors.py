@@ -1,0 +1,39 @@
+"""What went wrong, in words that tell the user what to do."""
+
+import difflib
+from collections.abc import Iterable
+
+
+class SensorgenError(Exception):
+    """Anything a user can put right; the command line shows it as one line and exits with 2."""
+
+
+class OutOfRange(SensorgenError):
+    """A number outside the range in which it means something."""
+
+
+class UnknownName(SensorgenError):
+    """A name that nothing goes by."""
+
+    def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
+        """Name the nearest of ``known`` to ``given``, and list them all."""
+        names = sorted(known)
+        near = difflib.get_close_matches(given, names, n=1, cutoff=0.5)
+        hint = f"; did you mean '{near[0]}'?" if near else "."
+        super().__init__(f"unknown {kind} {given!r}{hint} Known: {', '.join(names)}")
+
+
+class BadInput(SensorgenError):
+    """A file or a word on the command line that cannot be read as what it should be."""
+
+
+class MissingValue(SensorgenError):
+    """A value that no source gives."""
+
+
+class Unwritable(SensorgenError):
+    """A result that could not be put on disk."""
+
+
+class CadFailed(SensorgenError):
+    """The CAD kernel could not make a solid."""

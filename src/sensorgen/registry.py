@@ -1,0 +1,26 @@
+"""Names to things: what stands in a folder is known by its file name, and loaded when it is used."""
+
+import importlib
+from pathlib import Path
+from types import ModuleType
+
+from sensorgen.errors import UnknownName
+
+
+def names(package: ModuleType) -> list[str]:
+    """Names of the modules in a package, without loading any."""
+    folder = Path(next(iter(package.__path__)))
+    return sorted(p.stem for p in folder.glob("*.py") if not p.stem.startswith("_"))
+
+
+def load(package: ModuleType, name: str) -> ModuleType:
+    """Load one module of a package by its name.
+
+    Raises
+    ------
+    UnknownName
+        Nothing goes by that name; the nearest one is offered.
+    """
+    if name not in names(package):
+        raise UnknownName(package.__name__.rpartition(".")[2].removesuffix("s"), name, names(package))
+    return importlib.import_module(f"{package.__name__}.{name}")

@@ -1,0 +1,1 @@
+"""The slicers: their profiles, in their own formats."""
