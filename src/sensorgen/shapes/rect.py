@@ -1,0 +1,110 @@
+"""Two layers of crossed strips: cogs hang from cogs, and the lower ones stand on the film.
+
+One period of one layer, seen along its strips (e: conductor, x: dielectric, blank: air)::
+
+    eeeeeee   xxxxxxx   |eeeeeee ...
+    etpu   air  x60  air
+
+The upper layer's conductor strips hang on the top electrode, the lower layer's hang on them where they
+cross: all of them are at the top electrode's potential.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from math import ceil
+
+from sensorgen.scene import SLIVER_MM, Body, Envelope, Fill, Prism, Scene, box
+
+
+@dataclass(frozen=True)
+class Params(Envelope):
+    """Parameters of the crossed strips."""
+
+    etpu_width_mm: float = field(default=0.7, metadata={"help": "Width of a conductor strip.", "range": (0.02, 50.0)})
+    air_width_mm: float = field(
+        default=0.3, metadata={"help": "Air between a conductor strip and its neighbours.", "range": (0.02, 50.0)}
+    )
+    x60_width_mm: float = field(default=0.7, metadata={"help": "Width of a dielectric strip.", "range": (0.02, 50.0)})
+    upper_height_mm: float = field(
+        default=0.3, metadata={"help": "Height of the upper strip layer.", "range": (0.01, 10.0)}
+    )
+    lower_height_mm: float = field(
+        default=0.3, metadata={"help": "Height of the lower strip layer.", "range": (0.01, 10.0)}
+    )
+    dielectric_mm: float = field(
+        default=0.2, metadata={"help": "Thickness of the film under the strips.", "range": (0.0, 10.0)}
+    )
+    along: str = field(
+        default="xy",
+        metadata={"help": "Direction of the upper, then of the lower strips (xy: sqXY).", "choices": ("xy", "yx")},
+    )
+
+    @property
+    def period_mm(self) -> float:
+        """Period of both layers [mm]."""
+        return self.etpu_width_mm + self.x60_width_mm + 2 * self.air_width_mm
+
+    def periods(self) -> float:
+        """How many periods the sensor is long on its longer side [-]."""
+        return max(self.length_mm, self.width_mm) / self.period_mm
+
+
+def scene(p: Params, fill: Fill) -> Scene:
+    """Bodies of the crossed-strip sensor."""
+    low = p.electrode_mm
+    film = low + p.dielectric_mm
+    middle = film + p.lower_height_mm
+    roof = middle + p.upper_height_mm
+    top = roof + p.electrode_mm
+    strips = _strips(p)
+    upper, lower = p.along
+
+    def plate(z0: float, z1: float) -> tuple[Prism, ...]:
+        return (box(0.0, p.length_mm, 0.0, p.width_mm, _r(z0), _r(z1)),) if z1 - z0 > SLIVER_MM else ()
+
+    def both(part: str) -> tuple[Prism, ...]:
+        return strips(part, lower, film, middle) + strips(part, upper, middle, roof)
+
+    bodies = [Body("bottom_electrode", fill.bottom_electrode, plate(0.0, low), "bottom")]
+    feet = strips("x60", lower, film, middle)
+    if p.dielectric_mm > 0 and fill.film == fill.dielectric:
+        bodies.append(Body("film_and_lower", fill.film, plate(low, film) + feet))
+    else:
+        if p.dielectric_mm > 0:
+            bodies.append(Body("film", fill.film, plate(low, film)))
+        bodies.append(Body("lower_dielectric", fill.dielectric, feet))
+    if fill.support:
+        bodies.append(Body("support", fill.support, both("air")))
+    bodies += [
+        Body("hanging_dielectric", fill.dielectric, strips("x60", upper, middle, roof)),
+        Body("top_electrode_with_cogs", fill.top_electrode, both("etpu") + plate(roof, top), "top"),
+        Body("isolation", fill.isolation, plate(top, top + p.isolation_mm)),
+    ]
+    return Scene(tuple(b for b in bodies if b.prisms), (p.length_mm, p.width_mm, _r(top + p.isolation_mm)))
+
+
+def _strips(p: Params) -> Callable[[str, str, float, float], tuple[Prism, ...]]:
+    """A function that lays the strips of one part, in one direction, between two heights."""
+    etpu, air, x60 = p.etpu_width_mm, p.air_width_mm, p.x60_width_mm
+    runs = {"etpu": [(0.0, etpu)], "x60": [(etpu + air, etpu + air + x60)]}
+    runs["air"] = [(etpu, etpu + air), (etpu + air + x60, p.period_mm)]
+
+    def places(part: str, end: float) -> Iterator[tuple[float, float]]:
+        for k in range(ceil(end / p.period_mm - 1e-9)):
+            for start, stop in runs[part]:
+                a, b = _r(k * p.period_mm + start), min(_r(k * p.period_mm + stop), end)
+                if b - a > SLIVER_MM:
+                    yield a, b
+
+    def lay(part: str, direction: str, z0: float, z1: float) -> tuple[Prism, ...]:
+        z0, z1 = _r(z0), _r(z1)
+        if direction == "x":
+            return tuple(box(0.0, p.length_mm, a, b, z0, z1) for a, b in places(part, p.width_mm))
+        return tuple(box(a, b, 0.0, p.width_mm, z0, z1) for a, b in places(part, p.length_mm))
+
+    return lay
+
+
+def _r(value: float) -> float:
+    """Round away what sums leave behind, so that faces that meet have equal coordinates."""
+    return round(value, 12)
