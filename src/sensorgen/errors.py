@@ -37,3 +37,7 @@ class Unwritable(SensorgenError):
 
 class CadFailed(SensorgenError):
     """The CAD kernel could not make a solid."""
+
+
+class SlicerFailed(SensorgenError):
+    """A slicer is missing, or could not slice; the message carries its own words."""

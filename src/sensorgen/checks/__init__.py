@@ -1,0 +1,58 @@
+"""Will this nozzle and this layer height make that scene? One rule, or two that belong together, per file.
+
+The scene is taken as it lies on the bed. Rule 7, printed against exact volume, needs a slicer's G-code.
+"""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from sensorgen.checks import bed, bridges, gap, grid, widths
+from sensorgen.checks.slices import Slices, slanted
+from sensorgen.findings import SEVERITIES, Finding
+from sensorgen.printer import Printer, Quality
+from sensorgen.scene import Scene
+
+
+def findings(scene: Scene, printer: Printer, quality: Quality, gap_mm: float) -> list[Finding]:
+    """All findings about a scene, the most severe first.
+
+    Parameters
+    ----------
+    scene : Scene
+        As it lies on the bed.
+    printer, quality : Printer, Quality
+        What prints it.
+    gap_mm : float
+        Smallest distance of the electrodes, exact [mm].
+    """
+    slices = Slices(scene, quality)
+    found = [
+        *gap.check(slices, printer, quality, gap_mm),
+        *grid.check(scene, slices.layers),
+        *widths.check(slices, printer),
+        *bed.check(scene, printer),
+        *bridges.check(slices, printer, quality),
+        *_unchecked(scene),
+    ]
+    return sorted(_merged(found), key=lambda f: (SEVERITIES.index(f.severity), int(f.rule.partition("-")[0])))
+
+
+def _merged(found: Iterable[Finding]) -> Iterable[Finding]:
+    """The same finding in layer after layer becomes one, from the first layer to the last."""
+    merged: dict[tuple[str, str, str, str], list[Finding]] = {}
+    for finding in found:
+        alike = merged.setdefault((finding.rule, finding.severity, finding.body, finding.message), [])
+        before = alike[-1] if alike else None
+        if before and before.layer and finding.layer == (before.last_layer or before.layer) + 1:
+            alike[-1] = replace(before, last_layer=finding.layer)
+        else:
+            alike.append(finding)
+    return (finding for alike in merged.values() for finding in alike)
+
+
+def _unchecked(scene: Scene) -> list[Finding]:
+    return [
+        Finding("5-width", "info", body.name, "slanted outlines in plan: widths and bridges not checked", "look at the slices")
+        for body in scene.bodies
+        if any(slanted(p) for p in body.prisms)
+    ]

@@ -1,0 +1,92 @@
+"""Rule 9: what is printed over air. Any body below supports, whatever its material."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.checks.slices import TOUCH_MM, Rectangle, Slice, Slices, stretches
+from sensorgen.checks.widths import VANISHES
+from sensorgen.findings import Finding
+from sensorgen.printer import Printer, Quality
+from sensorgen.scene import Body
+
+Mask = NDArray[np.bool_]
+Lengths = NDArray[np.float64]
+
+
+def check(slices: Slices, printer: Printer, quality: Quality) -> Iterator[Finding]:
+    """Findings about bridges (held at both ends), overhangs (at one) and islands (at none)."""
+    line = printer.nozzle_mm * printer.line_width_ratio
+    known: dict[object, dict[str, float]] = {}
+    for layer in range(1, len(slices.layers)):
+        ground = slices.all(layer - 1)
+        for body in slices.scene.bodies:
+            shape = slices.body(body, layer)
+            if not shape or shape <= ground:
+                continue
+            if (shape, ground) not in known:
+                known[shape, ground] = _spans(shape, ground, VANISHES * printer.nozzle_mm)
+            yield from _judged(body, layer + 1, slices.layers.mids_mm[layer], known[shape, ground], quality, line)
+
+
+def _judged(
+    body: Body, layer: int, z_mm: float, spans: dict[str, float], quality: Quality, line_mm: float
+) -> Iterator[Finding]:
+    prism = min(body.prisms, key=lambda p: abs(sum(p.span("z")) / 2 - z_mm))
+    place = (prism.span("x")[0], prism.span("y")[0], z_mm)
+    limits = {"bridge": (quality.bridge_warning_mm, quality.bridge_error_mm), "overhang": (line_mm / 2, line_mm)}
+    for kind, (warn, fail) in limits.items():
+        span = spans[kind]
+        if span > warn + TOUCH_MM:
+            severe = span > fail + TOUCH_MM
+            yield Finding(
+                "9-bridge", "error" if severe else "warning", body.name,
+                f"{'a bridge' if kind == 'bridge' else 'an overhang'} of {span:.3g} mm over air",
+                f"narrow it to {warn:.2g} mm, print upside down, or fill the air with support",
+                round(span, 9), fail if severe else warn, layer, place,
+            )  # fmt: skip
+    if spans["island"] > 0:
+        yield Finding(
+            "9-bridge", "error", body.name, f"an island {spans['island']:.3g} mm wide starts in mid-air",
+            "turn the sensor over, or fill the air with support (--support bvoh)",
+            round(spans["island"], 9), 0.0, layer, place,
+        )  # fmt: skip
+
+
+def _spans(shape: frozenset[Rectangle], ground: frozenset[Rectangle], least_mm: float) -> dict[str, float]:
+    """Longest bridge, overhang and island of a layer's shape above a ground [mm].
+
+    Every unsupported place is held along x or along y; the better way counts.
+    """
+    piece = Slice(shape, ground)
+    filled, air = piece.filled, piece.filled & ~Slice(ground, shape).filled
+    x, y = piece.lines
+    ways = [_held(filled, air, x), tuple(m.T for m in _held(filled.T, air.T, y))]
+    ends, lengths = (np.stack([way[k] for way in ways]) for k in (0, 1))
+    # A bridge beats an overhang beats an island; among equals the shorter.
+    best = np.argmin(np.where(ends == 2, lengths, np.where(ends == 1, 2 * lengths, np.inf)), axis=0)[None]
+    ends, lengths = (np.take_along_axis(m, best, 0)[0] for m in (ends, lengths))
+    narrow = np.minimum(*(way[1] for way in ways))
+
+    def longest(values: Lengths, mask: Mask) -> float:
+        return float(values[mask].max()) if mask.any() else 0.0
+
+    return {
+        "bridge": longest(lengths, air & (ends == 2)),
+        "overhang": longest(lengths, air & (ends == 1)),
+        "island": longest(narrow, air & (ends == 0) & (narrow > least_mm + TOUCH_MM)),
+    }
+
+
+def _held(filled: Mask, air: Mask, line: Lengths) -> tuple[NDArray[np.int64], Lengths]:
+    """Along the first axis: at how many ends each unsupported stretch is held, and how long it is [mm]."""
+    ends = np.zeros(filled.shape, np.int64)
+    lengths = np.zeros(filled.shape)
+    for j in range(filled.shape[1]):
+        for start, end in stretches(air[:, j]):
+            left = start > 0 and filled[start - 1, j]
+            right = end < len(filled) and filled[end, j]
+            ends[start:end, j] = int(left) + int(right)
+            lengths[start:end, j] = line[end] - line[start]
+    return ends, lengths

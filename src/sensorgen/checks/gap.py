@@ -1,0 +1,82 @@
+"""Rules 1 and 2: the electrodes stay apart, and the film between them is printed as drawn."""
+
+from collections.abc import Iterator
+
+from sensorgen.checks.slices import TOUCH_MM, Slices
+from sensorgen.checks.widths import LINE_LOST, VANISHES
+from sensorgen.findings import Finding
+from sensorgen.printer import Printer, Quality
+from sensorgen.scene import Body, Scene
+
+
+def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> Iterator[Finding]:
+    """Findings about the electrode gap; ``gap_mm`` is the exact smallest distance of the electrodes."""
+    low, high = _electrodes(slices.scene)
+    names = f"{low.name} / {high.name}"
+    place = (0.0, 0.0, max(p.span("z")[1] for p in low.prisms))
+    layer = quality.layer_mm
+    if gap_mm <= TOUCH_MM:
+        yield Finding(
+            "1-short", "error", names, "the electrodes touch: a short by design",
+            "give the film a thickness (dielectric_mm)", round(gap_mm, 9), 0.0, place_mm=place,
+        )  # fmt: skip
+        return
+    if gap_mm < layer / 2 - TOUCH_MM:
+        yield Finding(
+            "2-film", "error", names,
+            f"the film of {gap_mm:g} mm is under half a layer ({layer:g} mm): it may not be printed at all",
+            f"use {layer:g} mm or more, or a quality with thinner layers", round(gap_mm, 9), round(layer / 2, 9), place_mm=place,
+        )  # fmt: skip
+        return
+    yield from _film(names, place, layer, gap_mm)
+    yield from _printed(slices, printer, gap_mm)
+
+
+def _film(names: str, place: tuple[float, float, float], layer: float, gap_mm: float) -> Iterator[Finding]:
+    count = gap_mm / layer
+    if abs(count - round(count)) > TOUCH_MM / layer:
+        below, above = max(1, int(count)) * layer, (int(count) + 1) * layer
+        yield Finding(
+            "2-film", "warning", names,
+            f"the film of {gap_mm:g} mm is {count:.3g} layers of {layer:g} mm: it prints as {round(count) * layer:g} mm",
+            f"use {below:g} or {above:g} mm", round(gap_mm, 9), round(round(count) * layer, 9), place_mm=place,
+        )  # fmt: skip
+    if count < 2 - TOUCH_MM / layer:
+        yield Finding(
+            "2-film", "warning", names,
+            "the film is a single layer: one pinhole or zit makes a short",
+            f"use {2 * layer:g} mm or more, or thinner layers", round(gap_mm, 9), round(2 * layer, 9), place_mm=place,
+        )  # fmt: skip
+
+
+def _printed(slices: Slices, printer: Printer, gap_mm: float) -> Iterator[Finding]:
+    """What the gap becomes when narrow features vanish."""
+    tracks = {"PrusaSlicer (Arachne)": VANISHES, "classic walls and Cura": LINE_LOST}
+    gaps = {slicer: printed_gap_mm(slices, share * printer.nozzle_mm) for slicer, share in tracks.items()}
+    if all(gap is not None and abs(gap - gap_mm) <= TOUCH_MM for gap in gaps.values()):
+        return
+    said = ", ".join(f"{slicer}: {'nothing prints' if gap is None else f'{gap:g} mm'}" for slicer, gap in gaps.items())
+    low, high = _electrodes(slices.scene)
+    worst = max((gap for gap in gaps.values() if gap is not None), default=None)
+    yield Finding(
+        "2-printed-gap", "warning", f"{low.name} / {high.name}",
+        f"as printed the electrodes stand apart by another distance than drawn ({gap_mm:g} mm): {said}",
+        "blunt the tips to a line width, use thinner layers, or put the faces on layer boundaries",
+        worst, round(gap_mm, 9), place_mm=(0.0, 0.0, max(p.span("z")[1] for p in low.prisms)),
+    )  # fmt: skip
+
+
+def printed_gap_mm(slices: Slices, least_mm: float) -> float | None:
+    """Distance of the electrodes when stretches up to ``least_mm`` wide are not printed; None without them [mm]."""
+    low, high = (slices.printed(body, least_mm) for body in _electrodes(slices.scene))
+    if not low or not high:
+        return None
+    boundaries = slices.layers.boundaries_mm
+    return round(boundaries[high[0]] - boundaries[low[-1] + 1], 9)
+
+
+def _electrodes(scene: Scene) -> tuple[Body, Body]:
+    """The terminals' bodies, the one nearer to the bed first."""
+    bodies = [b for b in scene.bodies if b.terminal]
+    low, high = sorted(bodies, key=lambda b: min(p.span("z")[0] for p in b.prisms))
+    return low, high

@@ -1,0 +1,69 @@
+"""Rules 3 and 4: faces on layer boundaries, and bodies that every sample misses."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+from sensorgen.checks.slices import TOUCH_MM, Layers
+from sensorgen.findings import Finding
+from sensorgen.scene import Body, Scene
+
+
+def check(scene: Scene, layers: Layers) -> Iterator[Finding]:
+    """Findings about where bodies lie on the layer grid."""
+    for body in scene.bodies:
+        yield from _faces(body, layers)
+        yield from _samples(body, layers)
+
+
+def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
+    levels = {z for p in body.prisms for z in _levels(p.axis, p.outline, p.span("z"))}
+    off = sorted(z for z in levels if layers.off_grid_mm(z) > TOUCH_MM)
+    if not off:
+        return
+    low, high = min(levels), max(levels)
+    thick, printed = high - low, layers.printed_mm(high) - layers.printed_mm(low)
+    named = ", ".join(f"{z:g}" for z in off[:3]) + (" ..." if len(off) > 3 else "")
+    effect = f"; it prints {printed:g} mm thick instead of {thick:g}" if abs(printed - thick) > TOUCH_MM else ""
+    yield Finding(
+        "3-grid", "warning", body.name, f"faces at {named} mm lie between layer boundaries{effect}",
+        f"move them to {', '.join(f'{layers.printed_mm(z):g}' for z in off[:3])} mm",
+        round(off[0], 9), round(layers.printed_mm(off[0]), 9),
+        place_mm=_place(body, off[0]), count=len(off),
+    )  # fmt: skip
+
+
+def _levels(axis: str, outline: tuple[tuple[float, float], ...], span: tuple[float, float]) -> set[float]:
+    return set(span) if axis == "z" else {round(z, 9) for _, z in outline}
+
+
+def _samples(body: Body, layers: Layers) -> Iterator[Finding]:
+    spans = {p.span("z"): p for p in body.prisms}
+    lost = [span for span in spans if not any(_within(mid, span) for mid in layers.mids_mm)]
+    for low, high in lost:
+        yield Finding(
+            "4-unsampled", "error", body.name,
+            f"{high - low:g} mm from {low:g} to {high:g} mm miss every mid-layer sample: this part is not printed",
+            "make it a layer thick, or move it onto the layer grid",
+            round(high - low, 9), layers.boundaries_mm[1] / 2, place_mm=_place(body, (low + high) / 2),
+            count=sum(p.span("z") == (low, high) for p in body.prisms),
+        )  # fmt: skip
+    for number, ((low, high), mid) in enumerate(zip(pairwise(layers.boundaries_mm), layers.mids_mm, strict=True)):
+        here = [s for s in spans if s not in lost and min(s[1], high) - max(s[0], low) > TOUCH_MM]
+        if here and not any(_within(mid, span) for span in here):
+            height = max(min(s[1], high) - max(s[0], low) for s in here)
+            yield Finding(
+                "4-unsampled", "warning", body.name,
+                f"its last {height:.3g} mm in this layer ({low:g} to {high:g} mm) end short of mid-height: not printed",
+                "put the end on a layer boundary", round(height, 9), round((high - low) / 2, 9), number + 1,
+                _place(body, (max(low, min(s[0] for s in here)) + min(high, max(s[1] for s in here))) / 2),
+            )  # fmt: skip
+
+
+def _within(z_mm: float, span: tuple[float, float]) -> bool:
+    return span[0] + TOUCH_MM < z_mm < span[1] - TOUCH_MM
+
+
+def _place(body: Body, z_mm: float) -> tuple[float, float, float]:
+    """A place of the body at or next to a height [mm]."""
+    prism = min(body.prisms, key=lambda p: max(p.span("z")[0] - z_mm, z_mm - p.span("z")[1], 0.0))
+    return (prism.span("x")[0], prism.span("y")[0], round(z_mm, 9))

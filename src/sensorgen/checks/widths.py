@@ -1,0 +1,112 @@
+"""Rules 5 and 6: what is too narrow at mid-layer vanishes or swells, and narrow gaps close.
+
+The limits were found by slicing (PrusaSlicer 2.5 with Arachne and with classic walls, CuraEngine 4.13; nozzle
+0.4 mm, line 0.44 mm) and scale with the nozzle.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from sensorgen.checks.slices import TOUCH_MM, Layers, Run, Slice, Slices, shown
+from sensorgen.findings import Finding
+from sensorgen.printer import Printer
+from sensorgen.scene import Body
+
+# As shares of the nozzle.
+VANISHES = 0.12 / 0.4  # no slicer prints a stretch this narrow
+SWELLS = 0.34 / 0.4  # Arachne prints anything narrower at this width
+LINE_LOST = 0.44 / 0.4  # classic walls and Cura drop anything narrower
+OVERFILLED = 0.70 / 0.4  # classic walls put 1.8 to 1.17 times the material into anything narrower
+GAP_CLOSES = 0.10 / 0.4
+
+
+@dataclass(frozen=True)
+class _Band:
+    """What becomes of stretches up to a width."""
+
+    upto: float
+    severity: str
+    message: str
+    advice: str
+
+
+_BANDS = (
+    _Band(VANISHES, "error", "vanishes in every slicer", "widen it beyond {line:.2g} mm"),
+    _Band(SWELLS, "warning", "prints {swells:.2g} mm wide (Arachne) or not at all (classic walls, Cura)", "widen it to {line:.2g} mm"),
+    _Band(LINE_LOST, "warning", "is narrower than a line: classic walls and Cura drop it", "widen it to {line:.2g} mm, or slice with Arachne"),
+    _Band(OVERFILLED, "info", "gets 1.2 to 1.8 times its material with classic walls", "slice with Arachne"),
+)  # fmt: skip
+
+
+def check(slices: Slices, printer: Printer) -> Iterator[Finding]:
+    """Findings about widths and gaps at mid-layer, one per body, layer and width."""
+    layers = slices.layers
+    for body in slices.scene.bodies:
+        pieces = {shape: Slice(shape) for shape in (slices.body(body, k) for k in range(len(layers))) if shape}
+        for number in range(len(layers)):
+            if slices.body(body, number):
+                piece = pieces[slices.body(body, number)]
+                yield from _narrow(body, piece, number, printer, layers)
+                yield from _closing(body, piece, number, printer, layers)
+
+
+def _narrow(body: Body, piece: Slice, number: int, printer: Printer, layers: Layers) -> Iterator[Finding]:
+    nozzle = printer.nozzle_mm
+    sizes = {"line": LINE_LOST * nozzle, "swells": SWELLS * nozzle}
+    for width, runs in _by_width(piece.runs(piece.filled), OVERFILLED * nozzle).items():
+        band = next(b for b in _BANDS if width <= b.upto * nozzle + TOUCH_MM)
+        tip = band.severity == "error" and all(_tapers(body, run, number, layers) for run in runs)
+        yield Finding(
+            "5-width", "warning" if tip else band.severity, body.name,
+            f"a {'tip' if tip else 'stretch'} {width:.3g} mm wide at mid-layer {band.message.format(**sizes)}",
+            f"blunt the tip to {sizes['line']:.2g} mm" if tip else band.advice.format(**sizes),
+            width, round(band.upto * nozzle, 9), number + 1, _place(runs[0], layers.mids_mm[number]), len(runs),
+        )  # fmt: skip
+
+
+def _closing(body: Body, piece: Slice, number: int, printer: Printer, layers: Layers) -> Iterator[Finding]:
+    limit = GAP_CLOSES * printer.nozzle_mm
+    for width, runs in _by_width(piece.enclosed(), limit - 2 * TOUCH_MM).items():
+        yield Finding(
+            "6-gap", "warning", body.name, f"a gap of {width:.3g} mm within the body closes when sliced",
+            f"widen it to {limit:.2g} mm or more", width, round(limit, 9), number + 1,
+            _place(runs[0], layers.mids_mm[number]), len(runs),
+        )  # fmt: skip
+
+
+def _by_width(runs: Iterable[Run], limit_mm: float) -> dict[float, list[Run]]:
+    """Runs up to a width, by width; those along x first, so that a square counts once."""
+    found: dict[float, list[Run]] = {}
+    for run in sorted(runs):
+        if run.width <= limit_mm + TOUCH_MM:
+            found.setdefault(run.width, []).append(run)
+    return {w: [r for r in rs if r.axis == rs[0].axis] for w, rs in sorted(found.items())}
+
+
+def _tapers(body: Body, run: Run, number: int, layers: Layers) -> bool:
+    """Whether the stretch is a tip that runs out within this layer, rather than a thin wall or strip."""
+    low, high = layers.boundaries_mm[number : number + 2]
+    x, y = ((run.start + run.end) / 2, run.across) if run.axis == "x" else (run.across, (run.start + run.end) / 2)
+    for prism in body.prisms:
+        if prism.axis == run.axis or prism.is_box():
+            continue
+        if not any(r.x0 < x < r.x1 and r.y0 < y < r.y1 for r in shown(prism, layers.mids_mm[number])):
+            continue
+        bottom, top = prism.span("z")
+        near = 1e-3 * (min(high, top) - max(low, bottom))
+        ends = (max(low, bottom) + near, min(high, top) - near)
+        return min(_width_at(shown(prism, z), x, y, run.axis) for z in ends) < 0.1 * run.width
+    return False
+
+
+def _width_at(rectangles: Iterable[tuple[float, float, float, float]], x: float, y: float, axis: str) -> float:
+    """Width of the rectangle around a place; 0 where there is none [mm]."""
+    for x0, x1, y0, y1 in rectangles:
+        if x0 <= x <= x1 and y0 <= y <= y1:
+            return x1 - x0 if axis == "x" else y1 - y0
+    return 0.0
+
+
+def _place(run: Run, z_mm: float) -> tuple[float, float, float]:
+    middle = round((run.start + run.end) / 2, 9)
+    return (middle, run.across, z_mm) if run.axis == "x" else (run.across, middle, z_mm)

@@ -1,0 +1,67 @@
+"""Are the meshes closed, oriented, apart from one another, and the electrodes apart?"""
+
+from collections.abc import Mapping
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sensorgen.geometry.mesh import Mesh
+from sensorgen.scene import Scene
+
+if TYPE_CHECKING:
+    import manifold3d
+
+# Where bodies share a face, rounding leaves a film of some 1e-13 mm; a real overlap is far above this.
+OVERLAP_MM = 1e-9
+
+
+def solid(mesh: Mesh) -> "manifold3d.Manifold":
+    """The mesh as a solid of manifold3d, in double precision; look at its ``status()``."""
+    import manifold3d
+
+    data = manifold3d.Mesh64(vert_properties=mesh.vertices_mm, tri_verts=mesh.triangles.astype(np.uint64))
+    return manifold3d.Manifold(data)
+
+
+def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
+    """Bodies, and what is wrong with them; empty when all are valid.
+
+    Parameters
+    ----------
+    scene : Scene
+        For the volumes that the meshes must have.
+    meshes : mapping of str to Mesh
+        One for each body, by its name.
+    """
+    import manifold3d
+
+    solids = {name: solid(mesh) for name, mesh in meshes.items()}
+    found = []
+    for body in scene.bodies:
+        exact, got = body.volume_mm3(), meshes[body.name].volume_mm3()
+        if solids[body.name].status() != manifold3d.Error.NoError:
+            found.append((body.name, f"not a closed oriented surface ({solids[body.name].status().name})"))
+        elif abs(got - exact) > 1e-9 * exact:
+            found.append((body.name, f"encloses {got:.9g} mm3, not {exact:.9g} mm3"))
+    if found:
+        return found
+    return [(f"{a} / {b}", f"overlap by {volume:.3g} mm3") for a, b, volume in _overlaps(solids)]
+
+
+def _overlaps(solids: Mapping[str, "manifold3d.Manifold"]) -> list[tuple[str, str, float]]:
+    shared = ((a, b, (solids[a] ^ solids[b]).volume()) for a, b in combinations(solids, 2) if _near(solids[a], solids[b]))
+    return [(a, b, v) for a, b, v in shared if v > OVERLAP_MM * min(solids[a].surface_area(), solids[b].surface_area())]
+
+
+def _near(a: "manifold3d.Manifold", b: "manifold3d.Manifold") -> bool:
+    """Whether their enclosing boxes share more than a face."""
+    box_a, box_b = np.array(a.bounding_box()), np.array(b.bounding_box())
+    return bool(np.all(np.minimum(box_a[3:], box_b[3:]) - np.maximum(box_a[:3], box_b[:3]) > OVERLAP_MM))
+
+
+def electrode_gap_mm(scene: Scene, meshes: Mapping[str, Mesh]) -> float:
+    """Smallest distance between a body at the top terminal and one at the bottom terminal, exact [mm]."""
+    top, bottom = ([solid(meshes[b.name]) for b in scene.bodies if b.terminal == t] for t in ("top", "bottom"))
+    reach = sum(scene.size_mm)
+    return min(float(a.min_gap(b, reach)) for a in top for b in bottom)

@@ -1,0 +1,67 @@
+"""Bodies to multi-material 3MF: the same bodies in one file per family of slicers.
+
+No slicer takes its tools from the 3MF standard, and each family keeps them elsewhere: see ``prusa``,
+``cura`` and ``orca``. Every file is valid 3MF all the same, with named bodies and coloured materials, so
+that any viewer shows it. Bodies stand in the order of their names.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sensorgen.errors import UnknownName
+from sensorgen.threemf import archive, cura, orca, prusa
+from sensorgen.threemf.part import Part, check
+
+__all__ = ["FAMILIES", "Part", "content"]
+
+_WRITERS = {"prusa": prusa.files, "cura": cura.files, "orca": orca.files}
+
+FAMILIES = tuple(_WRITERS)
+
+
+def content(family: str, title: str, parts: Sequence[Part], centre_mm: tuple[float, float]) -> bytes:
+    """The 3MF of some bodies for one family of slicers.
+
+    Parameters
+    ----------
+    family : str
+        One of ``FAMILIES``: ``prusa``, ``cura``, ``orca``.
+    title : str
+        Name of the print, shown by viewers and slicers.
+    parts : sequence of Part
+        The bodies, in any order.
+    centre_mm : (float, float)
+        Where the middle of the sensor (of the box around all bodies) goes on the bed [mm], in the
+        family's coordinates: of the bed for ``prusa`` and ``orca``, from its front left corner for
+        ``cura``. The lowest point comes to stand on the bed.
+
+    Returns
+    -------
+    bytes
+        The whole file. The same arguments give the same bytes.
+
+    Raises
+    ------
+    UnknownName
+        No such family.
+    BadInput, OutOfRange
+        See ``part.check``.
+
+    Examples
+    --------
+    >>> from sensorgen.geometry.mesh import Mesh
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    >>> sides = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], dtype=np.int32)
+    >>> film = Part("film", "X60", "#cccccc", 1, Mesh(corners, sides))
+    >>> content("prusa", "tetrahedron", [film], (0.0, 0.0))[:2]
+    b'PK'
+    """
+    if family not in _WRITERS:
+        raise UnknownName("family of slicers", family, FAMILIES)
+    check(title, parts, centre_mm)
+    ordered = sorted(parts, key=lambda part: part.name)
+    low = np.min([part.mesh.vertices_mm.min(axis=0) for part in parts], axis=0)
+    high = np.max([part.mesh.vertices_mm.max(axis=0) for part in parts], axis=0)
+    shift_mm = np.array([*centre_mm, 0.0]) - [*(low + high)[:2] / 2, low[2]]
+    return archive.pack(_WRITERS[family](title, ordered, shift_mm))
