@@ -1,7 +1,8 @@
 """What went wrong, in words that tell the user what to do."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 
 class SensorgenError(Exception):
@@ -29,6 +30,15 @@ class BadInput(SensorgenError):
 
 class MissingValue(SensorgenError):
     """A value that no source gives."""
+
+
+class Unprintable(SensorgenError):
+    """A design whose checks found errors; ``findings`` holds all of them."""
+
+    def __init__(self, findings: Sequence[Any]) -> None:
+        """Take the findings (see :class:`sensorgen.findings.Finding`)."""
+        self.findings = list(findings)
+        super().__init__("the checks found errors, and nothing was written; --force writes the files all the same")
 
 
 class Unwritable(SensorgenError):

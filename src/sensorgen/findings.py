@@ -26,12 +26,12 @@ class Finding:
         What was found and what was expected [mm].
     layer : int or None
         Number of the printed layer, from 1 at the bed [-].
-    last_layer : int or None
-        Where it goes on through the layers after, the last of them [-].
     place_mm : tuple of (float, float, float) or None
         One place where it shows: x, y, z on the bed, from the sensor's corner [mm].
     count : int
         At how many places it shows [-].
+    last_layer : int or None
+        Where it goes on through the layers after, the last of them [-].
     waiver : str
         The design's reason to accept it, or "".
     """
@@ -45,8 +45,8 @@ class Finding:
     limit_mm: float | None = None
     layer: int | None = None
     place_mm: tuple[float, float, float] | None = None
-    last_layer: int | None = None
     count: int = 1
+    last_layer: int | None = None
     waiver: str = ""
 
     def margin_mm(self) -> float | None:

@@ -150,6 +150,10 @@ class Envelope:
         default=0.0, metadata={"help": "Isolation layer over the top electrode; 0 leaves it out.", "range": (0.0, 10.0)}
     )
 
+    def cells(self) -> float:
+        """How many cells of a repeating pattern the sensor holds; 1 without a pattern [-]."""
+        return 1.0
+
 
 def rectangle(a0: float, a1: float, b0: float, b1: float) -> Outline:
     """Rectangle from (a0, b0) to (a1, b1), counter-clockwise [mm]."""

@@ -57,9 +57,9 @@ def _sections(scene: Scene, normal: str) -> list[Section]:
     looks: dict[object, int] = {}
     look = [looks.setdefault((body.name, _seen(p, normal)), len(looks)) for _, body, p in spans]
     found: dict[tuple[int, ...], tuple[float, float, list[int]]] = {}
-    for (low, high), members in zip(pairwise(cuts), slabs, strict=True):
-        key = tuple(look[i] for i in members)
-        depth, at, _ = found.get(key, (0.0, (low + high) / 2, members))
+    for (low, high), here in zip(pairwise(cuts), slabs, strict=True):
+        key = tuple(look[i] for i in here)
+        depth, at, members = found.get(key, (0.0, (low + high) / 2, here))
         found[key] = (depth + high - low, at, members)
     return [
         Section(across, depth, at, tuple((spans[i][1], o) for i in members for o in spans[i][2].cut(normal, at)))

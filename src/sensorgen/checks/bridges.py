@@ -83,10 +83,9 @@ def _held(filled: Mask, air: Mask, line: Lengths) -> tuple[NDArray[np.int64], Le
     """Along the first axis: at how many ends each unsupported stretch is held, and how long it is [mm]."""
     ends = np.zeros(filled.shape, np.int64)
     lengths = np.zeros(filled.shape)
-    for j in range(filled.shape[1]):
-        for start, end in stretches(air[:, j]):
-            left = start > 0 and filled[start - 1, j]
-            right = end < len(filled) and filled[end, j]
-            ends[start:end, j] = int(left) + int(right)
-            lengths[start:end, j] = line[end] - line[start]
+    padded = np.pad(filled, ((1, 1), (0, 0)))
+    starts, stops, rows = stretches(air)
+    for start, stop, row in zip(starts, stops, rows, strict=True):
+        ends[start:stop, row] = int(padded[start, row]) + int(padded[stop + 1, row])
+        lengths[start:stop, row] = line[stop] - line[start]
     return ends, lengths

@@ -16,6 +16,9 @@ from sensorgen.scene import Body, Prism, Scene
 TOUCH_MM = 1e-9  # below this a distance is rounding
 
 
+Indices = NDArray[np.intp]
+
+
 class Rectangle(NamedTuple):
     """What a layer shows of one prism [mm]."""
 
@@ -78,16 +81,15 @@ class Slice:
             self.filled[i0:i1, j0:j1] = True
 
     def runs(self, mask: NDArray[np.bool_]) -> set[Run]:
-        """Unbroken stretches of a mask over the grid, along x and along y; equal neighbours count once."""
+        """Unbroken stretches of a mask over the grid, along x and along y; the same one counts once."""
         found: set[Run] = set()
         for axis, name in enumerate("xy"):
-            rows = mask if axis == 0 else mask.T
+            starts, ends, rows = stretches(mask if axis == 0 else mask.T)
             along, across = self.lines[axis], self.lines[1 - axis]
-            changed = [True] + [bool((rows[:, j] != rows[:, j - 1]).any()) for j in range(1, rows.shape[1])]
-            for j in np.flatnonzero(changed):
-                for start, end in stretches(rows[:, j]):
-                    middle = float(across[j] + across[j + 1]) / 2
-                    found.add(Run(name, float(along[start]), float(along[end]), middle))
+            _, first = np.unique(starts * len(along) + ends, return_index=True)
+            middle = (across[rows] + across[rows + 1]) / 2
+            columns = (along[starts], along[ends], middle)
+            found.update(Run(name, *place) for place in zip(*(c[first].tolist() for c in columns), strict=True))
         return found
 
     def enclosed(self) -> set[Run]:
@@ -99,10 +101,12 @@ class Slice:
         return run.start == line[0] or run.end == line[-1]
 
 
-def stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and behind-last index of each unbroken run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+def stretches(mask: NDArray[np.bool_]) -> tuple[Indices, Indices, Indices]:
+    """Unbroken runs of True along the first axis: first index, behind-last index, index on the second axis."""
+    edges = np.diff(np.pad(mask, ((1, 1), (0, 0))).astype(np.int8), axis=0).T
+    rows, starts = np.nonzero(edges == 1)
+    _, ends = np.nonzero(edges == -1)
+    return starts, ends, rows
 
 
 def shown(prism: Prism, z_mm: float) -> Iterator[Rectangle]:

@@ -7,7 +7,7 @@ The limits were found by slicing (PrusaSlicer 2.5 with Arachne and with classic 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from sensorgen.checks.slices import TOUCH_MM, Layers, Run, Slice, Slices, shown
+from sensorgen.checks.slices import TOUCH_MM, Layers, Rectangle, Run, Slice, Slices, shown
 from sensorgen.findings import Finding
 from sensorgen.printer import Printer
 from sensorgen.scene import Body
@@ -55,7 +55,7 @@ def _narrow(body: Body, piece: Slice, number: int, printer: Printer, layers: Lay
     sizes = {"line": LINE_LOST * nozzle, "swells": SWELLS * nozzle}
     for width, runs in _by_width(piece.runs(piece.filled), OVERFILLED * nozzle).items():
         band = next(b for b in _BANDS if width <= b.upto * nozzle + TOUCH_MM)
-        tip = band.severity == "error" and all(_tapers(body, run, number, layers) for run in runs)
+        tip = band.severity == "error" and _all_taper(body, runs, number, layers)
         yield Finding(
             "5-width", "warning" if tip else band.severity, body.name,
             f"a {'tip' if tip else 'stretch'} {width:.3g} mm wide at mid-layer {band.message.format(**sizes)}",
@@ -83,28 +83,23 @@ def _by_width(runs: Iterable[Run], limit_mm: float) -> dict[float, list[Run]]:
     return {w: [r for r in rs if r.axis == rs[0].axis] for w, rs in sorted(found.items())}
 
 
-def _tapers(body: Body, run: Run, number: int, layers: Layers) -> bool:
-    """Whether the stretch is a tip that runs out within this layer, rather than a thin wall or strip."""
+def _all_taper(body: Body, runs: list[Run], number: int, layers: Layers) -> bool:
+    """Whether all stretches are tips that run out within this layer, rather than thin walls or strips."""
     low, high = layers.boundaries_mm[number : number + 2]
-    x, y = ((run.start + run.end) / 2, run.across) if run.axis == "x" else (run.across, (run.start + run.end) / 2)
+    ends: list[Rectangle] = []
     for prism in body.prisms:
-        if prism.axis == run.axis or prism.is_box():
-            continue
-        if not any(r.x0 < x < r.x1 and r.y0 < y < r.y1 for r in shown(prism, layers.mids_mm[number])):
-            continue
-        bottom, top = prism.span("z")
-        near = 1e-3 * (min(high, top) - max(low, bottom))
-        ends = (max(low, bottom) + near, min(high, top) - near)
-        return min(_width_at(shown(prism, z), x, y, run.axis) for z in ends) < 0.1 * run.width
-    return False
+        bottom, top = (max(low, prism.span("z")[0]), min(high, prism.span("z")[1]))
+        if top > bottom and not prism.is_box():
+            near = 1e-3 * (top - bottom)
+            ends += [r for z in (bottom + near, top - near) for r in shown(prism, z)]
+    return all(_tapers(run, ends) for run in runs)
 
 
-def _width_at(rectangles: Iterable[tuple[float, float, float, float]], x: float, y: float, axis: str) -> float:
-    """Width of the rectangle around a place; 0 where there is none [mm]."""
-    for x0, x1, y0, y1 in rectangles:
-        if x0 <= x <= x1 and y0 <= y <= y1:
-            return x1 - x0 if axis == "x" else y1 - y0
-    return 0.0
+def _tapers(run: Run, ends: list[Rectangle]) -> bool:
+    """Whether one of the two ends of the stretch's prism in this layer is far narrower than it is at mid-height."""
+    x, y = ((run.start + run.end) / 2, run.across) if run.axis == "x" else (run.across, (run.start + run.end) / 2)
+    widths = [r.x1 - r.x0 if run.axis == "x" else r.y1 - r.y0 for r in ends if r.x0 <= x <= r.x1 and r.y0 <= y <= r.y1]
+    return min(widths, default=run.width) < 0.1 * run.width
 
 
 def _place(run: Run, z_mm: float) -> tuple[float, float, float]:

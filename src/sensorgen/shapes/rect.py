@@ -16,6 +16,9 @@ from math import ceil
 from sensorgen.scene import SLIVER_MM, Body, Envelope, Fill, Prism, Scene, box
 
 
+SHORT = "sq"  # as the thesis's specimens are named: sqXY, sqYX
+
+
 @dataclass(frozen=True)
 class Params(Envelope):
     """Parameters of the crossed strips."""
@@ -44,9 +47,9 @@ class Params(Envelope):
         """Period of both layers [mm]."""
         return self.etpu_width_mm + self.x60_width_mm + 2 * self.air_width_mm
 
-    def periods(self) -> float:
-        """How many periods the sensor is long on its longer side [-]."""
-        return max(self.length_mm, self.width_mm) / self.period_mm
+    def cells(self) -> float:
+        """How many cells of the pattern the sensor holds [-]."""
+        return self.length_mm * self.width_mm / self.period_mm**2
 
 
 def scene(p: Params, fill: Fill) -> Scene:

@@ -45,8 +45,8 @@ class Params(Envelope):
                 f"{self.hang_height_mm:g}: the triangles would run into each other"
             )
 
-    def periods(self) -> float:
-        """How many periods the sensor is long [-]."""
+    def cells(self) -> float:
+        """How many cells of the pattern the sensor holds [-]."""
         return (self.length_mm if self.along == "x" else self.width_mm) / self.period_mm
 
 
@@ -56,7 +56,7 @@ def scene(p: Params, fill: Fill) -> Scene:
     film, roof = low + p.dielectric_mm, low + p.dielectric_mm + p.hang_height_mm
     top = roof + p.electrode_mm
     end, depth = (p.length_mm, p.width_mm) if p.along == "x" else (p.width_mm, p.length_mm)
-    halves = range(2 * ceil(p.periods() - 1e-9) + 1)
+    halves = range(2 * ceil(p.cells() - 1e-9) + 1)
 
     def prisms(outlines: Iterator[Outline] | list[Outline]) -> tuple[Prism, ...]:
         axis = "y" if p.along == "x" else "x"

@@ -70,7 +70,9 @@ def recipe(printer: Printer, quality: Quality, tool: int, load: Load) -> Recipe:
     return Recipe(
         material=load.material,
         source=load.source,
-        nozzle_c=_between(where, "nozzle temperature [C]", _value(load, tool, "nozzle_temperature_c"), 0, printer.max_nozzle_c),
+        nozzle_c=_between(
+            where, "nozzle temperature [C]", _value(load, tool, "nozzle_temperature_c"), 0, printer.max_nozzle_c
+        ),
         bed_c=_between(where, "bed temperature [C]", _value(load, tool, "bed_temperature_c"), 0, printer.max_bed_c),
         speed_mm_s=_between(where, "speed [mm/s]", _value(load, tool, "speed_mm_s"), 0.1, limits.xy),
         fan_percent=_between(where, "fan [%]", _value(load, tool, "fan_percent"), 0, 100),
@@ -134,7 +136,9 @@ def _value(load: Load, tool: int, quantity: str) -> float:
 
 def _between(where: str, what: str, value: float, low: float, high: float) -> float:
     if not (math.isfinite(value) and low <= value <= high):
-        raise OutOfRange(f"{where}: {what} is {value:g}; expected {low:g} to {high:g}: change it, or the printer's limit")
+        raise OutOfRange(
+            f"{where}: {what} is {value:g}; expected {low:g} to {high:g}: change it, or the printer's limit"
+        )
     return value
 
 

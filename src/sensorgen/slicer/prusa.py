@@ -95,7 +95,9 @@ def slice_3mf(threemf: Path, profile: Path, gcode: Path) -> None:
     for path in (threemf, profile):
         if not path.is_file():  # PrusaSlicer would take a missing profile for an empty one
             raise SlicerFailed(f"nothing to slice: there is no file {path}")
-    command = [program, "--export-gcode", "--dont-arrange", "--load", str(profile)]
+    # By default PrusaSlicer puts another value for one that it does not know, and goes on.
+    strict = ["--config-compatibility", "disable"]
+    command = [program, "--export-gcode", "--dont-arrange", *strict, "--load", str(profile)]
     run([*command, "--output", str(gcode), str(threemf)], gcode)
 
 

@@ -37,7 +37,7 @@ def run(command: Sequence[str], gcode: Path, environment: Mapping[str, str] | No
     gcode.unlink(missing_ok=True)
     name = Path(command[0]).name
     try:
-        done = subprocess.run(  # noqa: S603 - our own command, no shell
+        done = subprocess.run(
             list(command),
             capture_output=True,
             text=True,
@@ -57,6 +57,8 @@ def run(command: Sequence[str], gcode: Path, environment: Mapping[str, str] | No
 
 
 def _last_words(done: subprocess.CompletedProcess[str]) -> str:
-    lines = [line.strip() for line in (done.stderr + "\n" + done.stdout).splitlines()]
-    said = [line for line in lines if line and "[trace]" not in line and "[debug]" not in line]
-    return " | ".join(said[-KEPT_LINES:]) or "it said nothing"
+    """What the slicer calls an error, or else the end of what it said; the rest is licence and progress."""
+    lines = [line.strip() for line in f"{done.stderr}\n{done.stdout}".splitlines()]
+    errors = [line for line in lines if "error" in line.lower()]
+    said = [line for line in lines if line and not any(word in line for word in ("[trace]", "[debug]", "[WARNING]"))]
+    return " | ".join((errors or said)[-KEPT_LINES:]) or "it said nothing"

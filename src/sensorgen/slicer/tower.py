@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from sensorgen.printer import Printer, Quality
 
 PRIME_MM3 = 15.0  # what PrusaSlicer takes a nozzle to need before its pressure is steady
-MARGIN_MM = 5.0  # to the edges of the bed: the tower's brim
+MARGIN_MM = 10.0  # to the edges of the bed: the skirt goes round the tower too
 
 
 @dataclass(frozen=True)

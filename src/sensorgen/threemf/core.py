@@ -106,8 +106,8 @@ def _base_materials(parts: Sequence[Part]) -> Iterator[str]:
 
 
 def _vertices(vertices_mm: NDArray[np.float64]) -> Iterator[str]:
-    # Grids have few distinct coordinates: each is put in words once. Nine digits are a hundred times
-    # finer than the float32 that readers keep; below 1e-9 mm there is only noise, and no -0.
+    # Grids have few distinct coordinates: each is put in words once. Readers keep float32, and nine digits
+    # tell any two of those apart; below 1e-9 mm there is only noise, and no -0.
     values, places = np.unique(np.round(vertices_mm, 9) + 0.0, return_inverse=True)
     words = np.array([f"{value:.9g}" for value in values.tolist()], dtype=object)
     places = places.reshape(-1, 3)
@@ -121,5 +121,5 @@ def _triangles(triangles: NDArray[np.int32], first: int, mark: str) -> Iterator[
 
 
 def _lines(line: str, cells: NDArray[np.generic]) -> str:
-    # One format call for all rows: five times faster than one per row.
+    # One format call for all rows: measured 1.7 times as fast as one per row.
     return line * len(cells) % tuple(cells.ravel().tolist())

@@ -1,9 +1,10 @@
 """3MF for Cura: one object per body, grouped, each with its tool in its metadata.
 
 Cura's reader makes a scene node of each object and takes those of one ``<components>`` as a group, which
-keeps the bodies together (a lone body stands without group, about the origin). From an object's ``<metadatagroup>`` it takes every entry of the namespace
-``cura``: ``cura:extruder_nr``, counted from 0, chooses the tool, any other name a setting of this body
-alone (``SETTINGS`` below). Title and materials are for other viewers; Cura reads neither.
+keeps the bodies together (a lone body stands without group, about the origin). From an object's
+``<metadatagroup>`` it takes every entry of the namespace ``cura``: ``cura:extruder_nr``, counted from 0,
+chooses the tool, any other name a setting of this body alone (``SETTINGS`` below). The materials are for
+other viewers; Cura reads none.
 
 Placement: ``centre_mm`` counts from the *front left corner* of the bed. Cura subtracts half of
 ``machine_width`` and half of ``machine_depth`` from what it reads, also where ``machine_center_is_zero``
@@ -34,9 +35,7 @@ SETTINGS = {
 _NAMESPACE = {"cura": "http://software.ultimaker.com/xml/cura/3mf/2015/10"}
 
 
-def files(
-    title: str, parts: Sequence[Part], shift_mm: NDArray[np.float64]
-) -> Iterator[tuple[str, Iterator[str]]]:
+def files(title: str, parts: Sequence[Part], shift_mm: NDArray[np.float64]) -> Iterator[tuple[str, Iterator[str]]]:
     """Path and text of each file; ``shift_mm`` leads from sensor to bed coordinates [mm]."""
     if len(parts) == 1:
         parts, shift_mm = _centred(parts[0], shift_mm)

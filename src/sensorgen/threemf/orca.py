@@ -34,9 +34,7 @@ _NAMESPACE = {"BambuStudio": "http://schemas.bambulab.com/package/2021"}
 _VERSION = {"BambuStudio:3mfVersion": "1"}
 
 
-def files(
-    title: str, parts: Sequence[Part], shift_mm: NDArray[np.float64]
-) -> Iterator[tuple[str, Iterator[str]]]:
+def files(title: str, parts: Sequence[Part], shift_mm: NDArray[np.float64]) -> Iterator[tuple[str, Iterator[str]]]:
     """Path and text of each file; ``shift_mm`` leads from sensor to bed coordinates [mm]."""
     yield core.MODEL, core.model(title, _VERSION, _NAMESPACE, parts, _objects(title, parts), shift_mm)
     yield CONFIG, _config(title, parts)

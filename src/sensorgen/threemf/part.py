@@ -10,8 +10,8 @@ import numpy as np
 from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.geometry.mesh import Mesh
 
-# What XML 1.0 cannot carry, not even escaped.
-_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+# What XML 1.0 cannot carry, not even escaped; and line breaks and tabs, whose escapes lib3mf refuses.
+_NOT_XML = re.compile("[^\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 @dataclass(frozen=True, eq=False)

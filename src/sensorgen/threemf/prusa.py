@@ -1,9 +1,12 @@
-"""3MF for PrusaSlicer and its like (SuperSlicer): one object, one mesh, and who prints which triangles.
+"""3MF for PrusaSlicer: one object, one mesh, and who prints which triangles.
 
 PrusaSlicer pays no heed to ``basematerials``; tested with 2.5.0, bodies meant for several tools all went
 to the first. What it heeds is ``Metadata/Slic3r_PE_model.config``: ranges of triangles, each a *volume*
 with its tool, counted from 1, and settings of its own. The object there and the one in the model share
 their id. ``slic3rpe:Version3mf`` marks the file as of this format, so that the names in it are kept.
+
+It is silent about mistakes: a tool that the printer lacks becomes the first, and a setting that it does
+not know is dropped (both seen in 2.5.0). Who knows the printer must check before.
 
 Placement: ``centre_mm`` is in bed coordinates, those of ``bed_shape`` and of the G-code. For a bed whose
 origin is its centre that is (0, 0). The slicer keeps it with ``--dont-arrange`` only.
@@ -26,9 +29,7 @@ _NAMESPACE = {"slic3rpe": "http://schemas.slic3r.org/3mf/2017/06"}
 _VERSION = {"slic3rpe:Version3mf": "1"}
 
 
-def files(
-    title: str, parts: Sequence[Part], shift_mm: NDArray[np.float64]
-) -> Iterator[tuple[str, Iterator[str]]]:
+def files(title: str, parts: Sequence[Part], shift_mm: NDArray[np.float64]) -> Iterator[tuple[str, Iterator[str]]]:
     """Path and text of each file; ``shift_mm`` leads from sensor to bed coordinates [mm]."""
     yield core.MODEL, core.model(title, _VERSION, _NAMESPACE, parts, _object(title, parts), shift_mm)
     yield CONFIG, _config(title, parts)

@@ -1,0 +1,193 @@
+"""From a design to the files that print it: one folder, complete or not there at all."""
+
+import json
+import platform
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from sensorgen import __version__, drawing, materials, printer, store, threemf
+from sensorgen.design import Design
+from sensorgen.errors import Unprintable
+from sensorgen.geometry.cad import CadProcess
+from sensorgen.predict import prediction
+from sensorgen.review import Review, Step, report, review
+from sensorgen.slicer import cura, prusa
+from sensorgen.slicer.loads import Load
+
+QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
+LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")
+STEPS = ("meshes", "checks", "validity", "3MF", "profiles", "drawing", "STEP", "done")
+
+
+@dataclass(frozen=True)
+class Built:
+    """What a build has left behind.
+
+    Attributes
+    ----------
+    folder : Path
+        Where the files are.
+    review : Review
+        The findings.
+    prediction : dict
+        As in ``prediction.json``.
+    """
+
+    folder: Path
+    review: Review
+    prediction: dict[str, Any]
+
+
+def build(design: Design, out: Path, *, cad: bool = True, force: bool = False, strict: bool = False, step: Step = lambda _: None) -> Built:
+    """Write all files of a design into ``out/<name>``.
+
+    Parameters
+    ----------
+    design : Design
+        What to build.
+    out : Path
+        Folder that holds the designs' folders.
+    cad : bool
+        Also write the STEP file; it takes the CAD kernel some seconds.
+    force : bool
+        Write the files in spite of findings of severity error.
+    strict : bool
+        Take warnings for errors.
+    step : callable
+        Told what comes next, for a progress display.
+
+    Raises
+    ------
+    Unprintable
+        The checks found errors; its ``findings`` has them, and nothing was written.
+    Unwritable, CadFailed, MissingValue
+        See there; nothing was written.
+    """
+    folder = out / design.name
+    with ExitStack() as stack:
+        kernel = stack.enter_context(CadProcess()) if cad else None  # its import runs beside everything below
+        held = review(design, step)
+        if held.errors(strict) and not force:
+            raise Unprintable(held.findings)
+        held = held.with_meshes(design)
+        stage = stack.enter_context(store.staging(folder))
+        if kernel:
+            kernel.submit(design.printed, _colours(design), design.name, stage / f"{design.name}.step")
+        predicted = prediction(design)
+        for name, content in _files(design, held, predicted, step):
+            store.write(stage, {name: content})
+        if kernel:
+            step("STEP")
+            kernel.result()
+        store.write(stage, {store.MANIFEST: _json(_manifest(design, stage))})
+        store.publish(stage, folder)
+        step("done")
+    return Built(folder, held, predicted)
+
+
+def _files(design: Design, held: Review, predicted: dict[str, Any], step: Step) -> Iterator[tuple[str, bytes]]:
+    name = design.name
+    step("3MF")
+    for family in threemf.FAMILIES:
+        yield f"{name}.{family}.3mf", threemf.content(family, name, _parts(design, held), _centre_mm(design, family))
+    step("profiles")
+    for path, text in profiles(design).items():
+        yield path, text.encode()
+    step("drawing")
+    yield f"{name}.svg", draw(design, held).encode()
+    yield "check.json", _json(report(design, held))
+    yield "prediction.json", _json(predicted)
+    yield "design.json", _json(design.model_dump(mode="json"))
+
+
+def draw(design: Design, held: Review) -> str:
+    """The drawing of the cross-section, as SVG."""
+    scene = design.printed
+    names = {body.material for body in scene.bodies}
+    known = {name: (materials.load(name).title, materials.load(name).colour) for name in sorted(names)}
+    return drawing.svg(scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known)
+
+
+def profiles(design: Design) -> dict[str, str]:
+    """Slicer profiles, by file name: PrusaSlicer and Cura, for every quality that ships and the design's own."""
+    loads = _loads(design)
+    texts: dict[str, str] = {}
+    qualities = {q.name: q for q in (*map(printer.load_quality, QUALITIES), design.layers)}
+    for quality in qualities.values():
+        texts[f"profiles/prusa/{design.machine.name}-{quality.name}.ini"] = prusa.profile(design.machine, quality, loads)
+        texts |= {f"profiles/cura/{path}": text for path, text in cura.profiles(design.machine, quality, loads).items()}
+    return texts
+
+
+def _loads(design: Design) -> dict[int, Load]:
+    """What each used tool prints, by the printer's own tool number."""
+    return {design.tool(name): _load(design, name) for name in design.used()}
+
+
+def _load(design: Design, name: str) -> Load:
+    infill = design.infill.get(name)
+    return Load(materials.load(name), design.used()[name], infill and infill.percent, infill and infill.pattern)
+
+
+def _parts(design: Design, held: Review) -> list[threemf.Part]:
+    return [_part(design, body.name, body.material, held) for body in design.printed.bodies]
+
+
+def _part(design: Design, name: str, material: str, held: Review) -> threemf.Part:
+    tool = design.tool(material)
+    return threemf.Part(
+        name=name,
+        material=materials.load(material).title,
+        colour=materials.load(material).colour,
+        extruder=design.machine.slicer_index(tool),
+        mesh=held.meshes[name],
+        settings=prusa.volume_settings(design.machine, design.layers, tool, _load(design, material)),
+    )
+
+
+def _centre_mm(design: Design, family: str) -> tuple[float, float]:
+    """Middle of the bed as a slicer family counts it: Cura from the front left corner, whatever the printer does."""
+    bed_x, bed_y = design.machine.bed_mm
+    return (bed_x / 2, bed_y / 2) if family == "cura" else design.machine.bed_centre_mm()
+
+
+def _colours(design: Design) -> dict[str, str]:
+    return {body.name: materials.load(body.material).colour for body in design.printed.bodies}
+
+
+def _manifest(design: Design, stage: Path) -> dict[str, Any]:
+    return {
+        "name": design.name,
+        "design": design.id(),
+        "resolved": design.resolved(),
+        "files": store.hashes(stage),
+        "versions": versions(),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Versions of this software, of Python and of the libraries that the results depend on."""
+    found = {"sensorgen": __version__, "python": platform.python_version()}
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def _json(data: Mapping[str, Any]) -> bytes:
+    """Indented JSON that ends in a newline; infinity, which JSON lacks, becomes a word."""
+    return (json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def _plain(data: Any) -> Any:
+    if isinstance(data, Mapping):
+        return {key: _plain(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_plain(value) for value in data]
+    return "infinity" if data == float("inf") else data

@@ -1,0 +1,50 @@
+"""``sensorgen build``: all files of a design."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from sensorgen.cli import show
+from sensorgen.cli.designs import DesignGroup
+
+if TYPE_CHECKING:
+    from sensorgen.design import Design
+
+OWN: list[click.Parameter] = [
+    click.Option(["--out"], default="out", show_default=True, metavar="DIR", help="Folder for the designs' folders."),
+    click.Option(["--no-cad"], is_flag=True, help="Leave out the STEP file, and with it the CAD kernel's seconds."),
+    click.Option(["--force"], is_flag=True, help="Write the files in spite of findings of severity error."),
+    click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
+    click.Option(["--json", "as_json"], is_flag=True, help="Print the result as JSON."),
+]
+
+
+def _work(design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool, as_json: bool) -> int:
+    from sensorgen.build import STEPS, build
+    from sensorgen.errors import Unprintable
+
+    try:
+        with show.progress(STEPS) as step:
+            built = build(design, Path(out), cad=not no_cad, force=force, strict=strict, step=step)
+    except Unprintable as error:
+        if as_json:
+            show.as_json({"name": design.name, "folder": None, "findings": [f.as_dict() for f in error.findings]})
+        else:
+            show.findings(error.findings)
+        raise
+    files = sorted(str(p.relative_to(built.folder).as_posix()) for p in built.folder.rglob("*") if p.is_file())
+    if as_json:
+        found = [f.as_dict() for f in built.review.findings]
+        show.as_json({"name": design.name, "folder": str(built.folder), "files": files, "findings": found, "prediction": built.prediction})
+        return 0
+    show.findings(built.review.findings)
+    click.echo()
+    show.prediction(built.prediction)
+    click.echo(f"\n{built.folder}: {len(files)} files; {show.summary(built.review)}")
+    return 0
+
+
+command = DesignGroup(
+    _work, OWN, name="build", help="Write everything that a design's print needs: 3MF, STEP, profiles, drawing, prediction."
+)

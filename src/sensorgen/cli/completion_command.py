@@ -1,0 +1,21 @@
+"""``sensorgen completion``: words that the shell completes."""
+
+import click
+from click.shell_completion import get_completion_class
+
+
+@click.command("completion")
+@click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
+def command(shell: str) -> None:
+    """Print the completion script for a shell.
+
+    \b
+    bash:  eval "$(sensorgen completion bash)"
+    zsh:   eval "$(sensorgen completion zsh)"
+    fish:  sensorgen completion fish | source
+    """
+    from sensorgen.cli import cli
+
+    kind = get_completion_class(shell)
+    assert kind is not None  # click knows the three
+    click.echo(kind(cli, {}, "sensorgen", "_SENSORGEN_COMPLETE").source())

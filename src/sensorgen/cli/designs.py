@@ -1,0 +1,238 @@
+"""Words on the command line to a design: a shape with options, or a file with changes to it."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sensorgen import registry, shapes, units
+from sensorgen.errors import BadInput, SensorgenError, UnknownName
+
+if TYPE_CHECKING:
+    from sensorgen.design import Design
+
+Data = dict[str, Any]
+Work = Callable[..., int]
+
+
+class Length(click.ParamType):
+    """A length, in millimetres unless it names another unit."""
+
+    name = "mm"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Read a length as typed [mm]."""
+        if isinstance(value, float):
+            return value
+        try:
+            return units.length_mm(value)
+        except BadInput as error:
+            self.fail(str(error), param, ctx)
+
+
+class DesignGroup(click.Group):
+    """A command whose first word is a shape or a design file; each shape brings its own options."""
+
+    def __init__(self, work: Work, own: list[click.Parameter], **attributes: Any) -> None:
+        """``work`` gets the design and the values of the command's ``own`` options; it returns the exit code."""
+        super().__init__(subcommand_metavar="{SHAPE|DESIGN.yaml} [OPTIONS]", **attributes)
+        self.work, self.own = work, own
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of the shapes."""
+        return registry.names(shapes)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command:
+        """The command for a shape, or for a design file."""
+        if _is_file(name):
+            from sensorgen import yamlfile
+
+            base = {"name": Path(name).stem} | yamlfile.read(Path(name))
+            return self._command(name, str(base.get("shape", "")), base)
+        return self._command(name, name, {"shape": name})
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str, click.Command, list[str]]:
+        """Take the first word; an option in its place is the user's slip."""
+        if args[0].startswith("-"):
+            raise click.UsageError(f"no such option before the shape: {args[0]}. Write: {ctx.command_path} SHAPE {' '.join(args)}")
+        return args[0], self.get_command(ctx, args[0]), args[1:]
+
+    def _command(self, name: str, shape: str, base: Data) -> click.Command:
+        module = registry.load(shapes, shape) if shape or not _is_file(name) else None
+        params = _parameter_options(module.Params) if module else []
+
+        def run(**given: Any) -> int:
+            own = {p.name: given.pop(p.name) for p in self.own if p.name}
+            return self.work(_design(base, given, name), **own)
+
+        about = (module.__doc__ or "").strip() if module else ""
+        return click.Command(
+            name, params=[*params, *_design_options(), *self.own], callback=run, help=about.replace("::\n", "\n\b"),
+            short_help=about.partition("\n")[0],
+        )  # fmt: skip
+
+
+def _is_file(word: str) -> bool:
+    return word.endswith((".yaml", ".yml")) or "/" in word
+
+
+def option_of(field: str) -> str:
+    """Option for a parameter: ``hang_height_mm`` is ``--hang-height``."""
+    return "--" + field.removesuffix("_mm").replace("_", "-")
+
+
+def _parameter_options(params: type) -> list[click.Parameter]:
+    options: list[click.Parameter] = []
+    for field in dataclasses.fields(params):
+        choices = field.metadata.get("choices")
+        options.append(
+            click.Option(
+                [option_of(field.name), field.name],
+                type=click.Choice(choices) if choices else Length(),
+                help=f"{field.metadata['help']}  [default: {field.default}]",
+            )
+        )
+    return options
+
+
+def _design_options() -> list[click.Parameter]:
+    return [
+        click.Option(["--size"], metavar="LxW", help="Length and width at once, as in 100x10."),
+        click.Option(["--orientation"], type=click.Choice(["as-drawn", "upside-down"]), help="How it lies on the bed."),
+        click.Option(["--support"], metavar="MATERIAL", help="Fill the air with a soluble support: bvoh, pla, none."),
+        click.Option(["--material"], multiple=True, metavar="PART=NAME[@SOURCE]",
+                     help="Material of a part (electrode, top_electrode, film, dielectric ...) and the source of its values."),
+        click.Option(["--printer"], metavar="NAME", help="A printer that is listed, or a YAML file."),
+        click.Option(["--quality"], metavar="NAME", help="fine, extrafine, or a YAML file."),
+        click.Option(["--nozzle", "nozzle_mm"], type=Length(), help="Nozzle diameter, when not the printer's own."),
+        click.Option(["--tool"], multiple=True, metavar="MATERIAL=NUMBER", help="Tool of a material, in the printer's numbers."),
+        click.Option(["--infill"], multiple=True, metavar="[MATERIAL=]PERCENT", help="Infill of a material; of the dielectric if none is named."),
+        click.Option(["--infill-pattern"], multiple=True, metavar="[MATERIAL=]PATTERN", help="Pattern of the infill: rectilinear, grid ..."),
+        click.Option(["--shrinkage"], type=float, metavar="SHARE", help="Shrinkage in the plane to print against, as in 0.2."),
+        click.Option(["--set", "settings"], multiple=True, metavar="KEY=VALUE", help="Any parameter, or key of the design file, as in infill.x60.percent=80."),
+        click.Option(["--name"], help="Name of folder and files; made from the parameters if not given."),
+    ]  # fmt: skip
+
+
+def _design(base: Data, given: Data, word: str) -> "Design":
+    from sensorgen import design
+
+    data = _merged({k: v for k, v in base.items() if k != "name"}, _changes(base, given, word))
+    untouched = data == {k: v for k, v in base.items() if k != "name"}
+    name = given["name"] or (base.get("name", "") if untouched else "")
+    return design.make(data | ({"name": name} if name else {}), word if _is_file(word) else "")
+
+
+def _changes(base: Data, given: Data, word: str) -> Data:
+    """The options that were given, as the part of a design file that they stand for."""
+    known = {f.name for f in dataclasses.fields(registry.load(shapes, str(base["shape"])).Params)} if "shape" in base else set()
+    parameters = {k: given[k] for k in known if given.get(k) is not None}
+    parameters |= _size(given["size"]) if given["size"] else {}
+    slots = _slots(given["material"]) | _support(given["support"])
+    dielectric = _dielectric(base, slots)
+    changes = {
+        "parameters": parameters,
+        "materials": slots,
+        "tools": {key: _integer(value, "--tool") for key, value in _pairs(given["tool"], "--tool")},
+        "infill": _infill(given, dielectric),
+        **{k: given[k] for k in ("orientation", "printer", "quality", "nozzle_mm", "shrinkage") if given[k] is not None},
+    }
+    for key, value in _pairs(given["settings"], "--set"):
+        changes = _merged(changes, _setting(key, value, known, word))
+    return {k: v for k, v in changes.items() if v != {}}
+
+
+def _merged(base: Any, change: Any) -> Any:
+    if isinstance(base, Mapping) and isinstance(change, Mapping):
+        return {k: _merged(base[k], change[k]) if k in base and k in change else {**base, **change}[k] for k in {**base, **change}}
+    return change
+
+
+def _size(text: str) -> Data:
+    parts = text.lower().replace("×", "x").split("x")
+    if len(parts) != 2:
+        raise BadInput(f"--size {text!r}: expected LENGTHxWIDTH, as in 100x10")
+    return {"length_mm": units.length_mm(parts[0]), "width_mm": units.length_mm(parts[1])}
+
+
+def _slots(words: tuple[str, ...]) -> Data:
+    slots: Data = {}
+    for part, value in _pairs(words, "--material"):
+        slots |= {"top_electrode": value, "bottom_electrode": value} if part == "electrode" else {part: value}
+    return slots
+
+
+def _support(word: str | None) -> Data:
+    if word is None:
+        return {}
+    return {"support": None if word == "none" else word}
+
+
+def _dielectric(base: Data, slots: Data) -> str:
+    own = base.get("materials")
+    named = slots.get("dielectric") or (own.get("dielectric") if isinstance(own, dict) else None) or "x60"
+    return str(named).partition("@")[0]
+
+
+def _infill(given: Data, dielectric: str) -> Data:
+    found: Data = {}
+    for option, key in (("infill", "percent"), ("infill_pattern", "pattern")):
+        for word in given[option]:
+            material, _, value = word.rpartition("=")
+            entry = _number(value.removesuffix("%"), "--infill") if key == "percent" else value
+            found.setdefault(material or dielectric, {})[key] = entry
+    return found
+
+
+def _setting(key: str, value: str, known: set[str], word: str) -> Data:
+    """One ``--set``: a parameter of the shape, or a key of the design file with dots between its parts."""
+    path = ["parameters", key] if key in known else key.split(".")
+    if path[0] == "parameters":
+        end: Any = _parameter(value)
+    else:
+        end = _plain(value)
+    from sensorgen.design import Design
+
+    if path[0] not in Design.model_fields:
+        raise UnknownName("key", key, known | set(Design.model_fields))
+    for part in reversed(path):
+        end = {part: end}
+    return dict(end)
+
+
+def _parameter(value: str) -> float | str:
+    try:
+        return units.length_mm(value)
+    except SensorgenError:
+        return value
+
+
+def _plain(value: str) -> Any:
+    for kind in (int, float):
+        try:
+            return kind(value)
+        except ValueError:
+            continue
+    return None if value == "none" else value
+
+
+def _pairs(words: tuple[str, ...], option: str) -> list[tuple[str, str]]:
+    for word in words:
+        if "=" not in word.strip("="):
+            raise BadInput(f"{option} {word!r}: expected KEY=VALUE")
+    return [(k.strip(), v.strip()) for k, _, v in (word.partition("=") for word in words)]
+
+
+def _integer(value: str, option: str) -> int:
+    if not value.isdigit():
+        raise BadInput(f"{option}: {value!r} is not a whole number")
+    return int(value)
+
+
+def _number(value: str, option: str) -> float:
+    try:
+        return float(value)
+    except ValueError:
+        raise BadInput(f"{option}: {value!r} is not a number") from None

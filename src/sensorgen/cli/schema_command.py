@@ -1,0 +1,12 @@
+"""``sensorgen schema``: what a design file may hold."""
+
+import click
+
+
+@click.command("schema", help="Print the JSON Schema of the design file, for editors that check while you type.")
+def command() -> None:
+    """Print the schema."""
+    from sensorgen import catalogue
+    from sensorgen.cli import show
+
+    show.as_json(catalogue.schema())

@@ -1,0 +1,209 @@
+"""Vertical columns side by side: a certified lower bound, and an upper one from the columns' own field.
+
+Flux that may only run straight up is admissible for Thomson's principle, so the columns in parallel bound the
+capacitance from below. Any potential that is right on the electrodes bounds it from above (Dirichlet): we try
+the columns' own potential where it has no jumps, and a potential that rises within the narrowest gap only.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.interval import Interval
+from sensorgen.scene import Scene
+from sensorgen.sections import Column, Layer, sections
+from sensorgen.sections import columns as cut_columns
+from sensorgen.units import EPS0_F_PER_M, M_PER_MM
+
+SOURCE = "Thesis 3.2.1 and 3.2.2, Eqs. 3.10 to 3.49, corrected; Dirichlet's and Thomson's principles"
+COST = 1
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
+_JUMP = 1e-9  # a potential is continuous when its two sides differ by less, of 1 V
+
+
+def unfit(scene: Scene) -> str | None:
+    """Why this model cannot speak of this scene, or None."""
+    try:
+        cells = [cell for section in sections(scene) for cell in cut_columns(section)]
+    except ValueError as error:
+        return str(error)
+    gaps = [_gap(cell) for cell in cells]
+    if any(gap is None for gap in gaps):
+        return "an electrode does not cover the whole sensor"
+    if min(min(g.thickness_mm()) for g in gaps if g is not None) <= 0:
+        return "the electrodes touch: the capacitance grows without bound"
+    if len({z for g in gaps if g is not None for z in g.bottom_mm}) > 1:
+        return "the bottom electrode is not flat"
+    return None
+
+
+def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
+    r"""Bounds of the capacitance between the terminals, fringes at the sensor's edge left out.
+
+    .. math:: C_{lower} = \varepsilon_0 \int \frac{dA}{s}, \quad s = \sum_k \frac{t_k}{\varepsilon_k}
+
+    .. math:: C_{upper} = \varepsilon_0 \int \varepsilon_r |\nabla u|^2 dV
+
+    with the column potential u, rising by dz / (s eps) in each layer; or u = z / g up to the narrowest gap g,
+    whichever is less.
+
+    Parameters
+    ----------
+    scene : Scene
+        As drawn, for which :func:`unfit` is None.
+    permittivity : mapping of str to float
+        Relative permittivity of each material that lies between the electrodes, and of "air" [-].
+
+    Returns
+    -------
+    Interval
+        Capacitance of the whole sensor [F].
+
+    Raises
+    ------
+    KeyError
+        A material between the electrodes has no permittivity.
+    """
+    lower = trial = slab = 0.0
+    found = [(section, [_stack(c, permittivity) for c in cut_columns(section)]) for section in sections(scene)]
+    narrowest = min(stack.gap_mm() for _, stacks in found for stack in stacks)
+    for section, stacks in found:
+        below = sum(s.upright() for s in stacks)
+        lower += section.depth_mm * below
+        trial += section.depth_mm * (below + sum(s.sideways() for s in stacks))
+        slab += section.depth_mm * sum(s.within(narrowest) for s in stacks)
+    smooth = len(found) == 1 and all(_meet(a, b) for a, b in pairwise(found[0][1]))
+    upper = min(trial, slab) if smooth else slab
+    return Interval(lower, max(lower, upper)).times(EPS0_F_PER_M * M_PER_MM)
+
+
+@dataclass(frozen=True)
+class _Gap:
+    """The space between the electrodes in one column; pairs are left and right side."""
+
+    bottom_mm: tuple[float, float]
+    top_mm: tuple[float, float]
+    layers: tuple[Layer, ...]
+
+    def thickness_mm(self) -> tuple[float, float]:
+        return self.top_mm[0] - self.bottom_mm[0], self.top_mm[1] - self.bottom_mm[1]
+
+
+def _gap(cell: Column) -> _Gap | None:
+    """The layers between the uppermost bottom electrode and the lowest top electrode above it."""
+    floors = [k for k, layer in enumerate(cell.layers) if layer.body.terminal == "bottom"]
+    roofs = [k for k, layer in enumerate(cell.layers) if layer.body.terminal == "top"]
+    if not floors or not roofs or roofs[0] < floors[-1]:
+        return None
+    between = cell.layers[floors[-1] + 1 : roofs[0]]
+    return _Gap(cell.layers[floors[-1]].top_mm, cell.layers[roofs[0]].bottom_mm, between)
+
+
+@dataclass(frozen=True)
+class _Stack:
+    """One column's dielectric layers, air included, from bottom to top.
+
+    ``heights_mm`` (n + 1, 2) are the interfaces at the left and right side, ``eps`` (n,) what lies between.
+    """
+
+    width_mm: float
+    heights_mm: NDArray[np.float64]
+    eps: NDArray[np.float64]
+
+    def reduced_mm(self) -> NDArray[np.float64]:
+        """Thickness over permittivity up to each interface, (n + 1, 2) [mm]."""
+        steps = np.diff(self.heights_mm, axis=0) / self.eps[:, None]
+        return np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+
+    def gap_mm(self) -> float:
+        """Smallest distance of the electrodes [mm]."""
+        return float((self.heights_mm[-1] - self.heights_mm[0]).min())
+
+    def upright(self) -> float:
+        """Capacitance of vertical flux per depth, over eps0 [-]: the integral of dx / s, s linear in x."""
+        left, right = self.reduced_mm()[-1]
+        ratio = (right - left) / left
+        return float(self.width_mm / left * (np.log1p(ratio) / ratio if abs(ratio) > 1e-12 else 1.0))
+
+    def sideways(self) -> float:
+        """What the column potential's horizontal field adds to its energy, per depth and over eps0 [-].
+
+        Quadrature in log s, which resolves an apex of any sharpness; exact to rounding for thin films too.
+        """
+        reduced = self.reduced_mm()
+        slopes = np.diff(np.stack([self.heights_mm, reduced]), axis=2)[..., 0] / self.width_mm
+        if not slopes.any():
+            return 0.0
+        share, weight = _graded(reduced[-1, 0], reduced[-1, 1])
+        z, q = (m[:, :1] + np.diff(m, axis=1) * share for m in (self.heights_mm, reduced))
+        dz, dq = (slope[:, None] for slope in slopes)
+        s, ds, eps, t = q[-1], dq[-1], self.eps[:, None], np.diff(z, axis=0)
+        steady = (dq[:-1] - dz[:-1] / eps) / s - q[:-1] * ds / s**2
+        rising = ds / (eps * s**2)
+        energy = eps * (steady**2 * t - steady * rising * t**2 + rising**2 * t**3 / 3)
+        return float(self.width_mm * (energy.sum(0) @ weight))
+
+    def within(self, gap_mm: float) -> float:
+        """Energy of a potential that rises evenly within ``gap_mm`` above the bottom, per depth and over eps0 [-]."""
+        areas = [self.width_mm * _mean_min(h, gap_mm) for h in (self.heights_mm - self.heights_mm[0])]
+        return float(np.diff(areas) @ self.eps / gap_mm**2)
+
+    def potential(self, side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Heights of the interfaces at one side [mm], and the column potential there [V]."""
+        q = self.reduced_mm()[:, side]
+        return self.heights_mm[:, side], q / q[-1]
+
+
+def _mean_min(ends: NDArray[np.float64], limit: float) -> float:
+    """Mean of min(h, limit) for h running straight between two values."""
+    low, high = sorted(float(e) for e in ends)
+    if high <= limit:
+        return (low + high) / 2
+    if low >= limit:
+        return limit
+    share = (limit - low) / (high - low)
+    return share * (low + limit) / 2 + (1 - share) * limit
+
+
+def _graded(left: float, right: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Gauss points and weights on 0..1, evenly spread in the logarithm of a value running from left to right."""
+    part, weight = (_NODES + 1) / 2, _WEIGHTS / 2
+    span = np.log(right / left)
+    if abs(span) < 1e-6:
+        return part, weight
+    value = left * np.exp(span * part)
+    return (value - left) / (right - left), weight * value * span / (right - left)
+
+
+def _stack(cell: Column, permittivity: Mapping[str, float]) -> _Stack:
+    gap = _gap(cell)
+    assert gap is not None  # unfit() has looked
+    lines, eps = [gap.bottom_mm], []
+    for bottom, top, value in _filled(gap, permittivity):
+        if max(top[0] - bottom[0], top[1] - bottom[1]) > 0:
+            lines.append(top)
+            eps.append(value)
+    return _Stack(cell.right_mm - cell.left_mm, np.array(lines), np.array(eps))
+
+
+def _filled(
+    gap: _Gap, permittivity: Mapping[str, float]
+) -> Iterator[tuple[tuple[float, float], tuple[float, float], float]]:
+    """The layers of a gap with the air between them."""
+    at = gap.bottom_mm
+    for layer in gap.layers:
+        yield at, layer.bottom_mm, permittivity["air"]
+        yield layer.bottom_mm, layer.top_mm, permittivity[layer.body.material]
+        at = layer.top_mm
+    yield at, gap.top_mm, permittivity["air"]
+
+
+def _meet(left: _Stack, right: _Stack) -> bool:
+    """Whether the potentials of two neighbours agree along the line between them."""
+    (za, ua), (zb, ub) = left.potential(1), right.potential(0)
+    z = np.concatenate([za, zb])
+    return bool(np.abs(np.interp(z, za, ua) - np.interp(z, zb, ub)).max() < _JUMP)

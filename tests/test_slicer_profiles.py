@@ -1,0 +1,356 @@
+"""Profiles as text: what must be in them, and what is refused. No slicer runs here."""
+
+import configparser
+import json
+import math
+import sys
+import uuid
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from sensorgen import materials
+from sensorgen.errors import BadInput, MissingValue, OutOfRange, SlicerFailed, UnknownName
+from sensorgen.printer import Printer, load_printer, load_quality, printer_names, quality_names
+from sensorgen.slicer import cura, curaengine, gcode, prusa
+from sensorgen.slicer.loads import Load, line_width_mm, recipes
+from sensorgen.slicer.run import run
+from sensorgen.slicer.tower import MARGIN_MM, tower
+
+FINE = load_quality("fine")
+DIABASE = load_printer("diabase-h5")
+both_printers = pytest.mark.parametrize(
+    "printer", [load_printer(name) for name in printer_names()], ids=lambda p: p.name
+)
+both_qualities = pytest.mark.parametrize("quality", [load_quality(n) for n in quality_names()], ids=lambda q: q.name)
+
+
+def usual(printer: Printer, **override: object) -> dict[int, Load]:
+    """Electrodes and dielectric on the printer's usual tools; ``override`` is for the dielectric."""
+    return {
+        printer.default_tools["etpu"]: Load(materials.load("etpu")),
+        printer.default_tools["x60"]: Load(materials.load("x60"), **override),
+    }
+
+
+def changed(name: str, **prints: float) -> materials.Material:
+    """A material whose print values are not as shipped."""
+    shipped = materials.load(name)
+    values = {key: (materials.Value(value=v, source="test", default=True),) for key, v in prints.items()}
+    return shipped.model_copy(update={"print": shipped.print | values})
+
+
+def ini(text: str) -> dict[str, str]:
+    lines = (line.partition("=") for line in text.splitlines() if "=" in line and not line.startswith("#"))
+    return {key.strip(): value.strip() for key, _, value in lines}
+
+
+def values(text: str) -> dict[str, str]:
+    parser = configparser.ConfigParser(interpolation=None)
+    parser.read_string(text)
+    return dict(parser["values"])
+
+
+# --- loads ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("prints", "says"),
+    [
+        ({"nozzle_temperature_c": 251.0}, r"etpu on tool 3: nozzle temperature \[C\] is 251; expected 0 to 250"),
+        ({"bed_temperature_c": 121.0}, r"bed temperature \[C\] is 121; expected 0 to 120"),
+        ({"speed_mm_s": 201.0}, r"speed \[mm/s\] is 201; expected 0.1 to 200"),
+        ({"fan_percent": 101.0}, r"fan \[%\] is 101"),
+        ({"wall_lines": 1.5}, r"walls \[lines\] is 1.5; expected a whole number"),
+        ({"flow_percent": math.nan}, r"flow \[%\] is nan"),
+    ],
+)
+def test_beyond_the_printer_is_refused(prints, says):
+    with pytest.raises(OutOfRange, match=says):
+        prusa.profile(DIABASE, FINE, {3: Load(changed("etpu", **prints))})
+
+
+def test_a_hotter_printer_takes_what_another_refuses():
+    hot = {0: Load(changed("etpu", nozzle_temperature_c=260.0))}
+    assert "temperature = 260,0,0,0,0" in prusa.profile(load_printer("prusa-xl5"), FINE, hot)
+
+
+def test_missing_print_value_is_named_with_its_tool():
+    with pytest.raises(MissingValue, match="tool 3: air has no default .*add it under 'print'"):
+        recipes(DIABASE, FINE, {3: Load(materials.load("air"))})
+
+
+@pytest.mark.parametrize(
+    ("loads", "error", "says"),
+    [
+        ({}, BadInput, "no tool is loaded"),
+        ({6: Load(materials.load("etpu"))}, BadInput, r"no tool 6; its tools are \[1, 2, 3, 4, 5\]"),
+        ({3: Load(materials.load("etpu"), infill_percent=0)}, OutOfRange, r"infill \[%\] is 0; expected 1 to 100"),
+        ({3: Load(materials.load("etpu"), infill_pattern="gird")}, UnknownName, "did you mean 'grid'"),
+        (
+            {3: Load(materials.load("etpu")), 4: Load(changed("x60", bed_temperature_c=60.0))},
+            BadInput,
+            "one bed, two temperatures: etpu on tool 3 75 C, x60 on tool 4 60 C",
+        ),
+    ],
+)
+def test_impossible_loads_are_refused(loads, error, says):
+    with pytest.raises(error, match=says):
+        cura.profiles(DIABASE, FINE, loads)
+
+
+def test_layers_thinner_than_the_printer_are_refused():
+    with pytest.raises(OutOfRange, match=r"layer height \[mm\] is 0.02; expected 0.06"):
+        recipes(DIABASE, FINE.model_copy(update={"layer_mm": 0.02}), usual(DIABASE))
+
+
+def test_the_named_source_counts_and_the_default_fills_in():
+    made = recipes(DIABASE, FINE, {4: Load(materials.load("x60"), source="thesis-4.1")})
+    assert (made[3].nozzle_c, made[3].bed_c) == (230.0, 75.0)
+
+
+# --- PrusaSlicer ------------------------------------------------------------------------------------------
+
+
+@both_printers
+@both_qualities
+def test_prusa_lists_have_one_entry_per_tool(printer, quality):
+    found = ini(prusa.profile(printer, quality, usual(printer)))
+    tools = len(printer.tool_numbers)
+    for key in ("nozzle_diameter", "temperature", "retract_length", "filament_max_volumetric_speed", "min_fan_speed"):
+        assert len(found[key].split(",")) == tools, key
+    assert len(found["filament_settings_id"].split(";")) == tools
+    assert len(found["wiping_volumes_matrix"].split(",")) == tools**2
+    assert float(found["layer_height"]) == quality.layer_mm
+    assert {float(v) for k, v in found.items() if k.endswith("extrusion_width")} == {line_width_mm(printer)}
+
+
+def test_prusa_unused_tools_are_named_so_and_stay_cold():
+    found = ini(prusa.profile(DIABASE, FINE, usual(DIABASE)))
+    assert found["filament_settings_id"] == '"unused";"unused";"etpu";"x60";"unused"'
+    assert found["temperature"] == "0,0,210,230,0"
+    assert found["first_layer_bed_temperature"] == "0,0,75,75,0"
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [("diabase-h5", "-195x-85,195x-85,195x85,-195x85"), ("prusa-xl5", "0x0,360x0,360x360,0x360")],
+)
+def test_prusa_bed_lies_where_the_printer_has_its_origin(name, shape):
+    printer = load_printer(name)
+    assert ini(prusa.profile(printer, FINE, usual(printer)))["bed_shape"] == shape
+
+
+def test_prusa_start_gcode_stays_on_one_line():
+    found = ini(prusa.profile(DIABASE, FINE, usual(DIABASE)))
+    assert found["start_gcode"] == r"M501\nG90\nM83\nG54\nG32\nM106 P3 S0"
+
+
+def test_prusa_nothing_changes_the_drawing():
+    found = ini(prusa.profile(DIABASE, FINE, usual(DIABASE)))
+    for key in (
+        "thick_bridges",
+        "elefant_foot_compensation",
+        "xy_size_compensation",
+        "raft_layers",
+        "support_material",
+    ):
+        assert found[key] == "0", key
+    assert found["perimeter_generator"] == "arachne"
+
+
+def test_prusa_takes_what_is_safe_for_all_and_bodies_carry_their_own():
+    loads = {3: Load(materials.load("etpu")), 4: Load(changed("x60", speed_mm_s=40.0), "", 80.0, "grid")}
+    found = ini(prusa.profile(DIABASE, FINE, loads))
+    assert (found["fill_density"], found["fill_pattern"], found["perimeter_speed"]) == ("100%", "rectilinear", "20")
+    own = prusa.volume_settings(DIABASE, FINE, 4, loads[4])
+    assert (own["fill_density"], own["fill_pattern"], own["perimeter_speed"]) == ("80%", "grid", "40")
+    assert set(own) <= set(found)
+
+
+def test_prusa_full_infill_has_no_pattern():
+    own = prusa.volume_settings(DIABASE, FINE, 4, Load(materials.load("x60"), infill_pattern="honeycomb"))
+    assert (own["fill_density"], own["fill_pattern"]) == ("100%", "rectilinear")
+
+
+def test_two_tools_and_one_tool_are_enough():
+    two = DIABASE.model_copy(update={"tool_numbers": (7, 9), "default_tools": {"etpu": 9, "x60": 7}})
+    assert ini(prusa.profile(two, FINE, usual(two)))["temperature"] == "230,210"
+    alone = prusa.profile(two, FINE, {9: Load(materials.load("etpu"))})
+    assert (ini(alone)["temperature"], ini(alone)["wipe_tower"]) == ("0,210", "0")
+    assert json.loads(cura.profiles(two, FINE, usual(two))["definitions/diabase-h5.def.json"])["metadata"][
+        "machine_extruder_trains"
+    ] == {"0": "diabase-h5_extruder_0", "1": "diabase-h5_extruder_1"}
+
+
+# --- Cura -------------------------------------------------------------------------------------------------
+
+
+@both_printers
+def test_cura_files_name_each_other(printer):
+    files = cura.profiles(printer, FINE, usual(printer))
+    machine = json.loads(files[f"definitions/{printer.name}.def.json"])
+    trains = machine["metadata"]["machine_extruder_trains"]
+    assert sorted(trains) == [str(i) for i in range(len(printer.tool_numbers))]
+    for number, train in trains.items():
+        extruder = json.loads(files[f"extruders/{train}.def.json"])
+        assert extruder["metadata"] == {"machine": printer.name, "position": number}
+    assert f"materials/{machine['metadata']['preferred_material']}.xml.fdm_material" in files
+    qualities = [text for path, text in files.items() if path.startswith(f"quality/{printer.name}/")]
+    assert len(qualities) == 3
+    for text in qualities:
+        parser = configparser.ConfigParser(interpolation=None)
+        parser.read_string(text)
+        assert parser["general"]["definition"] == printer.name
+        assert parser["metadata"]["quality_type"] == "fine"
+        if "material" in parser["metadata"]:
+            assert f"materials/{parser['metadata']['material']}.xml.fdm_material" in files
+
+
+def test_cura_material_is_well_formed_and_says_what_the_recipe_says():
+    files = cura.profiles(DIABASE, FINE, usual(DIABASE))
+    root = ElementTree.fromstring(files["materials/sensorgen_etpu.xml.fdm_material"])
+    space = {"m": "http://www.ultimaker.com/material"}
+    found = {s.get("key"): s.text for s in root.iterfind("m:settings/m:setting", space)}
+    assert found["print temperature"] == "210"
+    assert found["retraction amount"] == "4.7"
+    assert root.findtext("m:properties/m:density", None, space) == "1.1"
+    assert uuid.UUID(root.findtext("m:metadata/m:GUID", None, space)).version == 5  # from the name, not by chance
+
+
+def test_cura_density_that_no_source_gives_is_left_out():
+    files = cura.profiles(DIABASE, FINE, {5: Load(materials.load("bvoh"))})
+    assert "<density>" not in files["materials/sensorgen_bvoh.xml.fdm_material"]
+
+
+def test_cura_keeps_two_infills_of_one_material_apart():
+    loads = {3: Load(materials.load("x60")), 4: Load(materials.load("x60"), infill_percent=80.0, infill_pattern="grid")}
+    own = "quality/diabase-h5/diabase-h5_fine_sensorgen_x60"
+    files = cura.profiles(DIABASE, FINE, loads)
+    assert values(files[f"{own}.inst.cfg"])["infill_sparse_density"] == "100"
+    thin = values(files[f"{own}_infill80_grid.inst.cfg"])
+    assert (thin["infill_sparse_density"], thin["infill_pattern"], thin["bottom_layers"]) == ("80", "grid", "0")
+
+
+def test_cura_refuses_a_pattern_that_it_does_not_have():
+    with pytest.raises(OutOfRange, match="Cura has no honeycomb infill; use rectilinear"):
+        cura.profiles(DIABASE, FINE, usual(DIABASE, infill_percent=80.0, infill_pattern="honeycomb"))
+
+
+@both_printers
+@both_qualities
+def test_profiles_are_the_same_each_time_and_without_leftovers(printer, quality):
+    loads = usual(printer)
+    texts = [prusa.profile(printer, quality, loads), *cura.profiles(printer, quality, loads).values()]
+    backwards = dict(reversed(loads.items()))
+    assert texts == [prusa.profile(printer, quality, backwards), *cura.profiles(printer, quality, backwards).values()]
+    assert not any("$" in text for text in texts)
+    settings = curaengine.engine_settings(printer, quality, loads)
+    told = [settings.common, *settings.tools.values(), *settings.unused.values()]
+    assert not any("$" in value for each in told for value in each.values())
+
+
+# --- tower ------------------------------------------------------------------------------------------------
+
+
+@both_printers
+@both_qualities
+@pytest.mark.parametrize("tools", [2, 5])
+def test_tower_stands_on_the_bed_and_holds_what_is_primed(printer, quality, tools):
+    place = tower(printer, quality, tools)
+    centre_x, centre_y = printer.bed_centre_mm()
+    assert place.x_mm + place.side_mm == centre_x + printer.bed_mm[0] / 2 - MARGIN_MM
+    assert place.y_mm > centre_y
+    assert math.pi / 4 * place.side_mm**2 * quality.layer_mm >= tools * 15.0
+
+
+# --- reading G-code ---------------------------------------------------------------------------------------
+
+
+def mm(found: gcode.Extruded) -> dict[tuple[int, str], float]:
+    """Lengths instead of volumes: the filament of these tests has a section of 1 mm2."""
+    return {key: round(volume, 9) for key, volume in found.volume_mm3.items()}
+
+
+SECTION_OF_ONE = 2 / math.sqrt(math.pi)
+
+
+def test_reading_relative_with_retraction_over_a_tool_change():
+    lines = [
+        "M83",
+        "T1 ; first",
+        ";TYPE:Perimeter",
+        "G1 X1 E2",
+        "G1 E-3 F900",
+        "T0",
+        "G1 X2 E5",
+        "T1",
+        "G1 E3",
+        "G1 X3 E.5",
+    ]
+    found = gcode.read(lines, SECTION_OF_ONE)
+    assert found.tools == (1, 0, 1)
+    assert mm(found) == {(1, "perimeter"): 2.5, (0, "perimeter"): 5.0}
+
+
+def test_reading_absolute_with_resets():
+    lines = ["M82", "T0", "G92 E0", "G1 X1 E2", "G1 E1.5", "G1 X9 E2.5", "G92 E0.0", "G1 X3 E1", "G1 X4"]
+    assert mm(gcode.read(lines, SECTION_OF_ONE)) == {(0, ""): 3.5}
+
+
+def test_reading_counts_what_goes_beyond_a_retraction():
+    assert mm(gcode.read(["M83", "G1 E-1", "G1 E1.25"], SECTION_OF_ONE)) == {(0, ""): 0.25}
+
+
+def test_reading_is_not_fooled_by_comments_and_parameters():
+    lines = ["; T4", "M83 ; E9", "M104 T3 S210", "G10 P3 S210", "(T2)", "T-1", "T3", "T3", "m106 s255", "g1 x1 e1 ; E5"]
+    found = gcode.read(lines, SECTION_OF_ONE)
+    assert found.tools == (3,)
+    assert mm(found) == {(3, ""): 1.0}
+
+
+def test_model_is_told_from_tower_and_skirt():
+    lines = [
+        "M83",
+        ";TYPE:SKIRT",
+        "G1 E1",
+        ";TYPE:WALL-OUTER",
+        "G1 E2",
+        ";TYPE:Wipe tower",
+        "G1 E4",
+        ";TYPE:Skirt/Brim",
+        "G1 E8",
+    ]
+    found = gcode.read(lines, SECTION_OF_ONE)
+    assert found.model_mm3() == {0: pytest.approx(2.0)}
+    assert found.total_mm3() == {0: pytest.approx(15.0)}
+
+
+# --- running ----------------------------------------------------------------------------------------------
+
+
+def test_a_missing_slicer_says_how_to_get_it(monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(SlicerFailed, match="prusa-slicer is not installed.*apt install"):
+        prusa.slice_3mf(tmp_path / "a.3mf", tmp_path / "a.ini", tmp_path / "a.gcode")
+    settings = curaengine.engine_settings(DIABASE, FINE, usual(DIABASE))
+    with pytest.raises(SlicerFailed, match="CuraEngine is not installed"):
+        curaengine.slice_bodies([(tmp_path / "a.stl", 2)], settings, tmp_path / "a.gcode")
+
+
+def python(code: str) -> list[str]:
+    return [sys.executable, "-c", code]
+
+
+def test_a_failing_slicer_is_quoted(tmp_path):
+    with pytest.raises(SlicerFailed, match="exit code 3: Error: no such wall"):
+        run(python("print('licence'); print('Error: no such wall'); raise SystemExit(3)"), tmp_path / "a.gcode")
+
+
+def test_an_old_result_is_not_taken_for_a_new_one(tmp_path: Path):
+    old = tmp_path / "a.gcode"
+    old.write_text("G28\n")
+    with pytest.raises(SlicerFailed, match="wrote no"):
+        run(python("pass"), old)
+    assert not old.exists()
