@@ -192,6 +192,28 @@ def test_prusa_bodies_carry_their_infill_walls_and_speed(prusa_slicer, tmp_path)
     assert "F720" in result.read_text()
 
 
+def test_prusa_bridges_over_air_with_lines_of_usual_width(prusa_slicer, tmp_path):
+    posts = [box(0, STEP_MM), box(0, STEP_MM)]
+    posts[0] = [(x if x < 0 else -8.0, y, z) for x, y, z in posts[0]]
+    posts[1] = [(x if x > 0 else 8.0, y, z) for x, y, z in posts[1]]
+    bodies = [(posts[0], 3, {}), (posts[1], 3, {}), (box(STEP_MM, 2 * STEP_MM), 4, {})]
+    found = read(slice_with_prusa(DIABASE, FINE, usual(DIABASE), bodies, tmp_path), DIABASE)
+    assert found.volume_mm3[(3, "bridge infill")] > 0
+    assert fullness(found, {2: STEP_MM * 0.2, 3: STEP_MM})[3] == SOLID  # 1.21 with thick bridges, on the bridging layer
+
+
+@pytest.mark.parametrize(("gap_mm", "islands"), [(0.0, 1), (0.05, 2)])
+def test_prusa_keeps_gaps_and_joins_what_touches(prusa_slicer, tmp_path, gap_mm, islands):
+    halves = [
+        [(x if x < 0 else -gap_mm / 2, y, z) for x, y, z in box(0, STEP_MM)],
+        [(x if x > 0 else gap_mm / 2, y, z) for x, y, z in box(0, STEP_MM)],
+    ]
+    load = {3: Load(materials.load("etpu"))}
+    result = slice_with_prusa(DIABASE, FINE, load, [(half, 3, {}) for half in halves], tmp_path)
+    layers = round(STEP_MM / FINE.layer_mm)
+    assert result.read_text().count(";TYPE:External perimeter") == islands * layers
+
+
 def test_prusa_single_tool_needs_no_tower(prusa_slicer, tmp_path):
     result = slice_with_prusa(DIABASE, FINE, {4: Load(materials.load("x60"))}, [(box(0, STEP_MM), 4, {})], tmp_path)
     found = read(result, DIABASE)

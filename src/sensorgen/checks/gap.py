@@ -51,7 +51,7 @@ def _film(names: str, place: tuple[float, float, float], layer: float, gap_mm: f
 
 def _printed(slices: Slices, printer: Printer, gap_mm: float) -> Iterator[Finding]:
     """What the gap becomes when narrow features vanish."""
-    tracks = {"PrusaSlicer (Arachne)": VANISHES, "classic walls and Cura": LINE_LOST}
+    tracks = {"Arachne": VANISHES, "classic walls or plain Cura": LINE_LOST, "Cura filling outline gaps": 0.0}
     gaps = {slicer: printed_gap_mm(slices, share * printer.nozzle_mm) for slicer, share in tracks.items()}
     if all(gap is not None and abs(gap - gap_mm) <= TOUCH_MM for gap in gaps.values()):
         return

@@ -13,7 +13,7 @@ from sensorgen.printer import Printer
 from sensorgen.scene import Body
 
 # As shares of the nozzle.
-VANISHES = 0.12 / 0.4  # no slicer prints a stretch this narrow
+VANISHES = 0.12 / 0.4  # only Cura filling outline gaps prints a stretch this narrow
 SWELLS = 0.34 / 0.4  # Arachne prints anything narrower at this width
 LINE_LOST = 0.44 / 0.4  # classic walls and Cura drop anything narrower
 OVERFILLED = 0.70 / 0.4  # classic walls put 1.8 to 1.17 times the material into anything narrower
@@ -31,9 +31,9 @@ class _Band:
 
 
 _BANDS = (
-    _Band(VANISHES, "error", "vanishes in every slicer", "widen it beyond {line:.2g} mm"),
-    _Band(SWELLS, "warning", "prints {swells:.2g} mm wide (Arachne) or not at all (classic walls, Cura)", "widen it to {line:.2g} mm"),
-    _Band(LINE_LOST, "warning", "is narrower than a line: classic walls and Cura drop it", "widen it to {line:.2g} mm, or slice with Arachne"),
+    _Band(VANISHES, "error", "vanishes (Cura filling outline gaps prints it 1.7 times too full)", "widen it beyond {line:.2g} mm"),
+    _Band(SWELLS, "warning", "prints {swells:.2g} mm wide (Arachne) or not at all (classic walls, plain Cura)", "widen it to {line:.2g} mm"),
+    _Band(LINE_LOST, "warning", "is narrower than a line: classic walls and plain Cura drop it", "widen it to {line:.2g} mm, or slice with Arachne"),
     _Band(OVERFILLED, "info", "gets 1.2 to 1.8 times its material with classic walls", "slice with Arachne"),
 )  # fmt: skip
 

@@ -49,10 +49,9 @@ def words(frame: Frame, boundaries_mm: Sequence[float]) -> str:
         return "no layers given"
     first, later = boundaries_mm[1], boundaries_mm[min(2, count)] - boundaries_mm[min(1, count - 1)]
     drawn = _step(_pitch(frame, boundaries_mm), LINE_PITCH)
-    heights = (
-        f"{number(first)} mm" if abs(first - later) < 1e-9 else f"{number(later)} mm, the first {number(first)} mm"
-    )
-    return f"{count} layer{'s' * (count > 1)} of {heights}" + (f" (a line every {drawn})" if drawn > 1 else "")
+    other = f", the first {number(first)} mm" if abs(first - later) > 1e-9 else ""
+    every = f" (a line every {drawn})" if drawn > 1 else ""
+    return f"{count} layer{'s' * (count > 1)} of {number(later)} mm{other}{every}"
 
 
 def _pitch(frame: Frame, boundaries_mm: Sequence[float]) -> float:

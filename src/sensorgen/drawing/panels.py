@@ -29,12 +29,13 @@ class Panel:
         return self.frame.x(at_mm[0]), self.frame.y(at_mm[1])
 
 
-def arrange(
-    views: Sequence[View], grid_mm: float, height_mm: float, room: tuple[float, float, float, float]
-) -> list[Panel]:
-    """Views side by side at one true scale, left, top, right, bottom of the ``room`` given on the page [mm].
+Room = tuple[float, float, float, float]  # left, top, right, bottom on the page [mm]
 
-    ``grid_mm`` is the height of the highest layer boundary, which may lie over the sensor.
+
+def arrange(views: Sequence[View], grid_mm: float, height_mm: float, room: Room) -> list[Panel]:
+    """Views side by side at one true scale.
+
+    ``grid_mm`` is the height of the highest layer boundary, which may lie over the sensor's ``height_mm``.
     """
     left, top, right, bottom = room
     each = (right - left) / len(views) - GUTTER
@@ -91,9 +92,8 @@ def materials(panel: Panel, colours: Colours, kind: str = "body") -> Iterator[st
         paths.setdefault(body.name, []).append(panel.frame.outline(outline))
     for name, path in paths.items():
         material = bodies[name].material
-        yield element(
-            "path", kind, d="".join(path), fill=colour(colours, material), data_body=name, data_material=material
-        )
+        told = {"data_body": name, "data_material": material}
+        yield element("path", kind, "", d="".join(path), fill=colour(colours, material), **told)
 
 
 def colour(colours: Colours, material: str) -> str:

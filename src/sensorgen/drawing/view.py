@@ -90,8 +90,10 @@ def _terminals_mm2(section: Section) -> float:
 
 def _clipped(section: Section, end_mm: float) -> Iterator[Region]:
     for body, outline in section.regions:
-        whole = max(u for u, _ in outline) <= end_mm
-        if part := outline if whole else clipped(outline, end_mm):
+        along = [u for u, _ in outline]
+        if max(along) <= end_mm:
+            yield body, outline
+        elif min(along) < end_mm and (part := clipped(outline, end_mm)):
             yield body, part
 
 

@@ -1,5 +1,6 @@
 """PrusaSlicer: one profile for all tools of a printer, and its command line."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from string import Template
@@ -193,7 +194,7 @@ def _line_area_mm2(printer: Printer, quality: Quality) -> float:
     the material asks.
     """
     height_mm = max(quality.layer_mm, quality.first_layer_mm)
-    return height_mm * (line_width_mm(printer) - height_mm * (1 - 0.7853981633974483))
+    return height_mm * (line_width_mm(printer) - height_mm * (1 - math.pi / 4))
 
 
 def _pattern(r: Recipe) -> str:
