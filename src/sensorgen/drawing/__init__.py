@@ -112,7 +112,7 @@ def _around(panel: Panel, name: str) -> Iterator[str]:
     """Caption, widths and break line of one detail view."""
     above, below = measures.widths(panel.view)
     over = panel.frame.top - 3
-    yield panels.caption(panel, name, over - dimensions.ROW * len(above) - 1.5)
+    yield panels.caption(panel, name, min(over - dimensions.ROW * len(above) - 1.5, panel.frame.top - 5.8))
     yield from dimensions.rows(panel.frame, above, over, -dimensions.ROW)
     yield from dimensions.rows(panel.frame, below, panel.frame.bed + 5.4, dimensions.ROW)
     yield panels.broken(panel)

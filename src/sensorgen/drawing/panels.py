@@ -4,11 +4,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import floor, log10
 
-from sensorgen.drawing.paper import Frame, element, number, text
+from sensorgen.drawing.paper import Frame, element, fitted, number, text
 from sensorgen.drawing.view import View
 from sensorgen.scene import Body, Point
 
 GUTTER = 8.0  # between a view and what is right of it: room for markers [mm]
+CAPTION = 78.0  # room for the words over a view [mm]
 REPEATS, FLATTEST, MOST_REPEATS = 1.7, 12.0, 60.0
 LARGER = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
 SMALLER = (1.0, 2.0, 5.0)  # 1:2 and 1:5 are read at a glance, 1:1.67 is not
@@ -39,14 +40,15 @@ def arrange(views: Sequence[View], grid_mm: float, height_mm: float, room: Room)
     """
     left, top, right, bottom = room
     each = (right - left) / len(views) - GUTTER
-    scale = round_scale(min((bottom - top) / grid_mm, *(each / _wanted_mm(view, height_mm) for view in views)))
+    wanted = max(_wanted_mm(view, height_mm) for view in views)
+    scale = round_scale(min((bottom - top) / grid_mm, each / wanted))
     bottom -= (bottom - top - grid_mm * scale) / 2
     panels = []
     for view in views:
         end = _end_mm(view, each / scale)
         frame = Frame(left, bottom, left + end * scale, bottom - grid_mm * scale, scale, scale)
         panels.append(Panel(replace(view, end_mm=end), frame))
-        left = frame.right + GUTTER
+        left = max(frame.right + GUTTER, left + CAPTION)
     return panels
 
 
@@ -145,7 +147,7 @@ def caption(panel: Panel, name: str, y: float) -> str:
         f"Section {name}: {view.normal} = {number(view.section.at_mm)} mm, "
         f"{view.section.across} from 0 to {number(view.end_mm)} mm, {scale_words(scale)}"
     )
-    return text("bold", panel.frame.left, y, words)
+    return text("bold", panel.frame.left, y, fitted(words, (CAPTION - 2) / 1.08))
 
 
 def broken(panel: Panel) -> str:

@@ -8,7 +8,7 @@ from unicodedata import east_asian_width
 from sensorgen.scene import Point
 
 ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})
-SMALL, PLAIN = 2.3, 2.5  # text heights [mm]; smaller cannot be read on A4
+PLAIN = 2.5  # height of text; the smallest is 2.3, for less cannot be read on A4 [mm]
 # Widths in DejaVu Sans, the widest of the usual fonts, in groups [em].
 WIDTHS = ((0.28, "ijl"), (0.34, " .,:;'|!I"), (0.43, "frt()[]-/"), (0.53, "csz"), (0.6, "aekovxy"), (0.83, "w"))
 GLYPHS = {c: em for em, letters in (*WIDTHS, (1.0, "mMW@%\N{EM DASH}")) for c in letters}

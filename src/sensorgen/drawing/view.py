@@ -66,7 +66,7 @@ def views(scene: Scene) -> list[View]:
 
 def _view(scene: Scene, across: str) -> View:
     """The section in which most of the terminals is seen: through the conductor strips, not beside them."""
-    section = max(_cuts(scene, "y" if across == "x" else "x"), key=_terminals_mm2)
+    section = max(_cuts(scene, "y" if across == "x" else "x"), key=_shown_mm2)
     extent = scene.size_mm[AXES.index(across)]
     corners = sorted({u for _, outline in section.regions for u, _ in outline})
     probe = View(section, extent, (), corners[min(PROBE, len(corners) - 1)])
@@ -84,8 +84,10 @@ def _cuts(scene: Scene, normal: str) -> Iterator[Section]:
         yield Section(PLANE[normal][0], high - low, at, tuple(cut))
 
 
-def _terminals_mm2(section: Section) -> float:
-    return round(sum(area_mm2(outline) for body, outline in section.regions if body.terminal), 6)
+def _shown_mm2(section: Section) -> tuple[float, float]:
+    """Area of the terminals, and of everything, that a section shows [mm2]."""
+    areas = [(area_mm2(outline), bool(body.terminal)) for body, outline in section.regions]
+    return round(sum(area for area, terminal in areas if terminal), 6), round(sum(area for area, _ in areas), 6)
 
 
 def _clipped(section: Section, end_mm: float) -> Iterator[Region]:

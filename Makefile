@@ -1,0 +1,43 @@
+# `make` lists what there is.
+PYTHON ?= python3
+VENV ?= .venv
+BIN = $(VENV)/bin
+READY = $(VENV)/.ready
+READY_DEV = $(VENV)/.ready-dev
+
+.PHONY: help demo test lint docs bench clean
+
+help: ## list the targets
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 8
+
+demo: $(READY) ## set up, and build the triangular sensor with a film of 0.2 mm
+	$(BIN)/sensorgen build tri --dielectric 0.2
+
+test: $(READY_DEV) ## set up, with the slicers where apt may, and run all tests
+	scripts/system-packages --slicers
+	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
+
+lint: $(READY_DEV) ## style, types, and which module may import which
+	$(BIN)/ruff format --check src tests bench docs
+	$(BIN)/ruff check src tests bench docs
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache
+
+docs: $(READY_DEV) ## write docs/reference.md from the --help texts, and the pictures of README and docs
+	$(BIN)/python docs/generate.py
+
+bench: $(READY_DEV) ## measure speed, memory and accuracy; write bench/results
+	$(BIN)/python bench/run.py
+
+clean: ## remove everything that is derived
+	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+
+$(READY): pyproject.toml constraints.txt scripts/system-packages
+	scripts/system-packages
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	touch $@
+
+$(READY_DEV): $(READY)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	touch $@

@@ -1,0 +1,413 @@
+"""The drawing shows the scene that it was given, says where the findings are, and stays on its page."""
+
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from itertools import combinations, pairwise
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from sensorgen import registry, shapes
+from sensorgen.drawing import markers, measures, panels, svg
+from sensorgen.drawing.paper import fitted, spread, width, wrapped
+from sensorgen.drawing.view import period, views
+from sensorgen.findings import Finding
+from sensorgen.scene import Body, Fill, Point, Prism, Scene, area_mm2, box
+from sensorgen.sections import Column, columns
+
+SHAPES = registry.names(shapes)
+COLOURS = {"etpu": ("PI-eTPU 85-700+", "#303436"), "x60": ("Flexion X60", "#f2c14e"), "bvoh": ("BVOH", "#7fc8f8")}
+NS = {"s": "http://www.w3.org/2000/svg"}
+
+
+def scene_of(shape: str, fill: Fill | None = None, **parameters: object) -> Scene:
+    module = registry.load(shapes, shape)
+    made = module.scene(module.Params(**parameters), fill or Fill())
+    assert isinstance(made, Scene)
+    return made
+
+
+def layers_of(scene: Scene, layer_mm: float = 0.1, first_mm: float | None = None) -> list[float]:
+    grid = [0.0]
+    while grid[-1] < scene.size_mm[2] - 1e-9:
+        grid.append(round((first_mm or layer_mm) + (len(grid) - 1) * layer_mm, 9))
+    return grid
+
+
+def drawn(scene: Scene, *findings: Finding, title: str = "a sensor", grid: list[float] | None = None) -> ET.Element:
+    return ET.fromstring(svg(scene, title, layers_of(scene) if grid is None else grid, findings, COLOURS))
+
+
+def finding(number: int = 1, **fields: object) -> Finding:
+    told = {
+        "rule": f"{number}-rule",
+        "severity": "error",
+        "body": "film",
+        "message": "It will not print.",
+        "advice": "Widen it.",
+    }
+    return Finding(**(told | fields))  # type: ignore[arg-type]
+
+
+def polygons(path: str) -> list[list[Point]]:
+    """The closed outlines of a path, in millimetres on paper with z upwards."""
+    return [
+        [(float(x), -float(y)) for x, y in (corner.split() for corner in part.strip("MZ").split("L"))]
+        for part in re.findall(r"M[^Z]*Z", path)
+    ]
+
+
+def heights(element: ET.Element, kind: str) -> list[float]:
+    """Where the layer lines of a class run on the page [mm]."""
+    path = element.find(f".//s:path[@class='{kind}']", NS)
+    return [] if path is None else [float(y) for y in re.findall(r"M\S+ (\S+?)H", path.get("d", ""))]
+
+
+def spots(page: ET.Element) -> dict[int, list[Point]]:
+    """Where each finding's markers point at, by its number."""
+    found: dict[int, list[Point]] = {}
+    for group in page.iterfind(".//s:g[@class='marker']", NS):
+        circle = group.find("s:circle", NS)
+        assert circle is not None
+        at = float(circle.get("cx", "")), float(circle.get("cy", ""))
+        found.setdefault(int(group.get("data-number", "")), []).append(at)
+    return found
+
+
+def words(page: ET.Element) -> list[str]:
+    return [element.text or "" for element in page.iterfind(".//s:text", NS)]
+
+
+def area_until(row: list[Column], end_mm: float) -> dict[str, float]:
+    """Area of each material from 0 to ``end_mm``, by columns: without any clipping of outlines [mm2]."""
+    total: dict[str, float] = {}
+    for column in row:
+        full = column.right_mm - column.left_mm
+        share = min(max(end_mm - column.left_mm, 0.0) / full, 1.0)
+        for layer in column.layers:
+            left, right = (layer.top_mm[k] - layer.bottom_mm[k] for k in (0, 1))
+            mean = left + (right - left) * share / 2
+            total[layer.body.material] = total.get(layer.body.material, 0.0) + mean * share * full
+    return total
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("support", ["", "bvoh"])
+def test_areas_are_those_of_the_scene(shape: str, turned: bool, support: str) -> None:
+    scene = scene_of(shape, Fill(support=support), width_mm=9.0, isolation_mm=0.1)
+    scene = scene.turned_over() if turned else scene
+    page = drawn(scene)
+    details = page.findall(".//s:g[@class='view']", NS)
+    assert [d.get("data-across") for d in details] == [v.section.across for v in views(scene)]
+    for detail, view in zip(details, views(scene), strict=True):
+        scale = float(detail.get("data-scale", ""))
+        paths = {p.get("data-body"): polygons(p.get("d", "")) for p in detail.iterfind("s:path", NS)}
+        corners = [corner for outlines in paths.values() for outline in outlines for corner in outline]
+        end = (max(x for x, _ in corners) - min(x for x, _ in corners)) / scale
+        tall = (max(y for _, y in corners) - min(y for _, y in corners)) / scale
+        assert tall == pytest.approx(scene.size_mm[2], abs=0.001 / scale)
+        found: dict[str, float] = {}
+        for path in detail.iterfind("s:path", NS):
+            inside = sum(area_mm2(outline) for outline in polygons(path.get("d", ""))) / scale**2
+            material = path.get("data-material", "")
+            found[material] = found.get(material, 0.0) + inside
+        exact = area_until(columns(view.section), end)
+        assert found == pytest.approx(exact, abs=0.0005 * 4000 / scale**2)
+
+
+def test_areas_of_two_periods_of_triangles_are_those_of_the_thesis() -> None:
+    """Per period: cog 0.25, hanging X60 0.25, lower X60 0.24 mm2; film 0.2, electrodes 0.3 mm."""
+    detail = drawn(scene_of("tri")).find(".//s:g[@class='view']", NS)
+    assert detail is not None
+    scale = float(detail.get("data-scale", ""))
+    area = {
+        p.get("data-body"): sum(map(area_mm2, polygons(p.get("d", "")))) / scale**2
+        for p in detail.iterfind("s:path", NS)
+    }
+    assert area == pytest.approx(
+        {
+            "bottom_electrode": 4 * 0.3,
+            "film_and_lower": 4 * 0.2 + 2 * 0.24,
+            "hanging_dielectric": 2 * 0.25,
+            "top_electrode_with_cogs": 4 * 0.3 + 2 * 0.25,
+        },
+        abs=1e-4,
+    )
+
+
+def test_both_directions_of_crossed_strips_are_drawn_through_the_conductor() -> None:
+    strips = {view.section.across: view for view in views(scene_of("rect"))}
+    assert {across: view.section.at_mm for across, view in strips.items()} == {"x": 0.35, "y": 0.35}
+    assert [view.section.across for view in views(scene_of("tri", along="y"))] == ["y"]
+    assert [view.section.across for view in views(scene_of("reference"))] == ["x"]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(("layer_mm", "first_mm"), [(0.1, None), (0.06, None), (0.1, 0.2)])
+def test_layer_lines_respect_the_first_layer(shape: str, layer_mm: float, first_mm: float | None) -> None:
+    scene = scene_of(shape)
+    grid = layers_of(scene, layer_mm, first_mm)
+    page = drawn(scene, grid=grid)
+    lines, mids = heights(page, "grid"), heights(page, "mid")
+    assert len(lines) == len(grid)
+    assert mids == pytest.approx([(a + b) / 2 for a, b in pairwise(lines)], abs=0.002)
+    scale = float(page.find(".//s:g[@class='view']", NS).get("data-scale"))  # type: ignore[union-attr, arg-type]
+    assert [lines[0] - y for y in lines] == pytest.approx([z * scale for z in grid], abs=0.002)
+
+
+def test_many_layers_get_every_tenth_number_and_few_lines() -> None:
+    scene = scene_of("reference", dielectric_mm=10.0, electrode_mm=10.0)
+    grid = layers_of(scene, 0.06)
+    page = drawn(scene, grid=grid)
+    assert len(grid) == 501
+    assert len(heights(page, "grid")) < 220
+    bold = [t.text for t in page.iterfind(".//s:text[@class='small bold middle']", NS)]
+    assert bold
+    assert all(int(number or "") % 10 == 0 for number in bold)
+
+
+@pytest.mark.parametrize("layer", [1, 6, 13])
+def test_a_finding_without_a_place_stands_at_the_middle_of_its_layer(layer: int) -> None:
+    page = drawn(scene_of("tri"), finding(layer=layer))
+    mids = heights(page, "mid")
+    [(_, y)] = spots(page)[1]
+    off = [abs(y - mid) for mid in mids]
+    assert off.index(min(off)) + 1 == layer  # a marker planted one layer off would be nearest to another
+    assert min(off) < 0.002
+
+
+def test_a_finding_with_a_place_is_marked_there() -> None:
+    scene = scene_of("tri")
+    page = drawn(scene, finding(place_mm=(2.5, 5.0, 0.55), layer=6))
+    [(x, y)] = spots(page)[1]
+    cog = next(p for p in page.iterfind(".//s:g[@class='view']/s:path", NS) if p.get("data-body", "").startswith("top"))
+    apexes = sorted(
+        {corner for outline in polygons(cog.get("d", "")) for corner in outline}, key=lambda c: (c[1], c[0])
+    )
+    bed = max(heights(page, "grid"))
+    assert x == pytest.approx(apexes[1][0], abs=0.002)
+    assert bed - y == pytest.approx((bed + apexes[1][1]) * 0.55 / 0.5, abs=0.01)
+
+
+def test_a_finding_beyond_the_detail_is_marked_at_its_edge_and_in_the_overview() -> None:
+    page = drawn(scene_of("tri"), finding(place_mm=(99.0, 5.0, 0.65)))
+    detail, overview = spots(page)[1]
+    mids = heights(page, "mid")
+    assert detail[1] == pytest.approx(mids[6], abs=0.002)
+    assert overview[0] > 280
+    assert overview[1] > mids[0]
+
+
+def test_findings_are_ranked_and_the_rest_is_counted() -> None:
+    severities = ["info", "warning", "error"] * 4
+    found = [finding(k, severity=s, layer=1 + k, waiver="known" if k == 2 else "") for k, s in enumerate(severities)]
+    ranked = markers.ranked(found)
+    assert [mark.kind for mark in ranked] == ["error"] * 3 + ["warning"] * 4 + ["info"] * 4 + ["waived"]
+    page = drawn(scene_of("tri"), *found)
+    assert set(spots(page)) == set(range(1, 11))
+    assert any("and 2 more in check.json" in line for line in words(page))
+
+
+def test_no_findings_are_said_to_be_none() -> None:
+    assert any("no findings" in line for line in words(drawn(scene_of("reference"))))
+
+
+def test_hostile_words_stay_words() -> None:
+    hostile = "Größe \"<script>alert(1)</script>\" & 'x' ]]> \x00\x08\ud800\u202e " + "W" * 400
+    scene = scene_of("tri")
+    body = replace(scene.bodies[0], name="<b>&", material='"/><x')
+    scene = Scene((body, *scene.bodies[1:]), scene.size_mm)
+    page = drawn(scene, finding(message=hostile, advice=hostile, rule=hostile, waiver=hostile), title=hostile)
+    assert {element.tag.rpartition("}")[2] for element in page.iter()} <= {
+        *("svg", "title", "style", "defs", "marker", "path", "rect", "line", "circle", "text", "g")
+    }
+    title = page.findtext("s:title", None, NS) or ""
+    assert "".join(title.split()).startswith("Größe\"<script>alert(1)</script>\"&'x']]>")
+    stays_on_page(page)
+
+
+def fresh(script: str, seed: str = "0") -> str:
+    """What a script prints in an interpreter of its own."""
+    run = [sys.executable, "-c", script]
+    return subprocess.run(run, capture_output=True, check=True, text=True, env={"PYTHONHASHSEED": seed}).stdout
+
+
+def test_the_same_input_gives_the_same_bytes() -> None:
+    script = (
+        "import sys; from sensorgen.drawing import svg; from sensorgen.scene import Fill;"
+        "from sensorgen.shapes import rect; s = rect.scene(rect.Params(), Fill()); sys.stdout.write(svg(s, 't', [0.1 * k for k in range(15)], [], {}))"
+    )
+    assert len({fresh(script, seed) for seed in ("1", "2")}) == 1
+    assert fresh(script) == svg(scene_of("rect"), "t", [0.1 * k for k in range(15)], [], {})
+
+
+def test_drawing_needs_neither_numpy_nor_the_cad_kernel() -> None:
+    script = (
+        "import sys; from sensorgen.drawing import svg; from sensorgen.scene import Fill;"
+        "from sensorgen.shapes import tri; svg(tri.scene(tri.Params(), Fill()), 't', [0, 0.1], [], {});"
+        "print([m for m in ('numpy', 'pydantic', 'matplotlib', 'build123d') if m in sys.modules])"
+    )
+    assert fresh(script) == "[]\n"
+
+
+@pytest.mark.parametrize(
+    ("shape", "parameters"),
+    [
+        ("rect", {"length_mm": 330.0, "width_mm": 330.0}),
+        ("tri", {"length_mm": 330.0, "period_mm": 0.2, "dielectric_mm": 0.0}),
+        ("tri", {"electrode_mm": 10.0, "hang_height_mm": 10.0, "period_mm": 0.5}),
+    ],
+)
+def test_size_is_limited(shape: str, parameters: dict[str, float]) -> None:
+    scene = scene_of(shape, Fill(support="bvoh"), **parameters)
+    text = svg(scene, "t", layers_of(scene, 0.06), [finding(k, layer=k) for k in range(1, 40)], COLOURS)
+    assert text.count("<") < 2000
+    assert len(text) < 300_000
+
+
+def size_of(text: ET.Element) -> float:
+    sizes = {"title": 4.4, "heading": 3.0, "small": 2.3, "count": 2.4}
+    return next((sizes[kind] for kind in (text.get("class") or "").split() if kind in sizes), 2.5)
+
+
+def boxes(page: ET.Element) -> list[tuple[float, float, float, float, str]]:
+    """Left, top, right, bottom and words of every text, at its usual width [mm]."""
+    found = []
+    for text in page.iterfind(".//s:text", NS):
+        kinds, size, said = (text.get("class") or "").split(), size_of(text), text.text or ""
+        long = width(said, size) * 0.93  # the estimate is for the widest of fonts
+        x, y = float(text.get("x", "")), float(text.get("y", ""))
+        x -= long / 2 if {"middle", "count"} & set(kinds) else long if "end" in kinds else 0.0
+        found.append((x, y - 0.75 * size, x + long, y, said))
+    return found
+
+
+def stays_on_page(page: ET.Element) -> None:
+    for left, top, right, bottom, said in boxes(page):
+        assert 6 <= left <= right <= 291, said
+        assert 6 <= top <= bottom <= 204, said
+    for circle in page.iterfind(".//s:circle", NS):
+        assert 8 <= float(circle.get("cx", "")) <= 289
+        assert 8 <= float(circle.get("cy", "")) <= 202
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("layer_mm", [0.1, 0.06])
+@pytest.mark.parametrize("count", [0, 3, 12])
+def test_no_text_runs_into_another(shape: str, layer_mm: float, count: int) -> None:
+    scene = scene_of(shape, Fill(support="bvoh"), isolation_mm=0.1)
+    long = "The interface at 0.74 mm is off the layer grid and prints as 0.7 mm; " * 4
+    found = [
+        finding(k, layer=k, message=long, place_mm=(0.3 * k, 0.4, 0.1 * k) if k % 3 else None)
+        for k in range(1, count + 1)
+    ]
+    page = drawn(scene, *found, grid=layers_of(scene, layer_mm))
+    stays_on_page(page)
+    for a, b in combinations(boxes(page), 2):
+        apart = a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
+        assert apart, (a, b)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(data=st.data())
+def test_any_size_gives_a_page(shape: str, data: st.DataObject) -> None:
+    envelope = {
+        "length_mm": (1.0, 1000.0),
+        "width_mm": (1.0, 100.0),
+        "electrode_mm": (0.01, 10.0),
+        "isolation_mm": (0.0, 10.0),
+    }
+    own = {
+        "tri": {"period_mm": (0.5, 100.0), "hang_height_mm": (0.02, 10.0), "dielectric_mm": (0.0, 10.0)},
+        "rect": {"etpu_width_mm": (0.3, 50.0), "air_width_mm": (0.02, 50.0), "upper_height_mm": (0.01, 10.0)},
+    }.get(shape, {})
+    chosen: dict[str, float] = {
+        name: data.draw(st.floats(low, high), name) for name, (low, high) in (envelope | own).items()
+    }
+    if shape == "tri":
+        chosen["lower_height_mm"] = min(data.draw(st.floats(0.01, 9.0)), 0.9 * chosen["hang_height_mm"])
+    scene = scene_of(shape, None, **chosen)
+    scene = scene.turned_over() if data.draw(st.booleans()) else scene
+    grid = layers_of(scene, data.draw(st.floats(0.05, 0.3)), data.draw(st.floats(0.05, 0.5)))
+    place = st.none() | st.tuples(*(st.floats(0.0, size) for size in scene.size_mm))
+    layer = st.none() | st.integers(1, len(grid))
+    found = [
+        finding(k, place_mm=data.draw(place), layer=data.draw(layer)) for k in range(data.draw(st.integers(0, 12)))
+    ]
+    text = svg(scene, "t", grid, found, COLOURS)
+    assert len(text) < 500_000
+    page = ET.fromstring(text)
+    stays_on_page(page)
+    assert page.findall(".//s:g[@class='view']/s:path", NS)
+
+
+def test_dimensions_are_the_parameters() -> None:
+    page = drawn(scene_of("tri", period_mm=1.7, dielectric_mm=0.15, electrode_mm=0.35, hang_height_mm=0.55))
+    said = words(page)
+    for value in ("0.35", "0.15", "0.24", "0.55", "0.85", "1.7", "1.4", "100", "gap 0.15"):
+        assert value in said
+    said = words(drawn(scene_of("rect", etpu_width_mm=0.8, air_width_mm=0.25, x60_width_mm=0.6)))
+    for value in ("0.8", "0.25", "0.6", "1.9", "gap 0.2", "100", "10"):
+        assert value in said
+
+
+def test_the_period_survives_a_pattern_that_begins_within_one() -> None:
+    strips = {view.section.across: view for view in views(scene_of("rect", width_mm=9.5).turned_over())}
+    assert strips["y"].repeat_mm() == pytest.approx(2.0)
+    assert period([]) == ()
+    assert views(scene_of("reference"))[0].period_mm == ()
+
+
+def test_the_gap_is_the_smallest_distance_even_aslant() -> None:
+    low, high = box(0, 1, 0, 1, 0, 1), box(4, 5, 0, 1, 5, 6)
+    scene = Scene((Body("a", "etpu", (low,), "bottom"), Body("b", "etpu", (high,), "top")), (5.0, 1.0, 6.0))
+    gap = measures.nearest(views(scene)[0])
+    assert gap is not None
+    assert gap.value_mm == pytest.approx(5.0)
+    short = measures.nearest(views(scene_of("tri", dielectric_mm=0.0))[0])
+    assert short is not None
+    assert short.value_mm == 0.0
+    assert "gap 0: short" in words(drawn(scene_of("tri", dielectric_mm=0.0)))
+
+
+def test_a_scene_slanted_in_plan_is_drawn_too() -> None:
+    bump = Prism("z", ((2.0, 1.0), (3.0, 2.0), (2.0, 3.0), (1.0, 2.0)), 0.3, 0.6)
+    plate = box(0, 4, 0, 4, 0, 0.3)
+    scene = Scene((Body("plate", "etpu", (plate,), "bottom"), Body("bump", "x60", (bump,))), (4.0, 4.0, 0.6))
+    assert len(drawn(scene).findall(".//s:g[@class='view']", NS)) == 2
+
+
+def test_one_layer_no_layers_and_unknown_materials_are_drawn() -> None:
+    scene = scene_of("reference", dielectric_mm=0.0)
+    for grid in ([], [0.0], [0.0, 0.6]):
+        assert ET.fromstring(svg(scene, "", grid, [finding(layer=3)], {})) is not None
+
+
+def test_spread_keeps_order_and_distance() -> None:
+    assert spread([], [], 0, 1) == []
+    places = spread([5.0, 5.0, 5.0, 20.0], [3.0] * 4, 0.0, 100.0)
+    assert places == [2.0, 5.0, 8.0, 20.0]
+    assert spread([9.0, 9.5], [2.0, 2.0], 0.0, 10.0) == [8.0, 10.0]
+
+
+def test_words_keep_to_their_room() -> None:
+    rows = wrapped("a long story " * 20, 30.0, 2)
+    assert len(rows) == 2
+    assert all(width(row) <= 30.0 for row in rows)
+    assert rows[1].endswith("…")
+    assert width(fitted("\N{CJK UNIFIED IDEOGRAPH-4E00}" * 50, 20.0)) <= 20.0
+
+
+def test_scales_are_customary() -> None:
+    assert [panels.scale_words(panels.round_scale(s)) for s in (63.0, 1.0, 0.7, 2100.0)] == [
+        "60:1",
+        "1:1",
+        "1:2",
+        "2000:1",
+    ]
