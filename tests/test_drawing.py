@@ -1,5 +1,6 @@
 """The drawing shows the scene that it was given, says where the findings are, and stays on its page."""
 
+import os
 import re
 import subprocess
 import sys
@@ -63,8 +64,8 @@ def polygons(path: str) -> list[list[Point]]:
 
 def heights(element: ET.Element, kind: str) -> list[float]:
     """Where the layer lines of a class run on the page [mm]."""
-    path = element.find(f".//s:path[@class='{kind}']", NS)
-    return [] if path is None else [float(y) for y in re.findall(r"M\S+ (\S+?)H", path.get("d", ""))]
+    paths = [p.get("d", "") for p in element.iterfind(".//s:path", NS) if (p.get("class") or "").split()[:1] == [kind]]
+    return [float(y) for path in paths for y in re.findall(r"M\S+ (\S+?)H", path)]
 
 
 def spots(page: ET.Element) -> dict[int, list[Point]]:
@@ -234,13 +235,15 @@ def test_hostile_words_stay_words() -> None:
 def fresh(script: str, seed: str = "0") -> str:
     """What a script prints in an interpreter of its own."""
     run = [sys.executable, "-c", script]
-    return subprocess.run(run, capture_output=True, check=True, text=True, env={"PYTHONHASHSEED": seed}).stdout
+    environment = os.environ | {"PYTHONHASHSEED": seed, "PYTHONIOENCODING": "utf-8"}
+    return subprocess.run(run, capture_output=True, check=True, encoding="utf-8", env=environment).stdout
 
 
 def test_the_same_input_gives_the_same_bytes() -> None:
     script = (
         "import sys; from sensorgen.drawing import svg; from sensorgen.scene import Fill;"
-        "from sensorgen.shapes import rect; s = rect.scene(rect.Params(), Fill()); sys.stdout.write(svg(s, 't', [0.1 * k for k in range(15)], [], {}))"
+        "from sensorgen.shapes import rect; s = rect.scene(rect.Params(), Fill());"
+        "sys.stdout.write(svg(s, 't', [0.1 * k for k in range(15)], [], {}))"
     )
     assert len({fresh(script, seed) for seed in ("1", "2")}) == 1
     assert fresh(script) == svg(scene_of("rect"), "t", [0.1 * k for k in range(15)], [], {})

@@ -3,6 +3,7 @@
 import json
 import platform
 from collections.abc import Iterator, Mapping
+from concurrent.futures import Future
 from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -75,14 +76,13 @@ def build(design: Design, out: Path, *, cad: bool = True, force: bool = False, s
             raise Unprintable(held.findings)
         held = held.with_meshes(design)
         stage = stack.enter_context(store.staging(folder))
-        if kernel:
-            kernel.submit(design.printed, _colours(design), design.name, stage / f"{design.name}.step")
+        step_file = stage / f"{design.name}.step"
+        job = kernel.submit(design.printed, _colours(design), design.name, step_file) if kernel else None
         predicted = prediction(design)
         for name, content in _files(design, held, predicted, step):
             store.write(stage, {name: content})
-        if kernel:
-            step("STEP")
-            kernel.result()
+        if job:
+            _await(job, step)
         store.write(stage, {store.MANIFEST: _json(_manifest(design, stage))})
         store.publish(stage, folder)
         step("done")
@@ -102,6 +102,16 @@ def _files(design: Design, held: Review, predicted: dict[str, Any], step: Step) 
     yield "check.json", _json(report(design, held))
     yield "prediction.json", _json(predicted)
     yield "design.json", _json(design.model_dump(mode="json"))
+
+
+def _await(job: "Future[None]", step: Step) -> None:
+    """Wait for the STEP file, and let the progress display see that time passes."""
+    while True:
+        step("STEP")
+        try:
+            return job.result(timeout=0.2)
+        except TimeoutError:
+            continue
 
 
 def draw(design: Design, held: Review) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.checks.slices import TOUCH_MM, Rectangle, Slice, Slices, stretches
-from sensorgen.checks.widths import VANISHES
+from sensorgen.checks.widths import VANISHES, line_mm
 from sensorgen.findings import Finding
 from sensorgen.printer import Printer, Quality
 from sensorgen.scene import Body
@@ -17,7 +17,7 @@ Lengths = NDArray[np.float64]
 
 def check(slices: Slices, printer: Printer, quality: Quality) -> Iterator[Finding]:
     """Findings about bridges (held at both ends), overhangs (at one) and islands (at none)."""
-    line = printer.nozzle_mm * printer.line_width_ratio
+    line = line_mm(printer)
     known: dict[object, dict[str, float]] = {}
     for layer in range(1, len(slices.layers)):
         ground = slices.all(layer - 1)
@@ -57,26 +57,35 @@ def _judged(
 def _spans(shape: frozenset[Rectangle], ground: frozenset[Rectangle], least_mm: float) -> dict[str, float]:
     """Longest bridge, overhang and island of a layer's shape above a ground [mm].
 
-    Every unsupported place is held along x or along y; the better way counts.
+    Every unsupported place is held along x or along y; the better way counts. Places that are held neither way,
+    as the corners of a roof that juts out on two sides, hold on to those that are.
     """
     piece = Slice(shape, ground)
-    filled, air = piece.filled, piece.filled & ~Slice(ground, shape).filled
-    x, y = piece.lines
+    air = piece.filled & ~Slice(ground, shape).filled
+    found = {"bridge": 0.0, "overhang": 0.0, "island": 0.0}
+
+    def note(kind: str, values: Lengths) -> None:
+        found[kind] = max(found[kind], float(values.max(initial=0.0)))
+
+    while air.any():
+        ends, lengths, narrow = _best(piece, air)
+        note("bridge", lengths[ends == 2])
+        note("overhang", lengths[ends == 1])
+        if not ends.any():
+            note("island", narrow[air & (narrow > least_mm + TOUCH_MM)])
+            break
+        air &= ends == 0
+    return found
+
+
+def _best(piece: Slice, air: Mask) -> tuple[NDArray[np.int64], Lengths, Lengths]:
+    """How every unsupported place is held best: at how many ends, over which length, and its narrower stretch [mm]."""
+    filled, (x, y) = piece.filled, piece.lines
     ways = [_held(filled, air, x), tuple(m.T for m in _held(filled.T, air.T, y))]
     ends, lengths = (np.stack([way[k] for way in ways]) for k in (0, 1))
     # A bridge beats an overhang beats an island; among equals the shorter.
     best = np.argmin(np.where(ends == 2, lengths, np.where(ends == 1, 2 * lengths, np.inf)), axis=0)[None]
-    ends, lengths = (np.take_along_axis(m, best, 0)[0] for m in (ends, lengths))
-    narrow = np.minimum(*(way[1] for way in ways))
-
-    def longest(values: Lengths, mask: Mask) -> float:
-        return float(values[mask].max()) if mask.any() else 0.0
-
-    return {
-        "bridge": longest(lengths, air & (ends == 2)),
-        "overhang": longest(lengths, air & (ends == 1)),
-        "island": longest(narrow, air & (ends == 0) & (narrow > least_mm + TOUCH_MM)),
-    }
+    return *(np.take_along_axis(m, best, 0)[0] for m in (ends, lengths)), lengths.min(axis=0)
 
 
 def _held(filled: Mask, air: Mask, line: Lengths) -> tuple[NDArray[np.int64], Lengths]:

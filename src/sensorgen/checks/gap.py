@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from sensorgen.checks.slices import TOUCH_MM, Slices
-from sensorgen.checks.widths import LINE_LOST, VANISHES
+from sensorgen.checks.slices import TOUCH_MM, Layers, Slices
+from sensorgen.checks.widths import VANISHES, line_mm
 from sensorgen.findings import Finding
 from sensorgen.printer import Printer, Quality
 from sensorgen.scene import Body, Scene
@@ -21,38 +21,50 @@ def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> 
             "give the film a thickness (dielectric_mm)", round(gap_mm, 9), 0.0, place_mm=place,
         )  # fmt: skip
         return
-    if gap_mm < layer / 2 - TOUCH_MM:
+    printed_mm = _between(slices.layers, place[2], gap_mm)
+    if gap_mm < layer / 2 - TOUCH_MM or printed_mm <= 0:
         yield Finding(
             "2-film", "error", names,
-            f"the film of {gap_mm:g} mm is under half a layer ({layer:g} mm): it may not be printed at all",
+            f"the film of {gap_mm:g} mm may not be printed at all: a layer is {layer:g} mm",
             f"use {layer:g} mm or more, or a quality with thinner layers", round(gap_mm, 9), round(layer / 2, 9), place_mm=place,
         )  # fmt: skip
         return
-    yield from _film(names, place, layer, gap_mm)
+    yield from _film(names, place, layer, gap_mm, printed_mm)
     yield from _printed(slices, printer, gap_mm)
 
 
-def _film(names: str, place: tuple[float, float, float], layer: float, gap_mm: float) -> Iterator[Finding]:
-    count = gap_mm / layer
-    if abs(count - round(count)) > TOUCH_MM / layer:
+def _between(layers: Layers, bottom_mm: float, thickness_mm: float) -> float:
+    """Thickness that something comes out with [mm]."""
+    return round(layers.printed_mm(bottom_mm + thickness_mm) - layers.printed_mm(bottom_mm), 9)
+
+
+def _film(
+    names: str, place: tuple[float, float, float], layer: float, gap_mm: float, printed_mm: float
+) -> Iterator[Finding]:
+    if abs(printed_mm - gap_mm) > TOUCH_MM:
+        count = gap_mm / layer
         below, above = max(1, int(count)) * layer, (int(count) + 1) * layer
         yield Finding(
             "2-film", "warning", names,
-            f"the film of {gap_mm:g} mm is {count:.3g} layers of {layer:g} mm: it prints as {round(count) * layer:g} mm",
-            f"use {below:g} or {above:g} mm", round(gap_mm, 9), round(round(count) * layer, 9), place_mm=place,
+            f"the film of {gap_mm:g} mm is {count:.3g} layers of {layer:g} mm: it prints as {printed_mm:g} mm",
+            f"use {below:g} or {above:g} mm", round(gap_mm, 9), printed_mm, place_mm=place,
         )  # fmt: skip
-    if count < 2 - TOUCH_MM / layer:
+    if printed_mm < 2 * layer - TOUCH_MM:
         yield Finding(
             "2-film", "warning", names,
             "the film is a single layer: one pinhole or zit makes a short",
-            f"use {2 * layer:g} mm or more, or thinner layers", round(gap_mm, 9), round(2 * layer, 9), place_mm=place,
+            f"use {2 * layer:g} mm or more, or thinner layers", printed_mm, round(2 * layer, 9), place_mm=place,
         )  # fmt: skip
 
 
 def _printed(slices: Slices, printer: Printer, gap_mm: float) -> Iterator[Finding]:
     """What the gap becomes when narrow features vanish."""
-    tracks = {"Arachne": VANISHES, "classic walls or plain Cura": LINE_LOST, "Cura filling outline gaps": 0.0}
-    gaps = {slicer: printed_gap_mm(slices, share * printer.nozzle_mm) for slicer, share in tracks.items()}
+    tracks = {
+        "Arachne": VANISHES * printer.nozzle_mm,
+        "classic walls or plain Cura": line_mm(printer) - 2 * TOUCH_MM,  # a whole line prints
+        "Cura filling outline gaps": 0.0,
+    }
+    gaps = {slicer: printed_gap_mm(slices, least) for slicer, least in tracks.items()}
     if all(gap is not None and abs(gap - gap_mm) <= TOUCH_MM for gap in gaps.values()):
         return
     said = ", ".join(f"{slicer}: {'nothing prints' if gap is None else f'{gap:g} mm'}" for slicer, gap in gaps.items())

@@ -60,7 +60,8 @@ def _samples(body: Body, layers: Layers) -> Iterator[Finding]:
 
 
 def _within(z_mm: float, span: tuple[float, float]) -> bool:
-    return span[0] + TOUCH_MM < z_mm < span[1] - TOUCH_MM
+    """Whether a sample hits: one on a face between two bodies hits the upper one, as in ``Prism.cut``."""
+    return span[0] - TOUCH_MM < z_mm < span[1] - TOUCH_MM
 
 
 def _place(body: Body, z_mm: float) -> tuple[float, float, float]:

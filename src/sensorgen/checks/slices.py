@@ -142,7 +142,7 @@ class Slices:
 
     def printed(self, body: Body, least_mm: float) -> list[int]:
         """Layers (counted from 0) in which some stretch of a body is wider than ``least_mm``."""
-        return [k for k, found in enumerate(self._shown[body.name]) if _widest_mm(found) > least_mm]
+        return [k for k, found in enumerate(self._shown[body.name]) if _widest_mm(found) > least_mm + TOUCH_MM]
 
 
 def _rectangles(body: Body, z_mm: float) -> frozenset[Rectangle]:

@@ -15,7 +15,6 @@ from sensorgen.scene import Body
 # As shares of the nozzle.
 VANISHES = 0.12 / 0.4  # only Cura filling outline gaps prints a stretch this narrow
 SWELLS = 0.34 / 0.4  # Arachne prints anything narrower at this width
-LINE_LOST = 0.44 / 0.4  # classic walls and Cura drop anything narrower
 OVERFILLED = 0.70 / 0.4  # classic walls put 1.8 to 1.17 times the material into anything narrower
 GAP_CLOSES = 0.10 / 0.4
 
@@ -24,18 +23,38 @@ GAP_CLOSES = 0.10 / 0.4
 class _Band:
     """What becomes of stretches up to a width."""
 
-    upto: float
+    upto_mm: float
     severity: str
     message: str
     advice: str
 
 
-_BANDS = (
-    _Band(VANISHES, "error", "vanishes (Cura filling outline gaps prints it 1.7 times too full)", "widen it beyond {line:.2g} mm"),
-    _Band(SWELLS, "warning", "prints {swells:.2g} mm wide (Arachne) or not at all (classic walls, plain Cura)", "widen it to {line:.2g} mm"),
-    _Band(LINE_LOST, "warning", "is narrower than a line: classic walls and plain Cura drop it", "widen it to {line:.2g} mm, or slice with Arachne"),
-    _Band(OVERFILLED, "info", "gets 1.2 to 1.8 times its material with classic walls", "slice with Arachne"),
-)  # fmt: skip
+def _bands(printer: Printer) -> tuple[_Band, ...]:
+    """What a printer's nozzle makes of narrow stretches, from the narrowest on; a whole line prints."""
+    line, swells = line_mm(printer), SWELLS * printer.nozzle_mm
+    return (
+        _Band(
+            VANISHES * printer.nozzle_mm, "error", "vanishes (Cura filling outline gaps prints it 1.7 times too full)",
+            f"widen it to {line:.2g} mm",
+        ),
+        _Band(
+            swells, "warning", f"prints {swells:.2g} mm wide (Arachne) or not at all (classic walls, plain Cura)",
+            f"widen it to {line:.2g} mm",
+        ),
+        _Band(
+            line - 2 * TOUCH_MM, "warning", "is narrower than a line: classic walls and plain Cura drop it",
+            f"widen it to {line:.2g} mm, or slice with Arachne",
+        ),
+        _Band(
+            OVERFILLED * printer.nozzle_mm, "info", "gets 1.2 to 1.8 times its material with classic walls",
+            "slice with Arachne",
+        ),
+    )  # fmt: skip
+
+
+def line_mm(printer: Printer) -> float:
+    """Width of one line; classic walls and Cura drop anything narrower [mm]."""
+    return round(printer.nozzle_mm * printer.line_width_ratio, 9)
 
 
 def check(slices: Slices, printer: Printer) -> Iterator[Finding]:
@@ -51,16 +70,15 @@ def check(slices: Slices, printer: Printer) -> Iterator[Finding]:
 
 
 def _narrow(body: Body, piece: Slice, number: int, printer: Printer, layers: Layers) -> Iterator[Finding]:
-    nozzle = printer.nozzle_mm
-    sizes = {"line": LINE_LOST * nozzle, "swells": SWELLS * nozzle}
-    for width, runs in _by_width(piece.runs(piece.filled), OVERFILLED * nozzle).items():
-        band = next(b for b in _BANDS if width <= b.upto * nozzle + TOUCH_MM)
+    bands = _bands(printer)
+    for width, runs in _by_width(piece.runs(piece.filled), bands[-1].upto_mm).items():
+        band = next(b for b in bands if width <= b.upto_mm + TOUCH_MM)
         tip = band.severity == "error" and _all_taper(body, runs, number, layers)
         yield Finding(
             "5-width", "warning" if tip else band.severity, body.name,
-            f"a {'tip' if tip else 'stretch'} {width:.3g} mm wide at mid-layer {band.message.format(**sizes)}",
-            f"blunt the tip to {sizes['line']:.2g} mm" if tip else band.advice.format(**sizes),
-            width, round(band.upto * nozzle, 9), number + 1, _place(runs[0], layers.mids_mm[number]), len(runs),
+            f"a {'tip' if tip else 'stretch'} {width:.3g} mm wide at mid-layer {band.message}",
+            f"blunt the tip to {line_mm(printer):.2g} mm" if tip else band.advice,
+            width, round(band.upto_mm, 6), number + 1, _place(runs[0], layers.mids_mm[number]), len(runs),
         )  # fmt: skip
 
 
@@ -84,7 +102,7 @@ def _by_width(runs: Iterable[Run], limit_mm: float) -> dict[float, list[Run]]:
 
 
 def _all_taper(body: Body, runs: list[Run], number: int, layers: Layers) -> bool:
-    """Whether all stretches are tips that run out within this layer, rather than thin walls or strips."""
+    """Whether all stretches are tips that run out before the next sample, rather than thin walls or strips."""
     low, high = layers.boundaries_mm[number : number + 2]
     ends: list[Rectangle] = []
     for prism in body.prisms:
@@ -96,10 +114,13 @@ def _all_taper(body: Body, runs: list[Run], number: int, layers: Layers) -> bool
 
 
 def _tapers(run: Run, ends: list[Rectangle]) -> bool:
-    """Whether one of the two ends of the stretch's prism in this layer is far narrower than it is at mid-height."""
-    x, y = ((run.start + run.end) / 2, run.across) if run.axis == "x" else (run.across, (run.start + run.end) / 2)
-    widths = [r.x1 - r.x0 if run.axis == "x" else r.y1 - r.y0 for r in ends if r.x0 <= x <= r.x1 and r.y0 <= y <= r.y1]
-    return min(widths, default=run.width) < 0.1 * run.width
+    """Whether the stretch loses half of its width or more up to an end of its prism in this layer.
+
+    What goes on like that is nothing at the next sample, twice as far away.
+    """
+    spans = [((r.x0, r.x1), (r.y0, r.y1)) if run.axis == "x" else ((r.y0, r.y1), (r.x0, r.x1)) for r in ends]
+    widths = [b - a for (a, b), (c, d) in spans if a <= run.end and b >= run.start and c <= run.across <= d]
+    return min(widths, default=run.width) < 0.51 * run.width
 
 
 def _place(run: Run, z_mm: float) -> tuple[float, float, float]:

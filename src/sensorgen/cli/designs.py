@@ -69,7 +69,7 @@ class DesignGroup(click.Group):
 
         about = (module.__doc__ or "").strip() if module else ""
         return click.Command(
-            name, params=[*params, *_design_options(), *self.own], callback=run, help=about.replace("::\n", "\n\b"),
+            name, params=[*params, *_design_options(), *self.own], callback=run, help=about.replace("::\n\n", ":\n\n\b\n"),
             short_help=about.partition("\n")[0],
         )  # fmt: skip
 

@@ -18,7 +18,7 @@ def grid(frame: Frame, boundaries_mm: Sequence[float], right: float) -> Iterator
     lines = _path(frame, _every(boundaries_mm, _step(pitch, LINE_PITCH)), right)
     if pitch >= MID_PITCH:
         yield element("path", "under", d=lines)
-    yield element("path", "grid", d=lines)
+    yield element("path", "grid" if pitch >= MID_PITCH else "grid dense", d=lines)
     if mids:
         yield element("path", "mid", d=_path(frame, mids, right))
 

@@ -44,6 +44,8 @@ def _caption(detail: Panel, whole: Panel, name: str, scene: Scene) -> Iterator[s
     frame, view = whole.frame, whole.view
     ratio = frame.per_mm_up / frame.per_mm
     yield f"Overview {name}: all of {view.section.across}, {number(scene.size_mm[AXES.index(view.normal)])} mm deep"
+    if view.period_mm:
+        yield f"period {number(view.repeat_mm())} mm"
     yield f"height × {ratio:.3g}" if ratio > 1.0005 else "true to scale"
     if detail.view.end_mm < view.extent_mm:
         yield "dashed: the detail above"

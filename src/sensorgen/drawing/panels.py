@@ -10,7 +10,8 @@ from sensorgen.scene import Body, Point
 
 GUTTER = 8.0  # between a view and what is right of it: room for markers [mm]
 CAPTION = 78.0  # room for the words over a view [mm]
-REPEATS, FLATTEST, MOST_REPEATS = 1.7, 12.0, 60.0
+REPEATS, MOST_REPEATS = 1.7, 60.0
+LOWEST = 12.0  # a view that is flatter on paper shows nothing [mm]
 LARGER = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
 SMALLER = (1.0, 2.0, 5.0)  # 1:2 and 1:5 are read at a glance, 1:1.67 is not
 
@@ -40,7 +41,7 @@ def arrange(views: Sequence[View], grid_mm: float, height_mm: float, room: Room)
     """
     left, top, right, bottom = room
     each = (right - left) / len(views) - GUTTER
-    wanted = max(_wanted_mm(view, height_mm) for view in views)
+    wanted = max(min(_wanted_mm(view, height_mm), each / LOWEST * height_mm) for view in views)
     scale = round_scale(min((bottom - top) / grid_mm, each / wanted))
     bottom -= (bottom - top - grid_mm * scale) / 2
     panels = []
@@ -53,9 +54,9 @@ def arrange(views: Sequence[View], grid_mm: float, height_mm: float, room: Room)
 
 
 def _wanted_mm(view: View, height_mm: float) -> float:
-    """A period and most of the next or, where nothing repeats, four heights; never so much that the sensor becomes a line."""
+    """A period and most of the next or, where nothing repeats, four heights [mm]."""
     wanted = max(REPEATS * view.repeat_mm(), height_mm) if view.period_mm else 4 * height_mm
-    return min(wanted, FLATTEST * height_mm, view.extent_mm)
+    return min(wanted, view.extent_mm)
 
 
 def _end_mm(view: View, room_mm: float) -> float:
@@ -116,14 +117,19 @@ def letter_places(panel: Panel) -> dict[str, Point]:
     """For each body, where its letter has most room on the page [mm]."""
     best: dict[str, tuple[float, Point]] = {}
     for column in panel.view.columns:
-        middle = (column.left_mm + column.right_mm) / 2
+        along = _aside((column.left_mm, column.right_mm))
         for layer in column.layers:
-            low, high = sum(layer.bottom_mm) / 2, sum(layer.top_mm) / 2
-            room = round(min((column.right_mm - column.left_mm), high - low), 6)
+            low, high = _aside(layer.bottom_mm), _aside(layer.top_mm)
+            room = round(min(column.right_mm - column.left_mm, high - low), 6)
             if room > best.get(layer.body.name, (0.0,))[0]:
-                best[layer.body.name] = (room, panel.place((middle, (low + high) / 2)))
+                best[layer.body.name] = (room, panel.place((along, (low + high) / 2)))
     left, right = panel.frame.left + 2, max(panel.frame.right - 2, panel.frame.left + 2)
     return {name: (min(max(x, left), right), y) for name, (_, (x, y)) in best.items()}
+
+
+def _aside(ends: Point) -> float:
+    """A little left of the middle, where no line of symmetry runs."""
+    return ends[0] + 0.4 * (ends[1] - ends[0])
 
 
 def lettered(panel: Panel, names: Mapping[str, str], colours: Colours) -> Iterator[str]:

@@ -49,7 +49,7 @@ class CadProcess:
         self.timeout_s = timeout_s
         self._late = False
         self._said = tempfile.TemporaryFile()  # noqa: SIM115  (closed in __exit__; a pipe nobody reads would fill up)
-        self._process = subprocess.Popen(
+        self._process = subprocess.Popen(  # noqa: S603  (this Python, and a module of our own)
             [sys.executable, *WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said
         )
         self._thread = ThreadPoolExecutor(1, "cad")  # sends and waits, so that the caller need not
@@ -118,7 +118,7 @@ class CadProcess:
     def _obituary(self) -> str:
         """Why there is no answer."""
         if self._late:
-            return f"the CAD process took more than {self.timeout_s:g} s and was stopped: try a smaller sensor, or again"
+            return f"the CAD process took more than {self.timeout_s:g} s and was stopped: try a smaller one, or again"
         try:
             code = self._process.wait(GRACE_S)
         except subprocess.TimeoutExpired:

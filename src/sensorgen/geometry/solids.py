@@ -5,8 +5,8 @@ used, because that takes seconds.
 
 One extruded profile per prism, and no fuse: a body of several prisms is one product, a compound under one name and
 colour, even where its boxes touch. One rule for all sizes, exact, and linear in the number of prisms. Fusing a body's
-boxes in one go, glued, is exact too and gives one valid solid, but cuts faces up wherever strips cross, which everything
-after it pays for. Crossed strips (``rect``, OCCT 8.0; solids and STEP file together):
+boxes in one go, glued, is exact too and gives one valid solid, but cuts faces up wherever strips cross, for which all
+that follows pays. Crossed strips (``rect``, OCCT 8.0; solids and STEP file together):
 
 ========  ===============  ================
 cells     compound         fused
@@ -65,7 +65,7 @@ def solid(prism: Prism) -> "Solid":
     except Exception as error:  # whatever the kernel throws: Standard_Failure, StdFail_NotDone, ValueError
         raise CadFailed(f"{_described(prism)}: {error or type(error).__name__}") from error
     exact = prism.volume_mm3()
-    if not 0 < exact >= abs(volume - exact) / VOLUME_RATIO:
+    if not (exact > 0 and abs(volume - exact) <= VOLUME_RATIO * exact):  # so that NaN is caught as well
         raise CadFailed(
             f"{_described(prism)}: its solid holds {volume:.12g} mm3, its outline {exact:.12g} mm3; an outline runs"
             " counter-clockwise, does not cross itself, and is no thinner than 1e-7 mm"

@@ -1,0 +1,44 @@
+"""Write what can be derived: docs/reference.md from the --help texts, and the pictures from the designs."""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+DOCS = Path(__file__).parent
+DESIGNS = DOCS.parent / "designs"
+PICTURES = {"trix-d0.2": ["tri"], "sqxy-d0.2": ["rect"], "trix-upside-down": ["tri", "--orientation", "upside-down"]}
+PAGES = (
+    [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"], ["predict"],
+    ["list"], ["schema"], ["completion"],
+)  # fmt: skip
+
+
+def sensorgen(*words: str) -> str:
+    """What the command prints, on a terminal of 100 columns."""
+    command = [sys.executable, "-m", "sensorgen", *words]
+    environment = {"COLUMNS": "100", "TERMINAL_WIDTH": "100", "PYTHONIOENCODING": "utf-8", "PATH": ""}
+    return subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout
+
+
+def reference() -> str:
+    """The command reference."""
+    parts = ["# Command reference\n\nWritten by `make docs` from the `--help` texts; a test holds the two together.\n"]
+    for page in PAGES:
+        parts.append(f"## {' '.join(['sensorgen', *page])}\n\n```text\n{sensorgen(*page, '--help').rstrip()}\n```\n")
+    return "\n".join(parts)
+
+
+def main() -> None:
+    """Write reference and pictures."""
+    (DOCS / "reference.md").write_text(reference(), "utf-8")
+    (DOCS / "pictures").mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        for name, words in PICTURES.items():
+            out = Path(folder) / f"{name}.svg"
+            sensorgen("draw", *words, "--output", str(out))
+            (DOCS / "pictures" / out.name).write_bytes(out.read_bytes())
+
+
+if __name__ == "__main__":
+    main()
