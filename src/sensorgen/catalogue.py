@@ -37,9 +37,15 @@ def models() -> Entries:
     return {name: _model(name) for name in registry.names(model_files)}
 
 
+def sources() -> Entries:
+    """What the names of the sources stand for."""
+    return {name: {"about": where} for name, where in material_files.citations().items()}
+
+
 def _materials_values(material: material_files.Material) -> list[str]:
     return [
-        f"{quantity}: {v.value:g}  [{v.source}]"
+        f"{quantity}: {v.value:.7g}  [{v.source}]"
+        + (f" ({v.low:g} to {v.high:g})" if v.low is not None and v.high is not None else "")
         + (" (default)" if v.default else "")
         + (" IMPLAUSIBLE, never a default" if v.implausible else "")
         + (f"  {v.note}" if v.note else "")

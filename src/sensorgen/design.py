@@ -5,6 +5,7 @@ import hashlib
 import json
 import math
 import re
+import reprlib
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -15,12 +16,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from sensorgen import __version__, registry, shapes, yamlfile
 from sensorgen import materials as material_files
-from sensorgen.errors import BadInput, MissingValue, OutOfRange, UnknownName
+from sensorgen.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.findings import Finding
 from sensorgen.printer import Printer, Quality, load_printer, load_quality
 from sensorgen.scene import Envelope, Fill, Scene
 
 MAX_CELLS = 50_000  # crossed strips of 330 x 330 mm have 27 225
+MAX_LAYERS = 5_000  # 30 mm in layers of 0.06 mm have 500
 _NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,98}[A-Za-z0-9])?")
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # Windows cannot have files of these names
 
@@ -28,7 +30,7 @@ Slot = Annotated[str, Field(pattern=r"^[a-z0-9-]+(@[a-z0-9.-]+)?$")]
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)  # strict: true is not 1, nor "5" a number
 
 
 class Slots(_Strict):
@@ -69,33 +71,23 @@ class Design(_Strict):
     nozzle_mm: Annotated[float, Field(ge=0.05, le=5.0)] | None = Field(
         default=None, description="Nozzle diameter when it is not the printer's own [mm]."
     )
-    tools: dict[str, int] = Field(default={}, description="Material to tool, in the printer's own numbers.")
+    tools: dict[str, Annotated[int, Field(ge=0, le=99)]] = Field(default={}, description="Material to tool, in the printer's own numbers.")
     infill: dict[str, Infill] = Field(default={}, description="Material to infill.")
     orientation: Literal["as-drawn", "upside-down"] = "as-drawn"
     shrinkage: Annotated[float, Field(ge=0, lt=0.9)] = Field(
         default=0.0, description="Share that the bake takes off in the plane; the print is made larger by it [-]."
     )
-    waivers: tuple[Waiver, ...] = ()
+    waivers: tuple[Waiver, ...] = Field(default=(), strict=False)  # YAML has lists only
 
     @field_validator("name")
     @classmethod
     def _safe_name(cls, name: str) -> str:
-        if name and (not _NAME.fullmatch(name) or _DEVICES.fullmatch(name)):
+        if not _NAME.fullmatch(name) or _DEVICES.fullmatch(name):
             raise ValueError(
-                f"{name!r} cannot be a file name everywhere: use letters a to z, digits, '.', '-' and '_', "
-                "with a letter or digit first and last"
+                f"{_shown(name)} cannot be a file name everywhere; expected at most 100 letters a to z, digits, '.', '-' "
+                "and '_', with a letter or digit first and last: set it with --name, or 'name:' in the file"
             )
         return name
-
-    @field_validator("parameters", mode="before")
-    @classmethod
-    def _no_truth(cls, given: Any) -> Any:
-        """Refuse true and false, which would pass for 1 and 0."""
-        if isinstance(given, dict):
-            for key, value in given.items():
-                if isinstance(value, bool):
-                    raise ValueError(f"{key} is {value}; expected a number or a word")
-        return given
 
     @cached_property
     def params(self) -> Envelope:
@@ -161,13 +153,13 @@ class Design(_Strict):
         return tools[material]
 
     def resolved(self) -> dict[str, Any]:
-        """Everything that decides the result, with all defaults and the material values filled in."""
+        """Everything that decides the sensor, with all defaults and the values of material and printer filled in."""
         stuff = {}
         for name, source in sorted(self.used().items()):
             stuff[name] = material_files.load(name).model_dump() | {"source": source}
         return {
             "sensorgen": __version__,
-            **self.model_dump(exclude={"parameters", "waivers"}),
+            **self.model_dump(exclude={"name", "parameters", "printer", "quality", "waivers"}),
             "parameters": dataclasses.asdict(self.params),
             "materials_values": stuff,
             "printer_values": self.machine.model_dump(),
@@ -175,7 +167,7 @@ class Design(_Strict):
         }
 
     def id(self) -> str:
-        """Hash of all resolved parameters, material values and the software's version."""
+        """Hash of all resolved parameters, material values and the software's version; not of the design's name."""
         text = json.dumps(self.resolved(), sort_keys=True, allow_nan=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -258,21 +250,59 @@ def load(path: Path) -> Design:
 def make(data: Mapping[str, Any], where: str = "") -> Design:
     """Check a design given as plain data; ``where`` names its file in errors."""
     try:
-        design = Design.model_validate(dict(data))
+        design = Design.model_validate(dict(data) if isinstance(data, Mapping) else data)
+        _check_names(design)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"] if part not in ("float", "str"))
-        raise BadInput(": ".join(x for x in (where, key, _plain(first, data)) if x)) from None
-    _check_names(design)
+        raise BadInput(_plain(error.errors()[0])).within(where) from None
+    except SensorgenError as error:
+        raise error.within(where) from None
     return design if design.name else design.model_copy(update={"name": name_of(design)})
 
 
-def _plain(first: Mapping[str, Any], data: Mapping[str, Any]) -> str:
-    """What pydantic says, in our words where a key is unknown."""
-    if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
-        return str(UnknownName("key", str(first["loc"][0]), Design.model_fields))
-    message = str(first["msg"]).removeprefix("Value error, ")
-    return message if message.startswith(repr(first["input"])) else f"{message} (given: {str(first['input'])[:80]!r})"
+_INSIDE = {"materials": Slots, "infill": Infill, "waivers": Waiver}
+_EXPECTED = {
+    "bool_type": "true or false",
+    "float_type": "a number",
+    "greater_than": "a number above {gt:g}",
+    "greater_than_equal": "{ge:g} or more",
+    "int_type": "a whole number",
+    "less_than": "a number below {lt:g}",
+    "less_than_equal": "{le:g} or less",
+    "literal_error": "{expected}",
+    "string_pattern_mismatch": "{pattern}",
+    "string_too_short": "at least {min_length} characters",
+    "string_type": "text",
+    "dict_type": "a mapping of names to values",
+    "model_type": "a mapping of names to values",
+    "tuple_type": "a list",
+}
+_PATTERNS = {"materials": "NAME or NAME@SOURCE", "waivers": "a rule such as 5-width, or just 5"}
+
+
+def _plain(first: Mapping[str, Any]) -> str:
+    """What pydantic found, in our words: what was given, and what was expected."""
+    place = [str(part) for part in first["loc"] if part not in ("float", "str")] or ["a design"]
+    key, kind = ".".join(place), first["type"]
+    if kind == "value_error":
+        return f"{key}: {first['ctx']['error']}"
+    if kind == "missing":
+        return f"{key} is missing" + (f"; expected one of {', '.join(registry.names(shapes))}" if key == "shape" else "")
+    if kind == "extra_forbidden":
+        known = _INSIDE[place[0]] if len(place) > 1 else Design
+        return str(UnknownName(f"key of {'.'.join(place[:-1])}" if len(place) > 1 else "key", place[-1], known.model_fields))
+    limits = dict(first.get("ctx", {})) | {"pattern": _PATTERNS.get(place[0])}
+    expected = _EXPECTED[kind].format(**limits) if kind in _EXPECTED else str(first["msg"]).lower()
+    return f"{key} is {_shown(first['input'])}; expected {expected}"
+
+
+def _shown(value: object) -> str:
+    """A value as given, cut short."""
+    short = reprlib.Repr()
+    short.maxstring = 60
+    try:
+        return short.repr(value)
+    except ValueError:  # a whole number of thousands of digits
+        return "a huge number"
 
 
 def _check_names(design: Design) -> None:
@@ -287,6 +317,8 @@ def _check_names(design: Design) -> None:
                 kind = "conducts" if material.conductor else "does not conduct"
                 raise BadInput(f"materials.{part}: {material.name} {kind}")
     _one_source_each(design)
+    _soluble(design)
+    _refuse_stacks(design)
     for material, tool in design.tools.items():
         material_files.load(material)
         if tool not in design.machine.tool_numbers:
@@ -304,6 +336,21 @@ def _one_source_each(design: Design) -> None:
             material, source = design.slot(part)
             if source and chosen.setdefault(material.name, source) != source:
                 raise BadInput(f"materials.{part}: {material.name} is taken from {chosen[material.name]} elsewhere; name one source")
+
+
+def _soluble(design: Design) -> None:
+    """The support is washed out: nothing that stays may be made of it."""
+    slots = {part: (value or "").partition("@")[0] for part, value in design.materials.model_dump().items()}
+    support = slots.pop("support")
+    if support and support in slots.values():
+        raise BadInput(f"materials.support: the sensor itself is made of {support}; expected a material that dissolves, as bvoh")
+
+
+def _refuse_stacks(design: Design) -> None:
+    """Refuse layers so thin that they would fill the memory."""
+    layers = design.drawn.size_mm[2] / design.layers.layer_mm
+    if layers > MAX_LAYERS:
+        raise OutOfRange(f"{layers:.3g} layers of {design.layers.layer_mm:g} mm; expected at most {MAX_LAYERS}: use another quality")
 
 
 def _one_tool_each(design: Design) -> None:
@@ -327,19 +374,24 @@ def name_of(design: Design) -> str:
     start = getattr(shape(design.shape), "SHORT", design.shape) + str(getattr(params, "along", ""))
     parts = [start]
     if hasattr(params, "along"):
-        parts.append(f"d{params.dielectric_mm:g}")  # type: ignore[attr-defined]
+        parts.append(f"d{params.dielectric_mm:.10g}")  # type: ignore[attr-defined]
     said = {"along"} | ({"dielectric_mm"} if hasattr(params, "along") else set())
     for key, field in known.items():
         value = getattr(params, key)
         if key not in said and value != field.default:
-            parts.append(f"{key.removesuffix('_mm').replace('_', '-')}{value:g}")
+            parts.append(f"{key.removesuffix('_mm').replace('_', '-')}{value:.10g}")
     default = Design(shape=design.shape)
     for key in ("quality", "printer"):
         if getattr(design, key) != getattr(default, key):
-            parts.append(Path(getattr(design, key)).stem)
+            parts.append(re.sub("[^A-Za-z0-9._]+", "-", Path(getattr(design, key)).stem).strip(".-_"))
     if design.orientation != default.orientation:
         parts.append("upside-down")
     others = design.model_dump(include={"materials", "nozzle_mm", "tools", "infill", "shrinkage"})
     if others != default.model_dump(include=set(others)):
-        parts.append(hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()[:6])
-    return "-".join(parts)[:100]
+        parts.append(_digest(others))
+    whole = "-".join(filter(None, parts))
+    return whole if len(whole) <= 100 else f"{whole[:90].rstrip('.-_')}-{_digest(whole)}"
+
+
+def _digest(data: object) -> str:
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:6]

@@ -2,11 +2,17 @@
 
 import difflib
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, Self
 
 
 class SensorgenError(Exception):
     """Anything a user can put right; the command line shows it as one line and exits with 2."""
+
+    def within(self, where: str) -> Self:
+        """The same error, its message led by the file or key that it is about."""
+        if where:
+            self.args = (f"{where}: {self}",)
+        return self
 
 
 class OutOfRange(SensorgenError):
@@ -19,9 +25,9 @@ class UnknownName(SensorgenError):
     def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
         """Name the nearest of ``known`` to ``given``, and list them all."""
         names = sorted(known)
-        near = difflib.get_close_matches(given, names, n=1, cutoff=0.5)
+        near = difflib.get_close_matches(given[:100].lower(), names, n=1)
         hint = f"; did you mean '{near[0]}'?" if near else "."
-        super().__init__(f"unknown {kind} {given!r}{hint} Known: {', '.join(names)}")
+        super().__init__(f"unknown {kind} {given[:100]!r}{hint} Known: {', '.join(names)}")
 
 
 class BadInput(SensorgenError):
@@ -38,7 +44,9 @@ class Unprintable(SensorgenError):
     def __init__(self, findings: Sequence[Any]) -> None:
         """Take the findings (see :class:`sensorgen.findings.Finding`)."""
         self.findings = list(findings)
-        super().__init__("the checks found errors, and nothing was written; --force writes the files all the same")
+        open_ones = [f for f in self.findings if not f.waiver]
+        first = f"{open_ones[0].rule}, {open_ones[0].message}" if open_ones else "the checks found errors"
+        super().__init__(f"{first}; nothing was written (--force writes the files all the same)")
 
 
 class Unwritable(SensorgenError):

@@ -2,13 +2,15 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 from sensorgen.errors import Unwritable
 
@@ -24,10 +26,10 @@ def staging(folder: Path) -> Iterator[Path]:
     Unwritable
         The place cannot be written to, or the disk is full.
     """
-    _refuse_file(folder)
     stage = folder.parent / f".{folder.name}.{os.getpid()}.part"
     try:
         try:
+            _refuse_file(folder)
             folder.parent.mkdir(parents=True, exist_ok=True)
             _sweep(folder)
             stage.mkdir()
@@ -39,43 +41,52 @@ def staging(folder: Path) -> Iterator[Path]:
 
 
 def _refuse_file(folder: Path) -> None:
-    if folder.exists() and not folder.is_dir():
-        raise Unwritable(f"{str(folder)!r} is a file; expected a folder: move it away, or name another place with --out")
+    for place in (folder, *folder.parents):
+        if os.path.lexists(place) and not place.is_dir():
+            what = "a link that leads nowhere" if place.is_symlink() else "a file"
+            raise Unwritable(f"{str(place)!r} is {what}; expected a folder: move it away, or name another place with --out")
 
 
 def _sweep(folder: Path) -> None:
     """Remove what a killed run of this name has left."""
     for left in folder.parent.glob(f".{folder.name}.*.part"):
         pid = left.name.split(".")[-2]
-        if pid.isdigit() and not _alive(int(pid)):
+        if re.fullmatch("[0-9]{1,9}", pid) and not _alive(int(pid)):
             shutil.rmtree(left, ignore_errors=True)
 
 
 def _alive(pid: int) -> bool:
+    """Whether another process of that number runs; on Windows, where asking would end it, always."""
+    if pid == os.getpid():  # left by an earlier process of our number, as containers have them
+        return False
     try:
-        os.kill(pid, 0)
+        return os.name == "nt" or os.kill(pid, 0) is None
     except ProcessLookupError:
         return False
     except OSError:
         return True
-    return True
 
 
 def publish(stage: Path, folder: Path) -> None:
     """Move all staged files into place, the manifest last; files that only an earlier manifest lists go.
 
-    Everything that can fail for lack of space or rights has happened by now: what is left is renaming.
-    A user's own files in the folder stay. Ctrl-C waits until all are in place.
+    Everything that can fail for lack of space or rights has happened by then: what is left is renaming.
+    A user's own files in the folder stay. Another run that publishes here, and Ctrl-C, wait until all are in place.
     """
     folder.mkdir(exist_ok=True)
-    stale = set(_listed(folder)) - {_key(f, stage) for f in _files(stage)}
-    with _undisturbed():
-        for file in sorted(_files(stage), key=lambda f: f.name == MANIFEST):
-            target = folder / file.relative_to(stage)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(file, target)
+    staged = {_key(file, stage): file for file in _files(stage)}
+    targets = {name: folder / name for name in staged}
+    for target in targets.values():
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.is_dir() or not os.access(target.parent, os.W_OK):
+            raise Unwritable(f"cannot write {str(target)!r}: a folder is in its place, or the folder around it is read-only")
+    with _alone(folder), _undisturbed():
+        stale = set(listed(folder)) - set(staged)
+        for name in sorted(set(staged) - {MANIFEST}):
+            os.replace(staged[name], targets[name])
         for name in stale:
             (folder / name).unlink(missing_ok=True)
+        os.replace(staged[MANIFEST], targets[MANIFEST])
 
 
 def write(folder: Path, files: Mapping[str, bytes]) -> None:
@@ -98,6 +109,8 @@ def replace(path: Path, content: bytes) -> None:
         The place cannot be written to, or the disk is full.
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    if path.exists() and not path.is_file():
+        raise Unwritable(f"cannot write {str(path)!r}: it is a folder or a device; expected a file")
     try:
         write(part.parent, {part.name: content})
         os.replace(part, path)
@@ -120,31 +133,48 @@ def _key(file: Path, folder: Path) -> str:
     return file.relative_to(folder).as_posix()
 
 
-def _listed(folder: Path) -> list[str]:
-    """Names in the manifest of an earlier build; none where it is missing or damaged."""
+def listed(folder: Path) -> list[str]:
+    """Files in the manifest of an earlier build; none where it is missing or damaged, and none outside the folder."""
     try:
         names = list(json.loads((folder / MANIFEST).read_text("utf-8"))["files"])
-    except (OSError, ValueError, KeyError, TypeError):
+        return [n for n in names if _inside(folder, folder / n)]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return []
-    return [n for n in names if isinstance(n, str) and (folder / n).resolve().is_relative_to(folder.resolve())]
+
+
+def _inside(folder: Path, file: Path) -> bool:
+    return file.parent.resolve().is_relative_to(folder.resolve()) and (file.is_file() or file.is_symlink())
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Wait until no other run publishes to a folder, where the system can tell."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a network folder without locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
 
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Hold back Ctrl-C for a moment."""
-    held: list[int] = []
-
-    def hold(number: int, _: FrameType | None) -> None:
-        held.append(number)
-
-    try:
-        before = signal.signal(signal.SIGINT, hold)
-    except ValueError:  # not in the main thread: nobody interrupts here
-        yield
-        return
+    """Hold back Ctrl-C and a request to end for a moment."""
+    held: list[tuple[int, FrameType | None]] = []
+    before: dict[int, Any] = {}
+    with suppress(ValueError):  # not in the main thread: nobody interrupts here
+        for number in (signal.SIGINT, signal.SIGTERM):
+            before[number] = signal.signal(number, lambda *what: held.append(what))
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
-    if held:
-        raise KeyboardInterrupt
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    for number, _ in held[:1]:
+        signal.raise_signal(number)

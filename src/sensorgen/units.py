@@ -7,8 +7,8 @@ from sensorgen.errors import BadInput
 EPS0_F_PER_M = 8.8541878128e-12  # CODATA 2018, as in the reference values that we test against
 M_PER_MM = 1e-3
 
-_MM_PER = {"": 1.0, "mm": 1.0, "um": 1e-3, "µm": 1e-3, "cm": 10.0, "m": 1000.0}
-_LENGTH = re.compile(r"\s*([-+]?[0-9.]+(?:e[-+]?[0-9]+)?)\s*([a-zµ]*)\s*", re.IGNORECASE)
+_MM_PER = {"": 1.0, "mm": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3, "cm": 10.0, "m": 1000.0}
+_LENGTH = re.compile(r"\s*([-+]?[0-9.]+(?:e[-+]?[0-9]+)?)\s*([a-zµμ]*)\s*", re.IGNORECASE)
 
 
 def length_mm(text: str) -> float:

@@ -98,7 +98,7 @@ class Slice:
 
     def _open(self, run: Run) -> bool:
         line = self.lines["xy".index(run.axis)]
-        return run.start == line[0] or run.end == line[-1]
+        return bool(run.start == line[0] or run.end == line[-1])
 
 
 def stretches(mask: NDArray[np.bool_]) -> tuple[Indices, Indices, Indices]:

@@ -2,7 +2,9 @@
 
 import importlib
 import os
+import signal
 import sys
+from types import FrameType
 from typing import Any
 
 import click
@@ -28,11 +30,15 @@ class _Lazy(click.Group):
         return command
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
-        if args and not args[0].startswith("-") and args[0] not in COMMANDS:
+        if not ctx.resilient_parsing and not args[0].startswith("-") and args[0] not in COMMANDS:
             from sensorgen.errors import UnknownName
 
             raise UnknownName("command", args[0], COMMANDS)
         return super().resolve_command(ctx, args)
+
+
+class _Terminated(BaseException):
+    """Somebody asked this process to end (SIGTERM)."""
 
 
 @click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -41,16 +47,18 @@ def cli() -> None:
     """From one design to a printable elastomer sensor: geometry, checks, 3MF, profiles, prediction.
 
     \b
-    sensorgen build tri --dielectric 0.2      a shape, with options for its parameters
-    sensorgen build designs/23/trix-d0.2.yaml a design file
+    sensorgen build tri --dielectric 0.2        a shape, with options
+    sensorgen build designs/23/trix-d0.2.yaml   a design file
     """
 
 
 def main() -> None:
     """Run the command line and leave with 0 (clean), 1 (findings of severity error) or 2 (wrong input)."""
     try:
+        signal.signal(signal.SIGTERM, _terminate)
         code = cli.main(prog_name="sensorgen", standalone_mode=False)
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except Unprintable as error:
         code = _complain(error, FOUND_ERRORS)
     except SensorgenError as error:
@@ -60,13 +68,28 @@ def main() -> None:
     except MemoryError:
         code = _complain("not enough memory for this design: use a longer period or a smaller sensor", WRONG_INPUT)
     except (KeyboardInterrupt, click.Abort):
-        code = _complain("interrupted; no file was changed", 130)
+        code = _complain("interrupted; no file is half-written", 128 + signal.SIGINT)
+    except _Terminated:
+        code = _complain("told to end; no file is half-written", 128 + signal.SIGTERM)
     except BrokenPipeError:  # the reader of a pipe has gone: nothing to say, and nobody to say it to
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _silence()
         code = 0
+    except (OSError, UnicodeEncodeError) as error:
+        _silence()
+        code = _complain(f"cannot write the output: {getattr(error, 'strerror', None) or error}", WRONG_INPUT)
     sys.exit(code if isinstance(code, int) else 0)
 
 
+def _terminate(_: int, __: FrameType | None) -> None:
+    raise _Terminated
+
+
+def _silence() -> None:
+    """Let what is still in the output's buffer go nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def _complain(what: object, code: int) -> int:
-    click.echo(f"sensorgen: {what}", err=True)
+    text = str(what)
+    click.echo(text if text.startswith("Usage:") else f"sensorgen: {' '.join(text.split())}", err=True)
     return code

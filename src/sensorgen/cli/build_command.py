@@ -21,6 +21,7 @@ OWN: list[click.Parameter] = [
 
 
 def _work(design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool, as_json: bool) -> int:
+    from sensorgen import store
     from sensorgen.build import STEPS, build
     from sensorgen.errors import Unprintable
 
@@ -33,7 +34,7 @@ def _work(design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool
         else:
             show.findings(error.findings)
         raise
-    files = sorted(str(p.relative_to(built.folder).as_posix()) for p in built.folder.rglob("*") if p.is_file())
+    files = sorted([*store.listed(built.folder), store.MANIFEST])
     if as_json:
         found = [f.as_dict() for f in built.review.findings]
         show.as_json({"name": design.name, "folder": str(built.folder), "files": files, "findings": found, "prediction": built.prediction})
@@ -46,5 +47,7 @@ def _work(design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool
 
 
 command = DesignGroup(
-    _work, OWN, name="build", help="Write everything that a design's print needs: 3MF, STEP, profiles, drawing, prediction."
-)
+    _work, OWN, name="build",
+    help="Write everything that a design's print needs: 3MF, STEP, profiles, drawing, prediction.",
+    short_help="Write all that a print needs: 3MF, STEP, profiles, drawing.",
+)  # fmt: skip

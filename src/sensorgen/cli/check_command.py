@@ -29,4 +29,4 @@ def _work(design: "Design", *, strict: bool, as_json: bool) -> int:
     return 1 if held.errors(strict) else 0
 
 
-command = DesignGroup(_work, OWN, name="check", help="Check a design against nozzle, layers and bed, before printing.")
+command = DesignGroup(_work, OWN, name="check", help="Check a design against nozzle, layers and bed.")

@@ -3,11 +3,14 @@
 import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from sensorgen import registry, shapes, units
+from sensorgen.cli.words import Length, OneOf
 from sensorgen.errors import BadInput, SensorgenError, UnknownName
 
 if TYPE_CHECKING:
@@ -17,27 +20,15 @@ Data = dict[str, Any]
 Work = Callable[..., int]
 
 
-class Length(click.ParamType):
-    """A length, in millimetres unless it names another unit."""
-
-    name = "mm"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Read a length as typed [mm]."""
-        if isinstance(value, float):
-            return value
-        try:
-            return units.length_mm(value)
-        except BadInput as error:
-            self.fail(str(error), param, ctx)
-
-
 class DesignGroup(click.Group):
     """A command whose first word is a shape or a design file; each shape brings its own options."""
 
     def __init__(self, work: Work, own: list[click.Parameter], **attributes: Any) -> None:
         """``work`` gets the design and the values of the command's ``own`` options; it returns the exit code."""
-        super().__init__(subcommand_metavar="{SHAPE|DESIGN.yaml} [OPTIONS]", **attributes)
+        super().__init__(
+            options_metavar="", subcommand_metavar="{SHAPE|DESIGN.yaml} [OPTIONS]", epilog="SHAPE --help lists the options.",
+            context_settings={"ignore_unknown_options": True}, **attributes,
+        )  # fmt: skip
         self.work, self.own = work, own
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -46,32 +37,53 @@ class DesignGroup(click.Group):
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command:
         """The command for a shape, or for a design file."""
-        if _is_file(name):
-            from sensorgen import yamlfile
+        if not _is_file(name):
+            return self._command(name, registry.load(shapes, name), {"shape": name})
+        from sensorgen import yamlfile
 
-            base = {"name": Path(name).stem} | yamlfile.read(Path(name))
-            return self._command(name, str(base.get("shape", "")), base)
-        return self._command(name, name, {"shape": name})
+        base = {"name": Path(name).stem} | yamlfile.read(Path(name))
+        try:
+            module = registry.load(shapes, base["shape"]) if isinstance(base.get("shape"), str) else None
+        except UnknownName as error:
+            raise error.within(name) from None
+        return self._command(name, module, base)
 
-    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str, click.Command, list[str]]:
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
         """Take the first word; an option in its place is the user's slip."""
+        if ctx.resilient_parsing:  # the shell asks for words to complete
+            try:
+                return args[0], self.get_command(ctx, args[0]), args[1:]
+            except SensorgenError:
+                return None, None, []
         if args[0].startswith("-"):
-            raise click.UsageError(f"no such option before the shape: {args[0]}. Write: {ctx.command_path} SHAPE {' '.join(args)}")
+            raise BadInput(f"{args[0]} stands before the shape; write {ctx.command_path} {{SHAPE|DESIGN.yaml}} {args[0]} ...")
         return args[0], self.get_command(ctx, args[0]), args[1:]
 
-    def _command(self, name: str, shape: str, base: Data) -> click.Command:
-        module = registry.load(shapes, shape) if shape or not _is_file(name) else None
-        params = _parameter_options(module.Params) if module else []
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Files, and the shapes."""
+        return [CompletionItem(incomplete, type="file"), *super().shell_complete(ctx, incomplete)]
 
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the shapes under their own name."""
+        with formatter.section("Shapes"):
+            formatter.write_dl([(name, _about(registry.load(shapes, name)).partition("\n")[0]) for name in self.list_commands(ctx)])
+
+    def _command(self, name: str, module: ModuleType | None, base: Data) -> click.Command:
         def run(**given: Any) -> int:
             own = {p.name: given.pop(p.name) for p in self.own if p.name}
             return self.work(_design(base, given, name), **own)
 
-        about = (module.__doc__ or "").strip() if module else ""
+        params = _parameter_options(module.Params) if module else []
+        about = _about(module)
         return click.Command(
-            name, params=[*params, *_design_options(), *self.own], callback=run, help=about.replace("::\n\n", ":\n\n\b\n"),
-            short_help=about.partition("\n")[0],
-        )  # fmt: skip
+            name, params=[*params, *_design_options(), *self.own], callback=run, help=about, short_help=about.partition("\n")[0]
+        )
+
+
+def _about(module: ModuleType | None) -> str:
+    """What a shape's file says of it; click leaves a picture alone that follows a backspace."""
+    about = (module.__doc__ or "").strip() if module else ""
+    return about.replace("\n\n::\n\n", "\n\n\b\n").replace("::\n\n", ":\n\n\b\n")
 
 
 def _is_file(word: str) -> bool:
@@ -90,22 +102,26 @@ def _parameter_options(params: type) -> list[click.Parameter]:
         options.append(
             click.Option(
                 [option_of(field.name), field.name],
-                type=click.Choice(choices) if choices else Length(),
-                help=f"{field.metadata['help']}  [default: {field.default}]",
+                type=OneOf(choices) if choices else Length(),
+                help=f"{field.metadata['help']}  [default: {_plainly(field.default)}]",
             )
         )
     return options
 
 
+def _plainly(default: float | str) -> str:
+    return f"{default:g}" if isinstance(default, float) else default
+
+
 def _design_options() -> list[click.Parameter]:
     return [
         click.Option(["--size"], metavar="LxW", help="Length and width at once, as in 100x10."),
-        click.Option(["--orientation"], type=click.Choice(["as-drawn", "upside-down"]), help="How it lies on the bed."),
+        click.Option(["--orientation"], type=OneOf(["as-drawn", "upside-down"]), help="How it lies on the bed; as-drawn if not given."),
         click.Option(["--support"], metavar="MATERIAL", help="Fill the air with a soluble support: bvoh, pla, none."),
         click.Option(["--material"], multiple=True, metavar="PART=NAME[@SOURCE]",
                      help="Material of a part (electrode, top_electrode, film, dielectric ...) and the source of its values."),
-        click.Option(["--printer"], metavar="NAME", help="A printer that is listed, or a YAML file."),
-        click.Option(["--quality"], metavar="NAME", help="fine, extrafine, or a YAML file."),
+        click.Option(["--printer"], metavar="NAME", help="A printer that is listed, or a YAML file; diabase-h5 if not given."),
+        click.Option(["--quality"], metavar="NAME", help="A quality that is listed, or a YAML file; fine if not given."),
         click.Option(["--nozzle", "nozzle_mm"], type=Length(), help="Nozzle diameter, when not the printer's own."),
         click.Option(["--tool"], multiple=True, metavar="MATERIAL=NUMBER", help="Tool of a material, in the printer's numbers."),
         click.Option(["--infill"], multiple=True, metavar="[MATERIAL=]PERCENT", help="Infill of a material; of the dielectric if none is named."),
@@ -119,17 +135,20 @@ def _design_options() -> list[click.Parameter]:
 def _design(base: Data, given: Data, word: str) -> "Design":
     from sensorgen import design
 
-    data = _merged({k: v for k, v in base.items() if k != "name"}, _changes(base, given, word))
-    untouched = data == {k: v for k, v in base.items() if k != "name"}
-    name = given["name"] or (base.get("name", "") if untouched else "")
-    return design.make(data | ({"name": name} if name else {}), word if _is_file(word) else "")
+    unnamed = {k: v for k, v in base.items() if k != "name"}
+    data = _merged(unnamed, _changes(base, given))
+    if given["name"] is not None:
+        data["name"] = given["name"]
+    elif data == unnamed and "name" in base:
+        data["name"] = base["name"]
+    return design.make(data, word if _is_file(word) else "")
 
 
-def _changes(base: Data, given: Data, word: str) -> Data:
+def _changes(base: Data, given: Data) -> Data:
     """The options that were given, as the part of a design file that they stand for."""
-    known = {f.name for f in dataclasses.fields(registry.load(shapes, str(base["shape"])).Params)} if "shape" in base else set()
+    known = {f.name for f in dataclasses.fields(registry.load(shapes, base["shape"]).Params)} if isinstance(base.get("shape"), str) else set()
     parameters = {k: given[k] for k in known if given.get(k) is not None}
-    parameters |= _size(given["size"]) if given["size"] else {}
+    parameters |= _size(given["size"]) if given["size"] is not None else {}
     slots = _slots(given["material"]) | _support(given["support"])
     dielectric = _dielectric(base, slots)
     changes = {
@@ -140,7 +159,7 @@ def _changes(base: Data, given: Data, word: str) -> Data:
         **{k: given[k] for k in ("orientation", "printer", "quality", "nozzle_mm", "shrinkage") if given[k] is not None},
     }
     for key, value in _pairs(given["settings"], "--set"):
-        changes = _merged(changes, _setting(key, value, known, word))
+        changes = _merged(changes, _setting(key, value, known))
     return {k: v for k, v in changes.items() if v != {}}
 
 
@@ -151,10 +170,11 @@ def _merged(base: Any, change: Any) -> Any:
 
 
 def _size(text: str) -> Data:
-    parts = text.lower().replace("×", "x").split("x")
-    if len(parts) != 2:
-        raise BadInput(f"--size {text!r}: expected LENGTHxWIDTH, as in 100x10")
-    return {"length_mm": units.length_mm(parts[0]), "width_mm": units.length_mm(parts[1])}
+    try:
+        length, width = map(units.length_mm, text.lower().replace("×", "x").split("x"))
+    except (ValueError, BadInput):
+        raise BadInput(f"--size {text!r}: expected LENGTHxWIDTH, as in 100x10") from None
+    return {"length_mm": length, "width_mm": width}
 
 
 def _slots(words: tuple[str, ...]) -> Data:
@@ -186,7 +206,7 @@ def _infill(given: Data, dielectric: str) -> Data:
     return found
 
 
-def _setting(key: str, value: str, known: set[str], word: str) -> Data:
+def _setting(key: str, value: str, known: set[str]) -> Data:
     """One ``--set``: a parameter of the shape, or a key of the design file with dots between its parts."""
     path = ["parameters", key] if key in known else key.split(".")
     if path[0] == "parameters":
@@ -195,8 +215,8 @@ def _setting(key: str, value: str, known: set[str], word: str) -> Data:
         end = _plain(value)
     from sensorgen.design import Design
 
-    if path[0] not in Design.model_fields:
-        raise UnknownName("key", key, known | set(Design.model_fields))
+    if path[0] not in Design.model_fields or len(path) > 3:
+        raise UnknownName("key of --set", key, known | set(Design.model_fields))
     for part in reversed(path):
         end = {part: end}
     return dict(end)
@@ -226,9 +246,10 @@ def _pairs(words: tuple[str, ...], option: str) -> list[tuple[str, str]]:
 
 
 def _integer(value: str, option: str) -> int:
-    if not value.isdigit():
-        raise BadInput(f"{option}: {value!r} is not a whole number")
-    return int(value)
+    try:
+        return int(value)
+    except ValueError:
+        raise BadInput(f"{option}: {value!r} is not a whole number") from None
 
 
 def _number(value: str, option: str) -> float:

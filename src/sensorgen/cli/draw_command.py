@@ -32,4 +32,4 @@ def _work(design: "Design", *, output: str | None) -> int:
     return 0
 
 
-command = DesignGroup(_work, OWN, name="draw", help="Draw the cross-section with dimensions, layers and findings, as SVG.")
+command = DesignGroup(_work, OWN, name="draw", help="Draw the cross-section, its layers and findings, as SVG.")

@@ -22,5 +22,7 @@ def _work(design: "Design", *, as_json: bool) -> int:
 
 
 command = DesignGroup(
-    _work, OWN, name="predict", help="Predict capacitance with its bounds, electrode resistance, corner frequency and impedance."
-)
+    _work, OWN, name="predict",
+    help="Predict capacitance with its bounds, electrode resistance, corner frequency and impedance.",
+    short_help="Predict capacitance, resistance and impedance.",
+)  # fmt: skip

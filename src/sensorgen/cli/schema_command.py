@@ -3,9 +3,9 @@
 import click
 
 
-@click.command("schema", help="Print the JSON Schema of the design file, for editors that check while you type.")
+@click.command("schema", short_help="Print the JSON Schema of the design file.")
 def command() -> None:
-    """Print the schema."""
+    """Print the JSON Schema of the design file, for editors that check while you type."""
     from sensorgen import catalogue
     from sensorgen.cli import show
 

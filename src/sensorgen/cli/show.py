@@ -54,10 +54,10 @@ def prediction(predicted: Mapping[str, Any]) -> None:
     }
     for name, value in rows.items():
         click.echo(f"{name:17}{value}")
-    click.echo("impedance        at         Re [ohm]      Im [ohm]      (Im between the bounds of C)")
+    click.echo(f"{'impedance at':>17}  {'Re [ohm]':>11}   {'Im [ohm]':>11}   Im at the bounds of C")
     for tone in predicted["impedance_ohm"]:
         low, high = tone["im_range"]
-        click.echo(f"{si(tone['frequency_hz'], 'Hz'):>26}  {tone['re']:11.5g}   {tone['im']:11.5g}   {low:.4g} .. {high:.4g}")
+        click.echo(f"{si(tone['frequency_hz'], 'Hz'):>17}  {tone['re']:11.5g}   {tone['im']:11.5g}   {low:.4g} .. {high:.4g}")
 
 
 def _between(bounds: Mapping[str, float], unit: str) -> str:
@@ -84,8 +84,8 @@ def as_json(data: Any) -> None:
 
 @contextmanager
 def progress(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
-    """A bar that moves with the named steps; only for a person, and only once a second has passed."""
-    if not sys.stderr.isatty():
+    """A bar that moves with the named steps and is gone afterwards; only for a person."""
+    if sys.stderr is None or not sys.stderr.isatty():
         yield lambda _: None
         return
     started = time.monotonic()

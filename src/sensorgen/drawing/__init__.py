@@ -64,7 +64,7 @@ def svg(
     lanes, details = _details(scene, grid)
     wholes = overview.arrange(details, scene.size_mm[2], LEFT, RIGHT, OVERVIEW + 10)
     marked = markers.ranked(findings)
-    entries = markers.placed(marked, LEFT + 2, FOOT + 8.5, SPLIT - 3, BOTTOM - 2)
+    entries = markers.placed(marked, panels.letters(scene.bodies), (LEFT + 2, FOOT + 8.5, SPLIT - 3, BOTTOM - 2))
     shown = [entry.mark for entry in entries]
     gap = _gap(details)
     parts = [

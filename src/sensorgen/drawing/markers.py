@@ -1,15 +1,15 @@
 """Findings: numbered markers at their places, and the list that the numbers lead to."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import cos, hypot, pi, sin
 
-from sensorgen.drawing.panels import GUTTER, Panel
+from sensorgen.drawing.panels import GUTTER, Panel, Room
 from sensorgen.drawing.paper import Frame, clean, element, fitted, line, spread, text, wrapped
 from sensorgen.findings import SEVERITIES, Finding
 from sensorgen.scene import AXES, Point
 
-MOST = 10
+MOST, FEW = 10, 6  # findings in the list; up to so many have room for longer words
 RADIUS, CLEAR = 2.1, 4.5  # of a marker; from one marker's centre to the next [mm]
 LINE, INDENT, COLUMNS_APART = 2.95, 6.0, 5.0  # of the list [mm]
 DISTANCES, ANGLES = (5.0, 7.5, 10.0, 13.0, 17.0, 22.0), 16
@@ -154,13 +154,15 @@ def _balloon(mark: Marked, x: float, y: float) -> str:
     return element("circle", f"balloon {mark.kind}", cx=x, cy=y, r=RADIUS) + text(ink, x, y + 0.85, str(mark.number))
 
 
-def placed(marked: Sequence[Marked], left: float, top: float, right: float, bottom: float) -> list[Entry]:
-    """As many findings as there is room for, in two columns between the given sides on the page [mm]."""
+def placed(marked: Sequence[Marked], letters: Mapping[str, str], room: Room) -> list[Entry]:
+    """As many findings as there is room for on the page, in two columns; fewer may have more words."""
+    left, top, right, bottom = room
+    lines = 2 if len(marked) > FEW else 4
     wide = (right - left - COLUMNS_APART) / 2
     entries: list[Entry] = []
     x, y = left, top
     for mark in marked[:MOST]:
-        rows = _rows(mark, wide - INDENT)
+        rows = _rows(mark, letters, wide - INDENT, lines)
         if y + (len(rows) - 1) * LINE > bottom:
             x, y = x + wide + COLUMNS_APART, top
         if x > right - wide + 1e-9 or y + (len(rows) - 1) * LINE > bottom:
@@ -192,19 +194,20 @@ def _plural(kind: str, count: int) -> str:
     return kind if count == 1 or kind in ("info", "waived") else kind + "s"
 
 
-def _rows(mark: Marked, room: float) -> list[tuple[str, str]]:
-    """Class and text of one finding's lines: two for what and where, one for what to do."""
+def _rows(mark: Marked, letters: Mapping[str, str], room: float, lines: int) -> list[tuple[str, str]]:
+    """Class and text of one finding's lines: up to ``lines`` for what and where, one for what to do."""
     f = mark.finding
-    where = ", ".join(_where(f))
-    what = wrapped(f"{f.rule}{f' ({where})' if where else ''}: {f.message}", room, 2)
+    where = ", ".join(_where(f, letters))
+    what = wrapped(f"{f.rule}{f' ({where})' if where else ''}: {f.message}", room, lines)
     advice = f"waived: {f.waiver}" if f.waiver else f.advice
     kind = "faint" if f.waiver else ""
     return [(kind, row) for row in what] + [("faint", fitted(clean(advice), room))] * bool(advice)
 
 
-def _where(f: Finding) -> Iterator[str]:
+def _where(f: Finding, letters: Mapping[str, str]) -> Iterator[str]:
+    """Body, by the letter that it has in the legend; layer; number of places."""
     if f.body:
-        yield f.body
+        yield " / ".join(letters.get(name, name) for name in f.body.split(" / "))
     if f.layer is not None:
         yield f"layer {f.layer}"
     if f.count > 1:

@@ -44,9 +44,20 @@ def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
             found.append((body.name, f"not a closed oriented surface ({solids[body.name].status().name})"))
         elif abs(got - exact) > 1e-9 * exact:
             found.append((body.name, f"encloses {got:.9g} mm3, not {exact:.9g} mm3"))
+        elif (twice := _self_overlap_mm3(solids[body.name])) > OVERLAP_MM * solids[body.name].surface_area():
+            found.append((body.name, f"overlaps itself by {twice:.3g} mm3"))
     if found:
         return found
     return [(f"{a} / {b}", f"overlap by {volume:.3g} mm3") for a, b, volume in _overlaps(solids)]
+
+
+def _self_overlap_mm3(solid: "manifold3d.Manifold") -> float:
+    """Volume that the shells of one body enclose more than once [mm3]."""
+    import manifold3d
+
+    shells = solid.decompose()
+    united = manifold3d.Manifold.batch_boolean(shells, manifold3d.OpType.Add) if len(shells) > 1 else solid
+    return float(solid.volume() - united.volume())
 
 
 def _overlaps(solids: Mapping[str, "manifold3d.Manifold"]) -> list[tuple[str, str, float]]:

@@ -1,0 +1,44 @@
+"""Kinds of words on the command line: lengths with their units, and names from a list."""
+
+from typing import Any
+
+import click
+
+from sensorgen import units
+from sensorgen.errors import BadInput, UnknownName
+
+
+class Length(click.ParamType):
+    """A length, in millimetres unless it names another unit."""
+
+    name = "mm"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Read a length as typed [mm]."""
+        if isinstance(value, float):
+            return value
+        try:
+            return units.length_mm(value)
+        except BadInput as error:
+            raise error.within(_said(param)) from None
+
+
+class OneOf(click.Choice):  # type: ignore[type-arg]
+    """One name of a list; the nearest is offered where another is given."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Take a name that is in the list."""
+        if value not in self.choices:
+            raise UnknownName(_said(param), str(value), self.choices)
+        return str(value)
+
+    def get_missing_message(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """Nothing: the message names the argument by its choices."""
+        return ""
+
+
+def _said(param: click.Parameter | None) -> str:
+    """A parameter as the user types it."""
+    if isinstance(param, click.Option):
+        return max(param.opts, key=len)
+    return param.name or "" if param else ""

@@ -1,0 +1,110 @@
+"""What every shape must do; a new file in ``shapes/`` is tested here before it has a test of its own.
+
+A new shape has no stored scene yet: ``STORE_SCENES=1 pytest tests/shapes`` writes the missing ones.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sensorgen import registry, shapes
+from sensorgen.design import make
+from sensorgen.geometry import meshes, validity
+from sensorgen.review import review
+from sensorgen.scene import Envelope, Fill, Scene, area_mm2
+
+STORED = Path(__file__).parents[1] / "reference" / "scenes"
+SMALL = {"length_mm": 3.0, "width_mm": 2.5}  # one and a half periods: the edge is clipped
+ORIENTATIONS = ("as-drawn", "upside-down")
+
+
+@pytest.fixture(params=registry.names(shapes))
+def name(request) -> str:
+    return request.param
+
+
+@pytest.fixture
+def shape(name):
+    return registry.load(shapes, name)
+
+
+def small(shape, fill: Fill | None = None) -> Scene:
+    return shape.scene(shape.Params(**SMALL), fill or Fill())
+
+
+def test_there_are_shapes():
+    assert {"rect", "reference", "tri"} <= set(registry.names(shapes))
+
+
+def test_its_file_says_what_it_is(shape):
+    assert shape.__doc__
+    assert issubclass(shape.Params, Envelope)
+
+
+def test_every_parameter_has_help_and_a_range_that_holds_its_default(shape):
+    for field in fields(shape.Params):
+        assert field.metadata["help"].endswith("."), field.name
+        if "choices" in field.metadata:
+            assert field.default in field.metadata["choices"], field.name
+        else:
+            low, high = field.metadata["range"]
+            assert low <= field.default <= high, field.name
+
+
+def test_it_imports_the_scene_and_the_standard_library_only(name):
+    code = (
+        "import json, sys; before = set(sys.modules); "
+        f"import sensorgen.shapes.{name}; print(json.dumps(sorted(set(sys.modules) - before)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)  # noqa: S603
+    loaded = set(json.loads(done.stdout))
+    ours = {m for m in loaded if m.partition(".")[0] == "sensorgen"}
+    assert ours <= {"sensorgen", "sensorgen.scene", "sensorgen.errors", "sensorgen.shapes", f"sensorgen.shapes.{name}"}
+    assert {m.partition(".")[0] for m in loaded - ours} <= set(sys.stdlib_module_names)
+
+
+def test_its_defaults_pass_the_checks(name):
+    assert review(make({"shape": name, "printer": "diabase-h5", "quality": "fine"})).errors() == []
+
+
+def test_with_support_its_volumes_add_up_to_the_envelope(shape):
+    scene = small(shape, Fill(support="bvoh"))
+    assert sum(b.volume_mm3() for b in scene.bodies) == pytest.approx(np.prod(scene.size_mm), rel=1e-12)
+
+
+@pytest.mark.parametrize("orientation", ORIENTATIONS)
+@pytest.mark.parametrize("fill", [Fill(), Fill(support="bvoh"), Fill(film="pla")], ids=["plain", "support", "film"])
+def test_its_bodies_are_closed_and_apart(shape, fill, orientation):
+    scene = small(shape, fill)
+    scene = scene.turned_over() if orientation == "upside-down" else scene
+    made = {body.name: meshes.mesh(body) for body in scene.bodies}
+    assert validity.faults(scene, made) == []
+
+
+def test_its_outlines_turn_left_and_stay_in_the_envelope(shape):
+    scene = replace(small(shape))
+    for prism in (p for body in scene.bodies for p in body.prisms):
+        assert area_mm2(prism.outline) > 0
+        for axis, size in zip("xyz", scene.size_mm, strict=True):
+            low, high = prism.span(axis)
+            assert 0 <= low < high <= size + 1e-12
+
+
+def test_both_terminals_are_there_and_names_are_unique(shape):
+    bodies = small(shape, Fill(support="bvoh")).bodies
+    assert sorted(b.terminal for b in bodies if b.terminal) == ["bottom", "top"]
+    assert len({b.name for b in bodies}) == len(bodies)
+
+
+def test_its_scene_is_the_stored_one(name, shape):
+    scene = json.loads(json.dumps(asdict(small(shape))))
+    path = STORED / f"{name}.json"
+    if os.environ.get("STORE_SCENES") and not path.exists():
+        path.write_text(json.dumps(scene, indent=1) + "\n", "utf-8")
+    assert scene == json.loads(path.read_text("utf-8")), "if the change is meant, delete the file and store it anew"

@@ -1,0 +1,132 @@
+"""The whole way of a design: every file there, right, and the same each time."""
+
+import hashlib
+import json
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from sensorgen import catalogue, design
+from sensorgen.build import build
+from sensorgen.errors import Unprintable
+from sensorgen.threemf import FAMILIES
+
+DESIGNS = Path(__file__).parents[1] / "designs"
+PRINTABLE = sorted(p.relative_to(DESIGNS).as_posix() for p in DESIGNS.rglob("*.yaml") if not p.stem.endswith("-d0"))
+SHORTED = sorted(p.relative_to(DESIGNS).as_posix() for p in DESIGNS.rglob("*-d0.yaml"))
+
+
+def contents(folder):
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A full build of the README's sensor, STEP included."""
+    return build(design.make({"shape": "tri"}), tmp_path_factory.mktemp("whole"))
+
+
+def test_every_promised_file_is_there(whole):
+    files = set(contents(whole.folder))
+    promised = {f"trix-d0.2.{end}" for end in ("prusa.3mf", "cura.3mf", "orca.3mf", "step", "svg")}
+    promised |= {"check.json", "prediction.json", "design.json", "manifest.json"}
+    promised |= {f"profiles/prusa/diabase-h5-{quality}.ini" for quality in ("fine", "extrafine")}
+    assert promised <= files
+    assert {name.split("/")[2] for name in files if name.startswith("profiles/cura/")} == {
+        "definitions", "extruders", "materials", "quality",
+    }  # fmt: skip
+    assert len([n for n in files if n.startswith("profiles/cura/extruders/")]) == 5
+
+
+def test_rebuilt_it_is_the_same_to_the_byte(whole, tmp_path):
+    again = build(design.make({"shape": "tri"}), tmp_path)
+    assert contents(again.folder) == contents(whole.folder)
+
+
+def test_manifest_has_the_hash_of_every_other_file(whole):
+    manifest = json.loads((whole.folder / "manifest.json").read_text("utf-8"))
+    files = {k: hashlib.sha256(v).hexdigest() for k, v in contents(whole.folder).items() if k != "manifest.json"}
+    assert manifest["files"] == files
+    assert manifest["design"] == json.loads((whole.folder / "check.json").read_text("utf-8"))["design"]
+    assert set(manifest["versions"]) >= {"sensorgen", "python", "build123d", "manifold3d", "numpy"}
+
+
+def test_the_design_file_beside_the_results_builds_the_same_design(whole):
+    data = json.loads((whole.folder / "design.json").read_text("utf-8"))
+    assert design.make(data).id() == design.make({"shape": "tri"}).id()
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("name", PRINTABLE)
+def test_lib3mf_reads_every_3mf_of_the_thesis_back(name, family, tmp_path):
+    import lib3mf
+
+    variant = design.load(DESIGNS / name)
+    folder = build(variant, tmp_path, cad=False).folder
+    model = lib3mf.Wrapper().CreateModel()
+    reader = model.QueryReader("3mf")
+    reader.SetStrictModeActive(True)
+    reader.ReadFromFile(str(folder / f"{variant.name}.{family}.3mf"))
+    assert reader.GetWarningCount() == 0
+    objects = model.GetMeshObjects()
+    volumes = {}
+    while objects.MoveNext():
+        mesh = objects.GetCurrentMeshObject()
+        volumes[mesh.GetName()] = volume_mm3(mesh.GetVertices(), mesh.GetTriangleIndices())
+    exact = {body.name: body.volume_mm3() for body in variant.printed.bodies}
+    if family == "prusa":  # PrusaSlicer wants one mesh; its own config names the bodies within
+        assert sum(volumes.values()) == pytest.approx(sum(exact.values()), rel=1e-6)
+    else:
+        # lib3mf keeps float32, whose steps of 7.6e-6 mm at x = 100 mm are up to 1.1e-5 of a strip of 0.7 mm; over
+        # the strips of a body they average out to about 1e-6.
+        assert volumes == {body: pytest.approx(v, rel=2e-6) for body, v in exact.items()}
+
+
+def volume_mm3(vertices, triangles):
+    import numpy as np
+
+    points = np.array([list(v.Coordinates) for v in vertices], float)
+    a, b, c = (points[np.array([list(t.Indices) for t in triangles])[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+
+
+@pytest.mark.parametrize("name", SHORTED)
+def test_a_film_of_nothing_is_refused_unless_forced(name, tmp_path):
+    variant = design.load(DESIGNS / name)
+    with pytest.raises(Unprintable) as caught:
+        build(variant, tmp_path / "out", cad=False)
+    assert [f.rule for f in caught.value.findings if f.severity == "error"] == ["1-short"]
+    assert not (tmp_path / "out").exists()
+    forced = build(variant, tmp_path / "out", cad=False, force=True)
+    assert forced.prediction["capacitance_f"] is None
+    assert "touch" in forced.prediction["reason"]
+
+
+def test_the_drawing_is_well_formed_and_named(whole):
+    root = ET.parse(whole.folder / "trix-d0.2.svg").getroot()
+    assert root.tag.endswith("svg")
+    assert "trix-d0.2" in "".join(root.itertext())
+
+
+def test_profiles_put_each_material_on_its_tool(whole):
+    ini = (whole.folder / "profiles/prusa/diabase-h5-fine.ini").read_text("utf-8")
+    kinds = re.search(r"^filament_type = (.*)$", ini, re.MULTILINE)[1].split(";")
+    assert [kind.strip('"') for kind in kinds] == ["UNUSED", "UNUSED", "ETPU", "X60", "UNUSED"]
+
+
+@pytest.mark.parametrize("printer", ["diabase-h5", "prusa-xl5"])
+def test_nothing_is_wired_to_one_printer(printer, tmp_path):
+    variant = design.make({"shape": "rect", "printer": printer, "materials": {"support": "bvoh"}})
+    built = build(variant, tmp_path, cad=False)
+    config = (built.folder / f"{variant.name}.prusa.3mf").exists()
+    assert config
+    names = {p.name for p in (built.folder / "profiles" / "prusa").iterdir()}
+    assert names == {f"{printer}-fine.ini", f"{printer}-extrafine.ini"}
+
+
+def test_all_listed_shapes_build(tmp_path):
+    for shape in catalogue.shapes():
+        built = build(design.make({"shape": shape, "parameters": {"length_mm": 10}}), tmp_path, cad=False)
+        assert (built.folder / "manifest.json").exists()

@@ -1,0 +1,61 @@
+"""The documents say what the program does."""
+
+import re
+import runpy
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sensorgen.cli import COMMANDS, cli
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", ROOT / "docs" / "tutorial.md"]
+DESIGN = re.compile(r"```yaml\n# (\S+\.yaml)\n(.*?)```", re.DOTALL)
+
+
+def commands():
+    """Every sensorgen command of the pages that does not need the CAD kernel or write elsewhere."""
+    for page in PAGES:
+        for block in re.findall(r"```sh\n(.*?)```", page.read_text("utf-8"), re.DOTALL):
+            for line in block.replace("\\\n", " ").splitlines():
+                words = shlex.split(line, comments=True)
+                if words[:1] == ["sensorgen"] and ">" not in words:
+                    yield pytest.param(words[1:], id=" ".join(words[1:]))
+
+
+def test_the_reference_is_what_the_help_texts_say():
+    generate = runpy.run_path(str(ROOT / "docs" / "generate.py"))
+    assert (ROOT / "docs" / "reference.md").read_text("utf-8") == generate["reference"](), "run `make docs`"
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_each_command_has_help_and_is_in_the_documents(name):
+    assert cli.get_command(None, name).get_short_help_str()
+    assert any(f"sensorgen {name}" in page.read_text("utf-8") for page in [*PAGES, ROOT / "docs" / "reference.md"])
+
+
+@pytest.mark.parametrize("words", list(commands()))
+def test_every_command_of_the_pages_works(words, tmp_path):
+    for page in PAGES:
+        for name, text in DESIGN.findall(page.read_text("utf-8")):
+            (tmp_path / name).write_text(text, "utf-8")
+    (tmp_path / "designs").symlink_to(ROOT / "designs")
+    extra = ["--no-cad"] if words[0] == "build" else []
+    done = subprocess.run([sys.executable, "-m", "sensorgen", *words, *extra], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode in ({0, 1} if "--strict" in words else {0}), done.stderr
+
+
+def test_links_between_the_pages_lead_somewhere():
+    for page in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]:
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text("utf-8")):
+            assert (page.parent / target).exists(), f"{page.name} links to {target}"
+
+
+def test_shape_files_are_named_in_the_contributing_guide():
+    guide = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    modules = {p.stem for p in (ROOT / "src" / "sensorgen").iterdir() if not p.name.startswith(("_", "."))}
+    missing = {m for m in modules if f"`{m}`" not in guide and f"`{m}/`" not in guide and m != "py.typed"}
+    assert not missing

@@ -1,0 +1,105 @@
+"""Sections and columns: together they are the scene."""
+
+import pytest
+
+from sensorgen.scene import Body, Fill, Prism, Scene, area_mm2, box
+from sensorgen.sections import columns, sections
+from sensorgen.shapes import rect, reference, tri
+
+SCENES = {
+    "tri": tri.scene(tri.Params(length_mm=7.13, width_mm=3.3), Fill(support="bvoh")),
+    "tri along y": tri.scene(tri.Params(length_mm=3.3, width_mm=7.13, along="y", isolation_mm=0.1), Fill()),
+    "tri upside down": tri.scene(tri.Params(length_mm=7.13, width_mm=3.3), Fill()).turned_over(),
+    "rect": rect.scene(rect.Params(length_mm=7.13, width_mm=3.3), Fill(support="bvoh")),
+    "rect, two films": rect.scene(rect.Params(length_mm=4.5, width_mm=5.9, along="yx"), Fill(film="pla")),
+    "plate": reference.scene(reference.Params(length_mm=7.0), Fill()),
+}
+
+
+@pytest.fixture(params=SCENES)
+def scene(request):
+    return SCENES[request.param]
+
+
+def test_areas_times_depths_are_the_volumes(scene):
+    for body in scene.bodies:
+        total = sum(s.depth_mm * area_mm2(o) for s in sections(scene) for b, o in s.regions if b.name == body.name)
+        assert total == pytest.approx(body.volume_mm3(), rel=1e-12)
+
+
+def test_layers_of_the_columns_are_the_volumes(scene):
+    def area(column, layer) -> float:
+        heights = [top - bottom for bottom, top in zip(layer.bottom_mm, layer.top_mm, strict=True)]
+        return (column.right_mm - column.left_mm) * sum(heights) / 2
+
+    for body in scene.bodies:
+        total = sum(
+            s.depth_mm * area(c, layer)
+            for s in sections(scene)
+            for c in columns(s)
+            for layer in c.layers
+            if layer.body.name == body.name
+        )
+        assert total == pytest.approx(body.volume_mm3(), rel=1e-9)
+
+
+def test_columns_cover_the_section_and_layers_do_not_overlap(scene):
+    for section in sections(scene):
+        cells = columns(section)
+        size = scene.size_mm["xy".index(section.across)]
+        assert (cells[0].left_mm, cells[-1].right_mm) == (0.0, size)
+        assert all(a.right_mm == b.left_mm for a, b in zip(cells, cells[1:], strict=False))
+        for cell in cells:
+            for low, high in zip(cell.layers, cell.layers[1:], strict=False):
+                assert all(t <= b + 1e-12 for t, b in zip(low.top_mm, high.bottom_mm, strict=True))
+
+
+def test_depths_add_up_to_the_sensor(scene):
+    found = sections(scene)
+    normal = "yx"["xy".index(found[0].across)]
+    assert sum(s.depth_mm for s in found) == pytest.approx(scene.size_mm["xy".index(normal)], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("shape", "options", "depths"),
+    [
+        (reference, {}, [10.0]),
+        (tri, {}, [10.0]),
+        (tri, {"along": "y"}, [100.0]),
+        # Five periods over the width of 10: through the conductor strips (0.7 each), air (0.3 twice), dielectric (0.7).
+        (rect, {}, [3.5, 3.0, 3.5]),
+    ],
+)
+def test_a_section_that_repeats_is_found_once_with_all_its_depth(shape, options, depths):
+    found = sections(shape.scene(shape.Params(**options), Fill()))
+    assert [s.depth_mm for s in found] == pytest.approx(depths, rel=1e-12)
+
+
+def test_a_section_that_repeats_shows_the_prisms_of_its_own_place():
+    """Every region is cut where its own prisms are: a mix of places once lost the later strips, and their volume."""
+    scene = rect.scene(rect.Params(), Fill())
+    for section in sections(scene):
+        here = {(body.name, outline) for body, outline in section.regions}
+        normal = "yx"["xy".index(section.across)]
+        expected = {
+            (body.name, o) for body in scene.bodies for p in body.prisms for o in p.cut(normal, section.at_mm)
+        }
+        assert here == expected
+
+
+def _with(prism: Prism) -> Scene:
+    return Scene((Body("odd", "x60", (prism, box(0, 1, 0, 1, 2, 3))),), (4, 4, 3))
+
+
+SLANT = ((0.0, 0.0), (2.0, 0.0), (1.0, 1.0))
+
+
+def test_an_outline_slanted_in_plan_has_no_constant_section():
+    with pytest.raises(ValueError, match="constant cross-sections"):
+        sections(_with(Prism("z", SLANT, 0, 1)))
+
+
+def test_slants_both_ways_have_no_constant_section():
+    both = Scene((Body("a", "x60", (Prism("x", SLANT, 0, 4),)), Body("b", "x60", (Prism("y", SLANT, 0, 4),))), (4, 4, 1))
+    with pytest.raises(ValueError, match="constant cross-sections"):
+        sections(both)

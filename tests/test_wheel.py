@@ -1,0 +1,27 @@
+"""An installed sensorgen has its data with it."""
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_the_wheel_works_without_the_repository(tmp_path):
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)],
+        cwd=ROOT, check=True, capture_output=True,
+    )  # fmt: skip
+    (wheel,) = tmp_path.glob("*.whl")
+    site = tmp_path / "site"
+    zipfile.ZipFile(wheel).extractall(site)
+    assert {p.name for p in site.iterdir() if p.suffix != ".dist-info"} == {"sensorgen"}
+    # -S -I would hide the libraries, too; the extracted folder comes first on the path instead.
+    code = (
+        f"import sys; sys.path.insert(0, {str(site)!r}); import sensorgen; assert sensorgen.__file__.startswith({str(site)!r});"
+        "from sensorgen.cli import main; sys.argv = ['sensorgen', 'build', 'tri', '--length', '6', '--no-cad']; main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / "trix-d0.2-length6" / "manifest.json").exists()
