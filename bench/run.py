@@ -99,7 +99,12 @@ def meshing() -> tuple[list[dict[str, object]], dict[str, list[list[float]]]]:
         row("mesh of rect, 165 x 165 cells [s]", rect[1], 1.0, f"{rect[4]:.3g} triangles, volume to {rect[3]:.0e}"),
         row("the same, peak memory [MB]", rect[2], 600.0, "numpy and manifold3d included"),
         row("mesh of tri, 165 periods [s]", tri[1], 0.05, f"volume to {tri[3]:.0e}"),
-        row("rect: time per cell, 165 against 40", (rect[1] / 165**2) / (curves["rect"][3][1] / 40**2), 1.5, "1 is linear growth"),
+        row(
+            "rect: time per cell, 165 against 40",
+            (rect[1] / 165**2) / (curves["rect"][3][1] / 40**2),
+            1.5,
+            "1 is linear growth",
+        ),
     ]
     return table, curves
 
@@ -116,7 +121,9 @@ def against_union() -> list[dict[str, object]]:
 
     def union() -> "manifold3d.Manifold":
         boxes = [solid(p) for p in body.prisms]
-        return manifold3d.Manifold.batch_boolean(boxes, manifold3d.OpType.Add)
+        made = manifold3d.Manifold.batch_boolean(boxes, manifold3d.OpType.Add)
+        made.to_mesh64()  # it works only when asked
+        return made
 
     def solid(p) -> "manifold3d.Manifold":
         low, high = zip(*(p.span(axis) for axis in "xyz"), strict=True)
@@ -174,7 +181,12 @@ def plot_growth(curves: dict[str, list[list[float]]]) -> None:
     left.plot(165, 0.05, "^", color="firebrick", label="target, tri")
     right.axhline(600, color="firebrick", ls="--", lw=1, label="target, rect")
     left.set(xlabel="cells (rect) or periods (tri)", ylabel="time of scene and mesh [s]", title="Growth of the mesher")
-    right.set(xlabel="cells (rect) or periods (tri)", ylabel="peak memory [MB]", ylim=(0, 650), title="Memory, libraries included")
+    right.set(
+        xlabel="cells (rect) or periods (tri)",
+        ylabel="peak memory [MB]",
+        ylim=(0, 650),
+        title="Memory, libraries included",
+    )
     for axes in (left, right):
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
@@ -206,7 +218,9 @@ def table(rows: list[dict[str, object]], found: list[dict[str, object]]) -> str:
     lines = ["| what | target, at most | got | |", "|---|---|---|---|"]
     lines += [f"| {r['what']} | {r['target']:g} | {r['got']:.3g} | {r['note']} |" for r in rows]
     lines += ["", "| capacitance by `columns` | time [ms] | lower bound [%] | upper bound [%] |", "|---|---|---|---|"]
-    lines += [f"| {m['cell']} | {m['seconds'] * 1e3:.2f} | {m['lower'] * 100:+.2f} | {m['upper'] * 100:+.2f} |" for m in found]
+    lines += [
+        f"| {m['cell']} | {m['seconds'] * 1e3:.2f} | {m['lower'] * 100:+.2f} | {m['upper'] * 100:+.2f} |" for m in found
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -219,7 +233,9 @@ def main() -> None:
     plot_growth(curves)
     plot_models(found)
     (RESULTS / "table.md").write_text(table(rows, found), "utf-8")
-    (RESULTS / "results.json").write_text(json.dumps({"rows": rows, "curves": curves, "models": found}, indent=1) + "\n", "utf-8")
+    (RESULTS / "results.json").write_text(
+        json.dumps({"rows": rows, "curves": curves, "models": found}, indent=1) + "\n", "utf-8"
+    )
     print(table(rows, found))
 
 

@@ -23,10 +23,9 @@ def sensorgen(*words: str) -> str:
 
 def reference() -> str:
     """The command reference."""
-    parts = ["# Command reference\n\nWritten by `make docs` from the `--help` texts; a test holds the two together.\n"]
-    for page in PAGES:
-        parts.append(f"## {' '.join(['sensorgen', *page])}\n\n```text\n{sensorgen(*page, '--help').rstrip()}\n```\n")
-    return "\n".join(parts)
+    head = "# Command reference\n\nWritten by `make docs` from the `--help` texts; a test holds the two together.\n"
+    pages = (f"## {' '.join(['sensorgen', *p])}\n\n```text\n{sensorgen(*p, '--help').rstrip()}\n```\n" for p in PAGES)
+    return "\n".join([head, *pages])
 
 
 def main() -> None:

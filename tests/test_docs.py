@@ -44,7 +44,9 @@ def test_every_command_of_the_pages_works(words, tmp_path):
             (tmp_path / name).write_text(text, "utf-8")
     (tmp_path / "designs").symlink_to(ROOT / "designs")
     extra = ["--no-cad"] if words[0] == "build" else []
-    done = subprocess.run([sys.executable, "-m", "sensorgen", *words, *extra], cwd=tmp_path, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "sensorgen", *words, *extra], cwd=tmp_path, capture_output=True, text=True
+    )
     assert done.returncode in ({0, 1} if "--strict" in words else {0}), done.stderr
 
 

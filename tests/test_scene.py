@@ -209,6 +209,13 @@ def test_area_has_the_sign_of_the_turn():
     assert area_mm2(((0, 0), (0, 3), (2, 3), (2, 0))) == -6
 
 
+@pytest.mark.parametrize("along", ["x", "y"])
+def test_what_is_shorter_than_its_pattern_has_no_empty_bodies(along):
+    """Half a period holds one cog, and no hanging dielectric."""
+    scene = tri.scene(tri.Params(length_mm=1.0, width_mm=1.0, along=along), Fill())
+    assert [b.name for b in scene.bodies] == ["bottom_electrode", "film_and_lower", "top_electrode_with_cogs"]
+
+
 def test_a_body_is_found_by_its_name():
     scene = Scene((Body("film", "x60", (box(0, 1, 0, 1, 0, 1),)),), (1, 1, 1))
     assert scene.body("film").volume_mm3() == 1

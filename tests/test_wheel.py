@@ -19,7 +19,8 @@ def test_the_wheel_works_without_the_repository(tmp_path):
     assert {p.name for p in site.iterdir() if p.suffix != ".dist-info"} == {"sensorgen"}
     # -S -I would hide the libraries, too; the extracted folder comes first on the path instead.
     code = (
-        f"import sys; sys.path.insert(0, {str(site)!r}); import sensorgen; assert sensorgen.__file__.startswith({str(site)!r});"
+        f"import sys; site = {str(site)!r}; sys.path.insert(0, site); import sensorgen;"
+        "assert sensorgen.__file__.startswith(site);"
         "from sensorgen.cli import main; sys.argv = ['sensorgen', 'build', 'tri', '--length', '6', '--no-cad']; main()"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from sensorgen import __version__, drawing, materials, printer, store, threemf
-from sensorgen.design import Design
+from sensorgen.design import Design, Infill
 from sensorgen.errors import Unprintable
 from sensorgen.geometry.cad import CadProcess
 from sensorgen.predict import prediction
@@ -43,7 +43,15 @@ class Built:
     prediction: dict[str, Any]
 
 
-def build(design: Design, out: Path, *, cad: bool = True, force: bool = False, strict: bool = False, step: Step = lambda _: None) -> Built:
+def build(
+    design: Design,
+    out: Path,
+    *,
+    cad: bool = True,
+    force: bool = False,
+    strict: bool = False,
+    step: Step = lambda _: None,
+) -> Built:
     """Write all files of a design into ``out/<name>``.
 
     Parameters
@@ -128,7 +136,9 @@ def profiles(design: Design) -> dict[str, str]:
     texts: dict[str, str] = {}
     qualities = {q.name: q for q in (*map(printer.load_quality, QUALITIES), design.layers)}
     for quality in qualities.values():
-        texts[f"profiles/prusa/{design.machine.name}-{quality.name}.ini"] = prusa.profile(design.machine, quality, loads)
+        texts[f"profiles/prusa/{design.machine.name}-{quality.name}.ini"] = prusa.profile(
+            design.machine, quality, loads
+        )
         texts |= {f"profiles/cura/{path}": text for path, text in cura.profiles(design.machine, quality, loads).items()}
     return texts
 
@@ -139,8 +149,8 @@ def _loads(design: Design) -> dict[int, Load]:
 
 
 def _load(design: Design, name: str) -> Load:
-    infill = design.infill.get(name)
-    return Load(materials.load(name), design.used()[name], infill and infill.percent, infill and infill.pattern)
+    infill = design.infill.get(name, Infill())
+    return Load(materials.load(name), design.used()[name], infill.percent, infill.pattern)
 
 
 def _parts(design: Design, held: Review) -> list[threemf.Part]:

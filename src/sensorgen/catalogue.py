@@ -24,7 +24,8 @@ def _shape(name: str) -> dict[str, Any]:
 def _said(field: dataclasses.Field[Any]) -> str:
     choices = field.metadata.get("choices")
     limits = "one of " + ", ".join(choices) if choices else "{:g} to {:g} mm".format(*field.metadata["range"])
-    return f"{field.metadata['help']} {limits}, default {field.default}"
+    default = field.default if choices else f"{field.default:g}"
+    return f"{field.metadata['help']} ({limits}; default {default})"
 
 
 def materials() -> Entries:
@@ -74,7 +75,10 @@ def _printer(p: printer.Printer) -> dict[str, Any]:
 def qualities() -> Entries:
     """Print qualities with their layers."""
     found = (printer.load_quality(name) for name in printer.quality_names())
-    return {q.name: {"about": q.title, "values": [f"layers {q.layer_mm:g} mm, first {q.first_layer_mm:g} mm"]} for q in found}
+    return {
+        q.name: {"about": q.title, "values": [f"layers {q.layer_mm:g} mm, first {q.first_layer_mm:g} mm"]}
+        for q in found
+    }
 
 
 def _model(name: str) -> dict[str, Any]:
@@ -92,12 +96,19 @@ def schema() -> dict[str, Any]:
     names = registry.names(shape_files)
     made["properties"]["shape"] |= {"enum": names}
     made["properties"]["parameters"] = {"type": "object"}
-    made["allOf"] = [{"if": {"properties": {"shape": {"const": n}}}, "then": {"properties": {"parameters": _parameters(n)}}} for n in names]
+    made["allOf"] = [
+        {"if": {"properties": {"shape": {"const": n}}}, "then": {"properties": {"parameters": _parameters(n)}}}
+        for n in names
+    ]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made, "title": "sensorgen design"}
 
 
 def _parameters(name: str) -> dict[str, Any]:
-    return {"type": "object", "additionalProperties": False, "properties": {k: _property(f) for k, f in design.fields(name).items()}}
+    return {
+        "type": "object",
+        "additionalProperties": False,
+        "properties": {k: _property(f) for k, f in design.fields(name).items()},
+    }
 
 
 def _property(field: dataclasses.Field[Any]) -> dict[str, Any]:

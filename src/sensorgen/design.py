@@ -24,7 +24,8 @@ from sensorgen.scene import Envelope, Fill, Scene
 MAX_CELLS = 50_000  # crossed strips of 330 x 330 mm have 27 225
 MAX_LAYERS = 5_000  # 30 mm in layers of 0.06 mm have 500
 _NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,98}[A-Za-z0-9])?")
-_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # Windows cannot have files of these names
+# Windows cannot have files of these names.
+_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
 Slot = Annotated[str, Field(pattern=r"^[a-z0-9-]+(@[a-z0-9.-]+)?$")]
 
@@ -71,7 +72,9 @@ class Design(_Strict):
     nozzle_mm: Annotated[float, Field(ge=0.05, le=5.0)] | None = Field(
         default=None, description="Nozzle diameter when it is not the printer's own [mm]."
     )
-    tools: dict[str, Annotated[int, Field(ge=0, le=99)]] = Field(default={}, description="Material to tool, in the printer's own numbers.")
+    tools: dict[str, Annotated[int, Field(ge=0, le=99)]] = Field(
+        default={}, description="Material to tool, in the printer's own numbers."
+    )
     infill: dict[str, Infill] = Field(default={}, description="Material to infill.")
     orientation: Literal["as-drawn", "upside-down"] = "as-drawn"
     shrinkage: Annotated[float, Field(ge=0, lt=0.9)] = Field(
@@ -84,8 +87,8 @@ class Design(_Strict):
     def _safe_name(cls, name: str) -> str:
         if not _NAME.fullmatch(name) or _DEVICES.fullmatch(name):
             raise ValueError(
-                f"{_shown(name)} cannot be a file name everywhere; expected at most 100 letters a to z, digits, '.', '-' "
-                "and '_', with a letter or digit first and last: set it with --name, or 'name:' in the file"
+                f"{_shown(name)} cannot be a file name everywhere; expected at most 100 letters a to z, digits, "
+                "'.', '-' and '_', with a letter or digit first and last: set it with --name, or 'name:' in the file"
             )
         return name
 
@@ -149,7 +152,9 @@ class Design(_Strict):
         """
         tools = self.machine.default_tools | self.tools
         if material not in tools:
-            raise MissingValue(f"no tool for {material}: name one with --tool {material}=NUMBER, or in the design's 'tools'")
+            raise MissingValue(
+                f"no tool for {material}: name one with --tool {material}=NUMBER, or in the design's 'tools'"
+            )
         return tools[material]
 
     def resolved(self) -> dict[str, Any]:
@@ -173,7 +178,9 @@ class Design(_Strict):
 
     def waived(self, findings: list[Finding]) -> list[Finding]:
         """The findings, with the reason where the design accepts them."""
-        return [dataclasses.replace(f, waiver=next((w.reason for w in self.waivers if _covers(w, f)), "")) for f in findings]
+        return [
+            dataclasses.replace(f, waiver=next((w.reason for w in self.waivers if _covers(w, f)), "")) for f in findings
+        ]
 
 
 def _covers(waiver: Waiver, finding: Finding) -> bool:
@@ -259,7 +266,7 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
     return design if design.name else design.model_copy(update={"name": name_of(design)})
 
 
-_INSIDE = {"materials": Slots, "infill": Infill, "waivers": Waiver}
+_INSIDE: dict[str, type[_Strict]] = {"materials": Slots, "infill": Infill, "waivers": Waiver}
 _EXPECTED = {
     "bool_type": "true or false",
     "float_type": "a number",
@@ -286,10 +293,11 @@ def _plain(first: Mapping[str, Any]) -> str:
     if kind == "value_error":
         return f"{key}: {first['ctx']['error']}"
     if kind == "missing":
-        return f"{key} is missing" + (f"; expected one of {', '.join(registry.names(shapes))}" if key == "shape" else "")
+        return f"{key} is missing; expected " + (", ".join(registry.names(shapes)) if key == "shape" else "text")
     if kind == "extra_forbidden":
-        known = _INSIDE[place[0]] if len(place) > 1 else Design
-        return str(UnknownName(f"key of {'.'.join(place[:-1])}" if len(place) > 1 else "key", place[-1], known.model_fields))
+        inside = f" of {'.'.join(place[:-1])}" if len(place) > 1 else ""
+        known = _INSIDE[place[0]].model_fields if inside else Design.model_fields
+        return str(UnknownName(f"key{inside}", place[-1], known))
     limits = dict(first.get("ctx", {})) | {"pattern": _PATTERNS.get(place[0])}
     expected = _EXPECTED[kind].format(**limits) if kind in _EXPECTED else str(first["msg"]).lower()
     return f"{key} is {_shown(first['input'])}; expected {expected}"
@@ -319,12 +327,12 @@ def _check_names(design: Design) -> None:
     _one_source_each(design)
     _soluble(design)
     _refuse_stacks(design)
-    for material, tool in design.tools.items():
-        material_files.load(material)
-        if tool not in design.machine.tool_numbers:
-            raise BadInput(f"tools.{material}: {design.machine.name} has no tool {tool}; it has {list(design.machine.tool_numbers)}")
-    for material in design.infill:
-        material_files.load(material)
+    for name in (*design.tools, *design.infill):
+        material_files.load(name)
+    machine = design.machine
+    for name, tool in design.tools.items():
+        if tool not in machine.tool_numbers:
+            raise BadInput(f"tools.{name}: {machine.name} has no tool {tool}; it has {list(machine.tool_numbers)}")
     _one_tool_each(design)
 
 
@@ -335,7 +343,8 @@ def _one_source_each(design: Design) -> None:
         if getattr(design.materials, part) and not part.endswith("_electrode"):
             material, source = design.slot(part)
             if source and chosen.setdefault(material.name, source) != source:
-                raise BadInput(f"materials.{part}: {material.name} is taken from {chosen[material.name]} elsewhere; name one source")
+                other = chosen[material.name]
+                raise BadInput(f"materials.{part}: {material.name} is taken from {other} elsewhere; name one source")
 
 
 def _soluble(design: Design) -> None:
@@ -343,14 +352,18 @@ def _soluble(design: Design) -> None:
     slots = {part: (value or "").partition("@")[0] for part, value in design.materials.model_dump().items()}
     support = slots.pop("support")
     if support and support in slots.values():
-        raise BadInput(f"materials.support: the sensor itself is made of {support}; expected a material that dissolves, as bvoh")
+        raise BadInput(
+            f"materials.support: the sensor itself is made of {support}; expected a material that dissolves, as bvoh"
+        )
 
 
 def _refuse_stacks(design: Design) -> None:
     """Refuse layers so thin that they would fill the memory."""
     layers = design.drawn.size_mm[2] / design.layers.layer_mm
     if layers > MAX_LAYERS:
-        raise OutOfRange(f"{layers:.3g} layers of {design.layers.layer_mm:g} mm; expected at most {MAX_LAYERS}: use another quality")
+        raise OutOfRange(
+            f"{layers:.3g} layers of {design.layers.layer_mm:g} mm; expected at most {MAX_LAYERS}: use another quality"
+        )
 
 
 def _one_tool_each(design: Design) -> None:
@@ -358,7 +371,9 @@ def _one_tool_each(design: Design) -> None:
     for material in sorted({body.material for body in design.drawn.bodies}):
         tool = design.tool(material)
         if tool in owners:
-            raise BadInput(f"tool {tool} is given to both {owners[tool]} and {material}: choose with --tool {material}=NUMBER")
+            raise BadInput(
+                f"tool {tool} is given to both {owners[tool]} and {material}: choose with --tool {material}=NUMBER"
+            )
         owners[tool] = material
 
 
@@ -381,9 +396,8 @@ def name_of(design: Design) -> str:
         if key not in said and value != field.default:
             parts.append(f"{key.removesuffix('_mm').replace('_', '-')}{value:.10g}")
     default = Design(shape=design.shape)
-    for key in ("quality", "printer"):
-        if getattr(design, key) != getattr(default, key):
-            parts.append(re.sub("[^A-Za-z0-9._]+", "-", Path(getattr(design, key)).stem).strip(".-_"))
+    for given, usual in ((design.quality, default.quality), (design.printer, default.printer)):
+        parts.append("" if given == usual else re.sub("[^A-Za-z0-9._]+", "-", Path(given).stem).strip(".-_"))
     if design.orientation != default.orientation:
         parts.append("upside-down")
     others = design.model_dump(include={"materials", "nozzle_mm", "tools", "infill", "shrinkage"})

@@ -33,7 +33,9 @@ class Review:
     def counts(self) -> dict[str, int]:
         """How many findings there are of each severity, and how many are waived."""
         open_ones = [f.severity for f in self.findings if not f.waiver]
-        return {s: open_ones.count(s) for s in ("error", "warning", "info")} | {"waived": len(self.findings) - len(open_ones)}
+        return {s: open_ones.count(s) for s in ("error", "warning", "info")} | {
+            "waived": len(self.findings) - len(open_ones)
+        }
 
 
 def review(design: Design, step: Step = lambda _: None) -> Review:
@@ -78,7 +80,13 @@ def _meshes(design: Design) -> dict[str, Mesh]:
 
 
 def _fault(body: str, what: str) -> Finding:
-    return Finding("0-body", "error", body, what, "change the parameters; if they make sense, this is a fault of sensorgen: report it")
+    return Finding(
+        "0-body",
+        "error",
+        body,
+        what,
+        "change the parameters; if they make sense, this is a fault of sensorgen: report it",
+    )
 
 
 def report(design: Design, held: Review) -> dict[str, Any]:

@@ -12,7 +12,7 @@ Outline = tuple[Point, ...]
 
 AXES = "xyz"
 PLANE = {"x": ("y", "z"), "y": ("x", "z"), "z": ("x", "y")}  # the two axes of an outline, by prism axis
-SLIVER_MM = 1e-9  # a piece narrower than this is rounding, not geometry
+SLIVER_MM = 1e-6  # a nanometre: narrower pieces are rounding, not geometry, and the CAD kernel refuses them from 1e-7
 
 
 @dataclass(frozen=True)
@@ -100,13 +100,17 @@ class Scene:
     Attributes
     ----------
     bodies : tuple of Body
-        From bottom to top.
+        From bottom to top; those that no prism fills, as in a sensor shorter than its pattern, are left out.
     size_mm : (float, float, float)
         Edges of the enclosing box, whose corner is the origin [mm].
     """
 
     bodies: tuple[Body, ...]
     size_mm: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        """Leave out empty bodies."""
+        object.__setattr__(self, "bodies", tuple(b for b in self.bodies if b.prisms))
 
     def body(self, name: str) -> Body:
         """The body of that name; raises KeyError where there is none."""

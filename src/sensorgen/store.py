@@ -35,7 +35,9 @@ def staging(folder: Path) -> Iterator[Path]:
             stage.mkdir()
             yield stage
         except OSError as error:
-            raise Unwritable(f"cannot write to {str(folder)!r}: {error.strerror or error}; name another place with --out") from None
+            raise Unwritable(
+                f"cannot write to {str(folder)!r}: {error.strerror or error}; name another place with --out"
+            ) from None
     finally:
         shutil.rmtree(stage, ignore_errors=True)
 
@@ -44,7 +46,9 @@ def _refuse_file(folder: Path) -> None:
     for place in (folder, *folder.parents):
         if os.path.lexists(place) and not place.is_dir():
             what = "a link that leads nowhere" if place.is_symlink() else "a file"
-            raise Unwritable(f"{str(place)!r} is {what}; expected a folder: move it away, or name another place with --out")
+            raise Unwritable(
+                f"{str(place)!r} is {what}; expected a folder: move it away, or name another place with --out"
+            )
 
 
 def _sweep(folder: Path) -> None:
@@ -60,7 +64,9 @@ def _alive(pid: int) -> bool:
     if pid == os.getpid():  # left by an earlier process of our number, as containers have them
         return False
     try:
-        return os.name == "nt" or os.kill(pid, 0) is None
+        if os.name != "nt":
+            os.kill(pid, 0)
+        return True
     except ProcessLookupError:
         return False
     except OSError:
@@ -79,14 +85,16 @@ def publish(stage: Path, folder: Path) -> None:
     for target in targets.values():
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir() or not os.access(target.parent, os.W_OK):
-            raise Unwritable(f"cannot write {str(target)!r}: a folder is in its place, or the folder around it is read-only")
+            raise Unwritable(
+                f"cannot write {str(target)!r}: a folder is in its place, or the folder around it is read-only"
+            )
     with _alone(folder), _undisturbed():
         stale = set(listed(folder)) - set(staged)
         for name in sorted(set(staged) - {MANIFEST}):
-            os.replace(staged[name], targets[name])
+            staged[name].replace(targets[name])
         for name in stale:
             (folder / name).unlink(missing_ok=True)
-        os.replace(staged[MANIFEST], targets[MANIFEST])
+        staged[MANIFEST].replace(targets[MANIFEST])
 
 
 def write(folder: Path, files: Mapping[str, bytes]) -> None:
@@ -108,12 +116,12 @@ def replace(path: Path, content: bytes) -> None:
     Unwritable
         The place cannot be written to, or the disk is full.
     """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part = path.parent / f".{path.name}.{os.getpid()}.part"
     if path.exists() and not path.is_file():
         raise Unwritable(f"cannot write {str(path)!r}: it is a folder or a device; expected a file")
     try:
         write(part.parent, {part.name: content})
-        os.replace(part, path)
+        part.replace(path)
     except OSError as error:
         raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from None
     finally:
@@ -166,15 +174,19 @@ def _alone(folder: Path) -> Iterator[None]:
 @contextmanager
 def _undisturbed() -> Iterator[None]:
     """Hold back Ctrl-C and a request to end for a moment."""
-    held: list[tuple[int, FrameType | None]] = []
+    held: list[int] = []
     before: dict[int, Any] = {}
+
+    def hold(number: int, _: FrameType | None) -> None:
+        held.append(number)
+
     with suppress(ValueError):  # not in the main thread: nobody interrupts here
         for number in (signal.SIGINT, signal.SIGTERM):
-            before[number] = signal.signal(number, lambda *what: held.append(what))
+            before[number] = signal.signal(number, hold)
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-    for number, _ in held[:1]:
-        signal.raise_signal(number)
+        for which, handler in before.items():
+            signal.signal(which, handler)
+    for which in held[:1]:
+        signal.raise_signal(which)

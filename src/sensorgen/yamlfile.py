@@ -4,7 +4,7 @@ import os
 import re
 import stat
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import yaml
 
@@ -36,13 +36,17 @@ def read(path: Path) -> dict[str, Any]:
 
 def _content(path: Path) -> bytes:
     """Content of a regular file; a pipe or device, which may never end, is not waited for."""
-    with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb") as file:
+    with open(path, "rb", opener=_unblocked) as file:
         found = os.fstat(file.fileno())
         if not stat.S_ISREG(found.st_mode):
             raise BadInput(f"{path}: not a file; expected a YAML file")
         if found.st_size > MAX_BYTES:
             raise BadInput(f"{path}: {found.st_size} bytes; expected at most {MAX_BYTES}: is this the right file?")
         return file.read(MAX_BYTES)
+
+
+def _unblocked(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def parse(text: str, where: str) -> dict[str, Any]:
@@ -70,14 +74,15 @@ def parse(text: str, where: str) -> dict[str, Any]:
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise BadInput(f"{where}: not YAML: {' '.join(str(error).split())}") from None
     if not isinstance(data, dict):
-        raise BadInput(f"{where}: holds {_KINDS.get(type(data), 'something else')}; expected a mapping of names to values")
+        kind = _KINDS.get(type(data), "something else")
+        raise BadInput(f"{where}: holds {kind}; expected a mapping of names to values")
     return data
 
 
 def _refuse_tricks(text: str, where: str) -> None:
     depth = 0
     for event in yaml.parse(text, Loader=_Loader):
-        place = f"{where}: line {event.start_mark.line + 1}"
+        place = f"{where}: line {event.start_mark.line + 1}"  # type: ignore[union-attr]
         if isinstance(event, yaml.AliasEvent):
             raise BadInput(f"{place}: aliases (*name) are not taken: write the value out")
         if getattr(event, "tag", None):
@@ -93,7 +98,7 @@ def _refuse_tricks(text: str, where: str) -> None:
 class _Loader(yaml.SafeLoader):
     """The safe loader with fewer surprises; a key given twice is refused, where YAML would keep the last."""
 
-    yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}
+    yaml_implicit_resolvers: ClassVar[dict[str, list[tuple[str, re.Pattern[str]]]]] = {}  # type: ignore[misc]
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen: set[str] = set()
@@ -107,10 +112,11 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
+_FLOAT = r"[-+]?((0|[1-9][0-9]*)(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]{1,4})?|[-+]?\.inf|\.nan"
 for _kind, _pattern, _first in (  # as in YAML 1.2
     ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
     ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
     ("int", r"[-+]?(0|[1-9][0-9]{0,17})", list("-+0123456789")),
-    ("float", r"[-+]?((0|[1-9][0-9]*)(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]{1,4})?|[-+]?\.inf|\.nan", list("-+.0123456789")),
+    ("float", _FLOAT, list("-+.0123456789")),
 ):
     _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", re.compile(f"(?:{_pattern})$"), _first)

@@ -31,7 +31,9 @@ def solid_mm3(variant):
 def judge(record_property, slicer, name, variant, extruded):
     solid, printed = solid_mm3(variant), extruded.model_mm3()
     ratios = {tool: printed[tool] / solid[tool] for tool in solid}
-    row = "  ".join(f"T{tool} {printed[tool]:7.1f} of {solid[tool]:7.1f} mm3 ({ratios[tool]:.3f})" for tool in sorted(solid))
+    row = "  ".join(
+        f"T{tool} {printed[tool]:7.1f} of {solid[tool]:7.1f} mm3 ({ratios[tool]:.3f})" for tool in sorted(solid)
+    )
     record_property("volumes", f"{slicer:6} {name:20} {row}")
     assert set(extruded.tools) == TOOLS
     assert set(printed) == TOOLS
@@ -48,7 +50,9 @@ def test_prusaslicer_prints_every_body_on_its_tool(name, tmp_path, prusa_slicer,
     folder = build(variant, tmp_path, cad=False).folder
     out = tmp_path / "print.gcode"
     prusa.slice_3mf(folder / f"{variant.name}.prusa.3mf", folder / "profiles/prusa/diabase-h5-fine.ini", out)
-    judge(record_property, "Prusa", name, variant, gcode.read(out.read_text().splitlines(), variant.machine.filament_mm))
+    judge(
+        record_property, "Prusa", name, variant, gcode.read(out.read_text().splitlines(), variant.machine.filament_mm)
+    )
 
 
 @pytest.mark.parametrize("name", VARIANTS)
@@ -56,7 +60,10 @@ def test_curaengine_prints_every_body_on_its_tool(name, tmp_path, cura_engine, r
     variant = design.load(DESIGNS / name)
     loads = {variant.tool(m): Load(design.material_files.load(m), source) for m, source in variant.used().items()}
     settings = curaengine.engine_settings(variant.machine, variant.layers, loads)
-    bodies = [(stl(tmp_path, variant, b), variant.machine.slicer_index(variant.tool(b.material))) for b in variant.printed.bodies]
+    bodies = [
+        (stl(tmp_path, variant, b), variant.machine.slicer_index(variant.tool(b.material)))
+        for b in variant.printed.bodies
+    ]
     out = tmp_path / "print.gcode"
     curaengine.slice_bodies(bodies, settings, out)
     judge(record_property, "Cura", name, variant, gcode.read(out.read_text().splitlines(), variant.machine.filament_mm))

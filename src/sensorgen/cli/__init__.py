@@ -20,14 +20,20 @@ FOUND_ERRORS = 1
 class _Lazy(click.Group):
     """Commands that are imported when they are asked for: ``cli/NAME_command.py`` holds ``command``."""
 
-    def list_commands(self, ctx: click.Context) -> list[str]:
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         return list(COMMANDS)
 
-    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
         if name not in COMMANDS:
             return None
         command: click.Command = importlib.import_module(f"sensorgen.cli.{name}_command").command
         return command
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:  # the reader of a pipe has gone: nothing to say, and nobody to say it to
+            return _silence()
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         if not ctx.resilient_parsing and not args[0].startswith("-") and args[0] not in COMMANDS:
@@ -44,7 +50,7 @@ class _Terminated(BaseException):
 @click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(__version__, prog_name="sensorgen")
 def cli() -> None:
-    """From one design to a printable elastomer sensor: geometry, checks, 3MF, profiles, prediction.
+    r"""From one design to a printable elastomer sensor: geometry, checks, 3MF, profiles, prediction.
 
     \b
     sensorgen build tri --dielectric 0.2        a shape, with options
@@ -56,37 +62,44 @@ def main() -> None:
     """Run the command line and leave with 0 (clean), 1 (findings of severity error) or 2 (wrong input)."""
     try:
         signal.signal(signal.SIGTERM, _terminate)
-        code = cli.main(prog_name="sensorgen", standalone_mode=False)
+        code = _run()
         if sys.stdout is not None:
             sys.stdout.flush()
-    except Unprintable as error:
-        code = _complain(error, FOUND_ERRORS)
-    except SensorgenError as error:
-        code = _complain(error, WRONG_INPUT)
-    except click.ClickException as error:
-        code = _complain(error.format_message(), WRONG_INPUT)
     except MemoryError:
         code = _complain("not enough memory for this design: use a longer period or a smaller sensor", WRONG_INPUT)
     except (KeyboardInterrupt, click.Abort):
         code = _complain("interrupted; no file is half-written", 128 + signal.SIGINT)
     except _Terminated:
         code = _complain("told to end; no file is half-written", 128 + signal.SIGTERM)
-    except BrokenPipeError:  # the reader of a pipe has gone: nothing to say, and nobody to say it to
-        _silence()
-        code = 0
     except (OSError, UnicodeEncodeError) as error:
         _silence()
         code = _complain(f"cannot write the output: {getattr(error, 'strerror', None) or error}", WRONG_INPUT)
-    sys.exit(code if isinstance(code, int) else 0)
+    sys.exit(code)
+
+
+def _run() -> int:
+    try:
+        code = cli.main(prog_name="sensorgen", standalone_mode=False)
+    except Unprintable as error:
+        return _complain(error, FOUND_ERRORS)
+    except SensorgenError as error:
+        return _complain(error, WRONG_INPUT)
+    except click.NoSuchOption as error:
+        near = f"; did you mean '{error.possibilities[0]}'?" if error.possibilities else "."
+        return _complain(f"unknown option '{error.option_name}'{near} --help lists all", WRONG_INPUT)
+    except click.ClickException as error:
+        return _complain(error.format_message(), WRONG_INPUT)
+    return code if isinstance(code, int) else 0
 
 
 def _terminate(_: int, __: FrameType | None) -> None:
     raise _Terminated
 
 
-def _silence() -> None:
+def _silence() -> int:
     """Let what is still in the output's buffer go nowhere."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 0
 
 
 def _complain(what: object, code: int) -> int:

@@ -37,7 +37,15 @@ def _work(design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool
     files = sorted([*store.listed(built.folder), store.MANIFEST])
     if as_json:
         found = [f.as_dict() for f in built.review.findings]
-        show.as_json({"name": design.name, "folder": str(built.folder), "files": files, "findings": found, "prediction": built.prediction})
+        show.as_json(
+            {
+                "name": design.name,
+                "folder": str(built.folder),
+                "files": files,
+                "findings": found,
+                "prediction": built.prediction,
+            }
+        )
         return 0
     show.findings(built.review.findings)
     click.echo()

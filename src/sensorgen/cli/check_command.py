@@ -1,4 +1,4 @@
-"""``sensorgen check``: will it print?"""
+"""``sensorgen check``: whether it will print."""
 
 from typing import TYPE_CHECKING
 

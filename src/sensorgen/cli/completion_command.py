@@ -9,7 +9,7 @@ from sensorgen.cli.words import OneOf
 @click.command("completion")
 @click.argument("shell", type=OneOf(["bash", "zsh", "fish"]))
 def command(shell: str) -> None:
-    """Print the completion script for a shell.
+    r"""Print the completion script for a shell.
 
     \b
     bash:  eval "$(sensorgen completion bash)"
@@ -19,5 +19,5 @@ def command(shell: str) -> None:
     from sensorgen.cli import cli
 
     kind = get_completion_class(shell)
-    assert kind is not None  # click knows the three
-    click.echo(kind(cli, {}, "sensorgen", "_SENSORGEN_COMPLETE").source())
+    if kind:  # click knows the three
+        click.echo(kind(cli, {}, "sensorgen", "_SENSORGEN_COMPLETE").source())

@@ -26,16 +26,19 @@ class DesignGroup(click.Group):
     def __init__(self, work: Work, own: list[click.Parameter], **attributes: Any) -> None:
         """``work`` gets the design and the values of the command's ``own`` options; it returns the exit code."""
         super().__init__(
-            options_metavar="", subcommand_metavar="{SHAPE|DESIGN.yaml} [OPTIONS]", epilog="SHAPE --help lists the options.",
-            context_settings={"ignore_unknown_options": True}, **attributes,
-        )  # fmt: skip
+            options_metavar="",
+            subcommand_metavar="{SHAPE|DESIGN.yaml} [OPTIONS]",
+            epilog="SHAPE --help lists the options.",
+            context_settings={"ignore_unknown_options": True},
+            **attributes,
+        )
         self.work, self.own = work, own
 
-    def list_commands(self, ctx: click.Context) -> list[str]:
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         """Names of the shapes."""
         return registry.names(shapes)
 
-    def get_command(self, ctx: click.Context, name: str) -> click.Command:
+    def get_command(self, ctx: click.Context, name: str) -> click.Command:  # noqa: ARG002
         """The command for a shape, or for a design file."""
         if not _is_file(name):
             return self._command(name, registry.load(shapes, name), {"shape": name})
@@ -48,7 +51,9 @@ class DesignGroup(click.Group):
             raise error.within(name) from None
         return self._command(name, module, base)
 
-    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
         """Take the first word; an option in its place is the user's slip."""
         if ctx.resilient_parsing:  # the shell asks for words to complete
             try:
@@ -56,7 +61,9 @@ class DesignGroup(click.Group):
             except SensorgenError:
                 return None, None, []
         if args[0].startswith("-"):
-            raise BadInput(f"{args[0]} stands before the shape; write {ctx.command_path} {{SHAPE|DESIGN.yaml}} {args[0]} ...")
+            raise BadInput(
+                f"{args[0]} stands before the shape; write {ctx.command_path} {{SHAPE|DESIGN.yaml}} {args[0]} ..."
+            )
         return args[0], self.get_command(ctx, args[0]), args[1:]
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
@@ -66,7 +73,9 @@ class DesignGroup(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the shapes under their own name."""
         with formatter.section("Shapes"):
-            formatter.write_dl([(name, _about(registry.load(shapes, name)).partition("\n")[0]) for name in self.list_commands(ctx)])
+            formatter.write_dl(
+                [(name, _about(registry.load(shapes, name)).partition("\n")[0]) for name in self.list_commands(ctx)]
+            )
 
     def _command(self, name: str, module: ModuleType | None, base: Data) -> click.Command:
         def run(**given: Any) -> int:
@@ -76,7 +85,11 @@ class DesignGroup(click.Group):
         params = _parameter_options(module.Params) if module else []
         about = _about(module)
         return click.Command(
-            name, params=[*params, *_design_options(), *self.own], callback=run, help=about, short_help=about.partition("\n")[0]
+            name,
+            params=[*params, *_design_options(), *self.own],
+            callback=run,
+            help=about,
+            short_help=about.partition("\n")[0],
         )
 
 
@@ -109,26 +122,40 @@ def _parameter_options(params: type) -> list[click.Parameter]:
     return options
 
 
-def _plainly(default: float | str) -> str:
-    return f"{default:g}" if isinstance(default, float) else default
+def _plainly(default: Any) -> str:
+    return f"{default:g}" if isinstance(default, float) else str(default)
 
 
 def _design_options() -> list[click.Parameter]:
+    def option(flag: str, metavar: str | None, about: str, **more: Any) -> click.Option:
+        return click.Option([*flag.split()], metavar=metavar, help=about, **more)
+
     return [
-        click.Option(["--size"], metavar="LxW", help="Length and width at once, as in 100x10."),
-        click.Option(["--orientation"], type=OneOf(["as-drawn", "upside-down"]), help="How it lies on the bed; as-drawn if not given."),
-        click.Option(["--support"], metavar="MATERIAL", help="Fill the air with a soluble support: bvoh, pla, none."),
-        click.Option(["--material"], multiple=True, metavar="PART=NAME[@SOURCE]",
-                     help="Material of a part (electrode, top_electrode, film, dielectric ...) and the source of its values."),
-        click.Option(["--printer"], metavar="NAME", help="A printer that is listed, or a YAML file; diabase-h5 if not given."),
-        click.Option(["--quality"], metavar="NAME", help="A quality that is listed, or a YAML file; fine if not given."),
-        click.Option(["--nozzle", "nozzle_mm"], type=Length(), help="Nozzle diameter, when not the printer's own."),
-        click.Option(["--tool"], multiple=True, metavar="MATERIAL=NUMBER", help="Tool of a material, in the printer's numbers."),
-        click.Option(["--infill"], multiple=True, metavar="[MATERIAL=]PERCENT", help="Infill of a material; of the dielectric if none is named."),
-        click.Option(["--infill-pattern"], multiple=True, metavar="[MATERIAL=]PATTERN", help="Pattern of the infill: rectilinear, grid ..."),
-        click.Option(["--shrinkage"], type=float, metavar="SHARE", help="Shrinkage in the plane to print against, as in 0.2."),
-        click.Option(["--set", "settings"], multiple=True, metavar="KEY=VALUE", help="Any parameter, or key of the design file, as in infill.x60.percent=80."),
-        click.Option(["--name"], help="Name of folder and files; made from the parameters if not given."),
+        option("--size", "LxW", "Length and width at once, as in 100x10."),
+        option(
+            "--orientation", None, "How it lies on the bed; as-drawn if not given.",
+            type=OneOf(["as-drawn", "upside-down"]),
+        ),
+        option("--support", "MATERIAL", "Fill the air with a soluble support: bvoh, pla, none."),
+        option(
+            "--material", "PART=NAME[@SOURCE]",
+            "Material of a part (electrode, top_electrode, film, dielectric ...) and the source of its values.",
+            multiple=True,
+        ),
+        option("--printer", "NAME", "A printer that is listed, or a YAML file; diabase-h5 if not given."),
+        option("--quality", "NAME", "A quality that is listed, or a YAML file; fine if not given."),
+        option("--nozzle nozzle_mm", None, "Nozzle diameter, when not the printer's own.", type=Length()),
+        option("--tool", "MATERIAL=NUMBER", "Tool of a material, in the printer's numbers.", multiple=True),
+        option(
+            "--infill", "[MATERIAL=]PERCENT", "Infill of a material; of the dielectric if none is named.", multiple=True
+        ),
+        option("--infill-pattern", "[MATERIAL=]PATTERN", "Pattern of the infill: rectilinear, grid ...", multiple=True),
+        option("--shrinkage", "SHARE", "Shrinkage in the plane to print against, as in 0.2.", type=float),
+        option(
+            "--set settings", "KEY=VALUE", "Any parameter, or key of the design file, as in infill.x60.percent=80.",
+            multiple=True,
+        ),
+        option("--name", None, "Name of folder and files; made from the parameters if not given."),
     ]  # fmt: skip
 
 
@@ -146,7 +173,11 @@ def _design(base: Data, given: Data, word: str) -> "Design":
 
 def _changes(base: Data, given: Data) -> Data:
     """The options that were given, as the part of a design file that they stand for."""
-    known = {f.name for f in dataclasses.fields(registry.load(shapes, base["shape"]).Params)} if isinstance(base.get("shape"), str) else set()
+    known = (
+        {f.name for f in dataclasses.fields(registry.load(shapes, base["shape"]).Params)}
+        if isinstance(base.get("shape"), str)
+        else set()
+    )
     parameters = {k: given[k] for k in known if given.get(k) is not None}
     parameters |= _size(given["size"]) if given["size"] is not None else {}
     slots = _slots(given["material"]) | _support(given["support"])
@@ -156,7 +187,9 @@ def _changes(base: Data, given: Data) -> Data:
         "materials": slots,
         "tools": {key: _integer(value, "--tool") for key, value in _pairs(given["tool"], "--tool")},
         "infill": _infill(given, dielectric),
-        **{k: given[k] for k in ("orientation", "printer", "quality", "nozzle_mm", "shrinkage") if given[k] is not None},
+        **{
+            k: given[k] for k in ("orientation", "printer", "quality", "nozzle_mm", "shrinkage") if given[k] is not None
+        },
     }
     for key, value in _pairs(given["settings"], "--set"):
         changes = _merged(changes, _setting(key, value, known))
@@ -165,7 +198,10 @@ def _changes(base: Data, given: Data) -> Data:
 
 def _merged(base: Any, change: Any) -> Any:
     if isinstance(base, Mapping) and isinstance(change, Mapping):
-        return {k: _merged(base[k], change[k]) if k in base and k in change else {**base, **change}[k] for k in {**base, **change}}
+        return {
+            k: _merged(base[k], change[k]) if k in base and k in change else {**base, **change}[k]
+            for k in {**base, **change}
+        }
     return change
 
 

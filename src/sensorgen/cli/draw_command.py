@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from sensorgen.design import Design
 
 OWN: list[click.Parameter] = [
-    click.Option(["--output", "-o"], metavar="FILE", help="SVG file to write; NAME.svg here if not given, - for the terminal.")
+    click.Option(
+        ["--output", "-o"], metavar="FILE", help="SVG file to write; NAME.svg here if not given, - for the terminal."
+    )
 ]
 
 

@@ -14,8 +14,10 @@ KINDS = ("shapes", "materials", "printers", "qualities", "models", "sources")
 @click.argument("kind", type=OneOf(KINDS))
 @click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
 def command(kind: str, as_json: bool) -> None:
-    """List what goes by a name: shapes with their parameters, materials with every value and its source,
-    printers, qualities, models, or the sources themselves.
+    """List what goes by a name.
+
+    Shapes with their parameters, materials with every value and its source, printers, qualities, models, or what
+    the sources stand for.
     """
     from sensorgen import catalogue
     from sensorgen.cli import show
@@ -25,10 +27,9 @@ def command(kind: str, as_json: bool) -> None:
         show.as_json(entries)
         return
     width = min(shutil.get_terminal_size((110, 24)).columns, 120)
+    indent = max(map(len, entries)) + 2
     for name, entry in entries.items():
-        first, *more = textwrap.wrap(entry["about"], width - 15) or [""]
-        click.echo(click.style(f"{name:15}", bold=True) + first)
-        for line in more:
-            click.echo(" " * 15 + line)
+        about = textwrap.fill(entry["about"], width, initial_indent=" " * indent, subsequent_indent=" " * indent)
+        click.echo(click.style(f"{name:{indent}}", bold=True) + about[indent:])
         for line in entry.get("values", []):
             click.echo(textwrap.fill(line, width, initial_indent="    ", subsequent_indent=" " * 8))

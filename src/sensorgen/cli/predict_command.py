@@ -1,4 +1,4 @@
-"""``sensorgen predict``: what should the bench measure?"""
+"""``sensorgen predict``: what the bench should measure."""
 
 from typing import TYPE_CHECKING
 

@@ -24,7 +24,9 @@ def findings(found: Sequence["Finding"]) -> None:
     width = min(shutil.get_terminal_size((110, 24)).columns, 120)
     for f in found:
         head = "waived" if f.waiver else f.severity
-        click.echo(click.style(f"{head:8}", fg=_COLOURS.get(head), bold=head == "error") + f"{f.rule}  {f.body}{_where(f)}")
+        click.echo(
+            click.style(f"{head:8}", fg=_COLOURS.get(head), bold=head == "error") + f"{f.rule}  {f.body}{_where(f)}"
+        )
         after = f"accepted: {f.waiver}" if f.waiver else f"-> {f.advice}"
         click.echo(textwrap.fill(f"{f.message} {after}", width, initial_indent=" " * 8, subsequent_indent=" " * 8))
 
@@ -38,7 +40,10 @@ def _where(f: "Finding") -> str:
 def summary(review: "Review") -> str:
     """How many findings there are, in words."""
     counts = [(n, kind) for kind, n in review.counts().items() if n]
-    return ", ".join(f"{n} {kind}{'s' if n > 1 and kind in ('error', 'warning') else ''}" for n, kind in counts) or "no findings"
+    return (
+        ", ".join(f"{n} {kind}{'s' if n > 1 and kind in ('error', 'warning') else ''}" for n, kind in counts)
+        or "no findings"
+    )
 
 
 def prediction(predicted: Mapping[str, Any]) -> None:
@@ -57,7 +62,9 @@ def prediction(predicted: Mapping[str, Any]) -> None:
     click.echo(f"{'impedance at':>17}  {'Re [ohm]':>11}   {'Im [ohm]':>11}   Im at the bounds of C")
     for tone in predicted["impedance_ohm"]:
         low, high = tone["im_range"]
-        click.echo(f"{si(tone['frequency_hz'], 'Hz'):>17}  {tone['re']:11.5g}   {tone['im']:11.5g}   {low:.4g} .. {high:.4g}")
+        click.echo(
+            f"{si(tone['frequency_hz'], 'Hz'):>17}  {tone['re']:11.5g}   {tone['im']:11.5g}   {low:.4g} .. {high:.4g}"
+        )
 
 
 def _between(bounds: Mapping[str, float], unit: str) -> str:

@@ -8,12 +8,12 @@ from sensorgen import units
 from sensorgen.errors import BadInput, UnknownName
 
 
-class Length(click.ParamType):
+class Length(click.ParamType):  # type: ignore[type-arg]
     """A length, in millimetres unless it names another unit."""
 
     name = "mm"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:  # noqa: ARG002
         """Read a length as typed [mm]."""
         if isinstance(value, float):
             return value
@@ -26,13 +26,13 @@ class Length(click.ParamType):
 class OneOf(click.Choice):  # type: ignore[type-arg]
     """One name of a list; the nearest is offered where another is given."""
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:  # noqa: ARG002
         """Take a name that is in the list."""
         if value not in self.choices:
             raise UnknownName(_said(param), str(value), self.choices)
         return str(value)
 
-    def get_missing_message(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+    def get_missing_message(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002
         """Nothing: the message names the argument by its choices."""
         return ""
 

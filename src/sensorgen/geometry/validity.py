@@ -42,6 +42,8 @@ def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
         exact, got = body.volume_mm3(), meshes[body.name].volume_mm3()
         if solids[body.name].status() != manifold3d.Error.NoError:
             found.append((body.name, f"not a closed oriented surface ({solids[body.name].status().name})"))
+        elif not _two_manifold(meshes[body.name]):
+            found.append((body.name, "shells are welded along an edge: programs that read 3MF refuse that"))
         elif abs(got - exact) > 1e-9 * exact:
             found.append((body.name, f"encloses {got:.9g} mm3, not {exact:.9g} mm3"))
         elif (twice := _self_overlap_mm3(solids[body.name])) > OVERLAP_MM * solids[body.name].surface_area():
@@ -49,6 +51,13 @@ def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
     if found:
         return found
     return [(f"{a} / {b}", f"overlap by {volume:.3g} mm3") for a, b, volume in _overlaps(solids)]
+
+
+def _two_manifold(mesh: Mesh) -> bool:
+    """Whether every edge has one triangle on each side; manifold3d takes a seam with four and parts it."""
+    ends = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    there, back = (np.sort(ends @ way) for way in ([1, len(mesh.vertices_mm)], [len(mesh.vertices_mm), 1]))
+    return bool(np.all(np.diff(there) > 0) and np.array_equal(there, back))
 
 
 def _self_overlap_mm3(solid: "manifold3d.Manifold") -> float:
@@ -61,7 +70,9 @@ def _self_overlap_mm3(solid: "manifold3d.Manifold") -> float:
 
 
 def _overlaps(solids: Mapping[str, "manifold3d.Manifold"]) -> list[tuple[str, str, float]]:
-    shared = ((a, b, (solids[a] ^ solids[b]).volume()) for a, b in combinations(solids, 2) if _near(solids[a], solids[b]))
+    shared = (
+        (a, b, (solids[a] ^ solids[b]).volume()) for a, b in combinations(solids, 2) if _near(solids[a], solids[b])
+    )
     return [(a, b, v) for a, b, v in shared if v > OVERLAP_MM * min(solids[a].surface_area(), solids[b].surface_area())]
 
 

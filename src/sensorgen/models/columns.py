@@ -67,6 +67,8 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
     ------
     KeyError
         A material between the electrodes has no permittivity.
+    ValueError
+        The scene is unfit.
     """
     lower = trial = slab = 0.0
     found = [(section, [_stack(c, permittivity) for c in cut_columns(section)]) for section in sections(scene)]
@@ -181,7 +183,8 @@ def _graded(left: float, right: float) -> tuple[NDArray[np.float64], NDArray[np.
 
 def _stack(cell: Column, permittivity: Mapping[str, float]) -> _Stack:
     gap = _gap(cell)
-    assert gap is not None  # unfit() has looked
+    if gap is None:
+        raise ValueError("an electrode does not cover the whole sensor: ask unfit() first")
     lines, eps = [gap.bottom_mm], []
     for bottom, top, value in _filled(gap, permittivity):
         if max(top[0] - bottom[0], top[1] - bottom[1]) > 0:

@@ -9,9 +9,7 @@ SOURCE = "Thesis appendix B, Eq. B.53, for unequal tracks"
 COST = 0
 
 
-def impedance(
-    frequency_hz: ArrayLike, resistance_ohm: ArrayLike, capacitance_f: ArrayLike
-) -> NDArray[np.complex128]:
+def impedance(frequency_hz: ArrayLike, resistance_ohm: ArrayLike, capacitance_f: ArrayLike) -> NDArray[np.complex128]:
     r"""Impedance between the two tracks at the contacts.
 
     .. math:: Z = \frac{1}{j \omega C} \frac{z}{\tanh z}, \quad z^2 = j \omega R C

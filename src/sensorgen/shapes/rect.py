@@ -9,12 +9,11 @@ The upper layer's conductor strips hang on the top electrode, the lower layer's 
 cross: all of them are at the top electrode's potential.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import ceil
 
 from sensorgen.scene import SLIVER_MM, Body, Envelope, Fill, Prism, Scene, box
-
 
 SHORT = "sq"  # as the thesis's specimens are named: sqXY, sqYX
 
@@ -59,53 +58,54 @@ def scene(p: Params, fill: Fill) -> Scene:
     middle = film + p.lower_height_mm
     roof = middle + p.upper_height_mm
     top = roof + p.electrode_mm
-    strips = _strips(p)
-    upper, lower = p.along
+    upper, lower = p.along[0], p.along[1]
 
     def plate(z0: float, z1: float) -> tuple[Prism, ...]:
         return (box(0.0, p.length_mm, 0.0, p.width_mm, _r(z0), _r(z1)),) if z1 - z0 > SLIVER_MM else ()
 
     def both(part: str) -> tuple[Prism, ...]:
-        return strips(part, lower, film, middle) + strips(part, upper, middle, roof)
+        return _strips(p, part, lower, film, middle) + _strips(p, part, upper, middle, roof)
 
-    bodies = [Body("bottom_electrode", fill.bottom_electrode, plate(0.0, low), "bottom")]
-    feet = strips("x60", lower, film, middle)
-    if p.dielectric_mm > 0 and fill.film == fill.dielectric:
-        bodies.append(Body("film_and_lower", fill.film, plate(low, film) + feet))
-    else:
-        if p.dielectric_mm > 0:
-            bodies.append(Body("film", fill.film, plate(low, film)))
-        bodies.append(Body("lower_dielectric", fill.dielectric, feet))
-    if fill.support:
-        bodies.append(Body("support", fill.support, both("air")))
-    bodies += [
-        Body("hanging_dielectric", fill.dielectric, strips("x60", upper, middle, roof)),
+    feet = _strips(p, "x60", lower, film, middle)
+    bodies = [
+        Body("bottom_electrode", fill.bottom_electrode, plate(0.0, low), "bottom"),
+        *_lower(plate(low, film), feet, fill),
+        Body("support", fill.support, both("air") if fill.support else ()),
+        Body("hanging_dielectric", fill.dielectric, _strips(p, "x60", upper, middle, roof)),
         Body("top_electrode_with_cogs", fill.top_electrode, both("etpu") + plate(roof, top), "top"),
         Body("isolation", fill.isolation, plate(top, top + p.isolation_mm)),
     ]
     return Scene(tuple(b for b in bodies if b.prisms), (p.length_mm, p.width_mm, _r(top + p.isolation_mm)))
 
 
-def _strips(p: Params) -> Callable[[str, str, float, float], tuple[Prism, ...]]:
-    """A function that lays the strips of one part, in one direction, between two heights."""
+def _lower(film: tuple[Prism, ...], feet: tuple[Prism, ...], fill: Fill) -> list[Body]:
+    """Film and lower dielectric strips: one body where they are of one material."""
+    if film and fill.film == fill.dielectric:
+        return [Body("film_and_lower", fill.film, film + feet)]
+    return [Body("film", fill.film, film), Body("lower_dielectric", fill.dielectric, feet)]
+
+
+def _strips(p: Params, part: str, direction: str, z0: float, z1: float) -> tuple[Prism, ...]:
+    """The strips of one part, in one direction, between two heights."""
+    z0, z1 = _r(z0), _r(z1)
+    if direction == "x":
+        return tuple(box(0.0, p.length_mm, a, b, z0, z1) for a, b in _places(p, part, p.width_mm))
+    return tuple(box(a, b, 0.0, p.width_mm, z0, z1) for a, b in _places(p, part, p.length_mm))
+
+
+def _places(p: Params, part: str, end_mm: float) -> Iterator[tuple[float, float]]:
+    """Where the strips of a part start and stop, the last one cut at the sensor's end [mm]."""
     etpu, air, x60 = p.etpu_width_mm, p.air_width_mm, p.x60_width_mm
-    runs = {"etpu": [(0.0, etpu)], "x60": [(etpu + air, etpu + air + x60)]}
-    runs["air"] = [(etpu, etpu + air), (etpu + air + x60, p.period_mm)]
-
-    def places(part: str, end: float) -> Iterator[tuple[float, float]]:
-        for k in range(ceil(end / p.period_mm - 1e-9)):
-            for start, stop in runs[part]:
-                a, b = _r(k * p.period_mm + start), min(_r(k * p.period_mm + stop), end)
-                if b - a > SLIVER_MM:
-                    yield a, b
-
-    def lay(part: str, direction: str, z0: float, z1: float) -> tuple[Prism, ...]:
-        z0, z1 = _r(z0), _r(z1)
-        if direction == "x":
-            return tuple(box(0.0, p.length_mm, a, b, z0, z1) for a, b in places(part, p.width_mm))
-        return tuple(box(a, b, 0.0, p.width_mm, z0, z1) for a, b in places(part, p.length_mm))
-
-    return lay
+    runs = {
+        "etpu": [(0.0, etpu)],
+        "x60": [(etpu + air, etpu + air + x60)],
+        "air": [(etpu, etpu + air), (etpu + air + x60, p.period_mm)],
+    }
+    for k in range(ceil(end_mm / p.period_mm - 1e-9)):
+        for start, stop in runs[part]:
+            a, b = _r(k * p.period_mm + start), min(_r(k * p.period_mm + stop), end_mm)
+            if b - a > SLIVER_MM:
+                yield a, b
 
 
 def _r(value: float) -> float:

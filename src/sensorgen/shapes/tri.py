@@ -10,7 +10,7 @@ One period, seen along the prisms (e: conductor, x: dielectric, blank: air)::
     eeeeeeeeeeeeeeeeeeee   bottom electrode
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from math import ceil
 
@@ -52,58 +52,75 @@ class Params(Envelope):
 
 def scene(p: Params, fill: Fill) -> Scene:
     """Bodies of the triangular sensor."""
-    low = p.electrode_mm
-    film, roof = low + p.dielectric_mm, low + p.dielectric_mm + p.hang_height_mm
-    top = roof + p.electrode_mm
-    end, depth = (p.length_mm, p.width_mm) if p.along == "x" else (p.width_mm, p.length_mm)
-    halves = range(2 * ceil(p.cells() - 1e-9) + 1)
-
-    def prisms(outlines: Iterator[Outline] | list[Outline]) -> tuple[Prism, ...]:
-        axis = "y" if p.along == "x" else "x"
-        cut = (clipped(outline, end) for outline in outlines)
-        return tuple(Prism(axis, outline, 0.0, depth) for outline in cut if outline)
-
-    def apex(k: int) -> float:
-        """Place of the k-th hanging apex; the even ones are cogs [mm]."""
-        return (k + 0.5) * p.period_mm / 2
-
-    def layer(z0: float, z1: float) -> tuple[Prism, ...]:
-        return prisms([rectangle(0.0, end, z0, z1)])
-
-    quarter = p.period_mm / 4
-    comb = [(end, top), (0.0, top), (0.0, roof)]
-    for k in halves[::2]:
-        comb += [(apex(k) - quarter, roof), (apex(k), film), (apex(k) + quarter, roof)]
-    comb += [(max(end, apex(halves[-1]) + quarter), roof), (max(end, apex(halves[-1]) + quarter), top)]
-    hanging = ([(apex(k) - quarter, roof), (apex(k), film), (apex(k) + quarter, roof)] for k in halves[1::2])
-    feet = ([(apex(k), film), (apex(k) - quarter, film + p.lower_height_mm), (apex(k) - 2 * quarter, film)] for k in halves)
-    air = (
-        [(apex(k) - 2 * quarter, film), (apex(k) - quarter, film + p.lower_height_mm), (apex(k), film), (apex(k) - quarter, roof)]
-        for k in halves
-    )
-
-    bodies = [Body("bottom_electrode", fill.bottom_electrode, layer(0.0, low), "bottom")]
-    if p.dielectric_mm > 0 and fill.film == fill.dielectric:
-        sawtooth = _sawtooth([apex(k) for k in halves], film, film + p.lower_height_mm)
-        foot = [(0.0, low), (sawtooth[0][0], low), *sawtooth]
-        bodies.append(Body("film_and_lower", fill.film, prisms([tuple(foot)])))
-    else:
-        if p.dielectric_mm > 0:
-            bodies.append(Body("film", fill.film, layer(low, film)))
-        bodies.append(Body("lower_dielectric", fill.dielectric, prisms(map(tuple, feet))))
-    if fill.support:
-        bodies.append(Body("support", fill.support, prisms(map(tuple, air))))
-    bodies.append(Body("hanging_dielectric", fill.dielectric, prisms(map(tuple, hanging))))
-    bodies.append(Body("top_electrode_with_cogs", fill.top_electrode, prisms([tuple(comb)]), "top"))
-    if p.isolation_mm > 0:
-        bodies.append(Body("isolation", fill.isolation, layer(top, top + p.isolation_mm)))
-    return Scene(tuple(bodies), (p.length_mm, p.width_mm, round(top + p.isolation_mm, 12)))
+    f = _Frame(p)
+    bodies = [
+        Body("bottom_electrode", fill.bottom_electrode, f.prisms([f.layer(0.0, f.low)]), "bottom"),
+        *_lower(f, fill),
+        Body("support", fill.support, f.prisms(f.air()) if fill.support else ()),
+        Body("hanging_dielectric", fill.dielectric, f.prisms(f.hanging())),
+        Body("top_electrode_with_cogs", fill.top_electrode, f.prisms([f.comb()]), "top"),
+        Body("isolation", fill.isolation, f.prisms([f.layer(f.top, f.top + p.isolation_mm)]) if p.isolation_mm else ()),
+    ]
+    size_mm = (p.length_mm, p.width_mm, round(f.top + p.isolation_mm, 12))
+    return Scene(tuple(b for b in bodies if b.prisms), size_mm)
 
 
-def _sawtooth(valleys_mm: list[float], low_mm: float, high_mm: float) -> list[Point]:
-    """Upper side of film and lower triangles, from right to left [mm]."""
-    quarter = (valleys_mm[1] - valleys_mm[0]) / 2
-    line = [(valleys_mm[0] - quarter, high_mm)]
-    for valley in valleys_mm:
-        line += [(valley, low_mm), (valley + quarter, high_mm)]
-    return line[::-1]
+def _lower(f: "_Frame", fill: Fill) -> list[Body]:
+    """Film and lower triangles: one body where they are of one material."""
+    if f.film == f.low:
+        return [Body("lower_dielectric", fill.dielectric, f.prisms(f.feet()))]
+    if fill.film == fill.dielectric:
+        return [Body("film_and_lower", fill.film, f.prisms([f.film_with_feet()]))]
+    film = Body("film", fill.film, f.prisms([f.layer(f.low, f.film)]))
+    return [film, Body("lower_dielectric", fill.dielectric, f.prisms(f.feet()))]
+
+
+class _Frame:
+    """Heights and places that the outlines share, and the outlines, not yet cut to the sensor's end [mm]."""
+
+    def __init__(self, p: Params) -> None:
+        self.low = p.electrode_mm
+        self.film = self.low + p.dielectric_mm
+        self.peak = self.film + p.lower_height_mm
+        self.roof = self.film + p.hang_height_mm
+        self.top = self.roof + p.electrode_mm
+        self.quarter = p.period_mm / 4
+        self.end, self.depth = (p.length_mm, p.width_mm) if p.along == "x" else (p.width_mm, p.length_mm)
+        self.axis = "y" if p.along == "x" else "x"
+        # Hanging apexes, first a cog's, then in turn; enough of them to go beyond the end.
+        self.apexes = [(k + 0.5) * p.period_mm / 2 for k in range(2 * ceil(p.cells() - 1e-9) + 1)]
+
+    def prisms(self, outlines: Iterable[Iterable[Point]]) -> tuple[Prism, ...]:
+        """Cut outlines to the sensor and extrude them; what lies beyond its end is left out."""
+        cut = (clipped(outline, self.end) for outline in outlines)
+        return tuple(Prism(self.axis, outline, 0.0, self.depth) for outline in cut if outline)
+
+    def layer(self, z0: float, z1: float) -> Outline:
+        return rectangle(0.0, self.end, z0, z1)
+
+    def triangle(self, apex: float) -> list[Point]:
+        """A hanging triangle."""
+        return [(apex - self.quarter, self.roof), (apex, self.film), (apex + self.quarter, self.roof)]
+
+    def hanging(self) -> list[list[Point]]:
+        return [self.triangle(apex) for apex in self.apexes[1::2]]
+
+    def comb(self) -> list[Point]:
+        """Top electrode with its cogs."""
+        beyond = max(self.end, self.apexes[-1] + self.quarter)
+        teeth = [point for apex in self.apexes[::2] for point in self.triangle(apex)]
+        return [(beyond, self.top), (0.0, self.top), (0.0, self.roof), *teeth, (beyond, self.roof)]
+
+    def feet(self) -> list[list[Point]]:
+        """Triangles on the film, each to the left of a hanging apex."""
+        q = self.quarter
+        return [[(a - 2 * q, self.film), (a, self.film), (a - q, self.peak)] for a in self.apexes]
+
+    def film_with_feet(self) -> list[Point]:
+        teeth = [point for a in reversed(self.apexes) for point in ((a + self.quarter, self.peak), (a, self.film))]
+        return [(0.0, self.low), (teeth[0][0], self.low), *teeth, (self.apexes[0] - self.quarter, self.peak)]
+
+    def air(self) -> list[list[Point]]:
+        """What is left open above each foot."""
+        q = self.quarter
+        return [[(a - 2 * q, self.film), (a - q, self.peak), (a, self.film), (a - q, self.roof)] for a in self.apexes]

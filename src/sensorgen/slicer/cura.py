@@ -7,8 +7,8 @@ import json
 import re
 import uuid
 from collections.abc import Mapping
+from html import escape
 from string import Template
-from xml.sax.saxutils import escape
 
 from sensorgen.errors import MissingValue, OutOfRange
 from sensorgen.printer import Printer, Quality, folder

@@ -5,12 +5,11 @@ longer the boundary of anything.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.threemf.part import Part
+from sensorgen.threemf.part import Part, escaped
 
 MODEL = "3D/3dmodel.model"
 OBJECT_ID = 1  # the one object of the build; the bodies of a family with one object each come after it
@@ -45,10 +44,10 @@ def model(
     shift_mm : (3,) float64 array
         From the sensor's coordinates to those of the bed [mm].
     """
-    prefixes = "".join(f" xmlns:{prefix}={quoteattr(address)}" for prefix, address in namespaces.items())
+    prefixes = "".join(f' xmlns:{prefix}="{escaped(address)}"' for prefix, address in namespaces.items())
     yield f'<?xml version="1.0" encoding="UTF-8"?>\n<model unit="millimeter" xmlns="{_CORE}"{prefixes}>\n'
     for name, value in {"Title": title, "Application": "sensorgen", **metadata}.items():
-        yield f"<metadata name={quoteattr(name)}>{escape(value)}</metadata>\n"
+        yield f'<metadata name="{escaped(name)}">{escaped(value)}</metadata>\n'
     yield "<resources>\n"
     yield from _base_materials(parts)
     yield from objects
@@ -71,14 +70,14 @@ def mesh(parts: Sequence[Part], marks: Sequence[str]) -> Iterator[str]:
 
 def body(number: int, part: Part, parts: Sequence[Part], group: str = "") -> Iterator[str]:
     """Text of the object of one body; ``group`` is that of its metadata, ``parts`` are for its material."""
-    yield f'<object id="{number}" type="model" name={quoteattr(part.name)}{material(part, parts)}>\n{group}'
+    yield f'<object id="{number}" type="model" name="{escaped(part.name)}"{material(part, parts)}>\n{group}'
     yield from mesh([part], [""])
     yield "</object>\n"
 
 
 def assembly(title: str, count: int) -> Iterator[str]:
     """Text of the object that holds ``count`` bodies, which must stand before it."""
-    yield f'<object id="{OBJECT_ID}" type="model" name={quoteattr(title)}>\n<components>\n'
+    yield f'<object id="{OBJECT_ID}" type="model" name="{escaped(title)}">\n<components>\n'
     for place in range(count):
         yield f'<component objectid="{body_id(place)}"/>\n'
     yield "</components>\n</object>\n"
@@ -101,7 +100,7 @@ def _palette(parts: Sequence[Part]) -> list[tuple[str, str]]:
 def _base_materials(parts: Sequence[Part]) -> Iterator[str]:
     yield f'<basematerials id="{MATERIALS_ID}">\n'
     for name, colour in _palette(parts):
-        yield f'<base name={quoteattr(name)} displaycolor="{colour.upper()}"/>\n'
+        yield f'<base name="{escaped(name)}" displaycolor="{colour.upper()}"/>\n'
     yield "</basematerials>\n"
 
 

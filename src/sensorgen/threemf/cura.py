@@ -16,13 +16,12 @@ a window. Reader: Ultimaker/Cura, ``plugins/3MFReader/ThreeMFReader.py``; Ultima
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.threemf import core
-from sensorgen.threemf.part import Part
+from sensorgen.threemf.part import Part, escaped
 
 # PrusaSlicer's name of a setting to Cura's, where both mean the same.
 SETTINGS = {
@@ -61,5 +60,5 @@ def _objects(title: str, parts: Sequence[Part]) -> Iterator[str]:
 def _group(part: Part) -> str:
     known = sorted((SETTINGS[key], value) for key, value in part.settings.items() if key in SETTINGS)
     entries = {"extruder_nr": str(part.extruder)} | {key: value.removesuffix("%") for key, value in known}
-    lines = (f"<metadata name={quoteattr('cura:' + key)}>{escape(v)}</metadata>\n" for key, v in entries.items())
+    lines = (f'<metadata name="cura:{escaped(key)}">{escaped(v)}</metadata>\n' for key, v in entries.items())
     return f"<metadatagroup>\n{''.join(lines)}</metadatagroup>\n"

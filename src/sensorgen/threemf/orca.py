@@ -20,13 +20,12 @@ Reader: SoftFever/OrcaSlicer and bambulab/BambuStudio, ``src/libslic3r/Format/bb
 """
 
 from collections.abc import Iterator, Sequence
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.threemf import core
-from sensorgen.threemf.part import Part
+from sensorgen.threemf.part import Part, escaped
 
 CONFIG = "Metadata/model_settings.config"
 
@@ -56,4 +55,4 @@ def _config(title: str, parts: Sequence[Part]) -> Iterator[str]:
 
 
 def _metadata(name: str, extruder: int) -> str:
-    return f'<metadata key="name" value={quoteattr(name)}/>\n<metadata key="extruder" value="{extruder + 1}"/>\n'
+    return f'<metadata key="name" value="{escaped(name)}"/>\n<metadata key="extruder" value="{extruder + 1}"/>\n'

@@ -1,5 +1,6 @@
 """One body of a multi-material 3MF, and what can be wrong with it."""
 
+import html
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -104,3 +105,8 @@ def _check_mesh(part: Part) -> None:
     a, b, c = triangles.T
     if ((a == b) | (b == c) | (c == a)).any():
         raise BadInput(f"body {part.name!r} has a triangle with one corner twice")
+
+
+def escaped(text: str) -> str:
+    """Text for XML, also within double quotes; without references by number, which lib3mf refuses."""
+    return html.escape(text, quote=False).replace('"', "&quot;")

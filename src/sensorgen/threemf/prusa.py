@@ -15,13 +15,12 @@ Reader: prusa3d/PrusaSlicer, ``src/libslic3r/Format/3mf.cpp``.
 """
 
 from collections.abc import Iterator, Sequence
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.threemf import core
-from sensorgen.threemf.part import Part
+from sensorgen.threemf.part import Part, escaped
 
 CONFIG = "Metadata/Slic3r_PE_model.config"
 
@@ -36,7 +35,7 @@ def files(title: str, parts: Sequence[Part], shift_mm: NDArray[np.float64]) -> I
 
 
 def _object(title: str, parts: Sequence[Part]) -> Iterator[str]:
-    name = quoteattr(title)
+    name = f'"{escaped(title)}"'
     yield f'<object id="{core.OBJECT_ID}" type="model" name={name}{core.material(parts[0], parts)}>\n'
     yield from core.mesh(parts, [core.material(part, parts, "p1") for part in parts])
     yield "</object>\n"
@@ -61,4 +60,4 @@ def _volume(part: Part) -> dict[str, str]:
 
 
 def _metadata(kind: str, key: str, value: str) -> str:
-    return f'<metadata type="{kind}" key={quoteattr(key)} value={quoteattr(value)}/>\n'
+    return f'<metadata type="{kind}" key="{escaped(key)}" value="{escaped(value)}"/>\n'

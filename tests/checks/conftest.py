@@ -1,0 +1,63 @@
+"""Small sensors with one planted defect, and the findings about them."""
+
+from collections.abc import Callable
+
+import pytest
+
+from sensorgen import checks
+from sensorgen.findings import Finding
+from sensorgen.geometry import meshes, validity
+from sensorgen.printer import Printer, Quality, load_printer, load_quality
+from sensorgen.scene import Body, Scene, box
+
+Findings = Callable[..., list[Finding]]
+
+WIDE = 20.0
+
+
+@pytest.fixture
+def printer() -> Printer:
+    """The thesis's printer: bed 390 x 170 mm, nozzle 0.4 mm, line 0.44 mm."""
+    return load_printer("diabase-h5")
+
+
+@pytest.fixture
+def fine() -> Quality:
+    """Layers of 0.1 mm."""
+    return load_quality("fine")
+
+
+@pytest.fixture
+def extrafine() -> Quality:
+    """Layers of 0.06 mm."""
+    return load_quality("extrafine")
+
+
+@pytest.fixture
+def sensor() -> Callable[..., Scene]:
+    """A function that lays a film, some bodies and a top electrode on a bottom electrode."""
+
+    def make(*bodies: Body, film_mm: float = 0.6, bottom_mm: float = 0.3, top_mm: float = 0.3, fill: bool = True) -> Scene:
+        """Fill the gap with a film unless told not to; ``bodies`` go on top of the sensor then."""
+        roof, end = bottom_mm + film_mm, bottom_mm + film_mm + top_mm
+        stack = [Body("low", "etpu", (box(0, WIDE, 0, WIDE, 0, bottom_mm),), "bottom")]
+        if fill:
+            stack.append(Body("film", "x60", (box(0, WIDE, 0, WIDE, bottom_mm, roof),)))
+        stack += [Body("high", "etpu", (box(0, WIDE, 0, WIDE, roof, end),), "top"), *bodies]
+        height = max(prism.span("z")[1] for body in stack for prism in body.prisms)
+        return Scene(tuple(stack), (WIDE, WIDE, height))
+
+    return make
+
+
+@pytest.fixture
+def findings(printer, fine) -> Findings:
+    """A function that checks a scene, on the thesis's printer and with fine layers unless told otherwise."""
+
+    def check(scene: Scene, rule: str = "", body: str = "", gap_mm: float | None = None, **on) -> list[Finding]:
+        if gap_mm is None:
+            gap_mm = validity.electrode_gap_mm(scene, {b.name: meshes.mesh(b) for b in scene.bodies})
+        found = checks.findings(scene, on.get("printer", printer), on.get("quality", fine), gap_mm)
+        return [f for f in found if f.rule.startswith(rule) and body in ("", f.body)]
+
+    return check

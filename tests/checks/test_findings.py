@@ -1,0 +1,98 @@
+"""What holds for the findings of all rules: order, form, merging, waivers, and clean sensors."""
+
+import json
+
+import pytest
+
+from sensorgen.design import make
+from sensorgen.findings import SEVERITIES, Finding
+from sensorgen.review import report, review
+from sensorgen.scene import Body, box
+
+BAD = {
+    "shape": "tri",
+    "parameters": {"length_mm": 8.3, "width_mm": 4.0, "dielectric_mm": 0.14},
+    "orientation": "upside-down",
+}
+
+
+def test_a_plate_has_no_findings():
+    assert review(make({"shape": "reference"})).findings == []
+
+
+def test_findings_come_with_the_worst_first_and_complete():
+    found = review(make(BAD)).findings
+    order = [SEVERITIES.index(f.severity) for f in found]
+    assert order == sorted(order)
+    assert {"error", "warning", "info"} == {f.severity for f in found}
+    for f in found:
+        assert f.rule[0].isdigit()
+        assert f.body
+        assert f.message
+        assert f.advice
+        assert f.value_mm is not None
+        assert f.limit_mm is not None
+        assert f.layer is not None or f.place_mm is not None
+
+
+def test_the_margin_is_value_less_limit():
+    assert Finding("5-width", "error", "b", "m", "a", value_mm=0.1, limit_mm=0.12).margin_mm() == -0.02
+    assert Finding("5-width", "info", "b", "m", "a").margin_mm() is None
+
+
+def test_the_report_is_plain_json():
+    design = make(BAD)
+    text = json.dumps(report(design, review(design)), allow_nan=False)
+    first = json.loads(text)["findings"][0]
+    assert set(first) >= {"rule", "severity", "body", "layer", "value_mm", "limit_mm", "margin_mm", "advice", "place_mm"}
+
+
+def test_the_same_finding_in_layer_after_layer_is_one(sensor, findings):
+    strips = (box(5, 5.3, 0, 20, 1.2, 1.5), box(5, 10, 0, 20, 1.5, 1.6), box(5, 5.3, 0, 20, 1.6, 1.7))
+    found = findings(sensor(Body("strip", "pla", strips)), "5-", "strip")
+    assert [(f.layer, f.last_layer) for f in found] == [(13, 15), (17, None)]
+
+
+def waived(*waivers: dict[str, str]) -> list[Finding]:
+    return review(make(BAD | {"waivers": list(waivers)})).findings
+
+
+@pytest.mark.parametrize(
+    ("waiver", "covers"),
+    [
+        ({"rule": "5-width"}, lambda f: f.rule == "5-width"),
+        ({"rule": "5"}, lambda f: f.rule == "5-width"),
+        ({"rule": "2"}, lambda f: f.rule.startswith("2-")),
+        ({"rule": "2-film"}, lambda f: f.rule == "2-film"),
+        ({"rule": "5", "body": "film_and_lower"}, lambda f: f.rule == "5-width" and f.body == "film_and_lower"),
+        ({"rule": "5", "body": "film"}, lambda f: False),
+        ({"rule": "1"}, lambda f: False),
+        ({"rule": "10"}, lambda f: False),
+    ],
+)
+def test_a_waiver_silences_only_what_it_names(waiver, covers):
+    found = waived(waiver | {"reason": "tried on the bench"})
+    assert len(found) == len(waived())
+    assert [bool(f.waiver) for f in found] == [covers(f) for f in found]
+    assert {f.waiver for f in found if f.waiver} <= {"tried on the bench"}
+
+
+def test_what_is_waived_stops_nothing():
+    with_all = review(make(BAD | {"waivers": [{"rule": r, "reason": "tried on the bench"} for r in "23459"]}))
+    assert with_all.errors(strict=True) == []
+    assert with_all.counts() == {"error": 0, "warning": 0, "info": 0, "waived": len(with_all.findings)}
+    assert review(make(BAD)).errors() != []
+
+
+def test_one_waiver_leaves_the_other_errors():
+    island = {"rule": "9", "reason": "tried on the bench"}
+    held = review(make(BAD | {"waivers": [island]}))
+    assert not any(f.rule == "9-bridge" for f in held.errors())
+
+
+def test_the_quality_decides_which_faces_are_off_the_grid():
+    plate = {"shape": "reference", "parameters": {"dielectric_mm": 0.6, "electrode_mm": 0.3}}
+    assert review(make(plate | {"quality": "fine"})).findings == []
+    assert review(make(plate | {"quality": "extrafine"})).findings == []  # 0.3 and 0.6 are whole layers of both
+    found = review(make(plate | {"quality": "extrafine", "parameters": {"dielectric_mm": 0.7}})).findings
+    assert {f.rule for f in found} == {"2-film", "2-printed-gap", "3-grid", "4-unsampled"}

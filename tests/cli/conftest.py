@@ -1,0 +1,114 @@
+"""The command line, called in this process for speed or in one of its own."""
+
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from sensorgen.cli import main
+
+TEMPLATE = "import sys; sys.argv[0] = 'sensorgen'; from sensorgen.cli import main; {before}; main()"
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a command left behind: exit code, and what it wrote where."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def line(self) -> str:
+        """The one line on stderr; anything else there is a fault."""
+        assert self.err.count("\n") == 1, self.err
+        assert self.err.startswith("sensorgen: "), self.err
+        assert "Traceback" not in self.out + self.err
+        return self.err.strip()
+
+
+@pytest.fixture
+def run(capfd, monkeypatch, tmp_path):
+    """Run a command in this process, in an empty folder; gives :class:`Said`."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+
+    def call(*words):
+        monkeypatch.setattr(sys, "argv", ["sensorgen", *map(str, words)])
+        before = signal.getsignal(signal.SIGTERM)
+        capfd.readouterr()
+        try:
+            with pytest.raises(SystemExit) as left:
+                main()
+        finally:
+            signal.signal(signal.SIGTERM, before)
+        return Said(left.value.code, *capfd.readouterr())
+
+    return call
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Start a command in a process of its own; ``before`` is Python that goes ahead of it."""
+
+    def call(*words, before="pass", cwd=tmp_path, **environment):
+        return subprocess.Popen(
+            [sys.executable, "-c", TEMPLATE.format(before=before), *map(str, words)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=cwd,
+            env={**os.environ, "COLUMNS": "80", **environment},
+        )
+
+    return call
+
+
+@pytest.fixture
+def real(start):
+    """Run a command in a process of its own; gives :class:`Said`."""
+
+    def call(*words, **more):
+        process = start(*words, **more)
+        out, err = process.communicate(timeout=60)
+        return Said(process.returncode, out, err)
+
+    return call
+
+
+@pytest.fixture
+def disk(tmp_path):
+    """Mount a small disk: ``disk(bytes)`` gives its folder; skipped where this user may not mount."""
+    mounted = []
+
+    def mount(size):
+        place = tmp_path / "disk"
+        place.mkdir()
+        done = subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", f"size={size}", "none", place], capture_output=True, text=True
+        )
+        if done.returncode:
+            pytest.skip(f"cannot mount a small disk here: {done.stderr.strip()}")
+        mounted.append(place)
+        return place
+
+    try:
+        yield mount
+    finally:
+        for place in mounted:
+            subprocess.run(["umount", place], check=True)
+
+
+@pytest.fixture
+def contents():
+    """Every file below a folder, by its name there."""
+
+    def read(folder: Path):
+        return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+    return read

@@ -1,0 +1,188 @@
+"""Design files that cannot be read, mean harm, or are merely odd."""
+
+import os
+import time
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+DEEP = "[" * 100_000
+BOMB = "a: &a [x,x,x,x,x,x,x,x]\n" + "".join(
+    f"{b}: &{b} [{','.join([f'*{a}'] * 8)}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)
+)
+FILES = {
+    "tag": ("shape: !!python/object/apply:os.system ['touch pwned']", "line 1: tags (!name) are not taken"),
+    "bad timestamp": ("shape: tri\nname: !!timestamp nonsense", "line 2: tags (!name) are not taken"),
+    "billion laughs": (BOMB, "line 2: aliases (*name) are not taken"),
+    "deep": (DEEP, "nested deeper than 20 levels"),
+    "deep mappings": ("{a: " * 5_000, "nested deeper than 20 levels"),
+    "key twice": ("shape: tri\nshape: rect", "line 2, column 1: key 'shape' is given twice"),
+    "key twice inside": ("shape: tri\nparameters: {period_mm: 1, period_mm: 2}", "key 'period_mm' is given twice"),
+    "unhashable key": ("shape: tri\n? [a, b]\n: 1", "line 2, column 3: key that is a list or a mapping: expected text"),
+    "number as key": ("shape: tri\nparameters: {1: 2}", "key '1': expected text"),
+    "merge key": ("shape: tri\n<<: {quality: extrafine}", "unknown key '<<'"),
+    "tab": ("shape: tri\nparameters:\n\tperiod_mm: 2", "line 3, column 1: while scanning"),
+    "two documents": ("shape: tri\n---\nshape: rect", "expected a single document"),
+    "open quote": ("shape: 'tri", "line 1"),
+    "empty": ("", "holds nothing; expected a mapping of names to values"),
+    "comment": ("# nothing yet\n", "holds nothing"),
+    "list at top": ("- tri", "holds a list; expected a mapping"),
+    "word at top": ("tri", "holds text; expected a mapping"),
+    "huge code point": ('shape: "\\UFFFFFFFF"', "not YAML"),
+    "half a code point": ('shape: "\\ud800"', "unknown shape '\\ud800'"),
+    "NUL": ("shape: tri\0", "not YAML: unacceptable character #x0000"),
+    "no shape": ("quality: fine", "shape is missing; expected rect, reference, tri"),
+    "empty shape": ("shape:", "shape is None; expected text"),
+    "list as shape": ("shape: [tri]", "shape is ['tri']; expected text"),
+    "unknown shape": ("shape: trj", "unknown shape 'trj'; did you mean 'tri'?"),
+    "unknown key": ("shape: tri\nmaterial: {}", "unknown key 'material'; did you mean 'materials'?"),
+    "unknown parameter": ("shape: tri\nparameters: {perod_mm: 2}", "unknown parameter of tri 'perod_mm'; did"),
+    "true": ("shape: tri\nparameters: {period_mm: true}", "parameters.period_mm is True; expected a number"),
+    "yes": ("shape: tri\nparameters: {period_mm: yes}", "period_mm is 'yes'; expected a number"),
+    "octal": ("shape: tri\nparameters: {period_mm: 010}", "period_mm is '010'; expected a number"),
+    "sexagesimal": ("shape: tri\nparameters: {period_mm: 1:30}", "period_mm is '1:30'; expected a number"),
+    "date": ("shape: tri\nparameters: {period_mm: 2024-01-01}", "period_mm is '2024-01-01'; expected a number"),
+    "huge number": ("shape: tri\nparameters: {period_mm: 1" + "0" * 400 + "}", "period_mm is inf; expected a number from 0.1"),
+    "larger number": ("shape: tri\ntools: {x60: 1" + "0" * 5_000 + "}", "tools.x60 is inf; expected a whole number"),
+    "infinity": ("shape: tri\nparameters: {period_mm: .inf}", "period_mm is inf; expected a number from 0.1"),
+    "not a number": ("shape: tri\nparameters: {period_mm: .nan}", "period_mm is nan; expected a number from 0.1"),
+    "nothing": ("shape: tri\nparameters: {period_mm: }", "parameters.period_mm is None; expected a number"),
+    "list of parameters": ("shape: tri\nparameters: [1]", "parameters is [1]; expected a mapping of names to values"),
+    "word for materials": ("shape: tri\nmaterials: x60", "materials is 'x60'; expected a mapping of names to values"),
+    "waiver without reason": ("shape: tri\nwaivers: [{rule: 5-width}]", "waivers.0.reason is missing"),
+    "waiver with excuse": ("shape: tri\nwaivers: [{rule: 5-width, reason: eh}]", "reason is 'eh'; expected at least 5"),
+    "waiver of no rule": ("shape: tri\nwaivers: [{rule: width, reason: because}]", "expected a rule such as 5-width"),
+    "unsafe name": ("shape: tri\nname: ../../x", "name: '../../x' cannot be a file name everywhere"),
+    "no name": ("shape: tri\nname:", "name is None; expected text"),
+    "empty name": ("shape: tri\nname: ''", "name: '' cannot be a file name"),
+    "number as name": ("shape: tri\nname: 23", "name is 23; expected text"),
+    "one source each": ("shape: tri\nmaterials: {film: x60@thesis-4.1, dielectric: x60@thesis-3.2}", "name one source"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "message"), FILES.values(), ids=FILES)
+def test_bad_file(run, tmp_path, text, message):
+    (tmp_path / "bad.yaml").write_text(text, encoding="utf-8")
+    said = run("build", "bad.yaml", "--no-cad")
+    assert (said.code, said.out) == (2, "")
+    assert said.line.startswith("sensorgen: bad.yaml: ")
+    assert message in said.line
+    assert len(said.line) < 500
+    assert [p.name for p in tmp_path.iterdir()] == ["bad.yaml"]
+
+
+def test_100_mb_are_refused_without_being_read(run, tmp_path):
+    with (tmp_path / "big.yaml").open("wb") as file:
+        file.write(b"shape: tri\n#")
+        file.truncate(100_000_000)  # sparse: were it read, it would be a second and 100 MB
+    started = time.perf_counter()
+    said = run("check", "big.yaml")
+    assert time.perf_counter() - started < 0.2
+    assert "100000000 bytes; expected at most 100000" in said.line
+
+
+@pytest.mark.parametrize(
+    "text", ["- 1\n" * 20_000, "a: " + "x\n " * 25_000, "{" + "a: {}, " * 10_000, "a: [" + "1," * 40_000 + "]"],
+    ids=["list", "long text", "open mapping", "flow list"],
+)  # fmt: skip
+def test_the_largest_file_is_refused_in_seconds(run, tmp_path, text):
+    (tmp_path / "wide.yaml").write_text(text)
+    started = time.perf_counter()
+    assert run("check", "wide.yaml").code == 2
+    assert time.perf_counter() - started < 10
+
+
+def test_a_folder(run, tmp_path):
+    (tmp_path / "d.yaml").mkdir()
+    assert "cannot read 'd.yaml'" in run("check", "d.yaml").line
+
+
+def test_no_such_file(run):
+    assert "cannot read 'no.yaml': No such file or directory" in run("check", "no.yaml").line
+
+
+def test_a_link_that_leads_nowhere(run, tmp_path):
+    (tmp_path / "link.yaml").symlink_to("nowhere")
+    assert "cannot read 'link.yaml'" in run("check", "link.yaml").line
+
+
+def test_a_link_to_itself(run, tmp_path):
+    (tmp_path / "link.yaml").symlink_to("link.yaml")
+    assert "cannot read 'link.yaml'" in run("check", "link.yaml").line
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+def test_a_pipe_that_nobody_writes_to_is_not_waited_for(real, tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    assert "pipe.yaml: not a file" in real("check", "pipe.yaml").line
+
+
+@pytest.mark.parametrize("device", ["/dev/zero", "/dev/random", "/dev/tty", "/dev/stdin"])
+def test_a_device_is_not_read(real, device):
+    if not Path(device).exists():
+        pytest.skip(f"no {device} here")
+    said = real("check", device)
+    assert said.code == 2
+    assert device in said.line
+
+
+@contextmanager
+def as_nobody():
+    """Root, who may read everything, is nobody for a while."""
+    root = os.geteuid() == 0
+    if root:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        if root:
+            os.seteuid(0)
+
+
+@pytest.mark.skipif(not hasattr(os, "seteuid"), reason="no users on this system")
+def test_no_permission(run, tmp_path):
+    (tmp_path / "shut.yaml").write_text("shape: tri")
+    assert run("check", "shut.yaml").code == 0
+    (tmp_path / "shut.yaml").chmod(0)
+    with as_nobody():
+        said = run("check", "shut.yaml")
+    assert said.line == "sensorgen: cannot read 'shut.yaml': Permission denied"
+
+
+@pytest.mark.parametrize(
+    "content", [bytes(range(256)), "shape: tri # größe".encode("latin-1"), "shape: tri".encode("utf-16")],
+    ids=["binary", "latin-1", "utf-16"],
+)  # fmt: skip
+def test_not_utf8(run, tmp_path, content):
+    (tmp_path / "odd.yaml").write_bytes(content)
+    assert "save it as UTF-8 text" in run("check", "odd.yaml").line
+
+
+@pytest.mark.parametrize(
+    "content", [b"\xef\xbb\xbfshape: tri", b"shape: tri\r\nquality: fine\r\n", b"shape: tri # gr\xc3\xb6\xc3\x9fe"]
+)
+def test_bom_and_windows_line_ends_and_umlauts_in_comments_are_fine(run, tmp_path, content):
+    (tmp_path / "ok.yaml").write_bytes(content)
+    said = run("check", "ok.yaml")
+    assert (said.code, said.err) == (0, "")
+
+
+@pytest.mark.parametrize("stem", ["mein größter sensor", "it's", "-x", "CON"])
+def test_a_file_whose_name_is_no_name_for_results(run, tmp_path, stem):
+    path = tmp_path / f"{stem}.yaml"
+    path.write_text("shape: tri")
+    said = run("check", path)
+    assert "set it with --name, or 'name:' in the file" in said.line
+    assert run("check", path, "--name", "fine-name").code == 0
+    path.write_text("shape: tri\nname: fine-name")
+    assert run("check", path).code == 0
+
+
+@pytest.mark.parametrize("word", ["title: x", "name: again", "bed_mm: [1e999, 1]", "tool_numbers: []", "- 1", ""])
+def test_a_bad_printer_file(run, tmp_path, word):
+    (tmp_path / "p.yaml").write_text(word)
+    said = run("check", "tri", "--printer", "p.yaml")
+    assert said.code == 2
+    assert "p.yaml" in said.line

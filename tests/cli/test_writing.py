@@ -1,0 +1,300 @@
+"""Whatever happens while it writes: one clear line, whole files, nothing left behind."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import time
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+BUILD = ("build", "tri", "--no-cad", "--name", "x")
+OLD, NEW = ("--period", "2"), ("--period", "2.5")
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory):
+    """The files of the old build, and those of the new one."""
+    from sensorgen import design
+    from sensorgen.build import build
+
+    def files(period):
+        data = {"shape": "tri", "name": "x", "parameters": {"period_mm": period}}
+        folder = build(design.make(data), tmp_path_factory.mktemp("both"), cad=False).folder
+        return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+    return files(2.0), files(2.5)
+
+
+@pytest.fixture
+def built(tmp_path, both):
+    """The old build, in the usual place."""
+    for name, content in both[0].items():
+        path = tmp_path / "out/x" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    return tmp_path / "out"
+
+
+def assert_whole(found, both):
+    """Every file is of one build or of the other, and the manifest is, too."""
+    assert found
+    for name, content in found.items():
+        assert content in (both[0].get(name), both[1].get(name)), name
+
+
+def assert_manifest_verifies(found):
+    listed = json.loads(found["manifest.json"])["files"]
+    assert listed == {name: sha256(content).hexdigest() for name, content in found.items() if name != "manifest.json"}
+
+
+def test_rebuilt_elsewhere_every_byte_is_the_same(start, tmp_path, contents, both):
+    """Two processes with different hash seeds and different folders."""
+    words = (*BUILD, *OLD, "--out")
+    first, second = start(*words, "a", PYTHONHASHSEED="1"), start(*words, "b/c", PYTHONHASHSEED="2")
+    for process in (first, second):
+        process.communicate()
+        assert process.returncode == 0
+    assert contents(tmp_path / "a/x") == contents(tmp_path / "b/c/x") == both[0]
+    assert_manifest_verifies(both[0])
+
+
+def test_force_writes_a_short_and_predicts_nothing(run, tmp_path, contents):
+    said = run("build", "tri", "--dielectric", "0", "--no-cad", "--force")
+    assert (said.code, said.err) == (0, "")
+    found = contents(tmp_path / "out/trix-d0")
+    predicted = json.loads(found["prediction.json"])
+    assert predicted["capacitance_f"] is None
+    assert "touch" in predicted["reason"] or "short" in predicted["reason"]
+    assert {"trix-d0.prusa.3mf", "trix-d0.svg", "check.json"} < set(found)
+    assert_manifest_verifies(found)
+
+
+def test_missing_parents_are_made(run, tmp_path):
+    assert run(*BUILD, "--out", "a/b/c").code == 0
+    assert (tmp_path / "a/b/c/x/manifest.json").is_file()
+
+
+@pytest.mark.parametrize("out", ["taken", "taken/deeper", "taken/deeper/still"])
+def test_output_folder_is_a_file(run, tmp_path, out):
+    (tmp_path / "taken").write_text("mine")
+    said = run(*BUILD, "--out", out)
+    assert said.code == 2
+    assert "'taken' is a file; expected a folder: move it away, or name another place with --out" in said.line
+    assert (tmp_path / "taken").read_text() == "mine"
+
+
+def test_the_designs_own_folder_is_a_file(run, tmp_path):
+    (tmp_path / "x").write_text("mine")
+    assert "'x' is a file" in run(*BUILD, "--out", "").line
+    assert [p.name for p in tmp_path.iterdir()] == ["x"]
+
+
+def test_output_folder_is_a_link_that_leads_nowhere(run, tmp_path):
+    (tmp_path / "out").symlink_to("nowhere")
+    assert "'out' is a link that leads nowhere" in run(*BUILD).line
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_link_to_a_folder_is_followed(run, tmp_path):
+    (tmp_path / "real").mkdir()
+    (tmp_path / "out").symlink_to("real")
+    assert run(*BUILD).code == 0
+    assert (tmp_path / "real/x/manifest.json").is_file()
+
+
+@pytest.mark.parametrize("out", ["/proc", "/proc/none", "/dev/null", "a" * 300, "out\udcff/" + "b" * 300])
+def test_output_folder_that_cannot_be(run, tmp_path, out):
+    said = run(*BUILD, "--out", out)
+    assert said.code == 2
+    assert "name another place with --out" in said.line
+    assert not any(p.name.endswith(".part") for p in tmp_path.rglob("*"))
+
+
+def test_a_name_that_only_the_file_system_knows_is_printed(run, tmp_path):
+    said = run(*BUILD, "--out", "ö\udcff")
+    assert said.code in (0, 2)  # written, and said as well as the terminal can
+    assert "Traceback" not in said.err
+
+
+def test_read_only(run, disk, contents, both):
+    place = disk("8m")
+    assert run(*BUILD, *OLD, "--out", place).code == 0
+    subprocess.run(["mount", "-o", "remount,ro", place], check=True)
+    said = run(*BUILD, *NEW, "--out", place)
+    assert said.code == 2
+    assert f"cannot write to '{place}/x': Read-only file system; name another place with --out" in said.line
+    assert contents(place) == {f"x/{name}": content for name, content in both[0].items()}
+
+
+def test_disk_full(run, disk, contents, both):
+    """There is room for one build, but not for a second beside it."""
+    place = disk(str(sum(map(len, both[0].values())) + 400_000))
+    assert run(*BUILD, *OLD, "--out", place).code == 0
+    (place / "filler").write_bytes(bytes(300_000))
+    before = contents(place)
+    said = run(*BUILD, *NEW, "--out", place)
+    assert said.code == 2
+    assert (
+        said.line == f"sensorgen: cannot write to '{place}/x': No space left on device; name another place with --out"
+    )
+    assert contents(place) == before
+    assert sorted(p.name for p in place.iterdir()) == ["filler", "x"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no file size limits on Windows")
+@pytest.mark.parametrize("limit", [0, 3_000])
+def test_a_write_that_breaks_off(real, built, contents, both, limit):
+    """As on a full disk, but without needing one: no file may grow beyond the limit."""
+    said = real(*BUILD, *NEW, before=f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))")
+    assert said.code == 2
+    assert said.line == "sensorgen: cannot write to 'out/x': File too large; name another place with --out"
+    assert contents(built) == {f"x/{name}": content for name, content in both[0].items()}
+
+
+def test_drawing_breaks_off(real, tmp_path):
+    (tmp_path / "a.svg").write_text("mine")
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))"
+    assert real("draw", "tri", "-o", "a.svg", before=limit).line == "sensorgen: cannot write 'a.svg': File too large"
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("a.svg", "mine")]
+
+
+@pytest.mark.parametrize("place", ["/dev/null", ".", "/proc/none/x.svg"])
+def test_drawing_to_what_is_no_file(run, place):
+    said = run("draw", "tri", "-o", place)
+    assert said.code == 2
+    assert "cannot write" in said.line
+    assert not Path("/dev/null").is_file()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+def test_output_to_a_full_disk(tmp_path, start):
+    with Path("/dev/full").open("w") as full:
+        process = start("list", "materials")
+        process.communicate()
+        done = subprocess.run([*process.args], stdout=full, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, "sensorgen: cannot write the output: No space left on device\n")
+
+
+def test_a_reader_that_leaves_early(start):
+    with start("list", "materials") as process:
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 0
+
+
+# Interruptions. A build of this size takes half a second, a third of which is writing.
+
+SIGNALS = {"SIGINT": 130, "SIGTERM": 143, "SIGKILL": -9}
+
+
+def writing(process, out):
+    """Wait until a build has begun to write (or is done)."""
+    while process.poll() is None and not list(out.glob(".x.*.part")):
+        time.sleep(0.001)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("name", SIGNALS)
+def test_interrupted_while_writing(start, real, built, contents, both, name):
+    rng = random.Random(name)
+    for turn in range(8):
+        process = start(*BUILD, *(NEW, OLD)[turn % 2])
+        writing(process, built)
+        time.sleep(rng.uniform(0.0, 0.15))
+        process.send_signal(getattr(signal, name))
+        _, err = process.communicate()
+        assert process.returncode in (0, SIGNALS[name])  # it may have been done already
+        assert_whole(contents(built / "x"), both)
+        left = [p.name for p in built.iterdir() if p.name != "x"]
+        if name != "SIGKILL":
+            assert not left
+            if process.returncode:
+                assert err.strip().endswith("; no file is half-written")
+                assert err.strip().count("\n") == 0
+    assert real(*BUILD, *NEW).code == 0
+    assert contents(built) == {f"x/{name}": content for name, content in both[1].items()}  # leftovers are swept
+
+
+AT_RENAME = """
+import os, pathlib, signal
+rename, turns = pathlib.Path.replace, iter(range({turn}))
+def interrupted(self, target):
+    if next(turns, None) is None:
+        os.kill(os.getpid(), signal.{name})
+    return rename(self, target)
+pathlib.Path.replace = interrupted
+exec("")"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("turn", [0, 10, 23])
+def test_killed_between_two_renames(start, real, built, contents, both, turn):
+    before = AT_RENAME.format(turn=turn, name="SIGKILL")
+    process = start(*BUILD, *NEW, before=f"exec({before!r})")
+    process.communicate()
+    assert process.returncode == -9
+    found = contents(built / "x")
+    assert_whole(found, both)
+    assert found["manifest.json"] == both[0]["manifest.json"]  # the last to be replaced
+    assert real(*BUILD, *NEW).code == 0
+    assert contents(built) == {f"x/{name}": content for name, content in both[1].items()}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_an_interruption_between_two_renames_waits_for_the_last(start, built, contents, both, name):
+    before = AT_RENAME.format(turn=5, name=name)
+    process = start(*BUILD, *NEW, before=f"exec({before!r})")
+    process.communicate()
+    assert process.returncode == SIGNALS[name]
+    assert contents(built) == {f"x/{name}": content for name, content in both[1].items()}
+
+
+def test_builds_of_one_name_at_once(start, tmp_path, contents, both):
+    """Whoever comes last wins, with all of its files."""
+    for _ in range(2):
+        processes = [start(*BUILD, *period) for period in (OLD, NEW, OLD, NEW)]
+        for process in processes:
+            _, err = process.communicate()
+            assert (process.returncode, err) == (0, "")
+        assert contents(tmp_path / "out/x") in both
+        assert [p.name for p in (tmp_path / "out").iterdir()] == ["x"]
+
+
+def test_the_users_own_files_stay(run, tmp_path):
+    folder = tmp_path / "out/x"
+    (folder / "profiles").mkdir(parents=True)
+    mine = [folder / "notes.txt", folder / "profiles/mine.ini", tmp_path / "out/other.txt"]
+    for file in mine:
+        file.write_text("mine")
+    for period in (OLD, NEW):
+        said = run(*BUILD, *period, "--json")
+        assert said.code == 0
+        assert not {"notes.txt", "profiles/mine.ini"} & set(json.loads(said.out)["files"])
+    assert [file.read_text() for file in mine] == ["mine"] * 3
+
+
+def test_files_of_an_earlier_build_go(run, built, contents, both):
+    folder = built / "x"
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["files"] |= {"x.step": "0", "profiles/old/one.ini": "0"}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    (folder / "x.step").write_text("of a build with CAD")
+    (folder / "profiles/old").mkdir()
+    (folder / "profiles/old/one.ini").write_text("of another printer")
+    assert run(*BUILD, *NEW).code == 0
+    assert contents(folder) == both[1]
+
+
+def test_a_folder_where_a_file_should_go(run, built, contents):
+    (built / "x/x.svg").unlink()
+    (built / "x/x.svg").mkdir()
+    before = contents(built)
+    said = run(*BUILD, *NEW)
+    assert said.code == 2
+    assert "cannot write 'out/x/x.svg': a folder is in its place" in said.line
+    assert contents(built) == before
