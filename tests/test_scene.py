@@ -1,6 +1,7 @@
 """Scenes against closed forms, clipped periods and symmetries."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -57,7 +58,7 @@ def test_plate_is_three_plates():
     )
 
 
-# By hand: the part of one period of the default profile that lies left of a cut, in mm2 (tan gamma = 1, tan theta = 0.48).
+# By hand: the part of the default profile that lies left of a cut, in mm2 (tan gamma = 1, tan theta = 0.48).
 # At 0.25 the cog's flank has come down to 0.25, and the half triangle on the film has fallen from 0.24 to 0.12.
 @pytest.mark.parametrize(
     ("end", "cog", "hanging", "lower"),
@@ -178,7 +179,7 @@ def test_the_areas_of_the_cuts_integrate_to_the_volume(axis, along):
     node = 0.5 / np.sqrt(3)
     got = sum(
         (b - a) / 2 * area_mm2(outline)
-        for a, b in zip(ends, ends[1:], strict=False)
+        for a, b in pairwise(ends)
         for at in ((a + b) / 2 - node * (b - a), (a + b) / 2 + node * (b - a))
         for outline in prism.cut(axis, at)
     )

@@ -1,5 +1,7 @@
 """Sections and columns: together they are the scene."""
 
+from itertools import pairwise
+
 import pytest
 
 from sensorgen.scene import Body, Fill, Prism, Scene, area_mm2, box
@@ -48,9 +50,9 @@ def test_columns_cover_the_section_and_layers_do_not_overlap(scene):
         cells = columns(section)
         size = scene.size_mm["xy".index(section.across)]
         assert (cells[0].left_mm, cells[-1].right_mm) == (0.0, size)
-        assert all(a.right_mm == b.left_mm for a, b in zip(cells, cells[1:], strict=False))
+        assert all(a.right_mm == b.left_mm for a, b in pairwise(cells))
         for cell in cells:
-            for low, high in zip(cell.layers, cell.layers[1:], strict=False):
+            for low, high in pairwise(cell.layers):
                 assert all(t <= b + 1e-12 for t, b in zip(low.top_mm, high.bottom_mm, strict=True))
 
 
@@ -81,9 +83,7 @@ def test_a_section_that_repeats_shows_the_prisms_of_its_own_place():
     for section in sections(scene):
         here = {(body.name, outline) for body, outline in section.regions}
         normal = "yx"["xy".index(section.across)]
-        expected = {
-            (body.name, o) for body in scene.bodies for p in body.prisms for o in p.cut(normal, section.at_mm)
-        }
+        expected = {(body.name, o) for body in scene.bodies for p in body.prisms for o in p.cut(normal, section.at_mm)}
         assert here == expected
 
 
@@ -100,6 +100,7 @@ def test_an_outline_slanted_in_plan_has_no_constant_section():
 
 
 def test_slants_both_ways_have_no_constant_section():
-    both = Scene((Body("a", "x60", (Prism("x", SLANT, 0, 4),)), Body("b", "x60", (Prism("y", SLANT, 0, 4),))), (4, 4, 1))
+    ridges = (Body(axis, "x60", (Prism(axis, SLANT, 0, 4),)) for axis in "xy")
+    both = Scene(tuple(ridges), (4, 4, 1))
     with pytest.raises(ValueError, match="constant cross-sections"):
         sections(both)

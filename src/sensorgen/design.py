@@ -63,7 +63,11 @@ class Waiver(_Strict):
 class Design(_Strict):
     """A named variant of a sensor."""
 
-    name: str = Field(default="", description="Folder and file name; made from the parameters when not given.")
+    name: str = Field(
+        default="",
+        description="Folder and file name; made from the parameters when not given.",
+        json_schema_extra={"pattern": f"^{_NAME.pattern}$"},
+    )
     shape: str
     parameters: dict[str, float | str] = {}
     materials: Slots = Slots()

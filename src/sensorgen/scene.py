@@ -186,7 +186,7 @@ def clipped(outline: Iterable[Point], end_mm: float) -> Outline:
     Coordinates are rounded to 1e-12 mm, so that neighbours reached by different sums stay neighbours.
 
     >>> clipped([(0, 0), (2, 0), (2, 1), (0, 1)], 1.5)
-    ((0, 0), (1.5, 0), (1.5, 1), (0, 1))
+    ((0, 0), (1.5, 0.0), (1.5, 1.0), (0, 1))
     """
     points = [(round(u, 12), round(v, 12)) for u, v in outline]
     for sign, limit in ((-1.0, 0.0), (1.0, end_mm)):

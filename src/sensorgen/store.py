@@ -117,15 +117,16 @@ def replace(path: Path, content: bytes) -> None:
         The place cannot be written to, or the disk is full.
     """
     part = path.parent / f".{path.name}.{os.getpid()}.part"
-    if path.exists() and not path.is_file():
-        raise Unwritable(f"cannot write {str(path)!r}: it is a folder or a device; expected a file")
     try:
+        if path.exists() and not path.is_file():
+            raise Unwritable(f"cannot write {str(path)!r}: it is a folder or a device; expected a file")
         write(part.parent, {part.name: content})
         part.replace(path)
     except OSError as error:
         raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from None
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink()
 
 
 def hashes(folder: Path) -> dict[str, str]:

@@ -8,7 +8,7 @@ from sensorgen import checks
 from sensorgen.findings import Finding
 from sensorgen.geometry import meshes, validity
 from sensorgen.printer import Printer, Quality, load_printer, load_quality
-from sensorgen.scene import Body, Scene, box
+from sensorgen.scene import Body, Prism, Scene, box
 
 Findings = Callable[..., list[Finding]]
 
@@ -35,15 +35,20 @@ def extrafine() -> Quality:
 
 @pytest.fixture
 def sensor() -> Callable[..., Scene]:
-    """A function that lays a film, some bodies and a top electrode on a bottom electrode."""
+    """A function that lays a film, a top electrode and some bodies on a bottom electrode of 20 x 20 mm."""
 
-    def make(*bodies: Body, film_mm: float = 0.6, bottom_mm: float = 0.3, top_mm: float = 0.3, fill: bool = True) -> Scene:
-        """Fill the gap with a film unless told not to; ``bodies`` go on top of the sensor then."""
-        roof, end = bottom_mm + film_mm, bottom_mm + film_mm + top_mm
-        stack = [Body("low", "etpu", (box(0, WIDE, 0, WIDE, 0, bottom_mm),), "bottom")]
-        if fill:
-            stack.append(Body("film", "x60", (box(0, WIDE, 0, WIDE, bottom_mm, roof),)))
-        stack += [Body("high", "etpu", (box(0, WIDE, 0, WIDE, roof, end),), "top"), *bodies]
+    def plate(z0: float, z1: float) -> tuple[Prism]:
+        return (box(0, WIDE, 0, WIDE, z0, z1),)
+
+    def make(*bodies: Body, film_mm: float = 0.6, bottom_mm: float = 0.3) -> Scene:
+        """``bodies`` go on top of it, at 1.2 mm and above."""
+        roof = bottom_mm + film_mm
+        stack = [
+            Body("low", "etpu", plate(0, bottom_mm), "bottom"),
+            Body("film", "x60", plate(bottom_mm, roof)),
+            Body("high", "etpu", plate(roof, roof + 0.3), "top"),
+            *bodies,
+        ]
         height = max(prism.span("z")[1] for body in stack for prism in body.prisms)
         return Scene(tuple(stack), (WIDE, WIDE, height))
 

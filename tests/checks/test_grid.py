@@ -13,7 +13,9 @@ def patch(z0: float, z1: float, *more: tuple[float, float]) -> Body:
     return Body("patch", "pla", tuple(box(5, 10, 5, 10, a, b) for a, b in ((z0, z1), *more)))
 
 
-@pytest.mark.parametrize(("top_mm", "off"), [(1.5 - HAIR, True), (1.5 - 5e-10, False), (1.5, False), (1.5 + HAIR, True)])
+@pytest.mark.parametrize(
+    ("top_mm", "off"), [(1.5 - HAIR, True), (1.5 - 5e-10, False), (1.5, False), (1.5 + HAIR, True)]
+)
 def test_a_face_off_the_grid_is_a_warning(sensor, findings, top_mm, off):
     found = findings(sensor(patch(1.2, top_mm)), "3-", "patch")
     assert [f.severity for f in found] == ["warning"] * off

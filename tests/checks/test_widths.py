@@ -55,10 +55,13 @@ def test_following_the_advice_leaves_no_warning(sensor, findings):
 
 
 # With a nozzle of 0.25 mm all limits shrink in proportion: 0.075, 0.2125, 0.275, 0.4375.
-@pytest.mark.parametrize(("width", "severity"), [(0.075, "error"), (0.076, "warning"), (0.274, "warning"), (0.275, "info"), (0.438, "")])
-def test_another_nozzle_has_other_limits(sensor, findings, printer, width, severity):
+@pytest.mark.parametrize(
+    ("width", "severities"),
+    [(0.075, ["error"]), (0.076, ["warning"]), (0.274, ["warning"]), (0.275, ["info"]), (0.438, [])],
+)
+def test_another_nozzle_has_other_limits(sensor, findings, printer, width, severities):
     small = printer.model_copy(update={"nozzle_mm": 0.25})
-    assert [f.severity for f in findings(sensor(strip(width)), "5-", "strip", printer=small)] == [severity] * bool(severity)
+    assert [f.severity for f in findings(sensor(strip(width)), "5-", "strip", printer=small)] == severities
 
 
 # The other printer draws lines of 1.125 nozzles: 0.45 mm.
@@ -85,9 +88,10 @@ def test_a_strip_with_a_break_in_height_is_told_twice(sensor, findings):
     assert [(f.layer, f.last_layer) for f in found] == [(13, 15), (18, 19)]
 
 
-def spike(base_mm: float, height_mm: float, foot_mm: float = 1.2) -> Body:
-    half = base_mm / 2
-    return Body("strip", "pla", (Prism("y", ((5 - half, foot_mm), (5 + half, foot_mm), (5, foot_mm + height_mm)), 0, 20),))
+def spike(base_mm: float, height_mm: float) -> Body:
+    """A ridge on top of the sensor."""
+    left, right = 5 - base_mm / 2, 5 + base_mm / 2
+    return Body("strip", "pla", (Prism("y", ((left, 1.2), (right, 1.2), (5, 1.2 + height_mm)), 0, 20),))
 
 
 def test_a_tip_that_runs_out_is_a_warning(sensor, findings):
@@ -105,7 +109,8 @@ def test_a_tip_is_a_tip_wherever_it_ends_in_the_layer(sensor, findings, height):
     assert [f for f in findings(sensor(spike(height * 2, height)), "5-", "strip") if f.severity == "error"] == []
 
 
-@pytest.mark.parametrize(("quality", "film_mm"), [("fine", 0.15), ("fine", 0.1), ("extrafine", 0.1), ("extrafine", 0.2)])
+@pytest.mark.parametrize("film_mm", [0.1, 0.15, 0.2])
+@pytest.mark.parametrize("quality", ["fine", "extrafine"])
 def test_tips_of_triangles_cut_at_the_edge_are_tips_too(findings, request, quality, film_mm):
     """Half triangles at x = 0 taper to one side."""
     scene = tri.scene(tri.Params(length_mm=8.0, width_mm=4.0, dielectric_mm=film_mm), Fill())

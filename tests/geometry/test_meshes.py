@@ -76,9 +76,10 @@ def test_a_prism_stands_where_it_should(axis):
 
 
 def test_a_concave_outline_is_filled_once():
-    """A sawtooth with three teeth of 1 x 1 / 2 on a plate of 3 x 0.5."""
-    outline = ((0.0, 0.0), (3.0, 0.0), (3.0, 0.5), (2.5, 1.5), (2.0, 0.5), (1.5, 1.5), (1.0, 0.5), (0.5, 1.5), (0.0, 0.5))
-    assert_solid(mesh(Body("teeth", "x60", (Prism("y", outline, 0.0, 2.0),))), (1.5 + 1.5) * 2.0, shells=1)
+    """A sawtooth with three teeth of 1 x 1 / 2 on a plate of 3 x 0.5, and 2 deep."""
+    teeth = ((3.0, 0.5), (2.5, 1.5), (2.0, 0.5), (1.5, 1.5), (1.0, 0.5), (0.5, 1.5), (0.0, 0.5))
+    body = Body("teeth", "x60", (Prism("y", ((0.0, 0.0), (3.0, 0.0), *teeth), 0.0, 2.0),))
+    assert_solid(mesh(body), (1.5 + 1.5) * 2.0, shells=1)
 
 
 def test_cubes_that_share_a_face_are_one_shell():

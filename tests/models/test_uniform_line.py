@@ -108,7 +108,9 @@ def test_arrays_broadcast():
     assert z[1, 2] == impedance(1e4, R, 3 * C)
 
 
-@pytest.mark.parametrize(("f", "r", "c"), [(0, R, C), (-1, R, C), (1, -1, C), (1, R, 0), (np.nan, R, C), (1, np.nan, C)])
+@pytest.mark.parametrize(
+    ("f", "r", "c"), [(0, R, C), (-1, R, C), (1, -1, C), (1, R, 0), (np.nan, R, C), (1, np.nan, C)]
+)
 def test_senseless_values_are_refused(f, r, c):
     with pytest.raises(OutOfRange):
         impedance(f, r, c)

@@ -76,7 +76,7 @@ def assert_bodies(scene: Scene, volumes_mm3: dict[str, float]) -> None:
 
 
 def ridges(end: float, period: float, height: float, apexes: float) -> float:
-    """Area under triangles of base period / 2 and a height, one per period, the first apex at ``apexes``, from 0 to end."""
+    """Area from 0 to end under triangles of base period / 2, one per period, the first with its apex at ``apexes``."""
     kinks = np.arange(0.0, end + period, period / 4)
     places = np.unique(np.append(kinks[kinks < end], end))
     away = np.abs((places - apexes + period / 2) % period - period / 2)
@@ -92,7 +92,7 @@ def test_tri(options, fill, turned):
     end, depth = (p.length_mm, p.width_mm) if p.along == "x" else (p.width_mm, p.length_mm)
     cog = ridges(end, p.period_mm, p.hang_height_mm, 0.25 * p.period_mm)
     hanging = ridges(end, p.period_mm, p.hang_height_mm, 0.75 * p.period_mm)
-    lower = ridges(end, p.period_mm, p.lower_height_mm, 0.0) + ridges(end, p.period_mm, p.lower_height_mm, 0.5 * p.period_mm)
+    lower = sum(ridges(end, p.period_mm, p.lower_height_mm, place * p.period_mm) for place in (0.0, 0.5))
     floor = p.length_mm * p.width_mm
     volumes = dict.fromkeys(("etpu", "x60", "pla", "bvoh"), 0.0)
     volumes["etpu"] = 2 * p.electrode_mm * floor + cog * depth

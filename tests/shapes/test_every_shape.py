@@ -62,7 +62,7 @@ def test_it_imports_the_scene_and_the_standard_library_only(name):
         "import json, sys; before = set(sys.modules); "
         f"import sensorgen.shapes.{name}; print(json.dumps(sorted(set(sys.modules) - before)))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)  # noqa: S603
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(json.loads(done.stdout))
     ours = {m for m in loaded if m.partition(".")[0] == "sensorgen"}
     assert ours <= {"sensorgen", "sensorgen.scene", "sensorgen.errors", "sensorgen.shapes", f"sensorgen.shapes.{name}"}

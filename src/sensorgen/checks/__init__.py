@@ -52,7 +52,13 @@ def _merged(found: Iterable[Finding]) -> Iterable[Finding]:
 
 def _unchecked(scene: Scene) -> list[Finding]:
     return [
-        Finding("5-width", "info", body.name, "slanted outlines in plan: widths and bridges not checked", "look at the slices")
+        Finding(
+            "5-width",
+            "info",
+            body.name,
+            "slanted outlines in plan: widths and bridges not checked",
+            "look at the slices",
+        )
         for body in scene.bodies
         if any(slanted(p) for p in body.prisms)
     ]

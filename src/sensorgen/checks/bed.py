@@ -23,6 +23,7 @@ def check(scene: Scene, printer: Printer) -> Iterator[Finding]:
         )  # fmt: skip
     if height > printer.height_mm + TOUCH_MM:
         yield Finding(
-            "8-bed", "error", "sensor", f"{height:g} mm are higher than {printer.name} prints, {printer.height_mm:g} mm",
+            "8-bed", "error", "sensor",
+            f"{height:g} mm are higher than {printer.name} prints, {printer.height_mm:g} mm",
             "make it lower", height, printer.height_mm, place_mm=(0.0, 0.0, height),
         )  # fmt: skip

@@ -26,7 +26,8 @@ def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> 
         yield Finding(
             "2-film", "error", names,
             f"the film of {gap_mm:g} mm may not be printed at all: a layer is {layer:g} mm",
-            f"use {layer:g} mm or more, or a quality with thinner layers", round(gap_mm, 9), round(layer / 2, 9), place_mm=place,
+            f"use {layer:g} mm or more, or a quality with thinner layers",
+            round(gap_mm, 9), round(layer / 2, 9), place_mm=place,
         )  # fmt: skip
         return
     yield from _film(names, place, layer, gap_mm, printed_mm)

@@ -128,9 +128,7 @@ class Slices:
         """Cut ``scene``, as it lies on the bed, into the layers of ``quality``."""
         self.scene = scene
         self.layers = Layers(tuple(quality.boundaries_mm(scene.size_mm[2])))
-        self._shown = {
-            body.name: [_rectangles(body, mid) for mid in self.layers.mids_mm] for body in scene.bodies
-        }
+        self._shown = {body.name: [_rectangles(body, mid) for mid in self.layers.mids_mm] for body in scene.bodies}
 
     def body(self, body: Body, layer: int) -> frozenset[Rectangle]:
         """What a body shows in a layer (counted from 0), slanted outlines in plan left out."""

@@ -1,0 +1,230 @@
+"""Help, lists, schema and completion: what a user can find out without the manual."""
+
+import dataclasses
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import pytest
+import yaml
+
+from sensorgen import materials, models, printer, registry, shapes
+from sensorgen.cli import COMMANDS, cli
+from sensorgen.cli.designs import option_of
+
+DESIGNS = Path(__file__).parents[2] / "designs"
+ON_DESIGNS = ("build", "check", "draw", "predict")
+
+
+def options_of_help(text):
+    return set(re.findall(r"--[a-z0-9-]+", text.partition("Options:")[2]))
+
+
+@pytest.mark.parametrize("words", [[], *([c] for c in COMMANDS)], ids=str)
+def test_help_of_every_command(run, words):
+    said = run(*words, "--help")
+    assert (said.code, said.err) == (0, "")
+    assert max(map(len, said.out.splitlines())) <= 80
+    assert "..." not in said.out.partition("Commands:")[2]  # no help is cut short
+
+
+@pytest.mark.parametrize("shape", registry.names(shapes))
+@pytest.mark.parametrize("command", ON_DESIGNS)
+def test_help_of_every_shape_names_every_parameter(run, command, shape):
+    said = run(command, shape, "-h")
+    assert (said.code, said.err) == (0, "")
+    fields = dataclasses.fields(registry.load(shapes, shape).Params)
+    assert {option_of(f.name) for f in fields} <= options_of_help(said.out)
+    assert max(map(len, said.out.partition("Options:")[2].splitlines())) <= 80
+    for field in fields:
+        assert field.metadata["help"].split()[0] in said.out
+
+
+def test_the_picture_of_a_shape_is_not_wrapped(run):
+    assert (
+        "\n      ================  top electrode\n      ................  dielectric\n"
+        in run("build", "reference", "-h").out
+    )
+
+
+def test_every_option_has_help_and_every_command_its_line(run):
+    context = __import__("click").Context(cli)
+    for name in COMMANDS:
+        command = cli.get_command(context, name)
+        assert command.get_short_help_str(100)
+        inner = (
+            [command.get_command(context, shape) for shape in registry.names(shapes)]
+            if name in ON_DESIGNS
+            else [command]
+        )
+        for each in inner:
+            assert all(p.help for p in each.params if p.param_type_name == "option"), each.name
+
+
+def test_defaults_in_the_help_are_those_of_the_design(run):
+    from sensorgen.design import Design
+
+    said = " ".join(run("build", "tri", "-h").out.split())
+    for key in ("printer", "quality", "orientation"):
+        assert f"{Design.model_fields[key].default} if not given" in said
+
+
+def test_bare_commands_show_their_help(run):
+    for words in ([], ["build"]):
+        said = run(*words)
+        assert said.code == 2
+        assert said.err.startswith("Usage: sensorgen")
+
+
+def test_version(run):
+    assert run("--version").out.startswith("sensorgen, version ")
+
+
+def test_python_dash_m(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "sensorgen", "--version"], capture_output=True, text=True, cwd=tmp_path
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_list_materials_shows_every_value_with_its_source(run):
+    text = " ".join(run("list", "materials").out.split())
+    for name in materials.names():
+        material = materials.load(name)
+        for group in (material.properties, material.print):
+            for quantity, values in group.items():
+                for value in values:
+                    assert f"{quantity}: {value.value:.7g} [{value.source}]" in text
+    flagged = re.findall(r"resistivity_ohm_m: 0\.76923\d+ \[thesis-3\.2\] IMPLAUSIBLE, never a default", text)
+    assert len(flagged) == 1
+
+
+def test_every_source_is_explained(run):
+    said = json.loads(run("list", "sources", "--json").out)
+    assert {source for name in materials.names() for source in materials.load(name).sources()} <= set(said)
+    assert all(entry["about"] for entry in said.values())
+
+
+@pytest.mark.parametrize(
+    ("kind", "names"),
+    [
+        ("shapes", registry.names(shapes)),
+        ("materials", materials.names()),
+        ("printers", printer.printer_names()),
+        ("qualities", printer.quality_names()),
+        ("models", registry.names(models)),
+    ],
+)
+def test_lists_are_complete(run, kind, names):
+    said = run("list", kind)
+    assert (said.code, said.err) == (0, "")
+    assert [line.split()[0] for line in said.out.splitlines() if line[0] != " "] == names
+    data = json.loads(run("list", kind, "--json").out)
+    assert list(data) == names
+    assert all(entry["about"] for entry in data.values())
+
+
+@pytest.fixture
+def schema(run):
+    return json.loads(run("schema").out)
+
+
+def test_schema_is_valid(schema):
+    jsonschema.Draft202012Validator.check_schema(schema)
+
+
+@pytest.mark.parametrize("path", sorted(DESIGNS.rglob("*.yaml")), ids=lambda p: p.stem)
+def test_schema_takes_the_designs(schema, path):
+    jsonschema.Draft202012Validator(schema).validate(yaml.safe_load(path.read_text("utf-8")))
+
+
+FAULTS = [
+    "{}",
+    "{shape: trj}",
+    "{shape: tri, colour: red}",
+    "{shape: tri, parameters: {perod_mm: 2}}",
+    "{shape: tri, parameters: {period_mm: -2}}",
+    "{shape: tri, parameters: {period_mm: two}}",
+    "{shape: tri, parameters: {along: xy}}",
+    "{shape: rect, parameters: {period_mm: 2}}",
+    "{shape: tri, materials: {flm: x60}}",
+    "{shape: tri, materials: {film: X 60}}",
+    "{shape: tri, infill: {x60: {percent: 0}}}",
+    "{shape: tri, infill: {x60: {pattern: wavy}}}",
+    "{shape: tri, tools: {x60: four}}",
+    "{shape: tri, orientation: up}",
+    "{shape: tri, shrinkage: 1}",
+    "{shape: tri, nozzle_mm: 0}",
+    "{shape: tri, waivers: [{rule: 5-width}]}",
+    "{shape: tri, name: ''}",
+    "{shape: tri, name: ../x}",
+]
+
+
+@pytest.mark.parametrize("text", FAULTS)
+def test_schema_refuses_what_the_design_refuses(schema, text):
+    from sensorgen import design
+    from sensorgen.errors import SensorgenError
+
+    with pytest.raises(SensorgenError):
+        design.make(yaml.safe_load(text))
+    assert not jsonschema.Draft202012Validator(schema).is_valid(yaml.safe_load(text))
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_script(run, shell):
+    said = run("completion", shell)
+    assert said.code == 0
+    assert "_SENSORGEN_COMPLETE" in said.out
+
+
+COMPLETE = """
+eval "$(sensorgen completion bash)"
+compopt() { :; }
+COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); COMPREPLY=()
+_sensorgen_completion sensorgen
+printf '%s\\n' "${COMPREPLY[@]}"
+"""
+
+
+@pytest.fixture
+def complete(tmp_path):
+    bash = shutil.which("bash")
+    if bash is None:
+        pytest.skip("bash is not installed")
+    (tmp_path / "sensorgen").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m sensorgen "$@"\n')
+    (tmp_path / "sensorgen").chmod(0o755)
+    (tmp_path / "d.yaml").write_text("shape: rect")
+
+    def words(*typed):
+        done = subprocess.run(
+            [bash, "-c", COMPLETE, "complete", "sensorgen", *typed],
+            capture_output=True, text=True, cwd=tmp_path, env={"PATH": f"{tmp_path}:/usr/bin:/bin"},
+        )  # fmt: skip
+        assert done.stderr == ""
+        return set(done.stdout.split())
+
+    return words
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        (["bu"], {"build"}),
+        (["build", "t"], {"tri"}),
+        (["build", "tri", "--diel"], {"--dielectric"}),
+        (["build", "rect", "--air"], {"--air-width"}),
+        (["build", "d.yaml", "--air"], {"--air-width"}),
+        (["build", "tri", "--along", ""], {"x", "y"}),
+        (["build", "no.yaml", "--air"], set()),
+        (["build", "trj", "--air"], set()),
+        (["list", "m"], {"materials", "models"}),
+    ],
+    ids=lambda words: " ".join(sorted(words)) if isinstance(words, set) else " ".join(words),
+)
+def test_bash_completes(complete, typed, offered):
+    assert complete(*typed) == offered

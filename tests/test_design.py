@@ -1,0 +1,173 @@
+"""Designs: what they take, what identifies them, and what they are called."""
+
+import pytest
+
+from sensorgen import design, printer
+from sensorgen.design import make, name_of
+from sensorgen.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
+from sensorgen.findings import Finding
+
+
+def tri(**more):
+    return make({"shape": "tri", **more})
+
+
+CHANGES = [
+    {"parameters": {"period_mm": 2.5}},
+    {"parameters": {"dielectric_mm": 0.2000001}},
+    {"parameters": {"along": "y"}},
+    {"parameters": {"isolation_mm": 0.1}},
+    {"materials": {"film": "x60@thesis-4.1"}},
+    {"materials": {"top_electrode": "etpu@thesis-3.2"}},
+    {"materials": {"support": "bvoh"}},
+    {"printer": "prusa-xl5"},
+    {"quality": "extrafine"},
+    {"nozzle_mm": 0.25},
+    {"tools": {"x60": 2}},
+    {"infill": {"x60": {"percent": 80}}},
+    {"infill": {"x60": {"pattern": "grid"}}},
+    {"orientation": "upside-down"},
+    {"shrinkage": 0.02},
+]
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=str)
+def test_everything_that_decides_the_sensor_changes_its_id_and_its_name(change):
+    assert tri(**change).id() != tri().id()
+    assert tri(**change).name != tri().name
+
+
+def test_ids_and_names_of_all_changes_differ():
+    made = [tri(), *(tri(**change) for change in CHANGES)]
+    assert len({d.id() for d in made}) == len({d.name for d in made}) == len(made)
+
+
+@pytest.mark.parametrize(
+    "same",
+    [
+        {"name": "other"},
+        {"waivers": [{"rule": "5", "reason": "seen on the bench"}]},
+        {"parameters": {"period_mm": 2, "along": "x"}},
+        {"quality": "fine", "orientation": "as-drawn"},
+        {"materials": {"film": "x60", "support": None}},
+    ],
+    ids=str,
+)
+def test_what_decides_nothing_does_not_change_the_id(same):
+    assert tri(**same).id() == tri().id()
+
+
+def test_a_new_version_changes_the_id(monkeypatch):
+    before = tri().id()
+    monkeypatch.setattr(design, "__version__", "99.0")
+    assert tri().id() != before
+
+
+def test_a_changed_value_in_a_material_changes_the_id(monkeypatch):
+    before, load = tri().id(), design.material_files.load
+
+    def changed(name):
+        found = load(name)
+        value = found.value("density_kg_m3").model_copy(update={"value": 1.0})
+        return found.model_copy(update={"properties": found.properties | {"density_kg_m3": (value,)}})
+
+    monkeypatch.setattr(design.material_files, "load", changed)
+    assert tri().id() != before
+
+
+def test_the_place_of_a_printers_file_does_not_change_the_id(tmp_path):
+    shipped = (printer.folder() / "printers/diabase-h5.yaml").read_text("utf-8")
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "own.yaml").write_text(shipped)
+    one, two = (tri(printer=str(tmp_path / name / "own.yaml")) for name in ("a", "b"))
+    assert one.id() == two.id() != tri().id()
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=str)
+def test_what_is_written_is_read_back_as_the_same_design(change):
+    made = tri(**change)
+    assert make(made.model_dump(mode="json")) == made
+
+
+def test_long_names_are_cut_but_stay_apart():
+    odd = {f.name: 1.2345 for f in design.fields("rect").values() if f.name != "along"}
+    names = {name_of(make({"shape": "rect", "parameters": odd, "quality": q})) for q in ("fine", "extrafine")}
+    assert len(names) == 2
+    assert all(make({"shape": "rect", "name": name}).name == name for name in names)
+
+
+@pytest.mark.parametrize("stem", ["my printer", "größe", "...", "-x-", "a" * 200])
+def test_names_made_from_odd_file_names_are_safe(tmp_path, stem):
+    path = tmp_path / f"{stem}.yaml"
+    path.write_text((printer.folder() / "printers/diabase-h5.yaml").read_text("utf-8"))
+    name = tri(printer=str(path)).name
+    assert tri(name=name).name == name
+
+
+BAD = [
+    ({}, BadInput, "shape is missing; expected rect, reference, tri"),
+    ({"shape": 3}, BadInput, "shape is 3; expected text"),
+    ({"shape": "tri", 1: 2}, BadInput, "1 is 1; expected"),
+    ({"shape": "tri", "parameters": {"period_mm": True}}, BadInput, "period_mm is True; expected a number"),
+    ({"shape": "tri", "parameters": {"period_mm": 10**400}}, BadInput, "expected a number"),
+    ({"shape": "tri", "parameters": {"period_mm": 10**5000}}, BadInput, "is a huge number; expected a number"),
+    ({"shape": "tri", "parameters": {"along": 3}}, UnknownName, "unknown value of along '3.0'. Known: x, y"),
+    (
+        {"shape": "tri", "parameters": {"period_mm": float("nan")}},
+        OutOfRange,
+        "period_mm is nan; expected a number from",
+    ),
+    ({"shape": "tri", "tools": {"x60": True}}, BadInput, "tools.x60 is True; expected a whole number"),
+    ({"shape": "tri", "tools": {"x60": 10**5000}}, BadInput, "tools.x60 is a huge number; expected 99 or less"),
+    ({"shape": "tri", "tools": {"bvoh": 7}}, BadInput, "diabase-h5 has no tool 7"),
+    ({"shape": "tri", "shrinkage": True}, BadInput, "shrinkage is True; expected a number"),
+    ({"shape": "tri", "shrinkage": 0.9}, BadInput, "shrinkage is 0.9; expected a number below 0.9"),
+    ({"shape": "tri", "nozzle_mm": "0.4"}, BadInput, "nozzle_mm is '0.4'; expected a number"),
+    ({"shape": "tri", "waivers": {"rule": "5"}}, BadInput, "expected a list"),
+    ({"shape": "tri", "materials": {"film": "air"}}, MissingValue, "no tool for air: name one with --tool air=NUMBER"),
+    ({"shape": "tri", "printer": "x\0.yaml"}, BadInput, "embedded null byte"),
+    ({"shape": "tri", "name": "x" * 10_000}, BadInput, "cannot be a file name everywhere"),
+]
+
+
+@pytest.mark.parametrize(("data", "kind", "message"), BAD, ids=[message for *_, message in BAD])
+def test_bad_designs_name_file_and_key(data, kind, message):
+    with pytest.raises(kind) as error:
+        make(data, "some.yaml")
+    assert str(error.value).startswith("some.yaml: ")
+    assert message in str(error.value)
+    assert len(str(error.value)) < 400
+
+
+@pytest.mark.parametrize("data", [None, 3, "tri", [], [("shape", "tri")]])
+def test_what_is_no_mapping_is_no_design(data):
+    with pytest.raises(BadInput, match="expected a mapping"):
+        make(data)
+
+
+@pytest.mark.parametrize("shape", ["tri", "rect", "reference"])
+def test_every_parameter_is_taken_at_its_limits_and_not_beyond(shape):
+    for name, field in design.fields(shape).items():
+        if "range" not in field.metadata:
+            continue
+        for limit, beyond in zip(field.metadata["range"], (-1e-9, 1e-9), strict=True):
+            assert design._checked(field, limit) == limit
+            with pytest.raises(OutOfRange, match=f"{name} is .*; expected a number from"):
+                design.parameters(shape, {name: limit + beyond})
+
+
+def test_waivers_cover_their_rule_and_body_only():
+    found = [
+        Finding(rule, "warning", body, "m", "a") for rule in ("5-width", "9-bridge") for body in ("film", "isolation")
+    ]
+    named = tri(waivers=[{"rule": "5", "body": "film", "reason": "it was seen"}])
+    assert [bool(f.waiver) for f in named.waived(found)] == [True, False, False, False]
+    whole = tri(waivers=[{"rule": "9-bridge", "reason": "it was seen"}])
+    assert [f.waiver for f in whole.waived(found)] == ["", "", "it was seen", "it was seen"]
+
+
+def test_every_error_is_ours():
+    for data, *_ in BAD:
+        with pytest.raises(SensorgenError):
+            make(data)

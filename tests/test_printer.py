@@ -1,0 +1,83 @@
+"""Printers and qualities: data that holds together, and faults in it named."""
+
+import pytest
+
+from sensorgen import materials, printer
+from sensorgen.errors import BadInput, UnknownName
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A printer file of the user's, with a change to one that ships."""
+
+    def write(old, new):
+        text = (printer.folder() / "printers/diabase-h5.yaml").read_text("utf-8")
+        assert old in text
+        path = tmp_path / "own.yaml"
+        path.write_text(text.replace(old, new), "utf-8")
+        return str(path)
+
+    return write
+
+
+@pytest.mark.parametrize("name", printer.printer_names())
+def test_five_tools_that_slicers_count_from_zero(name):
+    machine = printer.load_printer(name)
+    assert machine.name == name
+    assert [machine.slicer_index(tool) for tool in machine.tool_numbers] == list(range(5))
+    assert set(machine.default_tools) <= set(materials.names())
+    assert machine.tool_numbers[0] == machine.first_tool
+
+
+def test_the_five_tool_printer_of_the_thesis():
+    machine = printer.load_printer("diabase-h5")
+    assert (machine.bed_mm, machine.nozzle_mm, machine.tool_numbers) == ((390.0, 170.0), 0.4, (1, 2, 3, 4, 5))
+    assert machine.nozzle_mm * machine.line_width_ratio == pytest.approx(0.44)
+
+
+@pytest.mark.parametrize(("name", "layer"), [("fine", 0.1), ("extrafine", 0.06)])
+def test_layers_of_the_qualities(name, layer):
+    quality = printer.load_quality(name)
+    assert quality.layer_mm == quality.first_layer_mm == layer
+    grid = quality.boundaries_mm(1.0)
+    assert grid[:3] == [0.0, layer, pytest.approx(2 * layer)]
+    assert grid[-2] < 1.0 <= grid[-1]
+
+
+def test_a_height_on_the_grid_needs_no_further_layer():
+    assert printer.load_quality("fine").boundaries_mm(0.3) == [0.0, 0.1, 0.2, 0.3]
+
+
+def test_bed_centre():
+    assert printer.load_printer("diabase-h5").bed_centre_mm() == (0.0, 0.0)
+    assert printer.load_printer("prusa-xl5").bed_centre_mm() == (180.0, 180.0)
+
+
+def test_a_printer_of_the_users_own(own):
+    machine = printer.load_printer(own("nozzle_mm: 0.4", "nozzle_mm: 0.25"))
+    assert (machine.name, machine.nozzle_mm) == ("own", 0.25)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("nozzle_mm: 0.4", "nozzle_mm: -0.4", "nozzle_mm"),
+        ("nozzle_mm: 0.4", "nozzle_mm: .nan", "nozzle_mm"),
+        ("nozzle_mm: 0.4", "nozle_mm: 0.4", "nozle_mm|nozzle_mm"),
+        ("bed_mm: [390.0, 170.0]", "bed_mm: [390.0]", "bed_mm"),
+        ("bed_mm: [390.0, 170.0]", "bed_mm: [.inf, 170.0]", "bed_mm"),
+        ("tool_numbers: [1, 2, 3, 4, 5]", "tool_numbers: []", "tool_numbers"),
+        ("etpu: 3", "etpu: 9", "default tool 9 for etpu is not among"),
+        ("bed_origin: centre", "bed_origin: left", "bed_origin"),
+        ("gcode_flavour: reprapfirmware", "gcode_flavour: own", "gcode_flavour"),
+    ],
+)
+def test_a_faulty_printer_file_is_named_with_its_key(own, old, new, key):
+    with pytest.raises(BadInput, match=f"own.yaml: .*({key})"):
+        printer.load_printer(own(old, new))
+
+
+@pytest.mark.parametrize(("load", "word"), [(printer.load_printer, "printer"), (printer.load_quality, "quality")])
+def test_unknown_names(load, word):
+    with pytest.raises(UnknownName, match=f"unknown {word} 'fyne'"):
+        load("fyne")

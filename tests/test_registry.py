@@ -1,0 +1,53 @@
+"""Names to things, and the nearest name to a wrong one."""
+
+import pytest
+
+from sensorgen import models, registry, shapes
+from sensorgen.errors import BadInput, UnknownName, Unprintable
+from sensorgen.findings import Finding
+
+
+def test_names_are_those_of_the_files():
+    assert registry.names(shapes) == ["rect", "reference", "tri"]
+    assert "columns" in registry.names(models)
+
+
+@pytest.mark.parametrize("name", registry.names(shapes))
+def test_what_is_listed_loads(name):
+    assert registry.load(shapes, name).__name__ == f"sensorgen.shapes.{name}"
+
+
+@pytest.mark.parametrize("name", ["__init__", "../errors", "tri.py", "", ".", "tri\0", "os", "errors"])
+def test_what_is_not_listed_does_not_load(name):
+    with pytest.raises(UnknownName, match="unknown shape"):
+        registry.load(shapes, name)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("trj", "unknown shape 'trj'; did you mean 'tri'? Known: rect, tri"),
+        ("RECT", "unknown shape 'RECT'; did you mean 'rect'? Known: rect, tri"),
+        ("sphere", "unknown shape 'sphere'. Known: rect, tri"),
+    ],
+)
+def test_the_nearest_name_is_offered(given, said):
+    assert str(UnknownName("shape", given, {"tri", "rect"})) == said
+
+
+def test_a_long_wrong_name_is_cut():
+    assert len(str(UnknownName("shape", "x" * 100_000, ["tri"]))) < 200
+
+
+def test_within_leads_the_message():
+    assert str(BadInput("what").within("f.yaml")) == "f.yaml: what"
+    assert str(BadInput("what").within("")) == "what"
+
+
+def test_unprintable_names_its_first_finding_that_stands():
+    findings = [
+        Finding("1-short", "error", "a", "waived", "b", waiver="on purpose"),
+        Finding("8-bed", "error", "a", "too large", "b"),
+    ]
+    assert str(Unprintable(findings)).startswith("8-bed, too large; nothing was written")
+    assert Unprintable(findings).findings == findings
