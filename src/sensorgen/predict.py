@@ -1,5 +1,6 @@
 """What a design should do, by the cheapest model that can speak of it."""
 
+import math
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -100,7 +101,7 @@ def prediction(design: Design) -> dict[str, Any]:
     resistance = {end: ohm for end, (ohm, _) in zip(("top", "bottom"), tracks, strict=True)}
     area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
     return {
-        "model": {"capacitance": answer.model, "line": "uniform_line"},
+        "model": {"capacitance": answer.model, "line": "line"},
         "refused": list(answer.refused),
         "capacitance_f": _bounds(answer.capacitance_f),
         "capacitance_per_area_f_per_m2": _bounds(answer.capacitance_f.times(1 / area)),
@@ -118,11 +119,12 @@ def prediction(design: Design) -> dict[str, Any]:
 
 def _line(resistance_ohm: float, capacitance_f: Interval) -> dict[str, Any]:
     """Corner frequency and impedance at the tones, for both bounds of the capacitance."""
-    from sensorgen.models import uniform_line
+    from sensorgen.models import line
 
     ends = (capacitance_f.lower, capacitance_f.middle(), capacitance_f.upper)
-    corner = [uniform_line.corner_frequency_hz(resistance_ohm, c) for c in ends]
-    rows = uniform_line.impedance([[f] for f in TONES_HZ], resistance_ohm, ends)
+    corner = [line.corner_frequency_hz(resistance_ohm, c) for c in ends]
+    admittance = [[2j * math.pi * f * c for c in ends] for f in TONES_HZ]
+    rows = line.cascade([resistance_ohm], [admittance], [1.0])  # per the sensor's own length
     return {
         "corner_frequency_hz": {"lower": corner[2], "middle": corner[1], "upper": corner[0]},
         "impedance_ohm": [

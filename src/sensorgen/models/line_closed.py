@@ -1,0 +1,162 @@
+"""The thesis's own solution in exponentials, as printed and as corrected: for comparison with `line`, not for use.
+
+Right where Re(gamma l) is under 355, tracks resist and the frequency is not low; see docs/line.md.
+"""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.errors import OutOfRange, UnknownName
+from sensorgen.models._line_inputs import Complex, Inputs, in_blocks, read
+
+SOURCE = "Thesis appendix B, Eqs. B.39, B.42, B.48, B.51, B.53, and Eqs. 2.24 and B.54"
+COST = 0
+
+PRINTED = ("B.39", "B.42", "B.48")
+
+Array = NDArray[Any]
+Matrix = tuple[Array, Array, Array, Array]
+
+
+def impedance(as_printed: str = "", **inputs: Any) -> Complex:
+    r"""Impedance of the pressed line, -A22/A21 of the product of three matrices (B.51 to B.53).
+
+    .. math:: A = \frac{1}{2e} \begin{pmatrix} 1 + e^2 & -\sqrt{2}\,(e^2 - 1)\,\rho / (\sqrt{\Gamma} H W) \\
+              -(e^2 - 1) \sqrt{\Gamma} H W / (\sqrt{2} \rho) & 1 + e^2 \end{pmatrix},
+              \quad e = \exp(\sqrt{2 \Gamma}\, l)
+
+    Parameters
+    ----------
+    as_printed : str
+        "" for the corrected equations, or the one to take with its misprint: "B.39" has the wrong sign of A21,
+        "B.42" has Gamma for its root in A12, "B.48" has sqrt(2 rho) for sqrt(2) rho in A21.
+    **inputs : float or array
+        As of :func:`sensorgen.models.line.impedance`, SI units; the far end has to be open. Unequal tracks count as
+        two equal ones of the same sum, of the height of the top one.
+
+    Returns
+    -------
+    complex array
+        Impedance in the broadcast shape [ohm].
+
+    Raises
+    ------
+    UnknownName
+        ``as_printed`` names no misprint.
+    OutOfRange
+        A far end that is not open; or where the exponentials have no number: they overflow, or r or y is 0.
+
+    Notes
+    -----
+    Without force the misprint of B.48 makes Z 1/sqrt(rho) times itself (not even its dimension is right), that of
+    B.39 turns its sign, and that of B.42 does not show, as A12 enters a product only.
+
+    Examples
+    --------
+    >>> plate = dict(L_m=0.1, W_m=0.01, H_top_m=3e-4, H_bottom_m=3e-4, rho_top_ohm_m=0.07, rho_bottom_ohm_m=0.2,
+    ...              d_m=6e-4, eps_r=4.68, f_Hz=99.7e3)
+    >>> [round(float(impedance(printed, **plate).real), 1) for printed in ("", "B.48", "B.39")]
+    [2997.1, 8157.1, -2997.1]
+    """
+    if as_printed and as_printed not in PRINTED:
+        raise UnknownName("misprint", as_printed, PRINTED)
+    return in_blocks(_open(inputs), partial(_product, as_printed))[0]
+
+
+def uniform(**inputs: Any) -> Complex:
+    r"""Impedance without force, in one equation (B.53, printed without fault).
+
+    .. math:: Z = \frac{\sqrt{2} \rho\, (1 + e^{2 \sqrt{2 \Gamma} L})}{H \sqrt{\Gamma} W (-1 + e^{2 \sqrt{2 \Gamma} L})}
+
+    Parameters
+    ----------
+    **inputs : float or array
+        As of :func:`impedance`; force and patch are left aside.
+
+    Returns
+    -------
+    complex array
+        Impedance in the broadcast shape [ohm].
+
+    Raises
+    ------
+    OutOfRange
+        As :func:`impedance`.
+    """
+    return in_blocks(_open(inputs), _uniform)[0]
+
+
+def series(**inputs: Any) -> Complex:
+    r"""Resistor and capacitor in series, Z = R + 1/(j omega C), as Eqs. 2.24, 2.25 and B.54 take the line.
+
+    Parameters
+    ----------
+    **inputs : float or array
+        As of :func:`impedance`; force and patch are left aside.
+
+    Returns
+    -------
+    complex array
+        Impedance in the broadcast shape [ohm]; its real part is three times too large at low frequency.
+
+    Raises
+    ------
+    OutOfRange
+        A far end that is not open; no current at all.
+    """
+    return in_blocks(_open(inputs), _series)[0]
+
+
+def _open(inputs: Any) -> Inputs:
+    found = read(inputs)
+    if found.load_ohm is not None:
+        raise OutOfRange("the thesis solves the open end only (B.3); for others take model 'line'")
+    return found
+
+
+def _product(printed: str, inputs: Inputs) -> list[Complex]:
+    r, y, lengths = inputs.sections()
+    height, width = inputs["H_top_m"], inputs["W_m"]
+    with np.errstate(all="ignore"):
+        parts = [
+            _matrix(printed, rs * height * width / 2, rs * ys / 2, height, width, length)
+            for rs, ys, length in zip(r, y, lengths, strict=True)
+        ]
+        (a, b, c, d), second, third = parts
+        for e, f, g, h in (second, third):
+            a, b, c, d = e * a + f * c, e * b + f * d, g * a + h * c, g * b + h * d
+        return [_finite(-d / c)]
+
+
+def _matrix(printed: str, rho: Array, gamma: Array, height: Array, width: Array, length: Array) -> Matrix:
+    """B.48: voltage and current behind a section from those before it, of two equal tracks."""
+    root, area = np.sqrt(gamma), height * width
+    e = np.exp(np.sqrt(2.0) * root * length)
+    same, other = (1 + e**2) / (2 * e), (e**2 - 1) / (2 * e)
+    a12 = -np.sqrt(2.0) * other * rho / ((gamma if printed == "B.42" else root) * area)
+    a21 = -other * root * area / (np.sqrt(2 * rho) if printed == "B.48" else np.sqrt(2.0) * rho)
+    return same, a12, -a21 if printed == "B.39" else a21, same
+
+
+def _uniform(inputs: Inputs) -> list[Complex]:
+    r, y, _ = inputs.sections()
+    area = inputs["H_top_m"] * inputs["W_m"]
+    with np.errstate(all="ignore"):
+        rho, gamma = r[0] * area / 2, r[0] * y[0] / 2
+        e = np.exp(2 * np.sqrt(2 * gamma) * inputs["L_m"])
+        return [_finite(np.sqrt(2.0) * rho * (1 + e) / (area * np.sqrt(gamma) * (-1 + e)))]
+
+
+def _series(inputs: Inputs) -> list[Complex]:
+    r, y, _ = inputs.sections()
+    with np.errstate(all="ignore"):
+        return [_finite(r[0] * inputs["L_m"] + 1 / (y[0] * inputs["L_m"]))]
+
+
+def _finite(z: Array) -> Complex:
+    if not np.isfinite(z).all():
+        raise OutOfRange("this equation has no number here (it overflows, or r or y is 0): take model 'line'")
+    return np.asarray(z, np.complex128)

@@ -1,0 +1,75 @@
+"""The pressed line as a ladder of resistors and capacitors: what a circuit simulator would be given.
+
+For comparison with `line` and as the circuit behind the ngspice tests; see docs/line.md.
+"""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from sensorgen.errors import OutOfRange
+from sensorgen.models._line_inputs import Complex, Inputs, in_blocks, read
+
+SOURCE = "Thesis Figs. 2.3, 2.4 and B.4: cells of finite length"
+COST = 1
+
+
+def impedance(cells: int = 100, *, one_sided: bool = False, **inputs: Any) -> Complex:
+    r"""Impedance at the contacts of a ladder, the same number of cells in each of the three sections.
+
+    .. math:: Y \leftarrow \frac{y h}{2} + \left(r h + \frac{1}{Y + y h / 2}\right)^{-1}
+              \quad \text{or, one-sided,} \quad Y \leftarrow \left(r h + \frac{1}{Y + y h}\right)^{-1}
+
+    Parameters
+    ----------
+    cells : int
+        Cells per section, 1 or more [-].
+    one_sided : bool
+        The whole capacitance behind the resistor, as in the thesis's figures, in place of half on each side.
+    **inputs : float or array
+        As of :func:`sensorgen.models.line.impedance`, SI units; the far end has to be open.
+
+    Returns
+    -------
+    complex array
+        Impedance in the broadcast shape [ohm].
+
+    Raises
+    ------
+    OutOfRange
+        No cells; a far end that is not open; no current at all (f = 0 without leak).
+
+    Notes
+    -----
+    Second order in 1/cells; one-sided first order only. Far above the corner frequency a cell has to be shorter than
+    the depth to which the current reaches.
+
+    Examples
+    --------
+    >>> plate = dict(L_m=0.1, W_m=0.01, H_top_m=3e-4, H_bottom_m=3e-4, rho_top_ohm_m=0.07, rho_bottom_ohm_m=0.2,
+    ...              d_m=6e-4, eps_r=4.68, f_Hz=99.7e3)
+    >>> [round(float(impedance(n, **plate).real), 2) for n in (1, 10, 100)]
+    [2228.88, 2989.54, 2997.04]
+    """
+    if cells < 1:
+        raise OutOfRange(f"a ladder needs one cell or more in each section, not {cells}")
+    found = read(inputs)
+    if found.load_ohm is not None:
+        raise OutOfRange("the ladder's far end is open; for others take model 'line'")
+    return in_blocks(found, partial(_block, cells, one_sided))[0]
+
+
+def _block(cells: int, one_sided: bool, inputs: Inputs) -> list[Complex]:
+    behind, before = (1.0, 0.0) if one_sided else (0.5, 0.5)
+    admittance: Any = np.asarray(0j)
+    with np.errstate(all="ignore"):
+        for r, y, length in zip(*(reversed(part) for part in inputs.sections()), strict=True):
+            step = length / cells
+            for _ in range(cells):
+                admittance = admittance + behind * y * step
+                admittance = admittance / (1 + r * step * admittance) + before * y * step
+        z = np.asarray(1 / admittance)
+    if not np.isfinite(z).all():
+        raise OutOfRange("no current flows through the ladder: its impedance is infinite")
+    return [z]

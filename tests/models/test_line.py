@@ -1,0 +1,269 @@
+"""The line against 25 digits, and against 60 and more in every corner. Re Z carries the position: tested by itself."""
+
+import mpmath
+import numpy as np
+import pytest
+from line_cases import PLATE, TONES, cases, exact, matrix, off, terminated
+
+from sensorgen.errors import BadInput, MissingValue, OutOfRange, UnknownName
+from sensorgen.models import line
+from sensorgen.models.line import cascade, corner_frequency_hz, impedance, sensitivities
+
+BIG = {"L_m": 1e3, "x_p_left_edge_m": 450.0, "L_p_m": 100.0, "F_N": 0.3}
+
+
+def test_the_224_references_to_25_digits():
+    assert len(cases()) == 224
+    for inputs, (re, im) in cases():
+        with mpmath.workdps(40):
+            whole, real = off(impedance(**inputs), mpmath.mpc(re, im))
+        assert whole < 1e-13, inputs
+        assert real < 1e-11, inputs
+
+
+CORNERS = {
+    "as it is": {},
+    "loss": {"tan_delta": 0.02},
+    "leak": {"G_S_per_m": 1e-7},
+    "strong leak": {"G_S_per_m": 1e3},
+    "piezoresistive": {"S_n_top_per_N": 0.1, "S_n_bottom_per_N": -0.2},
+    "softened to nothing": {"S_n_top_per_N": -1 / 3, "rho_bottom_ohm_m": 0.0},
+    "a kilometre": BIG,
+    "a micrometre": {"L_m": 1e-6, "x_p_left_edge_m": 3e-7, "L_p_m": 1e-7, "F_N": 1e-5},
+    "unequal by 1e6": {"rho_top_ohm_m": 2e5},
+    "unequal by 1e-6": {"rho_top_ohm_m": 2e-7, "H_top_m": 3e-2},
+    "no resistance": {"rho_top_ohm_m": 0.0, "rho_bottom_ohm_m": 0.0},
+    "one perfect track": {"rho_top_ohm_m": 0.0},
+    "thin film": {"d_m": 1e-12},
+    "at the contacts": {"x_p_left_edge_m": 0.0},
+    "at the far end": {"x_p_left_edge_m": 0.09},
+    "all of it": {"x_p_left_edge_m": 0.0, "L_p_m": 0.1, "F_N": 100.0},
+    "no force": {"F_N": 0.0},
+    "no patch": {"F_N": 0.0, "L_p_m": 0.0},
+    "pulled": {"F_N": -500.0},
+    "nearly touching": {"F_N": 600 * (1 - 1e-9)},
+    "short": {"far_end": "short"},
+    "short, a kilometre": BIG | {"far_end": "short"},
+    "10 kohm": {"far_end": 1e4},
+    "1 Tohm": {"far_end": 1e12},
+    "a microohm": {"far_end": 1e-6},
+    "short, no resistance": {"rho_top_ohm_m": 0.0, "rho_bottom_ohm_m": 0.0, "far_end": 50.0},
+}
+
+
+@pytest.mark.parametrize("corner", CORNERS)
+def test_every_corner_over_18_decades_of_frequency(corner):
+    """Against transfer matrices with 120 digits; pytest turns every warning into an error."""
+    inputs = PLATE | CORNERS[corner]
+    for f in (1e-9, 1e-3, 1.0, 1.1e3, 99.7e3, 1e6, 1e9):
+        true = exact(120, **(inputs | {"f_Hz": f}))
+        whole, real = off(impedance(**(inputs | {"f_Hz": f})), true)
+        # 1 - s of a strain 1e-9 below one keeps seven digits of F, W, L_p and E
+        tolerance = 1e-6 if corner == "nearly touching" else 1e-11
+        assert whole < tolerance, f
+        assert real < tolerance, f
+
+
+def test_far_ends_meet():
+    assert impedance(**PLATE, far_end=0.0) == impedance(**PLATE, far_end="short")
+    assert impedance(**PLATE, far_end=np.inf) == impedance(**PLATE)
+    assert impedance(**PLATE, far_end=[0.0, 50.0]).shape == (2,)
+
+
+@pytest.mark.parametrize("change", [{"f_Hz": 0.0}, {"L_m": 0.0, "L_p_m": 0.0, "x_p_left_edge_m": 0.0, "F_N": 0.0}])
+def test_without_current_it_is_infinite(change):
+    assert impedance(**(PLATE | change)) == complex(np.inf, 0)
+    assert impedance(**(PLATE | change), far_end=70.0).imag == 0
+
+
+def test_direct_current_through_a_leak_and_a_short():
+    track = (0.07 + 0.2) / (3e-4 * 0.01)
+    dc = PLATE | {"f_Hz": 0.0}
+    assert impedance(**dc, far_end="short") == pytest.approx(track * 0.1, rel=1e-13)
+    leaky = np.sqrt(track / 1e-3) / np.tanh(np.sqrt(track * 1e-3) * 0.1)
+    assert impedance(**dc, G_S_per_m=1e-3) == pytest.approx(leaky, rel=1e-13)
+
+
+def test_only_the_sum_of_the_tracks_counts():
+    swapped = PLATE | {"rho_top_ohm_m": 0.2, "rho_bottom_ohm_m": 0.07}
+    equal = PLATE | {"rho_top_ohm_m": 0.135, "rho_bottom_ohm_m": 0.135}
+    for other in (swapped, equal):
+        assert impedance(**other) == pytest.approx(impedance(**PLATE), rel=1e-14)
+
+
+def test_at_low_frequency_it_is_a_third_of_the_resistance_before_a_capacitor():
+    """Errata 2.24: not the whole of it."""
+    z = impedance(**(PLATE | {"F_N": 0.0, "f_Hz": 1.0}))
+    assert z.real == pytest.approx(9000 / 3, rel=1e-6)
+    assert corner_frequency_hz(9000.0, 69.06266493984e-12) == pytest.approx(256e3, rel=2e-3)
+    high = impedance(**(PLATE | {"F_N": 0.0, "f_Hz": 1.1e6}))
+    assert high.real == pytest.approx(0.9 * 9000 / 3, rel=0.05)
+
+
+def test_arrays_broadcast_and_blocks_make_no_difference(monkeypatch):
+    from sensorgen.models import _line_inputs
+
+    grid = PLATE | {
+        "f_Hz": np.array(TONES)[:, None, None],
+        "F_N": np.linspace(-2, 6, 11)[:, None],
+        "x_p_left_edge_m": np.linspace(0, 0.09, 13),
+        "far_end": "open",
+    }
+    whole = impedance(**grid)
+    slopes = sensitivities(**grid)[1]
+    assert whole.shape == (7, 11, 13)
+    monkeypatch.setattr(_line_inputs, "BLOCK", 20)
+    np.testing.assert_array_equal(impedance(**grid), whole)
+    np.testing.assert_array_equal(sensitivities(**grid)[1]["F_N"], slopes["F_N"])
+    one = PLATE | {"f_Hz": TONES[3], "F_N": np.linspace(-2, 6, 11)[4], "x_p_left_edge_m": np.linspace(0, 0.09, 13)[7]}
+    assert impedance(**one) == pytest.approx(whole[3, 4, 7], rel=1e-14)
+    assert impedance(**(PLATE | {"f_Hz": []})).shape == (0,)
+
+
+def test_a_million_samples_need_the_memory_of_their_answer():
+    import tracemalloc
+
+    force = np.linspace(0, 6, 1_000_000)
+    tracemalloc.start()
+    impedance(**(PLATE | {"F_N": force}))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 16e6 * 4
+
+
+def test_sections_of_any_number():
+    """A profile of pressure: 40 sections of a line whose film thins towards the middle, against 60 digits."""
+    thin = 1 - 0.4 * np.sin(np.linspace(0, np.pi, 40)) ** 2
+    r, y, lengths = 9e4 + 1e3 * np.arange(40), 2j * np.pi * 99.7e3 * 6.9e-10 / thin, np.full(40, 2.5e-3)
+    with mpmath.workdps(60):
+        product = mpmath.eye(2)
+        for part in zip(r.tolist(), y.tolist(), lengths.tolist(), strict=True):
+            product *= matrix(*(mpmath.mpmathify(v) for v in part))
+        for far_end in ("open", "short", 1e3):
+            whole, real = off(cascade(r, y, lengths, far_end), terminated(product, far_end))
+            assert whole < 1e-13
+            assert real < 1e-11
+
+
+def test_sections_of_no_length_and_cut_sections_change_nothing():
+    y = 2j * np.pi * 1e4 * 6.9e-10
+    whole = cascade([9e4], [y], [0.1])
+    assert cascade([9e4, 5.0, 9e4], [y, 1j, y], [0.03, 0.0, 0.07]) == pytest.approx(whole, rel=1e-14)
+
+
+REFUSED = [
+    ({"F_N": 600.0}, OutOfRange, "strains the film by 1"),
+    ({"F_N": 1e9}, OutOfRange, "electrodes touch"),
+    ({"F_N": np.nan}, OutOfRange, "F_N"),
+    ({"F_N": [1.0, np.inf]}, OutOfRange, "F_N has to be a number and finite, not inf"),
+    ({"f_Hz": -1.0}, OutOfRange, "f_Hz has to be 0 or more and finite, not -1"),
+    ({"f_Hz": [1.0, np.nan]}, OutOfRange, "not nan"),
+    ({"L_m": -0.1}, OutOfRange, "L_m"),
+    ({"L_p_m": -0.01}, OutOfRange, "L_p_m"),
+    ({"L_p_m": 0.0}, OutOfRange, "without area"),
+    ({"x_p_left_edge_m": 0.0901}, OutOfRange, "ends at 0.1001 m, beyond the sensor's 0.1 m"),
+    ({"x_p_left_edge_m": -1e-9}, OutOfRange, "x_p_left_edge_m"),
+    ({"d_m": 0.0}, OutOfRange, "d_m has to be above 0"),
+    ({"d_m": [0.1, 0.0]}, OutOfRange, "not 0"),
+    ({"G_S_per_m": np.inf}, OutOfRange, "G_S_per_m"),
+    ({"tan_delta": -0.1}, OutOfRange, "tan_delta"),
+    ({"S_n_top_per_N": -1.0}, OutOfRange, "resistivity is negative"),
+    ({"E_Pa": 0.0}, OutOfRange, "E_Pa"),
+    ({"far_end": -1.0}, OutOfRange, "far_end"),
+    ({"far_end": "opne"}, UnknownName, "did you mean 'open'"),
+    ({"far_end": [1.0, np.inf]}, OutOfRange, "far_end"),
+    ({"tan_delt": 1.0}, UnknownName, "did you mean 'tan_delta'"),
+    ({"F_N": "6 N"}, BadInput, "F_N takes numbers in SI units"),
+    ({"f_Hz": 1j}, BadInput, "f_Hz"),
+    ({"f_Hz": [1.0, 2.0], "F_N": [1.0, 2.0, 3.0]}, BadInput, "do not broadcast"),
+    ({"L_m": 1e300, "f_Hz": 1e300}, OutOfRange, "too extreme"),
+]
+
+
+@pytest.mark.parametrize(("change", "error", "words"), REFUSED)
+def test_senseless_values_are_refused_in_words(change, error, words):
+    with pytest.raises(error, match=words):
+        impedance(**(PLATE | change))
+
+
+@pytest.mark.parametrize("name", ["L_m", "E_Pa", "f_Hz"])
+def test_what_is_needed_and_not_given_is_missing(name):
+    with pytest.raises(MissingValue, match=name):
+        impedance(**{k: v for k, v in PLATE.items() if k != name})
+
+
+def test_sections_that_do_not_match_or_are_active_are_refused():
+    with pytest.raises(OutOfRange, match="make no sections"):
+        cascade([1.0], [1j, 1j], [1.0])
+    for r, y, length in ((-1.0, 1j, 1.0), (1.0, -1j, 1.0), (1.0, 1j, np.nan)):
+        with pytest.raises(OutOfRange):
+            cascade([r], [y], [length])
+
+
+SLOPES = {
+    "as it is": {},
+    "piezoresistive": {"S_n_top_per_N": 0.01, "S_n_bottom_per_N": 0.02, "tan_delta": 0.01, "G_S_per_m": 1e-6},
+    "low": {"f_Hz": 1.1e3},
+    "very low": {"f_Hz": 1e-3},
+    "high": {"f_Hz": 1e8, "tan_delta": 0.05},
+    "pulled, at the end": {"F_N": -6.0, "x_p_left_edge_m": 0.09},
+    "unpressed": {"F_N": 0.0, "S_n_top_per_N": 0.1},
+    "short": {"far_end": "short", "S_n_top_per_N": 0.01},
+    "terminated": {"far_end": 2e3, "G_S_per_m": 1e-5},
+}
+
+
+@pytest.mark.parametrize("corner", SLOPES)
+def test_derivatives_against_mpmath(corner):
+    """Central differences of the exact line with 80 digits and a step of 1e-25: right to 50 digits."""
+    inputs = {"tan_delta": 0.0, "G_S_per_m": 0.0, "S_n_top_per_N": 0.0, "S_n_bottom_per_N": 0.0}
+    inputs |= PLATE | SLOPES[corner]
+    z, by = sensitivities(**inputs)
+    assert z == pytest.approx(impedance(**inputs), rel=1e-14)
+    assert set(by) == set(inputs) - {"far_end"}
+    with mpmath.workdps(80):
+        step = mpmath.mpf(10) ** -25
+        for name, found in by.items():
+            low, high = (exact(80, **(inputs | {name: mpmath.mpf(inputs[name]) + s * step})) for s in (-1, 1))
+            true = (high - low) / (2 * step)
+            if abs(true) < mpmath.mpf(10) ** -40:  # without force nothing depends on E, L_p or x
+                assert abs(found) < 1e-15 * abs(by["L_m"]), name
+                continue
+            gap = mpmath.mpmathify(complex(found)) - true
+            assert abs(gap) / abs(true) < 1e-11, name
+            assert abs(gap.real) <= 1e-9 * abs(true.real) + 1e-15 * abs(true), name
+
+
+def test_no_press_leaves_no_trace_of_position():
+    assert sensitivities(of=["x_p_left_edge_m"], **(PLATE | {"F_N": 0.0}))[1]["x_p_left_edge_m"] == 0
+    # Film and tracks that change alike keep the characteristic impedance's ratio r/y: y is 1/(1 - s) times itself.
+    strain = 3.0 / (0.01 * 0.01 * 6e6)
+    alike = (1 / (1 - strain) - 1) / 3.0
+    matched = PLATE | {"S_n_top_per_N": alike, "S_n_bottom_per_N": alike}
+    by = [abs(sensitivities(of=["x_p_left_edge_m"], **p)[1]["x_p_left_edge_m"]) for p in (matched, PLATE)]
+    assert by[0] < 1e-10 * by[1]
+
+
+@pytest.mark.parametrize(
+    ("change", "of", "error"),
+    [
+        ({"f_Hz": 0.0}, None, OutOfRange),
+        ({"F_N": 0.0, "L_p_m": 0.0}, ["F_N"], OutOfRange),
+        ({}, ["eps0_F_per_m"], UnknownName),
+    ],
+)
+def test_derivatives_that_do_not_exist_are_refused(change, of, error):
+    with pytest.raises(error):
+        sensitivities(of=of, **(PLATE | change))
+
+
+def test_a_derivative_by_force_needs_a_modulus():
+    soft = {k: v for k, v in PLATE.items() if k not in ("E_Pa", "F_N")}
+    with pytest.raises(MissingValue):
+        sensitivities(**soft)
+    assert set(sensitivities(of=["f_Hz"], **soft)[1]) == {"f_Hz"}
+
+
+def test_the_model_has_what_the_list_of_models_shows():
+    assert line.COST == 0
+    assert "appendix B" in line.SOURCE

@@ -1,0 +1,93 @@
+"""The other ways to compute the line: right where they should be, and each seen to die where it does."""
+
+import numpy as np
+import pytest
+from line_cases import PLATE, cases, exact, off
+
+from sensorgen.errors import OutOfRange, UnknownName
+from sensorgen.models import line, line_abcd, line_closed, line_ladder
+
+MODELS = {"abcd": line_abcd.impedance, "exponentials": line_closed.impedance}
+LONG = PLATE | {"L_m": 1e3, "f_Hz": 1e6}
+GRID = PLATE | {"f_Hz": np.logspace(3, 6, 7)[:, None], "x_p_left_edge_m": np.linspace(0, 0.09, 5)}
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_they_agree_with_the_references(model):
+    for inputs, (re, im) in cases():
+        z, true = MODELS[model](**inputs), complex(float(re), float(im))
+        assert abs(z - true) < 1e-12 * abs(true)
+        assert abs(z.real - true.real) < 1e-9 * true.real
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    "change", [{"rho_top_ohm_m": 0.0, "rho_bottom_ohm_m": 0.0}, {"f_Hz": 0.0}, {"L_m": 1e3, "f_Hz": 1e6}]
+)
+def test_where_they_have_no_number_they_say_so(model, change):
+    with pytest.raises(OutOfRange, match="take model 'line'"):
+        MODELS[model](**(PLATE | change))
+    assert not np.isnan(line.impedance(**(PLATE | change)))
+
+
+@pytest.mark.parametrize(("model", "least"), [("abcd", 1e-10), ("exponentials", 1e-6)])
+def test_at_a_millihertz_they_lose_the_resistance(model, least):
+    low = PLATE | {"f_Hz": 1e-3}
+    true = exact(120, **low)
+    assert off(MODELS[model](**low), true)[1] > least
+    assert off(line.impedance(**low), true)[1] < 1e-13
+
+
+@pytest.mark.parametrize("far_end", ["short", 100.0, [10.0, 1e6]])
+def test_matrices_speak_of_other_far_ends(far_end):
+    a, b = (model(**PLATE, far_end=far_end) for model in (line_abcd.impedance, line.impedance))
+    assert a == pytest.approx(b, rel=1e-12)
+    for other in (line_closed.impedance, line_ladder.impedance):
+        with pytest.raises(OutOfRange, match="open"):
+            other(**PLATE, far_end=far_end)
+
+
+def test_the_misprints_and_their_effect():
+    free = GRID | {"F_N": 0.0}
+    z = line.impedance(**free)
+    assert line_closed.impedance(**free) == pytest.approx(z, rel=1e-12)
+    assert line_closed.uniform(**free) == pytest.approx(z, rel=1e-12)
+    one = PLATE | {"F_N": 0.0, "L_p_m": 0.0, "x_p_left_edge_m": 0.0}
+    z = line.impedance(**one)
+    assert line_closed.impedance("B.48", **one) == pytest.approx(z / np.sqrt(0.135), rel=1e-12)
+    assert line_closed.impedance("B.39", **one) == pytest.approx(-z, rel=1e-12)
+    assert line_closed.impedance("B.42", **one) == pytest.approx(z, rel=1e-12)
+    with pytest.raises(UnknownName, match=r"B\.48"):
+        line_closed.impedance("B.47", **one)
+
+
+@pytest.mark.parametrize(("printed", "least"), [("B.39", 0.5), ("B.42", 0.05), ("B.48", 0.5)])
+def test_pressed_every_misprint_shows(printed, least):
+    z = line.impedance(**PLATE)
+    assert abs(line_closed.impedance(printed, **PLATE) - z) > least * abs(z)
+
+
+def test_a_resistor_before_a_capacitor_is_no_line():
+    low = line_closed.series(**PLATE | {"f_Hz": 1e3})
+    assert low.real == pytest.approx(3 * line.impedance(**(PLATE | {"f_Hz": 1e3, "F_N": 0.0})).real, rel=1e-4)
+    assert low.imag == pytest.approx(line.impedance(**(PLATE | {"f_Hz": 1e3, "F_N": 0.0})).imag, rel=1e-4)
+
+
+@pytest.mark.parametrize(("one_sided", "order"), [(False, 2), (True, 1)])
+def test_ladders_converge_at_their_order(one_sided, order):
+    true = line.impedance(**GRID)
+    for part in (np.abs, np.real):
+        errors = [
+            np.abs(part(line_ladder.impedance(n, one_sided=one_sided, **GRID) - true)).max() for n in (40, 80, 160)
+        ]
+        rates = np.log2(np.array(errors[:-1]) / errors[1:])
+        assert rates == pytest.approx(order, abs=0.05)
+
+
+def test_a_ladder_dies_where_its_cells_are_longer_than_the_current_reaches():
+    high = PLATE | {"f_Hz": 1e9}
+    assert abs(line_ladder.impedance(10, **high) / line.impedance(**high) - 1) > 0.1
+    with pytest.raises(OutOfRange, match="no current"):
+        line_ladder.impedance(**(PLATE | {"f_Hz": 0.0}))
+    with pytest.raises(OutOfRange, match="one cell"):
+        line_ladder.impedance(0, **PLATE)
