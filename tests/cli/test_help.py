@@ -45,10 +45,9 @@ def test_help_of_every_shape_names_every_parameter(run, command, shape):
 
 
 def test_the_picture_of_a_shape_is_not_wrapped(run):
-    assert (
-        "\n      ================  top electrode\n      ................  dielectric\n"
-        in run("build", "reference", "-h").out
-    )
+    picture = "compared with.\n\n      ================  top electrode\n      ................  dielectric\n"
+    assert picture in run("build", "reference", "-h").out
+    assert "(e: conductor, x: dielectric, blank: air):\n\n      eeee" in run("build", "tri", "-h").out
 
 
 def test_every_option_has_help_and_every_command_its_line(run):
