@@ -77,7 +77,7 @@ def test_a_hotter_printer_takes_what_another_refuses():
 
 
 def test_missing_print_value_is_named_with_its_tool():
-    with pytest.raises(MissingValue, match="tool 3: air has no default .*add it under 'print'"):
+    with pytest.raises(MissingValue, match=r"tool 3: air has no default .*add it under 'print'"):
         recipes(DIABASE, FINE, {3: Load(materials.load("air"))})
 
 
@@ -332,7 +332,7 @@ def test_model_is_told_from_tower_and_skirt():
 
 def test_a_missing_slicer_says_how_to_get_it(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(SlicerFailed, match="prusa-slicer is not installed.*apt install"):
+    with pytest.raises(SlicerFailed, match=r"prusa-slicer is not installed.*apt install"):
         prusa.slice_3mf(tmp_path / "a.3mf", tmp_path / "a.ini", tmp_path / "a.gcode")
     settings = curaengine.engine_settings(DIABASE, FINE, usual(DIABASE))
     with pytest.raises(SlicerFailed, match="CuraEngine is not installed"):

@@ -126,8 +126,9 @@ def draw(design: Design, held: Review) -> str:
     """The drawing of the cross-section, as SVG."""
     scene = design.printed
     names = {body.material for body in scene.bodies}
+    notes = [f"{design.machine.name}, {design.layers.name}, printed {design.orientation}"]
     known = {name: (materials.load(name).title, materials.load(name).colour) for name in sorted(names)}
-    return drawing.svg(scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known)
+    return drawing.svg(scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known, notes)
 
 
 def profiles(design: Design) -> dict[str, str]:
