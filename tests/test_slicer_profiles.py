@@ -14,7 +14,7 @@ from sensorgen import materials
 from sensorgen.errors import BadInput, MissingValue, OutOfRange, SlicerFailed, UnknownName
 from sensorgen.printer import Printer, load_printer, load_quality, printer_names, quality_names
 from sensorgen.slicer import cura, curaengine, gcode, prusa
-from sensorgen.slicer.loads import Load, line_width_mm, recipes
+from sensorgen.slicer.loads import Load, recipes
 from sensorgen.slicer.run import run
 from sensorgen.slicer.tower import MARGIN_MM, tower
 
@@ -37,7 +37,7 @@ def usual(printer: Printer, **override: object) -> dict[int, Load]:
 def changed(name: str, **prints: float) -> materials.Material:
     """A material whose print values are not as shipped."""
     shipped = materials.load(name)
-    values = {key: (materials.Value(value=v, source="test", default=True),) for key, v in prints.items()}
+    values = {key: [materials.Value(value=v, source="test", default=True)] for key, v in prints.items()}
     return shipped.model_copy(update={"print": shipped.print | values})
 
 
@@ -123,7 +123,7 @@ def test_prusa_lists_have_one_entry_per_tool(printer, quality):
     assert len(found["filament_settings_id"].split(";")) == tools
     assert len(found["wiping_volumes_matrix"].split(",")) == tools**2
     assert float(found["layer_height"]) == quality.layer_mm
-    assert {float(v) for k, v in found.items() if k.endswith("extrusion_width")} == {line_width_mm(printer)}
+    assert {float(v) for k, v in found.items() if k.endswith("extrusion_width")} == {printer.line_mm()}
 
 
 def test_prusa_unused_tools_are_named_so_and_stay_cold():

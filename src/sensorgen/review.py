@@ -73,7 +73,7 @@ def _full(design: Design, step: Step) -> Review:
     if not any(f.severity == "error" for f in found):
         step("validity")
         found = [_fault(*fault) for fault in validity.faults(scene, made)] + found
-    return Review(made, design.waived(found))
+    return Review(made, design.waived(found) + design.idle_waivers(found))
 
 
 def _meshes(design: Design) -> dict[str, Mesh]:

@@ -88,6 +88,10 @@ class Body:
     prisms: tuple[Prism, ...] = field(repr=False)
     terminal: str = ""
 
+    def is_support(self) -> bool:
+        """Whether it is dissolved after printing, and no part of the sensor in use."""
+        return self.name == "support"
+
     def volume_mm3(self) -> float:
         """Exact volume [mm3]."""
         return sum(p.volume_mm3() for p in self.prisms)

@@ -51,7 +51,7 @@ FILES = {
     "word for materials": ("shape: tri\nmaterials: x60", "materials is 'x60'; expected a mapping of names to values"),
     "waiver without reason": ("shape: tri\nwaivers: [{rule: 5-width}]", "waivers.0.reason is missing"),
     "waiver with excuse": ("shape: tri\nwaivers: [{rule: 5-width, reason: eh}]", "reason is 'eh'; expected at least 5"),
-    "waiver of no rule": ("shape: tri\nwaivers: [{rule: width, reason: because}]", "expected a rule such as 5-width"),
+    "waiver of no rule": ("shape: tri\nwaivers: [{rule: width, reason: because}]", "expected text such as 5-width"),
     "unsafe name": ("shape: tri\nname: ../../x", "name: '../../x' cannot be a file name everywhere"),
     "no name": ("shape: tri\nname:", "name is None; expected text"),
     "empty name": ("shape: tri\nname: ''", "name: '' cannot be a file name"),

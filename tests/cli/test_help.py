@@ -227,3 +227,12 @@ def complete(tmp_path):
 )
 def test_bash_completes(complete, typed, offered):
     assert complete(*typed) == offered
+
+
+@pytest.mark.parametrize("words", [[], ["build"], ["build", "tri"], ["build", "rect"], ["completion"], ["list"]])
+def test_no_mark_of_the_help_formatter_is_seen(words):
+    done = subprocess.run(
+        [sys.executable, "-m", "sensorgen", *words, "--help"], capture_output=True, text=True, check=True
+    )
+    assert "\b" not in done.stdout
+    assert "\\b" not in done.stdout

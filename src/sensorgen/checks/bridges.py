@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.checks.slices import TOUCH_MM, Rectangle, Slice, Slices, stretches
-from sensorgen.checks.widths import VANISHES, line_mm
+from sensorgen.checks.widths import VANISHES
 from sensorgen.findings import Finding
 from sensorgen.printer import Printer, Quality
 from sensorgen.scene import Body
@@ -26,16 +26,17 @@ class _Span(NamedTuple):
 
 def check(slices: Slices, printer: Printer, quality: Quality) -> Iterator[Finding]:
     """Findings about bridges (held at both ends), overhangs (at one) and islands (at none)."""
-    line = line_mm(printer)
+    line, least = printer.line_mm(), VANISHES * printer.nozzle_mm
     known: dict[object, dict[str, _Span]] = {}
     for layer in range(1, len(slices.layers)):
-        ground = slices.all(layer - 1)
+        # What vanishes in the slicer neither needs support nor gives any.
+        ground = frozenset().union(*(slices.printed(b, layer - 1, least) for b in slices.scene.bodies))
         for body in slices.scene.bodies:
-            shape = slices.body(body, layer)
+            shape = slices.printed(body, layer, least)
             if not shape or shape <= ground:
                 continue
             if (shape, ground) not in known:
-                known[shape, ground] = _spans(shape, ground, VANISHES * printer.nozzle_mm)
+                known[shape, ground] = _spans(shape, ground, least)
             yield from _judged(body, layer + 1, slices.layers.mids_mm[layer], known[shape, ground], quality, line)
 
 
