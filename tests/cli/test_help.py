@@ -236,3 +236,15 @@ def test_no_mark_of_the_help_formatter_is_seen(words):
     )
     assert "\b" not in done.stdout
     assert "\\b" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("option", "offered"), [("--printer", "diabase-h5"), ("--quality", "extrafine"), ("--support", "bvoh")]
+)
+def test_the_shell_is_offered_names_of_the_option(option, offered):
+    from click.shell_completion import ShellComplete
+
+    asked = ShellComplete(cli, {}, "sensorgen", "_SENSORGEN_COMPLETE").get_completions(
+        ["build", "tri", option], offered[:3]
+    )
+    assert [item.value for item in asked] == [offered]
