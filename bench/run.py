@@ -57,7 +57,7 @@ def commands() -> list[dict[str, object]]:
     ]
 
 
-def row(what: str, got: float, target: float, note: str = "") -> dict[str, object]:
+def row(what: str, got: float, target: float | None, note: str = "") -> dict[str, object]:
     return {"what": what, "got": got, "target": target, "note": note}
 
 
@@ -109,6 +109,34 @@ def meshing() -> tuple[list[dict[str, object]], dict[str, list[list[float]]]]:
     return table, curves
 
 
+CHECK = """
+import sys, time
+from sensorgen import design
+from sensorgen.review import review
+made = design.make({"shape": "tri", "parameters": {"length_mm": float(sys.argv[1])}})
+start = time.perf_counter()
+review(made)
+print(time.perf_counter() - start)
+"""
+
+
+def checking() -> list[dict[str, object]]:
+    """Checks, validity included, against the number of periods."""
+
+    def took(periods: int) -> float:
+        runs = (
+            subprocess.run(
+                [sys.executable, "-c", CHECK, str(2.0 * periods)], check=True, capture_output=True, text=True
+            )
+            for _ in range(3)
+        )
+        return statistics.median(float(run.stdout) for run in runs)
+
+    few, many = took(40), took(160)
+    note = f"{few:.3f} s for 40, {many:.3f} s for 160 periods; 1 is linear growth"
+    return [row("checks of tri: time per period, 160 against 40", (many / 160) / (few / 40), 1.5, note)]
+
+
 def against_union() -> list[dict[str, object]]:
     """Our grid mesh against manifold3d's union of the same boxes, rect 20 x 20 cells."""
     import manifold3d
@@ -134,7 +162,7 @@ def against_union() -> list[dict[str, object]]:
     ours, peer = best(lambda: meshes.mesh(body)), best(union)
     errors = [abs(v / exact - 1) for v in (meshes.mesh(body).volume_mm3(), union().volume())]
     note = f"{ours * 1e3:.1f} ms, error {errors[0]:.0e}; union {peer * 1e3:.1f} ms, error {errors[1]:.0e}"
-    return [row("grid mesh against manifold3d's union of the same boxes, ratio", ours / peer, 1.0, note)]
+    return [row("grid mesh against manifold3d's union of the same boxes, ratio", ours / peer, None, note)]
 
 
 def models() -> list[dict[str, object]]:
@@ -194,29 +222,31 @@ def plot_growth(curves: dict[str, list[list[float]]]) -> None:
 
 
 def plot_models(found: list[dict[str, object]]) -> None:
+    """Interval of the bounds round the reference value, and the time that it took, for each cell."""
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(7, 3.8), layout="constrained")
+    figure, axes = plt.subplots(figsize=(8, 3.2), layout="constrained")
     colours = {"tri": "#c8951d", "rect": "#303436", "reference": "#3b7dd8"}
-    for entry in found:
-        shape = str(entry["cell"]).partition(",")[0]
-        x = float(entry["seconds"]) * 1e3
-        ends = [max(abs(float(entry[k])) * 100, 1e-7) for k in ("lower", "upper")]
-        axes.plot([x, x], ends, "-", color=colours[shape], lw=1)
-        axes.plot(x, ends[0], "v", color=colours[shape])
-        axes.plot(x, ends[1], "^", color=colours[shape])
-        axes.annotate(str(entry["cell"]), (x, ends[1]), textcoords="offset points", xytext=(6, 3), fontsize=8)
+    for y, entry in enumerate(reversed(found)):
+        colour = colours[str(entry["cell"]).partition(",")[0]]
+        low, high = float(entry["lower"]) * 100, float(entry["upper"]) * 100
+        axes.plot([low, high], [y, y], "|-", color=colour, lw=3, ms=14)
+        exact = abs(high - low) < 1e-3
+        said = "exact" if exact else f"{low:+.1f} .. {high:+.1f} %"
+        axes.annotate(f"{said},  {float(entry['seconds']) * 1e3:.2g} ms", (high + 3, y), va="center", fontsize=9)
+    axes.axvline(0, color="firebrick", lw=1)
     axes.set(
-        xscale="log", yscale="log", xlabel="time per capacitance [ms], 100 x 10 mm", ylabel="|error| of the bound [%]",
-        title="columns: lower (▽) and upper (△) bound against reference values",
+        xlim=(-35, 165), ylim=(-0.6, len(found) - 0.4), xlabel="bounds of C against the reference value [%]",
+        title="columns: how far the bounds are, and how long they take (100 x 10 mm)",
     )  # fmt: skip
-    axes.grid(alpha=0.3, which="both")
+    axes.set_yticks(range(len(found)), [f"{e['cell']} mm" for e in reversed(found)])
+    axes.grid(alpha=0.3, axis="x")
     figure.savefig(RESULTS / "models.png", dpi=130)
 
 
 def table(rows: list[dict[str, object]], found: list[dict[str, object]]) -> str:
-    lines = ["| what | target, at most | got | |", "|---|---|---|---|"]
-    lines += [f"| {r['what']} | {r['target']:g} | {r['got']:.3g} | {r['note']} |" for r in rows]
+    lines = ["| what | target, at most | got | how |", "|---|---|---|---|"]
+    lines += [f"| {r['what']} | {r['target'] or ''} | {r['got']:.3g} | {r['note']} |" for r in rows]
     lines += ["", "| capacitance by `columns` | time [ms] | lower bound [%] | upper bound [%] |", "|---|---|---|---|"]
     lines += [
         f"| {m['cell']} | {m['seconds'] * 1e3:.2f} | {m['lower'] * 100:+.2f} | {m['upper'] * 100:+.2f} |" for m in found
@@ -225,10 +255,15 @@ def table(rows: list[dict[str, object]], found: list[dict[str, object]]) -> str:
 
 
 def main() -> None:
-    """Measure everything and write the results."""
+    """Measure everything and write the results; with --draw only draw those of the last time."""
+    if "--draw" in sys.argv:
+        last = json.loads((RESULTS / "results.json").read_text("utf-8"))
+        plot_growth(last["curves"])
+        plot_models(last["models"])
+        return
     RESULTS.mkdir(exist_ok=True)
     mesh_rows, curves = meshing()
-    rows = [*commands(), *mesh_rows, *against_union()]
+    rows = [*commands(), *mesh_rows, *checking(), *against_union()]
     found = models()
     plot_growth(curves)
     plot_models(found)

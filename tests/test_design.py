@@ -69,7 +69,7 @@ def test_a_changed_value_in_a_material_changes_the_id(monkeypatch):
     def changed(name):
         found = load(name)
         value = found.value("density_kg_m3").model_copy(update={"value": 1.0})
-        return found.model_copy(update={"properties": found.properties | {"density_kg_m3": (value,)}})
+        return found.model_copy(update={"properties": found.properties | {"density_kg_m3": [value]}})
 
     monkeypatch.setattr(design.material_files, "load", changed)
     assert tri().id() != before

@@ -15,6 +15,11 @@ TABLE_3_2 = {"top_electrode": "etpu@thesis-3.2", "bottom_electrode": "etpu@thesi
 PLATE_F = 69.06266493984e-12  # eps0 4.68 100 x 10 / 0.6 mm
 
 
+def close(expected, rel: float):
+    """Relative only: pytest's absolute tolerance of 1e-12 is more than many a capacitance."""
+    return pytest.approx(expected, rel=rel, abs=0)
+
+
 def values(found) -> dict[tuple[str, str, str], float]:
     return {(v["material"], v["quantity"], v["source"]): v["value"] for v in found["values"]}
 
@@ -33,7 +38,7 @@ def test_the_source_that_a_design_names_is_taken(source, eps):
     slots = dict.fromkeys(("film", "dielectric"), f"x60@{source}")
     found = prediction(make({"shape": "reference", "materials": slots}))
     assert values(found)["x60", "relative_permittivity", source] == eps
-    assert found["capacitance_f"]["lower"] == pytest.approx(PLATE_F * eps / 4.68, rel=1e-12)
+    assert found["capacitance_f"]["lower"] == close(PLATE_F * eps / 4.68, 1e-12)
 
 
 @pytest.mark.parametrize("end", ["top", "bottom"])
@@ -41,7 +46,7 @@ def test_each_electrode_has_its_own_resistivity(end):
     """rho L / (H W): 0.8333 ohm m x 0.1 m / (0.3 mm x 10 mm) = 27.8 kohm."""
     found = prediction(make({"shape": "tri", "materials": {f"{end}_electrode": "etpu@thesis-3.2"}}))
     expected = {"top": 0.07 / 3e-5, "bottom": 0.2 / 3e-5} | {end: 1 / 1.2 / 3e-5}
-    assert found["electrode_resistance_ohm"] == pytest.approx(expected, rel=1e-12)
+    assert found["electrode_resistance_ohm"] == close(expected, 1e-12)
 
 
 def test_the_conductivity_printed_for_x60_is_kept_but_never_a_default():
@@ -58,8 +63,9 @@ def test_the_conductivity_printed_for_x60_is_kept_but_never_a_default():
 
 def test_a_value_that_no_source_gives_is_missing():
     """PLA as a film: nobody states its permittivity, and it is not taken for 0 or 1."""
-    with pytest.raises(MissingValue, match="pla has no default relative_permittivity"):
-        prediction(make({"shape": "tri", "materials": {"film": "pla"}}))
+    found = prediction(make({"shape": "tri", "materials": {"film": "pla"}}))
+    assert found["capacitance_f"] is None
+    assert "pla has no default relative_permittivity" in found["reason"]
 
 
 @pytest.mark.parametrize("shape", ["tri", "rect", "reference"])
@@ -88,7 +94,7 @@ def test_how_it_is_printed_does_not_change_what_it_is(change):
 def test_corner_frequencies_of_the_plate(slots, corner_khz):
     corner = prediction(make({"shape": "reference", "materials": slots}))["corner_frequency_hz"]
     assert corner["middle"] / 1e3 == pytest.approx(corner_khz, rel=2e-3)
-    assert corner["lower"] == pytest.approx(corner["upper"], rel=1e-12)
+    assert corner["lower"] == close(corner["upper"], 1e-12)
 
 
 def test_capacitances_of_the_thesis_sensors():
@@ -97,9 +103,9 @@ def test_capacitances_of_the_thesis_sensors():
         found = prediction(make({"shape": shape, "parameters": {"dielectric_mm": film}}))
         bounds = found["capacitance_f"]
         assert bounds["lower"] * (1 - 1e-12) <= exact <= bounds["upper"] * (1 + 1e-12)
-        assert bounds["middle"] ** 2 == pytest.approx(bounds["lower"] * bounds["upper"], rel=1e-12)
+        assert bounds["middle"] ** 2 == close(bounds["lower"] * bounds["upper"], 1e-12)
         per_area = found["capacitance_per_area_f_per_m2"]
-        assert per_area == pytest.approx({k: v / (0.1 * 0.01) for k, v in bounds.items()}, rel=1e-12)
+        assert per_area == close({k: v / (0.1 * 0.01) for k, v in bounds.items()}, 1e-12)
 
 
 def test_impedance_at_the_tones_is_coth():
@@ -109,8 +115,8 @@ def test_impedance_at_the_tones_is_coth():
     for row in found["impedance_ohm"]:
         y = 2j * math.pi * row["frequency_hz"] * PLATE_F
         z = cmath.sqrt(resistance / y) / cmath.tanh(cmath.sqrt(resistance * y))
-        assert row["re"] == pytest.approx(z.real, rel=1e-9)
-        assert row["im"] == pytest.approx(z.imag, rel=1e-12)
+        assert row["re"] == close(z.real, 1e-9)
+        assert row["im"] == close(z.imag, 1e-12)
 
 
 def test_the_ranges_of_the_impedance_hold_its_middle():

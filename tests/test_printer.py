@@ -26,7 +26,6 @@ def test_five_tools_that_slicers_count_from_zero(name):
     assert machine.name == name
     assert [machine.slicer_index(tool) for tool in machine.tool_numbers] == list(range(5))
     assert set(machine.default_tools) <= set(materials.names())
-    assert machine.tool_numbers[0] == machine.first_tool
 
 
 def test_the_five_tool_printer_of_the_thesis():
@@ -81,3 +80,25 @@ def test_a_faulty_printer_file_is_named_with_its_key(own, old, new, key):
 def test_unknown_names(load, word):
     with pytest.raises(UnknownName, match=f"unknown {word} 'fyne'"):
         load("fyne")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("tool_numbers: [3, 3, 4, 5]", "has a number twice"),
+        ('title: "two\\nlines"', "without control characters"),
+        ("colour: red", "unknown key 'colour'"),
+        ("nozzle_mm: 0", "nozzle_mm is 0; expected a number above 0"),
+        ("default_tools: {etpu: 9}", "not among"),
+    ],
+)
+def test_a_bad_printer_file_is_told_in_our_words(tmp_path, change, said):
+    text = (printer.folder() / "printers/diabase-h5.yaml").read_text("utf-8")
+    key = change.partition(":")[0]
+    path = tmp_path / "own.yaml"
+    path.write_text(
+        "\n".join(line for line in text.splitlines() if not line.startswith(key)) + f"\n{change}\n", "utf-8"
+    )
+    with pytest.raises(BadInput, match=said) as caught:
+        printer.load_printer(str(path))
+    assert str(caught.value).startswith(str(path))

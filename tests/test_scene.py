@@ -104,6 +104,22 @@ def test_upside_down_twice_is_as_drawn(shape):
     assert volumes(scene.turned_over()) == pytest.approx(volumes(scene), rel=1e-12)
 
 
+@pytest.mark.parametrize("axis", "xyz")
+def test_half_a_turn_about_x_keeps_x_and_turns_y_and_z(axis):
+    """A skew triangle, by its corners: no mirror image."""
+    prism = Prism(axis, ((0.0, 0.0), (2.0, 0.0), (0.5, 1.0)), 3.0, 3.5)
+    (turned,) = Scene((Body("skew", "x60", (prism,)),), (9.0, 8.0, 7.0)).turned_over().bodies[0].prisms
+
+    def corners(p: Prism) -> set[tuple[float, ...]]:
+        places = (
+            {p.axis: at} | dict(zip(PLANE[p.axis], c, strict=True)) for c in p.outline for at in (p.start_mm, p.end_mm)
+        )
+        return {tuple(place[a] for a in "xyz") for place in places}
+
+    assert corners(turned) == {(x, 8.0 - y, 7.0 - z) for x, y, z in corners(prism)}
+    assert area_mm2(turned.outline) == area_mm2(prism.outline)
+
+
 def test_upside_down_the_top_electrode_lies_on_the_bed():
     scene = tri.scene(tri.Params(length_mm=7.13, width_mm=3.3), Fill()).turned_over()
     (comb,) = scene.body("top_electrode_with_cogs").prisms
@@ -200,9 +216,9 @@ def test_clipping_a_triangle_leaves_its_left_part(end, area):
     assert area_mm2(left) == pytest.approx(area, rel=1e-12)
 
 
-@pytest.mark.parametrize("end", [1e-10, 0.0])
-def test_a_sliver_is_no_geometry(end):
-    assert clipped(((0.0, 0.0), (2.0, 0.0), (1.0, 1.0)), end) == ()
+@pytest.mark.parametrize(("end", "left"), [(0.0, False), (1e-10, False), (0.9e-6, False), (1.1e-6, True)])
+def test_less_than_a_nanometre_is_no_geometry(end, left):
+    assert bool(clipped(((0.0, 0.0), (2.0, 0.0), (1.0, 1.0)), end)) is left
 
 
 def test_area_has_the_sign_of_the_turn():
@@ -215,6 +231,10 @@ def test_what_is_shorter_than_its_pattern_has_no_empty_bodies(along):
     """Half a period holds one cog, and no hanging dielectric."""
     scene = tri.scene(tri.Params(length_mm=1.0, width_mm=1.0, along=along), Fill())
     assert [b.name for b in scene.bodies] == ["bottom_electrode", "film_and_lower", "top_electrode_with_cogs"]
+
+
+def test_a_scene_leaves_out_empty_bodies():
+    assert Scene((Body("film", "x60", ()),), (1, 1, 1)).bodies == ()
 
 
 def test_a_body_is_found_by_its_name():

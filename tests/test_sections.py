@@ -77,6 +77,13 @@ def test_a_section_that_repeats_is_found_once_with_all_its_depth(shape, options,
     assert [s.depth_mm for s in found] == pytest.approx(depths, rel=1e-12)
 
 
+def test_the_direction_with_fewer_sections_is_taken():
+    """Strips along x look alike all along x, and differ across it."""
+    strips = tuple(box(0, 4, y, y + 1, 0, 1) for y in (0.0, 2.0))
+    (only,) = sections(Scene((Body("strips", "x60", strips),), (4, 3, 1)))
+    assert (only.across, only.depth_mm) == ("y", 4.0)
+
+
 def test_a_section_that_repeats_shows_the_prisms_of_its_own_place():
     """Every region is cut where its own prisms are: a mix of places once lost the later strips, and their volume."""
     scene = rect.scene(rect.Params(), Fill())

@@ -14,7 +14,7 @@ from sensorgen import materials
 from sensorgen.errors import BadInput, MissingValue, OutOfRange, SlicerFailed, UnknownName
 from sensorgen.printer import Printer, load_printer, load_quality, printer_names, quality_names
 from sensorgen.slicer import cura, curaengine, gcode, prusa
-from sensorgen.slicer.loads import Load, line_width_mm, recipes
+from sensorgen.slicer.loads import Load, recipes
 from sensorgen.slicer.run import run
 from sensorgen.slicer.tower import MARGIN_MM, tower
 
@@ -37,7 +37,7 @@ def usual(printer: Printer, **override: object) -> dict[int, Load]:
 def changed(name: str, **prints: float) -> materials.Material:
     """A material whose print values are not as shipped."""
     shipped = materials.load(name)
-    values = {key: (materials.Value(value=v, source="test", default=True),) for key, v in prints.items()}
+    values = {key: [materials.Value(value=v, source="test", default=True)] for key, v in prints.items()}
     return shipped.model_copy(update={"print": shipped.print | values})
 
 
@@ -77,7 +77,7 @@ def test_a_hotter_printer_takes_what_another_refuses():
 
 
 def test_missing_print_value_is_named_with_its_tool():
-    with pytest.raises(MissingValue, match="tool 3: air has no default .*add it under 'print'"):
+    with pytest.raises(MissingValue, match=r"tool 3: air has no default .*add it under 'print'"):
         recipes(DIABASE, FINE, {3: Load(materials.load("air"))})
 
 
@@ -123,7 +123,7 @@ def test_prusa_lists_have_one_entry_per_tool(printer, quality):
     assert len(found["filament_settings_id"].split(";")) == tools
     assert len(found["wiping_volumes_matrix"].split(",")) == tools**2
     assert float(found["layer_height"]) == quality.layer_mm
-    assert {float(v) for k, v in found.items() if k.endswith("extrusion_width")} == {line_width_mm(printer)}
+    assert {float(v) for k, v in found.items() if k.endswith("extrusion_width")} == {printer.line_mm()}
 
 
 def test_prusa_unused_tools_are_named_so_and_stay_cold():
@@ -332,7 +332,7 @@ def test_model_is_told_from_tower_and_skirt():
 
 def test_a_missing_slicer_says_how_to_get_it(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(SlicerFailed, match="prusa-slicer is not installed.*apt install"):
+    with pytest.raises(SlicerFailed, match=r"prusa-slicer is not installed.*apt install"):
         prusa.slice_3mf(tmp_path / "a.3mf", tmp_path / "a.ini", tmp_path / "a.gcode")
     settings = curaengine.engine_settings(DIABASE, FINE, usual(DIABASE))
     with pytest.raises(SlicerFailed, match="CuraEngine is not installed"):

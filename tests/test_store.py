@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -142,6 +143,36 @@ def test_signals_wait_and_are_not_lost(number):
         assert told == ["told"]
     finally:
         signal.signal(number, before)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no locks on folders")
+def test_whoever_publishes_second_waits_for_the_first(tmp_path, monkeypatch):
+    folder, half_way, go_on, order = tmp_path / "x", threading.Event(), threading.Event(), []
+
+    def slow(self, target, rename=Path.replace):
+        if self.parent.name == "first" and self.name == "b":
+            half_way.set()
+            assert go_on.wait(10)
+        order.append(f"{self.parent.name} {self.name}")
+        return rename(self, target)
+
+    def work(name):
+        files = {"a": name.encode(), "b": name.encode(), store.MANIFEST: b"{}"}
+        store.write(tmp_path / name, files)
+        store.publish(tmp_path / name, folder)
+
+    monkeypatch.setattr(Path, "replace", slow)
+    workers = [threading.Thread(target=work, args=(name,)) for name in ("first", "second")]
+    workers[0].start()
+    assert half_way.wait(10)
+    workers[1].start()
+    workers[1].join(0.2)
+    assert workers[1].is_alive()
+    assert order == ["first a"]
+    go_on.set()
+    for worker in workers:
+        worker.join()
+    assert order == [f"{who} {what}" for who in ("first", "second") for what in ("a", "b", store.MANIFEST)]
 
 
 def test_publishing_from_a_thread(tmp_path):

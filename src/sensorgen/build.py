@@ -126,16 +126,18 @@ def draw(design: Design, held: Review) -> str:
     """The drawing of the cross-section, as SVG."""
     scene = design.printed
     names = {body.material for body in scene.bodies}
+    notes = [f"{design.machine.name}, {design.layers.name}, printed {design.orientation}"]
     known = {name: (materials.load(name).title, materials.load(name).colour) for name in sorted(names)}
-    return drawing.svg(scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known)
+    return drawing.svg(scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known, notes)
 
 
 def profiles(design: Design) -> dict[str, str]:
     """Slicer profiles, by file name: PrusaSlicer and Cura, for every quality that ships and the design's own."""
     loads = _loads(design)
     texts: dict[str, str] = {}
-    qualities = {q.name: q for q in (*map(printer.load_quality, QUALITIES), design.layers)}
-    for quality in qualities.values():
+    # The design's own quality comes last: Cura's machine definition, one for all, then starts with it.
+    others = (printer.load_quality(name) for name in QUALITIES if name != design.layers.name)
+    for quality in (*others, design.layers):
         texts[f"profiles/prusa/{design.machine.name}-{quality.name}.ini"] = prusa.profile(
             design.machine, quality, loads
         )

@@ -5,20 +5,20 @@ import hashlib
 import json
 import math
 import re
-import reprlib
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import Field, field_validator
 
 from sensorgen import __version__, registry, shapes, yamlfile
 from sensorgen import materials as material_files
 from sensorgen.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.findings import Finding
 from sensorgen.printer import Printer, Quality, load_printer, load_quality
+from sensorgen.records import Strict, checked, shown
 from sensorgen.scene import Envelope, Fill, Scene
 
 MAX_CELLS = 50_000  # crossed strips of 330 x 330 mm have 27 225
@@ -27,14 +27,10 @@ _NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,98}[A-Za-z0-9])?")
 # Windows cannot have files of these names.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
-Slot = Annotated[str, Field(pattern=r"^[a-z0-9-]+(@[a-z0-9.-]+)?$")]
+Slot = Annotated[str, Field(pattern=r"^[a-z0-9-]+(@[a-z0-9.-]+)?$", examples=["x60", "x60@thesis-4.1"])]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)  # strict: true is not 1, nor "5" a number
-
-
-class Slots(_Strict):
+class Slots(Strict):
     """Which material fills which part, each with the source of its values: ``x60`` or ``x60@thesis-4.1``."""
 
     top_electrode: Slot = "etpu@thesis-c.1-top"
@@ -45,22 +41,22 @@ class Slots(_Strict):
     support: Slot | None = Field(default=None, description="Fills the air while printing; left empty when not given.")
 
 
-class Infill(_Strict):
+class Infill(Strict):
     """How densely one material is printed."""
 
     percent: Annotated[float, Field(gt=0, le=100)] | None = None
     pattern: Literal["rectilinear", "grid", "concentric", "honeycomb", "triangles"] | None = None
 
 
-class Waiver(_Strict):
+class Waiver(Strict):
     """A finding that the designer accepts, and why."""
 
-    rule: Annotated[str, Field(pattern=r"^[0-9]+(-[a-z-]+)?$", description="As in 5-width, or just 5.")]
+    rule: Annotated[str, Field(pattern=r"^[0-9]+(-[a-z-]+)?$", examples=["5-width", "5"])]
     body: str = Field(default="", description="Name of the body; all bodies when not given.")
     reason: Annotated[str, Field(min_length=5)]
 
 
-class Design(_Strict):
+class Design(Strict):
     """A named variant of a sensor."""
 
     name: str = Field(
@@ -69,7 +65,7 @@ class Design(_Strict):
         json_schema_extra={"pattern": f"^{_NAME.pattern}$"},
     )
     shape: str
-    parameters: dict[str, float | str] = {}
+    parameters: dict[str, float | str] = Field(default={})
     materials: Slots = Slots()
     printer: str = "diabase-h5"
     quality: str = "fine"
@@ -91,7 +87,7 @@ class Design(_Strict):
     def _safe_name(cls, name: str) -> str:
         if not _NAME.fullmatch(name) or _DEVICES.fullmatch(name):
             raise ValueError(
-                f"{_shown(name)} cannot be a file name everywhere; expected at most 100 letters a to z, digits, "
+                f"{shown(name)} cannot be a file name everywhere; expected at most 100 letters a to z, digits, "
                 "'.', '-' and '_', with a letter or digit first and last: set it with --name, or 'name:' in the file"
             )
         return name
@@ -138,7 +134,7 @@ class Design(_Strict):
     @cached_property
     def in_use(self) -> Scene:
         """The sensor as drawn, its soluble support gone."""
-        return dataclasses.replace(self.drawn, bodies=tuple(b for b in self.drawn.bodies if b.name != "support"))
+        return dataclasses.replace(self.drawn, bodies=tuple(b for b in self.drawn.bodies if not b.is_support()))
 
     @cached_property
     def printed(self) -> Scene:
@@ -184,6 +180,20 @@ class Design(_Strict):
         """The findings, with the reason where the design accepts them."""
         return [
             dataclasses.replace(f, waiver=next((w.reason for w in self.waivers if _covers(w, f)), "")) for f in findings
+        ]
+
+    def idle_waivers(self, findings: list[Finding]) -> list[Finding]:
+        """A finding for each waiver that covers none of ``findings``: misspelt, or no longer needed."""
+        return [
+            Finding(
+                "10-waiver",
+                "warning",
+                w.body or "sensor",
+                f"the waiver of rule {w.rule} covers no finding",
+                "remove it, or correct its rule and body",
+            )
+            for w in self.waivers
+            if not any(_covers(w, f) for f in findings)
         ]
 
 
@@ -261,60 +271,13 @@ def load(path: Path) -> Design:
 def make(data: Mapping[str, Any], where: str = "") -> Design:
     """Check a design given as plain data; ``where`` names its file in errors."""
     try:
-        design = Design.model_validate(dict(data) if isinstance(data, Mapping) else data)
+        if isinstance(data, Mapping) and "shape" not in data:
+            raise BadInput(f"shape is missing; expected {', '.join(registry.names(shapes))}")
+        design = checked(Design, data)
         _check_names(design)
-    except ValidationError as error:
-        raise BadInput(_plain(error.errors()[0])).within(where) from None
     except SensorgenError as error:
         raise error.within(where) from None
     return design if design.name else design.model_copy(update={"name": name_of(design)})
-
-
-_INSIDE: dict[str, type[_Strict]] = {"materials": Slots, "infill": Infill, "waivers": Waiver}
-_EXPECTED = {
-    "bool_type": "true or false",
-    "float_type": "a number",
-    "greater_than": "a number above {gt:g}",
-    "greater_than_equal": "{ge:g} or more",
-    "int_type": "a whole number",
-    "less_than": "a number below {lt:g}",
-    "less_than_equal": "{le:g} or less",
-    "literal_error": "{expected}",
-    "string_pattern_mismatch": "{pattern}",
-    "string_too_short": "at least {min_length} characters",
-    "string_type": "text",
-    "dict_type": "a mapping of names to values",
-    "model_type": "a mapping of names to values",
-    "tuple_type": "a list",
-}
-_PATTERNS = {"materials": "NAME or NAME@SOURCE", "waivers": "a rule such as 5-width, or just 5"}
-
-
-def _plain(first: Mapping[str, Any]) -> str:
-    """What pydantic found, in our words: what was given, and what was expected."""
-    place = [str(part) for part in first["loc"] if part not in ("float", "str")] or ["a design"]
-    key, kind = ".".join(place), first["type"]
-    if kind == "value_error":
-        return f"{key}: {first['ctx']['error']}"
-    if kind == "missing":
-        return f"{key} is missing; expected " + (", ".join(registry.names(shapes)) if key == "shape" else "text")
-    if kind == "extra_forbidden":
-        inside = f" of {'.'.join(place[:-1])}" if len(place) > 1 else ""
-        known = _INSIDE[place[0]].model_fields if inside else Design.model_fields
-        return str(UnknownName(f"key{inside}", place[-1], known))
-    limits = dict(first.get("ctx", {})) | {"pattern": _PATTERNS.get(place[0])}
-    expected = _EXPECTED[kind].format(**limits) if kind in _EXPECTED else str(first["msg"]).lower()
-    return f"{key} is {_shown(first['input'])}; expected {expected}"
-
-
-def _shown(value: object) -> str:
-    """A value as given, cut short."""
-    short = reprlib.Repr()
-    short.maxstring = 60
-    try:
-        return short.repr(value)
-    except ValueError:  # a whole number of thousands of digits
-        return "a huge number"
 
 
 def _check_names(design: Design) -> None:

@@ -50,10 +50,10 @@ class Finding:
     waiver: str = ""
 
     def margin_mm(self) -> float | None:
-        """How far the value is from the limit, negative where it falls short of it [mm]."""
+        """How far the value is from the limit; negative, since a finding is on the wrong side of it [mm]."""
         if self.value_mm is None or self.limit_mm is None:
             return None
-        return round(self.value_mm - self.limit_mm, 9)
+        return -round(abs(self.value_mm - self.limit_mm), 9)
 
     def as_dict(self) -> dict[str, Any]:
         """The finding with its margin, for JSON."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from sensorgen import materials, models, registry
 from sensorgen.design import Design
-from sensorgen.errors import SensorgenError
+from sensorgen.errors import MissingValue, SensorgenError
 from sensorgen.interval import Interval
 from sensorgen.scene import Scene
 from sensorgen.units import M_PER_MM
@@ -89,14 +89,15 @@ def _capacitance_models() -> list[tuple[str, ModuleType]]:
 def prediction(design: Design) -> dict[str, Any]:
     """Everything that is predicted of a design, as plain data for ``prediction.json`` (SI units).
 
-    A scene that no model can speak of, as a short, has a reason in place of numbers.
+    A scene that no model can speak of, as a short, or a material without a value has a reason in place of numbers.
     """
-    taken = _permittivities(design)
+    taken: list[Taken] = []
     try:
+        taken = _permittivities(design)
         answer = capacitance(design.in_use, {t.material: t.value for t in taken})
-    except Unpredictable as error:
+        tracks = [_track(design, end) for end in ("top", "bottom")]
+    except (Unpredictable, MissingValue) as error:
         return {"capacitance_f": None, "reason": str(error), "values": [vars(t) for t in taken]}
-    tracks = [_track(design, end) for end in ("top", "bottom")]
     taken += [value for _, value in tracks]
     resistance = {end: ohm for end, (ohm, _) in zip(("top", "bottom"), tracks, strict=True)}
     area = design.params.length_mm * design.params.width_mm * M_PER_MM**2

@@ -1,23 +1,23 @@
 """Printers and print qualities, read from data: tools, nozzle, layers, bed."""
 
+import re
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from sensorgen import yamlfile
 from sensorgen.errors import BadInput, UnknownName
+from sensorgen.records import Strict, checked
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# Titles stand on one line of a slicer's profile.
+Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]*$", examples=["one line without control characters"])]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class MaxSpeed(_Strict):
+class MaxSpeed(Strict):
     """Fastest the axes may move [mm/s]."""
 
     xy: Positive
@@ -25,18 +25,17 @@ class MaxSpeed(_Strict):
     extruder: Positive
 
 
-class Printer(_Strict):
+class Printer(Strict):
     """A multi-tool printer; ``tool_numbers`` are those of its own G-code."""
 
     name: str
-    title: str
-    source: str
-    bed_mm: tuple[Positive, Positive]
+    title: Line
+    source: Line
+    bed_mm: Annotated[tuple[Positive, Positive], Field(strict=False)]  # YAML has lists only
     height_mm: Positive
     bed_origin: Literal["centre", "corner"]
     gcode_flavour: Literal["reprapfirmware", "marlin"]
-    first_tool: Annotated[int, Field(ge=0)]
-    tool_numbers: Annotated[tuple[int, ...], Field(min_length=1)]
+    tool_numbers: Annotated[tuple[int, ...], Field(min_length=1, strict=False)]
     default_tools: dict[str, int]
     nozzle_mm: Positive
     line_width_ratio: Positive
@@ -50,10 +49,16 @@ class Printer(_Strict):
 
     @model_validator(mode="after")
     def _tools_exist(self) -> Self:
+        if len(set(self.tool_numbers)) < len(self.tool_numbers):
+            raise ValueError(f"tool_numbers {list(self.tool_numbers)} has a number twice")
         for material, tool in self.default_tools.items():
             if tool not in self.tool_numbers:
                 raise ValueError(f"default tool {tool} for {material} is not among {list(self.tool_numbers)}")
         return self
+
+    def line_mm(self) -> float:
+        """Width of one printed line [mm]."""
+        return round(self.nozzle_mm * self.line_width_ratio, 6)
 
     def slicer_index(self, tool: int) -> int:
         """Place of a tool in a slicer's list, which counts from 0 [-]."""
@@ -64,12 +69,12 @@ class Printer(_Strict):
         return (0.0, 0.0) if self.bed_origin == "centre" else (self.bed_mm[0] / 2, self.bed_mm[1] / 2)
 
 
-class Quality(_Strict):
+class Quality(Strict):
     """How a print is cut into layers."""
 
     name: str
-    title: str
-    source: str
+    title: Line
+    source: Line
     layer_mm: Positive
     first_layer_mm: Positive
     infill_pattern: Literal["rectilinear", "grid", "concentric", "honeycomb", "triangles"]
@@ -122,10 +127,13 @@ def _load(kind: type[_Profile], word: str, name: str, known: list[str]) -> _Prof
         raise UnknownName(word, name, known)
     plural = {"printer": "printers", "quality": "qualities"}[word]
     path = Path(name) if own else folder() / plural / f"{name}.yaml"
+    data = yamlfile.read(path)
     try:
-        return kind(name=path.stem, **yamlfile.read(path))
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise BadInput(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
-    except TypeError as error:
-        raise BadInput(f"{path}: {error}") from None
+        return checked(kind, {**data, "name": _safe(path.stem)})
+    except BadInput as error:
+        raise error.within(str(path)) from None
+
+
+def _safe(stem: str) -> str:
+    """A file's name as it can stand in the names of other files, and in a slicer's profile."""
+    return re.sub("[^A-Za-z0-9._-]+", "-", stem)[:60].strip("._-") or "own"

@@ -9,6 +9,7 @@ from sensorgen.design import Design
 from sensorgen.findings import Finding
 from sensorgen.geometry import meshes, validity
 from sensorgen.geometry.mesh import Mesh
+from sensorgen.slicer.tower import tower
 
 Step = Callable[[str], None]
 STEPS = ("meshes", "checks", "validity")
@@ -68,15 +69,36 @@ def _full(design: Design, step: Step) -> Review:
     made = _meshes(design)
     step("checks")
     gap_mm = validity.electrode_gap_mm(scene, made)
-    found = checks.findings(scene, design.machine, design.layers, gap_mm)
+    found = checks.findings(scene, design.machine, design.layers, gap_mm) + _crowding(design)
     if not any(f.severity == "error" for f in found):
         step("validity")
         found = [_fault(*fault) for fault in validity.faults(scene, made)] + found
-    return Review(made, design.waived(found))
+    return Review(made, design.waived(found) + design.idle_waivers(found))
 
 
 def _meshes(design: Design) -> dict[str, Mesh]:
     return {body.name: meshes.mesh(body) for body in design.printed.bodies}
+
+
+def _crowding(design: Design) -> list[Finding]:
+    """A sensor that stands where the slicers put the prime tower, without which no tool change prints well."""
+    place = tower(design.machine, design.layers, len(design.used()))
+    free = [place.x_mm - design.machine.bed_centre_mm()[0], place.y_mm - design.machine.bed_centre_mm()[1]]
+    reach = [size / 2 for size in design.printed.size_mm[:2]]
+    if reach[0] <= free[0] or reach[1] <= free[1]:
+        return []
+    length, width = (round(2 * limit, 3) for limit in free)
+    return [
+        Finding(
+            "8-bed",
+            "warning",
+            "sensor",
+            f"it reaches into the far right corner, where the prime tower of {place.side_mm:g} mm stands",
+            f"keep it shorter than {length:g} mm or narrower than {width:g} mm, or move the tower in the slicer",
+            reach[0],
+            round(free[0], 9),
+        )
+    ]
 
 
 def _fault(body: str, what: str) -> Finding:

@@ -88,6 +88,10 @@ class Body:
     prisms: tuple[Prism, ...] = field(repr=False)
     terminal: str = ""
 
+    def is_support(self) -> bool:
+        """Whether it is dissolved after printing, and no part of the sensor in use."""
+        return self.name == "support"
+
     def volume_mm3(self) -> float:
         """Exact volume [mm3]."""
         return sum(p.volume_mm3() for p in self.prisms)
@@ -166,8 +170,14 @@ def rectangle(a0: float, a1: float, b0: float, b1: float) -> Outline:
     return ((a0, b0), (a1, b0), (a1, b1), (a0, b1))
 
 
+def rounded(value_mm: float) -> float:
+    """Round away what sums leave behind, so that faces that meet have equal coordinates [mm]."""
+    return round(value_mm, 12)
+
+
 def box(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float) -> Prism:
-    """Box between two corners [mm]."""
+    """Box between two corners, rounded [mm]."""
+    x0, x1, y0, y1, z0, z1 = (rounded(value) for value in (x0, x1, y0, y1, z0, z1))
     return Prism("z", rectangle(x0, x1, y0, y1), z0, z1)
 
 
@@ -183,12 +193,12 @@ def clipped(outline: Iterable[Point], end_mm: float) -> Outline:
     """The part of an outline with first coordinate between 0 and ``end_mm`` [mm], exactly.
 
     For outlines that every vertical line meets in one piece; empty where less than a sliver is left.
-    Coordinates are rounded to 1e-12 mm, so that neighbours reached by different sums stay neighbours.
+    Coordinates are rounded, so that neighbours reached by different sums stay neighbours.
 
     >>> clipped([(0, 0), (2, 0), (2, 1), (0, 1)], 1.5)
     ((0, 0), (1.5, 0.0), (1.5, 1.0), (0, 1))
     """
-    points = [(round(u, 12), round(v, 12)) for u, v in outline]
+    points = [(rounded(u), rounded(v)) for u, v in outline]
     for sign, limit in ((-1.0, 0.0), (1.0, end_mm)):
         points = list(_half_plane(points, sign, limit))
     distinct = tuple(p for k, p in enumerate(points) if p != points[k - 1])

@@ -5,7 +5,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-from sensorgen.scene import PLANE, SLIVER_MM, Body, Outline, Point, Prism, Scene
+from sensorgen.scene import PLANE, Body, Outline, Point, Prism, Scene
+
+ROUNDING_MM = 1e-9  # edges nearer than this are one edge, reached by different sums
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ def columns(section: Section) -> list[Column]:
     return [
         Column(left, right, tuple(_layers(section, found)))
         for (left, right), found in zip(pairwise(cuts), edges, strict=True)
-        if right - left > SLIVER_MM
+        if right - left > ROUNDING_MM
     ]
 
 

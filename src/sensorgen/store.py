@@ -39,7 +39,8 @@ def staging(folder: Path) -> Iterator[Path]:
                 f"cannot write to {str(folder)!r}: {error.strerror or error}; name another place with --out"
             ) from None
     finally:
-        shutil.rmtree(stage, ignore_errors=True)
+        with _undisturbed():
+            shutil.rmtree(stage, ignore_errors=True)
 
 
 def _refuse_file(folder: Path) -> None:

@@ -114,6 +114,14 @@ def test_the_corners_of_a_cap_hold_on_to_its_sides(sensor, findings, beyond, sev
     assert all("an overhang" in f.message for f in found)
 
 
+def test_a_roof_over_a_bay_is_held_at_its_sides_rather_than_at_its_back(sensor, findings):
+    """A bay 1 mm wide and 0.6 mm deep: a bridge of 1 mm sags less than an overhang of 0.6."""
+    bay = (box(2, 12, 2, 5, 1.2, 1.4), box(2, 6, 5, 5.6, 1.2, 1.4), box(7, 12, 5, 5.6, 1.2, 1.4))
+    roof = Body("roof", "etpu", (box(2, 12, 2, 5.6, 1.4, 1.6),))
+    (found,) = findings(sensor(Body("bay", "x60", bay), roof), "9-")
+    assert (found.severity, found.message) == ("warning", "a bridge of 1 mm over air")
+
+
 def test_an_arm_round_a_corner_is_an_overhang_of_its_own_length(sensor, findings):
     """The first arm is held by the pillar and sticks out 0.2 mm; the second leaves it sideways by 3 mm."""
     pillar = Body("pillar", "x60", (box(5, 10, 5, 6, 1.2, 1.4),))

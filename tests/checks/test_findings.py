@@ -35,7 +35,8 @@ def test_findings_come_with_the_worst_first_and_complete():
         assert f.layer is not None or f.place_mm is not None
 
 
-def test_the_margin_is_value_less_limit():
+def test_the_margin_is_negative_on_either_side_of_the_limit():
+    assert Finding("9-bridge", "error", "b", "m", "a", value_mm=0.3, limit_mm=0.22).margin_mm() == -0.08
     assert Finding("5-width", "error", "b", "m", "a", value_mm=0.1, limit_mm=0.12).margin_mm() == -0.02
     assert Finding("5-width", "info", "b", "m", "a").margin_mm() is None
 
@@ -73,6 +74,7 @@ def waived(*waivers: dict[str, str]) -> list[Finding]:
 )
 def test_a_waiver_silences_only_what_it_names(waiver, covers):
     found = waived(waiver | {"reason": "tried on the bench"})
+    found = [f for f in found if f.rule != "10-waiver"]
     assert len(found) == len(waived())
     assert [bool(f.waiver) for f in found] == [covers(f) for f in found]
     assert {f.waiver for f in found if f.waiver} <= {"tried on the bench"}

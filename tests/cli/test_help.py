@@ -45,10 +45,9 @@ def test_help_of_every_shape_names_every_parameter(run, command, shape):
 
 
 def test_the_picture_of_a_shape_is_not_wrapped(run):
-    assert (
-        "\n      ================  top electrode\n      ................  dielectric\n"
-        in run("build", "reference", "-h").out
-    )
+    picture = "compared with.\n\n      ================  top electrode\n      ................  dielectric\n"
+    assert picture in run("build", "reference", "-h").out
+    assert "(e: conductor, x: dielectric, blank: air):\n\n      eeee" in run("build", "tri", "-h").out
 
 
 def test_every_option_has_help_and_every_command_its_line(run):
@@ -228,3 +227,24 @@ def complete(tmp_path):
 )
 def test_bash_completes(complete, typed, offered):
     assert complete(*typed) == offered
+
+
+@pytest.mark.parametrize("words", [[], ["build"], ["build", "tri"], ["build", "rect"], ["completion"], ["list"]])
+def test_no_mark_of_the_help_formatter_is_seen(words):
+    done = subprocess.run(
+        [sys.executable, "-m", "sensorgen", *words, "--help"], capture_output=True, text=True, check=True
+    )
+    assert "\b" not in done.stdout
+    assert "\\b" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("option", "offered"), [("--printer", "diabase-h5"), ("--quality", "extrafine"), ("--support", "bvoh")]
+)
+def test_the_shell_is_offered_names_of_the_option(option, offered):
+    from click.shell_completion import ShellComplete
+
+    asked = ShellComplete(cli, {}, "sensorgen", "_SENSORGEN_COMPLETE").get_completions(
+        ["build", "tri", option], offered[:3]
+    )
+    assert [item.value for item in asked] == [offered]

@@ -206,3 +206,12 @@ def test_waived_findings_do_not_stop_a_build(run, tmp_path):
     said = run("build", "short.yaml", "--no-cad")
     assert (said.code, said.err) == (0, "")
     assert "accepted: a short on purpose" in " ".join(said.out.split())
+
+
+def test_a_share_may_be_given_in_percent():
+    from sensorgen.cli.words import Share
+    from sensorgen.errors import BadInput
+
+    assert Share().convert("20%", None, None) == Share().convert("0.2", None, None) == 0.2
+    with pytest.raises(BadInput, match=r"expected 0\.2 or 20%"):
+        Share().convert("much", None, None)

@@ -145,8 +145,8 @@ OPTIONS = sorted(
 VALUES = (
     st.sampled_from(
         [
-            "0", "1", "-1", "0.1", "2mm", "1e400", "nan", "50x20", "1x", "x", "y", "xy", "x60=2", "x60=", "=", "etpu=x60",
-            "film=x60@thesis-4.1", "electrode=etpu", "x60=80", "80%", "bvoh", "none", "a.b.c.d=1", "materials=1",
+            "0", "1", "-1", "0.1", "2mm", "1e400", "nan", "50x20", "1x", "x", "y", "xy", "x60=2", "x60=", "=",
+            "etpu=x60", "film=x60", "electrode=etpu", "x60=80", "80%", "bvoh", "none", "a.b.c.d=1", "materials=1",
             "tools.x60=1", "infill.x60.percent=80", "waivers=1", "parameters.period_mm=3um", "name=a", "shape=rect",
             "prusa-xl5", "extrafine", "upside-down", "no.yaml", "/", "..", "²", "x60=²",
         ]

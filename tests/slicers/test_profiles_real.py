@@ -74,9 +74,11 @@ def write_3mf(path: Path, bodies: list[tuple[Corners, int, dict[str, str]]]) -> 
         "[Content_Types].xml": f'<Types xmlns="{package}/content-types">'
         '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
         '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>',
-        "_rels/.rels": f'<Relationships xmlns="{package}/relationships"><Relationship Target="/3D/3dmodel.model" Id="r1" '
+        "_rels/.rels": f'<Relationships xmlns="{package}/relationships">'
+        '<Relationship Target="/3D/3dmodel.model" Id="r1" '
         'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>',
-        "3D/3dmodel.model": '<model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2013/02" '
+        "3D/3dmodel.model": '<model unit="millimeter" '
+        'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2013/02" '
         'xmlns:slic3rpe="http://schemas.slic3r.org/3mf/2017/06"><metadata name="slic3rpe:Version3mf">1</metadata>'
         f'<resources><object id="1" type="model"><mesh><vertices>{vertices}</vertices>'
         f"<triangles>{triangles}</triangles></mesh></object></resources>"

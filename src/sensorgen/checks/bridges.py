@@ -1,12 +1,13 @@
 """Rule 9: what is printed over air. Any body below supports, whatever its material."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.checks.slices import TOUCH_MM, Rectangle, Slice, Slices, stretches
-from sensorgen.checks.widths import VANISHES, line_mm
+from sensorgen.checks.widths import VANISHES
 from sensorgen.findings import Finding
 from sensorgen.printer import Printer, Quality
 from sensorgen.scene import Body
@@ -15,64 +16,75 @@ Mask = NDArray[np.bool_]
 Lengths = NDArray[np.float64]
 
 
+class _Span(NamedTuple):
+    """An unsupported stretch, and the middle of a place where it shows [mm]."""
+
+    mm: float = 0.0
+    x: float = 0.0
+    y: float = 0.0
+
+
 def check(slices: Slices, printer: Printer, quality: Quality) -> Iterator[Finding]:
     """Findings about bridges (held at both ends), overhangs (at one) and islands (at none)."""
-    line = line_mm(printer)
-    known: dict[object, dict[str, float]] = {}
+    line, least = printer.line_mm(), VANISHES * printer.nozzle_mm
+    known: dict[object, dict[str, _Span]] = {}
     for layer in range(1, len(slices.layers)):
-        ground = slices.all(layer - 1)
+        # What vanishes in the slicer neither needs support nor gives any.
+        ground = frozenset().union(*(slices.printed(b, layer - 1, least) for b in slices.scene.bodies))
         for body in slices.scene.bodies:
-            shape = slices.body(body, layer)
+            shape = slices.printed(body, layer, least)
             if not shape or shape <= ground:
                 continue
             if (shape, ground) not in known:
-                known[shape, ground] = _spans(shape, ground, VANISHES * printer.nozzle_mm)
+                known[shape, ground] = _spans(shape, ground, least)
             yield from _judged(body, layer + 1, slices.layers.mids_mm[layer], known[shape, ground], quality, line)
 
 
 def _judged(
-    body: Body, layer: int, z_mm: float, spans: dict[str, float], quality: Quality, line_mm: float
+    body: Body, layer: int, z_mm: float, spans: dict[str, _Span], quality: Quality, line_mm: float
 ) -> Iterator[Finding]:
-    prism = min(body.prisms, key=lambda p: abs(sum(p.span("z")) / 2 - z_mm))
-    place = (prism.span("x")[0], prism.span("y")[0], z_mm)
     limits = {"bridge": (quality.bridge_warning_mm, quality.bridge_error_mm), "overhang": (line_mm / 2, line_mm)}
     for kind, (warn, fail) in limits.items():
         span = spans[kind]
-        if span > warn + TOUCH_MM:
-            severe = span > fail + TOUCH_MM
+        if span.mm > warn + TOUCH_MM:
+            severe = span.mm > fail + TOUCH_MM
             yield Finding(
                 "9-bridge", "error" if severe else "warning", body.name,
-                f"{'a bridge' if kind == 'bridge' else 'an overhang'} of {span:.3g} mm over air",
+                f"{'a bridge' if kind == 'bridge' else 'an overhang'} of {span.mm:.3g} mm over air",
                 f"narrow it to {warn:.2g} mm, print upside down, or fill the air with support",
-                round(span, 9), fail if severe else warn, layer, place,
+                round(span.mm, 9), round(fail if severe else warn, 9), layer, (span.x, span.y, z_mm),
             )  # fmt: skip
-    if spans["island"] > 0:
+    island = spans["island"]
+    if island.mm > 0:
         yield Finding(
-            "9-bridge", "error", body.name, f"an island {spans['island']:.3g} mm wide starts in mid-air",
+            "9-bridge", "error", body.name, f"an island {island.mm:.3g} mm wide starts in mid-air",
             "turn the sensor over, or fill the air with support (--support bvoh)",
-            round(spans["island"], 9), 0.0, layer, place,
+            round(island.mm, 9), 0.0, layer, (island.x, island.y, z_mm),
         )  # fmt: skip
 
 
-def _spans(shape: frozenset[Rectangle], ground: frozenset[Rectangle], least_mm: float) -> dict[str, float]:
-    """Longest bridge, overhang and island of a layer's shape above a ground [mm].
+def _spans(shape: frozenset[Rectangle], ground: frozenset[Rectangle], least_mm: float) -> dict[str, _Span]:
+    """Longest bridge, overhang and island of a layer's shape above a ground.
 
     Every unsupported place is held along x or along y; the better way counts. Places that are held neither way,
     as the corners of a roof that juts out on two sides, hold on to those that are.
     """
     piece = Slice(shape, ground)
     air = piece.filled & ~Slice(ground, shape).filled
-    found = {"bridge": 0.0, "overhang": 0.0, "island": 0.0}
+    found = dict.fromkeys(("bridge", "overhang", "island"), _Span())
 
-    def note(kind: str, values: Lengths) -> None:
-        found[kind] = max(found[kind], float(values.max(initial=0.0)))
+    def note(kind: str, lengths: Lengths, where: Mask) -> None:
+        i, j = np.unravel_index(np.argmax(np.where(where, lengths, 0.0)), where.shape)
+        if where[i, j] and lengths[i, j] > found[kind].mm:
+            x, y = (float(line[k] + line[k + 1]) / 2 for line, k in zip(piece.lines, (i, j), strict=True))
+            found[kind] = _Span(float(lengths[i, j]), round(x, 9), round(y, 9))
 
     while air.any():
         ends, lengths, narrow = _best(piece, air)
-        note("bridge", lengths[ends == 2])
-        note("overhang", lengths[ends == 1])
+        note("bridge", lengths, ends == 2)
+        note("overhang", lengths, ends == 1)
         if not ends.any():
-            note("island", narrow[air & (narrow > least_mm + TOUCH_MM)])
+            note("island", narrow, air & (narrow > least_mm + TOUCH_MM))
             break
         air &= ends == 0
     return found

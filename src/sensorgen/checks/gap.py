@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from sensorgen.checks.slices import TOUCH_MM, Layers, Slices
-from sensorgen.checks.widths import VANISHES, line_mm
+from sensorgen.checks.widths import VANISHES
 from sensorgen.findings import Finding
 from sensorgen.printer import Printer, Quality
 from sensorgen.scene import Body, Scene
@@ -62,7 +62,7 @@ def _printed(slices: Slices, printer: Printer, gap_mm: float) -> Iterator[Findin
     """What the gap becomes when narrow features vanish."""
     tracks = {
         "Arachne": VANISHES * printer.nozzle_mm,
-        "classic walls or plain Cura": line_mm(printer) - 2 * TOUCH_MM,  # a whole line prints
+        "classic walls or plain Cura": printer.line_mm() - 2 * TOUCH_MM,  # a whole line prints
         "Cura filling outline gaps": 0.0,
     }
     gaps = {slicer: printed_gap_mm(slices, least) for slicer, least in tracks.items()}
@@ -81,7 +81,7 @@ def _printed(slices: Slices, printer: Printer, gap_mm: float) -> Iterator[Findin
 
 def printed_gap_mm(slices: Slices, least_mm: float) -> float | None:
     """Distance of the electrodes when stretches up to ``least_mm`` wide are not printed; None without them [mm]."""
-    low, high = (slices.printed(body, least_mm) for body in _electrodes(slices.scene))
+    low, high = (slices.printed_layers(body, least_mm) for body in _electrodes(slices.scene))
     if not low or not high:
         return None
     boundaries = slices.layers.boundaries_mm

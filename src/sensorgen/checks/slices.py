@@ -27,6 +27,10 @@ class Rectangle(NamedTuple):
     y0: float
     y1: float
 
+    def narrow_mm(self) -> float:
+        """Length of the shorter side [mm]."""
+        return min(self.x1 - self.x0, self.y1 - self.y0)
+
 
 class Run(NamedTuple):
     """A straight stretch through a slice, along one axis [mm]."""
@@ -134,19 +138,14 @@ class Slices:
         """What a body shows in a layer (counted from 0), slanted outlines in plan left out."""
         return self._shown[body.name][layer]
 
-    def all(self, layer: int) -> frozenset[Rectangle]:
-        """What all bodies show in a layer (counted from 0)."""
-        return frozenset().union(*(shown[layer] for shown in self._shown.values()))
+    def printed(self, body: Body, layer: int, least_mm: float) -> frozenset[Rectangle]:
+        """What of a body is wider than ``least_mm`` in a layer (counted from 0)."""
+        return frozenset(r for r in self._shown[body.name][layer] if r.narrow_mm() > least_mm + TOUCH_MM)
 
-    def printed(self, body: Body, least_mm: float) -> list[int]:
+    def printed_layers(self, body: Body, least_mm: float) -> list[int]:
         """Layers (counted from 0) in which some stretch of a body is wider than ``least_mm``."""
-        return [k for k, found in enumerate(self._shown[body.name]) if _widest_mm(found) > least_mm + TOUCH_MM]
+        return [k for k in range(len(self.layers)) if self.printed(body, k, least_mm)]
 
 
 def _rectangles(body: Body, z_mm: float) -> frozenset[Rectangle]:
     return frozenset(r for prism in body.prisms if not slanted(prism) for r in shown(prism, z_mm))
-
-
-def _widest_mm(found: frozenset[Rectangle]) -> float:
-    """Width of the widest rectangle, on its narrow side; 0 where there is none [mm]."""
-    return max((min(r.x1 - r.x0, r.y1 - r.y0) for r in found), default=0.0)

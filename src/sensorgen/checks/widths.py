@@ -7,10 +7,10 @@ The limits were found by slicing (PrusaSlicer 2.5 with Arachne and with classic 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from sensorgen.checks.slices import TOUCH_MM, Layers, Rectangle, Run, Slice, Slices, shown
+from sensorgen.checks.slices import TOUCH_MM, Layers, Run, Slice, Slices, shown
 from sensorgen.findings import Finding
 from sensorgen.printer import Printer
-from sensorgen.scene import Body
+from sensorgen.scene import Body, Prism
 
 # As shares of the nozzle.
 VANISHES = 0.12 / 0.4  # only Cura filling outline gaps prints a stretch this narrow
@@ -31,7 +31,7 @@ class _Band:
 
 def _bands(printer: Printer) -> tuple[_Band, ...]:
     """What a printer's nozzle makes of narrow stretches, from the narrowest on; a whole line prints."""
-    line, swells = line_mm(printer), SWELLS * printer.nozzle_mm
+    line, swells = printer.line_mm(), SWELLS * printer.nozzle_mm
     return (
         _Band(
             VANISHES * printer.nozzle_mm, "error", "vanishes (Cura filling outline gaps prints it 1.7 times too full)",
@@ -52,11 +52,6 @@ def _bands(printer: Printer) -> tuple[_Band, ...]:
     )  # fmt: skip
 
 
-def line_mm(printer: Printer) -> float:
-    """Width of one line; classic walls and Cura drop anything narrower [mm]."""
-    return round(printer.nozzle_mm * printer.line_width_ratio, 9)
-
-
 def check(slices: Slices, printer: Printer) -> Iterator[Finding]:
     """Findings about widths and gaps at mid-layer, one per body, layer and width."""
     layers = slices.layers
@@ -71,13 +66,17 @@ def check(slices: Slices, printer: Printer) -> Iterator[Finding]:
 
 def _narrow(body: Body, piece: Slice, number: int, printer: Printer, layers: Layers) -> Iterator[Finding]:
     bands = _bands(printer)
+    tips = None
     for width, runs in _by_width(piece.runs(piece.filled), bands[-1].upto_mm).items():
         band = next(b for b in bands if width <= b.upto_mm + TOUCH_MM)
-        tip = band.severity == "error" and _all_taper(body, runs, number, layers)
+        if band.severity == "error" and tips is None:
+            tips = _tips(body, number, layers)
+        tip = band.severity == "error" and all((r.axis, r.start, r.end) in (tips or ()) for r in runs)
+        severity = "warning" if tip or (band.severity == "error" and body.is_support()) else band.severity
         yield Finding(
-            "5-width", "warning" if tip else band.severity, body.name,
+            "5-width", severity, body.name,
             f"a {'tip' if tip else 'stretch'} {width:.3g} mm wide at mid-layer {band.message}",
-            f"blunt the tip to {line_mm(printer):.2g} mm" if tip else band.advice,
+            f"blunt the tip to {printer.line_mm():.2g} mm" if tip else band.advice,
             width, round(band.upto_mm, 6), number + 1, _place(runs[0], layers.mids_mm[number]), len(runs),
         )  # fmt: skip
 
@@ -101,26 +100,31 @@ def _by_width(runs: Iterable[Run], limit_mm: float) -> dict[float, list[Run]]:
     return {w: [r for r in rs if r.axis == rs[0].axis] for w, rs in sorted(found.items())}
 
 
-def _all_taper(body: Body, runs: list[Run], number: int, layers: Layers) -> bool:
-    """Whether all stretches are tips that run out before the next sample, rather than thin walls or strips."""
-    low, high = layers.boundaries_mm[number : number + 2]
-    ends: list[Rectangle] = []
-    for prism in body.prisms:
-        bottom, top = (max(low, prism.span("z")[0]), min(high, prism.span("z")[1]))
-        if top > bottom and not prism.is_box():
-            near = 1e-3 * (top - bottom)
-            ends += [r for z in (bottom + near, top - near) for r in shown(prism, z)]
-    return all(_tapers(run, ends) for run in runs)
+def _tips(body: Body, number: int, layers: Layers) -> set[tuple[str, float, float]]:
+    """Stretches that run out before the next sample, by axis, start and end [mm]: no thin walls or strips.
 
-
-def _tapers(run: Run, ends: list[Rectangle]) -> bool:
-    """Whether the stretch loses half of its width or more up to an end of its prism in this layer.
-
-    What goes on like that is nothing at the next sample, twice as far away.
+    Such a stretch loses half of its width or more between mid-layer and boundary, and so all of it up to the
+    next sample, twice as far away.
     """
-    spans = [((r.x0, r.x1), (r.y0, r.y1)) if run.axis == "x" else ((r.y0, r.y1), (r.x0, r.x1)) for r in ends]
-    widths = [b - a for (a, b), (c, d) in spans if a <= run.end and b >= run.start and c <= run.across <= d]
-    return min(widths, default=run.width) < 0.51 * run.width
+    mid, half = layers.mids_mm[number], layers.mids_mm[number] - layers.boundaries_mm[number]
+    near = 1e-3 * half
+    found = set()
+    for prism in body.prisms:
+        if prism.is_box() or prism.axis == "z":
+            continue
+        axis = "x" if prism.axis == "y" else "y"
+        below, here, above = (_runs(prism, z, axis) for z in (mid - near, mid, mid + near))
+        if len(below) == len(here) == len(above):  # the same pieces, each a little wider or narrower
+            for (a0, a1), (start, end), (b0, b1) in zip(below, here, above, strict=True):
+                loss = abs((b1 - b0) - (a1 - a0)) / 2 * half / near
+                if end - start - loss < 0.51 * (end - start):
+                    found.add((axis, start, end))
+    return found
+
+
+def _runs(prism: Prism, z_mm: float, axis: str) -> list[tuple[float, float]]:
+    """Where a prism starts and ends along an axis at a height, in order [mm]."""
+    return sorted((r.x0, r.x1) if axis == "x" else (r.y0, r.y1) for r in shown(prism, z_mm))
 
 
 def _place(run: Run, z_mm: float) -> tuple[float, float, float]:

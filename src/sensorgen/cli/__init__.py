@@ -50,12 +50,12 @@ class _Terminated(BaseException):
 @click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(__version__, prog_name="sensorgen")
 def cli() -> None:
-    r"""From one design to a printable elastomer sensor: geometry, checks, 3MF, profiles, prediction.
+    """From one design to a printable elastomer sensor: geometry, checks, 3MF, profiles, prediction.
 
     \b
     sensorgen build tri --dielectric 0.2        a shape, with options
     sensorgen build designs/23/trix-d0.2.yaml   a design file
-    """
+    """  # noqa: D301 - click reads the backspace
 
 
 def main() -> None:

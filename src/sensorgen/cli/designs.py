@@ -10,7 +10,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from sensorgen import registry, shapes, units
-from sensorgen.cli.words import Length, OneOf
+from sensorgen.cli.words import Length, OneOf, Share, completed
 from sensorgen.errors import BadInput, SensorgenError, UnknownName
 
 if TYPE_CHECKING:
@@ -136,27 +136,48 @@ def _design_options() -> list[click.Parameter]:
             "--orientation", None, "How it lies on the bed; as-drawn if not given.",
             type=OneOf(["as-drawn", "upside-down"]),
         ),
-        option("--support", "MATERIAL", "Fill the air with a soluble support: bvoh, pla, none."),
+        option(
+            "--support", "MATERIAL", "Fill the air with a soluble support: bvoh, pla, none.",
+            shell_complete=completed(lambda: ["bvoh", "none", "pla"]),
+        ),
         option(
             "--material", "PART=NAME[@SOURCE]",
             "Material of a part (electrode, top_electrode, film, dielectric ...) and the source of its values.",
             multiple=True,
         ),
-        option("--printer", "NAME", "A printer that is listed, or a YAML file; diabase-h5 if not given."),
-        option("--quality", "NAME", "A quality that is listed, or a YAML file; fine if not given."),
+        option(
+            "--printer", "NAME", "A printer that is listed, or a YAML file; diabase-h5 if not given.",
+            shell_complete=completed(_printers),
+        ),
+        option(
+            "--quality", "NAME", "A quality that is listed, or a YAML file; fine if not given.",
+            shell_complete=completed(_qualities),
+        ),
         option("--nozzle nozzle_mm", None, "Nozzle diameter, when not the printer's own.", type=Length()),
         option("--tool", "MATERIAL=NUMBER", "Tool of a material, in the printer's numbers.", multiple=True),
         option(
             "--infill", "[MATERIAL=]PERCENT", "Infill of a material; of the dielectric if none is named.", multiple=True
         ),
         option("--infill-pattern", "[MATERIAL=]PATTERN", "Pattern of the infill: rectilinear, grid ...", multiple=True),
-        option("--shrinkage", "SHARE", "Shrinkage in the plane to print against, as in 0.2.", type=float),
+        option("--shrinkage", "SHARE", "Shrinkage in the plane to print against, as in 0.2.", type=Share()),
         option(
             "--set settings", "KEY=VALUE", "Any parameter, or key of the design file, as in infill.x60.percent=80.",
             multiple=True,
         ),
         option("--name", None, "Name of folder and files; made from the parameters if not given."),
     ]  # fmt: skip
+
+
+def _printers() -> list[str]:
+    from sensorgen.printer import printer_names
+
+    return printer_names()
+
+
+def _qualities() -> list[str]:
+    from sensorgen.printer import quality_names
+
+    return quality_names()
 
 
 def _design(base: Data, given: Data, word: str) -> "Design":

@@ -28,13 +28,23 @@ def findings(found: Sequence["Finding"]) -> None:
             click.style(f"{head:8}", fg=_COLOURS.get(head), bold=head == "error") + f"{f.rule}  {f.body}{_where(f)}"
         )
         after = f"accepted: {f.waiver}" if f.waiver else f"-> {f.advice}"
-        click.echo(textwrap.fill(f"{f.message} {after}", width, initial_indent=" " * 8, subsequent_indent=" " * 8))
+        click.echo(
+            textwrap.fill(f"{f.message}{_place(f)} {after}", width, initial_indent=" " * 8, subsequent_indent=" " * 8)
+        )
 
 
 def _where(f: "Finding") -> str:
     layers = f", layer {f.layer}" if f.layer else ""
     layers += f" to {f.last_layer}" if f.last_layer else ""
-    return layers + (f", {f.count} places" if f.count > 1 else "")
+    places = f", {f.count} places" if f.count > 1 else ""
+    return layers + places
+
+
+def _place(f: "Finding") -> str:
+    if not f.place_mm:
+        return ""
+    x, y, z = f.place_mm
+    return f" ({'first ' if f.count > 1 else ''}at x {x:g}, y {y:g}, z {z:g} mm)"
 
 
 def summary(review: "Review") -> str:

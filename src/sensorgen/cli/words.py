@@ -1,5 +1,6 @@
 """Kinds of words on the command line: lengths with their units, and names from a list."""
 
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import click
@@ -21,6 +22,26 @@ class Length(click.ParamType):  # type: ignore[type-arg]
             return units.length_mm(value)
         except BadInput as error:
             raise error.within(_said(param)) from None
+
+
+class Share(click.ParamType):  # type: ignore[type-arg]
+    """A share of one, also in percent."""
+
+    name = "share"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:  # noqa: ARG002
+        """Read ``0.2`` or ``20%`` [-]."""
+        if isinstance(value, float):
+            return value
+        try:
+            return float(value[:-1]) / 100 if value.endswith("%") else float(value)
+        except ValueError:
+            raise BadInput(f"{_said(param)}: {value!r} is not a share; expected 0.2 or 20%") from None
+
+
+def completed(names: Callable[[], Iterable[str]]) -> Callable[[click.Context, click.Parameter, str], list[Any]]:
+    """What the shell offers for an option: the names that begin as typed, looked up only then."""
+    return lambda ctx, param, begun: [name for name in names() if name.startswith(begun)]  # noqa: ARG005
 
 
 class OneOf(click.Choice):  # type: ignore[type-arg]

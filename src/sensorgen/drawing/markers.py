@@ -205,10 +205,12 @@ def _rows(mark: Marked, letters: Mapping[str, str], room: float, lines: int) -> 
 
 
 def _where(f: Finding, letters: Mapping[str, str]) -> Iterator[str]:
-    """Body, by the letter that it has in the legend; layer; number of places."""
+    """Body, by its letter in the legend; layer; number of places, or the one place, which may lie elsewhere."""
     if f.body:
         yield " / ".join(letters.get(name, name) for name in f.body.split(" / "))
     if f.layer is not None:
         yield f"layer {f.layer}"
     if f.count > 1:
         yield f"{f.count} places"
+    elif f.layer is not None and f.place_mm is not None:
+        yield f"at x {f.place_mm[0]:g}, y {f.place_mm[1]:g}"

@@ -8,17 +8,14 @@ from functools import cache
 from importlib import resources
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from sensorgen import yamlfile
 from sensorgen.errors import BadInput, MissingValue, UnknownName
+from sensorgen.records import Strict, checked
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Value(_Strict):
+class Value(Strict):
     """One number as one source gives it; the property's name carries the unit."""
 
     value: float
@@ -30,7 +27,7 @@ class Value(_Strict):
     high: float | None = None
 
 
-class Material(_Strict):
+class Material(Strict):
     """A material with every value that its sources give."""
 
     name: str
@@ -38,8 +35,8 @@ class Material(_Strict):
     about: str
     colour: Annotated[str, Field(pattern="^#[0-9a-f]{6}$")]
     conductor: bool
-    properties: dict[str, tuple[Value, ...]]
-    print: dict[str, tuple[Value, ...]] = {}
+    properties: dict[str, list[Value]]
+    print: dict[str, list[Value]] = Field(default={})
     drying: str = ""
 
     def sources(self) -> set[str]:
@@ -61,7 +58,7 @@ class Material(_Strict):
         MissingValue
             No source gives it, or only an implausible one that a design must name to get.
         """
-        values = self.properties.get(quantity, ()) + self.print.get(quantity, ())
+        values = self.properties.get(quantity, []) + self.print.get(quantity, [])
         chosen = [v for v in values if v.source == source] or [v for v in values if v.default]
         if not chosen:
             named = ", ".join(sorted(v.source for v in values))
@@ -89,11 +86,12 @@ def load(name: str) -> Material:
     """
     if name not in names():
         raise UnknownName("material", name, names())
-    text = (resources.files(__name__) / f"{name}.yaml").read_text("utf-8")
+    file = f"{name}.yaml"
+    data = yamlfile.parse((resources.files(__name__) / file).read_text("utf-8"), file)
     try:
-        return Material(name=name, **yamlfile.parse(text, f"{name}.yaml"))
-    except ValidationError as error:
-        raise BadInput(f"{name}.yaml: {error.errors()[0]['loc']}: {error.errors()[0]['msg']}") from None
+        return checked(Material, {**data, "name": name})
+    except BadInput as error:
+        raise error.within(file) from None
 
 
 @cache
@@ -101,4 +99,5 @@ def citations() -> dict[str, str]:
     """What each source's name stands for."""
     text = (resources.files(__name__) / "sources.yaml").read_text("utf-8")
     data = yamlfile.parse(text, "sources.yaml")
-    return {name: f"{data['thesis']}: {where}" for name, where in data["sources"].items()}
+    theses = {str(name): f"{data['thesis']}: {where}" for name, where in data["sources"].items()}
+    return theses | {str(name): str(what) for name, what in data["others"].items()}

@@ -22,6 +22,7 @@ SOURCE = "Thesis 3.2.1 and 3.2.2, Eqs. 3.10 to 3.49, corrected; Dirichlet's and 
 COST = 1
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
+_ROUNDING = 1e-9  # by which exact bounds may seem to cross
 _JUMP = 1e-9  # a potential is continuous when its two sides differ by less, of 1 V
 
 
@@ -69,6 +70,8 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
         A material between the electrodes has no permittivity.
     ValueError
         The scene is unfit.
+    ArithmeticError
+        The bounds have crossed, which no geometry can make them do.
     """
     lower = trial = slab = 0.0
     found = [(section, [_stack(c, permittivity) for c in cut_columns(section)]) for section in sections(scene)]
@@ -80,6 +83,8 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
         slab += section.depth_mm * sum(s.within(narrowest) for s in stacks)
     smooth = len(found) == 1 and all(_meet(a, b) for a, b in pairwise(found[0][1]))
     upper = min(trial, slab) if smooth else slab
+    if upper < lower * (1 - _ROUNDING):
+        raise ArithmeticError(f"bounds in the wrong order, {lower} above {upper}: this is a fault of the model")
     return Interval(lower, max(lower, upper)).times(EPS0_F_PER_M * M_PER_MM)
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import ceil
 
-from sensorgen.scene import SLIVER_MM, Body, Envelope, Fill, Prism, Scene, box
+from sensorgen.scene import SLIVER_MM, Body, Envelope, Fill, Prism, Scene, box, rounded
 
 SHORT = "sq"  # as the thesis's specimens are named: sqXY, sqYX
 
@@ -61,7 +61,7 @@ def scene(p: Params, fill: Fill) -> Scene:
     upper, lower = p.along[0], p.along[1]
 
     def plate(z0: float, z1: float) -> tuple[Prism, ...]:
-        return (box(0.0, p.length_mm, 0.0, p.width_mm, _r(z0), _r(z1)),) if z1 - z0 > SLIVER_MM else ()
+        return (box(0.0, p.length_mm, 0.0, p.width_mm, z0, z1),) if z1 - z0 > SLIVER_MM else ()
 
     def both(part: str) -> tuple[Prism, ...]:
         return _strips(p, part, lower, film, middle) + _strips(p, part, upper, middle, roof)
@@ -75,7 +75,7 @@ def scene(p: Params, fill: Fill) -> Scene:
         Body("top_electrode_with_cogs", fill.top_electrode, both("etpu") + plate(roof, top), "top"),
         Body("isolation", fill.isolation, plate(top, top + p.isolation_mm)),
     ]
-    return Scene(tuple(b for b in bodies if b.prisms), (p.length_mm, p.width_mm, _r(top + p.isolation_mm)))
+    return Scene(tuple(bodies), (p.length_mm, p.width_mm, rounded(top + p.isolation_mm)))
 
 
 def _lower(film: tuple[Prism, ...], feet: tuple[Prism, ...], fill: Fill) -> list[Body]:
@@ -87,7 +87,6 @@ def _lower(film: tuple[Prism, ...], feet: tuple[Prism, ...], fill: Fill) -> list
 
 def _strips(p: Params, part: str, direction: str, z0: float, z1: float) -> tuple[Prism, ...]:
     """The strips of one part, in one direction, between two heights."""
-    z0, z1 = _r(z0), _r(z1)
     if direction == "x":
         return tuple(box(0.0, p.length_mm, a, b, z0, z1) for a, b in _places(p, part, p.width_mm))
     return tuple(box(a, b, 0.0, p.width_mm, z0, z1) for a, b in _places(p, part, p.length_mm))
@@ -103,11 +102,6 @@ def _places(p: Params, part: str, end_mm: float) -> Iterator[tuple[float, float]
     }
     for k in range(ceil(end_mm / p.period_mm - 1e-9)):
         for start, stop in runs[part]:
-            a, b = _r(k * p.period_mm + start), min(_r(k * p.period_mm + stop), end_mm)
+            a, b = rounded(k * p.period_mm + start), min(rounded(k * p.period_mm + stop), end_mm)
             if b - a > SLIVER_MM:
                 yield a, b
-
-
-def _r(value: float) -> float:
-    """Round away what sums leave behind, so that faces that meet have equal coordinates."""
-    return round(value, 12)

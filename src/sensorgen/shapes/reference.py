@@ -9,7 +9,7 @@
 
 from dataclasses import dataclass, field
 
-from sensorgen.scene import Body, Envelope, Fill, Scene, box
+from sensorgen.scene import Body, Envelope, Fill, Prism, Scene, box, rounded
 
 
 @dataclass(frozen=True)
@@ -26,13 +26,13 @@ def scene(p: Params, fill: Fill) -> Scene:
     low, high = p.electrode_mm, p.electrode_mm + p.dielectric_mm
     top = high + p.electrode_mm
 
-    def plate(z0: float, z1: float) -> tuple:  # type: ignore[type-arg]
-        return (box(0.0, p.length_mm, 0.0, p.width_mm, z0, z1),)
+    def plate(z0: float, z1: float) -> tuple[Prism, ...]:
+        return (box(0.0, p.length_mm, 0.0, p.width_mm, z0, z1),) if z1 > z0 else ()
 
-    bodies = [Body("bottom_electrode", fill.bottom_electrode, plate(0.0, low), "bottom")]
-    if p.dielectric_mm > 0:
-        bodies.append(Body("dielectric", fill.dielectric, plate(low, high)))
-    bodies.append(Body("top_electrode", fill.top_electrode, plate(high, top), "top"))
-    if p.isolation_mm > 0:
-        bodies.append(Body("isolation", fill.isolation, plate(top, top + p.isolation_mm)))
-    return Scene(tuple(bodies), (p.length_mm, p.width_mm, top + p.isolation_mm))
+    bodies = (
+        Body("bottom_electrode", fill.bottom_electrode, plate(0.0, low), "bottom"),
+        Body("dielectric", fill.dielectric, plate(low, high)),
+        Body("top_electrode", fill.top_electrode, plate(high, top), "top"),
+        Body("isolation", fill.isolation, plate(top, top + p.isolation_mm)),
+    )
+    return Scene(bodies, (p.length_mm, p.width_mm, rounded(top + p.isolation_mm)))

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from math import ceil
 
 from sensorgen.errors import OutOfRange
-from sensorgen.scene import Body, Envelope, Fill, Outline, Point, Prism, Scene, clipped, rectangle
+from sensorgen.scene import Body, Envelope, Fill, Outline, Point, Prism, Scene, clipped, rectangle, rounded
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,8 @@ def scene(p: Params, fill: Fill) -> Scene:
         Body("top_electrode_with_cogs", fill.top_electrode, f.prisms([f.comb()]), "top"),
         Body("isolation", fill.isolation, f.prisms([f.layer(f.top, f.top + p.isolation_mm)]) if p.isolation_mm else ()),
     ]
-    size_mm = (p.length_mm, p.width_mm, round(f.top + p.isolation_mm, 12))
-    return Scene(tuple(b for b in bodies if b.prisms), size_mm)
+    size_mm = (p.length_mm, p.width_mm, rounded(f.top + p.isolation_mm))
+    return Scene(tuple(bodies), size_mm)
 
 
 def _lower(f: "_Frame", fill: Fill) -> list[Body]:

@@ -12,7 +12,7 @@ from string import Template
 
 from sensorgen.errors import MissingValue, OutOfRange
 from sensorgen.printer import Printer, Quality, folder
-from sensorgen.slicer.loads import Load, Recipe, line_width_mm, number, recipes
+from sensorgen.slicer.loads import Load, Recipe, by_hand, number, recipes
 from sensorgen.slicer.tower import PRIME_MM3, tower
 
 FLAVOURS = {"reprapfirmware": "RepRap (RepRap)", "marlin": "RepRap (Marlin/Sprinter)"}
@@ -92,7 +92,7 @@ def of_all(printer: Printer, quality: Quality, used: Mapping[int, Recipe]) -> di
 
 def of_tool(printer: Printer, quality: Quality, r: Recipe) -> dict[str, str]:
     """What the templates call the numbers of one tool (see ``quality_tool.inst.cfg`` and ``engine.ini``)."""
-    width_mm = line_width_mm(printer)
+    width_mm = printer.line_mm()
     pattern = _pattern(r)
     overlap = 10 if r.infill_percent < 95 and pattern != "concentric" else 0  # as Cura's own formula has it
     return {
@@ -173,7 +173,7 @@ def _material(printer: Printer, r: Recipe) -> str:
             "guid": str(uuid.uuid5(uuid.NAMESPACE_URL, f"sensorgen/material/{name}")),
             "colour": r.material.colour,
             "about": escape(f"{r.material.title}: {r.material.about}"),
-            "drying": escape(f"Drying: {r.material.drying or 'no source says'}"),
+            "drying": escape(". ".join(by_hand(r.material)) or "no source says how to dry it"),
             "density": _density(r),
             "filament": number(printer.filament_mm),
             "nozzle_c": number(r.nozzle_c),

@@ -115,9 +115,12 @@ def recipes(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> di
     return {printer.slicer_index(tool): made[tool] for tool in sorted(made, key=printer.slicer_index)}
 
 
-def line_width_mm(printer: Printer) -> float:
-    """Width of one printed line [mm]."""
-    return round(printer.nozzle_mm * printer.line_width_ratio, 6)
+def by_hand(material: Material) -> list[str]:
+    """What the operator sets by hand, in words: the extruder's cam dial, and drying."""
+    found = [f"Drying: {material.drying}"] if material.drying else []
+    if "cam_dial" in material.print:
+        found.insert(0, f"Cam dial of the extruder: {number(material.value('cam_dial').value)}")
+    return found
 
 
 def number(value: float) -> str:

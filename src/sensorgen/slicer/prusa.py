@@ -7,7 +7,7 @@ from string import Template
 
 from sensorgen.errors import SlicerFailed
 from sensorgen.printer import Printer, Quality, folder
-from sensorgen.slicer.loads import Load, Recipe, line_width_mm, number, recipe, recipes
+from sensorgen.slicer.loads import Load, Recipe, by_hand, number, recipe, recipes
 from sensorgen.slicer.run import find, run
 from sensorgen.slicer.tower import PRIME_MM3, Tower, tower
 
@@ -166,7 +166,7 @@ def _of_print(printer: Printer, quality: Quality, used: Mapping[int, Recipe]) ->
         "notes": _escaped(tools),
         "layer_height": number(quality.layer_mm),
         "first_layer_height": number(quality.first_layer_mm),
-        "line_width": number(line_width_mm(printer)),
+        "line_width": number(printer.line_mm()),
         "perimeters": str(max(r.wall_lines for r in used.values())),
         "fill_density": f"{number(densest.infill_percent)}%",
         "fill_pattern": _pattern(densest),
@@ -194,7 +194,7 @@ def _line_area_mm2(printer: Printer, quality: Quality) -> float:
     the material asks.
     """
     height_mm = max(quality.layer_mm, quality.first_layer_mm)
-    return height_mm * (line_width_mm(printer) - height_mm * (1 - math.pi / 4))
+    return height_mm * (printer.line_mm() - height_mm * (1 - math.pi / 4))
 
 
 def _pattern(r: Recipe) -> str:
@@ -207,7 +207,7 @@ def _name(r: Recipe) -> str:
 
 
 def _note(r: Recipe) -> str:
-    return f"{r.material.title}: {r.material.about}" + (f". Drying: {r.material.drying}" if r.material.drying else "")
+    return ". ".join([f"{r.material.title}: {r.material.about}", *by_hand(r.material)])
 
 
 def _bed_shape(printer: Printer) -> str:

@@ -1,0 +1,32 @@
+"""Every shape, filled with support or not, lying either way: no false errors about widths, no missed islands."""
+
+import pytest
+
+from sensorgen import catalogue, design
+from sensorgen.review import review
+
+
+def errors(**data):
+    return {f.rule for f in review(design.make(data)).findings if f.severity == "error"}
+
+
+@pytest.mark.parametrize("quality", ["fine", "extrafine"])
+@pytest.mark.parametrize("orientation", ["as-drawn", "upside-down"])
+@pytest.mark.parametrize("film_mm", [0.1, 0.2])
+@pytest.mark.parametrize("shape", list(catalogue.shapes()))
+def test_with_support_every_shape_prints_either_way(shape, film_mm, orientation, quality):
+    given = {"parameters": {"dielectric_mm": film_mm, "length_mm": 12}, "materials": {"support": "bvoh"}}
+    assert errors(shape=shape, orientation=orientation, quality=quality, **given) == set()
+
+
+@pytest.mark.parametrize("quality", ["fine", "extrafine"])
+def test_feet_in_mid_air_are_islands_at_any_layer(quality):
+    """At 0.06 mm a tip that vanishes lies under the feet: it must not count as ground."""
+    assert errors(shape="tri", orientation="upside-down", quality=quality) == {"9-bridge"}
+
+
+def test_a_waiver_that_covers_nothing_is_told():
+    waivers = [{"rule": "55", "reason": "no such rule"}, {"rule": "3", "reason": "accepted here"}]
+    found = review(design.make({"shape": "tri", "waivers": waivers})).findings
+    assert [f.message for f in found if f.rule == "10-waiver"] == ["the waiver of rule 55 covers no finding"]
+    assert all(f.waiver for f in found if f.rule == "3-grid")
