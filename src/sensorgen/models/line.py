@@ -1,7 +1,7 @@
 r"""The sensor as a line: two resistive tracks with a film between them, pressed or not, any far end.
 
 A recursion from the far end to the contacts. It divides by none of resistance, admittance, length and frequency,
-so it survives every limit, and it keeps Re Z, a thousandth of \|Z\| that carries all there is to know of position.
+so it survives every limit, and it keeps Re Z, far below the corner a thousandth of \|Z\| that alone tells of position.
 """
 
 from collections.abc import Iterable, Sequence
