@@ -5,10 +5,12 @@ import math
 
 import pytest
 
-from sensorgen import materials, predict
+from sensorgen import materials, planner
 from sensorgen.design import make
 from sensorgen.errors import MissingValue
-from sensorgen.predict import TONES_HZ, Unpredictable, capacitance, prediction
+from sensorgen.interval import Interval
+from sensorgen.planner import Unpredictable, capacitance
+from sensorgen.predict import TONES_HZ, prediction
 
 EPS = {"x60": 4.68, "air": 1.00059}
 TABLE_3_2 = {"top_electrode": "etpu@thesis-3.2", "bottom_electrode": "etpu@thesis-3.2"}  # 1.2 S/m
@@ -73,7 +75,7 @@ def test_a_short_has_a_reason_in_place_of_numbers(shape):
     found = prediction(make({"shape": shape, "parameters": {"dielectric_mm": 0.0}}))
     assert found["capacitance_f"] is None
     assert "the electrodes touch" in found["reason"]
-    assert set(found) == {"capacitance_f", "reason", "values"}
+    assert set(found) == {"capacitance_f", "reason"}
 
 
 @pytest.mark.parametrize("shape", ["tri", "rect"])
@@ -136,7 +138,7 @@ class Model:
 
     def __init__(self, cost: int, lower: float, upper: float, reason: str = "") -> None:
         self.COST, self.reason, self.asked = cost, reason, 0
-        self.bounds = predict.Interval(lower, upper)
+        self.bounds = Interval(lower, upper)
 
     def unfit(self, scene):
         return self.reason or None
@@ -151,7 +153,7 @@ def ladder(monkeypatch):
     """A function that puts models, cheapest first, in the place of the registered ones."""
 
     def put(*found: Model) -> None:
-        monkeypatch.setattr(predict, "_capacitance_models", lambda: [(f"m{k}", m) for k, m in enumerate(found)])
+        monkeypatch.setattr(planner, "_capacitance_models", lambda: [(f"m{k}", m) for k, m in enumerate(found)])
 
     return put
 

@@ -1,0 +1,174 @@
+"""The sensor as its terminals see it: two tracks, a film, a tip that presses, and what gives way. SI units.
+
+A press is a flat tip across the whole width, centred at a position along the sensor. Where it overhangs an end, the
+force rests on the part of the tip that lies on the sensor.
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sensorgen.errors import OutOfRange
+from sensorgen.models import line
+from sensorgen.models.compression import Compression
+from sensorgen.units import EPS0_F_PER_M
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class Patch(NamedTuple):
+    """Where the tip rests on the sensor; arrays of the positions' shape."""
+
+    left_m: Real
+    length_m: Real
+    left_slope: Real
+    """Derivative of ``left_m`` by the position [-]."""
+    length_slope: Real
+    """Derivative of ``length_m`` by the position [-]."""
+
+
+class Response(NamedTuple):
+    """Impedance and how it moves with a press, in the shape that frequency, force and position broadcast to."""
+
+    impedance_ohm: Complex
+    by_force_ohm_per_n: Complex
+    by_position_ohm_per_m: Complex
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A line sensor with contacts at x = 0.
+
+    Attributes
+    ----------
+    length_m, width_m : float
+        Outline [m].
+    electrode_m : (float, float)
+        Thickness of the top and the bottom electrode [m].
+    resistivity_ohm_m : (float, float)
+        Of the top and the bottom electrode [ohm m].
+    capacitance_f_per_m : float
+        Unloaded, per length [F/m].
+    compression : Compression
+        How the film gives way.
+    tip_m : float
+        Length of the tip along the sensor [m].
+    tan_delta : float
+        Loss tangent of the film [-].
+    leak_s_per_m : float
+        Leak through the film per length, the same under the tip [S/m].
+    piezoresistance_per_n : (float, float)
+        Relative rise of the top and the bottom resistivity under the tip per force, S_n [1/N].
+    far_end : str or float
+        "open", "short", or a resistor [ohm].
+    """
+
+    length_m: float
+    width_m: float
+    electrode_m: tuple[float, float]
+    resistivity_ohm_m: tuple[float, float]
+    capacitance_f_per_m: float
+    compression: Compression
+    tip_m: float = 0.01
+    tan_delta: float = 0.0
+    leak_s_per_m: float = 0.0
+    piezoresistance_per_n: tuple[float, float] = (0.0, 0.0)
+    far_end: str | float = "open"
+
+    def resistance_ohm(self) -> float:
+        """Both electrodes together, end to end [ohm]."""
+        per_m = (rho / (h * self.width_m) for rho, h in zip(self.resistivity_ohm_m, self.electrode_m, strict=True))
+        return sum(per_m) * self.length_m
+
+    def capacitance_f(self) -> float:
+        """Unloaded, between the electrodes [F]."""
+        return self.capacitance_f_per_m * self.length_m
+
+    def corner_frequency_hz(self) -> float:
+        """Frequency above which the current no longer reaches the far end [Hz]."""
+        return line.corner_frequency_hz(self.resistance_ohm(), self.capacitance_f())
+
+    def patch(self, position_m: ArrayLike) -> Patch:
+        """The part of the sensor under a tip centred at ``position_m`` [m].
+
+        Raises
+        ------
+        OutOfRange
+            A position outside the sensor, or a tip that is longer than the sensor.
+        """
+        at = np.asarray(position_m, float)
+        bad = ~((at >= 0) & (at <= self.length_m))
+        if bad.any():
+            where = float(at[bad].flat[0]) * 1e3
+            raise OutOfRange(f"position {where:g} mm is outside the sensor; expected 0 to {self.length_m * 1e3:g} mm")
+        if not 0 < self.tip_m <= self.length_m:
+            raise OutOfRange(
+                f"a tip of {self.tip_m * 1e3:g} mm; expected up to the sensor's {self.length_m * 1e3:g} mm"
+            )
+        low, high = at - self.tip_m / 2, at + self.tip_m / 2
+        left, right = np.maximum(low, 0.0), np.minimum(high, self.length_m)
+        moves_left, moves_right = (low > 0).astype(float), (high < self.length_m).astype(float)
+        return Patch(left, right - left, moves_left, moves_right - moves_left)
+
+    def stress_pa(self, force_n: ArrayLike, position_m: ArrayLike) -> Real:
+        """Mean pressure under the tip [Pa], in the broadcast shape."""
+        return np.asarray(force_n, float) / (self.width_m * self.patch(position_m).length_m)
+
+    def line_inputs(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> dict[str, Any]:
+        """Inputs of :func:`sensorgen.models.line.impedance` for presses on this sensor.
+
+        The film is the plate of relative permittivity 1 that has the same capacitance, and its modulus the secant one.
+
+        Parameters
+        ----------
+        frequency_hz, force_n, position_m : float or array
+            Tones [Hz], forces [N], centres of the tip [m]; they broadcast.
+
+        Raises
+        ------
+        OutOfRange
+            As :meth:`patch` and the law of compression.
+        """
+        patch, stress = self.patch(position_m), self.stress_pa(force_n, position_m)
+        thinning, slope = self.compression.thinning(stress)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            secant = np.where(thinning == 0, 1 / slope, stress / thinning)
+        return self._tracks() | {
+            "f_Hz": frequency_hz, "F_N": force_n, "E_Pa": secant,
+            "x_p_left_edge_m": patch.left_m, "L_p_m": patch.length_m,
+        }  # fmt: skip
+
+    def _tracks(self) -> dict[str, Any]:
+        (top_m, bottom_m), (top, bottom) = self.electrode_m, self.resistivity_ohm_m
+        s_top, s_bottom = self.piezoresistance_per_n
+        return {
+            "L_m": self.length_m, "W_m": self.width_m, "H_top_m": top_m, "H_bottom_m": bottom_m, "rho_top_ohm_m": top,
+            "rho_bottom_ohm_m": bottom, "d_m": EPS0_F_PER_M * self.width_m / self.capacitance_f_per_m, "eps_r": 1.0,
+            "tan_delta": self.tan_delta, "G_S_per_m": self.leak_s_per_m, "S_n_top_per_N": s_top,
+            "S_n_bottom_per_N": s_bottom, "far_end": self.far_end,
+        }  # fmt: skip
+
+    def impedance(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> Complex:
+        """Impedance at the contacts [ohm], in the broadcast shape; parameters and errors as :meth:`line_inputs`."""
+        return line.impedance(**self.line_inputs(frequency_hz, force_n, position_m))
+
+    def response(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> Response:
+        r"""Impedance and its exact derivatives by force and position.
+
+        With thinning s(p), p = F/(W l) and the secant modulus E = p/s, the line knows the derivative at constant E;
+        what is missing is (E s' - 1) of the film's part of it, which -E/F times the derivative by E is.
+
+        Parameters and errors as :meth:`line_inputs`; also OutOfRange where Z is infinite.
+        """
+        inputs, patch = self.line_inputs(frequency_hz, force_n, position_m), self.patch(position_m)
+        z, by = line.sensitivities(of=("F_N", "x_p_left_edge_m", "L_p_m", "E_Pa"), **inputs)
+        stress = self.stress_pa(force_n, position_m)
+        slope, secant, force = self.compression.thinning(stress)[1], inputs["E_Pa"], np.asarray(force_n, float)
+        excess = secant * slope - 1
+        by_force = by["F_N"] - by["E_Pa"] * excess * secant / np.where(force == 0, 1.0, force)
+        by_length = by["L_p_m"] + by["E_Pa"] * excess * secant / patch.length_m
+        by_position = by["x_p_left_edge_m"] * patch.left_slope + by_length * patch.length_slope
+        return Response(z, by_force, by_position)

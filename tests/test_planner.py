@@ -1,0 +1,62 @@
+"""From a design to its sensor: which law of compression is taken, and what is said of it."""
+
+import pytest
+
+from sensorgen.design import make
+from sensorgen.errors import MissingValue, OutOfRange, UnknownName
+from sensorgen.planner import sensor_of
+
+
+def sensed(shape, law="", **rest):
+    return sensor_of(make({"shape": shape} | rest), law)
+
+
+def test_the_plate_of_table_3_1():
+    found = sensed("reference")
+    sensor = found.sensor
+    assert (sensor.length_m, sensor.width_m) == (0.1, 0.01)
+    assert sensor.electrode_m == pytest.approx((3e-4, 3e-4))
+    assert sensor.resistivity_ohm_m == (0.07, 0.2)
+    assert sensor.capacitance_f() == pytest.approx(69.06266493984e-12, rel=1e-10, abs=0)
+    assert sensor.compression.modulus_pa == 6e6
+    assert ("x60", "youngs_modulus_pa", 6e6) in {(t.material, t.quantity, t.value) for t in found.taken}
+    assert "bonded" in found.doubts[0]
+
+
+def test_a_bonded_plate_is_94_times_stiffer():
+    assert sensed("reference", "bonded").sensor.compression.modulus_pa == pytest.approx(94 * 6e6, rel=2e-3)
+
+
+@pytest.mark.parametrize("film", [0.1, 0.2])
+def test_solved_cells_answer_for_themselves(film):
+    found = sensed("tri", parameters={"dielectric_mm": film})
+    assert found.sensor.compression.name == "solved"
+    assert found.doubts == ()
+
+
+FIRM = {"film": "x60@thesis-4.1", "dielectric": "x60@thesis-4.1"}  # another modulus than the solved cell's
+
+
+@pytest.mark.parametrize(
+    ("shape", "rest"), [("rect", {}), ("tri", {"parameters": {"period_mm": 2.5}}), ("tri", {"materials": FIRM})]
+)
+def test_other_cells_are_taken_for_free_plates_and_that_is_said(shape, rest):
+    found = sensed(shape, **rest)
+    assert found.sensor.compression.name == "unconfined"
+    assert "was not solved" in found.doubts[0]
+
+
+def test_a_law_that_is_asked_for_is_taken():
+    assert sensed("tri", "unconfined").sensor.compression.name == "unconfined"
+
+
+def test_what_cannot_be_is_refused():
+    with pytest.raises(OutOfRange, match="speaks of a solid plate; tri has gaps"):
+        sensed("tri", "bonded")
+    with pytest.raises(UnknownName, match="law of compression 'bondet'; did you mean 'bonded'"):
+        sensed("tri", "bondet")
+
+
+def test_a_modulus_that_no_source_gives_is_missing():
+    with pytest.raises(MissingValue):
+        sensed("tri", materials={"film": "pla"})
