@@ -101,7 +101,12 @@ def cell(section: Section, height_mm: float) -> Cell:
     ValueError
         Outlines overlap, or an outline is open.
     """
-    whole = _straightened([_slice(c, height_mm) for c in columns(section)])
+    return mirrored([_slice(c, height_mm) for c in columns(section)])
+
+
+def mirrored(slices: list[Slice]) -> Cell:
+    """The smallest run of slices that mirrors at its own two sides continue to all of them."""
+    whole = _straightened(slices)
     places = _candidates(whole)
     for low, high in _pairs(places, whole[-1].right_mm):
         if _repeats(whole, low, high):

@@ -6,6 +6,7 @@ Thomson: any D of continuous normal component, without sources, tangential at th
 Both are quadratic and stationary at their best field: what a solver leaves unsolved enters squared, and to the safe side.
 """
 
+import os
 from dataclasses import dataclass
 from typing import Any
 
@@ -82,6 +83,7 @@ def energies(mesh: Mesh, permittivity: list[Number], weights: list[float], order
     CrossedBounds
         The lower bound lies above the upper one by more than rounding.
     """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # elements are small: threads would only wait for each other
     import ngsolve as ng
 
     lossy = any(np.imag(e) != 0 for e in permittivity)
