@@ -7,13 +7,15 @@ Both are quadratic and stationary at their best field: what a solver leaves unso
 """
 
 import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.errors import SensorgenError
+from sensorgen.errors import OutOfRange, SensorgenError
+from sensorgen.interval import Interval
 
 Number = float | complex
 
@@ -64,7 +66,9 @@ class Energies:
     unknowns: int
 
 
-def energies(mesh: Mesh, permittivity: list[Number], weights: list[float], order: int) -> Energies:
+def energies(
+    mesh: Mesh, permittivity: Sequence[Number], weights: Sequence[float], order: int, flux_order: int
+) -> Energies:
     """Solve both problems with polynomials of one order.
 
     Parameters
@@ -75,8 +79,8 @@ def energies(mesh: Mesh, permittivity: list[Number], weights: list[float], order
         Relative, of each region [-].
     weights : list of float
         Of each region in ``part`` [-].
-    order : int
-        Of the potential's polynomials, 2 or more; the flux has one less.
+    order, flux_order : int
+        Of the potential's polynomials, and of the flux's; 1 or more.
 
     Raises
     ------
@@ -90,13 +94,37 @@ def energies(mesh: Mesh, permittivity: list[Number], weights: list[float], order
     space = _ngsolve(mesh)
     eps = ng.CoefficientFunction([complex(e) if lossy else float(np.real(e)) for e in permittivity])
     upper, part = _potential(space, eps, weights, order, lossy)
-    lower, unknowns = _flux(space, eps, order - 1, lossy)
+    lower, unknowns = _flux(space, eps, flux_order, lossy)
     if not lossy and not 0 < lower <= upper * (1 + ROUNDING):
         raise CrossedBounds(
             f"lower bound {lower:.12g} above upper bound {upper:.12g} (order {order}): the solver failed on this scene; "
             "report it, and use --model columns meanwhile"
         )
     return Energies(lower, upper, part, unknowns)
+
+
+def check(permittivity: Mapping[str, complex], width: float) -> None:
+    """Refuse permittivities and accuracies that mean nothing."""
+    for material, value in permittivity.items():
+        if not (np.isfinite(value) and np.real(value) > 0):
+            raise OutOfRange(f"relative permittivity of {material} is {value:g}; expected a number above 0")
+    if not width > 0:
+        raise OutOfRange(f"accuracy is {width:g}; expected a number above 0, as 1e-4")
+
+
+def whole(found: Energies, shares: Sequence[float]) -> Interval:
+    r"""All cells of the sensor from one, and the cut ones at its ends from the energy in their part of it.
+
+    With weights w up to W on parts of the cell, the energy norm of the exact field differs from the computed one by at
+    most :math:`\sqrt{W (C_{upper} - C_{lower})}`, since its error over the whole cell is
+    :math:`\|u_h - u\|^2 = C_{upper} - C`.
+    """
+    least, most = min(shares), max(shares)
+    gap = max(found.upper - found.lower, 0.0)
+    part, off = np.sqrt(found.part), np.sqrt((most - least) * gap)
+    lower = least * found.lower + max(part - off, 0.0) ** 2
+    upper = least * found.upper + (part + off) ** 2
+    return Interval(float(min(lower, upper)), float(upper))
 
 
 ROUNDING = 1e-10  # relative: by how much bounds that have met may seem to cross
@@ -130,7 +158,7 @@ def _ngsolve(mesh: Mesh) -> Any:
 
 
 def _potential(
-    space: Any, eps: Any, weights: list[float], order: int, lossy: bool
+    space: Any, eps: Any, weights: Sequence[float], order: int, lossy: bool
 ) -> tuple[Number, Number]:
     """Least energy of a potential, and its weighted part."""
     import ngsolve as ng

@@ -154,7 +154,7 @@ def bricks(coarse: Grid, layers: int) -> tuple[Mesh, list[tuple[str, float]]]:
     (Mesh, list of (str, float))
         Bricks; and the material and share of each region.
     """
-    parts = [_graded(planes, layers) for planes in coarse.planes_mm]
+    parts = [_graded(planes, _layers(coarse.fill, axis, layers)) for axis, planes in enumerate(coarse.planes_mm)]
     fine = coarse.fill[np.ix_(*(owner for _, owner in parts))]
     shares = coarse.shares[np.ix_(parts[0][1], parts[1][1])][:, :, None] * np.ones(fine.shape)
     planes = [p for p, _ in parts]
@@ -175,15 +175,22 @@ def bricks(coarse: Grid, layers: int) -> tuple[Mesh, list[tuple[str, float]]]:
     ), regions
 
 
-def _graded(planes: NDArray[np.float64], layers: int) -> tuple[NDArray[np.float64], Ints]:
+def _layers(fill: Ints, axis: int, layers: int) -> list[int]:
+    """Layers beside each plane: all at the edges of electrodes, fewer where dielectrics meet, none at the ends."""
+    boxes = np.moveaxis(fill, axis, 0)
+    ends = ((a > 1) != (b > 1) for a, b in pairwise(boxes))
+    return [0, *(layers if at_electrode.any() else layers // 2 for at_electrode in ends), 0]
+
+
+def _graded(planes: NDArray[np.float64], layers: list[int]) -> tuple[NDArray[np.float64], Ints]:
     """Planes with layers between them, and from which interval each layer comes."""
     found, owners = [planes[0]], []
     for k, (a, b) in enumerate(pairwise(planes.tolist())):
-        shrink = RATIO ** np.arange(layers, 0, -1) * (b - a) / 2
-        left = a + shrink if k > 0 else np.array([])
-        right = b - shrink[::-1] if k < len(planes) - 2 else np.array([])
-        inner = np.concatenate([left, right, [b]])
-        found += inner.tolist()
+        half = (b - a) / 2
+        left = a + half * RATIO ** np.arange(layers[k], 0, -1)
+        right = b - half * RATIO ** np.arange(1, layers[k + 1] + 1)
+        inner = [*left.tolist(), *right.tolist(), b]
+        found += inner
         owners += [k] * len(inner)
     return np.array(found), np.array(owners)
 

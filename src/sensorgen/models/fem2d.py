@@ -11,7 +11,6 @@ from importlib.util import find_spec
 import numpy as np
 
 from sensorgen.cells import cell
-from sensorgen.errors import OutOfRange
 from sensorgen.interval import Interval
 from sensorgen.models import _fem_bounds as fem
 from sensorgen.models._fem_corners import exponents
@@ -78,9 +77,9 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     Notes
     -----
     Where a sensor ends amid a period, the pattern is thought to go on beyond its ends, and the sensor gets the energy
-    that lies within its own length; see :func:`_whole`.
+    that lies within its own length; see :func:`sensorgen.models._fem_bounds.whole`.
     """
-    _check(permittivity, width)
+    fem.check(permittivity, width)
     best = Interval(0.0, np.inf)
     for step in steps(scene, permittivity, width):
         if step.interval.upper - step.interval.lower < best.upper - best.lower:
@@ -153,7 +152,7 @@ def estimate(scene: Scene, permittivity: Mapping[str, complex], width: float = W
     OutOfRange, KeyError, ValueError
         As :func:`capacitance`.
     """
-    _check(permittivity, width)
+    fem.check(permittivity, width)
     section, coarse = _triangles(scene)
     moduli = {material: abs(permittivity[material]) for material, _ in coarse.regions}
     mesh = graded(coarse, exponents(coarse, moduli), max(_CORNER_SHARE * width, _SMALLEST_SHARE))
@@ -170,14 +169,6 @@ def estimate(scene: Scene, permittivity: Mapping[str, complex], width: float = W
     return best * scale, error * scale
 
 
-def _check(permittivity: Mapping[str, complex], width: float) -> None:
-    for material, value in permittivity.items():
-        if not (np.isfinite(value) and np.real(value) > 0):
-            raise OutOfRange(f"relative permittivity of {material} is {value:g}; expected a number above 0")
-    if not width > 0:
-        raise OutOfRange(f"accuracy is {width:g}; expected a number above 0, as 1e-4")
-
-
 def _triangles(scene: Scene) -> tuple[Section, Triangles]:
     """The scene's only cross-section, and its repeating cell in few triangles."""
     found = sections(scene)
@@ -188,7 +179,7 @@ def _triangles(scene: Scene) -> tuple[Section, Triangles]:
 
 def _solved(mesh: Triangles, permittivity: Mapping[str, float], order: int) -> tuple[Interval, int]:
     found = _energies(mesh, permittivity, order)
-    return _whole(found, [share for _, share in mesh.regions]), found.unknowns
+    return fem.whole(found, [share for _, share in mesh.regions]), found.unknowns
 
 
 def _energies(mesh: Triangles, permittivity: Mapping[str, complex], order: int) -> fem.Energies:
@@ -201,19 +192,4 @@ def _energies(mesh: Triangles, permittivity: Mapping[str, complex], order: int) 
         np.array([names.index(r) for r in mesh.regions], dtype=np.int32),
         {name: np.array(found, dtype=np.int32) for name, found in edges.items()},
     )
-    return fem.energies(ngsolve_mesh, [permittivity[m] for m, _ in names], [s - least for _, s in names], order)
-
-
-def _whole(found: fem.Energies, shares: list[float]) -> Interval:
-    r"""All cells of the sensor from one, and the cut ones at its ends from the energy in their part of it.
-
-    With weights w up to W on parts of the cell, the energy norm of the exact field differs from the computed one by at
-    most :math:`\sqrt{W (C_{upper} - C_{lower})}`, since its error over the whole cell is
-    :math:`\|u_h - u\|^2 = C_{upper} - C`.
-    """
-    least, most = min(shares), max(shares)
-    gap = max(found.upper - found.lower, 0.0)
-    part, off = np.sqrt(found.part), np.sqrt((most - least) * gap)
-    lower = least * found.lower + max(part - off, 0.0) ** 2
-    upper = least * found.upper + (part + off) ** 2
-    return Interval(float(min(lower, upper)), float(upper))
+    return fem.energies(ngsolve_mesh, [permittivity[m] for m, _ in names], [s - least for _, s in names], order, order - 1)
