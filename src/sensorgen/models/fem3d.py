@@ -22,7 +22,7 @@ COST = 3
 
 WIDTH = 1e-3  # of the interval, where the caller does not say
 
-_RUNGS = ((1, 4, 2), (1, 5, 3), (2, 5, 3), (3, 6, 4))  # layers, order of the potential, order of the flux
+_RUNGS = ((1, 4, 3), (2, 5, 4), (3, 6, 5))  # layers, order of the potential, order of the flux
 _MOST_BRICKS = 6000  # of one rung: more would not fit in 4 GB
 
 
