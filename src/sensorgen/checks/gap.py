@@ -83,7 +83,7 @@ def _printed(pair: Pair, slices: Slices, printer: Printer, gap_mm: float) -> Ite
         "classic walls or plain Cura": printer.line_mm() - 2 * TOUCH_MM,  # a whole line prints
         "Cura filling outline gaps": 0.0,
     }
-    gaps = {slicer: _printed_gap_mm(pair, slices, least) for slicer, least in tracks.items()}
+    gaps = {slicer: printed_gap_mm(pair, slices, least) for slicer, least in tracks.items()}
     if all(gap is not None and abs(gap - gap_mm) <= TOUCH_MM for gap in gaps.values()):
         return
     said = ", ".join(f"{slicer}: {'nothing prints' if gap is None else f'{gap:g} mm'}" for slicer, gap in gaps.items())
@@ -97,13 +97,8 @@ def _printed(pair: Pair, slices: Slices, printer: Printer, gap_mm: float) -> Ite
     )  # fmt: skip
 
 
-def printed_gap_mm(slices: Slices, least_mm: float) -> float | None:
+def printed_gap_mm(pair: Pair, slices: Slices, least_mm: float) -> float | None:
     """Distance of the two electrodes when stretches up to ``least_mm`` wide are not printed; None without them [mm]."""
-    low, high = _electrodes(slices.scene)
-    return _printed_gap_mm((low, high), slices, least_mm)
-
-
-def _printed_gap_mm(pair: Pair, slices: Slices, least_mm: float) -> float | None:
     low, high = (slices.printed_layers(body, least_mm) for body in pair)
     if not low or not high:
         return None
