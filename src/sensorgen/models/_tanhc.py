@@ -125,7 +125,7 @@ def _far(w: Array) -> Array:
 
 
 def _far_slope(w: Array, ratio: Array) -> Array:
-    return np.asarray((1 - w * ratio * ratio - ratio) / (2 * w))
+    return np.asarray((_far_sech_squared(w, ratio) - ratio) / (2 * w))
 
 
 def _far_sech_squared(w: Array, _: Array) -> Array:
