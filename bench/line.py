@@ -6,6 +6,7 @@ transfer matrices: they hold both of the thesis's geometries at its seven tones,
 """
 
 import json
+import os
 import re
 import shutil
 import statistics
@@ -342,9 +343,11 @@ def main() -> None:
     """Measure everything and write the results; with --draw only draw those of the last time."""
     if "--draw" not in sys.argv:
         RESULTS.mkdir(exist_ok=True)
-        found = {"methods": measure(), "sweeps": sweeps(), "misprints": misprints()}
+        busy = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+        found = {"load": busy, "methods": measure(), "sweeps": sweeps(), "misprints": misprints()}
         (RESULTS / "line.json").write_text(json.dumps(found, indent=1) + "\n", "utf-8")
-        text = table(found["methods"], found["misprints"])
+        text = f"{os.cpu_count()} cores, {busy:.1f} programs at work on them before the run.\n\n"
+        text += table(found["methods"], found["misprints"])
         (RESULTS / "line.md").write_text(text, "utf-8")
         print(text)
     last = json.loads((RESULTS / "line.json").read_text("utf-8"))
