@@ -8,6 +8,7 @@ import pytest
 from line_cases import PLATE, TONES, exact, matrix, off, terminated
 
 from sensorgen.errors import OutOfRange
+from sensorgen.models._line_inputs import BLOCK, blocks
 from sensorgen.models.line import cascade, impedance, sensitivities
 
 FREQUENCIES = np.geomspace(1e-9, 1e9, 37)
@@ -71,7 +72,7 @@ def test_a_short_through_the_film_is_what_its_leak_leaves():
         assert z.real == pytest.approx(np.sqrt(9e4 / leak), rel=1e-12, abs=0)
 
 
-@pytest.mark.parametrize("f", [1e-150, 1e-200, 1e-300])
+@pytest.mark.parametrize("f", [1e-142, 1e-150, 1e-200, 1e-300])
 def test_where_double_precision_would_lose_the_resistance_it_says_so(f):
     with pytest.raises(OutOfRange, match="too extreme"):
         impedance(**(PLATE | {"f_Hz": f}))
@@ -87,6 +88,31 @@ def test_one_bad_sample_among_many_is_found():
         values[17_123] = bad
         with pytest.raises(OutOfRange, match=name if name != "x_p_left_edge_m" and bad != 600 else "."):
             impedance(**(PLATE | {name: values}))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"x_p_left_edge_m": 0.06, "L_p_m": [0.01, 0.05]}, "ends at 0.11 m"),
+        ({"L_m": [0.1, 0.05]}, "beyond the sensor's 0.05 m"),
+        ({"F_N": 100.0, "L_p_m": [0.01, 0.001]}, "strains the film by 1.67"),
+        ({"F_N": 100.0, "W_m": [0.01, 0.001]}, "strains the film by 1.67"),
+        ({"F_N": 100.0, "E_Pa": [6e6, 6e5]}, "strains the film by 1.67"),
+        ({"S_n_top_per_N": [0.0, -1.0]}, "resistivity is negative"),
+    ],
+)
+def test_the_sample_that_does_not_fit_is_found_whatever_varies(change, words):
+    with pytest.raises(OutOfRange, match=words):
+        impedance(**(PLATE | {key: np.asarray(value) for key, value in change.items()}))
+
+
+def test_blocks_are_as_small_as_their_largest_input_asks():
+    whole = (slice(0, 4), slice(0, BLOCK))
+    assert next(blocks(whole, [(4, 1), (BLOCK,)])) == (slice(0, 1), slice(0, BLOCK // 4))
+    covered = np.zeros((4, 3 * BLOCK // 2), int)
+    for part in blocks((slice(0, 4), slice(0, 3 * BLOCK // 2)), [(4, 1)]):
+        covered[part] += 1
+    assert (covered == 1).all()
 
 
 def test_a_patch_may_end_at_the_end_by_rounding_only():
