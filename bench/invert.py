@@ -101,7 +101,8 @@ class Case:
 
 METHODS = {
     "least squares, batch": "batch", "least squares, one by one": "stream", "posterior, uniform prior": "posterior",
-    "scipy least_squares, two starts": "scipy", "thesis C.1-C.5 corrected": "thesis", "(forward model alone)": "forward",
+    "scipy least_squares, two starts": "scipy", "thesis C.1-C.5 corrected": "thesis",
+    "(forward model alone)": "forward",
 }  # fmt: skip
 
 

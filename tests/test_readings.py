@@ -16,7 +16,7 @@ ROW = "0.5,100,-2e6,90.5,-2e4\n"
 
 @pytest.fixture
 def read(tmp_path):
-    """Read a text (or bytes) as a file; gives tones, names of other columns, impedances, other cells and row numbers."""
+    """Read text or bytes as a file; gives tones, names of other columns, impedances, other cells and row numbers."""
 
     def call(text, size=1 << 14):
         path = tmp_path / "m.csv"
@@ -138,12 +138,12 @@ def test_what_is_wrong_is_said_with_its_place(read, text, words):
 
 
 def test_the_row_is_right_in_later_blocks(read):
-    with pytest.raises(BadInput, match="row 9, column im_ohm_1.1kHz"):
+    with pytest.raises(BadInput, match=r"row 9, column im_ohm_1\.1kHz"):
         read(HEAD + ROW * 7 + "1,2,x,4,5\n" + ROW, size=3)
 
 
 def test_text_that_is_not_utf8(read):
-    with pytest.raises(BadInput, match="0xff after row .* not UTF-8"):
+    with pytest.raises(BadInput, match=r"0xff after row .* not UTF-8"):
         read(HEAD.encode() + ROW.encode() + b"\xff,1,2,3,4\n")
     with pytest.raises(BadInput, match="not UTF-8"):
         read((HEAD + ROW).encode("utf-16"))

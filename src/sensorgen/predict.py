@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sensorgen.card import card
 from sensorgen.design import Design
-from sensorgen.errors import MissingValue, OutOfRange
+from sensorgen.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.interval import Interval
 from sensorgen.models import line
-from sensorgen.planner import Sensed, Unloaded, Unpredictable, unloaded
+from sensorgen.planner import TIP_M, Sensed, Unloaded, Unpredictable, is_plate, sensor_of, unloaded
 from sensorgen.sensor import Sensor
 from sensorgen.units import M_PER_MM, frequency_text
 
@@ -25,7 +26,9 @@ FORCES_N = tuple(k / 10 for k in range(61))  # up to the thesis's 6 N
 Complex = NDArray[np.complex128]
 
 
-def prediction(design: Design, frequency_hz: Sequence[float] = TONES_HZ) -> dict[str, Any]:
+def prediction(
+    design: Design, frequency_hz: Sequence[float] = TONES_HZ, law: str = "", tip_m: float = TIP_M
+) -> dict[str, Any]:
     """Everything that is predicted of a design, as plain data for ``prediction.json`` (SI units).
 
     Parameters
@@ -34,6 +37,8 @@ def prediction(design: Design, frequency_hz: Sequence[float] = TONES_HZ) -> dict
         As drawn.
     frequency_hz : sequence of float
         Tones of the impedance [Hz].
+    law, tip_m : str, float
+        Law of compression and length of the tip [m] for the identifiability card, as of :func:`planner.sensor_of`.
 
     Notes
     -----
@@ -52,6 +57,7 @@ def prediction(design: Design, frequency_hz: Sequence[float] = TONES_HZ) -> dict
         "capacitance_per_area_f_per_m2": _bounds(found.answer.capacitance_f.times(1 / area)),
         "electrode_resistance_ohm": resistance,
         **_line(sum(resistance.values()), found.answer.capacitance_f, frequency_hz),
+        "identifiability": _card(design, found, frequency_hz, law, tip_m),
         "values": [vars(t) for t in found.taken],
         "assumptions": [
             "ideal electrodes and no fringe at the sensor's edge for the capacitance",
@@ -60,6 +66,16 @@ def prediction(design: Design, frequency_hz: Sequence[float] = TONES_HZ) -> dict
             "unloaded, as drawn",
         ],
     }
+
+
+def _card(design: Design, found: Unloaded, frequency_hz: Sequence[float], law: str, tip_m: float) -> dict[str, Any]:
+    """The identifiability card with the doubts about its sensor, or why there is none."""
+    try:
+        sensed = sensor_of(design, law, tip_m)
+        stiffest = sensor_of(design, "bonded", tip_m).sensor if is_plate(found.answer) and not law else None
+        return card(sensed.sensor, frequency_hz, NOISE, stiffest=stiffest) | {"doubts": list(sensed.doubts)}
+    except SensorgenError as error:
+        return {"verdict": None, "reason": str(error)}
 
 
 def _resistance_ohm(design: Design, found: Unloaded) -> dict[str, float]:

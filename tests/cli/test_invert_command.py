@@ -129,7 +129,8 @@ def test_one_tone_says_so(run, tmp_path):
     [
         (["none.csv"], "cannot read 'none.csv'"), (["."], "is a folder"), ([], "MEASURED.csv"),
         (["m.csv", "--noise", "0"], "a noise of 0"), (["m.csv", "--noise", "x"], "is not a share"),
-        (["m.csv", "--prior", "x"], "--prior 'x': expected uniform"), (["m.csv", "--prior", "force=a+-1"], "not a force"),
+        (["m.csv", "--prior", "x"], "--prior 'x': expected uniform"),
+        (["m.csv", "--prior", "force=a+-1"], "not a force"),
         (["m.csv", "--prior", "force=1+-0"], "standard deviation above 0"),
         (["m.csv", "--force-limit", "0"], "force limit of 0 N"), (["m.csv", "--force-limit", "x"], "--force-limit"),
         (["m.csv", "-o", "."], "cannot write '.'"), (["m.csv", "-o", "no/where.csv"], "cannot write 'no/where.csv'"),

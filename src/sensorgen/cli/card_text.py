@@ -14,12 +14,23 @@ TONES = 7  # of more, those with most to tell of position are shown
 
 def card(found: Mapping[str, Any]) -> None:
     """Print what :func:`sensorgen.card.card` found: some twenty lines of at most ``WIDTH`` columns."""
-    for line in _lines(found):
+    for line in lines(found):
         click.echo(line)
 
 
-def _lines(found: Mapping[str, Any]) -> Iterator[str]:
+def of_prediction(predicted: Mapping[str, Any]) -> Iterator[str]:
+    """The card that comes with a prediction, as lines; nothing where nothing is predicted."""
+    found = predicted.get("identifiability")
+    if found:
+        yield ""
+        yield from lines(found) if found["verdict"] else [f"no identifiability card: {found['reason']}"]
+
+
+def lines(found: Mapping[str, Any]) -> Iterator[str]:
+    """The card as lines of text."""
     yield from _paragraph("verdict", found["verdict"] + ".")
+    for doubt in found.get("doubts", ()):
+        yield from _paragraph("doubtful", doubt)
     if found["stiffest"]:
         yield from _paragraph("", found["stiffest"]["verdict"] + ".")
     press = found["press"]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from sensorgen import units
-from sensorgen.cli import show
+from sensorgen.cli import card_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Length, OneOf, Values
 from sensorgen.errors import BadInput, Unwritable
@@ -62,7 +62,8 @@ def _work(
     _refuse_two(how)
     tones = frequency_hz or TONES_HZ
     if not (force_n or position_mm or how["as_csv"] or how["plot"]):
-        _deliver(_unpressed(prediction(design, tones), as_json=how["as_json"]), how["output"])
+        predicted = prediction(design, tones, compression or "", tip_mm * units.M_PER_MM)
+        _deliver(_unpressed(predicted, as_json=how["as_json"]), how["output"])
         return 0
     sensed = sensor_of(design, compression or "", tip_mm * units.M_PER_MM)
     _pressed(design, sensed, (tones, force_n or FORCES_N, position_mm or positions_mm(design)), how)
@@ -77,11 +78,12 @@ def _refuse_two(how: dict[str, Any]) -> None:
 
 
 def _unpressed(predicted: dict[str, Any], *, as_json: bool) -> Iterator[str]:
-    """The prediction without a press; the identifiability card joins it here."""
+    """The prediction without a press, and the identifiability card."""
     if as_json:
         yield show.json_text(predicted)
     else:
-        yield from (f"{line}\n" for line in show.prediction_lines(predicted))
+        lines = (*show.prediction_lines(predicted), *card_text.of_prediction(predicted))
+        yield from (f"{line}\n" for line in lines)
 
 
 def _pressed(design: "Design", sensed: "Sensed", axes: Axes, how: dict[str, Any]) -> None:

@@ -103,7 +103,7 @@ class Table:
         seed, shift = (np.concatenate(column) for column in zip(*found, strict=True))
         press = filters.seeds[seed]
         press[:, 0] = np.clip(press[:, 0] + shift, 0.0, 1.0)
-        return press
+        return press  # type: ignore[no-any-return]
 
     def cell(self, press: Real) -> Index:
         """Number of the cell that a press (n, 2) is in."""

@@ -111,7 +111,7 @@ def _seen(grown: Matrix, by_grown: Matrix, n: int) -> tuple[Piece, Piece]:
     shunt, series, rest = grown[..., n:, :n], grown[..., :n, n:], grown[..., n:, n:]
     by_shunt, by_series, by_rest = by_grown[..., n:, :n], by_grown[..., :n, n:], by_grown[..., n:, n:]
     inverse = np.linalg.inv(np.eye(n) + rest)
-    opened, shorted, passed = -inverse @ shunt, -series @ inverse, _turned(inverse)
+    opened, shorted, passed = -inverse @ shunt, -series @ inverse, _turned(inverse)  # type: ignore[arg-type]
     by_lost = passed @ _turned(by_rest) @ passed
     found = Piece(opened, shorted, passed, passed @ _turned(rest))
     by = Piece(
@@ -168,7 +168,7 @@ class Meeting:
         scale = np.exp2(np.rint(np.log2(np.where(size > 0, size, 1.0)) / 2))
         across = scale[..., :, None] / scale[..., None, :]
         inverse = np.linalg.inv(np.eye(n) + across * (impedance @ admittance))
-        self.passed: Matrix = inverse / across  # (1 + X W)^-1
+        self.passed: Matrix = inverse / across  # (1 + X W)^-1  # type: ignore[assignment]
         self.admittance: Matrix = admittance @ self.passed
         self.impedance: Matrix = self.passed @ impedance
         self.lost: Matrix = self.impedance @ admittance  # 1 - passed
