@@ -26,6 +26,12 @@ class Forward:
         The sensor.
     frequency_hz : (n_tones,) array
         Tones [Hz].
+    susceptance, loose : (n_tones,) array
+        Per length, unpressed: omega C', and the whole admittance of the film [S/m].
+    track, track_per_newton : float
+        Resistance of both electrodes per length, and how it rises under the tip [ohm/m], [ohm/m/N].
+    load : array or None
+        Resistor at the far end [ohm]; None where it is open.
 
     Examples
     --------
@@ -37,12 +43,14 @@ class Forward:
 
     def __init__(self, sensor: Sensor, frequency_hz: ArrayLike) -> None:
         self.sensor, self.frequency_hz = sensor, tones(frequency_hz)
-        self._turned = sensor.tan_delta + 1j
-        self._susceptance = 2 * np.pi * self.frequency_hz * sensor.capacitance_f_per_m
-        self._loose = sensor.leak_s_per_m + self._turned * self._susceptance
-        section = [height * sensor.width_m for height in sensor.electrode_m]
-        self._tracks = [rho / area for rho, area in zip(sensor.resistivity_ohm_m, section, strict=True)]
-        self._load: Real | None = far_load(sensor.far_end)
+        self.susceptance: Real = 2 * np.pi * self.frequency_hz * sensor.capacitance_f_per_m
+        self.loose = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * self.susceptance
+        tracks = [
+            rho / (h * sensor.width_m) for rho, h in zip(sensor.resistivity_ohm_m, sensor.electrode_m, strict=True)
+        ]
+        self.track = sum(tracks)
+        self.track_per_newton = sum(t * s for t, s in zip(tracks, sensor.piezoresistance_per_n, strict=True))
+        self.load: Real | None = far_load(sensor.far_end)
 
     def log_impedance(self, force_n: Real, position_m: Real) -> Complex:
         """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.line_inputs`.
@@ -52,22 +60,20 @@ class Forward:
         sensor, force = self.sensor, force_n[:, None]
         patch = sensor.patch(position_m[:, None])
         thinning, _ = sensor.compression.thinning(force / (sensor.width_m * patch.length_m))
-        pressed = sensor.leak_s_per_m + self._turned * (self._susceptance / (1 - thinning))
-        top, bottom = self._tracks
-        s_top, s_bottom = sensor.piezoresistance_per_n
-        under = (top + bottom) + force * (top * s_top + bottom * s_bottom)
+        pressed = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * (self.susceptance / (1 - thinning))
+        under = self.track + force * self.track_per_newton
         right = np.maximum(sensor.length_m - patch.left_m - patch.length_m, 0.0)
-        loose = self._loose, top + bottom
+        loose = self.loose, self.track
         return self._from_far_end((right, *loose), (patch.length_m, pressed, under), (patch.left_m, *loose))
 
     def _from_far_end(self, *sections: tuple[Real, NDArray[Any], Any]) -> Complex:
         """Pass admittance on from an open end, impedance from any other: one law with y and r exchanged."""
-        q: Any = 0.0 if self._load is None else self._load
+        q: Any = 0.0 if self.load is None else self.load
         for length, y, r in sections:
-            u, v = (y, r) if self._load is None else (r, y)
+            u, v = (y, r) if self.load is None else (r, y)
             along = length * tanhc(y * r * (length * length))
             q = (q + u * along) / (1.0 + q * (v * along))
-        return np.asarray(-np.log(q) if self._load is None else np.log(q))
+        return np.asarray(-np.log(q) if self.load is None else np.log(q))
 
     def force_limit_n(self, most_n: float = FORCE_LIMIT_N) -> float:
         """The largest force up to ``most_n`` that the sensor bears anywhere, the tip half over its end [N]."""

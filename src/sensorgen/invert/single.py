@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.invert.forward import Forward, Real
+from sensorgen.invert.scalar import Scalar
 from sensorgen.invert.table import Table, parts
 from sensorgen.invert.verdict import Status, chi2_limit
 
@@ -63,7 +64,7 @@ class Single:
     """
 
     def __init__(self, forward: Forward, table: Table, sigma: Real, contested: NDArray[np.bool_]) -> None:
-        self._forward, self._table, self._weight, self._contested = forward, table, 1 / sigma, contested
+        self._model, self._table, self._weight, self._contested = Scalar(forward), table, 1 / sigma, contested
         self._edges = [edges.tolist() for edges in table.edges]
         self._limit = float(chi2_limit(np.array([len(sigma) - 2]))[0])
         self._rounding = _ROUNDING**2 * float(self._weight @ self._weight)
@@ -86,8 +87,7 @@ class Single:
     def _normal(self, response: Real, force: float, position: float, exact: bool) -> _Normal:
         value, slope = self._table_at(force, position)
         if exact:
-            at = np.array([[force * self._scale[0]], [position * self._scale[1]]])
-            value = parts(self._forward.log_impedance(*at))[0]
+            value = parts(np.array(self._model.log_impedance(force * self._scale[0], position * self._scale[1])))
         slope *= self._weight
         residual = (response - value) * self._weight
         (ff, fx), (_, xx) = (slope @ slope.T).tolist()

@@ -168,7 +168,7 @@ class Meeting:
         scale = np.exp2(np.rint(np.log2(np.where(size > 0, size, 1.0)) / 2))
         across = scale[..., :, None] / scale[..., None, :]
         inverse = np.linalg.inv(np.eye(n) + across * (impedance @ admittance))
-        self.passed: Matrix = inverse / across  # (1 + X W)^-1  # type: ignore[assignment]
+        self.passed: Matrix = inverse / across  # type: ignore[assignment]
         self.admittance: Matrix = admittance @ self.passed
         self.impedance: Matrix = self.passed @ impedance
         self.lost: Matrix = self.impedance @ admittance  # 1 - passed
