@@ -187,6 +187,7 @@ WRONG = [
     (["--frequencies", "1mhz"], "'mhz' may be mHz or MHz"),
     (["--frequencies", "1kHz,1kHz"], "1000 stands twice"),
     (["--force", "0:700:100", "--position", "50"], "force 600 N at position 50 mm: the stress thins the film by 1: "),
+    (["--plot", "p", "--force", "0:700:100"], "force 300 N at position 0 mm: the stress thins the film by 1: "),
     (["--force", "1", "--tip", "120"], "a tip of 120 mm; expected up to the sensor's 100 mm"),
     (["--force", "1", "--tip", "0"], "a tip of 0 mm"),
     (["--force", "1", "--compression", "bond"], "unknown --compression 'bond'; did you mean 'bonded'?"),

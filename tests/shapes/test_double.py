@@ -33,6 +33,11 @@ def test_each_film_has_its_own_part():
     assert (found.body("lower_dielectric").material, found.body("upper_dielectric").material) == ("pla", "x60")
 
 
+def test_its_middle_electrode_is_of_the_top_ones_material():
+    found = double.scene(double.Params(), Fill(bottom_electrode="first", top_electrode="second"))
+    assert [b.material for b in found.bodies if b.terminal] == ["first", "second", "second"]
+
+
 def test_the_columns_refuse_three_electrodes_and_say_who_speaks_of_them():
     assert "sensorgen stack" in (columns.unfit(scene()) or "")
 

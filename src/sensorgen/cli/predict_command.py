@@ -101,7 +101,10 @@ def _pressed(design: "Design", sensed: "Sensed", axes: Axes, how: dict[str, Any]
 
 def _plot(sensed: "Sensed", axes: Axes, folder: Path) -> None:
     from sensorgen import plots, store
+    from sensorgen.predict import check_presses
 
+    _, force_n, position_mm = axes
+    check_presses(sensed.sensor, force_n, [x * units.M_PER_MM for x in position_mm])
     with show.progress(plots.STEPS) as step:
         for name, content in plots.files(sensed.sensor, *axes):
             step(name)

@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 from sensorgen.invert.forward import Real
 from sensorgen.invert.table import Local
 
-LOOSE, TIGHT = 0.2, 0.02  # share of the residual that a step still removes when a sample is done (Bates and Watts 1981)
-_ROUNDING = 1e-14  # of ln Z: what no step can remove
+LOOSE, TIGHT = 0.2, 0.01  # share of the residual that a step still removes when a sample is done (Bates and Watts 1981)
+REACH = 0.1  # farthest that one step moves the position: beyond it the response is not linear
+ROUNDING = 1e-14  # of ln Z: what no step can remove
 _FLOOR = 1e-9  # least information on the square's edge: keeps a singular matrix solvable, far below any reading's own
 _DAMPING = 1e-3  # first damping where a step failed
 _STEPS = 30
-_NO_FORCE = 1e-4  # of the limit: without force nothing depends on the position, so a search that lands there is stuck;
-_PART = 0.9  # above it a step gives up this share of the force at most
 
 Model = Callable[[Real], Local]
 Index = NDArray[np.intp]
@@ -101,7 +100,7 @@ def descend(target: Target, model: Model, start: Real, offset: float) -> Fit:
     """
     best = target.fit(start.copy(), model(start))
     damping, active = np.zeros(len(start)), np.arange(len(start))
-    rounding = _ROUNDING**2 * np.einsum("nk,nk->n", target.weight, target.weight)
+    rounding = ROUNDING**2 * np.einsum("nk,nk->n", target.weight, target.weight)
     for _ in range(_STEPS):
         now = best.rows(active)
         step = _step(now, damping[active])
@@ -133,9 +132,9 @@ def _step(fit: Fit, damping: Real) -> Real:
     force = (xx * by_force - fx * by_position) / determinant
     position = (ff * by_position - fx * by_force) / determinant
     at_force, at_position = fit.press.T
-    inside = _inside(at_position, position)
+    inside = _inside(at_position, np.minimum(np.maximum(position, -REACH), REACH))
     force = np.where(inside == position, force, (by_force - fx * inside) / ff)
-    within = np.maximum(_inside(at_force, force), np.where(at_force > _NO_FORCE, -_PART * at_force, -at_force))
+    within = _inside(at_force, force)
     inside = np.where(within == force, inside, (by_position - fx * within) / xx)
     found = np.empty_like(fit.press)
     found[:, 0], found[:, 1] = within, _inside(at_position, inside)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.invert.descent import REACH, ROUNDING, TIGHT
 from sensorgen.invert.forward import Forward, Real
 from sensorgen.invert.scalar import Scalar
 from sensorgen.invert.table import Table, parts
@@ -14,8 +15,6 @@ from sensorgen.invert.verdict import Status, chi2_limit
 
 _ROUGH = 2  # steps on the table before the exact model has its say
 _STEPS = 8
-_OFFSET = 0.02  # as the batch's
-_ROUNDING = 1e-14
 _FIRST_ORDER = [2, 1]  # by force, by position; the others are the value and the mixed derivative
 _GUESS = 1 / 12  # variance of a guess on the unit length
 
@@ -67,7 +66,7 @@ class Single:
         self._model, self._table, self._weight, self._contested = Scalar(forward), table, 1 / sigma, contested
         self._edges = [edges.tolist() for edges in table.edges]
         self._limit = float(chi2_limit(np.array([len(sigma) - 2]))[0])
-        self._rounding = _ROUNDING**2 * float(self._weight @ self._weight)
+        self._rounding = ROUNDING**2 * float(self._weight @ self._weight)
         self._scale = table.scale.tolist()
 
     def press(self, response: Real) -> Press | None:
@@ -77,10 +76,10 @@ class Single:
             normal = self._normal(response[0], force, position, exact=step >= _ROUGH)
             by_force, by_position = normal.step()
             force, position = force + by_force, position + by_position
-            if not (0 < force < 1 and 0 < position < 1):
+            if not (0 < force < 1 and 0 < position < 1 and abs(by_position) < REACH):
                 return None
             gain = by_force * normal.by_force + by_position * normal.by_position
-            if step >= _ROUGH and gain <= _OFFSET**2 * normal.chi2 + self._rounding:
+            if step >= _ROUGH and gain <= TIGHT**2 * normal.chi2 + self._rounding:
                 return self._answer(force, position, normal)
         return None
 

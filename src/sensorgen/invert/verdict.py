@@ -100,7 +100,7 @@ def chi2_limit(degrees: NDArray[np.intp]) -> Real:
     """Sum of squares that noise exceeds once in ten thousand samples (Wilson and Hilferty 1931); none for 0 degrees.
 
     >>> chi2_limit(np.array([12])).round(1).tolist()
-    [39.2]
+    [39.5]
     """
     ninth = 2 / (9 * np.maximum(degrees, 1))
     return np.where(degrees > 0, degrees * (1 - ninth + _TAIL * np.sqrt(ninth)) ** 3, np.inf)

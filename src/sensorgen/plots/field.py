@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.errors import OutOfRange
-from sensorgen.predict import check_presses
 from sensorgen.sensor import Sensor
 from sensorgen.units import M_PER_MM
 
@@ -113,7 +112,6 @@ def field(
             f"{len(f)} tones, {len(force)} forces and {len(at)} positions are too much to draw; "
             f"expected up to {MOST_TONES} tones and {LARGEST} points in all: use larger steps"
         )
-    check_presses(sensor, force, at * M_PER_MM)
     found = sensor.response(f[:, None, None], force[:, None], at * M_PER_MM)
     by_mm = found.by_position_ohm_per_m * M_PER_MM
     size = (sensor.tip_m / M_PER_MM, sensor.length_m / M_PER_MM)

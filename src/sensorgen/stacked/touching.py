@@ -96,14 +96,14 @@ class Touching:
         def wrong(isolation_mm: float) -> bool:
             return abs(self.force_n(isolation_mm, wiring)) > within_n
 
-        tried = [0.0, *np.geomspace(_THINNEST_MM, THICKEST_MM, 51).tolist()]
+        tried = [0.0, *np.geomspace(_THINNEST_MM, THICKEST_MM, 21).tolist()]
         last = max((k for k, t in enumerate(tried) if wrong(t)), default=None)
         if last is None:
             return 0.0
         if last == len(tried) - 1:
             return None
         low, high = tried[last : last + 2]
-        while high - low > 1e-3 * high:
+        while high - low > 2e-3 * high:
             middle = (low + high) / 2
             low, high = (middle, high) if wrong(middle) else (low, middle)
         return float(high)
