@@ -82,7 +82,8 @@ def two_presses(path):
     found = Estimator(sensor, TONES, NOISE).batch(z[None])
     figure, ax = plt.subplots(figsize=(7, 4.6))
     levels = [0, 0.1, 1, 2.3, 4.6, 9.2, 30, 100, 300, 1000, 3000, 1e4]
-    filled = ax.contourf(x * 1e3, f, square / NOISE**2, levels, cmap="viridis_r", norm=mpl.colors.BoundaryNorm(levels, 256))
+    norm = mpl.colors.BoundaryNorm(levels, 256)
+    filled = ax.contourf(x * 1e3, f, square / NOISE**2, levels, cmap="viridis_r", norm=norm)
     figure.colorbar(filled, label="chi squared at 0.1 % noise", ticks=levels)
     ax.contour(x * 1e3, f, square / NOISE**2, [9.21], colors="w", linewidths=1.2)
     ax.plot(found.position_m * 1e3, found.force_n, "o", color="w", mec="k", label="the best press (the true one)")

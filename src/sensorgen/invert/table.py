@@ -102,7 +102,8 @@ class Table:
         ]
         seed, shift = (np.concatenate(column) for column in zip(*found, strict=True))
         press = filters.seeds[seed]
-        press[:, 0] = np.clip(press[:, 0] + shift, 0.0, 1.0)
+        least = self.edges[0][1] / 2  # at no force nothing depends on the position: a search that starts there stays
+        press[:, 0] = np.clip(press[:, 0] + shift, least, 1.0)
         return press  # type: ignore[no-any-return]
 
     def cell(self, press: Real) -> Index:
