@@ -1,6 +1,6 @@
 """One cell of a cross-section as edges with a region on each side: what a mesher needs, for any prismatic scene."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -8,8 +8,10 @@ from sensorgen.errors import BadInput
 from sensorgen.scene import Point, Scene
 from sensorgen.sections import Column, Layer, columns, sections
 
-EMPTY = 0  # the region of whatever no body fills
+OUTSIDE = 0  # the region beyond the cell
+AIR = "air"
 _DIGITS = 9  # of a coordinate [mm]: places nearer than a picometre are one
+_SLIVER_MM = 1e-9
 
 Edge = tuple[Point, Point]
 
@@ -29,7 +31,7 @@ class Cell:
     Attributes
     ----------
     edges : mapping
-        Each edge, from its left or lower end, to the regions (left of it, right of it); 0 is empty.
+        Each edge, from its left or lower end, to the regions (left of it, right of it); 0 is outside.
     regions : tuple of Region
         Region k is ``regions[k - 1]``.
     left_mm, right_mm : float
@@ -47,6 +49,10 @@ class Cell:
     def width_mm(self) -> float:
         """Its width [mm]."""
         return self.right_mm - self.left_mm
+
+    def solid(self, region: int) -> bool:
+        """Whether a region is filled by a body."""
+        return region != OUTSIDE and self.regions[region - 1].material != AIR
 
     def heights_mm(self) -> Point:
         """Lowest and highest place [mm]."""
@@ -77,7 +83,7 @@ def cell_of(scene: Scene, period_mm: float | None) -> Cell:
         raise BadInput(f"compression needs one cross-section; this scene has {len(found)}: it must be solved in 3D")
     whole = columns(found[0])
     start, end = whole[0].left_mm, whole[-1].right_mm
-    period = period_mm or min(end - start, max(v for c in whole for layer in c.layers for v in layer.top_mm))
+    period = period_mm or min(end - start, max(whole[0].layers[-1].top_mm))
     if period > (end - start) * (1 + 1e-9):
         raise BadInput(f"the sensor is {end - start:g} mm long, less than its period of {period:g} mm")
     for axis in sorted({c.left_mm for c in whole if c.left_mm + period <= end + 1e-9} | {start}):
@@ -86,34 +92,48 @@ def cell_of(scene: Scene, period_mm: float | None) -> Cell:
     return _cell(whole, start, start + period, mirrored=False)
 
 
+Strip = tuple[float, float, list[tuple[Region, Point, Point]]]
+
+
 def _is_mirror(whole: list[Column], axis: float, period: float) -> bool:
-    """Whether the half period right of ``axis`` is the mirror image of the half period before it, repeated."""
-    ahead = _strips(whole, axis, axis + period / 2)
-    behind = _strips(whole, axis + period / 2, axis + period)
-    turned = [
-        (2 * axis + period - right, 2 * axis + period - left, [(layer.body, b[::-1], t[::-1]) for layer, b, t in layers])
-        for left, right, layers in reversed(behind)
+    """Whether the half period after ``axis`` and the one after that are mirror images."""
+    middle, end = axis + period / 2, axis + period
+    ahead = _strips(whole, axis, middle)
+    turned: list[Strip] = [
+        (axis + end - b, axis + end - a, [(region, low[::-1], high[::-1]) for region, low, high in layers])
+        for a, b, layers in reversed(_strips(whole, middle, end))
     ]
-    return _look(((a, b, [(x.body, y, z) for x, y, z in c]) for a, b, c in ahead)) == _look(turned)
+    return [_look(strip) for strip in ahead] == [_look(strip) for strip in turned]
 
 
-def _look(strips: Iterable[tuple[float, float, list[tuple[object, Point, Point]]]]) -> list[object]:
-    return [
-        (round(a, 6), round(b, 6), [(body.material, body.terminal, *(round(v, 6) for v in (*y, *z))) for body, y, z in c])  # type: ignore[attr-defined]
-        for a, b, c in strips
-    ]
-
-
-Strip = tuple[float, float, list[tuple[Layer, Point, Point]]]
+def _look(strip: Strip) -> tuple[object, ...]:
+    left, right, layers = strip
+    return round(left, 6), round(right, 6), [(r, *(round(v, 6) for v in (*low, *high))) for r, low, high in layers]
 
 
 def _strips(whole: list[Column], left: float, right: float) -> list[Strip]:
-    """The columns between two places, cut there: left, right, and each layer with its bottom and top line."""
+    """The columns between two places, cut there: left, right, and each region with its bottom and top line."""
     found = []
     for c in whole:
         a, b = max(c.left_mm, left), min(c.right_mm, right)
-        if b - a > 1e-9:
-            found.append((a, b, [(x, _at(c, x.bottom_mm, a, b), _at(c, x.top_mm, a, b)) for x in c.layers]))
+        if b - a > _SLIVER_MM:
+            found.append((a, b, _filled([_layer(c, x, a, b) for x in c.layers])))
+    return found
+
+
+def _layer(column: Column, layer: Layer, left: float, right: float) -> tuple[Region, Point, Point]:
+    region = Region(layer.body.material, layer.body.terminal)
+    return region, _at(column, layer.bottom_mm, left, right), _at(column, layer.top_mm, left, right)
+
+
+def _filled(layers: list[tuple[Region, Point, Point]]) -> list[tuple[Region, Point, Point]]:
+    """Layers, with air where one does not reach up to the next."""
+    found = layers[:1]
+    for region, low, high in layers[1:]:
+        below = found[-1][2]
+        if max(low[k] - below[k] for k in range(2)) > _SLIVER_MM:
+            found.append((Region(AIR, ""), below, low))
+        found.append((region, low, high))
     return found
 
 
@@ -126,16 +146,13 @@ def _at(column: Column, line: Point, left: float, right: float) -> Point:
 
 def _cell(whole: list[Column], left: float, right: float, *, mirrored: bool) -> Cell:
     strips = _strips(whole, left, right)
-    regions: list[Region] = []
-    for _, _, layers in strips:
-        regions += [r for r in (Region(x.body.material, x.body.terminal) for x, _, _ in layers) if r not in regions]
+    regions = list(dict.fromkeys(region for _, _, layers in strips for region, _, _ in layers))
     number = {region: k + 1 for k, region in enumerate(regions)}
     edges: dict[Edge, tuple[int, int]] = {}
     for a, b, layers in strips:
-        for layer, low, high in layers:
-            region = number[Region(layer.body.material, layer.body.terminal)]
-            _add(edges, (a, low[0]), (b, low[1]), (region, EMPTY))
-            _add(edges, (a, high[0]), (b, high[1]), (EMPTY, region))
+        for region, low, high in layers:
+            _add(edges, (a, low[0]), (b, low[1]), (number[region], OUTSIDE))
+            _add(edges, (a, high[0]), (b, high[1]), (OUTSIDE, number[region]))
     for before, after in pairwise([None, *strips, None]):
         _uprights(edges, before, after, number)
     kept = {edge: sides for edge, sides in edges.items() if sides[0] != sides[1]}
@@ -145,7 +162,7 @@ def _cell(whole: list[Column], left: float, right: float, *, mirrored: bool) -> 
 def _add(edges: dict[Edge, tuple[int, int]], a: Point, b: Point, sides: tuple[int, int]) -> None:
     """Add an edge from left to right, or from below upwards; what is known of it from its other side stays."""
     key = (_rounded(a), _rounded(b))
-    known = edges.get(key, (EMPTY, EMPTY))
+    known = edges.get(key, (OUTSIDE, OUTSIDE))
     edges[key] = (sides[0] or known[0], sides[1] or known[1])
 
 
@@ -162,7 +179,7 @@ def _uprights(
     heights = sorted({v for spans in sides for low, high, _ in spans for v in (low, high)})
     for low, high in pairwise(heights):
         middle = (low + high) / 2
-        left, right = (next((r for a, b, r in spans if a < middle < b), EMPTY) for spans in sides)
+        left, right = (next((r for a, b, r in spans if a < middle < b), OUTSIDE) for spans in sides)
         if left or right:
             edges[_rounded((place, low)), _rounded((place, high))] = (left, right)
 
@@ -170,8 +187,5 @@ def _uprights(
 def _spans(strip: Strip | None, end: int, number: Mapping[Region, int]) -> list[tuple[float, float, int]]:
     """Which region lies between which heights at one end of a strip."""
     layers = strip[2] if strip else []
-    return [
-        (round(low[end], _DIGITS), round(high[end], _DIGITS), number[Region(x.body.material, x.body.terminal)])
-        for x, low, high in layers
-        if high[end] - low[end] > 1e-9
-    ]
+    heights = [(round(low[end], _DIGITS), round(high[end], _DIGITS), number[r]) for r, low, high in layers]
+    return [(low, high, region) for low, high, region in heights if high - low > _SLIVER_MM]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from sensorgen.models._press.mesh import Mesh
+from sensorgen.models._press.mesh import Mesh, at_border
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -41,8 +41,7 @@ class Faces:
 def faces_of(mesh: Mesh) -> Faces:
     """The faces of a mesh, its lowest and highest level and its left and right side left out."""
     a, b = (mesh.points_m[mesh.rim[:, k]] for k in range(2))
-    low, high = mesh.points_m[:, 1].min(), mesh.points_m[:, 1].max()
-    outside = (a[:, 1] == b[:, 1]) & ((a[:, 1] == low) | (a[:, 1] == high))
+    outside = at_border(mesh)
     across = (a[:, 0] - b[:, 0]) / mesh.lengths_m()  # the solid lies left of a side: one that runs back looks up
     return Faces(mesh.rim[(across > _UPRIGHT) & ~outside], mesh.rim[(across < -_UPRIGHT) & ~outside])
 

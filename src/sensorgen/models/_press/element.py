@@ -24,7 +24,7 @@ _OUTER = 12  # displacements of the six nodes; then the bubble's two, then three
 _STIFF = 1e6  # in the tangent of an incompressible triangle, the pressure's stiffness over mu
 
 
-def _gradients(xi: Real, eta: Real) -> Real:
+def gradients(xi: Real, eta: Real) -> Real:
     """Derivatives of the six nodal functions and the bubble to xi and eta, (points, 7, 2)."""
     one, o = np.ones_like(xi), np.zeros_like(xi)
     a, b, c = 1 - xi - eta, xi, eta
@@ -36,7 +36,7 @@ def _gradients(xi: Real, eta: Real) -> Real:
     return np.moveaxis(np.array(rows), 2, 0)
 
 
-_GRADIENTS = _gradients(*_POINTS.T)
+_GRADIENTS = gradients(*_POINTS.T)
 _PRESSURES = np.column_stack([np.ones(len(_POINTS)), _POINTS - 1 / 3])  # constant, and two slopes without mean
 
 

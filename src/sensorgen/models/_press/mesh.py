@@ -1,5 +1,6 @@
 """Triangles of six nodes in a cell's solid parts, fine where two of them meet in one point."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -7,12 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.errors import MissingValue
-from sensorgen.models._press.cell import EMPTY, Cell
+from sensorgen.models._press.cell import OUTSIDE, Cell, Edge
+from sensorgen.scene import Point
 from sensorgen.units import M_PER_MM
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
+Run = tuple[int, int]
 
+_SAME = 1e-9  # of the cell's size: places nearer than this are one
 _SIDES = ((0, 1), (1, 2), (2, 0))
 
 
@@ -43,6 +47,16 @@ class Mesh:
         return np.asarray(np.hypot(*ends.T))
 
 
+@dataclass(frozen=True)
+class Net:
+    """What the mesher gives: places [m], corners and regions of triangles, and sides along negative regions."""
+
+    points_m: Real
+    corners: Whole
+    region: Whole
+    marked: Mapping[int, list[Run]]
+
+
 def of_triangles(points_m: Real, corners: Whole, region: Whole) -> Mesh:
     """A mesh with middles on the sides of given triangles, which are counter-clockwise."""
     sides = np.concatenate([corners[:, side] for side in _SIDES])
@@ -55,11 +69,19 @@ def of_triangles(points_m: Real, corners: Whole, region: Whole) -> Mesh:
     return Mesh(np.concatenate([points_m, middles]), triangles, region, rim)
 
 
-def pinches(cell: Cell) -> set[tuple[float, float]]:
-    """Points in which solids touch and nothing more: four edges towards the empty meet there, or two and a mirror."""
-    seen: dict[tuple[float, float], int] = {}
+def at_border(mesh: Mesh) -> NDArray[np.bool_]:
+    """Which sides of the rim lie on the straight border of the cell, and not within it."""
+    a, b = (mesh.points_m[mesh.rim[:, k]] for k in range(2))
+    ends = np.array([mesh.points_m.min(axis=0), mesh.points_m.max(axis=0)])
+    near = _SAME * (ends[1] - ends[0]).max()
+    return np.asarray(((abs(a - ends[:, None]) < near) & (abs(b - ends[:, None]) < near)).any(axis=(0, 2)))
+
+
+def pinches(cell: Cell) -> set[Point]:
+    """Points in which solids touch and nothing more: four edges of solids meet there, mirrors among them."""
+    seen: dict[Point, int] = {}
     for edge, sides in cell.edges.items():
-        if EMPTY in sides:
+        if cell.solid(sides[0]) != cell.solid(sides[1]):
             for point in edge:
                 seen[point] = seen.get(point, 0) + 1
     return {point for point, edges in seen.items() if edges >= 4}
@@ -97,25 +119,42 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
 
     The edges are cut here, because a mesher that smooths its sizes forgets the small ones at an apex.
     """
-    geometry = netgen()()
     sharp = pinches(cell)
-    exposed = {p for e, sides in cell.edges.items() if EMPTY in sides and _inside(cell, e) for p in e}
+    faces = [e for e, sides in cell.edges.items() if OUTSIDE not in sides and cell.solid(sides[0]) != cell.solid(sides[1])]
+    exposed = {p for edge in faces for p in edge}
     sizes = dict.fromkeys(exposed, fineness.corner_mm) | dict.fromkeys(sharp, fineness.apex_mm)
-    numbers: dict[tuple[float, float], int] = {}
-    for (a, b), (left, right) in cell.edges.items():
+    pieces: dict[Edge, tuple[int, int]] = {}
+    for (a, b), sides in cell.edges.items():
         ends = [sizes.get(p, fineness.coarse_mm) for p in (a, b)]
         shares = cuts(float(np.hypot(b[0] - a[0], b[1] - a[1])), ends[0], ends[1], fineness)
         places = [a, *((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])) for t in shares), b]
-        for p in places:
+        open_sides = tuple(k if cell.solid(k) else OUTSIDE for k in sides)
+        if open_sides != (OUTSIDE, OUTSIDE):
+            pieces |= dict.fromkeys(pairwise(places), open_sides)
+    net = triangulated(pieces, fineness.coarse_mm, fineness.growth)
+    return of_triangles(net.points_m, net.corners, net.region)
+
+
+def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth: float) -> Net:
+    """Mesh what edges with a region to their left and right enclose; regions from 0 down are left open."""
+    geometry = netgen()()
+    numbers: dict[Point, int] = {}
+    for (a, b), (left, right) in edges.items():
+        for p in (a, b):
             if p not in numbers:
                 numbers[p] = geometry.AppendPoint(*p)
-        for p, q in pairwise(places):
-            geometry.Append(["line", numbers[p], numbers[q]], leftdomain=left, rightdomain=right)
-    made = geometry.GenerateMesh(maxh=fineness.coarse_mm, grading=fineness.growth)
-    elements = made.Elements2D().NumPy()
+        domains = {"leftdomain": max(left, 0), "rightdomain": max(right, 0)}
+        geometry.Append(["line", numbers[a], numbers[b]], **domains)
+    made = geometry.GenerateMesh(maxh=coarse_mm, grading=growth)
+    elements, sides = made.Elements2D().NumPy(), made.Elements1D().NumPy()
     points = np.asarray(made.Coordinates(), float)[:, :2] * M_PER_MM
+    behind = [min(pair) for pair in edges.values()]
+    marked: dict[int, list[Run]] = {}
+    for (a, b), number in zip((sides["nodes"][:, :2] - 1).tolist(), sides["index"].tolist(), strict=True):
+        if behind[number - 1] < 0:
+            marked.setdefault(behind[number - 1], []).append((a, b))
     corners = elements["nodes"][:, :3].astype(np.int64) - 1
-    return of_triangles(points, corners, elements["index"].astype(np.int64))
+    return Net(points, corners, elements["index"].astype(np.int64), marked)
 
 
 def cuts(length_mm: float, first_mm: float, last_mm: float, fineness: Fineness) -> list[float]:
@@ -139,11 +178,3 @@ def _grown(reach: float, size: float, fineness: Fineness) -> Real:
     whole = np.log1p(growth * reach / size) / growth if reach < bend else turns + (reach - bend) / fineness.coarse_mm
     t = whole * np.arange(1, max(1, round(whole)) + 1) / max(1, round(whole))
     return np.where(t < turns, size / growth * np.expm1(growth * t), bend + (t - turns) * fineness.coarse_mm)
-
-
-def _inside(cell: Cell, edge: tuple[tuple[float, float], tuple[float, float]]) -> bool:
-    """Whether an edge is none of the cell's own sides."""
-    (u0, v0), (u1, v1) = edge
-    low, high = cell.heights_mm()
-    upright = u0 == u1 and u0 in (round(cell.left_mm, 9), round(cell.right_mm, 9))
-    return not upright and not (v0 == v1 and v0 in (low, high))
