@@ -26,7 +26,13 @@ Real = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Edges = Mapping[Edge, tuple[int, int]]
 
+_ROUNDING = 1e-9
+_HOLE = 1e-6  # area that a mesh may miss, as a share
 _MIDS = np.array([[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])  # middles of the sides: exact to degree 2
+
+
+class Unmeshed(Exception):
+    """No sound mesh of these outlines was found."""
 
 
 def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float, growth: float) -> Interval:
@@ -45,6 +51,8 @@ def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float,
     ------
     OutOfRange
         The electrodes touch.
+    Unmeshed
+        The mesher gave up, left a hole, or the bounds are in the wrong order, which no sound mesh can do.
     """
     air = next((k + 1 for k, r in enumerate(cell.regions) if r.material == AIR), OUTSIDE)
     mesh = _meshed(cell.edges, air, coarse_mm, growth)
@@ -59,6 +67,8 @@ def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float,
     width = float(x.max() - x.min())
     upper = _energy(mesh.points_m, triangles, eps, *ends) / width
     lower = 1 / (_energy(mesh.points_m, triangles, 1 / eps, *sides) * width)
+    if not lower <= upper * (1 + _ROUNDING):
+        raise Unmeshed(f"bounds in the wrong order, {lower} above {upper}")
     return Interval(lower, upper).times(EPS0_F_PER_M)
 
 
@@ -71,10 +81,23 @@ def _meshed(edges: Edges, air: int, coarse_mm: float, growth: float) -> Mesh:
             cut[key] = (-number, cut[key][1]) if place == 0 else (cut[key][0], -number)
         if wedge.first[-1] != wedge.second[-1]:
             cut[wedge.first[-1], wedge.second[-1]] = (-number, air)
-    net = triangulated(cut, coarse_mm, growth)
+    try:
+        net = triangulated(cut, coarse_mm, growth)
+    except Exception as error:  # the mesher's own kind of exception, known only where it is installed
+        raise Unmeshed(str(error)) from None
     new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
     corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])
+    _refuse_holes(edges, net.points_m[corners])
     return of_triangles(net.points_m, corners, np.concatenate([net.region, np.full(len(new), air)]))
+
+
+def _refuse_holes(edges: Edges, corners: Real) -> None:
+    """Compare the area within the edges with that of the triangles (m, 3, 2), none of which may be turned over."""
+    area = sum(0.5 * (a[0] * b[1] - a[1] * b[0]) * ((left > 0) - (right > 0)) for (a, b), (left, right) in edges.items())
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    parts = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / M_PER_MM**2
+    if parts.min() <= 0 or abs(parts.sum() / area - 1) > _HOLE:
+        raise Unmeshed("the mesh has holes or folds")
 
 
 def _filling(net: Net, number: int, wedge: Wedge) -> Iterator[tuple[int, int, int]]:

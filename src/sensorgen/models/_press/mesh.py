@@ -104,10 +104,10 @@ class Fineness:
     ``growth`` is by how much the size grows per distance [-].
     """
 
-    apex_mm: float = 1e-3
-    corner_mm: float = 0.02
-    coarse_mm: float = 0.1
-    growth: float = 0.35
+    apex_mm: float = 3.5e-4
+    corner_mm: float = 0.05
+    coarse_mm: float = 0.15
+    growth: float = 0.5
 
     def finer(self) -> "Fineness":
         """The next level: every length and the growth halved."""
