@@ -15,6 +15,7 @@ from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.interval import Interval
 from sensorgen.models import compression
 from sensorgen.models._press.cell import AIR, Cell, cell_of
+from sensorgen.models._press.contact import Faces
 from sensorgen.models._press.mesh import Fineness, Mesh, mesh_of
 from sensorgen.models._press.support import CHOICES, Held
 from sensorgen.scene import Scene
@@ -199,18 +200,18 @@ def _depth(gaps: Real) -> float:
 
 
 def _field(
-    cell: Cell, mesh: Mesh, faces: object, tied: NDArray[np.int64], u_m: Real, permittivity: Mapping[str, float]
+    cell: Cell, mesh: Mesh, faces: Faces, tied: NDArray[np.int64], u_m: Real, permittivity: Mapping[str, float]
 ) -> tuple[Interval | None, Cell]:
     """Capacitance and outlines of a deformed cell; gaps are closed a little more or less where a mesh fails."""
     from sensorgen.models._press import deformed, field
 
-    outlines = [deformed.deformed(cell, mesh, faces, tied, u_m, closed) for closed in deformed.CLOSED[: None if u_m.any() else 1]]  # type: ignore[arg-type]
-    for outline in outlines:
+    for closed in deformed.CLOSED:
+        outline = deformed.deformed(cell, mesh, faces, tied, u_m, closed)
         try:
             return field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH), outline
         except field.Unmeshed:
             continue
-    return None, outlines[0]
+    return None, outline
 
 
 def _imbalance(stress: Real, moved: Real, energy: Real) -> Real:

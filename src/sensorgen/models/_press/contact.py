@@ -60,6 +60,8 @@ class Pairs:
         Length of the lower side that it is on [m].
     point : (k,) array
         Which quadrature point it is.
+    sticks : (k,) array
+        Whether it touched before, and holds fast.
     """
 
     gap: csr_matrix
@@ -67,6 +69,7 @@ class Pairs:
     stiffness_pa: Real
     length_m: Real
     point: Whole
+    sticks: NDArray[np.bool_]
 
 
 def project(mesh: Mesh, faces: Faces, places_m: Real, penalty_pa: float, kept: Pairs | None = None) -> Pairs:
@@ -83,7 +86,7 @@ def project(mesh: Mesh, faces: Faces, places_m: Real, penalty_pa: float, kept: P
     along = np.einsum("kn,knd->kd", _slopes(s[found]), places_m[upper])
     gap, slip = _rows(lower, upper, shape[found], _shapes(s[found]), along[:, 1] / along[:, 0], 2 * len(mesh.points_m))
     weight = np.tile(_W, len(faces.lower))[found]
-    made = Pairs(gap, slip, penalty_pa * weight, length[found], found)
+    made = Pairs(gap, slip, penalty_pa * weight, length[found], found, np.zeros(len(found), bool))
     return _joined(made, kept) if kept else made
 
 
@@ -104,13 +107,14 @@ def _rows(
 def _joined(a: Pairs, b: Pairs) -> Pairs:
     from scipy.sparse import vstack
 
-    both = [np.concatenate([getattr(a, k), getattr(b, k)]) for k in ("stiffness_pa", "length_m", "point")]
+    both = [np.concatenate([getattr(a, k), getattr(b, k)]) for k in ("stiffness_pa", "length_m", "point", "sticks")]
     return Pairs(vstack([a.gap, b.gap]).tocsr(), vstack([a.slip, b.slip]).tocsr(), *both)
 
 
-def picked(pairs: Pairs, which: NDArray[np.bool_]) -> Pairs:
-    """Some of the pairs."""
-    return Pairs(pairs.gap[which], pairs.slip[which], pairs.stiffness_pa[which], pairs.length_m[which], pairs.point[which])
+def stuck(pairs: Pairs, which: NDArray[np.bool_]) -> Pairs:
+    """Some of the pairs, which hold fast from now on."""
+    rest = (pairs.stiffness_pa[which], pairs.length_m[which], pairs.point[which])
+    return Pairs(pairs.gap[which], pairs.slip[which], *rest, np.ones(which.sum(), bool))
 
 
 def _partners(here: Real, upper: Real, depth: Real) -> tuple[Whole, Real]:

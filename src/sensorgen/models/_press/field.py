@@ -74,7 +74,7 @@ def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float,
 
 def _meshed(edges: Edges, air: int, coarse_mm: float, growth: float) -> Mesh:
     """Mesh everything but the thin ends of the air, which are filled with triangles of their own."""
-    cut, thin = dict(edges), wedges(edges, air)
+    cut, thin = dict(edges), wedges(edges, air) if air != OUTSIDE else []
     for number, wedge in enumerate(thin, 1):
         for p, q in (*pairwise(wedge.first), *pairwise(wedge.second[::-1])):
             key, place = ((p, q), 0) if (p, q) in cut else ((q, p), 1)

@@ -91,8 +91,8 @@ class Problem:
         k = pairs.stiffness_pa * (gap < 0)
         force, stiffness = pairs.gap.T @ (k * gap), pairs.gap.T @ diags(k) @ pairs.gap
         if self.stick:
-            slip = pairs.slip @ self.places(u).ravel()
-            force = force + pairs.slip.T @ (k * slip)
+            k = pairs.stiffness_pa * pairs.sticks
+            force = force + pairs.slip.T @ (k * (pairs.slip @ self.places(u).ravel()))
             stiffness = stiffness + pairs.slip.T @ diags(k) @ pairs.slip
         return force, stiffness
 
@@ -100,8 +100,8 @@ class Problem:
         """Energy in the penalty, per depth [J/m]."""
         k = state.pairs.stiffness_pa
         gap = self.gaps(state.pairs, state.u_m)
-        slip = state.pairs.slip @ self.places(state.u_m).ravel() if self.stick else 0 * gap
-        return float(0.5 * (k * (gap < 0) * (gap**2 + slip**2)).sum())
+        slip = state.pairs.slip @ self.places(state.u_m).ravel() * state.pairs.sticks
+        return float(0.5 * (k * ((gap < 0) * gap**2 + slip**2)).sum())
 
     def residual(self, u: Real, inner: Inner, pairs: Pairs, pressure_pa: float) -> tuple[Real, csr_matrix, object]:
         """Forces out of balance on the free displacements, their derivative, and the triangles' condensed part."""
@@ -154,7 +154,7 @@ class Problem:
         return replace(second, stuck=stuck)
 
     def _stuck(self, state: State) -> Pairs:
-        return contact.picked(state.pairs, self.gaps(state.pairs, state.u_m) < 0)
+        return contact.stuck(state.pairs, self.gaps(state.pairs, state.u_m) < 0)
 
 
 def curve(problem: Problem, pressures_pa: Sequence[float]) -> Iterator[State]:

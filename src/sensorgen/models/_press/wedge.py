@@ -59,7 +59,7 @@ def _grown(
 ) -> Wedge:
     """Walk along both sides, always on where the way across is shorter, until the air is thick or both sides meet."""
     first, second = [tip, out], [tip, into]
-    while first[-1] != second[-1]:
+    while first[-1] != second[-1] and ahead[first[-1]] and back[second[-1]]:
         on_first, on_second = ahead[first[-1]][0], back[second[-1]][0]
         if on_first == second[-1]:
             first.append(on_first)
