@@ -27,6 +27,8 @@ SOURCE = (
 COST = 2
 
 _PENALTY = 10.0  # over the least Young's modulus of a solid [-]
+_LEAST_PENALTY_PA = 60e6
+_STEP = 1 / 600  # longest load step over the least Young's modulus: 10 kPa for 6 MPa [-]
 _LEAST_VOLUME = 0.2  # J below which a triangle says nothing any more [-]
 _DEEPEST = 0.3  # penetration over the side it happens on [-]
 _BALANCE = 0.01  # by which work and energy may differ [-]
@@ -178,10 +180,10 @@ def _solved(
         contact.faces_of(mesh),
         support.free_of(mesh, held, mirrored=cell.mirrored, tied=tied),
         support.top_load(mesh),
-        _PENALTY * float(e.min()),
+        max(_LEAST_PENALTY_PA, _PENALTY * float(e.min())),
         held.contact == "stick",
     )
-    states = list(load.curve(problem, stress_pa))
+    states = list(load.curve(problem, stress_pa, _STEP * float(e.min())))
     down = np.array([problem.load @ s.u_m / np.abs(problem.load).sum() for s in states])
     volume = np.array([problem.elements.volume_ratio(s.u_m, s.inner).min() for s in states])
     depth = np.array([_depth(problem.gaps(s.pairs, s.u_m) / s.pairs.length_m) for s in states])
@@ -189,7 +191,8 @@ def _solved(
     stress = np.array([s.pressure_pa for s in states])
     imbalance = _imbalance(stress, down * np.abs(problem.load).sum(), energy)
     fields = [_field(cell, mesh, problem.faces, tied, s.u_m, permittivity) for s in states] if permittivity else []
-    faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance, states[-1].stale))
+    unknown = sum(c is None for c, _ in fields)
+    faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance, states[-1].stale, unknown))
     return Pressed(
         stress, down, tuple(c for c, _ in fields), tuple(o for _, o in fields), volume, depth, imbalance, faults
     )
@@ -228,13 +231,14 @@ def _imbalance(stress: Real, moved: Real, energy: Real) -> Real:
 
 
 def _faults(
-    stress: Real, asked: Sequence[float], volume: Real, depth: Real, imbalance: Real, stale: int
+    stress: Real, asked: Sequence[float], volume: Real, depth: Real, imbalance: Real, stale: int, unknown: int
 ) -> list[str]:
     said = {
         f"converged up to {stress[-1] / 1e3:.4g} of {asked[-1] / 1e3:.4g} kPa": stress[-1] < asked[-1] * (1 - 1e-9),
         f"a triangle is squeezed to {volume.min():.2g} of its volume": volume.min() < _LEAST_VOLUME,
         f"faces run into each other by {depth.max():.2g} of a side": depth.max() > _DEEPEST,
         f"work and energy differ by {imbalance[-1]:.1%}": abs(imbalance[-1]) > _BALANCE,
+        f"no capacitance at {unknown} of {len(stress)} stresses: the deformed outlines could not be meshed": unknown > 0,
         f"{stale} load steps with old contact partners": stale > 0,
     }
     return [words for words, holds in said.items() if holds]

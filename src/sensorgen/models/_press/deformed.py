@@ -58,7 +58,7 @@ def _edges(cell: Cell, mesh: Mesh) -> Sides:
         found[a, m] = found[m, b] = (region, air)
     nodes = {tuple(np.round(p / M_PER_MM, 9).tolist()): k for k, p in enumerate(mesh.points_m)}
     for (p, q), sides in cell.edges.items():
-        if OUTSIDE in sides and air in sides:
+        if air != OUTSIDE and set(sides) == {air, OUTSIDE}:
             found[nodes[p], nodes[q]] = sides
     return {run: sides for run, sides in found.items() if sides[0] != sides[1]}
 

@@ -20,7 +20,8 @@ _NEARLY = 1e-3  # the same before the contact partners are looked for anew
 _MOST_STEPS = 25
 _LEAST_J = 0.05  # a step may not squeeze a triangle below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
-_LEAST_CUT = 1 / 64  # of the load between two points
+_LEAST_CUT = 1 / 64  # of the longest load step
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -157,14 +158,15 @@ class Problem:
         return contact.stuck(state.pairs, self.gaps(state.pairs, state.u_m) < 0)
 
 
-def curve(problem: Problem, pressures_pa: Sequence[float]) -> Iterator[State]:
-    """Equilibria at rising pressures; ends early where even small steps fail."""
+def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) -> Iterator[State]:
+    """Equilibria at rising pressures, in steps of at most ``longest_pa``; ends early where even small steps fail."""
     state = problem.start()
     yield state
     for target in pressures_pa[1:]:
-        step = whole = target - state.pressure_pa
-        while state.pressure_pa < target * (1 - 1e-12):
-            reached = problem.stepped(state, min(target, state.pressure_pa + step))
+        step = whole = min(target - state.pressure_pa, longest_pa)
+        while state.pressure_pa < target:
+            left = target - state.pressure_pa
+            reached = problem.stepped(state, target if left < step * (1 + _ROUNDING) else state.pressure_pa + step)
             if reached is not None:
                 state = reached
                 continue

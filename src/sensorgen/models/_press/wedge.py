@@ -34,7 +34,7 @@ def wedges(edges: Mapping[Edge, tuple[int, int]], air: int) -> list[Wedge]:
             back[b].append(a)
     found: list[Wedge] = []
     used: set[Point] = set()
-    for tip in ahead:
+    for tip in list(ahead):
         for out, into in product(ahead[tip], back[tip]):
             if _is_tip(tip, out, into, ahead) and not {out, into} & used:
                 found.append(_grown(tip, out, into, ahead, back))
