@@ -86,8 +86,9 @@ def cell_of(scene: Scene, period_mm: float | None) -> Cell:
     period = period_mm or min(end - start, max(whole[0].layers[-1].top_mm))
     if period > (end - start) * (1 + 1e-9):
         raise BadInput(f"the sensor is {end - start:g} mm long, less than its period of {period:g} mm")
-    for axis in sorted({c.left_mm for c in whole if c.left_mm + period <= end + 1e-9} | {start}):
-        if _is_mirror(whole, axis, period):
+    axes = {place for c in whole for place in (c.left_mm, (c.left_mm + c.right_mm) / 2)}
+    for axis in sorted(axes):
+        if axis + period <= end + _SLIVER_MM and _is_mirror(whole, axis, period):
             return _cell(whole, axis, axis + period / 2, mirrored=True)
     return _cell(whole, start, start + period, mirrored=False)
 
