@@ -48,7 +48,7 @@ def test_a_block_follows_the_closed_form_on_any_mesh(nu, period):
             return 1.0
         if nu == 0.5:
             return 1 / b
-        return brentq(lambda a: mu * a - mu / a + lam * (a * b - 1) * b, 0.5, 3)
+        return brentq(lambda a: mu * a - mu / a + lam * (a * b - 1) * b, 0.5, 9)
 
     def stress(b):
         a = across(b)
@@ -158,7 +158,7 @@ def _linear(mesh, modulus, nu, n):
 
 def test_cooks_membrane_locks_with_linear_triangles_and_not_with_ours():
     fine = cook(32, 0.4999, False)
-    assert cook(8, 0.4999, False) == pytest.approx(fine, rel=0.02)
+    assert cook(8, 0.4999, False) == pytest.approx(fine, rel=0.03)
     assert cook(8, 0.4999, True) < 0.6 * fine
     assert cook(8, 0.5, False) == pytest.approx(cook(8, 0.4999, False), rel=2e-3)
     assert cook(32, 0.3, True) == pytest.approx(cook(32, 0.3, False), rel=0.03)  # the same membrane, where both can

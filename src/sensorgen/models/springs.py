@@ -16,7 +16,7 @@ from sensorgen.units import M_PER_MM
 SOURCE = "Hooke's law, column by column; plane strain, E / (1 - nu^2)"
 COST = 0
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+_PLACES = (np.arange(256) + 0.5) / 256  # in each column; evenly, because gaps close from one side
 _HALVINGS = 60  # of the interval that holds the displacement
 
 Real = NDArray[np.float64]
@@ -72,8 +72,8 @@ def _stress(moved: Real, gap: Real, yielding: Real, width: Real) -> Real:
 
 
 def _columns(scene: Scene, modulus_pa: Mapping[str, float]) -> tuple[Real, Real, Real, float]:
-    """Gap [m], yielding t / M [m/Pa] and width [m] at quadrature places, and the least sum of thicknesses [m]."""
-    share = (_NODES + 1) / 2
+    """Gap [m], yielding t / M [m/Pa] and width [m] at places in all columns, and the least sum of thicknesses [m]."""
+    share = _PLACES
     rows = []
     for section in sections(scene):
         for column in columns(section):
@@ -84,7 +84,7 @@ def _columns(scene: Scene, modulus_pa: Mapping[str, float]) -> tuple[Real, Real,
             solid = tops - bottoms
             gap = np.maximum(bottoms[1:] - tops[:-1], 0.0).sum(axis=0)
             moduli = np.array([modulus_pa[layer.body.material] for layer in column.layers])
-            weight = _WEIGHTS / 2 * (column.right_mm - column.left_mm) * section.depth_mm
+            weight = np.full(len(share), (column.right_mm - column.left_mm) * section.depth_mm)
             rows.append(np.array([gap, (solid / moduli[:, None]).sum(axis=0), weight, solid.sum(axis=0)]))
     gap, yielding, weight, solid = np.concatenate(rows, axis=1)
     return gap * M_PER_MM, yielding * M_PER_MM, weight, float((gap + solid).min() * M_PER_MM)
