@@ -13,8 +13,8 @@ help: ## list the targets
 demo: $(READY) ## set up, and build the triangular sensor with a film of 0.2 mm
 	$(BIN)/sensorgen build tri --dielectric 0.2
 
-test: $(READY_DEV) ## set up, with the slicers where apt may, and run all tests
-	scripts/system-packages --slicers
+test: $(READY_DEV) ## set up, with slicers, ngspice and Chromium where apt may, and run all tests
+	scripts/system-packages --programs
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
 lint: $(READY_DEV) ## style, types, and which module may import which
@@ -27,7 +27,7 @@ docs: $(READY_DEV) ## write docs/reference.md from the --help texts, and the pic
 	$(BIN)/python docs/generate.py
 
 bench: $(READY_DEV) ## measure speed, memory and accuracy; write bench/results
-	$(BIN)/python bench/run.py
+	set -e; for program in bench/*.py; do $(BIN)/python $$program; done
 
 clean: ## remove everything that is derived
 	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -1,16 +1,35 @@
 """Predictions: what they rest on, what they refuse, and their numbers against the thesis and coth."""
 
 import cmath
+import csv
+import io
 import math
+import tracemalloc
 
+import mpmath
+import numpy as np
 import pytest
+from line_cases import PLATE as LINE_PLATE
 
 from sensorgen import materials, planner
 from sensorgen.design import make
-from sensorgen.errors import MissingValue
+from sensorgen.errors import MissingValue, OutOfRange
 from sensorgen.interval import Interval
-from sensorgen.planner import Unpredictable, capacitance
-from sensorgen.predict import TONES_HZ, prediction
+from sensorgen.models import line
+from sensorgen.planner import Unpredictable, capacitance, sensor_of
+from sensorgen.predict import (
+    FORCES_N,
+    LARGEST,
+    NOISE,
+    ROWS,
+    TONES_HZ,
+    csv_blocks,
+    grid,
+    moves,
+    positions_mm,
+    prediction,
+    presses,
+)
 
 EPS = {"x60": 4.68, "air": 1.00059}
 TABLE_3_2 = {"top_electrode": "etpu@thesis-3.2", "bottom_electrode": "etpu@thesis-3.2"}  # 1.2 S/m
@@ -180,3 +199,192 @@ def test_when_all_refuse_their_reasons_are_told(ladder):
     ladder(Model(0, 1.0, 2.0, reason="too slanted"), Model(1, 1.4, 1.5, reason="too tall"))
     with pytest.raises(Unpredictable, match="m0: too slanted; m1: too tall"):
         capacitance(make({"shape": "tri"}).drawn, EPS)
+
+
+def test_other_tones():
+    found = prediction(make({"shape": "reference"}), [1e3, 1e6])
+    assert [row["frequency_hz"] for row in found["impedance_ohm"]] == [1e3, 1e6]
+    resistance = sum(found["electrode_resistance_ohm"].values())
+    y = 2j * math.pi * 1e6 * PLATE_F
+    z = cmath.sqrt(resistance / y) / cmath.tanh(cmath.sqrt(resistance * y))
+    assert (found["impedance_ohm"][1]["re"], found["impedance_ohm"][1]["im"]) == (
+        close(z.real, 1e-9),
+        close(z.imag, 1e-9),
+    )
+
+
+@pytest.fixture(scope="module")
+def plate():
+    """The plate of Table 3.1, free to give way (B.49), and its design."""
+    design = make({"shape": "reference"})
+    return design, sensor_of(design)
+
+
+def exact(f, force, x_mm):
+    """B.53 and B.49 with 40 digits: three sections by their transfer, the tip of 10 mm wholly on the sensor."""
+    with mpmath.workdps(40):
+        r = mpmath.mpf("0.07") / (mpmath.mpf("3e-4") * mpmath.mpf("0.01")) * (1 + mpmath.mpf(20) / 7)
+        loose = (
+            2j * mpmath.pi * mpmath.mpf(f) * mpmath.mpf("8.8541878128e-12") * mpmath.mpf("4.68") * mpmath.mpf("0.01")
+        )
+        loose /= mpmath.mpf("6e-4")
+        pressed = loose / (1 - mpmath.mpf(force) / (mpmath.mpf("0.01") ** 2 * 6000000))
+        left = mpmath.mpf(x_mm) / 1000 - mpmath.mpf("0.005")
+        z = mpmath.inf
+        for y, length in ((loose, mpmath.mpf("0.09") - left), (pressed, mpmath.mpf("0.01")), (loose, left)):
+            if length < 1e-30:
+                continue
+            zc, t = mpmath.sqrt(r / y), mpmath.tanh(mpmath.sqrt(r * y) * length)
+            z = zc / t if z == mpmath.inf else zc * (z + zc * t) / (zc + z * t)
+        return complex(z)
+
+
+def test_the_grid_is_the_line_with_forty_digits(plate):
+    """Re Z by itself: it is a thousandth of |Z| and holds what tells of position."""
+    tones, forces, at = (1.1e3, 99.7e3), (0.0, 3.0, 6.0), (7.0, 50.0, 95.0)
+    z = grid(plate[1].sensor, tones, forces, np.array(at) * 1e-3)
+    assert z.shape == (2, 3, 3)
+    for k, f in enumerate(tones):
+        for j, force in enumerate(forces):
+            for i, x in enumerate(at):
+                assert z[k, j, i].real == close(exact(f, force, x).real, 1e-10)
+                assert z[k, j, i].imag == close(exact(f, force, x).imag, 1e-12)
+
+
+def test_at_the_ends_the_tip_overhangs_and_presses_on_what_is_left(plate):
+    z = grid(plate[1].sensor, [99.7e3], [3.0], [0.0, 0.1])[0, 0]
+    for value, left in zip(z, (0.0, 0.095), strict=True):
+        alone = line.impedance(**LINE_PLATE | {"L_p_m": 0.005, "x_p_left_edge_m": left})
+        assert (value.real, value.imag) == (close(alone.real, 1e-12), close(alone.imag, 1e-12))
+
+
+def test_positions_span_the_sensor_and_end_on_it():
+    for length in (100.0, 33.0, 177.8, 12.3):
+        found = positions_mm(make({"shape": "reference", "parameters": {"length_mm": length}}))
+        assert len(found) == 101
+        assert (found[0], found[50], found[-1]) == (0.0, pytest.approx(length / 2), length)
+        assert list(found) == sorted(set(found))
+
+
+def test_forces_that_are_taken_where_none_is_named():
+    assert tuple(k / 10 for k in range(61)) == FORCES_N
+
+
+@pytest.mark.parametrize(
+    ("forces", "at_mm", "said"),
+    [
+        ([1.0, 299.0, 300.0, 400.0], [0.0, 50.0], "force 300 N at position 0 mm: the stress thins the film by 1: at 1 "
+         r"its electrodes touch \(Eq. B.49\); expected up to 299 N there, or a longer tip"),
+        ([299.9, 600.0], [50.0], "force 600 N at position 50 mm: .* expected up to 299.9 N there, or a longer tip"),
+        ([700.0], [100.0], "force 700 N at position 100 mm: .* electrodes touch .*; expected less, or a longer tip"),
+        ([1.0], [50.0, 100.001], "position 100.001 mm is outside the sensor; expected 0 to 100 mm"),
+    ],
+)  # fmt: skip
+def test_presses_without_an_answer(plate, forces, at_mm, said):
+    """Half the tip carries at the ends: 0.01 x 0.005 m2 x 6 MPa = 300 N."""
+    with pytest.raises(OutOfRange, match=said):
+        grid(plate[1].sensor, [1e3], forces, np.array(at_mm) * 1e-3)
+    with pytest.raises(OutOfRange, match=said):
+        next(csv_blocks(plate[1].sensor, [1e3], forces, at_mm))
+
+
+def test_a_force_beyond_a_solved_curve_is_named_once():
+    """Three times 100 kPa on 10 x 10 mm2 are 30 N."""
+    design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})
+    with pytest.raises(OutOfRange, match="force 31 N at position 50 mm") as caught:
+        grid(sensor_of(design).sensor, [1e3], [29.0, 31.0, 33.0], [0.05])
+    assert str(caught.value).endswith("; expected up to 29 N there, or a longer tip")
+    assert str(caught.value).count("press") == 0
+
+
+def test_presses_as_plain_data(plate):
+    design, sensed = plate
+    found = presses(design, sensed, (1e3, 2e3), (0.0, 1.0, 2.0), (0.0, 50.0))
+    assert found["axes"] == ["frequency_hz", "force_n", "position_mm"]
+    assert np.shape(found["re_ohm"]) == np.shape(found["im_ohm"]) == (2, 3, 2)
+    assert found["re_ohm"][1][2][1] == close(exact(2e3, 2, 50).real, 1e-10)
+    assert found["im_ohm"][1][2][1] == close(exact(2e3, 2, 50).imag, 1e-12)
+    assert found["model"] == {"capacitance": "columns", "line": "line", "compression": "unconfined"}
+    assert (found["design"], found["design_id"], found["tip_mm"]) == (design.name, design.id(), 10.0)
+    assert "free to give way" in found["compression"]
+    assert found["doubts"] == list(sensed.doubts) != []
+    assert {v["quantity"] for v in found["values"]} == {
+        "relative_permittivity",
+        "resistivity_ohm_m",
+        "youngs_modulus_pa",
+    }
+
+
+def test_a_stress_beyond_the_solved_points_is_doubtful():
+    design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})
+    sensed = sensor_of(design)
+    assert presses(design, sensed, [1e3], [9.99], [50.0])["doubts"] == []
+    assert presses(design, sensed, [1e3], [1.0, 10.01], [50.0])["doubts"] == [
+        "above 100 kPa the curve is extended by its last slope"
+    ]
+    assert presses(design, sensed, [1e3], [6.0], [50.0, 100.0])["doubts"] != []
+
+
+def test_too_many_impedances_for_the_memory(plate):
+    said = (
+        f"1 x 1415 x 1414 tones, forces and positions; expected at most {LARGEST} impedances at once: use larger steps"
+    )
+    with pytest.raises(OutOfRange, match=said):
+        presses(*plate, [1e3], range(1415), np.linspace(0, 100, 1414))
+
+
+def test_moves_are_counted_in_deviations_of_a_reading():
+    """By hand: |Z| = 5 ohm at most, so a reading's deviation is 5 milliohm."""
+    re = [[[3.0, 3.0, 3.0], [3.0, 3.01, 2.99]]]
+    im = [[[-4.0, -4.0, -4.0], [-3.9, -3.98, -3.9]]]
+    (found,) = moves({"re_ohm": re, "im_ohm": im})
+    assert found == pytest.approx(
+        {"re_by_force": 2.0, "re_by_position": 4.0, "im_by_force": 4.0, "im_by_position": 16.0}, rel=1e-3
+    )
+    (louder,) = moves({"re_ohm": re, "im_ohm": im}, noise=1e-2)
+    assert louder["re_by_force"] == pytest.approx(found["re_by_force"] / 10)
+    assert NOISE == 1e-3
+
+
+def read(blocks):
+    rows = list(csv.reader(io.StringIO("".join(blocks))))
+    return rows[0], np.array(rows[1:], float)
+
+
+def test_csv_holds_what_the_plain_data_hold(plate):
+    design, sensed = plate
+    axes = (TONES_HZ, (0.0, 0.1, 0.2), (0.0, 3.0, 99.9))
+    head, rows = read(csv_blocks(sensed.sensor, *axes))
+    assert head[:6] == ["force_n", "position_mm", "re_ohm_1.1kHz", "im_ohm_1.1kHz", "re_ohm_2.3kHz", "im_ohm_2.3kHz"]
+    assert head[-1] == "im_ohm_99.7kHz"
+    assert rows[:, :2].tolist() == [[f, x] for f in axes[1] for x in axes[2]]
+    found = presses(design, sensed, *axes)
+    for k in range(7):
+        assert rows[:, 2 + 2 * k] == close(np.ravel(found["re_ohm"][k]), 1e-14)
+        assert rows[:, 3 + 2 * k] == close(np.ravel(found["im_ohm"][k]), 1e-14)
+
+
+@pytest.mark.parametrize("count", [ROWS - 1, ROWS, ROWS + 1])
+def test_csv_loses_no_row_between_blocks(plate, count):
+    at = np.linspace(5, 95, count)
+    blocks = list(csv_blocks(plate[1].sensor, [1e3], [1.0, 2.0], at))
+    assert [text.count("\n") for text in blocks[1:]] == [ROWS] * (2 * count // ROWS) + (
+        [2 * count % ROWS] if 2 * count % ROWS else []
+    )
+    _, rows = read(blocks)
+    assert np.array_equal(rows[:, 1], np.tile(at, 2))
+    assert np.array_equal(rows[:, 0], np.repeat([1.0, 2.0], count))
+    assert rows[count, 2] == close(exact(1e3, 2, 5).real, 1e-10)
+
+
+def test_csv_of_many_rows_needs_no_more_memory(plate):
+    """A block of rows is what is held, however many there are."""
+    peaks = []
+    for forces in (20, 80):
+        blocks = csv_blocks(plate[1].sensor, [1e3], np.linspace(0, 6, forces), np.linspace(0, 100, 1000))
+        tracemalloc.start()
+        rows = sum(text.count("\n") for text in blocks)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert rows == 80_001
+    assert peaks[1] < 1.1 * peaks[0] < 10e6

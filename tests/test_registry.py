@@ -8,7 +8,7 @@ from sensorgen.findings import Finding
 
 
 def test_names_are_those_of_the_files():
-    assert registry.names(shapes) == ["rect", "reference", "tri"]
+    assert registry.names(shapes) == ["double", "rect", "reference", "tri"]
     assert "columns" in registry.names(models)
 
 

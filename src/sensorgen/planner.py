@@ -176,24 +176,28 @@ def sensor_of(design: Design, law: str = "", tip_m: float = TIP_M) -> Sensed:
     return Sensed(sensor, (*found.taken, *moduli), doubts)
 
 
+def is_plate(answer: Answer) -> bool:
+    """Whether a capacitance is that of a solid plate, which has no other bounds than itself."""
+    return answer.capacitance_f.width() < _EXACT
+
+
 def _compression(design: Design, answer: Answer, law: str) -> tuple[Compression, tuple[Taken, ...], tuple[str, ...]]:
     """The law of compression, the moduli that it rests on, and what to doubt about it."""
     if law not in ("", *LAWS):
         raise UnknownName("law of compression", law, LAWS)
-    plate = answer.capacitance_f.width() < _EXACT
     moduli = {t.material: t for t in _moduli(design)}
     film = moduli[design.materials.dielectric.partition("@")[0]]
     solved = compression.solved(design.shape, vars(design.params), {n: t.value for n, t in moduli.items()})
     if solved and not law:
         return solved, tuple(moduli.values()), ()
     if law == "bonded":
-        if not plate:
+        if not is_plate(answer):
             raise OutOfRange(
                 f"the law 'bonded' speaks of a solid plate; {design.shape} has gaps: expected 'unconfined'"
             )
         return compression.bonded(film.value, design.params.width_mm * M_PER_MM, _gap_m(design)), (film,), ()
     doubt = "a plate free to give way sideways: bonded to its electrodes it would be stiffer"
-    if not plate:
+    if not is_plate(answer):
         doubt = (
             f"{design.shape} taken to give way as a free solid plate of {film.material} (B.49): its cell was not solved"
         )

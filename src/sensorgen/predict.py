@@ -1,21 +1,47 @@
 """What a design should measure, by the cheapest models that can speak of it."""
 
 import math
+from bisect import bisect_left
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sensorgen.card import card
 from sensorgen.design import Design
-from sensorgen.errors import MissingValue
+from sensorgen.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.interval import Interval
 from sensorgen.models import line
-from sensorgen.planner import Unloaded, Unpredictable, unloaded
-from sensorgen.units import M_PER_MM
+from sensorgen.planner import TIP_M, Sensed, Unloaded, Unpredictable, is_plate, sensor_of, unloaded
+from sensorgen.sensor import Sensor
+from sensorgen.units import M_PER_MM, frequency_text
 
 TONES_HZ = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)  # thesis, Table 5.1, its 4990 corrected
+NOISE = 1e-3  # standard deviation of the real and of the imaginary part, relative to the impedance's magnitude [-]
+LARGEST = 2_000_000  # impedances that are kept in memory at once
+ROWS = 4096  # of CSV at a time
+FORCES_N = tuple(k / 10 for k in range(61))  # up to the thesis's 6 N
+
+Complex = NDArray[np.complex128]
 
 
-def prediction(design: Design) -> dict[str, Any]:
+def prediction(
+    design: Design, frequency_hz: Sequence[float] = TONES_HZ, law: str = "", tip_m: float = TIP_M
+) -> dict[str, Any]:
     """Everything that is predicted of a design, as plain data for ``prediction.json`` (SI units).
 
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    frequency_hz : sequence of float
+        Tones of the impedance [Hz].
+    law, tip_m : str, float
+        Law of compression and length of the tip [m] for the identifiability card, as of :func:`planner.sensor_of`.
+
+    Notes
+    -----
     A scene that no model can speak of, as a short, or a material without a value has a reason in place of numbers.
     """
     try:
@@ -30,7 +56,8 @@ def prediction(design: Design) -> dict[str, Any]:
         "capacitance_f": _bounds(found.answer.capacitance_f),
         "capacitance_per_area_f_per_m2": _bounds(found.answer.capacitance_f.times(1 / area)),
         "electrode_resistance_ohm": resistance,
-        **_line(sum(resistance.values()), found.answer.capacitance_f),
+        **_line(sum(resistance.values()), found.answer.capacitance_f, frequency_hz),
+        "identifiability": _card(design, found, frequency_hz, law, tip_m),
         "values": [vars(t) for t in found.taken],
         "assumptions": [
             "ideal electrodes and no fringe at the sensor's edge for the capacitance",
@@ -41,6 +68,16 @@ def prediction(design: Design) -> dict[str, Any]:
     }
 
 
+def _card(design: Design, found: Unloaded, frequency_hz: Sequence[float], law: str, tip_m: float) -> dict[str, Any]:
+    """The identifiability card with the doubts about its sensor, or why there is none."""
+    try:
+        sensed = sensor_of(design, law, tip_m)
+        stiffest = sensor_of(design, "bonded", tip_m).sensor if is_plate(found.answer) and not law else None
+        return card(sensed.sensor, frequency_hz, NOISE, stiffest=stiffest) | {"doubts": list(sensed.doubts)}
+    except SensorgenError as error:
+        return {"verdict": None, "reason": str(error)}
+
+
 def _resistance_ohm(design: Design, found: Unloaded) -> dict[str, float]:
     """Resistance of each electrode's plate from end to end, rho L / (H W) [ohm]."""
     p = design.params
@@ -48,11 +85,11 @@ def _resistance_ohm(design: Design, found: Unloaded) -> dict[str, float]:
     return {end: rho * squares_per_m for end, rho in zip(("top", "bottom"), found.resistivity_ohm_m, strict=True)}
 
 
-def _line(resistance_ohm: float, capacitance_f: Interval) -> dict[str, Any]:
+def _line(resistance_ohm: float, capacitance_f: Interval, frequency_hz: Sequence[float]) -> dict[str, Any]:
     """Corner frequency and impedance at the tones, for both bounds of the capacitance."""
     ends = (capacitance_f.lower, capacitance_f.middle(), capacitance_f.upper)
     corner = [line.corner_frequency_hz(resistance_ohm, c) for c in ends]
-    admittance = [[2j * math.pi * f * c for c in ends] for f in TONES_HZ]
+    admittance = [[2j * math.pi * f * c for c in ends] for f in frequency_hz]
     rows = line.cascade([resistance_ohm], [admittance], [1.0])  # per the sensor's own length
     return {
         "corner_frequency_hz": {"lower": corner[2], "middle": corner[1], "upper": corner[0]},
@@ -64,10 +101,199 @@ def _line(resistance_ohm: float, capacitance_f: Interval) -> dict[str, Any]:
                 "re_range": [float(row.real.min()), float(row.real.max())],
                 "im_range": [float(row.imag.min()), float(row.imag.max())],
             }
-            for f, row in zip(TONES_HZ, rows, strict=True)
+            for f, row in zip(frequency_hz, rows, strict=True)
         ],
     }
 
 
 def _bounds(interval: Interval) -> dict[str, float]:
     return {"lower": interval.lower, "middle": interval.middle(), "upper": interval.upper}
+
+
+def grid(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> Complex:
+    """Impedance for every tone, force and position, in this order of axes [ohm].
+
+    Parameters
+    ----------
+    sensor : Sensor
+        That is pressed.
+    frequency_hz, force_n, position_m : (n,) array
+        Tones [Hz], forces [N] and centres of the tip [m].
+
+    Returns
+    -------
+    (n_frequency, n_force, n_position) complex array
+        Impedance [ohm]; memory is that of the answer.
+
+    Raises
+    ------
+    OutOfRange
+        A position outside the sensor, or a force that it cannot bear; the message names it.
+
+    Examples
+    --------
+    >>> from sensorgen.models.compression import unconfined
+    >>> plate = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), 69.06e-11, unconfined(6e6))
+    >>> grid(plate, [1.1e3, 99.7e3], [0.0, 3.0, 6.0], [0.02, 0.05]).shape
+    (2, 3, 2)
+    """
+    f, force, at = (np.asarray(values, float) for values in (frequency_hz, force_n, position_m))
+    check_presses(sensor, force, at)
+    return sensor.impedance(f[:, None, None], force[:, None], at)
+
+
+def check_presses(sensor: Sensor, force_n: ArrayLike, position_m: ArrayLike) -> None:
+    """Refuse presses that the sensor has no answer for.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        That is pressed.
+    force_n, position_m : (n,) array
+        Forces, rising [N]; centres of the tip [m].
+
+    Raises
+    ------
+    OutOfRange
+        A position outside the sensor; a force that makes the electrodes touch or is beyond the law of compression:
+        the first one, where the tip rests on least.
+    """
+    force, at = np.asarray(force_n, float), np.asarray(position_m, float)
+    hardest = float(at[np.argmin(sensor.patch(at).length_m)])
+    first = bisect_left(force, True, key=lambda value: bool(_refusal(sensor, value, hardest)))
+    if first < len(force):
+        fine = f"up to {force[first - 1]:g} N there" if first else "less"
+        where = f"force {force[first]:g} N at position {hardest / M_PER_MM:g} mm"
+        raise OutOfRange(f"{where}: {_refusal(sensor, force[first], hardest)}; expected {fine}, or a longer tip")
+
+
+def _refusal(sensor: Sensor, force_n: float, position_m: float) -> str:
+    """Why a press has no answer, "" if it has one."""
+    try:
+        sensor.compression.thinning(sensor.stress_pa(force_n, position_m))
+    except OutOfRange as error:
+        return str(error).partition(": press less")[0]
+    return ""
+
+
+def positions_mm(design: Design) -> tuple[float, ...]:
+    """A hundred equal steps along a design's sensor [mm]."""
+    length = float(design.params.length_mm)
+    return (*(length * k / 100 for k in range(100)), length)
+
+
+def presses(
+    design: Design,
+    sensed: Sensed,
+    frequency_hz: Sequence[float],
+    force_n: Sequence[float],
+    position_mm: Sequence[float],
+) -> dict[str, Any]:
+    """Impedance over tone, force and position, and what it rests on, as plain data.
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    sensed : Sensed
+        Its sensor.
+    frequency_hz, force_n, position_mm : sequence of float
+        Tones [Hz], forces [N] and centres of the tip [mm], each rising.
+
+    Returns
+    -------
+    dict
+        ``re_ohm`` and ``im_ohm`` are nested lists with the axes that ``axes`` names.
+
+    Raises
+    ------
+    OutOfRange
+        As :func:`grid`; also more than ``LARGEST`` impedances.
+    """
+    check_size(LARGEST, frequency_hz, force_n, position_mm)
+    sensor, position_m = sensed.sensor, np.asarray(position_mm) * M_PER_MM
+    z = grid(sensor, frequency_hz, force_n, position_m)
+    law = sensor.compression
+    beyond = law.doubt(float(sensor.stress_pa(force_n[-1], position_m).max()))
+    return {
+        "design": design.name,
+        "design_id": design.id(),
+        "model": {"capacitance": unloaded(design).answer.model, "line": "line", "compression": law.name},
+        "compression": law.source,
+        "tip_mm": sensor.tip_m / M_PER_MM,
+        "doubts": [*sensed.doubts, *([beyond] if beyond else [])],
+        "values": [vars(t) for t in sensed.taken],
+        "axes": ["frequency_hz", "force_n", "position_mm"],
+        "frequency_hz": list(frequency_hz),
+        "force_n": list(force_n),
+        "position_mm": list(position_mm),
+        "re_ohm": z.real.tolist(),
+        "im_ohm": z.imag.tolist(),
+    }
+
+
+def check_size(most: int, *axes: Sequence[float]) -> None:
+    """Refuse more than ``most`` impedances."""
+    counts = [len(axis) for axis in axes]
+    if math.prod(counts) > most:
+        said = " x ".join(map(str, counts))
+        raise OutOfRange(
+            f"{said} tones, forces and positions; expected at most {most} impedances at once: use larger steps, or CSV"
+        )
+
+
+def moves(predicted: Mapping[str, Any], noise: float = NOISE) -> list[dict[str, float]]:
+    """How far presses move R and X of each tone, in standard deviations of one reading.
+
+    Parameters
+    ----------
+    predicted : mapping
+        As of :func:`presses`.
+    noise : float
+        Of the real and of the imaginary part, relative to the impedance's magnitude [-].
+
+    Returns
+    -------
+    list of dict
+        Per tone: by force at the middle position, and by position at the largest force [-].
+    """
+    found = []
+    for re, im in zip(np.asarray(predicted["re_ohm"]), np.asarray(predicted["im_ohm"]), strict=True):
+        deviation, middle = noise * np.hypot(re, im).max(), re.shape[1] // 2
+        found.append(
+            {
+                f"{name}_by_{axis}": float(np.ptp(part) / deviation)
+                for name, values in (("re", re), ("im", im))
+                for axis, part in (("force", values[:, middle]), ("position", values[-1]))
+            }
+        )
+    return found
+
+
+def csv_blocks(
+    sensor: Sensor, frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float]
+) -> Iterator[str]:
+    """Impedances as CSV, a row per force and position, ``ROWS`` rows at a time after the head.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        That is pressed.
+    frequency_hz, force_n, position_mm : sequence of float
+        Tones [Hz], forces [N] and centres of the tip [mm].
+
+    Raises
+    ------
+    OutOfRange
+        As :func:`grid`, before the first block.
+    """
+    tones, force, at = (np.asarray(values, float) for values in (frequency_hz, force_n, position_mm))
+    check_presses(sensor, force, at * M_PER_MM)
+    names = [f"{part}_ohm_{frequency_text(f)}" for f in frequency_hz for part in ("re", "im")]
+    yield ",".join(["force_n", "position_mm", *names]) + "\n"
+    for start in range(0, force.size * at.size, ROWS):
+        by_force, by_position = np.divmod(np.arange(start, min(start + ROWS, force.size * at.size)), at.size)
+        f, x = force[by_force], at[by_position]
+        z = sensor.impedance(tones[:, None], f, x * M_PER_MM)
+        rows = np.column_stack([f, x, *(part for row in z for part in (row.real, row.imag))]).tolist()
+        yield "".join(",".join(map(repr, row)) + "\n" for row in rows)

@@ -80,7 +80,7 @@ class Body:
     prisms : tuple of Prism
         They do not overlap. Boxes that share a face are one solid; other prisms touch at most along edges.
     terminal : str
-        "top" or "bottom" where it is connected to an electrode's contact, else "".
+        "top", "middle" or "bottom" where it is connected to an electrode's contact, else "".
     """
 
     name: str

@@ -3,7 +3,7 @@
 import pytest
 
 HEAVY = ("numpy", "pydantic", "yaml", "build123d", "trimesh", "OCP", "manifold3d")
-CAD = ("build123d", "trimesh", "OCP", "matplotlib", "scipy")
+CAD = ("build123d", "trimesh", "OCP", "matplotlib", "scipy", "plotly", "sensorgen.plots")
 LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))"
 
 
@@ -17,6 +17,7 @@ LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))
         (["completion", "zsh"], HEAVY),
         (["check", "tri"], CAD),
         (["predict", "tri"], CAD),
+        (["predict", "tri", "--force", "0:6:1"], CAD),
         (["draw", "tri", "-o", "-"], CAD),
         (["build", "tri", "--no-cad"], CAD),
         (["list", "materials"], CAD),

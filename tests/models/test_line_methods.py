@@ -1,8 +1,10 @@
 """The other ways to compute the line: right where they should be, and each seen to die where it does."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from line_cases import PLATE, cases, exact, off
+from line_cases import PLATE, TONES, cases, exact, off
 
 from sensorgen.errors import OutOfRange, UnknownName
 from sensorgen.models import line, line_abcd, line_closed, line_ladder
@@ -59,6 +61,20 @@ def test_the_misprints_and_their_effect():
     assert line_closed.impedance("B.42", **one) == pytest.approx(z, rel=1e-12)
     with pytest.raises(UnknownName, match=r"B\.48"):
         line_closed.impedance("B.47", **one)
+
+
+def test_the_table_of_misprints_in_the_docs():
+    text = (Path(__file__).parents[2] / "docs" / "line.md").read_text("utf-8")
+    rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in text.splitlines() if row.startswith("| B.")]
+    rows = [row for row in rows if ".." in row[-1]]
+    assert [(row[0], float(row[1])) for row in rows] == [(p, f / 1e3) for p in line_closed.PRINTED for f in TONES]
+    places = {"F_N": np.linspace(0, 6, 5)[:, None], "x_p_left_edge_m": np.linspace(0, 0.09, 5)}
+    for printed, kilohertz, *spans in rows:
+        inputs = PLATE | places | {"f_Hz": float(kilohertz) * 1e3}
+        z, wrong = line.impedance(**inputs), line_closed.impedance(printed, **inputs)
+        ratios = (np.abs(wrong / z - 1), wrong.real / z.real, wrong.imag / z.imag)
+        for ratio, span in zip(ratios, spans, strict=True):
+            assert [float(v) for v in span.split("..")] == pytest.approx([ratio.min(), ratio.max()], rel=6e-3)
 
 
 @pytest.mark.parametrize(("printed", "least"), [("B.39", 0.5), ("B.42", 0.05), ("B.48", 0.5)])

@@ -79,8 +79,8 @@ def through_ngspice(inputs, cells: int, folder) -> complex:
 def test_ngspice_solves_the_same_ladder(f, tmp_path):
     if NGSPICE is None:
         if os.environ.get("CI"):
-            pytest.fail("ngspice is not installed, though scripts/system-packages --slicers installs it")
-        pytest.skip("ngspice is not installed: scripts/system-packages --slicers")
+            pytest.fail("ngspice is not installed, though scripts/system-packages --programs installs it")
+        pytest.skip("ngspice is not installed: scripts/system-packages --programs")
     inputs = PLATE | {"f_Hz": f}
     theirs = through_ngspice(inputs, 100, tmp_path)
     assert theirs == pytest.approx(line_ladder.impedance(100, **inputs), rel=1e-8)

@@ -1,6 +1,7 @@
 """Rules 1 and 2: the electrodes stay apart, and the film between them is printed as drawn."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 from sensorgen.checks.slices import TOUCH_MM, Layers, Slices
 from sensorgen.checks.widths import VANISHES
@@ -8,10 +9,27 @@ from sensorgen.findings import Finding
 from sensorgen.printer import Printer, Quality
 from sensorgen.scene import Body, Scene
 
+Pair = tuple[Body, Body]
+
 
 def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> Iterator[Finding]:
-    """Findings about the electrode gap; ``gap_mm`` is the exact smallest distance of the electrodes."""
-    low, high = _electrodes(slices.scene)
+    """Findings about the electrode gaps; ``gap_mm`` is the exact smallest distance of the electrodes.
+
+    Of three electrodes or more, neighbours are held apart by plates: there the distance is that of their faces.
+    """
+    pairs = list(pairwise(_electrodes(slices.scene)))
+    for pair in pairs:
+        yield from _between_two(pair, slices, printer, quality, gap_mm if len(pairs) == 1 else _apart_mm(pair))
+
+
+def _apart_mm(pair: Pair) -> float:
+    """Height from the lower electrode's top to the upper one's lowest place [mm]."""
+    low, high = pair
+    return round(min(p.span("z")[0] for p in high.prisms) - max(p.span("z")[1] for p in low.prisms), 9)
+
+
+def _between_two(pair: Pair, slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> Iterator[Finding]:
+    low, high = pair
     names = f"{low.name} / {high.name}"
     place = (0.0, 0.0, max(p.span("z")[1] for p in low.prisms))
     layer = quality.layer_mm
@@ -31,7 +49,7 @@ def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> 
         )  # fmt: skip
         return
     yield from _film(names, place, layer, gap_mm, printed_mm)
-    yield from _printed(slices, printer, gap_mm)
+    yield from _printed(pair, slices, printer, gap_mm)
 
 
 def _between(layers: Layers, bottom_mm: float, thickness_mm: float) -> float:
@@ -58,18 +76,18 @@ def _film(
         )  # fmt: skip
 
 
-def _printed(slices: Slices, printer: Printer, gap_mm: float) -> Iterator[Finding]:
+def _printed(pair: Pair, slices: Slices, printer: Printer, gap_mm: float) -> Iterator[Finding]:
     """What the gap becomes when narrow features vanish."""
     tracks = {
         "Arachne": VANISHES * printer.nozzle_mm,
         "classic walls or plain Cura": printer.line_mm() - 2 * TOUCH_MM,  # a whole line prints
         "Cura filling outline gaps": 0.0,
     }
-    gaps = {slicer: printed_gap_mm(slices, least) for slicer, least in tracks.items()}
+    gaps = {slicer: printed_gap_mm(pair, slices, least) for slicer, least in tracks.items()}
     if all(gap is not None and abs(gap - gap_mm) <= TOUCH_MM for gap in gaps.values()):
         return
     said = ", ".join(f"{slicer}: {'nothing prints' if gap is None else f'{gap:g} mm'}" for slicer, gap in gaps.items())
-    low, high = _electrodes(slices.scene)
+    low, high = pair
     worst = max((gap for gap in gaps.values() if gap is not None), default=None)
     yield Finding(
         "2-printed-gap", "warning", f"{low.name} / {high.name}",
@@ -79,17 +97,16 @@ def _printed(slices: Slices, printer: Printer, gap_mm: float) -> Iterator[Findin
     )  # fmt: skip
 
 
-def printed_gap_mm(slices: Slices, least_mm: float) -> float | None:
-    """Distance of the electrodes when stretches up to ``least_mm`` wide are not printed; None without them [mm]."""
-    low, high = (slices.printed_layers(body, least_mm) for body in _electrodes(slices.scene))
+def printed_gap_mm(pair: Pair, slices: Slices, least_mm: float) -> float | None:
+    """Distance of the two electrodes when stretches up to ``least_mm`` wide are not printed; None without them [mm]."""
+    low, high = (slices.printed_layers(body, least_mm) for body in pair)
     if not low or not high:
         return None
     boundaries = slices.layers.boundaries_mm
     return round(boundaries[high[0]] - boundaries[low[-1] + 1], 9)
 
 
-def _electrodes(scene: Scene) -> tuple[Body, Body]:
-    """The terminals' bodies, the one nearer to the bed first."""
+def _electrodes(scene: Scene) -> list[Body]:
+    """The terminals' bodies, the one nearest to the bed first."""
     bodies = [b for b in scene.bodies if b.terminal]
-    low, high = sorted(bodies, key=lambda b: min(p.span("z")[0] for p in b.prisms))
-    return low, high
+    return sorted(bodies, key=lambda b: min(p.span("z")[0] for p in b.prisms))

@@ -12,7 +12,7 @@ import click
 from sensorgen import __version__
 from sensorgen.errors import SensorgenError, Unprintable
 
-COMMANDS = ("build", "check", "draw", "predict", "list", "schema", "completion")
+COMMANDS = ("build", "check", "draw", "predict", "invert", "sheet", "stack", "list", "schema", "completion")
 WRONG_INPUT = 2
 FOUND_ERRORS = 1
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import show
+from sensorgen.cli import card_text, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
@@ -50,6 +50,8 @@ def _work(design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool
     show.findings(built.review.findings)
     click.echo()
     show.prediction(built.prediction)
+    for line in card_text.of_prediction(built.prediction):
+        click.echo(line)
     click.echo(f"\n{built.folder}: {len(files)} files; {show.summary(built.review)}")
     return 0
 

@@ -1,28 +1,159 @@
 """``sensorgen predict``: what the bench should measure."""
 
-from typing import TYPE_CHECKING
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from sensorgen.cli import show
+from sensorgen import units
+from sensorgen.cli import card_text, show
 from sensorgen.cli.designs import DesignGroup
+from sensorgen.cli.words import Length, OneOf, Values
+from sensorgen.errors import BadInput, Unwritable
 
 if TYPE_CHECKING:
     from sensorgen.design import Design
+    from sensorgen.planner import Sensed
 
-OWN: list[click.Parameter] = [click.Option(["--json", "as_json"], is_flag=True, help="Print the prediction as JSON.")]
+Axes = tuple[Sequence[float], Sequence[float], Sequence[float]]
+
+OWN: list[click.Parameter] = [
+    click.Option(
+        ["--force", "force_n"], type=Values(units.FORCE_N, zero=True),
+        help="Forces as START:STOP:STEP, one, or a list [N]; 0:6:0.1 where only positions are given.",
+    ),
+    click.Option(
+        ["--position", "position_mm"], type=Values(units.LENGTH_MM, zero=True),
+        help="Positions of the tip's middle [mm]; the whole sensor in 100 steps where only forces are given.",
+    ),
+    click.Option(
+        ["--frequencies", "frequency_hz"], type=Values(units.FREQUENCY_HZ, zero=False),
+        help="Tones, as in 1.1kHz,2.3kHz; the thesis's seven if not given.",
+    ),
+    click.Option(["--tip", "tip_mm"], type=Length(), default="10mm", show_default=True, help="Length of the tip."),
+    click.Option(
+        ["--compression"], type=OneOf(("unconfined", "bonded")),
+        help="How a plate gives way; the best that is known of the cell if not given.",
+    ),
+    click.Option(["--json", "as_json"], is_flag=True, help="Print as JSON."),
+    click.Option(["--csv", "as_csv"], is_flag=True, help="Print R and X as CSV, a row per force and position."),
+    click.Option(["--plot"], metavar="DIR", help="Draw R, X, sensitivities and inverse maps there, as PNG and HTML."),
+    click.Option(["--output", "-o"], metavar="FILE", help="File to write instead of the terminal."),
+]  # fmt: skip
 
 
-def _work(design: "Design", *, as_json: bool) -> int:
-    from sensorgen.predict import prediction
+def _work(
+    design: "Design",
+    *,
+    frequency_hz: Sequence[float] | None,
+    force_n: Sequence[float] | None,
+    position_mm: Sequence[float] | None,
+    tip_mm: float,
+    compression: str | None,
+    **how: Any,
+) -> int:
+    from sensorgen.planner import sensor_of
+    from sensorgen.predict import FORCES_N, TONES_HZ, positions_mm, prediction
 
-    predicted = prediction(design)
-    (show.as_json if as_json else show.prediction)(predicted)
+    _refuse_two(how)
+    tones = frequency_hz or TONES_HZ
+    if not (force_n or position_mm or how["as_csv"] or how["plot"]):
+        predicted = prediction(design, tones, compression or "", tip_mm * units.M_PER_MM)
+        _deliver(_unpressed(predicted, as_json=how["as_json"]), how["output"])
+        return 0
+    sensed = sensor_of(design, compression or "", tip_mm * units.M_PER_MM)
+    _pressed(design, sensed, (tones, force_n or FORCES_N, position_mm or positions_mm(design)), how)
     return 0
+
+
+def _refuse_two(how: dict[str, Any]) -> None:
+    given = [f"--{name.removeprefix('as_')}" for name in ("as_json", "as_csv", "plot") if how[name]]
+    given += ["--output"] if how["output"] and how["plot"] else []
+    if len(given) > 1:
+        raise BadInput(f"{' and '.join(given)} at once; expected one of them")
+
+
+def _unpressed(predicted: dict[str, Any], *, as_json: bool) -> Iterator[str]:
+    """The prediction without a press, and the identifiability card."""
+    if as_json:
+        yield show.json_text(predicted)
+    else:
+        lines = (*show.prediction_lines(predicted), *card_text.of_prediction(predicted))
+        yield from (f"{line}\n" for line in lines)
+
+
+def _pressed(design: "Design", sensed: "Sensed", axes: Axes, how: dict[str, Any]) -> None:
+    from sensorgen.predict import NOISE, csv_blocks, moves, presses
+
+    if how["plot"]:
+        _plot(sensed, axes, Path(how["plot"]))
+    elif how["as_csv"]:
+        _deliver(csv_blocks(sensed.sensor, *axes), how["output"], len(axes[1]) * len(axes[2]))
+    else:
+        predicted = presses(design, sensed, *axes)
+        lines = (f"{line}\n" for line in show.presses(predicted, moves(predicted), NOISE))
+        _deliver(show.json_lines(predicted) if how["as_json"] else lines, how["output"])
+
+
+def _plot(sensed: "Sensed", axes: Axes, folder: Path) -> None:
+    from sensorgen import plots, store
+    from sensorgen.predict import check_presses
+
+    _, force_n, position_mm = axes
+    check_presses(sensed.sensor, force_n, [x * units.M_PER_MM for x in position_mm])
+    with show.progress(plots.STEPS) as step:
+        for name, content in plots.files(sensed.sensor, *axes):
+            step(name)
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise Unwritable(f"cannot write to {str(folder)!r}: {error.strerror or error}") from None
+            store.replace(folder / name, content)
+    for name in plots.STEPS:
+        click.echo(str(folder / name))
+
+
+def _deliver(pieces: Iterator[str], output: str | None, rows: int = 0) -> None:
+    """Print pieces of text as they come, or write them to a file that is there when all of them are."""
+    if output in (None, "-"):
+        for piece in pieces:
+            sys.stdout.write(piece)
+        return
+    from sensorgen.predict import ROWS
+
+    with show.progress([f"{share} %" for share in range(101)]) as step, _beside(Path(str(output))) as file:
+        for k, piece in enumerate(pieces):
+            step(f"{100 * k * ROWS // rows if rows else 100} %")
+            file.write(piece)
+    click.echo(output)
+
+
+@contextmanager
+def _beside(path: Path) -> Iterator[TextIO]:
+    """A file to write to piece by piece, which takes its place when it is whole."""
+    part = path.parent / f".{path.name}.{os.getpid()}.part"
+    try:
+        if path.exists() and not path.is_file():
+            raise Unwritable(f"cannot write {str(path)!r}: it is a folder or a device; expected a file")
+        with part.open("w", encoding="utf-8", newline="\n") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from None
+    finally:
+        with suppress(OSError):
+            part.unlink()
 
 
 command = DesignGroup(
     _work, OWN, name="predict",
-    help="Predict capacitance with its bounds, electrode resistance, corner frequency and impedance.",
-    short_help="Predict capacitance, resistance and impedance.",
+    help="Predict capacitance with its bounds, electrode resistance, corner frequency and impedance; with --force, "
+    "--position, --csv or --plot, R and X over force, position and tone.",
+    short_help="Predict capacitance, resistance and impedance, pressed or not.",
 )  # fmt: skip

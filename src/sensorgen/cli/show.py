@@ -58,8 +58,14 @@ def summary(review: "Review") -> str:
 
 def prediction(predicted: Mapping[str, Any]) -> None:
     """Print the main numbers of a prediction."""
+    for line in prediction_lines(predicted):
+        click.echo(line)
+
+
+def prediction_lines(predicted: Mapping[str, Any]) -> Iterator[str]:
+    """The main numbers of a prediction, as lines."""
     if predicted["capacitance_f"] is None:
-        click.echo(f"no capacitance is predicted: {predicted['reason']}")
+        yield f"no capacitance is predicted: {predicted['reason']}"
         return
     r = predicted["electrode_resistance_ohm"]
     rows = {
@@ -67,14 +73,47 @@ def prediction(predicted: Mapping[str, Any]) -> None:
         "electrodes": f"top {si(r['top'], 'ohm')}, bottom {si(r['bottom'], 'ohm')} end to end",
         "corner frequency": _between(predicted["corner_frequency_hz"], "Hz"),
     }
-    for name, value in rows.items():
-        click.echo(f"{name:17}{value}")
-    click.echo(f"{'impedance at':>17}  {'Re [ohm]':>11}   {'Im [ohm]':>11}   Im at the bounds of C")
+    yield from (f"{name:17}{value}" for name, value in rows.items())
+    yield f"{'impedance at':>17}  {'Re [ohm]':>11}   {'Im [ohm]':>11}   Im at the bounds of C"
     for tone in predicted["impedance_ohm"]:
         low, high = tone["im_range"]
-        click.echo(
-            f"{si(tone['frequency_hz'], 'Hz'):>17}  {tone['re']:11.5g}   {tone['im']:11.5g}   {low:.4g} .. {high:.4g}"
-        )
+        yield f"{si(tone['frequency_hz'], 'Hz'):>17}  {tone['re']:11.5g}   {tone['im']:11.5g}   {low:.4g} .. {high:.4g}"
+
+
+def presses(predicted: Mapping[str, Any], moves: Sequence[Mapping[str, float]], noise: float) -> Iterator[str]:
+    """R and X over force and position, as lines: their ranges, how far they move, and corners at the highest tone."""
+    force, at = predicted["force_n"], predicted["position_mm"]
+    law = predicted["model"]["compression"]
+    yield (
+        f"{predicted['design']}: {_axis(force, 'force', 'N')}, {_axis(at, 'position', 'mm')}; "
+        f"tip {predicted['tip_mm']:g} mm, compression {law}"
+    )
+    yield from (f"doubtful: {doubt}" for doubt in predicted["doubts"])
+    yield ""
+    yield f"{'':10}  {'R [ohm]':^23}  {'X [ohm]':^23}   R moves, X moves by"
+    yield f"{'tone':>10}  {'least':>11} {'most':>11}  {'least':>11} {'most':>11}   force   pos.  force   pos."
+    for f, re, im, move in zip(predicted["frequency_hz"], predicted["re_ohm"], predicted["im_ohm"], moves, strict=True):
+        ranges = "  ".join(f"{min(map(min, v)):11.6g} {max(map(max, v)):11.6g}" for v in (re, im))
+        yield f"{si(f, 'Hz'):>10}  {ranges}  " + " ".join(f"{value:6.2f}" for value in move.values())
+    yield f"Moves are in deviations of one reading, {noise:.2g} of |Z|: by force at {at[len(at) // 2]:g} mm,"
+    yield f"by position at {force[-1]:g} N. Below about 1 a reading alone does not tell."
+    yield ""
+    yield f"R and X [ohm] at {si(predicted['frequency_hz'][-1], 'Hz')}"
+    places = _ends_and_middle(at)
+    yield f"{'':>10}  " + "  ".join(f"{f'{at[k]:g} mm':^25}" for k in places)
+    for j in _ends_and_middle(force):
+        cells = ((predicted["re_ohm"][-1][j][k], predicted["im_ohm"][-1][j][k]) for k in places)
+        yield f"{f'{force[j]:g} N':>10}  " + "  ".join(f"{re:12.7g} {im:12.7g}" for re, im in cells)
+
+
+def _axis(values: Sequence[float], name: str, unit: str) -> str:
+    if len(values) == 1:
+        return f"{name} {values[0]:g} {unit}"
+    return f"{len(values)} {name}s {values[0]:g} to {values[-1]:g} {unit}"
+
+
+def _ends_and_middle(values: Sequence[float]) -> list[int]:
+    return sorted({0, len(values) // 2, len(values) - 1})
 
 
 def _between(bounds: Mapping[str, float], unit: str) -> str:
@@ -96,7 +135,19 @@ def si(value: float, unit: str) -> str:
 
 def as_json(data: Any) -> None:
     """Print plain data as JSON."""
-    click.echo(json.dumps(data, indent=2, ensure_ascii=False))
+    click.echo(json_text(data), nl=False)
+
+
+def json_text(data: Any) -> str:
+    """Plain data as indented JSON."""
+    return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+
+
+def json_lines(data: Mapping[str, Any]) -> Iterator[str]:
+    """Plain data as JSON, a line per key: for long lists of numbers."""
+    for lead, (key, value) in zip(["{", *[","] * (len(data) - 1)], data.items(), strict=True):
+        yield f"{lead}\n  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False, allow_nan=False)}"
+    yield "\n}\n"
 
 
 @contextmanager

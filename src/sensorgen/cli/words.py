@@ -24,6 +24,31 @@ class Length(click.ParamType):  # type: ignore[type-arg]
             raise error.within(_said(param)) from None
 
 
+class Values(click.ParamType):  # type: ignore[type-arg]
+    """Several numbers of one quantity, none negative: ``0:6:0.1``, ``3``, ``1,2,5``, with or without units."""
+
+    def __init__(self, quantity: units.Quantity, *, zero: bool) -> None:
+        """Numbers of ``quantity``; ``zero`` says whether 0 is one of them."""
+        self.quantity, self.zero, self.name = quantity, zero, f"START:STOP:STEP|{quantity.name.upper()},..."
+
+    def convert(
+        self,
+        value: Any,
+        param: click.Parameter | None,
+        ctx: click.Context | None,  # noqa: ARG002
+    ) -> tuple[float, ...]:
+        """Read the numbers, in the quantity's first unit, rising."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            found = units.values(value, self.quantity)
+        except BadInput as error:
+            raise error.within(_said(param)) from None
+        if found[0] < 0 or (found[0] == 0 and not self.zero):
+            raise BadInput(f"{_said(param)}: {found[0]:g}; expected {'0 or more' if self.zero else 'above 0'}")
+        return found
+
+
 class Share(click.ParamType):  # type: ignore[type-arg]
     """A share of one, also in percent."""
 

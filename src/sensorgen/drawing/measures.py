@@ -5,7 +5,7 @@ Numbers only; nothing here knows of paper.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, permutations
 from math import hypot
 
 from sensorgen.drawing.view import SAME_MM, View
@@ -81,15 +81,18 @@ def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
 
 
 def nearest(view: View) -> Gap | None:
-    """Where the two terminals come nearest; of several such places the one nearest to the middle.
+    """Where two terminals come nearest; of several such places the one nearest to the middle.
 
     Looks beyond the view's end where the first period does: its end must not hide the gap.
     """
     middle = view.end_mm / 2
     if view.period_mm and view.period_mm[-1] > view.end_mm:
         view = replace(view, end_mm=view.period_mm[-1])
-    bottom, top = ([o for body, o in view.regions if body.terminal == name] for name in ("bottom", "top"))
-    found = [*_gaps(bottom, top), *_gaps(top, bottom)]
+    terminals: dict[str, list[Outline]] = {}
+    for body, outline in view.regions:
+        if body.terminal:
+            terminals.setdefault(body.terminal, []).append(outline)
+    found = [gap for pair in permutations(terminals.values(), 2) for gap in _gaps(*pair)]
     return min(found, key=lambda gap: (round(gap.value_mm, 6), gap.at_corner, abs(gap.near[0] - middle)), default=None)
 
 

@@ -83,7 +83,7 @@ def _near(a: "manifold3d.Manifold", b: "manifold3d.Manifold") -> bool:
 
 
 def electrode_gap_mm(scene: Scene, meshes: Mapping[str, Mesh]) -> float:
-    """Smallest distance between a body at the top terminal and one at the bottom terminal, exact [mm]."""
-    top, bottom = ([solid(meshes[b.name]) for b in scene.bodies if b.terminal == t] for t in ("top", "bottom"))
+    """Smallest distance between bodies at different terminals, exact [mm]."""
+    ends = [(b.terminal, solid(meshes[b.name])) for b in scene.bodies if b.terminal]
     reach = sum(scene.size_mm)
-    return min(float(a.min_gap(b, reach)) for a in top for b in bottom)
+    return min(float(a.min_gap(b, reach)) for (s, a), (t, b) in combinations(ends, 2) if s != t)

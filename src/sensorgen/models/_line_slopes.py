@@ -1,18 +1,18 @@
-"""Exact derivatives of the pressed line, passed on from section to section."""
+"""Exact derivatives of the pressed line, passed on from section to section; each is worked out only when asked for."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.errors import MissingValue, OutOfRange, UnknownName
-from sensorgen.models._line_inputs import DEFAULTS, Complex, Inputs, in_blocks, read
-from sensorgen.models._tanhc import tanhc, tanhc_slope
+from sensorgen.models._line_inputs import HIGHEST_OHM, NAMES, Complex, Inputs, in_blocks, read
+from sensorgen.models._tanhc import sech_squared, tanhc, tanhc_slope
 
-Array = NDArray[Any]
+Array = Any  # of numpy, or one of its scalars
 
-BY = tuple(name for name in DEFAULTS if name != "eps0_F_per_m")
+BY = tuple(name for name in NAMES if name != "eps0_F_per_m")
 _OF_PATCH = {"F_N", "E_Pa", "L_p_m"}  # through the strain, which needs an area and a modulus
 
 
@@ -31,129 +31,213 @@ def slopes(of: Iterable[str] | None, given: Mapping[str, Any]) -> tuple[Complex,
     return first, dict(zip(names, rest, strict=True))
 
 
-class _Local(NamedTuple):
-    """How an input moves resistance [ohm/m] and admittance [S/m] away from the patch and under it, per unit."""
-
-    r: Array | float = 0.0
-    r_pressed: Array | float = 0.0
-    y: Array | float = 0.0
-    y_pressed: Array | float = 0.0
-
-
-class _Section(NamedTuple):
-    """Derivatives of the immittance before a section, by what is behind and in it."""
-
-    before: Array
-    by_behind: Array
-    by_shunt: Array
-    by_series: Array
-    by_length: Array
-    by_shift: Array  # per unit of v0 u - v u0, when the section moves on by its length's unit
-
-
-def _section(q: Array, u: Array, v: Array, length: Array) -> _Section:
-    """One step of the recursion q -> (q + a) / (1 + b q), a = u l T, b = v l T, and its derivatives."""
-    squared = u * v * length * length
-    ratio = tanhc(squared)
-    slope = tanhc_slope(squared, ratio)
-    same = length * (ratio + squared * slope)  # da/du = db/dv
-    cross = length**3 * slope  # da/dv = u^2 of it, db/du = v^2 of it
-    a, b = u * length * ratio, v * length * ratio
-    below = 1 + b * q
-    before = (q + a) / below
-    return _Section(
-        before=before,
-        by_behind=_sech_squared(np.sqrt(squared)) / below**2,
-        by_shunt=(same - before * q * v**2 * cross) / below,
-        by_series=(u**2 * cross - before * q * same) / below,
-        by_length=u - v * before**2,
-        by_shift=-length * ratio * (a + 2 * q + b * q**2) / below**2,
-    )
-
-
-def _sech_squared(z: Array) -> Array:
-    """1 - tanh(z)^2 without cancellation, for a real part of 0 or more."""
-    decay = np.exp(-2 * z)
-    return np.asarray(4 * decay / (1 + decay) ** 2)
-
-
 def _block(inputs: Inputs, names: tuple[str, ...]) -> list[Array]:
     with np.errstate(all="ignore"):
-        z, r, y, lengths, shift = _by_sections(inputs)
-        local = _locals(inputs)
-        direct = {"x_p_left_edge_m": shift, "L_p_m": lengths[1] - lengths[2], "L_m": lengths[2]}
-        found = [z]
-        for name in names:
-            by = local.get(name, _Local())
-            total = (r[0] + r[2]) * by.r + r[1] * by.r_pressed + (y[0] + y[2]) * by.y + y[1] * by.y_pressed
-            found.append(total + direct.get(name, 0.0))
-    if any(np.isnan(value).any() or np.isinf(value).any() for value in found):
-        raise OutOfRange("no derivative where Z is infinite or beyond double precision")
-    return found
+        seen = _Line(inputs)
+        found = [seen.z, *(seen.slope(name) for name in names)]
+        if abs(seen.z.sum()) < HIGHEST_OHM and all(np.isfinite(value.sum()) for value in found):
+            return found
+    raise OutOfRange("no derivative where Z is infinite or beyond double precision")
 
 
-def _by_sections(inputs: Inputs) -> tuple[Array, list[Array], list[Array], list[Array], Array]:
-    """Z, and dZ by r, y and length of each section, and by the position of the patch."""
-    r, y, lengths = inputs.sections()
-    opened = inputs.load_ohm is None
-    shunt, series = (y, r) if opened else (r, y)
-    q = np.asarray(0.0 if inputs.load_ohm is None else inputs.load_ohm)
-    steps: list[_Section] = []
-    for u, v, length in zip(reversed(shunt), reversed(series), reversed(lengths), strict=True):
-        steps.append(_section(q, u, v, length))
-        q = steps[-1].before
-    z = 1 / q if opened else q
-    gain = -z * z if opened else np.asarray(1.0)
-    right, patch, left = steps
-    gains = (gain, gain * left.by_behind, gain * left.by_behind * patch.by_behind)
-    ordered = (left, patch, right)
-    by_u, by_v, by_l = (
-        [g * getattr(step, name) for g, step in zip(gains, ordered, strict=True)]
-        for name in ("by_shunt", "by_series", "by_length")
-    )
-    shift = gains[1] * patch.by_shift * _contrast(inputs, opened)
-    return z, *((by_v, by_u) if opened else (by_u, by_v)), by_l, shift
+class _Section:
+    """One step of the recursion, q -> (q + a) / (1 + b q), a = u l T, b = v l T, and how it passes changes on."""
+
+    def __init__(self, q: Array, u: Array, v: Array, length: Array) -> None:
+        self.q, self.u, self.v, self.length = q, u, v, length
+        self.squared = length * length * (u * v)
+        self.ratio = tanhc(self.squared)
+        t = length * self.ratio
+        self.a, self.b = u * t, v * t
+        self.below = 1 + self.b * q
+        self.before = (q + self.a) / self.below
+
+    @cached_property
+    def by_behind(self) -> Array:
+        """Derivative of the immittance before the section by that behind it."""
+        return sech_squared(self.squared, self.ratio) / (self.below * self.below)
+
+    @cached_property
+    def _same(self) -> Array:
+        """Derivative of a by u, and of b by v."""
+        return self.length * (self.ratio + self.squared * self._slope)
+
+    @cached_property
+    def _cross(self) -> Array:
+        """Derivative of a by v over u^2, and of b by u over v^2."""
+        return self.length**3 * self._slope
+
+    @cached_property
+    def _slope(self) -> Array:
+        return tanhc_slope(self.squared, self.ratio)
+
+    @cached_property
+    def by_shunt(self) -> Array:
+        """Derivative by u."""
+        return (self._same - self.before * self.q * (self.v * self.v * self._cross)) / self.below
+
+    @cached_property
+    def by_series(self) -> Array:
+        """Derivative by v."""
+        return (self.u * self.u * self._cross - self.before * self.q * self._same) / self.below
+
+    @cached_property
+    def by_length(self) -> Array:
+        """Derivative by l."""
+        return self.u - self.v * self.before * self.before
+
+    @cached_property
+    def by_shift(self) -> Array:
+        """Derivative by a move towards the far end, per unit of v0 u - v u0."""
+        above = self.a + self.q * (2 + self.b * self.q)
+        return -self.length * self.ratio * above / (self.below * self.below)
 
 
-def _contrast(inputs: Inputs, opened: bool) -> Array:
-    """r0 y_p - r_p y0 [1/m2], from the changes themselves so that it is exactly 0 where nothing is pressed."""
-    r, y, _ = inputs.sections()
-    strain = inputs.strain()
-    risen = (inputs["tan_delta"] + 1j) * inputs.susceptance() * (strain / (1 - strain))
-    found = r[0] * risen - inputs.track_change() * y[0]
-    return np.asarray(found if opened else -found)
+class _Line:
+    """The sections left of the patch, under it and right of it, as seen from the contacts."""
+
+    def __init__(self, inputs: Inputs) -> None:
+        self.inputs, self.opened = inputs, inputs.load_ohm is None
+        r, y, lengths = inputs.sections()
+        self._r, self._y = r[0], y[0]
+        shunt, series = (y, r) if self.opened else (r, y)
+        q: Array = np.zeros(()) if inputs.load_ohm is None else inputs.load_ohm
+        self.sections: list[_Section] = []
+        for u, v, length in zip(reversed(shunt), reversed(series), reversed(lengths), strict=True):
+            self.sections.insert(0, _Section(q, u, v, length))
+            q = self.sections[0].before
+        self.z = 1 / q if self.opened else q
+        self._gains = [-self.z * self.z if self.opened else np.ones(())]
+
+    def gain(self, index: int) -> Array:
+        """Derivative of Z by the immittance before a section."""
+        while len(self._gains) <= index:
+            self._gains.append(self._gains[-1] * self.sections[len(self._gains) - 1].by_behind)
+        return self._gains[index]
+
+    def slope(self, name: str) -> Array:
+        """Derivative of Z by an input."""
+        parts = [*self._by_place(name), *self._by_matter(name)]
+        return np.asarray(sum(parts), np.complex128)
+
+    def _by_place(self, name: str) -> Iterator[Array]:
+        """What a change of the sections' lengths, or a move of the patch, does."""
+        _, patch, right = self.sections
+        if name == "x_p_left_edge_m":
+            yield self.gain(1) * patch.by_shift * self._contrast()
+        if name == "L_p_m":
+            yield self.gain(1) * patch.by_length
+            yield -self.gain(2) * right.by_length
+        if name == "L_m":
+            yield self.gain(2) * right.by_length
+
+    def _by_matter(self, name: str) -> Iterator[Array]:
+        """What a change of resistance and admittance per length does."""
+        if name not in _CHANGES:
+            return
+        away, pressed = _CHANGES[name](_Film(self.inputs))
+        for index, (by_r, by_y) in enumerate((away, pressed, away)):
+            by_shunt, by_series = (by_y, by_r) if self.opened else (by_r, by_y)
+            if np.ndim(by_shunt) or by_shunt:
+                yield self.gain(index) * self.sections[index].by_shunt * by_shunt
+            if np.ndim(by_series) or by_series:
+                yield self.gain(index) * self.sections[index].by_series * by_series
+
+    def _contrast(self) -> Array:
+        """r0 y_p - r_p y0 [1/m2], from the changes themselves so that it is exactly 0 where nothing is pressed."""
+        p = self.inputs
+        strain = p.strain()
+        risen = (p["tan_delta"] + 1j) * (p.susceptance() * (strain / (1 - strain)))
+        found = self._r * risen - p.track_change() * self._y
+        return np.asarray(found if self.opened else -found)
 
 
-def _locals(p: Inputs) -> dict[str, _Local]:
-    """How each input moves the sections' resistance and admittance."""
-    (r, r_pressed), strain, turned = p.tracks(), p.strain(), p["tan_delta"] + 1j
-    omega_c, omega_c_pressed = p.susceptance(), p.susceptance() / (1 - strain)
-    y, y_pressed = turned * omega_c, turned * omega_c_pressed
-    by_strain = y_pressed / (1 - strain)
-    per_hertz = 2 * np.pi * p["eps0_F_per_m"] * p["eps_r"] * p["W_m"] / p["d_m"] * turned
-    area_modulus = p["W_m"] * p["L_p_m"] * p["E_Pa"]
-    known = {
-        "W_m": _Local(-r / p["W_m"], -r_pressed / p["W_m"], y / p["W_m"], (y_pressed - by_strain * strain) / p["W_m"]),
-        "d_m": _Local(y=-y / p["d_m"], y_pressed=-y_pressed / p["d_m"]),
-        "eps_r": _Local(y=y / p["eps_r"], y_pressed=y_pressed / p["eps_r"]),
-        "f_Hz": _Local(y=per_hertz, y_pressed=per_hertz / (1 - strain)),
-        "tan_delta": _Local(y=omega_c, y_pressed=omega_c_pressed),
-        "G_S_per_m": _Local(y=1.0, y_pressed=1.0),
-        "E_Pa": _Local(y_pressed=-by_strain * strain / p["E_Pa"]),
-        "L_p_m": _Local(y_pressed=-by_strain * strain / p["L_p_m"]),
-        "F_N": _Local(r_pressed=p.track_change_per_newton(), y_pressed=by_strain / area_modulus),
-    }
-    for end in ("top", "bottom"):
-        known |= _locals_of_track(p, end)
-    return known
+class _Film:
+    """What several derivatives share: the film's loss and its admittance, away from the patch and under it."""
+
+    def __init__(self, inputs: Inputs) -> None:
+        self.inputs, self.strain = inputs, inputs.strain()
+        self.turned = inputs["tan_delta"] + 1j
+        self.susceptance = inputs.susceptance()
+
+    def __getitem__(self, name: str) -> Array:
+        return self.inputs[name]
+
+    def thinned(self, value: Array) -> Array:
+        """Under the patch, in proportion to 1/d."""
+        return value / (1 - self.strain)
+
+    def by_strain(self) -> Array:
+        """Derivative of the admittance under the patch by strain [S/m]."""
+        return self.turned * (self.susceptance / (1 - self.strain) ** 2)
 
 
-def _locals_of_track(p: Inputs, end: str) -> dict[str, _Local]:
-    section, rho, force = p[f"H_{end}_m"] * p["W_m"], p[f"rho_{end}_ohm_m"], p["F_N"]
-    factor = 1 + p[f"S_n_{end}_per_N"] * force
-    thinner = -rho / (section * p[f"H_{end}_m"])
-    return {
-        f"rho_{end}_ohm_m": _Local(1 / section, factor / section),
-        f"H_{end}_m": _Local(thinner, thinner * factor),
-        f"S_n_{end}_per_N": _Local(r_pressed=rho * force / section),
-    }
+class _Change(NamedTuple):
+    """Derivative of resistance [ohm/m] and admittance [S/m] per length by an input."""
+
+    of_r: Array | float = 0.0
+    of_y: Array | float = 0.0
+
+
+Changes = tuple[_Change, _Change]  # away from the patch, and under it
+
+
+def _of_film(p: _Film, of_susceptance: Array) -> Changes:
+    """Of what enters the susceptance only."""
+    return _Change(of_y=p.turned * of_susceptance), _Change(of_y=p.turned * p.thinned(of_susceptance))
+
+
+def _by_width(p: _Film) -> Changes:
+    away, pressed = p.inputs.tracks()
+    wider = p.susceptance / p["W_m"]
+    film = p.turned * p.thinned(wider) - p.by_strain() * (p.strain / p["W_m"])
+    return _Change(-away / p["W_m"], p.turned * wider), _Change(-pressed / p["W_m"], film)
+
+
+def _by_tan_delta(p: _Film) -> Changes:
+    return _Change(of_y=p.susceptance), _Change(of_y=p.thinned(p.susceptance))
+
+
+def _by_leak(_: _Film) -> Changes:
+    return _Change(of_y=1.0), _Change(of_y=1.0)
+
+
+def _by_stiffness(name: str, p: _Film) -> Changes:
+    """By modulus or length of the patch: both make it yield less."""
+    return _Change(), _Change(of_y=-p.by_strain() * (p.strain / p[name]))
+
+
+def _by_force(p: _Film) -> Changes:
+    yields_at = p["W_m"] * p["L_p_m"] * p["E_Pa"]
+    return _Change(), _Change(p.inputs.track_change_per_newton(), p.by_strain() / yields_at)
+
+
+def _by_resistivity(end: str, p: _Film) -> Changes:
+    section = p[f"H_{end}_m"] * p["W_m"]
+    return _Change(1 / section), _Change((1 + p[f"S_n_{end}_per_N"] * p["F_N"]) / section)
+
+
+def _by_height(end: str, p: _Film) -> Changes:
+    away, pressed = _by_resistivity(end, p)
+    thinner = -p[f"rho_{end}_ohm_m"] / p[f"H_{end}_m"]
+    return _Change(thinner * away.of_r), _Change(thinner * pressed.of_r)
+
+
+def _by_softening(end: str, p: _Film) -> Changes:
+    return _Change(), _Change(p[f"rho_{end}_ohm_m"] * p["F_N"] / (p[f"H_{end}_m"] * p["W_m"]))
+
+
+_CHANGES: dict[str, Callable[[_Film], Changes]] = {
+    "W_m": _by_width,
+    "d_m": lambda p: _of_film(p, -p.susceptance / p["d_m"]),
+    "eps_r": lambda p: _of_film(p, p.susceptance / p["eps_r"]),
+    "f_Hz": lambda p: _of_film(p, p.inputs.susceptance_per_hertz()),
+    "tan_delta": _by_tan_delta,
+    "G_S_per_m": _by_leak,
+    "E_Pa": partial(_by_stiffness, "E_Pa"),
+    "L_p_m": partial(_by_stiffness, "L_p_m"),
+    "F_N": _by_force,
+    **{f"rho_{end}_ohm_m": partial(_by_resistivity, end) for end in ("top", "bottom")},
+    **{f"H_{end}_m": partial(_by_height, end) for end in ("top", "bottom")},
+    **{f"S_n_{end}_per_N": partial(_by_softening, end) for end in ("top", "bottom")},
+}

@@ -1,55 +1,142 @@
-"""tanh(z)/z of z squared, and its derivative: smooth through 0, right to rounding in both parts."""
+r"""tanh(z)/z of z squared, and its slopes: right to rounding in both parts, from 0 to infinity.
 
-from collections.abc import Sequence
-from typing import Any
+Near 0 it is Lambert's continued fraction, a quotient of two polynomials of z^2 that needs neither root nor exponential
+and loses nothing of a tiny imaginary part; far from 0 exp(-2z) is kept apart as a length and the tangent of an angle.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-# Taylor coefficients of tanh(z)/z in z^2: 2^2n (2^2n - 1) B_2n / (2n)!
-_TERMS = (
-    1.0, -1 / 3, 2 / 15, -17 / 315, 62 / 2835, -1382 / 155925, 21844 / 6081075, -929569 / 638512875,
-    6404582 / 10854718875, -443861162 / 1856156927625, 18888466084 / 194896477400625,
-    -113927491862 / 2900518163668125, 58870668456604 / 3698160658676859375,
-)  # fmt: skip
-_SLOPES = tuple(k * term for k, term in enumerate(_TERMS))[1:]
-_SMALL = 1e-2  # |z^2| below which eight terms serve: the ninth is under 1e-19 of the first
-_SMALL_SLOPE = 0.05  # the quotient of the derivative cancels twice, so its series reaches further: twelve terms, 1e-17
+Array = NDArray[Any]
 
 
-def tanhc(squared: NDArray[Any]) -> NDArray[Any]:
-    """tanh(z)/z [-], given z^2 with a real part of 0 or more.
+class _Fraction(NamedTuple):
+    """Numerator and denominator by rising powers of z^2."""
+
+    reach: float  # largest |Re z^2| + |Im z^2| at which either part is right to 2e-15
+    over: tuple[float, ...]
+    under: tuple[float, ...]
+
+
+def _lambert(degree: int, reach: float) -> _Fraction:
+    """1 / (1 + w / (3 + w / (5 + ...))), cut off where both polynomials of w have this degree."""
+    before: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,), (1.0,))
+    now: tuple[tuple[float, ...], tuple[float, ...]] = ((1.0,), (1.0,))
+    for odd in range(3, 4 * degree + 2, 2):
+        before, now = now, (_next(odd, now[0], before[0]), _next(odd, now[1], before[1]))
+    return _Fraction(reach, *(terms[: degree + 1] for terms in now))
+
+
+def _next(odd: int, now: tuple[float, ...], before: tuple[float, ...]) -> tuple[float, ...]:
+    """Odd times one polynomial, and w times the one before it."""
+    return tuple(odd * a + b for a, b in zip((*now, 0.0), (0.0, *before, 0.0), strict=False))
+
+
+_FRACTIONS = tuple(map(_lambert, range(2, 9), (6e-3, 0.18, 1.1, 4.0, 10.0, 20.0, 35.0)))
+_REACH = 35.0
+_REACH_OF_SLOPES = 4.0  # 1 - tanh^2 is a difference: farther on, more than one digit of it would go
+
+
+def tanhc(squared: Array) -> Array:
+    """T = tanh(z)/z [-], given z^2 with neither part below 0.
 
     >>> complex(tanhc(np.asarray(0j))), round(float(tanhc(np.asarray(1.0 + 0j)).real), 6)
     ((1+0j), 0.761594)
     """
-    small = np.abs(squared.imag) + np.abs(squared.real) < _SMALL
-    if small.all():
-        return _horner(_TERMS[:8], squared)
-    z = np.sqrt(squared)
-    if not small.any():
-        return np.asarray(np.tanh(z) / z)
-    found = np.empty_like(squared)
-    found[small] = _horner(_TERMS[:8], squared[small])
-    found[~small] = np.tanh(z[~small]) / z[~small]
-    return found
+    return _split(_near, _far, _REACH, squared)
 
 
-def tanhc_slope(squared: NDArray[Any], value: NDArray[Any]) -> NDArray[Any]:
-    """Derivative of tanh(z)/z by z^2 [-], given its value T: (1 - z^2 T^2 - T) / (2 z^2).
+def tanhc_slope(squared: Array, ratio: Array) -> Array:
+    """Derivative of T by z^2 [-], given T.
 
     >>> round(float(tanhc_slope(np.asarray(0j), np.asarray(1 + 0j)).real), 6)
     -0.333333
     """
-    small = np.abs(squared) < _SMALL_SLOPE
-    safe = np.where(small, 1.0, squared)
-    return np.where(small, _horner(_SLOPES, squared), (1 - squared * value**2 - value) / (2 * safe))
+    return _split(_near_slope, _far_slope, _REACH_OF_SLOPES, squared, ratio)
 
 
-def _horner(terms: Sequence[float], at: NDArray[Any]) -> NDArray[Any]:
+def sech_squared(squared: Array, ratio: Array) -> Array:
+    """1 - tanh(z)^2 [-], given T.
+
+    >>> complex(sech_squared(np.asarray(0j), np.asarray(1 + 0j)))
+    (1+0j)
+    """
+    return _split(_near_sech_squared, _far_sech_squared, _REACH_OF_SLOPES, squared, ratio)
+
+
+def _split(near: Callable[..., Array], far: Callable[..., Array], reach: float, w: Array, *more: Array) -> Array:
+    """Near and far values, each by its own way."""
+    size = w.real + w.imag
+    largest = float(size.max(initial=0.0))
+    if largest <= reach:
+        return near(largest, w, *more)
+    is_far = size > reach
+    if is_far.all():
+        return far(w, *more)
+    found = np.empty_like(w)
+    found[~is_far] = near(reach, *(v[~is_far] for v in (w, *more)))
+    found[is_far] = far(*(v[is_far] for v in (w, *more)))
+    return found
+
+
+def _near(largest: float, w: Array) -> Array:
+    _, over, under = _shortest(largest)
+    return np.asarray(_horner(over, w) / _horner(under, w))
+
+
+def _near_slope(largest: float, w: Array, ratio: Array) -> Array:
+    _, over, under = _shortest(largest)
+    above = _horner(_derived(over), w) - ratio * _horner(_derived(under), w)
+    return np.asarray(above / _horner(under, w))
+
+
+def _near_sech_squared(_: float, w: Array, ratio: Array) -> Array:
+    return 1 - w * ratio * ratio
+
+
+def _shortest(largest: float) -> _Fraction:
+    return next(fraction for fraction in _FRACTIONS if largest <= fraction.reach)
+
+
+def _horner(terms: Sequence[float], at: Array) -> Array:
     total = at * terms[-1]
     for term in terms[-2:0:-1]:
         total += term
         total *= at
     total += terms[0]
-    return np.asarray(total)
+    return total
+
+
+def _derived(terms: Sequence[float]) -> tuple[float, ...]:
+    return tuple(k * term for k, term in enumerate(terms))[1:]
+
+
+def _far(w: Array) -> Array:
+    z, decay, tangent = _far_parts(w)
+    square = tangent * tangent
+    below = (1 + decay) ** 2 + (1 - decay) ** 2 * square
+    tanh = np.empty_like(w)
+    tanh.real = (1 - decay * decay) * (1 + square) / below
+    tanh.imag = 4 * decay * tangent / below
+    return np.asarray(tanh / z)
+
+
+def _far_slope(w: Array, ratio: Array) -> Array:
+    return np.asarray((_far_sech_squared(w, ratio) - ratio) / (2 * w))
+
+
+def _far_sech_squared(w: Array, _: Array) -> Array:
+    _, decay, tangent = _far_parts(w)
+    turned = (1 + decay) + 1j * ((1 - decay) * tangent)
+    return np.asarray(4 * decay * (1 + tangent * tangent) / (turned * turned))
+
+
+def _far_parts(w: Array) -> tuple[Array, Array, Array]:
+    """The root z, exp(-2 Re z) and tan(Im z): real functions are several times as fast as complex ones."""
+    z = np.empty_like(w)
+    z.real = np.sqrt(0.5 * (np.abs(w) + w.real))
+    z.imag = 0.5 * w.imag / z.real
+    return z, np.exp(-2 * z.real), np.tan(z.imag)

@@ -28,6 +28,8 @@ _JUMP = 1e-9  # a potential is continuous when its two sides differ by less, of 
 
 def unfit(scene: Scene) -> str | None:
     """Why this model cannot speak of this scene, or None."""
+    if len({body.terminal for body in scene.bodies} - {""}) > 2:
+        return "more than two electrodes: sensorgen stack speaks of them"
     try:
         cells = [cell for section in sections(scene) for cell in cut_columns(section)]
     except ValueError as error:

@@ -1,0 +1,173 @@
+"""``sensorgen invert``: force and position back from measured impedances."""
+
+import os
+import re
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+import click
+
+from sensorgen import units
+from sensorgen.cli import show
+from sensorgen.cli.designs import DesignGroup
+from sensorgen.cli.words import Length, OneOf, Share
+from sensorgen.errors import BadInput, Unwritable
+
+if TYPE_CHECKING:
+    from sensorgen.design import Design
+    from sensorgen.invert import Estimator, Prior
+    from sensorgen.invert.answers import Summary
+    from sensorgen.readings import Readings
+
+_NORMAL = re.compile(r"(force|position)=(.+?)(?:\+-|±)(.+)")
+
+
+class _Force(click.ParamType):  # type: ignore[type-arg]
+    """A force, in newtons unless it names another unit."""
+
+    name = "n"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:  # noqa: ARG002
+        """Read a force as typed [N]."""
+        if isinstance(value, float):
+            return value
+        try:
+            return units.force_n(value)
+        except BadInput as error:
+            raise error.within("--force-limit") from None
+
+
+OWN: list[click.Parameter] = [
+    click.Argument(["measured"], metavar="MEASURED.csv"),
+    click.Option(
+        ["--noise"], type=Share(), default="0.1%", show_default=True, metavar="SHARE",
+        help="Standard deviation of R and of X, each as a share of the impedance's magnitude.",
+    ),
+    click.Option(
+        ["--prior"], metavar="WHAT",
+        help="What is known beforehand: uniform, or force=3+-1, position=50+-20 (N, mm), or both with a comma.",
+    ),
+    click.Option(["--force-limit", "force_limit_n"], type=_Force(), help="Largest force to look for [default: 13 N]."),
+    click.Option(["--tip", "tip_mm"], type=Length(), default="10mm", show_default=True, help="Length of the tip."),
+    click.Option(
+        ["--compression"], type=OneOf(("unconfined", "bonded")),
+        help="How a plate gives way; the best that is known of the cell if not given.",
+    ),
+    click.Option(
+        ["--output", "-o"], metavar="FILE.csv",
+        help="Write a row per sample, '-' to the terminal; readings from the standard input go there by themselves.",
+    ),
+    click.Option(["--json", "as_json"], is_flag=True, help="Print the summary as JSON."),
+]  # fmt: skip
+
+
+def _work(design: "Design", *, measured: str, output: str | None, as_json: bool, **how: Any) -> int:
+    from sensorgen.invert.answers import Summary
+    from sensorgen.readings import readings
+
+    with readings(measured) as source:
+        estimator, doubts = _estimator(design, source, **how)
+        summary = Summary(estimator, doubts)
+        live = measured == "-" and output is None
+        place = "-" if live else output
+        with _sink(place) as sink:
+            for text in _answers(source, estimator, summary, live=live, written=place is not None):
+                sink.write(text)
+                if live:
+                    sink.flush()
+    beside = place == "-"
+    for line in [show.json_text(summary.data()).rstrip()] if as_json else summary.lines():
+        click.echo(line, err=beside)
+    if not as_json and not beside:
+        click.echo(output or "--output FILE.csv writes force and position of every sample")
+    return 0
+
+
+def _estimator(
+    design: "Design",
+    source: "Readings",
+    *,
+    noise: float,
+    prior: str | None,
+    force_limit_n: float | None,
+    tip_mm: float,
+    compression: str | None,
+) -> "tuple[Estimator, tuple[str, ...]]":
+    """The estimator for this design, and what to doubt about its sensor."""
+    from sensorgen.invert import FORCE_LIMIT_N, Estimator
+    from sensorgen.planner import sensor_of
+
+    sensed = sensor_of(design, compression or "", tip_mm * units.M_PER_MM)
+    limit = FORCE_LIMIT_N if force_limit_n is None else force_limit_n
+    return Estimator(sensed.sensor, source.frequency_hz, noise, _prior(prior), limit), sensed.doubts
+
+
+def _prior(text: str | None) -> "Prior | None":
+    if text is None:
+        return None
+    from sensorgen.invert import Prior
+
+    if text.strip() == "uniform":
+        return Prior()
+    found: dict[str, tuple[float, float]] = {}
+    for word in text.split(","):
+        match = _NORMAL.fullmatch(word.strip().replace(" ", ""))
+        if match is None or match[1] in found:
+            raise BadInput(f"--prior {text!r}: expected uniform, or force=3+-1,position=50+-20 (N, mm)")
+        read, scale = (units.force_n, 1.0) if match[1] == "force" else (units.length_mm, units.M_PER_MM)
+        try:
+            found[match[1]] = read(match[2]) * scale, read(match[3]) * scale
+        except BadInput as error:
+            raise error.within("--prior") from None
+    return Prior(found.get("force"), found.get("position"))
+
+
+def _answers(
+    source: "Readings", estimator: "Estimator", summary: "Summary", *, live: bool, written: bool
+) -> Iterator[str]:
+    """The answers as text, block by block; a stream's line by line. They are made only if they are written."""
+    from sensorgen.invert import answers
+
+    if written:
+        yield answers.header(source.kept)
+    with show.progress(["reading"]) as step:
+        for block in source.blocks(1) if live else source.blocks():
+            found = estimator.batch(block.impedance_ohm)
+            summary.add(found)
+            step(f"{summary.samples} samples")
+            if written:
+                yield answers.rows(block.kept, found, prior=estimator.prior is not None)
+
+
+@contextmanager
+def _sink(output: str | None) -> Iterator[IO[str]]:
+    """Where the rows go, if there are any: the terminal, or a file that is there when it is whole."""
+    if output is None or output == "-":
+        yield sys.stdout
+        return
+    path = Path(output)
+    part = path.parent / f".{path.name}.{os.getpid()}.part"
+    try:
+        if path.exists() and not path.is_file():
+            raise Unwritable(f"cannot write {output!r}: it is a folder or a device; expected a file")
+        with part.open("w", encoding="utf-8", newline="\n") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        raise Unwritable(f"cannot write {output!r}: {error.strerror or error}") from None
+    finally:
+        with suppress(OSError):
+            part.unlink()
+
+
+command = DesignGroup(
+    _work, OWN, name="invert",
+    help="Force and position behind the impedances in MEASURED.csv ('-' reads the standard input): one row per sample, "
+    "columns re_ohm_1.1kHz and im_ohm_1.1kHz for every tone.",
+    short_help="Force and position back from measured impedances.",
+)  # fmt: skip

@@ -1,0 +1,117 @@
+"""The forward model of one sensor at fixed tones: everything that no press changes is worked out once."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.models._line_inputs import far_load
+from sensorgen.models._tanhc import tanhc
+from sensorgen.sensor import Sensor
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+FORCE_LIMIT_N = 13.0  # the rig's largest force, thesis chapter 6
+_HALVINGS = 40
+
+
+class Forward:
+    """Exact ln Z of a sensor at its tones, for one press per row.
+
+    Attributes
+    ----------
+    sensor : Sensor
+        The sensor.
+    frequency_hz : (n_tones,) array
+        Tones [Hz].
+    susceptance, loose : (n_tones,) array
+        Per length, unpressed: omega C', and the whole admittance of the film [S/m].
+    track, track_per_newton : float
+        Resistance of both electrodes per length, and how it rises under the tip [ohm/m], [ohm/m/N].
+    load : array or None
+        Resistor at the far end [ohm]; None where it is open.
+
+    Examples
+    --------
+    >>> from sensorgen.models.compression import unconfined
+    >>> sensor = Sensor(0.1, 0.01, (3e-4, 3e-4), (5.0, 5.0), 7.6e-10, unconfined(6e5))
+    >>> Forward(sensor, [1e3, 1e5]).log_impedance(np.array([3.0]), np.array([0.05])).shape
+    (1, 2)
+    """
+
+    def __init__(self, sensor: Sensor, frequency_hz: ArrayLike) -> None:
+        self.sensor, self.frequency_hz = sensor, tones(frequency_hz)
+        self.susceptance: Real = 2 * np.pi * self.frequency_hz * sensor.capacitance_f_per_m
+        self.loose = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * self.susceptance
+        tracks = [
+            rho / (h * sensor.width_m) for rho, h in zip(sensor.resistivity_ohm_m, sensor.electrode_m, strict=True)
+        ]
+        self.track = sum(tracks)
+        self.track_per_newton = sum(t * s for t, s in zip(tracks, sensor.piezoresistance_per_n, strict=True))
+        self.load: Real | None = far_load(sensor.far_end)
+
+    def log_impedance(self, force_n: Real, position_m: Real) -> Complex:
+        """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.line_inputs`.
+
+        The recursion of :mod:`sensorgen.models.line` without its checks, which a search would repeat at every step.
+        """
+        sensor, force = self.sensor, force_n[:, None]
+        patch = sensor.patch(position_m[:, None])
+        thinning, _ = sensor.compression.thinning(force / (sensor.width_m * patch.length_m))
+        pressed = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * (self.susceptance / (1 - thinning))
+        under = self.track + force * self.track_per_newton
+        right = np.maximum(sensor.length_m - patch.left_m - patch.length_m, 0.0)
+        loose = self.loose, self.track
+        return self._from_far_end((right, *loose), (patch.length_m, pressed, under), (patch.left_m, *loose))
+
+    def _from_far_end(self, *sections: tuple[Real, NDArray[Any], Any]) -> Complex:
+        """Pass admittance on from an open end, impedance from any other: one law with y and r exchanged."""
+        q: Any = 0.0 if self.load is None else self.load
+        for length, y, r in sections:
+            u, v = (y, r) if self.load is None else (r, y)
+            along = length * tanhc(y * r * (length * length))
+            q = (q + u * along) / (1.0 + q * (v * along))
+        return np.asarray(-np.log(q) if self.load is None else np.log(q))
+
+    def force_limit_n(self, most_n: float = FORCE_LIMIT_N) -> float:
+        """The largest force up to ``most_n`` that the sensor bears anywhere, the tip half over its end [N]."""
+        if not 0 < most_n < np.inf:
+            raise OutOfRange(f"a force limit of {most_n:g} N; expected a number above 0")
+        low, high = 0.0, most_n
+        if self._bears(high):
+            return high
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if self._bears(middle) else (low, middle)
+        return low * (1 - 1e-6)
+
+    def _bears(self, force_n: float) -> bool:
+        try:
+            self.log_impedance(np.full(2, force_n), np.array([0.0, self.sensor.length_m]))
+        except OutOfRange:
+            return False
+        return True
+
+
+def tones(frequency_hz: ArrayLike) -> Real:
+    """Tones as an array, or an error that says which one is none.
+
+    Raises
+    ------
+    BadInput, OutOfRange
+        No list of numbers; none at all, one that is not above 0 and finite, or two that are equal.
+    """
+    try:
+        found = np.atleast_1d(np.asarray(frequency_hz, np.float64))
+    except (TypeError, ValueError):
+        raise BadInput(f"tones are numbers in Hz, not {str(frequency_hz)[:60]!r}") from None
+    if found.ndim != 1 or not found.size:
+        raise BadInput(f"expected a list of tones in Hz, not an array of shape {found.shape}")
+    bad = ~((found > 0) & (found < np.inf))
+    if bad.any():
+        raise OutOfRange(f"a tone of {found[bad][0]:g} Hz; expected a number above 0")
+    if len(np.unique(found)) < len(found):
+        raise OutOfRange("the same tone twice: give each tone once")
+    return found

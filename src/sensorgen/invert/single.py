@@ -1,0 +1,123 @@
+"""One reading at a time, at the rig's rate: the batch's least squares in plain numbers, where nothing is special."""
+
+import math
+from bisect import bisect_right
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.invert.descent import REACH, ROUNDING, TIGHT
+from sensorgen.invert.forward import Forward, Real
+from sensorgen.invert.scalar import Scalar
+from sensorgen.invert.table import Table, parts
+from sensorgen.invert.verdict import Status, chi2_limit
+
+_ROUGH = 2  # steps on the table before the exact model has its say
+_STEPS = 8
+_FIRST_ORDER = [2, 1]  # by force, by position; the others are the value and the mixed derivative
+_GUESS = 1 / 12  # variance of a guess on the unit length
+
+
+class Press(NamedTuple):
+    """One estimate of a stream, as those of a batch [N], [m]."""
+
+    force_n: float
+    position_m: float
+    covariance: Real
+    status: Status
+
+
+class _Normal(NamedTuple):
+    """Normal equations of one step, and the sum of squares before it."""
+
+    ff: float
+    fx: float
+    xx: float
+    by_force: float
+    by_position: float
+    chi2: float
+
+    def step(self) -> tuple[float, float]:
+        """The undamped step."""
+        determinant = self.ff * self.xx - self.fx * self.fx
+        if not determinant > 0:
+            return math.nan, math.nan
+        force = (self.xx * self.by_force - self.fx * self.by_position) / determinant
+        return force, (self.ff * self.by_position - self.fx * self.by_force) / determinant
+
+
+class Single:
+    """Undamped Gauss-Newton for a reading with all its tones; whatever else comes is left to the batch.
+
+    Parameters
+    ----------
+    forward : Forward
+        The exact model.
+    table : Table
+        Its table.
+    sigma : (2 n_tones,) array
+        Standard deviations of ln Z.
+    contested : (n_cells,) array of bool
+        Cells at which another press may explain the reading as well.
+    """
+
+    def __init__(self, forward: Forward, table: Table, sigma: Real, contested: NDArray[np.bool_]) -> None:
+        self._model, self._table, self._weight, self._contested = Scalar(forward), table, 1 / sigma, contested
+        self._edges = [edges.tolist() for edges in table.edges]
+        self._limit = float(chi2_limit(np.array([len(sigma) - 2]))[0])
+        self._rounding = ROUNDING**2 * float(self._weight @ self._weight)
+        self._scale = table.scale.tolist()
+
+    def press(self, response: Real) -> Press | None:
+        """The press behind ln Z (1, 2 n_tones); None where the batch has to look at it."""
+        force, position = self._table.nearest(response, self._weight[None])[0].tolist()
+        for step in range(_STEPS):
+            normal = self._normal(response[0], force, position, exact=step >= _ROUGH)
+            by_force, by_position = normal.step()
+            force, position = force + by_force, position + by_position
+            if not (0 < force < 1 and 0 < position < 1 and abs(by_position) < REACH):
+                return None
+            gain = by_force * normal.by_force + by_position * normal.by_position
+            if step >= _ROUGH and gain <= TIGHT**2 * normal.chi2 + self._rounding:
+                return self._answer(force, position, normal)
+        return None
+
+    def _normal(self, response: Real, force: float, position: float, exact: bool) -> _Normal:
+        value, slope = self._table_at(force, position)
+        if exact:
+            value = parts(np.array(self._model.log_impedance(force * self._scale[0], position * self._scale[1])))
+        slope *= self._weight
+        residual = (response - value) * self._weight
+        (ff, fx), (_, xx) = (slope @ slope.T).tolist()
+        by_force, by_position = (slope @ residual).tolist()
+        return _Normal(ff, fx, xx, by_force, by_position, float(residual @ residual))
+
+    def _table_at(self, force: float, position: float) -> tuple[Real, Real]:
+        """As :meth:`Table.at`, for one press."""
+        cell, powers = self._cell(force, position), []
+        k = divmod(cell, self._table.shape[1])
+        for edges, at, i in zip(self._edges, (force, position), k, strict=True):
+            width = edges[i + 1] - edges[i]
+            t = (at - edges[i]) / width
+            powers.append(np.array(((1.0, t, t * t, t * t * t), (0.0, 1 / width, 2 * t / width, 3 * t * t / width))))
+        along = powers[0] @ self._table.coefficients[cell]
+        both = (powers[1] @ along.reshape(2, 4, -1)).reshape(4, -1)
+        return both[0], both[_FIRST_ORDER]
+
+    def _cell(self, force: float, position: float) -> int:
+        forces, positions = self._edges
+        row = bisect_right(forces, force, 1, len(forces) - 1) - 1
+        return row * self._table.shape[1] + bisect_right(positions, position, 1, len(positions) - 1) - 1
+
+    def _answer(self, force: float, position: float, normal: _Normal) -> Press | None:
+        """The press in SI units, unless its verdict is not the plain one."""
+        if self._contested[self._cell(force, position)]:
+            return None
+        determinant = normal.ff * normal.xx - normal.fx**2
+        variances = normal.xx / determinant, normal.ff / determinant
+        if max(variances) > _GUESS or normal.chi2 > self._limit:
+            return None
+        mixed = -normal.fx / determinant
+        covariance = np.array([[variances[0], mixed], [mixed, variances[1]]]) * np.outer(self._scale, self._scale)
+        return Press(force * self._scale[0], position * self._scale[1], covariance, Status.OK)

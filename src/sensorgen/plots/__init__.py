@@ -1,0 +1,40 @@
+"""What a sensor answers to presses, in pictures: maps of R and X, their sensitivities, and the way back (PNG, HTML)."""
+
+from collections.abc import Iterator, Sequence
+
+from sensorgen.plots.field import QUANTITIES, field
+from sensorgen.sensor import Sensor
+
+PAGE = "predict.html"
+STEPS = (*(f"{name}.png" for name in QUANTITIES), "inverse-position.png", "inverse-force.png", PAGE)
+
+
+def files(
+    sensor: Sensor, frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float]
+) -> Iterator[tuple[str, bytes]]:
+    """All pictures of a sensor, by file name, in the order of ``STEPS``.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        That is pressed.
+    frequency_hz, force_n, position_mm : sequence of float
+        Tones [Hz], forces [N] and centres of the tip [mm], each rising; at least two forces and two positions.
+
+    Raises
+    ------
+    OutOfRange
+        As :func:`sensorgen.plots.field.field`.
+    MissingValue
+        Matplotlib or Plotly is not installed.
+    """
+    from sensorgen.plots import inverse, maps, page
+    from sensorgen.plots.library import needed
+
+    needed("matplotlib", "plotly")
+    answer = field(sensor, frequency_hz, force_n, position_mm)
+    for name in QUANTITIES:
+        yield f"{name}.png", maps.png(answer, name)
+    yield "inverse-position.png", inverse.png(answer, "position")
+    yield "inverse-force.png", inverse.png(answer, "force")
+    yield PAGE, page.html(answer).encode()

@@ -1,0 +1,185 @@
+"""``sensorgen invert``: files in, files out, one line for what is wrong."""
+
+import csv
+import io
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from sensorgen import cli
+from sensorgen.cli import main  # noqa: F401 - the fixtures run it
+from sensorgen.design import make
+from sensorgen.planner import sensor_of
+
+TONES = {"1.1kHz": 1.1e3, "10.1kHz": 10.1e3, "99.7kHz": 99.7e3, "0.5MHz": 5e5}
+DESIGN = ["tri", "--dielectric", "0.1", "--material", "electrode=etpu@thesis-3.2"]
+PLAIN = {
+    "shape": "tri",
+    "parameters": {"dielectric_mm": 0.1},
+    "materials": {"top_electrode": "etpu@thesis-3.2", "bottom_electrode": "etpu@thesis-3.2"},
+}
+FORCE, POSITION = np.array([1.0, 2.0, 3.0, 5.0]), np.array([20.0, 40.0, 60.0, 75.0])
+
+
+@pytest.fixture(autouse=True)
+def registered(monkeypatch):
+    """The command, also before the list of commands names it."""
+    if "invert" not in cli.COMMANDS:
+        monkeypatch.setattr(cli, "COMMANDS", (*cli.COMMANDS, "invert"))
+
+
+def table(force=FORCE, position=POSITION, extra=()):
+    z = sensor_of(make(PLAIN)).sensor.impedance(
+        np.array(list(TONES.values())), force[:, None], position[:, None] * 1e-3
+    )
+    names = [f"{part}_ohm_{tone}" for tone in TONES for part in ("re", "im")]
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["time_s", *names, *extra])
+    for k, row in enumerate(z):
+        writer.writerow([k / 10, *(v for value in row for v in (value.real, value.imag)), *(["a,b"] * len(extra))])
+    return out.getvalue()
+
+
+def answers(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_there_and_back(run, tmp_path):
+    (tmp_path / "m.csv").write_text(table(extra=["label", "force_n"]))
+    said = run("invert", *DESIGN, "m.csv", "-o", "o.csv")
+    assert said.code == 0, said.err
+    assert "4 samples: 4 ok" in said.out
+    assert "median standard errors: force 0.1" in said.out
+    rows = answers((tmp_path / "o.csv").read_text())
+    assert [float(r["force_n"]) for r in rows] == pytest.approx(FORCE, abs=1e-8)
+    assert [float(r["position_mm"]) for r in rows] == pytest.approx(POSITION, abs=1e-5)
+    assert [r["time_s"] for r in rows] == ["0.0", "0.1", "0.2", "0.3"]
+    assert {r["label"] for r in rows} == {r["force_n_given"] for r in rows} == {"a,b"}
+    assert {r["status"] for r in rows} == {"ok"}
+    assert {r["tones"] for r in rows} == {"4"}
+    for row in rows:
+        low, high = float(row["position_low_mm"]), float(row["position_high_mm"])
+        assert high - low == pytest.approx(2 * 1.6449 * float(row["position_error_mm"]), rel=1e-3)
+    assert [p.name for p in tmp_path.iterdir() if p.name.startswith(".")] == []
+
+
+def test_predictions_come_back(run, tmp_path):
+    said = run("predict", *DESIGN, "--csv", "--force", "2:4:1", "--position", "20,50,70", "-o", "p.csv")
+    if said.code:
+        pytest.skip("predict writes no CSV")
+    assert run("invert", *DESIGN, "p.csv", "-o", "o.csv").code == 0
+    for row in answers((tmp_path / "o.csv").read_text()):
+        assert float(row["force_n"]) == pytest.approx(float(row["force_n_given"]), abs=1e-8)
+        assert float(row["position_mm"]) == pytest.approx(float(row["position_mm_given"]), abs=1e-5)
+
+
+def test_a_design_file(run, tmp_path):
+    (tmp_path / "m.csv").write_text(table())
+    (tmp_path / "d.yaml").write_text(json.dumps(PLAIN))
+    assert "4 ok" in run("invert", "d.yaml", "m.csv").out
+
+
+def test_json_and_the_terminal(run, tmp_path):
+    (tmp_path / "m.csv").write_text(table())
+    said = run("invert", *DESIGN, "m.csv", "--json")
+    told = json.loads(said.out.rpartition("\n--output")[0] or said.out)
+    assert told["samples"] == 4
+    assert told["statuses"] == {"ok": 4}
+    assert told["frequency_hz"] == list(TONES.values())
+    said = run("invert", *DESIGN, "m.csv", "-o", "-")
+    assert len(answers(said.out)) == 4
+    assert "4 samples" in said.err
+
+
+def test_blank_where_the_reading_does_not_say(run, tmp_path):
+    (tmp_path / "m.csv").write_text(table(np.array([0.0, 3.0]), np.array([50.0, 50.0])))
+    run("invert", *DESIGN, "m.csv", "-o", "o.csv")
+    none, some = answers((tmp_path / "o.csv").read_text())
+    assert none["status"] == "force only"
+    assert none["position_mm"] == none["position_low_mm"] == ""
+    assert abs(float(none["force_n"])) < 1e-6
+    assert some["status"] == "ok"
+    run("invert", *DESIGN, "m.csv", "-o", "o.csv", "--prior", "uniform")
+    none, _ = answers((tmp_path / "o.csv").read_text())
+    assert float(none["position_mm"]) == pytest.approx(50, abs=8)
+    assert 80 < float(none["position_high_mm"]) - float(none["position_low_mm"]) < 100
+
+
+def test_what_to_do_is_said(run, tmp_path):
+    (tmp_path / "m.csv").write_text(table(np.zeros(3), np.full(3, 50.0)))
+    assert "average them, choose tones nearer" in run("invert", *DESIGN, "m.csv").out
+    (tmp_path / "m.csv").write_text(table())
+    said = run("invert", "tri", "--dielectric", "0.2", "m.csv")
+    assert "no fit" in said.out
+    assert "times the noise" in said.out
+
+
+def test_one_tone_says_so(run, tmp_path):
+    z = sensor_of(make(PLAIN)).sensor.impedance(99.7e3, 3.0, 0.05)
+    (tmp_path / "m.csv").write_text(f"re_ohm_99.7kHz,im_ohm_99.7kHz\n{z.real},{z.imag}\n")
+    assert "note: one tone gives two numbers for two unknowns" in run("invert", *DESIGN, "m.csv").out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["none.csv"], "cannot read 'none.csv'"), (["."], "is a folder"), ([], "MEASURED.csv"),
+        (["m.csv", "--noise", "0"], "a noise of 0"), (["m.csv", "--noise", "x"], "is not a share"),
+        (["m.csv", "--prior", "x"], "--prior 'x': expected uniform"),
+        (["m.csv", "--prior", "force=a+-1"], "not a force"),
+        (["m.csv", "--prior", "force=1+-0"], "standard deviation above 0"),
+        (["m.csv", "--force-limit", "0"], "force limit of 0 N"), (["m.csv", "--force-limit", "x"], "--force-limit"),
+        (["m.csv", "-o", "."], "cannot write '.'"), (["m.csv", "-o", "no/where.csv"], "cannot write 'no/where.csv'"),
+        (["bad.csv", "-o", "o.csv"], "bad.csv, row 6, column re_ohm_1.1kHz: 'x' is not a number"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_one_line(run, tmp_path, words, said):
+    text = table()
+    (tmp_path / "m.csv").write_text(text)
+    (tmp_path / "bad.csv").write_text(text + "1,x,2,3,4,5,6,7,8\n")
+    found = run("invert", *DESIGN, *words)
+    assert found.code == 2
+    assert said in found.line
+    assert not (tmp_path / "o.csv").exists()
+    assert not [p for p in tmp_path.iterdir() if p.name.endswith(".part")]
+
+
+def test_an_older_answer_survives_an_error(run, tmp_path):
+    (tmp_path / "o.csv").write_text("mine")
+    (tmp_path / "bad.csv").write_text(table() + "1,x,2,3,4,5,6,7,8\n")
+    assert run("invert", *DESIGN, "bad.csv", "-o", "o.csv").code == 2
+    assert (tmp_path / "o.csv").read_text() == "mine"
+
+
+@pytest.mark.parametrize("words", [["--help"], ["tri", "--help"]])
+def test_help(run, words):
+    said = run("invert", *words)
+    assert said.code == 0
+    assert "MEASURED.csv" in said.out
+
+
+LIVE = (
+    "import sys; sys.argv[0] = 'sensorgen'; import sensorgen.cli as c; c.COMMANDS = {*c.COMMANDS, 'invert'}; c.main()"
+)
+
+
+def test_a_pipe_is_answered_line_by_line(tmp_path):
+    head, *rows = table().splitlines(keepends=True)
+    process = subprocess.Popen(
+        [sys.executable, "-c", LIVE, "invert", *DESIGN, "-"], cwd=tmp_path, text=True, bufsize=1,
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    process.stdin.write(head)
+    process.stdin.flush()
+    assert process.stdout.readline().startswith("time_s,force_n,position_mm")
+    for row, force in zip(rows, FORCE, strict=True):
+        process.stdin.write(row)
+        process.stdin.flush()
+        assert float(process.stdout.readline().split(",")[1]) == pytest.approx(force, abs=1e-8)
+    out, err = process.communicate(timeout=30)
+    assert (process.returncode, out) == (0, "")
+    assert "4 samples: 4 ok" in err

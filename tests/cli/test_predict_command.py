@@ -1,0 +1,265 @@
+"""``sensorgen predict`` with presses: tables, JSON, CSV, pictures, and what it refuses."""
+
+import csv
+import io
+import json
+import math
+
+import pytest
+
+from sensorgen.models import line
+
+PRESSES = ["--force", "0:6:3N", "--position", "20,50", "--frequencies", "1.1kHz,99.7kHz"]
+PLATE = {
+    "L_m": 0.1, "W_m": 0.01, "H_top_m": 3e-4, "H_bottom_m": 3e-4, "rho_top_ohm_m": 0.07, "rho_bottom_ohm_m": 0.2,
+    "d_m": 6e-4, "eps_r": 4.68, "E_Pa": 6e6,
+}  # fmt: skip
+LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))"
+BONDED = 4 / 3 * (1 + (10 / 1.2) ** 2)  # times E, Gent and Lindley
+
+
+def at_point(f, force, x_mm, tip_mm=10.0, stiffer=1.0):
+    """The pressed plate straight from the line."""
+    press = {"F_N": force, "L_p_m": tip_mm / 1e3, "x_p_left_edge_m": (x_mm - tip_mm / 2) / 1e3}
+    return complex(line.impedance(**PLATE | {"E_Pa": 6e6 * stiffer}, **press, f_Hz=f))
+
+
+def close(z):
+    return (pytest.approx(z.real, rel=1e-12, abs=0), pytest.approx(z.imag, rel=1e-12, abs=0))
+
+
+def rows_of(text):
+    return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(io.StringIO(text))]
+
+
+def test_csv_against_the_line(run):
+    said = run("predict", "reference", *PRESSES, "--csv")
+    assert (said.code, said.err) == (0, "")
+    rows = rows_of(said.out)
+    assert [(row["force_n"], row["position_mm"]) for row in rows] == [(f, x) for f in (0, 3, 6) for x in (20, 50)]
+    for row in rows:
+        for f, name in ((1.1e3, "1.1kHz"), (99.7e3, "99.7kHz")):
+            z = at_point(f, row["force_n"], row["position_mm"])
+            assert (row[f"re_ohm_{name}"], row[f"im_ohm_{name}"]) == close(z)
+    assert len(rows[0]) == 6
+
+
+def test_json_and_csv_say_the_same(run):
+    found = json.loads(run("predict", "reference", *PRESSES, "--json").out)
+    rows = iter(rows_of(run("predict", "reference", *PRESSES, "--csv").out))
+    assert (found["frequency_hz"], found["force_n"], found["position_mm"]) == ([1100, 99700], [0, 3, 6], [20, 50])
+    for j, force in enumerate(found["force_n"]):
+        for i, x in enumerate(found["position_mm"]):
+            row = next(rows)
+            assert (row["force_n"], row["position_mm"]) == (force, x)
+            for k, name in enumerate(("1.1kHz", "99.7kHz")):
+                z = complex(row[f"re_ohm_{name}"], row[f"im_ohm_{name}"])
+                assert (found["re_ohm"][k][j][i], found["im_ohm"][k][j][i]) == close(z)
+    assert found["axes"] == ["frequency_hz", "force_n", "position_mm"]
+
+
+@pytest.mark.parametrize(
+    ("words", "stiffer", "tip"),
+    [
+        ([], 1.0, 10.0), (["--compression", "bonded"], BONDED, 10.0), (["--tip", "2cm"], 1.0, 20.0),
+        (["--compression", "unconfined", "--tip", "5"], 1.0, 5.0),
+    ],
+)  # fmt: skip
+def test_law_and_tip_reach_the_sensor(run, words, stiffer, tip):
+    said = run("predict", "reference", "--force", "5", "--position", "50", "--frequencies", "50kHz", "--json", *words)
+    found = json.loads(said.out)
+    assert (found["re_ohm"][0][0][0], found["im_ohm"][0][0][0]) == close(at_point(5e4, 5.0, 50.0, tip, stiffer))
+    assert found["tip_mm"] == pytest.approx(tip)
+    assert found["model"]["compression"] == ("bonded" if stiffer > 1 else "unconfined")
+    assert bool(found["doubts"]) is (stiffer == 1)
+
+
+def test_axes_that_are_not_named(run):
+    forces = json.loads(run("predict", "reference", "--position", "50", "--json").out)
+    assert (forces["force_n"], forces["position_mm"]) == ([k / 10 for k in range(61)], [50])
+    assert forces["frequency_hz"] == [1100, 2300, 5300, 10100, 19900, 49900, 99700]
+    places = json.loads(run("predict", "reference", "--length", "50", "--force", "1", "--json").out)
+    assert (places["force_n"], places["position_mm"]) == ([1], [k / 2 for k in range(101)])
+    assert len(rows_of(run("predict", "reference", "--csv", "--frequencies", "1").out)) == 61 * 101
+
+
+def test_no_press_prints_what_it_always_did(run):
+    said = run("predict", "reference")
+    assert said.out.startswith("capacitance      69.06 pF\nelectrodes       top 2.333 kohm, bottom 6.667 kohm")
+    found = json.loads(run("predict", "reference", "--json", "--frequencies", "1kHz,1MHz").out)
+    assert [row["frequency_hz"] for row in found["impedance_ohm"]] == [1e3, 1e6]
+    assert len(found["impedance_ohm"]) == 2
+    assert "1 MHz" in run("predict", "reference", "--frequencies", "1MHz").out
+
+
+def span(values):
+    ordered = sorted(values)
+    return ordered[-1] - ordered[0]
+
+
+def test_the_table(run):
+    said = run("predict", "reference", *PRESSES)
+    assert (said.code, said.err) == (0, "")
+    lines = said.out.splitlines()
+    assert max(map(len, lines)) <= 100
+    assert lines[0] == "reference: 3 forces 0 to 6 N, 2 positions 20 to 50 mm; tip 10 mm, compression unconfined"
+    assert lines[1].startswith("doubtful: a plate free to give way sideways")
+    numbers = {row.split()[0]: row.split()[2:] for row in lines if "kHz  " in row}
+    values = {(f, x): at_point(99.7e3, f, x) for f in (0, 3, 6) for x in (20, 50)}
+    low, high, least, most, re_f, re_x, im_f, im_x = map(float, numbers["99.7"])
+    assert low == pytest.approx(min(z.real for z in values.values()), rel=1e-5)
+    assert high == pytest.approx(max(z.real for z in values.values()), rel=1e-5)
+    assert least == pytest.approx(min(z.imag for z in values.values()), rel=1e-5)
+    assert most == pytest.approx(max(z.imag for z in values.values()), rel=1e-5)
+    deviation = 1e-3 * max(map(abs, values.values()))
+    at_50, at_6 = [values[f, 50] for f in (0, 3, 6)], [values[6, x] for x in (20, 50)]
+    for points, of_r, of_x in ((at_50, re_f, im_f), (at_6, re_x, im_x)):
+        assert of_r == pytest.approx(span(z.real for z in points) / deviation, abs=0.006)
+        assert of_x == pytest.approx(span(z.imag for z in points) / deviation, abs=0.006)
+    corner = [float(word) for word in lines[-1].split()[2:]]
+    expected = [v for x in (20, 50) for v in (values[6, x].real, values[6, x].imag)]
+    assert corner == pytest.approx(expected, rel=1e-6)
+    assert "R and X [ohm] at 99.7 kHz" in lines
+
+
+def test_a_single_press(run):
+    lines = run("predict", "reference", "--force", "2", "--position", "30").out.splitlines()
+    assert lines[0].startswith("reference: force 2 N, position 30 mm; tip 10 mm")
+    z = at_point(99.7e3, 2.0, 30.0)
+    assert list(map(float, lines[-1].split()[2:])) == pytest.approx([z.real, z.imag], rel=1e-6)
+
+
+@pytest.mark.parametrize("form", ["--csv", "--json", None])
+@pytest.mark.parametrize("press", [True, False])
+def test_a_file_holds_what_the_terminal_would_show(run, tmp_path, form, press):
+    words = ["predict", "reference", *(PRESSES if press else []), *([form] if form else [])]
+    words += ["--position", "50"] if form == "--csv" and not press else []
+    said = run(*words, "-o", "out.txt")
+    assert (said.code, said.out, said.err) == (0, "out.txt\n", "")
+    assert (tmp_path / "out.txt").read_bytes().decode() == run(*words).out == run(*words, "-o", "-").out
+    assert [p.name for p in tmp_path.iterdir()] == ["out.txt"]
+
+
+def test_a_file_that_fails_leaves_the_old_one(run, tmp_path, monkeypatch):
+    from sensorgen import predict
+
+    def half(*_):
+        yield "half"
+        raise OSError(28, "No space left on device")
+
+    (tmp_path / "out.csv").write_text("old")
+    monkeypatch.setattr(predict, "csv_blocks", half)
+    said = run("predict", "reference", *PRESSES, "--csv", "-o", "out.csv")
+    assert said.code == 2
+    assert "cannot write 'out.csv': No space left on device" in said.line
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("out.csv", "old")]
+
+
+def test_a_file_is_put_in_place_of_the_old_one(run, tmp_path):
+    """Not written over: who holds the old file open, or links to it, keeps it whole."""
+    (tmp_path / "out.csv").write_text("old")
+    (tmp_path / "link.csv").hardlink_to(tmp_path / "out.csv")
+    assert run("predict", "reference", *PRESSES, "--csv", "-o", "out.csv").code == 0
+    assert (tmp_path / "link.csv").read_text() == "old"
+
+
+def test_pictures(run, tmp_path):
+    from sensorgen import plots
+
+    said = run("predict", "reference", *PRESSES, "--plot", "a/b")
+    assert (said.code, said.err) == (0, "")
+    folder = tmp_path / "a" / "b"
+    assert sorted(p.name for p in folder.iterdir()) == sorted(plots.STEPS)
+    assert said.out.splitlines() == [f"a/b/{name}" for name in plots.STEPS]
+    assert (folder / "resistance.png").read_bytes().startswith(b"\x89PNG")
+
+
+WRONG = [
+    (["--force", "0:6:0"], "--force: '0:6:0': expected a step above 0"),
+    (["--force", "2,1"], "--force: '2,1': 1 stands after 2; expected rising values, each once"),
+    (["--force", "-1"], "--force: -1; expected 0 or more"),
+    (["--force", "nan"], "--force: 'nan' is not a force"),
+    (["--force", "6 kg"], "--force: '6 kg' is not a force: write a number, with N, mN, kN"),
+    (["--position", "0:120:40"], "position 120 mm is outside the sensor; expected 0 to 100 mm"),
+    (["--position", "1,5"], None),
+    (["--position=-5"], "--position: -5; expected 0 or more"),
+    (["--frequencies", "0,1kHz"], "--frequencies: 0; expected above 0"),
+    (["--frequencies", "1mhz"], "'mhz' may be mHz or MHz"),
+    (["--frequencies", "1kHz,1kHz"], "1000 stands twice"),
+    (["--force", "0:700:100", "--position", "50"], "force 600 N at position 50 mm: the stress thins the film by 1: "),
+    (["--plot", "p", "--force", "0:700:100"], "force 300 N at position 0 mm: the stress thins the film by 1: "),
+    (["--force", "1", "--tip", "120"], "a tip of 120 mm; expected up to the sensor's 100 mm"),
+    (["--force", "1", "--tip", "0"], "a tip of 0 mm"),
+    (["--force", "1", "--compression", "bond"], "unknown --compression 'bond'; did you mean 'bonded'?"),
+    (["--force", "1", "--json", "--csv"], "--json and --csv at once; expected one of them"),
+    (["--plot", "p", "--csv"], "--csv and --plot at once"),
+    (["--plot", "p", "-o", "f"], "--plot and --output at once"),
+    (["--plot", "p", "--force", "1"], "1 force(s) and 101 position(s) make no map"),
+    (["--force", "0:6:0.001", "--position", "0:100:0.1"], "7 x 6001 x 1001 tones, forces and positions; expected"),
+    (["--force", "1", "-o", "no/such/folder"], "cannot write 'no/such/folder': No such file or directory"),
+    (["--force", "1", "-o", "."], "cannot write '.': it is a folder or a device; expected a file"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("words", "message"), WRONG, ids=[" ".join(words) for words, _ in WRONG])
+def test_wrong_words(run, tmp_path, words, message):
+    said = run("predict", "reference", *words)
+    if message is None:  # one mm and five mm, not one and a half
+        assert "2 positions 1 to 5 mm" in said.out
+        return
+    assert (said.code, said.out) == (2, "")
+    assert message in said.line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_where_a_file_is(run, tmp_path):
+    (tmp_path / "p").write_text("mine")
+    said = run("predict", "reference", *PRESSES, "--plot", "p")
+    assert said.code == 2
+    assert "cannot write to 'p': File exists" in said.line
+    assert (tmp_path / "p").read_text() == "mine"
+
+
+def test_a_short_has_no_answer_to_a_press(run):
+    for how in (["--json"], ["--csv"], ["--plot", "p"], []):
+        said = run("predict", "tri", "--dielectric", "0", "--force", "1", *how)
+        assert (said.code, said.out) == (2, "")
+        assert "the electrodes touch" in said.line
+
+
+def test_a_law_that_does_not_speak_of_the_shape(run):
+    said = run("predict", "tri", "--force", "1", "--compression", "bonded")
+    assert (said.code, said.out) == (2, "")
+    assert "the law 'bonded' speaks of a solid plate; tri has gaps: expected 'unconfined'" in said.line
+
+
+def test_json_is_plain(run):
+    found = json.loads(run("predict", "tri", "--force", "1:3:1", "--json").out, parse_constant=pytest.fail)
+    assert all(math.isfinite(x) for plane in found["re_ohm"] for row in plane for x in row)
+    assert set(found) == {
+        "design", "design_id", "model", "compression", "tip_mm", "doubts", "values", "axes", "frequency_hz", "force_n",
+        "position_mm", "re_ohm", "im_ohm",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("words", [[], ["--force", "0:6:1"], ["--csv", "--force", "1"], ["--json", "--position", "5"]])
+def test_no_plot_library_is_loaded_without_a_plot(real, words):
+    said = real("predict", "tri", *words, before=LOADED)
+    assert said.code == 0
+    modules = set(said.out.rpartition("loaded: ")[2].split())
+    assert "numpy" in modules
+    assert not {"matplotlib", "plotly", "scipy", "sensorgen.plots", "build123d", "trimesh"} & modules
+
+
+def test_help_does_not_load_numpy(real):
+    said = real("predict", "tri", "--help", before=LOADED)
+    assert not {"numpy", "pydantic", "sensorgen.predict"} & set(said.out.rpartition("loaded: ")[2].split())
+
+
+def test_options_are_what_the_planner_knows():
+    from sensorgen.cli.predict_command import OWN
+    from sensorgen.planner import LAWS, TIP_M
+
+    options = {option.name: option for option in OWN}
+    assert tuple(options["compression"].type.choices) == LAWS
+    assert options["tip_mm"].type.convert(options["tip_mm"].default, None, None) == TIP_M * 1e3

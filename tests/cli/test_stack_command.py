@@ -1,0 +1,54 @@
+"""``sensorgen stack``, in a group of its own so that it does not matter what else there is."""
+
+import json
+
+import pytest
+
+from sensorgen import cli
+
+
+@pytest.fixture(autouse=True)
+def _registered(monkeypatch):
+    monkeypatch.setattr(cli, "COMMANDS", tuple(dict.fromkeys((*cli.COMMANDS, "stack"))))
+
+
+def test_it_prints_tables(run):
+    said = run("stack", "double", "--isolation", "0.3")
+    assert (said.code, said.err) == (0, "")
+    for word in ("lower film alone", "difference alone", "0.3 mm", "bare", "top driven", "bridge", "doubt:"):
+        assert word in said.out
+    assert max(map(len, said.out.split("taken for granted")[0].splitlines())) <= 150
+
+
+def test_its_json_is_plain(run):
+    said = run("stack", "tri", "--dielectric", "0.1", "--force", "3N", "--position", "45", "--json")
+    found = json.loads(said.out)
+    assert (found["force_n"], found["position_m"]) == (3.0, pytest.approx(0.045))
+    assert [row["frequency_hz"] for row in found["readings_ohm"]][-1] == 99.7e3
+    assert {row["wiring"] for row in found["touch"]} == {"top driven", "top at ground", "bridge, either way round"}
+
+
+def test_tones_are_taken_as_typed(run):
+    said = run("stack", "reference", "--frequencies", "10.1kHz,1MHz", "--json")
+    assert [row["frequency_hz"] for row in json.loads(said.out)["readings_ohm"]] == [10.1e3, 1e6]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--position", "99"], "overhangs"),
+        (["--force", "1,2"], "expected one"),
+        (["--force", "0"], "--force"),
+        (["--noise", "0"], "--noise"),
+        (["--noise", "nan"], "--noise"),
+        (["--frequencies", "-1kHz"], "--frequencies"),
+        (["--touch", "200"], "overhangs"),
+        (["--touch", "-1"], "tip"),
+        (["--force", "9kN"], "touch"),
+        (["--upper-dielectric", "0"], "touch"),
+    ],
+)
+def test_wrong_words_end_with_2_and_one_line(run, words, said):
+    found = run("stack", "double", *words)
+    assert found.code == 2
+    assert said in found.line

@@ -1,0 +1,79 @@
+"""tanh(z)/z and its slopes against mpmath, on both sides of every border between their formulas, in both parts."""
+
+import mpmath
+import numpy as np
+import pytest
+
+from sensorgen.models import _tanhc
+from sensorgen.models._tanhc import sech_squared, tanhc, tanhc_slope
+
+BORDERS = [fraction.reach for fraction in _tanhc._FRACTIONS]
+SIZES = [
+    0.0,
+    1e-300,
+    1e-30,
+    1e-8,
+    *(b * side for b in BORDERS for side in (0.5, 1 - 1e-9, 1 + 1e-9)),
+    1e2,
+    1e4,
+    1e8,
+    1e60,
+]
+SHARES = [0.0, 1e-9, 0.3, 0.5, 1 - 1e-6, 1.0]  # of the imaginary part: a leak alone, both, a capacitor alone
+
+
+def exact(w: complex) -> tuple[mpmath.mpc, mpmath.mpc, mpmath.mpc]:
+    if w == 0:
+        return mpmath.mpc(1), -mpmath.mpf(1) / 3, mpmath.mpc(1)
+    z = mpmath.sqrt(mpmath.mpmathify(w))
+    ratio, falling = mpmath.tanh(z) / z, 1 / mpmath.cosh(z) ** 2
+    return ratio, (falling - ratio) / (2 * z * z), falling
+
+
+@pytest.mark.parametrize("share", SHARES)
+@pytest.mark.parametrize("size", SIZES)
+def test_right_everywhere(size, share):
+    w = np.array([complex(size * (1 - share), size * share)])
+    ratio = tanhc(w)
+    found = (ratio, tanhc_slope(w, ratio), sech_squared(w, ratio))
+    with mpmath.workdps(700 if size < 1e-8 else 60):
+        for got, true in zip(found, exact(complex(w[0])), strict=True):
+            # an exponential far out is known as well as its argument; below 1e-290 it is nothing
+            room = 4e-14 + 4e-16 * size**0.5 if got is found[2] else 4e-14
+            assert abs(complex(got[0]) - true) <= room * abs(true) + 1e-290
+
+
+@pytest.mark.parametrize("share", SHARES)
+@pytest.mark.parametrize("size", SIZES)
+def test_both_parts_of_the_ratio_everywhere(size, share):
+    """The smaller part by itself: from it comes Re Z."""
+    w = np.array([complex(size * (1 - share), size * share)])
+    got = complex(tanhc(w)[0])
+    with mpmath.workdps(700 if size < 1e-8 else 60):
+        true = exact(complex(w[0]))[0]
+        assert abs(got.real - true.real) <= 2e-15 * abs(true.real)
+        assert abs(got.imag - true.imag) <= 4e-15 * abs(true.imag) + 1e-300
+
+
+def test_the_tiny_imaginary_part_keeps_its_digits():
+    """-w/3 where T is 1 to within rounding: Re Z of a short line hangs on it."""
+    for size in (1e-200, 1e-30, 1e-9):
+        assert tanhc(np.array([1j * size]))[0].imag == pytest.approx(-size / 3, rel=1e-14, abs=0)
+
+
+def test_near_and_far_in_one_array_are_what_they_are_alone():
+    w = np.array([1e-12j, 0.5 + 0.1j, 34j, 36j, 1e3 + 1e3j, 3.9j, 4.1j])
+    ratio = tanhc(w)
+    for k, one in enumerate(w):
+        alone = tanhc(one[None])
+        assert ratio[k] == pytest.approx(alone[0], rel=2e-15)
+        assert tanhc_slope(w, ratio)[k] == pytest.approx(tanhc_slope(one[None], alone)[0], rel=1e-13)
+        assert sech_squared(w, ratio)[k] == pytest.approx(sech_squared(one[None], alone)[0], rel=1e-13)
+    assert tanhc(w[:0]).shape == (0,)
+    assert tanhc(w.reshape(7, 1)).shape == (7, 1)
+
+
+def test_no_number_stays_no_number():
+    with np.errstate(all="ignore"):
+        assert np.isnan(tanhc(np.array([complex(np.nan, 0), 1.0]))[0])
+        assert np.isnan(tanhc(np.array([complex(np.nan, 0), 100.0]))[0])

@@ -1,0 +1,338 @@
+"""The sheet against closed forms, the one-dimensional line, limits and symmetries."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import mpmath
+import numpy as np
+import pytest
+from line_cases import PLATE
+
+from sensorgen.models import line, sheet
+from sensorgen.models.sheet import BY, Contact, Patch, Sheet, impedance, solve
+from sensorgen.units import EPS0_F_PER_M
+
+TONES = np.array([1e-3, 1.1e3, 99.7e3, 1e6])
+C = EPS0_F_PER_M * PLATE["eps_r"] / PLATE["d_m"]
+STRIP = Sheet(PLATE["L_m"], PLATE["W_m"], (PLATE["rho_top_ohm_m"] / 3e-4, PLATE["rho_bottom_ohm_m"] / 3e-4), C)
+PAIR = (STRIP.edge("top", "left"), STRIP.edge("bottom", "left"))
+SQUARE = Sheet(0.1, 0.08, (450.0, 700.0), 7e-8, tan_delta=0.02, leak_s_per_m2=1e-6)
+TIP = Patch(0.0213, 0.0371, 0.015, 0.022, 1.3, (1.2, 1.1))
+
+
+def pad(side, x, y, size=0.01):
+    return Contact(side, (x, x + size), (y, y + size))
+
+
+MIXED = [
+    (pad("top", 0.0, 0.0), pad("bottom", 0.09, 0.07)),
+    (SQUARE.edge("top", "right", 0.02, 0.05), SQUARE.edge("bottom", "front", 0.01, 0.04)),
+    (pad("top", 0.03, 0.05), pad("top", 0.0, 0.0)),
+]
+
+
+def strip_press(x, factor, s_n):
+    """A press across the whole strip, for the line and for the sheet."""
+    strain = 1 - 1 / factor
+    force = strain * PLATE["W_m"] * PLATE["L_p_m"] * PLATE["E_Pa"]
+    inputs = PLATE | {"f_Hz": TONES, "F_N": force, "x_p_left_edge_m": x, "S_n_top_per_N": s_n, "S_n_bottom_per_N": s_n}
+    return inputs, Patch(x, 0.0, PLATE["L_p_m"], PLATE["W_m"], factor, (1 + s_n * force,) * 2)
+
+
+def rates(errors):
+    return np.log2(np.array(errors[:-1]) / errors[1:])
+
+
+@pytest.mark.parametrize("part", [np.abs, np.real, np.imag])
+@pytest.mark.parametrize("s_n", [0.0, 0.005])
+def test_with_edge_contacts_it_is_the_line_in_second_order(part, s_n):
+    inputs, press = strip_press(0.043, 1.4, s_n)
+    true = line.impedance(**inputs)
+    errors = [
+        np.abs(part(impedance(STRIP, [PAIR], TONES, press, cells=n)[:, 0, 0] - true) / part(true)).max()
+        for n in (20, 40, 80)
+    ]
+    assert rates(errors) == pytest.approx(2, abs=0.15)
+    assert errors[0] < 2e-3
+    assert errors[2] < 2e-4
+
+
+@pytest.mark.parametrize("x", [0.0, 0.0377, 0.0431, 0.09])
+def test_derivatives_are_those_of_the_line(x):
+    inputs, press = strip_press(x, 1.4, 0.0)
+    tones = TONES[1:3]
+    names = ["x_p_left_edge_m", "S_n_top_per_N", "S_n_bottom_per_N", "E_Pa"]
+    _, by = line.sensitivities(of=names, **(inputs | {"f_Hz": tones}))
+    got = {name: value[:, 0, 0] for name, value in solve(STRIP, [PAIR], tones, press, of=BY, cells=80).by.items()}
+    force, strain = inputs["F_N"], 1 - 1 / press.capacitance_factor
+    assert got["x_m"] == pytest.approx(by["x_p_left_edge_m"], rel=1e-3)
+    assert -got["capacitance_factor"] / (1 - strain) ** 2 * strain / inputs["E_Pa"] == pytest.approx(
+        by["E_Pa"], rel=1e-3
+    )
+    for end in ("top", "bottom"):
+        near = (
+            1e-3 * np.abs(by[f"S_n_{end}_per_N"]).max()
+        )  # at the far end, where no current is, there is little to see
+        assert got[f"{end}_resistance_factor"] * force == pytest.approx(by[f"S_n_{end}_per_N"], abs=10 * near)
+    assert np.abs(got["y_m"]).max() < 1e-9 * np.abs(got["x_m"]).max()
+
+
+@pytest.mark.parametrize(("s_n", "least", "worst"), [(0.0, 1.7, 1e-3), (0.005, 0.7, 0.15)])
+def test_the_derivative_by_place_converges_wherever_the_patch_lies(s_n, least, worst):
+    """In second order; in first where the sheets change too, since current and voltage then bend under the edge."""
+    errors = []
+    for n in (20, 40, 80):
+        found = []
+        for x in 0.04 + np.linspace(0, 0.005, 5):
+            inputs, press = strip_press(x, 1.4, s_n)
+            true = line.sensitivities(of=["x_p_left_edge_m"], **(inputs | {"f_Hz": 99.7e3}))[1]["x_p_left_edge_m"]
+            got = solve(STRIP, [PAIR], 99.7e3, press, of=["x_m"], cells=n).by["x_m"][0, 0, 0]
+            found.append(abs(got - true) / abs(true))
+        errors.append(max(found))
+    assert errors[0] < worst
+    assert np.log2(errors[0] / errors[-1]) / 2 > least
+
+
+@pytest.mark.parametrize("edge", ["front", "back", "right"])
+def test_every_edge_is_like_the_left_one(edge):
+    turned = edge in ("front", "back")
+    size = (STRIP.width_m, STRIP.length_m) if turned else (STRIP.length_m, STRIP.width_m)
+    film = replace(STRIP, length_m=size[0], width_m=size[1])
+    ports = [(film.edge("top", edge), film.edge("bottom", edge))]
+    assert impedance(film, ports, TONES, cells=20) == pytest.approx(impedance(STRIP, [PAIR], TONES, cells=20), rel=1e-9)
+
+
+def two_stretches(length, width, stretches):
+    """Resistance in squares between two stretches of the front edge: conformal map onto the half plane."""
+    k = mpmath.findroot(
+        lambda m: mpmath.ellipk(1 - m) / (2 * mpmath.ellipk(m)) - width / length, (1e-6, 1 - 1e-6), solver="anderson"
+    )
+    quarter = mpmath.ellipk(k)
+    a, b, c, d = (mpmath.ellipfun("sn", quarter * (2 * x / length - 1), m=k) for x in stretches)
+    ratio = (b - a) * (d - c) / ((c - a) * (d - b))
+    return float(mpmath.ellipk(1 - ratio) / mpmath.ellipk(ratio))
+
+
+@pytest.mark.parametrize("stretches", [(0.0, 0.01, 0.08, 0.1), (0.02, 0.03, 0.035, 0.09), (0.01, 0.011, 0.05, 0.051)])
+def test_stretches_of_an_edge_have_the_resistance_of_the_conformal_map(stretches):
+    film = Sheet(0.1, 0.07, (450.0, 700.0), 7e-8)
+    port = [tuple(film.edge("top", "front", *stretches[k : k + 2]) for k in (0, 2))]
+    true = 450.0 * two_stretches(0.1, 0.07, stretches)
+    errors = np.array([impedance(film, port, 0.0, cells=n)[0, 0, 0].real / true - 1 for n in (20, 40, 80)])
+    assert (rates(np.abs(errors)) > 1.35).all()  # 1.8 to 2 in the end; without grading it is 1
+    assert abs(4 * errors[2] - errors[1]) / 3 < 5e-3
+
+
+def test_van_der_pauw_on_one_sheet():
+    film, size = Sheet(0.1, 0.06, (450.0, 700.0), 7e-8), 1e-4
+    places = [("front", 0.03), ("right", 0.02), ("back", 0.05), ("left", 0.01)]
+    a, b, c, d = (film.edge("top", edge, at, at + size) for edge, at in places)
+    z = impedance(film, [(a, b), (d, c), (b, c), (a, d)], 0.0, cells=80)[0].real
+    assert np.exp(-np.pi * z[0, 1] / 450.0) + np.exp(-np.pi * z[2, 3] / 450.0) == pytest.approx(1, abs=1e-3)
+
+
+def test_a_rectangle_between_opposite_edges_is_its_squares():
+    port = [(SQUARE.edge("bottom", "left"), SQUARE.edge("bottom", "right"))]
+    for n in (1, 7, 40):
+        assert impedance(replace(SQUARE, leak_s_per_m2=0.0), port, 0.0, cells=n)[0, 0, 0] == pytest.approx(875.0)
+    assert impedance(replace(SQUARE, sheet_resistance_ohm=(450.0, 0.0)), port, 1e4, cells=20)[0, 0, 0] == 0
+
+
+@pytest.mark.parametrize("x", [0.0, 0.0213, 0.08, 0.085])
+def test_a_band_of_other_resistance_is_in_series(x):
+    ends = SQUARE.edge("top", "left"), SQUARE.edge("top", "right")
+    press = Patch(x, 0.0, 0.015, 0.08, 1.0, (3.0, 1.0))
+    squares = (0.1 + 2.0 * 0.015) / 0.08
+    z = impedance(SQUARE, [ends], 0.0, press, cells=80)[0, 0, 0].real
+    assert z == pytest.approx(450.0 * squares, rel=2e-3)
+    beside = Patch(0.0, x * 0.5, 0.1, 0.015, 1.0, (3.0, 1.0))  # along the current: in parallel
+    z = impedance(SQUARE, [ends], 0.0, beside, cells=40)[0, 0, 0].real
+    assert z == pytest.approx(450.0 * 0.1 / (0.065 + 0.015 / 3), rel=2e-4)
+
+
+@pytest.mark.parametrize("x", [0.0, 0.0995])
+def test_a_band_narrower_than_half_a_cell_at_an_end_still_counts(x):
+    ends = SQUARE.edge("top", "left"), SQUARE.edge("top", "right")
+    press = Patch(x, 0.0, 0.0005, 0.08, 1.0, (3.0, 1.0))
+    z = impedance(SQUARE, [ends], 0.0, press, cells=10)[0, 0, 0].real
+    loose = impedance(SQUARE, [ends], 0.0, cells=10)[0, 0, 0].real
+    assert z - loose == pytest.approx(450.0 * 2 * 0.0005 / 0.08, rel=0.2)
+
+
+@pytest.mark.parametrize("contact", [PAIR, (pad("top", 0.09, 0.0, 0.01), pad("bottom", 0.09, 0.0, 0.01))])
+def test_at_a_nanohertz_it_is_the_whole_capacitance(contact):
+    film = replace(STRIP, tan_delta=0.0)
+    z = impedance(film, [contact], [1e-9, 1.0], cells=40)[:, 0, 0]
+    assert z.imag == pytest.approx(-1 / (2 * np.pi * np.array([1e-9, 1.0]) * C * 1e-3), rel=1e-9)
+    assert z[0].real == pytest.approx(z[1].real, rel=1e-8)
+    reach = 0.1 if contact is PAIR else 0.09  # a pad across the strip is an end of a shorter one
+    third = sum(STRIP.sheet_resistance_ohm) * reach / 0.01 * (reach / 0.1) ** 2 / 3
+    assert z[0].real == pytest.approx(third, rel=1e-3)
+
+
+@pytest.mark.parametrize("ohm", [0.0, 1e-30, 1e-6])
+def test_without_resistance_it_is_a_capacitor(ohm):
+    film = replace(SQUARE, sheet_resistance_ohm=(ohm, ohm), leak_s_per_m2=0.0)
+    z = impedance(film, MIXED[:2], 1e4, TIP, cells=20)[0]
+    more = 0.3 * 0.015 * 0.022
+    whole = 1 / ((1j + 0.02) * 2 * np.pi * 1e4 * 7e-8 * (0.1 * 0.08 + more))
+    assert z == pytest.approx(np.full((2, 2), whole), rel=1e-6)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_one_perfect_sheet_leaves_the_other(side):
+    ohm = (0.0, 900.0) if side else (900.0, 0.0)
+    z = impedance(replace(STRIP, sheet_resistance_ohm=ohm), [PAIR], TONES, cells=20)
+    assert z == pytest.approx(impedance(replace(STRIP, sheet_resistance_ohm=(450.0, 450.0)), [PAIR], TONES, cells=20))
+    wired = Contact("top", (0.1, 0.1), (0.0, 0.01)), PAIR[1]  # the current now enters and leaves at opposite ends
+    twin = impedance(replace(STRIP, sheet_resistance_ohm=ohm), [wired], TONES, cells=20)
+    assert twin == pytest.approx(z) if not side else np.isfinite(twin).all()
+
+
+def test_it_is_reciprocal_and_passive():
+    z = impedance(SQUARE, MIXED, [0.0, 1e3, 1e5, 1e6], TIP, cells=30)
+    assert z == pytest.approx(z.transpose(0, 2, 1), rel=1e-10)
+    assert (np.linalg.eigvalsh(z.real) > 0).all()
+    assert (np.linalg.eigvalsh(z[1:].imag)[:, 0] < 0).all()
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_mirror_changes_nothing_but_the_sign_of_the_derivative(axis):
+    size = (SQUARE.length_m, SQUARE.width_m)[axis]
+
+    def turned(contact):
+        spans = [contact.x_m, contact.y_m]
+        spans[axis] = (size - spans[axis][1], size - spans[axis][0])
+        return Contact(contact.side, *spans)
+
+    mirrored = replace(TIP, **({"y_m": size - 0.0371 - 0.022} if axis else {"x_m": size - 0.0213 - 0.015}))
+    one = solve(SQUARE, MIXED, [1e3, 1e5], TIP, of=BY, cells=20)
+    two = solve(SQUARE, [(turned(a), turned(b)) for a, b in MIXED], [1e3, 1e5], mirrored, of=BY, cells=20)
+    assert two.impedance_ohm == pytest.approx(one.impedance_ohm, rel=1e-9)
+    for name in BY:
+        sign = -1 if name == ("x_m", "y_m")[axis] else 1
+        scale = np.abs(one.by[name]).max()
+        assert two.by[name] / scale == pytest.approx(sign * one.by[name] / scale, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    "ports", [MIXED, [(SQUARE.edge("top", "left", 0.0, 0.02), SQUARE.edge("bottom", "left", 0.06, 0.08))]]
+)
+def test_turned_upside_down_and_with_ports_reversed(ports):
+    other = {"top": "bottom", "bottom": "top"}
+    flipped = [tuple(replace(c, side=other[c.side]) for c in port)[::-1] for port in ports]
+    film = replace(SQUARE, sheet_resistance_ohm=SQUARE.sheet_resistance_ohm[::-1])
+    for factors in ((1.2, 1.1), (1.2, 1.2)):
+        press, turned = (replace(TIP, resistance_factor=f) for f in (factors, factors[::-1]))
+        z = impedance(SQUARE, ports, 1e5, press, cells=20)
+        assert impedance(film, flipped, 1e5, turned, cells=20) == pytest.approx(z, rel=1e-9)
+
+
+def test_sheets_that_change_differently_are_not_folded():
+    inputs, press = strip_press(0.043, 1.4, 0.005)
+    press = replace(press, resistance_factor=(press.resistance_factor[0], 1.0))
+    true = line.impedance(**(inputs | {"S_n_bottom_per_N": 0.0}))
+    z = impedance(STRIP, [PAIR], TONES, press, cells=80)[:, 0, 0]
+    assert z.real == pytest.approx(true.real, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", BY)
+def test_derivatives_follow_the_impedance_in_two_dimensions(name):
+    """Differences of fourth order, which see the same film; the hats are piecewise, so a small step inside a piece."""
+    step = 1e-6 if name in ("x_m", "y_m") else 1e-3
+
+    def moved(by):
+        if name.endswith("resistance_factor"):
+            top, bottom = TIP.resistance_factor
+            return replace(TIP, resistance_factor=(top + by, bottom) if name[0] == "t" else (top, bottom + by))
+        return replace(TIP, **{name: getattr(TIP, name) + by})
+
+    def z(by):
+        return impedance(SQUARE, MIXED, [1e4, 1e6], moved(by), cells=20)
+
+    slope = (8 * (z(step) - z(-step)) - z(2 * step) + z(-2 * step)) / (12 * step)
+    exact = solve(SQUARE, MIXED, [1e4, 1e6], TIP, of=[name], cells=20).by[name]
+    assert exact / np.abs(exact).max() == pytest.approx(slope / np.abs(exact).max(), abs=1e-6)
+
+
+@pytest.mark.parametrize("size", [(0.015, 0.004), (0.0007, 0.0003)])
+def test_a_light_press_anywhere_reads_the_squared_voltage_of_the_film(size):
+    """First order in the press: dZ/dk = -j omega C'' times the integral of u^2, which is one-dimensional."""
+    x, y, hertz = 0.0213, 0.0031, 99.7e3
+    got = solve(STRIP, [PAIR], hertz, Patch(x, y, *size), of=["capacitance_factor"], cells=80)
+    r = sum(STRIP.sheet_resistance_ohm) / STRIP.width_m
+    gamma = mpmath.sqrt(r * 2j * mpmath.pi * hertz * C * STRIP.width_m)
+    z = mpmath.sqrt(r / (2j * mpmath.pi * hertz * C * STRIP.width_m)) / mpmath.tanh(gamma * STRIP.length_m)
+    far = STRIP.length_m
+
+    def voltage_squared(at):
+        return (z * mpmath.cosh(gamma * (far - at)) / mpmath.cosh(gamma * far)) ** 2
+
+    true = -2j * mpmath.pi * hertz * C * size[1] * mpmath.quad(voltage_squared, [x, x + size[0]])
+    assert got.by["capacitance_factor"][0, 0, 0] == pytest.approx(complex(true), rel=2e-4)
+
+
+def test_facing_contacts_are_folded_to_the_same_numbers():
+    """An unequal ratio of resistances, however little, needs both sheets: the two ways must meet."""
+    ports = [(pad("top", x, y), pad("bottom", x, y)) for x, y in ((0.0, 0.0), (0.09, 0.0), (0.05, 0.07))]
+    near = replace(TIP, resistance_factor=(1.2, 1.2 + 1e-12))
+    even = replace(TIP, resistance_factor=(1.2, 1.2))
+    one, two = (solve(SQUARE, ports, [0.0, 1e3, 1e6], press, of=BY, cells=20) for press in (even, near))
+    assert one.impedance_ohm == pytest.approx(two.impedance_ohm, rel=1e-9)
+    for name in BY:
+        scale = np.abs(two.by[name]).max()
+        assert one.by[name] / scale == pytest.approx(two.by[name] / scale, abs=1e-9)
+
+
+def test_an_array_of_capacitances_is_what_a_patch_on_its_steps_makes():
+    cells = np.full((10, 8), 7e-8)
+    cells[2:5, 3:4] *= 1.3
+    patch = Patch(0.02, 0.03, 0.03, 0.01, 1.3)
+    z = impedance(replace(SQUARE, capacitance_f_per_m2=cells), MIXED, 1e5, cells=23)
+    assert z == pytest.approx(impedance(SQUARE, MIXED, 1e5, patch, cells=23), rel=1e-12)
+    lumpy = replace(SQUARE, capacitance_f_per_m2=np.outer(np.arange(1, 8), np.arange(2, 7)) * 1e-8)
+    pressed = impedance(replace(lumpy, sheet_resistance_ohm=(0.0, 0.0)), MIXED[:1], 1e5, TIP, cells=17)[0, 0, 0]
+    x, y = np.linspace(0, 0.1, 7001), np.linspace(0, 0.08, 5001)
+    mid_x, mid_y = (x[1:] + x[:-1]) / 2, (y[1:] + y[:-1]) / 2
+    under = ((mid_x > 0.0213) & (mid_x < 0.0363))[:, None] & ((mid_y > 0.0371) & (mid_y < 0.0591))
+    c = lumpy.capacitances()[(mid_x / 0.1 * 7).astype(int)][:, (mid_y / 0.08 * 5).astype(int)] * (1 + 0.3 * under)
+    whole = (0.02 + 1j) * 2 * np.pi * 1e5 * c.mean() * 0.008 + 1e-6 * 0.008
+    assert pressed == pytest.approx(1 / whole, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "ports",
+    [
+        [(pad("top", 0.0, 0.0, 0.004), pad("bottom", 0.0, 0.0, 0.004))],
+        [(pad("top", 0.0, 0.0), pad("bottom", 0.09, 0.07))],
+        [(pad("top", 0.04, 0.03), pad("bottom", 0.04, 0.03))],
+    ],
+)
+def test_pads_converge_in_second_order(ports):
+    z = [impedance(SQUARE, ports, [2e5], TIP, cells=n).real for n in (20, 40, 80)]
+    change = [np.abs(b - a).max() for a, b in pairwise(z)]
+    assert (rates(change) > 1.6).all()
+
+
+def test_the_estimated_error_covers_the_true_one():
+    inputs, press = strip_press(0.043, 1.4, 0.005)
+    true = line.impedance(**inputs)
+    for accuracy in (1e-2, 1e-3):
+        got = solve(STRIP, [PAIR], TONES, press, accuracy=accuracy)
+        z = got.impedance_ohm[:, 0, 0]
+        off = max(np.abs(part(z - true) / part(true)).max() for part in (np.real, np.imag))
+        assert off <= got.error <= accuracy
+    stretches = (0.02, 0.03, 0.035, 0.09)
+    port = [tuple(SQUARE.edge("top", "front", *stretches[k : k + 2]) for k in (0, 2))]
+    got = solve(replace(SQUARE, leak_s_per_m2=0.0), port, 0.0, accuracy=2e-2)
+    assert abs(got.impedance_ohm[0, 0, 0] / (450.0 * two_stretches(0.1, 0.08, stretches)) - 1) < got.error
+
+
+def test_the_depth_is_that_of_the_line():
+    film = replace(STRIP, leak_s_per_m2=3.0)
+    y = 3.0 + 2j * np.pi * 1e5 * C
+    assert sheet.depth_m(film, 1e5) == pytest.approx(1 / abs(y * sum(STRIP.sheet_resistance_ohm)) ** 0.5)
+    assert sheet.depth_m(STRIP, 0.0) == np.inf
+    assert sheet.depth_m(STRIP, 1e5, Patch(0, 0, 0.01, 0.01, 4.0, (4.0, 4.0))) == pytest.approx(
+        sheet.depth_m(STRIP, 1e5) / 4
+    )

@@ -1,0 +1,79 @@
+"""How the card is printed: what a person looks for is there, and it fits the screen."""
+
+from dataclasses import replace
+
+import pytest
+
+from sensorgen.card import card
+from sensorgen.cli import card_text
+from sensorgen.models import compression
+from sensorgen.predict import TONES_HZ
+from sensorgen.sensor import Sensor
+
+PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), 8.8541878128e-12 * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))
+BONDED = replace(PLATE, compression=compression.bonded(6e6, 0.01, 6e-4))
+CAPACITOR = replace(PLATE, resistivity_ohm_m=(0.0, 0.0))
+
+
+def printed(capsys, sensor=PLATE, tones=TONES_HZ, **more) -> str:
+    card_text.card(card(sensor, tones, **more))
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"stiffest": BONDED},
+        {"sensor": CAPACITOR},
+        {"force_n": 0.0},
+        {"tones": [1e3]},
+        {"tones": [1e3 * 1.1**k for k in range(60)]},
+    ],
+)
+def test_it_fits_the_screen(capsys, more):
+    lines = printed(capsys, **more).splitlines()
+    assert len(lines) <= 25
+    assert max(len(line) for line in lines) <= 100
+
+
+def test_it_says_what_the_plate_cannot_do(capsys):
+    text = " ".join(printed(capsys, stiffest=BONDED).split())
+    assert "verdict at 0.1 % noise this design cannot sense force and cannot locate a press" in text
+    assert "position to 225 mm" in text
+    assert "(213 N, 21 m)" in text
+    assert "1. a cell of triangles over a film of 0.1 mm (tri), in place of the film: 0.15 N, 8.3 mm" in text
+    assert "all at once:" in text
+    assert "99.7 kHz (6 N, 258 mm); 49.9 + 99.7 kHz" in text
+    assert "of all up to 1 MHz:" in text
+    assert "of the presses from 1 N on 0 % are known to 0.6 N, 0 % to 10 mm" in text
+
+
+def test_a_tone_is_held_against_the_noise(capsys):
+    """6 N strain the film by 1 %, on a tenth of the sensor: 0.1 % per 6 N, at every tone."""
+    row = next(line.split() for line in printed(capsys).splitlines() if line.strip().startswith("1.1 kHz"))
+    assert row == ["1.1", "kHz", "2.093", "Mohm", "0.017", "%/N", "4.3e-06", "%/mm", "14", "%", "0", "%"]
+
+
+def test_of_many_tones_those_are_shown_that_tell_of_position(capsys):
+    tones = [1e3 * 1.1**k for k in range(60)]
+    rows = [line.split() for line in printed(capsys, tones=tones).splitlines() if "%/mm" in line]
+    assert len(rows) == 7
+    assert all(row[1] == "kHz" and 100 < float(row[0]) < 300 for row in rows)
+    assert [float(row[0]) for row in rows] == sorted(float(row[0]) for row in rows)
+
+
+def test_what_is_undefined_is_said_in_words(capsys):
+    text = printed(capsys, CAPACITOR)
+    assert "nan" not in text
+    assert "None" not in text
+    assert "position leaves no trace in Z" in " ".join(text.split())
+    assert "no tones tell both force and position" in text
+
+
+def test_where_nothing_helps_it_says_so(capsys):
+    assert "none of the changes that were tried" in printed(capsys, force_n=0.0)
+
+
+def test_a_doubt_about_the_map_is_told(capsys):
+    law = compression.curve("example", "made up", [0.0, 1e5], [1.0, 1.3])
+    assert "above 100 kPa the curve is extended" in " ".join(printed(capsys, replace(PLATE, compression=law)).split())

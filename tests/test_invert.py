@@ -1,0 +1,385 @@
+"""Force and position back from impedance: against presses that are known, the bound, SciPy, and brute force."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.stats import chi2
+
+from sensorgen.design import make
+from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.invert import Estimator, Prior, Status, estimate
+from sensorgen.invert.forward import Forward
+from sensorgen.invert.verdict import chi2_limit
+from sensorgen.models.compression import unconfined
+from sensorgen.planner import sensor_of
+from sensorgen.predict import TONES_HZ
+from sensorgen.sensor import Sensor
+
+TONES = np.array(TONES_HZ)
+NOISE = 1e-3
+
+
+def tri(resistivity_ohm_m, **changes):
+    sensor = sensor_of(make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})).sensor
+    return dataclasses.replace(sensor, resistivity_ohm_m=(resistivity_ohm_m,) * 2, **changes)
+
+
+SENSORS = {
+    "eTPU at 0.83 ohm m": (tri(1 / 1.2), TONES),
+    "eTPU at 0.83 ohm m, tones to 1 MHz": (tri(1 / 1.2), TONES * 10),
+    "5 ohm m": (tri(5.0), TONES),
+    "5 ohm m, tones to 1 MHz": (tri(5.0), TONES * 10),
+}
+EVERYTHING = dataclasses.replace(
+    tri(2.0), tan_delta=0.02, leak_s_per_m=1e-6, piezoresistance_per_n=(0.02, -0.01), far_end=5e4,
+    electrode_m=(3e-4, 5e-4), tip_m=0.012,
+)  # fmt: skip
+# the thesis's plate, Table 3.1, with the mean resistivity of Table C.1
+PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.135, 0.135), 8.8541878128e-12 * 4.68 * 0.01 / 6e-4, unconfined(6e6))
+
+
+def presses(count, sensor=None, force=(0.2, 6.0), seed=1, ends=0.0):
+    rng = np.random.default_rng(seed)
+    length = 0.1 if sensor is None else sensor.length_m
+    return rng.uniform(*force, count), rng.uniform(ends, length - ends, count)
+
+
+def readings(sensor, tones, force, position):
+    return sensor.impedance(tones, np.asarray(force)[:, None], np.asarray(position)[:, None])
+
+
+def noisy(z, noise=NOISE, seed=2):
+    rng = np.random.default_rng(seed)
+    return z * (1 + noise * (rng.normal(size=z.shape) + 1j * rng.normal(size=z.shape)))
+
+
+def bound(sensor, tones, force, position, noise=NOISE):
+    """Cramer-Rao bound from the sensor's own derivatives, the noise being relative to the impedance."""
+    z, by_force, by_position = sensor.response(tones, force, position)
+    j = np.stack([by_force / abs(z), by_position / abs(z)], -1) / noise
+    return np.linalg.inv((j.conj().T @ j).real)
+
+
+@pytest.mark.parametrize("name", ["open", "short", "resistor", "plate"])
+def test_the_forward_model_is_the_sensor(name):
+    ends = {"open": "open", "short": "short", "resistor": 5e4, "plate": "open"}
+    sensor = PLATE if name == "plate" else dataclasses.replace(EVERYTHING, far_end=ends[name])
+    force, position = presses(300)
+    position[:4] = 0.0, 0.1, 0.003, 0.098
+    got = np.exp(Forward(sensor, TONES).log_impedance(force, position))
+    want = readings(sensor, TONES, force, position)
+    assert abs(got / want - 1).max() < 1e-13
+    assert abs(got.real / want.real - 1).max() < 1e-11
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_without_noise_every_press_comes_back(name):
+    sensor, tones = SENSORS[name]
+    force, position = presses(6000)
+    found = estimate(sensor, tones, readings(sensor, tones, force, position))
+    told = found.status <= Status.AMBIGUOUS
+    assert told.mean() > 0.9
+    assert abs(found.force_n - force)[told].max() < 1e-9
+    assert abs(found.position_m - position)[told].max() < 1e-8
+    assert found.chi2[told].max() < 1e-6
+
+
+def test_a_sensor_with_everything_comes_back():
+    force, position = presses(2000)
+    found = estimate(EVERYTHING, TONES * 10, readings(EVERYTHING, TONES * 10, force, position))
+    told = found.status <= Status.AMBIGUOUS
+    assert told.mean() > 0.8
+    near = (abs(found.force_n - force) < 1e-9) & (abs(found.position_m - position) < 1e-8)
+    assert near[told].mean() > 0.995
+    assert (found.chi2 < 0.01)[told].all()  # the others stop where the response folds back, far within the noise
+    assert (np.sqrt(found.covariance[told & ~near, 0, 0]) > 0.2).all()
+
+
+def test_it_is_the_least_squares_solution():
+    sensor, tones = SENSORS["5 ohm m, tones to 1 MHz"]
+    force, position = presses(40, force=(1.0, 6.0), ends=0.015)
+    z = noisy(readings(sensor, tones, force, position))
+    found = estimate(sensor, tones, z)
+    for k in range(len(z)):
+
+        def residual(p, k=k):
+            off = np.log(z[k] / sensor.impedance(tones, p[0], p[1] / 100)) / NOISE
+            return np.concatenate([off.real, off.imag])
+
+        start, border = (force[k], position[k] * 100), ([0.0, 0.0], [13.0, 10.0])
+        peer = least_squares(residual, start, bounds=border, x_scale=(0.2, 0.2), xtol=1e-12, ftol=1e-14)
+        deviation = np.sqrt(np.diag(np.linalg.inv(peer.jac.T @ peer.jac)))
+        assert abs(found.force_n[k] - peer.x[0]) < 0.02 * deviation[0]
+        assert abs(found.position_m[k] * 100 - peer.x[1]) < 0.02 * deviation[1]
+        assert found.chi2[k] == pytest.approx(2 * peer.cost, rel=1e-3)
+        assert np.sqrt(found.covariance[k, 0, 0]) == pytest.approx(deviation[0], rel=3e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "force", "position"),
+    [
+        ("5 ohm m, tones to 1 MHz", 3.0, 0.045), ("5 ohm m, tones to 1 MHz", 5.0, 0.02), ("5 ohm m", 6.0, 0.045),
+        ("eTPU at 0.83 ohm m, tones to 1 MHz", 4.0, 0.05), ("eTPU at 0.83 ohm m", 6.0, 0.045),
+    ],
+)  # fmt: skip
+def test_with_noise_it_is_at_the_bound_and_intervals_cover(name, force, position):
+    sensor, tones = SENSORS[name]
+    n = 10_000
+    z = noisy(np.tile(sensor.impedance(tones, force, position), (n, 1)))
+    found = estimate(sensor, tones, z)
+    limit = bound(sensor, tones, force, position)
+    assert np.mean(found.status == Status.NO_FIT) < 1e-3
+    assert np.mean(found.status <= Status.AT_THE_END) > 0.999
+    off = np.stack([found.force_n - force, found.position_m - position])
+    rms = np.sqrt(np.mean(off**2, 1))
+    assert rms == pytest.approx(np.sqrt(np.diag(limit)), rel=0.1, abs=0)
+    assert np.corrcoef(off)[0, 1] == pytest.approx(limit[0, 1] / np.sqrt(limit[0, 0] * limit[1, 1]), abs=0.05)
+    for interval, truth in ((found.force_90_n, force), (found.position_90_m, position)):
+        assert 0.88 <= np.mean((interval[:, 0] < truth) & (truth < interval[:, 1])) <= 0.92
+    assert np.mean(found.chi2) == pytest.approx(2 * len(tones) - 2, rel=0.02)
+    assert np.median(np.sqrt(found.covariance[:, 1, 1])) == pytest.approx(np.sqrt(limit[1, 1]), rel=0.05)
+
+
+def test_noise_per_tone_weighs_the_tones():
+    sensor, tones = SENSORS["5 ohm m"]
+    n, noise = 10_000, NOISE * np.array([1, 1, 2, 2, 5, 0.5, 1])
+    z = noisy(np.tile(sensor.impedance(tones, 4.0, 0.045), (n, 1)), noise)
+    found = estimate(sensor, tones, z, noise)
+    limit = bound(sensor, tones, 4.0, 0.045, noise[:, None])
+    assert np.std(found.position_m) == pytest.approx(np.sqrt(limit[1, 1]), rel=0.1)
+    assert np.std(found.force_n) == pytest.approx(np.sqrt(limit[0, 0]), rel=0.1)
+
+
+def test_a_press_at_no_force_has_no_position():
+    sensor, tones = SENSORS["5 ohm m"]
+    found = estimate(sensor, tones, readings(sensor, tones, [0.0, 0.0, 0.001], [0.02, 0.05, 0.07]))
+    assert set(found.status.tolist()) == {Status.FORCE_ONLY}
+    assert abs(found.force_n - [0, 0, 0.001]).max() < 2e-3
+    assert np.isfinite(found.force_n).all()
+    assert not np.isnan(found.covariance).any()
+
+
+def test_the_thesis_plate_senses_neither():
+    z = noisy(np.tile(PLATE.impedance(TONES, 6.0, 0.05), (500, 1)))
+    found = estimate(PLATE, TONES, z)
+    assert np.median(found.status) >= Status.FORCE_ONLY
+    six = Estimator(PLATE, TONES, force_limit_n=6.0).batch(z)
+    assert np.mean(six.status == Status.NOT_IDENTIFIABLE) > 0.9
+    deviation = np.sqrt(np.diag(bound(PLATE, TONES, 6.0, 0.05)))
+    assert deviation == pytest.approx([2.23, 0.225], rel=0.02)
+
+
+def test_what_no_press_explains_is_no_fit():
+    sensor, tones = SENSORS["5 ohm m"]
+    z = readings(sensor, tones, [3.0], [0.05]) * np.exp(0.02j * np.arange(7))
+    found = estimate(sensor, tones, z)
+    assert found.status.tolist() == [Status.NO_FIT]
+    assert found.chi2[0] > chi2_limit(np.array([12]))[0]
+
+
+@pytest.mark.parametrize("degrees", [4, 12, 40])
+def test_no_fit_is_one_sample_in_ten_thousand(degrees):
+    assert chi2_limit(np.array([degrees]))[0] == pytest.approx(chi2.isf(1e-4, degrees), rel=0.04)
+
+
+def test_a_press_beyond_the_border_lies_on_it():
+    sensor, tones = SENSORS["5 ohm m"]
+    z = readings(sensor, tones, [6.0], [0.05])
+    found = Estimator(sensor, tones, force_limit_n=5.9).batch(z)
+    assert found.status.tolist() == [Status.AT_THE_END]
+    assert found.force_n[0] == pytest.approx(5.9)
+    near = Estimator(sensor, tones).batch(noisy(readings(sensor, tones, [0.05] * 400, [0.05] * 400)))
+    assert (near.force_n >= 0).all()
+    assert ((near.position_m >= 0) & (near.position_m <= 0.1)).all()
+
+
+@pytest.mark.parametrize("missing", [np.nan, 0.0, complex(np.nan, 1.0), np.inf])
+def test_missing_tones_do_not_count(missing):
+    sensor, tones = SENSORS["5 ohm m, tones to 1 MHz"]
+    force, position = presses(500, force=(1.0, 6.0), ends=0.01)
+    z = readings(sensor, tones, force, position)
+    z[:, 2] = missing
+    z[::2, 5] = missing
+    found = estimate(sensor, tones, z)
+    told = found.status <= Status.AMBIGUOUS
+    assert told.all()
+    assert abs(found.position_m - position)[told].max() < 1e-8
+    assert found.tones.tolist() == [5, 6] * 250
+    fewer = estimate(sensor, np.delete(tones, 2), np.delete(z, 2, 1)[1::2])
+    assert found.covariance[1::2] == pytest.approx(fewer.covariance, rel=1e-4, abs=0)
+
+
+def test_nothing_measured_is_missing():
+    sensor, tones = SENSORS["5 ohm m"]
+    z = np.concatenate([readings(sensor, tones, [3.0], [0.05]), np.full((1, 7), np.nan), np.zeros((1, 7))])
+    found = estimate(sensor, tones, z)
+    assert found.status.tolist() == [Status.OK, Status.MISSING, Status.MISSING]
+    assert np.isnan(found.force_n).tolist() == [False, True, True]
+    assert found.tones.tolist() == [7, 0, 0]
+    assert Estimator(sensor, tones).one(np.zeros(7)).status == Status.MISSING
+
+
+def test_one_tone_works_and_says_so():
+    sensor = tri(5.0)
+    estimator = Estimator(sensor, [99.7e3])
+    assert "nothing is left" in estimator.doubts[0]
+    assert Estimator(sensor, [1e4, 1e5]).doubts == ()
+    force, position = presses(300, force=(1.0, 6.0), ends=0.01)
+    z = readings(sensor, [99.7e3], force, position)
+    found = estimator.batch(z)
+    assert np.mean(found.chi2 < 1e-6) > 0.99
+    exact = found.chi2 < 1e-6
+    found, z, position = estimator.batch(z[exact]), z[exact], position[exact]
+    back = readings(sensor, [99.7e3], found.force_n, found.position_m)
+    assert abs(back / z - 1).max() < 1e-9
+    hit = abs(found.position_m - position) < 1e-8
+    other = abs(found.other_position_m - position) < 1e-4
+    assert (hit | other | (found.status >= Status.AT_THE_END)).all()
+
+
+def test_both_presses_are_told():
+    """Behind the tip's last full place the pressed length shrinks, so that two presses may read alike."""
+    sensor, tones = SENSORS["eTPU at 0.83 ohm m"]
+    force, position = presses(4000, force=(3.0, 6.0))
+    z = readings(sensor, tones, force, position)
+    found = estimate(sensor, tones, z)
+    two = np.flatnonzero(found.status == Status.AMBIGUOUS)
+    assert len(two) > 5
+    other = readings(sensor, tones, found.other_force_n[two], found.other_position_m[two])
+    off = np.log(other / z[two])
+    distance = (np.sum(abs(off) ** 2, 1)) / NOISE**2
+    assert (distance < 9.3).all()
+    assert np.median(abs(found.other_position_m - found.position_m)[two]) > 3e-3
+    assert np.isnan(found.other_force_n[found.status == Status.OK]).all()
+
+
+def test_brute_force_finds_no_third_and_no_better_press():
+    sensor, tones = SENSORS["5 ohm m, tones to 1 MHz"]
+    force, position = presses(30, force=(0.5, 6.0), seed=7)
+    z = noisy(readings(sensor, tones, force, position), seed=8)
+    found = estimate(sensor, tones, z)
+    f, x = np.meshgrid(np.linspace(0, 13, 261), np.linspace(0, 0.1, 401), indexing="ij")
+    grid = np.log(sensor.impedance(tones[:, None, None], f, x))
+    for k in range(len(z)):
+        square = (abs(np.log(z[k])[:, None, None] - grid) ** 2).sum(0) / NOISE**2
+        assert found.chi2[k] <= square.min() + 1e-3
+
+
+def test_streams_and_batches_agree():
+    sensor, tones = SENSORS["5 ohm m"]
+    force, position = presses(300, force=(0.0, 6.0))
+    z = noisy(readings(sensor, tones, force, position))
+    z[5, 2] = np.nan
+    estimator = Estimator(sensor, tones)
+    batch, stream = estimator.batch(z), [estimator.one(row) for row in z]
+    assert [int(s.status) for s in stream] == batch.status.tolist()
+    told = batch.status <= Status.AMBIGUOUS
+    for name, error in (("force_n", 0), ("position_m", 1)):
+        off = (np.array([getattr(s, name) for s in stream]) - getattr(batch, name))[told]
+        assert (abs(off) < 0.05 * np.sqrt(batch.covariance[told, error, error])).all()
+    covariances = np.array([s.covariance for s in stream])
+    ratio = covariances[told][:, [0, 1], [0, 1]] / batch.covariance[told][:, [0, 1], [0, 1]]
+    assert np.percentile(abs(ratio - 1), 95) < 0.02  # both take the information of one step before the last
+
+
+def test_blocks_do_not_show():
+    sensor, tones = SENSORS["5 ohm m"]
+    force, position = presses(20_000)
+    z = noisy(readings(sensor, tones, force, position))
+    estimator = Estimator(sensor, tones)
+    whole, part = estimator.batch(z), estimator.batch(z[17_000:17_100])
+    assert whole.force_n[17_000:17_100] == pytest.approx(part.force_n, rel=1e-9)
+    assert whole.force_n.shape == (20_000,)
+    assert whole.covariance.shape == (20_000, 2, 2)
+    assert estimator.batch(z[:0]).force_n.shape == (0,)
+
+
+def test_a_wide_posterior_is_better_than_least_squares():
+    """Noise above signal: presses from the prior, so that the posterior mean has the least error that there is."""
+    rng = np.random.default_rng(5)
+    force, position = rng.uniform(0, 6, 1500), rng.uniform(0, 0.1, 1500)
+    z = noisy(readings(PLATE, TONES, force, position), 3e-3)
+    plain = Estimator(PLATE, TONES, 3e-3, force_limit_n=6.0).batch(z)
+    known = Estimator(PLATE, TONES, 3e-3, Prior(), force_limit_n=6.0).batch(z)
+
+    def rms(found):
+        return np.sqrt(np.mean((found.force_n - force) ** 2)), np.sqrt(np.mean((found.position_m - position) ** 2))
+
+    (force_ls, position_ls), (force_map, position_map) = rms(plain), rms(known)
+    assert force_map < 0.8 * force_ls
+    assert position_map < 0.8 * position_ls
+    assert force_map < 1.02 * 6 / math.sqrt(12)  # a guess, the middle of the range
+    assert position_map < 1.02 * 0.1 / math.sqrt(12)
+    for interval, truth in ((known.force_90_n, force), (known.position_90_m, position)):
+        assert 0.87 < np.mean((interval[:, 0] < truth) & (truth < interval[:, 1])) < 0.93
+    assert np.mean(known.covariance[:, 0, 0]) == pytest.approx(force_map**2, rel=0.1)
+
+
+def test_the_posterior_is_bayes_by_brute_force():
+    prior = Prior(force_n=(2.0, 1.5), position_m=(0.06, 0.02))
+    sensor, tones = SENSORS["eTPU at 0.83 ohm m"]
+    noise = 4e-3
+    z = noisy(readings(sensor, tones, [1.5, 3.0, 0.3], [0.05, 0.08, 0.06]), noise)
+    found = Estimator(sensor, tones, noise, prior, force_limit_n=8.0).batch(z)
+    f, x = np.meshgrid((np.arange(800) + 0.5) / 100, (np.arange(400) + 0.5) / 4000, indexing="ij")
+    grid = np.log(sensor.impedance(tones[:, None, None], f, x))
+    for k in range(len(z)):
+        square = (abs(np.log(z[k])[:, None, None] - grid) ** 2).sum(0) / noise**2
+        square += ((f - 2.0) / 1.5) ** 2 + ((x - 0.06) / 0.02) ** 2
+        weight = np.exp((square.min() - square) / 2)
+        weight /= weight.sum()
+        mean_f, mean_x = (weight * f).sum(), (weight * x).sum()
+        assert found.force_n[k] == pytest.approx(mean_f, abs=0.02)
+        assert found.position_m[k] == pytest.approx(mean_x, abs=5e-4)
+        assert np.sqrt(found.covariance[k, 0, 0]) == pytest.approx(
+            np.sqrt((weight * (f - mean_f) ** 2).sum()), rel=0.03
+        )
+        assert np.sqrt(found.covariance[k, 1, 1]) == pytest.approx(
+            np.sqrt((weight * (x - mean_x) ** 2).sum()), rel=0.03
+        )
+
+
+def test_a_prior_does_not_matter_where_the_data_speak():
+    sensor, tones = SENSORS["5 ohm m, tones to 1 MHz"]
+    z = noisy(readings(sensor, tones, [4.0], [0.04]), 1e-4)
+    plain = Estimator(sensor, tones, 1e-4).batch(z)
+    known = Estimator(sensor, tones, 1e-4, Prior(force_n=(3.0, 2.0))).batch(z)
+    assert known.force_n == pytest.approx(plain.force_n, abs=0.1 * np.sqrt(plain.covariance[0, 0, 0]))
+    assert known.covariance == pytest.approx(plain.covariance, rel=0.05, abs=0)
+
+
+@pytest.mark.parametrize(
+    ("tones", "noise", "error", "words"),
+    [
+        ([1e3, 1e3], 1e-3, OutOfRange, "the same tone twice"), ([0.0], 1e-3, OutOfRange, "a tone of 0 Hz"),
+        ([np.nan], 1e-3, OutOfRange, "nan"), ([], 1e-3, BadInput, "expected a list"), (["a"], 1e-3, BadInput, "Hz"),
+        ([1e3], 0.0, OutOfRange, "a noise of 0"), ([1e3], -1.0, OutOfRange, "noise"), ([1e3], 2.0, OutOfRange, "noise"),
+        ([1e3], [1e-3, 1e-3], BadInput, "one per tone"), ([1e3], np.nan, OutOfRange, "noise"),
+    ],
+)  # fmt: skip
+def test_what_is_refused(tones, noise, error, words):
+    with pytest.raises(error, match=words):
+        Estimator(PLATE, tones, noise)
+
+
+@pytest.mark.parametrize("z", [np.ones(7), np.ones((2, 6)), np.ones((2, 7, 1)), [["a"] * 7]])
+def test_readings_of_another_shape_are_refused(z):
+    with pytest.raises(BadInput, match="readings"):
+        Estimator(PLATE, TONES).batch(z)
+
+
+@pytest.mark.parametrize("normal", [(1.0, 0.0), (np.nan, 1.0), (1.0, -1.0), (1.0, np.inf)])
+def test_a_prior_that_is_none(normal):
+    with pytest.raises(OutOfRange, match="standard deviation above 0"):
+        Prior(force_n=normal)
+
+
+def test_the_force_limit_is_what_the_sensor_bears():
+    soft = dataclasses.replace(PLATE, compression=unconfined(1e5))
+    estimator = Estimator(soft, TONES)
+    assert estimator.scale[0] == pytest.approx(0.01 * 0.005 * 1e5, rel=1e-5)  # half the tip on the sensor
+    with pytest.raises(OutOfRange, match="force limit"):
+        Estimator(soft, TONES, force_limit_n=0.0)

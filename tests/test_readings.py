@@ -1,0 +1,189 @@
+"""CSV files of impedances: what passes, and what is said about the rest."""
+
+import io
+import sys
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from sensorgen.errors import BadInput
+from sensorgen.readings import readings
+
+HEAD = "time_s,re_ohm_1.1kHz,im_ohm_1.1kHz,re_ohm_99.7kHz,im_ohm_99.7kHz\n"
+ROW = "0.5,100,-2e6,90.5,-2e4\n"
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Read text or bytes as a file; gives tones, names of other columns, impedances, other cells and row numbers."""
+
+    def call(text, size=1 << 14):
+        path = tmp_path / "m.csv"
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        with readings(str(path)) as source:
+            blocks = list(source.blocks(size))
+        z = np.concatenate([b.impedance_ohm for b in blocks])
+        rows = [row for b in blocks for row in b.rows]
+        return source.frequency_hz.tolist(), source.kept, z, [cells for b in blocks for cells in b.kept], rows
+
+    return call
+
+
+def test_a_plain_file(read):
+    tones, kept, z, cells, rows = read(HEAD + ROW + ROW)
+    assert tones == [1100.0, 99700.0]
+    assert kept == ["time_s"]
+    assert z.tolist() == [[100 - 2e6j, 90.5 - 2e4j]] * 2
+    assert cells == [["0.5"], ["0.5"]]
+    assert rows == [2, 3]
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 100])
+def test_blocks_do_not_show(read, size):
+    text = HEAD + "".join(f"t{k},{k},-{k},2,-3\n" for k in range(10))
+    _, _, z, cells, rows = read(text, size)
+    assert z[:, 0].real.tolist() == list(range(10))
+    assert [c[0] for c in cells] == [f"t{k}" for k in range(10)]
+    assert rows == list(range(2, 12))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\ufeff" + HEAD + ROW,
+        HEAD + ROW.rstrip("\n"),
+        (HEAD + ROW).replace("\n", "\r\n"),
+        HEAD + "\n" + ROW + "\n \n",
+        (HEAD + ROW).replace(",", ";"),
+        (HEAD + "0,5;100;-2e6;90,5;-2e4\n").replace("1.1kHz", "1.1 kHz").replace("s,", "s;").replace("Hz,", "Hz;"),
+        (HEAD + ROW).replace(",", "\t"),
+        HEAD + '"0.5",100,-2e6,"90.5",-2e4\n',
+        HEAD.replace("1.1kHz", "1100Hz").replace("99.7kHz", "0.0997MHz") + ROW,
+        HEAD + ROW.replace(",", " , "),
+    ],
+    ids=[
+        "bom",
+        "no last newline",
+        "crlf",
+        "blank rows",
+        "semicolons",
+        "decimal commas",
+        "tabs",
+        "quotes",
+        "Hz",
+        "blanks",
+    ],
+)
+def test_other_ways_to_write_the_same(read, text):
+    tones, _, z, _, _ = read(text)
+    assert tones == pytest.approx([1100.0, 99700.0])
+    assert z.tolist() == [[100 - 2e6j, 90.5 - 2e4j]]
+
+
+def test_quoted_labels_keep_their_separators(read):
+    _, kept, z, cells, _ = read('label,re_ohm_1kHz,im_ohm_1kHz\n"a, ""b""",1,-2\nplain,3,-4\n')
+    assert kept == ["label"]
+    assert cells == [['a, "b"'], ["plain"]]
+    assert z[:, 0].tolist() == [1 - 2j, 3 - 4j]
+
+
+@pytest.mark.parametrize("cell", ["", "nan", "NaN", " "])
+def test_empty_cells_were_not_measured(read, cell):
+    z = read(HEAD + ROW + f"1,{cell},-2e6,1,-2\n")[2]
+    assert np.isnan(z[1, 0])
+    assert z[1, 1] == 1 - 2j
+    assert z[0, 0] == 100 - 2e6j
+
+
+def test_columns_in_any_order(read):
+    tones, kept, z, cells, _ = read("im_ohm_2kHz,a,re_ohm_1kHz,re_ohm_2kHz,b,im_ohm_1kHz\n-4,x,1,3,y,-2\n")
+    assert tones == [1000.0, 2000.0]
+    assert z.tolist() == [[1 - 2j, 3 - 4j]]
+    assert (kept, cells) == (["a", "b"], [["x", "y"]])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", ["m.csv", "the file is empty", "re_ohm_1.1kHz"]),
+        ("\ufeff", ["the file is empty"]),
+        (HEAD, ["m.csv", "no rows below the header"]),
+        (HEAD + "\n\n", ["no rows"]),
+        ("time_s,force_n\n1,2\n", ["row 1", "no impedances among the columns time_s, force_n"]),
+        ("re_ohm_1kHz,x\n1,2\n", ["row 1", "column re_ohm_1kHz has no partner im_ohm_1kHz"]),
+        ("x,im_ohm_1kHz\n1,2\n", ["column im_ohm_1kHz has no partner re_ohm_1kHz"]),
+        ("re_ohm_1kHz,im_ohm_1kHz,re_ohm_1kHz\n1,2,3\n", ["re_ohm_1kHz and re_ohm_1kHz are the same part"]),
+        ("re_ohm_1kHz,im_ohm_1kHz,re_ohm_1000Hz,im_ohm_1000Hz\n1,2,3,4\n", ["re_ohm_1kHz and re_ohm_1000Hz"]),
+        ("re_ohm_abc,im_ohm_abc\n1,2\n", ["row 1", "column re_ohm_abc", "'abc' is not a frequency"]),
+        ("re_ohm_0Hz,im_ohm_0Hz\n1,2\n", ["column re_ohm_0Hz", "above 0"]),
+        (HEAD + ROW + "1,2,x,4,5\n", ["m.csv", "row 3", "column im_ohm_1.1kHz", "'x' is not a number"]),
+        (HEAD + ROW + "\n1,2,x,4,5\n", ["row 4"]),
+        (HEAD + ROW + "1,2,3,4\n", ["row 3", "4 cells, but the header has 5"]),
+        (HEAD + ROW + "1,2,3,4,5,6\n", ["row 3", "6 cells, but the header has 5"]),
+        (HEAD + "0,5,100,5,-2,5,90,5,-2,5\n", ["row 2", "10 cells", "decimal commas", "';'"]),
+        (HEAD + ROW + "1,inf,3,4,5\n", ["row 3", "column re_ohm_1.1kHz", "'inf' is not finite"]),
+        (HEAD + ROW + "1,2,1e999,4,5\n", ["row 3", "column im_ohm_1.1kHz", "not finite"]),
+        (HEAD + '1,"2,3,4,5\n', ["row 2", "quotation mark is not closed"]),
+        (HEAD.replace(",", ";") + "1;1.234,5;2;3;4\n", ["row 2", "'1.234,5' has a point and a comma"]),
+        (HEAD + ROW + "1,2,3j,4,5\n", ["row 3", "'3j' is not a number"]),
+        (HEAD + ROW + "1,2 3,3,4,5\n", ["row 3", "'2 3' is not a number"]),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_with_its_place(read, text, words):
+    with pytest.raises(BadInput) as error:
+        read(text)
+    for word in words:
+        assert word in str(error.value)
+
+
+def test_the_row_is_right_in_later_blocks(read):
+    with pytest.raises(BadInput, match=r"row 9, column im_ohm_1\.1kHz"):
+        read(HEAD + ROW * 7 + "1,2,x,4,5\n" + ROW, size=3)
+
+
+def test_text_that_is_not_utf8(read):
+    with pytest.raises(BadInput, match=r"0xff after row .* not UTF-8"):
+        read(HEAD.encode() + ROW.encode() + b"\xff,1,2,3,4\n")
+    with pytest.raises(BadInput, match="not UTF-8"):
+        read((HEAD + ROW).encode("utf-16"))
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(BadInput, match="is a folder"), readings(str(tmp_path)):
+        pass
+    with pytest.raises(BadInput, match="No such file"), readings(str(tmp_path / "none.csv")):
+        pass
+    with pytest.raises(BadInput, match="null"), readings("a\0b"):
+        pass
+
+
+def test_the_standard_input_comes_row_by_row(monkeypatch):
+    class Pipe(io.StringIO):
+        taken = 0
+
+        def __next__(self):
+            self.taken += 1
+            return super().__next__()
+
+    pipe = Pipe(HEAD + ROW * 3)
+    monkeypatch.setattr(sys, "stdin", pipe)
+    with readings("-") as source:
+        for k, block in enumerate(source.blocks(1)):
+            assert pipe.taken == k + 2
+            assert block.rows == [k + 2]
+
+
+def test_memory_does_not_grow_with_the_file(tmp_path):
+    path = tmp_path / "long.csv"
+    peaks = []
+    for rows in (40_000, 160_000):
+        with path.open("w") as file:
+            file.write(HEAD)
+            file.writelines([ROW] * rows)
+        tracemalloc.start()
+        with readings(str(path)) as source:
+            assert sum(len(b.rows) for b in source.blocks(4096)) == rows
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.2 * peaks[0]
