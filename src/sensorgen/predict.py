@@ -3,6 +3,7 @@
 import math
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,7 @@ def prediction(
     frequency_hz : sequence of float
         Tones of the impedance [Hz].
     law, tip_m : str, float
-        Law of compression and length of the tip [m] for the identifiability card, as of :func:`sensorgen.sensing.sensor_of`.
+        Law of compression and length of the tip [m], as of :func:`sensorgen.sensing.sensor_of`, for the card.
 
     Notes
     -----
@@ -140,7 +141,10 @@ def grid(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position_m
     """
     f, force, at = (np.asarray(values, float) for values in (frequency_hz, force_n, position_m))
     check_presses(sensor, force, at)
-    return sensor.impedance(f[:, None, None], force[:, None], at)
+    ends = [0, *(np.flatnonzero(np.diff(sensor.whole(at))) + 1).tolist(), at.size]
+    runs = [at[start:end] for start, end in pairwise(ends)]  # tips that lie whole on the sensor all press alike
+    found = [sensor.impedance(f[:, None, None], force[:, None], run) for run in runs]
+    return found[0] if len(found) == 1 else np.concatenate(found, axis=-1)
 
 
 def check_presses(sensor: Sensor, force_n: ArrayLike, position_m: ArrayLike) -> None:

@@ -1,7 +1,7 @@
 """The sensor as its terminals see it: two tracks, a film, a tip that presses, and what gives way. SI units.
 
-A press is a flat tip across the whole width, centred at a position along the sensor. Where it overhangs an end, the
-force rests on the part of the tip that lies on the sensor.
+A press is a tip across the whole width, centred at a position along the sensor. Where it overhangs an end, the force
+rests on the part of the tip that lies on the sensor, spread there as the profile of its pressure says.
 """
 
 from dataclasses import dataclass
@@ -11,16 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.errors import OutOfRange
-from sensorgen.models import line
+from sensorgen.models import line, line_tip
 from sensorgen.models.compression import Compression
+from sensorgen.models.pressure import pieces
 from sensorgen.units import EPS0_F_PER_M
+
+UNIFORM = "uniform"
+PIECES = 16  # what the press changes of Z is then right to 1e-3
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
 class Patch(NamedTuple):
-    """Where the tip rests on the sensor; arrays of the positions' shape."""
+    """Where the tip rests on the sensor; arrays of the positions' shape, or numbers where they are all the same."""
 
     left_m: Real
     length_m: Real
@@ -56,12 +60,17 @@ class Sensor:
         How the film gives way.
     tip_m : float
         Length of the tip along the sensor [m].
+    profile : str
+        How its pressure is spread: one of :data:`sensorgen.models.pressure.PROFILES`.
+    pieces : int
+        That a tip whose pressure is not uniform is cut into.
     tan_delta : float
         Loss tangent of the film [-].
     leak_s_per_m : float
         Leak through the film per length, the same under the tip [S/m].
     piezoresistance_per_n : (float, float)
-        Relative rise of the top and the bottom resistivity under the tip per force, S_n [1/N].
+        Relative rise of the top and the bottom resistivity under the tip per force, S_n, in proportion to the pressure
+        where that is not uniform [1/N].
     far_end : str or float
         "open", "short", or a resistor [ohm].
     """
@@ -73,6 +82,8 @@ class Sensor:
     capacitance_f_per_m: float
     compression: Compression
     tip_m: float = 0.01
+    profile: str = UNIFORM
+    pieces: int = PIECES
     tan_delta: float = 0.0
     leak_s_per_m: float = 0.0
     piezoresistance_per_n: tuple[float, float] = (0.0, 0.0)
@@ -108,17 +119,27 @@ class Sensor:
             raise OutOfRange(
                 f"a tip of {self.tip_m * 1e3:g} mm; expected up to the sensor's {self.length_m * 1e3:g} mm"
             )
-        low, high = at - self.tip_m / 2, at + self.tip_m / 2
+        whole, low, high = self.whole(at), at - self.tip_m / 2, at + self.tip_m / 2
+        if whole.all():  # one length for all keeps the axes of a grid apart
+            return Patch(low, np.asarray(self.tip_m), np.ones(()), np.zeros(()))
         left, right = np.maximum(low, 0.0), np.minimum(high, self.length_m)
         moves_left, moves_right = (low > 0).astype(float), (high < self.length_m).astype(float)
-        return Patch(left, right - left, moves_left, moves_right - moves_left)
+        return Patch(left, np.where(whole, self.tip_m, right - left), moves_left, moves_right - moves_left)
+
+    def whole(self, position_m: ArrayLike) -> NDArray[np.bool_]:
+        """Whether a tip centred at ``position_m`` [m] lies on the sensor with its whole length."""
+        at = np.asarray(position_m, float)
+        return np.asarray((at - self.tip_m / 2 > 0) & (at + self.tip_m / 2 < self.length_m))
 
     def stress_pa(self, force_n: ArrayLike, position_m: ArrayLike) -> Real:
-        """Mean pressure under the tip [Pa], in the broadcast shape."""
-        return np.asarray(force_n, float) / (self.width_m * self.patch(position_m).length_m)
+        """Highest pressure under the tip [Pa], which a uniform one has everywhere; in the broadcast shape."""
+        force = np.asarray(force_n, float)
+        if self.profile == UNIFORM:
+            return force / (self.width_m * self.patch(position_m).length_m)
+        return self._tip(force, position_m).highest_pa()
 
     def line_inputs(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> dict[str, Any]:
-        """Inputs of :func:`sensorgen.models.line.impedance` for presses on this sensor.
+        """Inputs of :func:`sensorgen.models.line.impedance` for presses of a uniform tip on this sensor.
 
         The film is the plate of relative permittivity 1 that has the same capacitance, and its modulus the secant one.
 
@@ -130,8 +151,12 @@ class Sensor:
         Raises
         ------
         OutOfRange
-            As :meth:`patch` and the law of compression.
+            As :meth:`patch` and the law of compression; a tip whose pressure is not uniform.
         """
+        if self.profile != UNIFORM:
+            raise OutOfRange(
+                f"a tip with a pressure like a {self.profile!r} makes no single patch; expected a uniform one"
+            )
         patch, stress = self.patch(position_m), self.stress_pa(force_n, position_m)
         thinning, slope = self.compression.thinning(stress)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -151,24 +176,57 @@ class Sensor:
             "S_n_bottom_per_N": s_bottom, "far_end": self.far_end,
         }  # fmt: skip
 
+    def _tip(self, force_n: Real, position_m: ArrayLike) -> line_tip.Tip:
+        """A tip that is cut into pieces; the whole one always into the same."""
+        patch, at = self.patch(position_m), np.asarray(position_m, float)
+        cut = pieces(self.profile, self.pieces)
+        if patch.length_m.ndim or patch.length_m < self.tip_m:
+            begin = (patch.left_m - at) / self.tip_m + 0.5
+            ends = (np.maximum(begin, 0.0), np.minimum(begin + patch.length_m / self.tip_m, 1.0))
+            by_begin = (patch.left_slope - 1) / self.tip_m
+            cut = pieces(self.profile, self.pieces, ends, (by_begin, by_begin + patch.length_slope / self.tip_m))
+        return line_tip.Tip(force_n, *patch, self.width_m, cut)
+
+    def _track(self) -> line_tip.Track:
+        per_m = [rho / (h * self.width_m) for rho, h in zip(self.resistivity_ohm_m, self.electrode_m, strict=True)]
+        rise = sum(r * s for r, s in zip(per_m, self.piezoresistance_per_n, strict=True))
+        return line_tip.Track(
+            self.length_m, sum(per_m), rise, self.capacitance_f_per_m, self.tan_delta, self.leak_s_per_m, self.far_end
+        )
+
     def impedance(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> Complex:
         """Impedance at the contacts [ohm], in the broadcast shape; parameters and errors as :meth:`line_inputs`."""
-        return line.impedance(**self.line_inputs(frequency_hz, force_n, position_m))
+        if self.profile == UNIFORM:
+            return line.impedance(**self.line_inputs(frequency_hz, force_n, position_m))
+        tip = self._tip(np.asarray(force_n, float), position_m)
+        return line_tip.impedance(self._track(), tip, self.compression, np.asarray(frequency_hz, float))
 
     def response(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> Response:
-        r"""Impedance and its exact derivatives by force and position.
-
-        With thinning s(p), p = F/(W l) and the secant modulus E = p/s, the line knows the derivative at constant E;
-        what is missing is (E s' - 1) of the film's part of it, which -E/F times the derivative by E is.
+        """Impedance and its exact derivatives by force and position, whatever the profile of the pressure.
 
         Parameters and errors as :meth:`line_inputs`; also OutOfRange where Z is infinite.
         """
+        if self.profile == UNIFORM:
+            return self._uniform_response(frequency_hz, force_n, position_m)
+        tip = self._tip(np.asarray(force_n, float), position_m)
+        found = line_tip.response(self._track(), tip, self.compression, np.asarray(frequency_hz, float))
+        return Response(*found)
+
+    def _uniform_response(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> Response:
+        r"""Of one patch, whose film has the secant modulus E = p/s, with thinning s(p) and p = F/(W l).
+
+        The line knows the derivative at constant E; what is missing is (E s' - 1) of the film's part of it, which -E/F
+        times the derivative by E is.
+        """
         inputs, patch = self.line_inputs(frequency_hz, force_n, position_m), self.patch(position_m)
-        z, by = line.sensitivities(of=("F_N", "x_p_left_edge_m", "L_p_m", "E_Pa"), **inputs)
-        stress = self.stress_pa(force_n, position_m)
-        slope, secant, force = self.compression.thinning(stress)[1], inputs["E_Pa"], np.asarray(force_n, float)
-        excess = secant * slope - 1
-        by_force = by["F_N"] - by["E_Pa"] * excess * secant / np.where(force == 0, 1.0, force)
-        by_length = by["L_p_m"] + by["E_Pa"] * excess * secant / patch.length_m
-        by_position = by["x_p_left_edge_m"] * patch.left_slope + by_length * patch.length_slope
+        moves = bool(np.any(patch.length_slope))
+        of = ("F_N", "x_p_left_edge_m", "E_Pa", *(["L_p_m"] if moves else []))
+        z, by = line.sensitivities(of=of, **inputs)
+        force, secant = np.asarray(force_n, float), inputs["E_Pa"]
+        excess = secant * self.compression.thinning(self.stress_pa(force, position_m))[1] - 1
+        by_force = by["F_N"] - by["E_Pa"] * (excess * secant / np.where(force == 0, 1.0, force))
+        by_position = by["x_p_left_edge_m"] * patch.left_slope
+        if moves:
+            by_length = by["L_p_m"] + by["E_Pa"] * (excess * secant / patch.length_m)
+            by_position = by_position + by_length * patch.length_slope
         return Response(z, by_force, by_position)

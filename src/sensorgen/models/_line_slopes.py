@@ -1,6 +1,6 @@
 """Exact derivatives of the pressed line, passed on from section to section; each is worked out only when asked for."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -93,15 +93,13 @@ class _Section:
         return -self.length * self.ratio * above / (self.below * self.below)
 
 
-class _Line:
-    """The sections left of the patch, under it and right of it, as seen from the contacts."""
+class Chain:
+    """Sections from the contacts to the far end, and how a change of each reaches the contacts."""
 
-    def __init__(self, inputs: Inputs) -> None:
-        self.inputs, self.opened = inputs, inputs.load_ohm is None
-        r, y, lengths = inputs.sections()
-        self._r, self._y = r[0], y[0]
+    def __init__(self, r: Sequence[Array], y: Sequence[Array], lengths: Sequence[Array], load: Array | None) -> None:
+        self.opened = load is None
         shunt, series = (y, r) if self.opened else (r, y)
-        q: Array = np.zeros(()) if inputs.load_ohm is None else inputs.load_ohm
+        q: Array = np.zeros(()) if load is None else load
         self.sections: list[_Section] = []
         for u, v, length in zip(reversed(shunt), reversed(series), reversed(lengths), strict=True):
             self.sections.insert(0, _Section(q, u, v, length))
@@ -115,41 +113,61 @@ class _Line:
             self._gains.append(self._gains[-1] * self.sections[len(self._gains) - 1].by_behind)
         return self._gains[index]
 
+    def by_matter(self, index: int, by_r: Array | float, by_y: Array | float) -> Iterator[Array]:
+        """What a change of resistance and admittance per length of a section does."""
+        by_shunt, by_series = (by_y, by_r) if self.opened else (by_r, by_y)
+        if np.ndim(by_shunt) or by_shunt:
+            yield self.gain(index) * self.sections[index].by_shunt * by_shunt
+        if np.ndim(by_series) or by_series:
+            yield self.gain(index) * self.sections[index].by_series * by_series
+
+    def by_length(self, index: int) -> Array:
+        """What a longer section does."""
+        return self.gain(index) * self.sections[index].by_length
+
+    def by_shift(self, index: int, contrast: Array) -> Array:
+        """What a move of a section towards the far end does, within a line that it differs from by r0 y - r y0."""
+        return self.gain(index) * self.sections[index].by_shift * (contrast if self.opened else -contrast)
+
+
+class _Line(Chain):
+    """The sections left of the patch, under it and right of it, as seen from the contacts."""
+
+    def __init__(self, inputs: Inputs) -> None:
+        self.inputs = inputs
+        r, y, lengths = inputs.sections()
+        self._r, self._y = r[0], y[0]
+        super().__init__(r, y, lengths, inputs.load_ohm)
+
     def slope(self, name: str) -> Array:
         """Derivative of Z by an input."""
-        parts = [*self._by_place(name), *self._by_matter(name)]
+        parts = [*self._by_place(name), *self._by_inputs(name)]
         return np.asarray(sum(parts), np.complex128)
 
     def _by_place(self, name: str) -> Iterator[Array]:
         """What a change of the sections' lengths, or a move of the patch, does."""
-        _, patch, right = self.sections
         if name == "x_p_left_edge_m":
-            yield self.gain(1) * patch.by_shift * self._contrast()
+            yield self.by_shift(1, self._contrast())
         if name == "L_p_m":
-            yield self.gain(1) * patch.by_length
-            yield -self.gain(2) * right.by_length
+            yield self.by_length(1)
+            yield -self.by_length(2)
         if name == "L_m":
-            yield self.gain(2) * right.by_length
+            yield self.by_length(2)
 
-    def _by_matter(self, name: str) -> Iterator[Array]:
+    def _by_inputs(self, name: str) -> Iterator[Array]:
         """What a change of resistance and admittance per length does."""
         if name not in _CHANGES:
             return
         away, pressed = _CHANGES[name](_Film(self.inputs))
-        for index, (by_r, by_y) in enumerate((away, pressed, away)):
-            by_shunt, by_series = (by_y, by_r) if self.opened else (by_r, by_y)
-            if np.ndim(by_shunt) or by_shunt:
-                yield self.gain(index) * self.sections[index].by_shunt * by_shunt
-            if np.ndim(by_series) or by_series:
-                yield self.gain(index) * self.sections[index].by_series * by_series
+        for index, change in enumerate((away, pressed, away)):
+            yield from self.by_matter(index, *change)
 
     def _contrast(self) -> Array:
         """r0 y_p - r_p y0 [1/m2], from the changes themselves so that it is exactly 0 where nothing is pressed."""
         p = self.inputs
         strain = p.strain()
         risen = (p["tan_delta"] + 1j) * (p.susceptance() * (strain / (1 - strain)))
-        found = self._r * risen - p.track_change() * self._y
-        return np.asarray(found if self.opened else -found)
+        return np.asarray(self._r * risen - p.track_change() * self._y)
 
 
 class _Film:
