@@ -1,0 +1,1 @@
+"""Plane-strain compression of a cell: outline, mesh, elements, contact, load steps, and the capacitance when deformed."""

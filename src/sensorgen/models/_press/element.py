@@ -1,0 +1,174 @@
+r"""Near-incompressible neo-Hookean triangles: six nodes and a bubble for the displacement, a linear pressure of its own.
+
+.. math:: \Pi = \int \tfrac{\mu}{2} (F : F - 2) - \mu \ln J + p (J - 1) - \frac{p^2}{2 \lambda}
+
+The pressure jumps between triangles; it and the bubble are condensed, triangle by triangle. Stationary in p it is the
+energy mu/2 (tr C - 2) - mu ln J + lambda/2 (J - 1)^2; for nu = 1/2 the last term is gone and J = 1 holds on average.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.models._press.mesh import Mesh
+
+Real = NDArray[np.float64]
+
+# Six points, exact to degree 4 (Strang and Fix; Cowper 1973): barycentric a, a, 1 - 2a, and weight.
+_ORBITS = ((0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322))
+_POINTS = np.array([p for a, _ in _ORBITS for p in ((a, a), (1 - 2 * a, a), (a, 1 - 2 * a))])
+_WEIGHTS = np.array([w / 2 for _, w in _ORBITS for _ in range(3)])
+_OUTER = 12  # displacements of the six nodes; then the bubble's two, then three of the pressure
+_STIFF = 1e6  # in the tangent of an incompressible triangle, the pressure's stiffness over mu
+
+
+def gradients(xi: Real, eta: Real) -> Real:
+    """Derivatives of the six nodal functions and the bubble to xi and eta, (points, 7, 2)."""
+    one, o = np.ones_like(xi), np.zeros_like(xi)
+    a, b, c = 1 - xi - eta, xi, eta
+    da, db, dc = (-one, -one), (one, o), (o, one)
+    both = range(2)
+    rows = [[(4 * x - 1) * d[k] for k in both] for x, d in ((a, da), (b, db), (c, dc))]
+    rows += [[4 * (x * dy[k] + y * dx[k]) for k in both] for x, dx, y, dy in ((a, da, b, db), (b, db, c, dc), (c, dc, a, da))]
+    rows += [[27 * (da[k] * b * c + a * db[k] * c + a * b * dc[k]) for k in both]]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+_GRADIENTS = gradients(*_POINTS.T)
+_PRESSURES = np.column_stack([np.ones(len(_POINTS)), _POINTS - 1 / 3])  # constant, and two slopes without mean
+
+
+@dataclass(frozen=True)
+class Law:
+    """What each triangle is made of: shear modulus [Pa], and 1 / lambda [1/Pa], 0 where incompressible."""
+
+    mu_pa: Real
+    yielding_per_pa: Real
+
+
+def law(youngs_modulus_pa: Real, poisson_ratio: Real) -> Law:
+    """Lame's constants from E [Pa] and nu [-], which may be 1/2."""
+    e, nu = youngs_modulus_pa, poisson_ratio
+    return Law(e / (2 * (1 + nu)), (1 + nu) * (1 - 2 * nu) / (e * nu))
+
+
+@dataclass(frozen=True)
+class Inner:
+    """What the triangles keep for themselves: bubble (m, 2) [m] and pressure (m, 3) [Pa]."""
+
+    bubble: Real
+    pressure: Real
+
+    def moved(self, step: Real, share: float) -> "Inner":
+        """After a share of a step (m, 5)."""
+        return Inner(self.bubble + share * step[:, :2], self.pressure + share * step[:, 2:])
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """Condensed stiffness (m, 12, 12) and force (m, 12); the inner step is ``offset - slope @ du``."""
+
+    stiffness: Real
+    force: Real
+    offset: Real
+    slope: Real
+    mu_pa: Real
+
+    def imbalance(self) -> float:
+        """How far the inner unknowns are from their own equilibrium: the largest step of a pressure over mu [-]."""
+        return float(np.abs(self.offset[:, 2:] / self.mu_pa[:, None]).max())
+
+    def inner_step(self, du: Real) -> Real:
+        """Step of bubble and pressure that belongs to a step of the nodes (m, 12)."""
+        return self.offset - np.einsum("mij,mj->mi", self.slope, du)
+
+
+@dataclass(frozen=True)
+class Elements:
+    """All triangles of a mesh, at once."""
+
+    mesh: Mesh
+    law: Law
+
+    @cached_property
+    def _geometry(self) -> tuple[Real, Real]:
+        """Gradients of the seven functions (m, points, 7, 2) [1/m], and weights (m, points) [m2]."""
+        a, b, c = (self.mesh.points_m[self.mesh.triangles[:, k]] for k in range(3))
+        jacobian = np.stack([b - a, c - a], axis=2)
+        inverse = np.linalg.inv(jacobian)
+        return np.einsum("qnk,mki->mqni", _GRADIENTS, inverse), np.linalg.det(jacobian)[:, None] * _WEIGHTS
+
+    @cached_property
+    def _strains(self) -> tuple[Real, Real]:
+        """How F's entries (11, 12, 21, 22), and those of its cofactor, depend on the 14 displacements."""
+        g, _ = self._geometry
+        b = np.zeros((*g.shape[:2], 4, 14))
+        b[:, :, 0, 0::2], b[:, :, 1, 0::2] = g[..., 0], g[..., 1]
+        b[:, :, 2, 1::2], b[:, :, 3, 1::2] = g[..., 0], g[..., 1]
+        return b, b[:, :, ::-1] * np.array([1.0, -1.0, -1.0, 1.0])[:, None]
+
+    def start(self) -> Inner:
+        """Unloaded."""
+        m = len(self.mesh.triangles)
+        return Inner(np.zeros((m, 2)), np.zeros((m, 3)))
+
+    def deformation(self, u: Real, inner: Inner) -> Real:
+        """Entries 11, 12, 21, 22 of F at each quadrature point (m, points, 4)."""
+        local = np.concatenate([u[self.freedoms], inner.bubble], axis=1)
+        found: Real = np.matmul(self._strains[0].reshape(len(local), -1, 14), local[:, :, None])
+        return found.reshape(len(local), -1, 4) + np.array([1.0, 0.0, 0.0, 1.0])
+
+    def volume_ratio(self, u: Real, inner: Inner) -> Real:
+        """J at each quadrature point (m, points)."""
+        f = self.deformation(u, inner)
+        return np.asarray(f[..., 0] * f[..., 3] - f[..., 1] * f[..., 2])
+
+    @cached_property
+    def freedoms(self) -> NDArray[np.int64]:
+        """Numbers of the 12 displacements of each triangle: x, y of one node after the other."""
+        return np.asarray((2 * self.mesh.triangles[:, :, None] + np.arange(2)).reshape(-1, _OUTER))
+
+    def energy_j_per_m(self, u: Real, inner: Inner) -> float:
+        """Energy stored, per depth [J/m]."""
+        f, (_, weights) = self.deformation(u, inner), self._geometry
+        j = f[..., 0] * f[..., 3] - f[..., 1] * f[..., 2]
+        p = inner.pressure @ _PRESSURES.T
+        shape = self.law.mu_pa[:, None] * (0.5 * ((f**2).sum(-1) - 2) - np.log(j))
+        return float((weights * (shape + p * (j - 1) - 0.5 * p**2 * self.law.yielding_per_pa[:, None])).sum())
+
+    def tangent(self, u: Real, inner: Inner) -> Tangent:
+        """Residual and its derivative at a state whose J is above 0."""
+        residual, matrix = self.full(u, inner)
+        k, o = matrix, _OUTER
+        inside = np.concatenate([k[:, o:, :o], residual[:, o:, None]], axis=2)
+        solved = np.linalg.solve(k[:, o:, o:], inside)
+        condensed = np.matmul(k[:, :o, o:], solved)
+        return Tangent(
+            k[:, :o, :o] - condensed[..., :-1], residual[:, :o] - condensed[..., -1], -solved[..., -1], solved[..., :-1],
+            self.law.mu_pa,
+        )
+
+    def full(self, u: Real, inner: Inner) -> tuple[Real, Real]:
+        """Residual (m, 17) and its derivative before the inner unknowns are condensed."""
+        f, (_, w), (b, c) = self.deformation(u, inner), self._geometry, self._strains
+        m, q = w.shape
+        cofactor = f[..., ::-1] * np.array([1.0, -1.0, -1.0, 1.0])
+        j = f[..., 0] * f[..., 3] - f[..., 1] * f[..., 2]
+        mu, p = self.law.mu_pa[:, None], inner.pressure @ _PRESSURES.T
+        along = np.matmul(cofactor[:, :, None, :], b)[:, :, 0]  # dJ to the displacements (m, points, 14)
+        stress = (w * mu)[..., None] * f + (w * (p - mu / j))[..., None] * cofactor
+        turned = (w * mu)[..., None, None] * b + (w * (p - mu / j))[..., None, None] * c
+        stiffness = np.matmul(b.reshape(m, 4 * q, 14).transpose(0, 2, 1), turned.reshape(m, 4 * q, 14))
+        stiffness += np.matmul((along * (w * mu / j**2)[..., None]).transpose(0, 2, 1), along)
+        coupling = np.matmul((along * w[..., None]).transpose(0, 2, 1), _PRESSURES)
+        mass = np.einsum("mq,qi,qk->mik", w, _PRESSURES, _PRESSURES)
+        yielding = self.law.yielding_per_pa[:, None]
+        matrix = np.zeros((m, 17, 17))
+        matrix[:, :14, :14], matrix[:, :14, 14:], matrix[:, 14:, :14] = stiffness, coupling, coupling.transpose(0, 2, 1)
+        matrix[:, 14:, 14:] = -mass * np.maximum(yielding, 1 / (_STIFF * mu))[..., None]
+        residual = np.empty((m, 17))
+        residual[:, :14] = np.matmul(stress.reshape(m, 1, 4 * q), b.reshape(m, 4 * q, 14))[:, 0]
+        residual[:, 14:] = (w * (j - 1)) @ _PRESSURES - yielding * np.einsum("mik,mk->mi", mass, inner.pressure)
+        return residual, matrix

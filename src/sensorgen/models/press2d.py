@@ -1,0 +1,249 @@
+"""Prismatic cells under pressure: plane-strain finite elements with contact, and the capacitance when deformed.
+
+Near-incompressible neo-Hookean solids at large strain; gaps close and open, without friction or sticking. Each answer is
+checked: load reached, volume kept, faces not run into each other, work equal to the energy stored.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.interval import Interval
+from sensorgen.models import compression
+from sensorgen.models._press.cell import AIR, Cell, cell_of
+from sensorgen.models._press.contact import Faces
+from sensorgen.models._press.mesh import Fineness, Mesh, mesh_of
+from sensorgen.models._press.support import CHOICES, Held
+from sensorgen.scene import Scene
+
+SOURCE = (
+    "neo-Hookean plane strain, displacement with bubble and pressure (Crouzeix and Raviart 1973), penalty contact with "
+    "frozen partners; bounds of the capacitance by Dirichlet's and Thomson's principles"
+)
+COST = 2
+
+_PENALTY = 10.0  # over the least Young's modulus of a solid [-]
+_LEAST_PENALTY_PA = 60e6
+_STEP = 1 / 600  # longest load step over the least Young's modulus: 10 kPa for 6 MPa [-]
+_LEAST_VOLUME = 0.2  # J below which a triangle says nothing any more [-]
+_DEEPEST = 0.3  # penetration over the side it happens on [-]
+_BALANCE = 0.01  # by which work and energy may differ [-]
+_LEVELS = 0.01  # by which two meshes may differ [-]
+_FIELD_GROWTH = 0.5  # of the triangles of the capacitance's mesh, per distance [-]
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """Young's modulus [Pa] and Poisson's ratio [-], up to 1/2, which is exactly incompressible."""
+
+    youngs_modulus_pa: float
+    poisson_ratio: float
+
+    def __post_init__(self) -> None:
+        """Refuse what is no elastic solid."""
+        if not (self.youngs_modulus_pa > 0 and 0 < self.poisson_ratio <= 0.5):
+            raise OutOfRange(
+                f"E {self.youngs_modulus_pa:g} Pa, nu {self.poisson_ratio:g}: expected E above 0 and nu above 0, up to 0.5"
+            )
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """A cell under rising pressure, as far as it converged.
+
+    Attributes
+    ----------
+    stress_pa, displacement_m : (n,) array
+        Pressure on the top, and how far the top has come down on average [Pa], [m].
+    capacitance_f_per_m2 : tuple of (Interval or None)
+        Bounds for the deformed outlines; None where they could not be meshed [F/m2].
+    outlines : tuple of Cell
+        The deformed cell at each pressure; empty when no capacitance was asked for.
+    volume_ratio, penetration, imbalance : (n,) array
+        Least J, largest penetration over the side that it happens on, and work over energy less 1 [-].
+    faults : tuple of str
+        Why the answer is not to be trusted; empty when every check holds.
+    """
+
+    stress_pa: Real
+    displacement_m: Real
+    capacitance_f_per_m2: tuple[Interval | None, ...]
+    outlines: tuple[Cell, ...]
+    volume_ratio: Real
+    penetration: Real
+    imbalance: Real
+    faults: tuple[str, ...]
+
+    @property
+    def converged_pa(self) -> float:
+        """Highest pressure that was reached [Pa]."""
+        return float(self.stress_pa[-1])
+
+
+def press(
+    cell: Cell,
+    solids: Mapping[str, Elastic],
+    stress_pa: Sequence[float],
+    permittivity: Mapping[str, float] | None = None,
+    held: Held | None = None,
+    fineness: Fineness | None = None,
+) -> Pressed:
+    """Press a cell from above.
+
+    Parameters
+    ----------
+    cell : Cell
+        From :func:`sensorgen.models._press.cell.cell_of`.
+    solids : mapping of str to Elastic
+        By material.
+    stress_pa : sequence of float
+        Pressures, from 0 on and rising [Pa].
+    permittivity : mapping of str to float, optional
+        Relative permittivity by material, with "air"; without it no capacitance is computed [-].
+    held : Held, optional
+        Base, period, top and contact.
+    fineness : Fineness, optional
+        Of the mesh.
+
+    Raises
+    ------
+    OutOfRange
+        Pressures do not rise from 0, or a choice of ``held`` is unknown.
+    MissingValue
+        The mesher is not installed.
+    """
+    held, fineness = held or Held(), fineness or Fineness()
+    _check(cell, stress_pa, held)
+    found = _solved(cell, solids, stress_pa, permittivity, held, fineness)
+    if found.converged_pa < stress_pa[-1]:
+        again = _solved(cell, solids, stress_pa, permittivity, held, replace(fineness, apex_mm=2 * fineness.apex_mm))
+        found = max(found, again, key=lambda pressed: pressed.converged_pa)
+    return found
+
+
+def compared(found: Pressed, finer: Pressed) -> Pressed:
+    """The finer of two solutions, with a fault where they differ by more than 1 %."""
+    n = min(len(found.stress_pa), len(finer.stress_pa))
+    apart = float(np.max(np.abs(found.displacement_m[1:n] / finer.displacement_m[1:n] - 1), initial=0.0))
+    if apart <= _LEVELS:
+        return finer
+    return replace(finer, faults=(*finer.faults, f"two meshes differ by {apart:.1%} in displacement"))
+
+
+def curve_of(pressed: Pressed, name: str = "solved") -> compression.Curve:
+    """The law of compression that a solved cell gives, for the sensor.
+
+    Raises
+    ------
+    OutOfRange
+        The solution has faults, or the capacitance is not known at two pressures at least.
+    """
+    if pressed.faults:
+        raise OutOfRange(f"the solved cell is not to be trusted: {'; '.join(pressed.faults)}")
+    known = [(p, c.middle()) for p, c in zip(pressed.stress_pa, pressed.capacitance_f_per_m2, strict=True) if c]
+    ratio = [c / known[0][1] for _, c in known] if known else []
+    return compression.curve(name, SOURCE, [float(p) for p, _ in known], ratio)
+
+
+def _check(cell: Cell, stress_pa: Sequence[float], held: Held) -> None:
+    if len(stress_pa) < 2 or stress_pa[0] != 0 or any(b <= a for a, b in pairwise(stress_pa)):
+        raise OutOfRange("stresses must begin with 0 and rise, as in 0:100:10")
+    for key, choices in CHOICES.items():
+        if getattr(held, key) not in choices:
+            raise BadInput(f"{key} {getattr(held, key)!r}: expected {' or '.join(choices)}")
+    if not cell.mirrored:
+        raise BadInput("this cell is not its own mirror image: only cells with mirrors can be pressed")
+
+
+def _solved(
+    cell: Cell,
+    solids: Mapping[str, Elastic],
+    stress_pa: Sequence[float],
+    permittivity: Mapping[str, float] | None,
+    held: Held,
+    fineness: Fineness,
+) -> Pressed:
+    from sensorgen.models._press import contact, element, load, support
+
+    mesh = mesh_of(cell, fineness)
+    materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in cell.regions]
+    e, nu = (np.array([getattr(m, key) for m in materials])[mesh.region - 1] for key in ("youngs_modulus_pa", "poisson_ratio"))
+    tied = support.tied_nodes(mesh)
+    problem = load.Problem(
+        element.Elements(mesh, element.law(e, nu)),
+        contact.faces_of(mesh),
+        support.free_of(mesh, held, mirrored=cell.mirrored, tied=tied),
+        support.top_load(mesh),
+        max(_LEAST_PENALTY_PA, _PENALTY * float(e.min())),
+        held.contact == "stick",
+    )
+    states = list(load.curve(problem, stress_pa, _STEP * float(e.min())))
+    down = np.array([problem.load @ s.u_m / np.abs(problem.load).sum() for s in states])
+    volume = np.array([problem.elements.volume_ratio(s.u_m, s.inner).min() for s in states])
+    depth = np.array([_depth(problem.gaps(s.pairs, s.u_m) / s.pairs.length_m) for s in states])
+    energy = np.array([problem.elements.energy_j_per_m(s.u_m, s.inner) + problem.contact_energy(s) for s in states])
+    stress = np.array([s.pressure_pa for s in states])
+    imbalance = _imbalance(stress, down * np.abs(problem.load).sum(), energy)
+    fields = [_field(cell, mesh, problem.faces, tied, s.u_m, permittivity) for s in states] if permittivity else []
+    unknown = sum(c is None for c, _ in fields)
+    faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance, states[-1].stale, unknown))
+    return Pressed(
+        stress, down, tuple(c for c, _ in fields), tuple(o for _, o in fields), volume, depth, imbalance, faults
+    )
+
+
+def _depth(gaps: Real) -> float:
+    return float(-gaps.min(initial=0.0))
+
+
+def _field(
+    cell: Cell, mesh: Mesh, faces: Faces, tied: NDArray[np.int64], u_m: Real, permittivity: Mapping[str, float]
+) -> tuple[Interval | None, Cell]:
+    """Capacitance and outlines of a deformed cell; gaps are closed a little more or less where a mesh fails."""
+    from sensorgen.models._press import deformed, field
+
+    for closed in deformed.CLOSED:
+        outline = deformed.deformed(cell, mesh, faces, tied, u_m, closed)
+        try:
+            return field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH), outline
+        except field.Unmeshed:
+            continue
+    return None, outline
+
+
+def _imbalance(stress: Real, moved: Real, energy: Real) -> Real:
+    """Work of the load over the energy stored, less 1; between two loads they follow a power law."""
+    found = np.zeros(len(stress))
+    if len(stress) < 3:
+        return found
+    powers = np.log(moved[2:] / moved[1:-1]) / np.log(stress[2:] / stress[1:-1])
+    powers = np.concatenate([powers[:1], powers])
+    ends = stress * moved
+    work = np.cumsum(powers / (1 + powers) * np.diff(ends))
+    found[1:] = work / energy[1:] - 1
+    return found
+
+
+def _faults(
+    stress: Real, asked: Sequence[float], volume: Real, depth: Real, imbalance: Real, stale: int, unknown: int
+) -> list[str]:
+    said = {
+        f"converged up to {stress[-1] / 1e3:.4g} of {asked[-1] / 1e3:.4g} kPa": stress[-1] < asked[-1] * (1 - 1e-9),
+        f"a triangle is squeezed to {volume.min():.2g} of its volume": volume.min() < _LEAST_VOLUME,
+        f"faces run into each other by {depth.max():.2g} of a side": depth.max() > _DEEPEST,
+        f"work and energy differ by {imbalance[-1]:.1%}": abs(imbalance[-1]) > _BALANCE,
+        f"no capacitance at {unknown} of {len(stress)} stresses: the deformed outlines could not be meshed": unknown > 0,
+        f"{stale} load steps with old contact partners": stale > 0,
+    }
+    return [words for words, holds in said.items() if holds]
+
+
+def cell(scene: Scene, period_mm: float | None) -> Cell:
+    """The cell of a scene, to be pressed; see :func:`sensorgen.models._press.cell.cell_of`."""
+    return cell_of(scene, period_mm)

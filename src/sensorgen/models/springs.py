@@ -1,0 +1,90 @@
+"""Columns as springs in series, side by side under a stiff plate: the cheapest guess at how a cell gives way.
+
+Each column is free to bulge, knows nothing of its neighbours, and carries once its gap is closed.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.errors import OutOfRange
+from sensorgen.scene import Scene
+from sensorgen.sections import columns, sections
+from sensorgen.units import M_PER_MM
+
+SOURCE = "Hooke's law, column by column; plane strain, E / (1 - nu^2)"
+COST = 0
+
+_PLACES = (np.arange(256) + 0.5) / 256  # in each column; evenly, because gaps close from one side
+_HALVINGS = 60  # of the interval that holds the displacement
+
+Real = NDArray[np.float64]
+
+
+def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Sequence[float]) -> Real:
+    r"""How far a stiff plate on a prismatic scene comes down.
+
+    .. math:: \sigma = \frac{1}{L} \int \frac{\max(\delta - g, 0)}{\sum_k t_k / M_k} dx
+
+    with the air gap g and the layers' thickness t and modulus M in each column.
+
+    Parameters
+    ----------
+    scene : Scene
+        Prismatic, its support gone.
+    modulus_pa : mapping of str to float
+        M of each material, as E / (1 - nu^2) [Pa].
+    stress_pa : sequence of float
+        Mean stresses, 0 or more [Pa].
+
+    Returns
+    -------
+    (n,) array
+        Displacement of the top [m].
+
+    Raises
+    ------
+    OutOfRange
+        A stress is below 0, or would press a column flat.
+
+    Notes
+    -----
+    It ignores that columns hold each other and that rubber keeps its volume: see ``docs/compression.md`` for its error.
+    """
+    gap, yielding, width, height = _columns(scene, modulus_pa)
+    stress = np.asarray(stress_pa, float)
+    if (stress < 0).any():
+        raise OutOfRange(f"a stress of {stress.min():g} Pa pulls; expected 0 or more")
+    low, high = np.zeros(len(stress)), np.full(len(stress), height)
+    if (_stress(high[:1], gap, yielding, width) <= stress.max(initial=0.0)).any():
+        raise OutOfRange(f"{stress.max():g} Pa presses the cell flat")
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        beyond = _stress(middle, gap, yielding, width) > stress
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    return np.where(stress > 0, high, 0.0)
+
+
+def _stress(moved: Real, gap: Real, yielding: Real, width: Real) -> Real:
+    share = np.maximum(moved[:, None] - gap, 0.0) / yielding
+    return np.asarray(share @ width / width.sum())
+
+
+def _columns(scene: Scene, modulus_pa: Mapping[str, float]) -> tuple[Real, Real, Real, float]:
+    """Gap [m], yielding t / M [m/Pa] and width [m] at places in all columns, and the least sum of thicknesses [m]."""
+    share = _PLACES
+    rows = []
+    for section in sections(scene):
+        for column in columns(section):
+            bottoms, tops = (
+                np.array([getattr(layer, key) for layer in column.layers]) @ np.array([1 - share, share])
+                for key in ("bottom_mm", "top_mm")
+            )
+            solid = tops - bottoms
+            gap = np.maximum(bottoms[1:] - tops[:-1], 0.0).sum(axis=0)
+            moduli = np.array([modulus_pa[layer.body.material] for layer in column.layers])
+            weight = np.full(len(share), (column.right_mm - column.left_mm) * section.depth_mm)
+            rows.append(np.array([gap, (solid / moduli[:, None]).sum(axis=0), weight, solid.sum(axis=0)]))
+    gap, yielding, weight, solid = np.concatenate(rows, axis=1)
+    return gap * M_PER_MM, yielding * M_PER_MM, weight, float((gap + solid).min() * M_PER_MM)

@@ -1,0 +1,124 @@
+"""Cells under pressure against curves that others solved, and their symmetries and balances."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sensorgen.design import make
+from sensorgen.errors import BadInput, OutOfRange
+
+pytest.importorskip("netgen")
+from sensorgen.models import press2d
+from sensorgen.models._press.mesh import Fineness
+from sensorgen.models._press.support import Held
+
+REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "contact.json").read_text())
+VARIANTS = REFERENCE["variants_L1_k60_error_about_1pc"]
+STRESSES = np.linspace(0, 1e5, 11)
+EPS = {"x60": 4.68, "air": 1.00059}
+PER_M = 2e-3 * 1e12  # from F/m2 to pF per metre of depth and period of 2 mm
+
+
+def solids(nu=0.4999, x60=6e6, etpu=22e6):
+    return {"x60": press2d.Elastic(x60, nu), "etpu": press2d.Elastic(etpu, nu)}
+
+
+def tri(film=0.1, **more):
+    drawn = make({"shape": "tri", "parameters": {"dielectric_mm": film, **more}})
+    return press2d.cell(drawn.in_use, drawn.params.period_mm)
+
+
+@pytest.mark.parametrize("film", [0.1, 0.2])
+def test_the_reference_curve_at_every_load(film):
+    known = REFERENCE[f"tri_d{film}"]
+    found = press2d.press(tri(film), solids(), STRESSES, EPS)
+    assert found.faults == ()
+    assert found.displacement_m[1:] * 1e6 == pytest.approx(known["uy_um"][1:], rel=0.01)
+    middle = np.array([c.middle() for c in found.capacitance_f_per_m2]) * PER_M
+    assert (middle - middle[0])[1:] == pytest.approx(known["dC_pF_per_m"][1:], rel=0.015)
+    unloaded = found.capacitance_f_per_m2[0].times(PER_M)
+    assert unloaded.lower < known["C0_exact_pF_per_m"] < unloaded.upper
+    assert max(c.width() for c in found.capacitance_f_per_m2) < 1e-3
+    assert abs(found.imbalance[-1]) < 0.002  # work of the load is the energy stored
+
+
+@pytest.mark.parametrize(
+    ("name", "held", "nu"),
+    [
+        ("stick", Held(contact="stick"), 0.4999),
+        ("free", Held(base="sliding", period="free"), 0.4999),
+        ("roller", Held(base="sliding"), 0.4999),
+        ("rigid", Held(top="rigid"), 0.4999),
+        ("nu45", Held(), 0.45),
+        ("nu499", Held(), 0.499),
+    ],
+)
+def test_choices_of_the_boundary(name, held, nu):
+    found = press2d.press(tri(), solids(nu), STRESSES, held=held)
+    assert found.faults == ()
+    assert found.displacement_m[1:] * 1e6 == pytest.approx(VARIANTS[f"{name}_d0.1"]["uy_um"][1:], rel=0.015)
+
+
+def test_exactly_incompressible_is_the_limit():
+    moved = [press2d.press(tri(), solids(nu), STRESSES[:4]).displacement_m[-1] for nu in (0.4999, 0.49999, 0.5)]
+    assert moved[2] == pytest.approx(moved[1], rel=1e-3)
+    assert moved[0] > moved[1] > moved[2]
+
+
+def test_stress_scales_with_the_moduli():
+    """All else equal, only stress over modulus counts (the penalty scales too)."""
+    one = press2d.press(tri(), solids(), STRESSES[:4])
+    five = press2d.press(tri(), solids(x60=30e6, etpu=110e6), 5 * STRESSES[:4])
+    assert five.displacement_m == pytest.approx(one.displacement_m, rel=1e-6, abs=1e-15)
+
+
+def test_a_finer_mesh_agrees():
+    coarse, fine = (press2d.press(tri(), solids(), STRESSES[:6:5], fineness=f) for f in (Fineness(), Fineness().finer()))
+    assert press2d.compared(coarse, fine).faults == ()
+    assert coarse.displacement_m[-1] == pytest.approx(fine.displacement_m[-1], rel=5e-3)
+
+
+def test_levels_that_differ_are_told():
+    found = press2d.press(tri(), solids(), STRESSES[:2])
+    other = press2d.press(tri(), solids(x60=6.3e6), STRESSES[:2])
+    assert "two meshes differ by" in press2d.compared(found, other).faults[-1]
+
+
+def test_a_plate_between_fixed_sides_is_confined():
+    drawn = make({"shape": "reference"})
+    found = press2d.press(press2d.cell(drawn.in_use, None), solids(), [0.0, 1e5], EPS)
+    confined = {k: s.youngs_modulus_pa * (1 - 0.4999) / (1.4999 * 2e-4) for k, s in solids().items()}
+    assert found.displacement_m[-1] == pytest.approx(1e5 * 0.6e-3 * sum(1 / m for m in confined.values()), rel=1e-4)
+    assert found.capacitance_f_per_m2[0].middle() == pytest.approx(0.27625066e-12 / 4e-6, rel=1e-7)
+
+
+def test_a_curve_for_the_sensor():
+    law = press2d.curve_of(press2d.press(tri(), solids(), STRESSES[:3], EPS))
+    thinning, slope = law.thinning(np.asarray(2e4))
+    assert 1 / (1 - thinning) == pytest.approx(1 + 18.21 / 159.65204, rel=0.002)
+    assert slope > 0
+
+
+def test_too_much_is_told_with_the_last_load():
+    found = press2d.press(tri(), solids(x60=0.4e6), [0.0, 5e4], fineness=Fineness(corner_mm=0.1, coarse_mm=0.2))
+    assert found.faults
+    assert found.converged_pa <= 5e4
+    with pytest.raises(OutOfRange, match="not to be trusted"):
+        press2d.curve_of(found)
+
+
+@pytest.mark.parametrize("stresses", [[1.0, 2.0], [0.0], [0.0, 2.0, 1.0]])
+def test_stresses_that_do_not_rise_from_0_are_refused(stresses):
+    with pytest.raises(OutOfRange, match="begin with 0"):
+        press2d.press(tri(), solids(), stresses)
+
+
+def test_what_is_no_prism_or_no_solid_is_refused():
+    with pytest.raises(BadInput, match="solved in 3D"):
+        press2d.cell(make({"shape": "rect"}).in_use, 2.0)
+    with pytest.raises(OutOfRange, match="up to 0.5"):
+        press2d.Elastic(6e6, 0.51)
+    with pytest.raises(BadInput, match="bonded or sliding"):
+        press2d.press(tri(), solids(), [0.0, 1.0], held=Held(base="glued"))
