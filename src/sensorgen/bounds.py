@@ -1,15 +1,12 @@
 """The capacitance of designs between bounds, one design or many: what ``sensorgen cell`` answers, as plain data."""
 
-import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from math import inf
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sensorgen import planner
 from sensorgen.design import Design
@@ -17,6 +14,9 @@ from sensorgen.errors import SensorgenError
 from sensorgen.planner import Answer, Unpredictable
 from sensorgen.scene import Scene
 from sensorgen.units import M_PER_MM
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
 
 
 @dataclass(frozen=True)
@@ -112,6 +112,9 @@ def _in_parallel(inputs: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[tuple
     """Number and answer of each, as they come."""
     if not inputs:
         return
+    from concurrent.futures import Future, as_completed
+    from concurrent.futures.process import BrokenProcessPool
+
     with _pool(min(jobs, len(inputs))) as pool:
         numbers: dict[Future[Answer | str], int] = {pool.submit(_said, *each): k for k, each in enumerate(inputs)}
         try:
@@ -124,8 +127,11 @@ def _in_parallel(inputs: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[tuple
 
 
 @contextmanager
-def _pool(jobs: int) -> Iterator[ProcessPoolExecutor]:
+def _pool(jobs: int) -> Iterator["ProcessPoolExecutor"]:
     """Fresh processes, so that solver and CAD kernel never meet in one; ended at once if anything goes wrong."""
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
     pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _quietly)
     try:
         yield pool
@@ -163,7 +169,7 @@ def _plain(design: Design, found: Answer | str) -> dict[str, Any]:
         "reached": found.reached(),
         "seconds": found.seconds(),
         "known": found.known,
-        "capacitance_f": {"lower": found.capacitance_f.lower, "upper": found.capacitance_f.upper},
+        "area_m2": area,
         "refused": list(found.refused),
         "plan": [asdict(c) for c in found.plan],
         "values": [vars(t) for t in planner.permittivities(design)],

@@ -1,7 +1,5 @@
 """``sensorgen cell``: capacitance per area between bounds as near as asked, for one design or along a sweep."""
 
-import csv
-import io
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -123,7 +121,7 @@ def _lines(data: Data, *, explain: bool) -> Iterator[str]:
         yield "measured"
         yield from (f"  {line}" for line in _measured(data["plan"]))
         yield ""
-    yield f"{data['design']}: {show.si(data['capacitance_f']['lower'], 'F')} to {show.si(data['capacitance_f']['upper'], 'F')}"
+    yield f"{data['design']}: {show.si(low * data['area_m2'], 'F')} to {show.si(high * data['area_m2'], 'F')}"
     yield f"{'per area':12}{low:.10g} to {high:.10g} F/m2"
     yield f"{'apart by':12}{data['relative_width']:.2g} of their middle, {data['accuracy']:g} wanted"
     when = ", known from before" if data["known"] else ""
@@ -170,6 +168,9 @@ def _table(key: str, rows: Sequence[Data]) -> Iterator[str]:
 
 
 def _csv(key: str, rows: Sequence[Data]) -> Iterator[str]:
+    import csv
+    import io
+
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow([key, *COLUMNS])
