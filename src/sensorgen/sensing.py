@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from sensorgen import materials
 from sensorgen.design import Design
 from sensorgen.errors import OutOfRange, UnknownName
 from sensorgen.models import compression
@@ -102,5 +101,5 @@ def _gap_m(design: Design) -> float:
 def _moduli(design: Design) -> list[Taken]:
     """Young's modulus of every material in the sensor."""
     used, names = design.used(), sorted({body.material for body in design.in_use.bodies})
-    found = [(name, materials.load(name).value("youngs_modulus_pa", used[name])) for name in names]
+    found = [(name, design.material(name).value("youngs_modulus_pa", used[name])) for name in names]
     return [Taken(name, "youngs_modulus_pa", value.value, value.source) for name, value in found]

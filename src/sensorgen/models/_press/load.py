@@ -17,6 +17,7 @@ Real = NDArray[np.float64]
 
 _ENOUGH = 1e-8  # residual over load
 _NEARLY = 1e-3  # the same before the contact partners are looked for anew
+_STILL = 1e-10  # a step so much shorter than the way is rounding: nu near 1/2 turns it into forces
 _MOST_STEPS = 25
 _LEAST_J = 0.05  # a step may not squeeze a triangle below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
@@ -125,13 +126,14 @@ class Problem:
                 return None
             if np.abs(residual).max() < enough * scale and local.imbalance() < enough:
                 return replace(state, pressure_pa=pressure_pa, u_m=u, inner=inner, pairs=pairs)
-            step = -splu(stiffness.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.001, options={"SymmetricMode": True}).solve(residual)
-            du = self.free @ step
+            du = self.free @ _solved(stiffness, -residual)
             inside = local.inner_step(du[self.elements.freedoms])
             share = self._share(u, inner, du, inside)
             if share is None:
                 return None
             u, inner = u + share * du, inner.moved(inside, share)
+            if np.abs(du).max() <= _STILL * np.abs(u).max() and local.imbalance() < _NEARLY:
+                return replace(state, pressure_pa=pressure_pa, u_m=u, inner=inner, pairs=pairs)
         return None
 
     def _share(self, u: Real, inner: Inner, du: Real, inside: Real) -> float | None:
@@ -156,6 +158,15 @@ class Problem:
 
     def _stuck(self, state: State) -> Pairs:
         return contact.stuck(state.pairs, self.gaps(state.pairs, state.u_m) < 0)
+
+
+def _solved(stiffness: csr_matrix, right: Real) -> Real:
+    """Solve a symmetric system, pivots taken from the diagonal where they can be."""
+    solver = splu(
+        stiffness.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.001, options={"SymmetricMode": True}
+    )
+    found: Real = solver.solve(right)
+    return found
 
 
 def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) -> Iterator[State]:
