@@ -3,20 +3,23 @@
 import math
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
+from math import inf
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sensorgen.card import card
+from sensorgen.budget import budget
+from sensorgen.card import FORCE_N, card
 from sensorgen.design import Design
 from sensorgen.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.interval import Interval
 from sensorgen.models import line
 from sensorgen.planner import Unloaded, Unpredictable, is_plate, unloaded
 from sensorgen.sensing import TIP_M, Sensed, sensor_of
-from sensorgen.sensor import Sensor
+from sensorgen.sensor import UNIFORM, Sensor
 from sensorgen.units import M_PER_MM, frequency_text
 
 TONES_HZ = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)  # thesis, Table 5.1, its 4990 corrected
@@ -29,8 +32,9 @@ Complex = NDArray[np.complex128]
 
 
 def prediction(
-    design: Design, frequency_hz: Sequence[float] = TONES_HZ, law: str = "", tip_m: float = TIP_M
-) -> dict[str, Any]:
+    design: Design, frequency_hz: Sequence[float] = TONES_HZ, law: str = "", tip_m: float = TIP_M,
+    *, profile: str = UNIFORM, accuracy: float = inf,
+) -> dict[str, Any]:  # fmt: skip
     """Everything that is predicted of a design, as plain data for ``prediction.json`` (SI units).
 
     Parameters
@@ -39,15 +43,18 @@ def prediction(
         As drawn.
     frequency_hz : sequence of float
         Tones of the impedance [Hz].
-    law, tip_m : str, float
-        Law of compression and length of the tip [m], as of :func:`sensorgen.sensing.sensor_of`, for the card.
+    law, tip_m, profile : str, float, str
+        Law of compression, length of the tip [m] and how its pressure is spread, as of
+        :func:`sensorgen.sensing.sensor_of`, for the card and the error budget.
+    accuracy : float
+        Wanted of abs(Z), relative [-]; the capacitance is bounded as nearly, and an unknown cell solved.
 
     Notes
     -----
     A scene that no model can speak of, as a short, or a material without a value has a reason in place of numbers.
     """
     try:
-        found = unloaded(design)
+        found = unloaded(design, accuracy)
     except (Unpredictable, MissingValue) as error:
         return {"capacitance_f": None, "reason": str(error)}
     area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
@@ -59,25 +66,31 @@ def prediction(
         "capacitance_per_area_f_per_m2": _bounds(found.answer.capacitance_f.times(1 / area)),
         "electrode_resistance_ohm": resistance,
         **_line(sum(resistance.values()), found.answer.capacitance_f, frequency_hz),
-        "identifiability": _card(design, found, frequency_hz, law, tip_m),
+        **_pressed(design, frequency_hz, law, tip_m, profile, accuracy),
         "values": [vars(t) for t in found.taken],
         "assumptions": [
             "ideal electrodes and no fringe at the sensor's edge for the capacitance",
             "electrode resistance of the plates alone: cogs can only lower it",
             "no dielectric loss and no leak: the sources give none",
+            "resistivity under the tip as elsewhere: no source says how it moves with pressure",
             "unloaded, as drawn",
         ],
     }
 
 
-def _card(design: Design, found: Unloaded, frequency_hz: Sequence[float], law: str, tip_m: float) -> dict[str, Any]:
-    """The identifiability card with the doubts about its sensor, or why there is none."""
+def _pressed(
+    design: Design, frequency_hz: Sequence[float], law: str, tip_m: float, profile: str, accuracy: float
+) -> dict[str, Any]:
+    """The identifiability card with the doubts about its sensor, and the error budget; or why there is none."""
     try:
-        sensed = sensor_of(design, law, tip_m)
-        stiffest = sensor_of(design, "bonded", tip_m).sensor if is_plate(found.answer) and not law else None
-        return card(sensed.sensor, frequency_hz, NOISE, stiffest=stiffest) | {"doubts": list(sensed.doubts)}
+        sensed = sensor_of(design, law, tip_m, profile=profile, accuracy=accuracy)
+        other = sensed.law.others[0] if is_plate(sensed.unloaded.answer) and not law else None
+        stiffest = replace(sensed.sensor, compression=other) if other else None
+        made = card(sensed.sensor, frequency_hz, NOISE, stiffest=stiffest) | {"doubts": list(sensed.doubts)}
+        middle = sensed.sensor.length_m / 2
+        return {"identifiability": made, "budget": budget(design, sensed, frequency_hz, FORCE_N, middle, accuracy)}
     except SensorgenError as error:
-        return {"verdict": None, "reason": str(error)}
+        return {"identifiability": {"verdict": None, "reason": str(error)}, "budget": None}
 
 
 def _resistance_ohm(design: Design, found: Unloaded) -> dict[str, float]:
@@ -193,6 +206,7 @@ def presses(
     frequency_hz: Sequence[float],
     force_n: Sequence[float],
     position_mm: Sequence[float],
+    accuracy: float = inf,
 ) -> dict[str, Any]:
     """Impedance over tone, force and position, and what it rests on, as plain data.
 
@@ -204,6 +218,8 @@ def presses(
         Its sensor.
     frequency_hz, force_n, position_mm : sequence of float
         Tones [Hz], forces [N] and centres of the tip [mm], each rising.
+    accuracy : float
+        Wanted of abs(Z), relative, for the error budget of the largest force at the middle position [-].
 
     Returns
     -------
@@ -223,9 +239,11 @@ def presses(
     return {
         "design": design.name,
         "design_id": design.id(),
-        "model": {"capacitance": unloaded(design).answer.model, "line": "line", "compression": law.name},
+        "model": {"capacitance": sensed.unloaded.answer.model, "line": "line", "compression": law.name},
         "compression": law.source,
         "tip_mm": sensor.tip_m / M_PER_MM,
+        "profile": sensor.profile,
+        "budget": budget(design, sensed, frequency_hz, force_n[-1], float(position_m[len(position_m) // 2]), accuracy),
         "doubts": [*sensed.doubts, *([beyond] if beyond else [])],
         "values": [vars(t) for t in sensed.taken],
         "axes": ["frequency_hz", "force_n", "position_mm"],

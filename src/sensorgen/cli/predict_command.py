@@ -4,15 +4,16 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 from sensorgen import units
-from sensorgen.cli import card_text, show
+from sensorgen.cli import budget_text, card_text, show
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import Length, OneOf, Values
+from sensorgen.cli.words import Length, OneOf, Ratio, Values
 from sensorgen.errors import BadInput, Unwritable
 
 if TYPE_CHECKING:
@@ -36,8 +37,17 @@ OWN: list[click.Parameter] = [
     ),
     click.Option(["--tip", "tip_mm"], type=Length(), default="10mm", show_default=True, help="Length of the tip."),
     click.Option(
-        ["--compression"], type=OneOf(("unconfined", "bonded")),
-        help="How a plate gives way; the best that is known of the cell if not given.",
+        ["--compression"], type=OneOf(("unconfined", "bonded", "solved")),
+        help="How the film gives way: a plate free or bonded, a cell solved (needs NGSolve, takes some seconds); the "
+        "best that is known of it if not given.",
+    ),
+    click.Option(
+        ["--profile"], type=OneOf(("uniform", "hertz", "parabola")), default="uniform", show_default=True,
+        help="Pressure under the tip: of a flat one, of a round one on a thick body, of a round one on a thin film.",
+    ),
+    click.Option(
+        ["--accuracy"], type=Ratio(), default=None,
+        help="Wanted of |Z|, as 1e-3: bounds the capacitance as nearly, solves an unknown cell, says what misses it.",
     ),
     click.Option(["--json", "as_json"], is_flag=True, help="Print as JSON."),
     click.Option(["--csv", "as_csv"], is_flag=True, help="Print R and X as CSV, a row per force and position."),
@@ -54,19 +64,22 @@ def _work(
     position_mm: Sequence[float] | None,
     tip_mm: float,
     compression: str | None,
+    profile: str,
+    accuracy: float | None,
     **how: Any,
 ) -> int:
     from sensorgen.predict import FORCES_N, TONES_HZ, positions_mm, prediction
     from sensorgen.sensing import sensor_of
 
     _refuse_two(how)
-    tones = frequency_hz or TONES_HZ
+    tones, wanted = frequency_hz or TONES_HZ, accuracy or inf
+    law, tip_m = compression or "", tip_mm * units.M_PER_MM
     if not (force_n or position_mm or how["as_csv"] or how["plot"]):
-        predicted = prediction(design, tones, compression or "", tip_mm * units.M_PER_MM)
+        predicted = prediction(design, tones, law, tip_m, profile=profile, accuracy=wanted)
         _deliver(_unpressed(predicted, as_json=how["as_json"]), how["output"])
         return 0
-    sensed = sensor_of(design, compression or "", tip_mm * units.M_PER_MM)
-    _pressed(design, sensed, (tones, force_n or FORCES_N, position_mm or positions_mm(design)), how)
+    sensed = sensor_of(design, law, tip_m, profile=profile, accuracy=wanted)
+    _pressed(design, sensed, (tones, force_n or FORCES_N, position_mm or positions_mm(design)), wanted, how)
     return 0
 
 
@@ -78,15 +91,18 @@ def _refuse_two(how: dict[str, Any]) -> None:
 
 
 def _unpressed(predicted: dict[str, Any], *, as_json: bool) -> Iterator[str]:
-    """The prediction without a press, and the identifiability card."""
+    """The prediction without a press, the identifiability card, and the error budget."""
     if as_json:
         yield show.json_text(predicted)
     else:
         lines = (*show.prediction_lines(predicted), *card_text.of_prediction(predicted))
         yield from (f"{line}\n" for line in lines)
+        if predicted.get("budget"):
+            yield "\n"
+            yield from (f"{line}\n" for line in budget_text.lines(predicted["budget"]))
 
 
-def _pressed(design: "Design", sensed: "Sensed", axes: Axes, how: dict[str, Any]) -> None:
+def _pressed(design: "Design", sensed: "Sensed", axes: Axes, accuracy: float, how: dict[str, Any]) -> None:
     from sensorgen.predict import NOISE, csv_blocks, moves, presses
 
     if how["plot"]:
@@ -94,9 +110,10 @@ def _pressed(design: "Design", sensed: "Sensed", axes: Axes, how: dict[str, Any]
     elif how["as_csv"]:
         _deliver(csv_blocks(sensed.sensor, *axes), how["output"], len(axes[1]) * len(axes[2]))
     else:
-        predicted = presses(design, sensed, *axes)
-        lines = (f"{line}\n" for line in show.presses(predicted, moves(predicted), NOISE))
-        _deliver(show.json_lines(predicted) if how["as_json"] else lines, how["output"])
+        predicted = presses(design, sensed, *axes, accuracy)
+        lines = (*show.presses(predicted, moves(predicted), NOISE), "", *budget_text.lines(predicted["budget"]))
+        text = (f"{line}\n" for line in lines)
+        _deliver(show.json_lines(predicted) if how["as_json"] else text, how["output"])
 
 
 def _plot(sensed: "Sensed", axes: Axes, folder: Path) -> None:

@@ -86,7 +86,7 @@ def presses(predicted: Mapping[str, Any], moves: Sequence[Mapping[str, float]], 
     law = predicted["model"]["compression"]
     yield (
         f"{predicted['design']}: {_axis(force, 'force', 'N')}, {_axis(at, 'position', 'mm')}; "
-        f"tip {predicted['tip_mm']:g} mm, compression {law}"
+        f"tip {predicted['tip_mm']:g} mm ({predicted['profile']}), compression {law}"
     )
     yield from (f"doubtful: {doubt}" for doubt in predicted["doubts"])
     yield ""

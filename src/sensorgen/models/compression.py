@@ -4,7 +4,7 @@ The *thinning* is the share by which a plate of the same capacitance would be th
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -53,6 +53,10 @@ class Plate:
             raise OutOfRange(f"the stress thins the film by {np.max(share):.3g}: at 1 its electrodes touch (Eq. B.49)")
         return share, np.full_like(share, 1 / self.modulus_pa)
 
+    def stiffer(self, factor: float) -> "Plate":
+        """The same of a material that many times as stiff."""
+        return replace(self, modulus_pa=self.modulus_pa * factor)
+
     def doubt(self, stress_pa: float) -> str:  # noqa: ARG002 - a law has no last point
         """Nothing."""
         return ""
@@ -94,6 +98,22 @@ class Curve:
             )
         ratio, slope = self._ratio(stress_pa)
         return 1 - 1 / ratio, slope / ratio**2
+
+    def stiffer(self, factor: float) -> "Curve":
+        """The same of materials that are all that many times as stiff: stresses scale."""
+        return replace(
+            self,
+            stress_pa=tuple(p * factor for p in self.stress_pa),
+            slope_per_pa=tuple(m / factor for m in self.slope_per_pa),
+        )
+
+    def rising(self, factor: float) -> "Curve":
+        """A curve that rises that many times as much."""
+        return replace(
+            self,
+            ratio=tuple(1 + (g - 1) * factor for g in self.ratio),
+            slope_per_pa=tuple(m * factor for m in self.slope_per_pa),
+        )
 
     def doubt(self, stress_pa: float) -> str:
         """Whether the stress is beyond the last point."""

@@ -1,0 +1,175 @@
+"""How the film of a design gives way, by the best that is known of its cell; and by how much that may be wrong.
+
+A plate has two laws, free to give way sideways and bonded, which bracket it. A cell with gaps is solved once and for
+all where it is a prototype's; any other one is solved when asked for, and kept.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from hashlib import sha256
+from json import dumps
+from typing import Any
+
+from sensorgen import cached
+from sensorgen.design import Design
+from sensorgen.errors import OutOfRange, SensorgenError, UnknownName
+from sensorgen.models import compression
+from sensorgen.models.compression import Compression, Curve
+from sensorgen.planner import Answer, Taken, is_plate, permittivities
+from sensorgen.units import M_PER_MM
+
+LAWS = ("unconfined", "bonded", "solved")
+STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)))  # 6 N on a tip of 10 x 10 mm are 60 kPa
+_STORED = 0.006  # of the rise: mesh levels, penalties and a second discretisation agree to it
+_COARSER = 1.5  # mesh that a solution is compared with, by its edges
+_HELD = {"stick": -0.039, "stiff tip": 0.017, "free sideways": -0.011}  # of the rise, d = 0.1: docs/sensitivity.md
+
+
+@dataclass(frozen=True)
+class Law:
+    """How a film gives way.
+
+    Attributes
+    ----------
+    compression : Compression
+        Thinning over stress.
+    taken : tuple of Taken
+        Moduli that it rests on.
+    doubts : tuple of str
+        Why it is to be taken with care.
+    others : tuple of Compression
+        As good as it within its own error: of the mesh, or the other law of a plate.
+    held : tuple of Compression
+        The same cell held or touched otherwise.
+    bounded : bool
+        Whether its error is known: not where a cell with gaps is taken for a plate.
+    """
+
+    compression: Compression
+    taken: tuple[Taken, ...]
+    doubts: tuple[str, ...] = ()
+    others: tuple[Compression, ...] = ()
+    held: tuple[Compression, ...] = ()
+    bounded: bool = True
+
+
+def law_of(design: Design, answer: Answer, name: str = "", *, solve: bool = False) -> Law:
+    """The law of compression of a design.
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    answer : Answer
+        Its unloaded capacitance.
+    name : str
+        One of ``LAWS``, or "" for the best that is known.
+    solve : bool
+        Whether "" may take seconds to solve a cell that is not known.
+
+    Raises
+    ------
+    UnknownName, OutOfRange
+        No such law; or a law that does not speak of this shape.
+    MissingValue, BadInput
+        For "solved": no modulus or Poisson's ratio, no NGSolve, a cell that is no prism.
+    """
+    if name not in ("", *LAWS):
+        raise UnknownName("law of compression", name, LAWS)
+    moduli = _values(design, "youngs_modulus_pa")
+    if is_plate(answer):
+        return _plate(design, moduli, name)
+    if name == "bonded":
+        raise OutOfRange(f"the law 'bonded' speaks of a solid plate; {design.shape} has gaps: expected 'unconfined'")
+    known = compression.solved(design.shape, vars(design.params), {n: t.value for n, t in moduli.items()})
+    if known and name != "unconfined":
+        return _cell(known, moduli, _STORED)
+    if name == "solved":
+        return _solved(design, moduli)
+    if solve and not name:
+        try:
+            return _solved(design, moduli)
+        except SensorgenError as error:
+            return _as_plate(design, moduli, str(error))
+    return _as_plate(design, moduli, "ask for the law 'solved', which takes some seconds")
+
+
+def _plate(design: Design, moduli: Mapping[str, Taken], name: str) -> Law:
+    """Free or bonded, the other one being as good as it."""
+    if name == "solved":
+        raise OutOfRange(f"{design.shape} is a solid plate: expected the law 'unconfined' or 'bonded'")
+    film = moduli[_film(design)]
+    free = compression.unconfined(film.value)
+    tied = compression.bonded(film.value, design.params.width_mm * M_PER_MM, _gap_m(design))
+    if name == "bonded":
+        return Law(tied, (film,), others=(free,))
+    return Law(
+        free, (film,), ("a plate free to give way sideways: bonded to its electrodes it would be stiffer",), (tied,)
+    )
+
+
+def _as_plate(design: Design, moduli: Mapping[str, Taken], why: str) -> Law:
+    film = moduli[_film(design)]
+    doubt = f"{design.shape} taken to give way as a free solid plate of {film.material} (B.49): its cell was not solved"
+    return Law(compression.unconfined(film.value), (film,), (f"{doubt}; {why}",), bounded=False)
+
+
+def _cell(found: Curve, moduli: Mapping[str, Taken], within: float, doubts: tuple[str, ...] = ()) -> Law:
+    """A solved cell: its rise known to a share, and what other ways to hold it would make of it."""
+    others = tuple(found.rising(1 + sign * within) for sign in (-1, 1))
+    held = tuple(found.rising(1 + change) for change in _HELD.values())
+    return Law(found, tuple(moduli.values()), doubts, others, held)
+
+
+def _solved(design: Design, moduli: Mapping[str, Taken]) -> Law:
+    """Solve a cell by finite elements, or take it from the cache."""
+    ratios, eps = _values(design, "poisson_ratio"), {t.material: t.value for t in permittivities(design)}
+    solids = {name: (moduli[name].value, ratios[name].value) for name in moduli}
+    scene = sha256(dumps(asdict(design.in_use), sort_keys=True).encode()).hexdigest()
+    question = {"what": "compression", "scene": scene, "solids": solids, "permittivity": eps, "stress_pa": STRESS_PA}
+    found = cached.answer(question, lambda: _pressed(design, solids, eps))
+    doubts: tuple[str, ...] = ()
+    if found["stress_pa"][-1] < STRESS_PA[-1]:
+        doubts = (f"the solution of the cell ended at {found['stress_pa'][-1] / 1e3:.3g} kPa",)
+    curve = compression.curve("solved", found["source"], found["stress_pa"], found["ratio"])
+    return _cell(curve, {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, found["within"], doubts)
+
+
+def _pressed(design: Design, solids: Mapping[str, tuple[float, float]], eps: Mapping[str, float]) -> dict[str, Any]:
+    """The curve of a cell on two meshes, as plain data; as far as it converged."""
+    from sensorgen.models import press2d
+    from sensorgen.models._press.mesh import Fineness
+
+    cell = press2d.cell(design.in_use, getattr(design.params, "period_mm", None))
+    elastic = {name: press2d.Elastic(*pair) for name, pair in solids.items()}
+    fine, stress = Fineness(), list(STRESS_PA)
+    found = press2d.press(cell, elastic, stress, eps)
+    if 0 < found.converged_pa < stress[-1]:
+        stress = [p for p in stress if p <= found.converged_pa]
+        found = press2d.press(cell, elastic, stress, eps)
+    curve = press2d.curve_of(found)
+    coarse = replace(fine, corner_mm=_COARSER * fine.corner_mm, coarse_mm=_COARSER * fine.coarse_mm)
+    other = press2d.curve_of(press2d.press(cell, elastic, stress, eps, fineness=coarse))
+    rises = zip(curve.ratio[1:], other.ratio[1:], strict=False)
+    within = max(abs((b - 1) / (a - 1) - 1) for a, b in rises)
+    return {"source": curve.source, "stress_pa": curve.stress_pa, "ratio": curve.ratio, "within": max(within, _STORED)}
+
+
+def _film(design: Design) -> str:
+    return design.materials.dielectric.partition("@")[0]
+
+
+def _gap_m(design: Design) -> float:
+    """Distance of the electrodes of a plate [m]."""
+    spans = {
+        end: [p.span("z") for b in design.in_use.bodies if b.terminal == end for p in b.prisms]
+        for end in ("top", "bottom")
+    }
+    return (min(low for low, _ in spans["top"]) - max(high for _, high in spans["bottom"])) * M_PER_MM
+
+
+def _values(design: Design, quantity: str) -> dict[str, Taken]:
+    """A quantity of every material in the sensor."""
+    used, names = design.used(), sorted({body.material for body in design.in_use.bodies})
+    found = {name: design.material(name).value(quantity, used[name]) for name in names}
+    return {name: Taken(name, quantity, value.value, value.source) for name, value in found.items()}
