@@ -97,6 +97,11 @@ def span(values):
     return ordered[-1] - ordered[0]
 
 
+def last_of_table(lines):
+    """Numbers of the last row of R and X, which the budget follows."""
+    return lines[lines.index("", lines.index("R and X [ohm] at 99.7 kHz")) - 1].split()[2:]
+
+
 def test_the_table(run):
     said = run("predict", "reference", *PRESSES)
     assert (said.code, said.err) == (0, "")
@@ -116,7 +121,7 @@ def test_the_table(run):
     for points, of_r, of_x in ((at_50, re_f, im_f), (at_6, re_x, im_x)):
         assert of_r == pytest.approx(span(z.real for z in points) / deviation, abs=0.006)
         assert of_x == pytest.approx(span(z.imag for z in points) / deviation, abs=0.006)
-    corner = [float(word) for word in lines[-1].split()[2:]]
+    corner = [float(word) for word in last_of_table(lines)]
     expected = [v for x in (20, 50) for v in (values[6, x].real, values[6, x].imag)]
     assert corner == pytest.approx(expected, rel=1e-6)
     assert "R and X [ohm] at 99.7 kHz" in lines
@@ -126,7 +131,7 @@ def test_a_single_press(run):
     lines = run("predict", "reference", "--force", "2", "--position", "30").out.splitlines()
     assert lines[0].startswith("reference: force 2 N, position 30 mm; tip 10 mm")
     z = at_point(99.7e3, 2.0, 30.0)
-    assert list(map(float, lines[-1].split()[2:])) == pytest.approx([z.real, z.imag], rel=1e-6)
+    assert list(map(float, last_of_table(lines))) == pytest.approx([z.real, z.imag], rel=1e-6)
 
 
 @pytest.mark.parametrize("form", ["--csv", "--json", None])
@@ -238,7 +243,7 @@ def test_json_is_plain(run):
     assert all(math.isfinite(x) for plane in found["re_ohm"] for row in plane for x in row)
     assert set(found) == {
         "design", "design_id", "model", "compression", "tip_mm", "doubts", "values", "axes", "frequency_hz", "force_n",
-        "position_mm", "re_ohm", "im_ohm",
+        "position_mm", "re_ohm", "im_ohm", "profile", "budget",
     }  # fmt: skip
 
 
@@ -259,8 +264,46 @@ def test_help_does_not_load_numpy(real):
 def test_options_are_what_the_planner_knows():
     from sensorgen.celllaw import LAWS
     from sensorgen.cli.predict_command import OWN
+    from sensorgen.models.pressure import PROFILES
     from sensorgen.sensing import TIP_M
 
     options = {option.name: option for option in OWN}
     assert tuple(options["compression"].type.choices) == LAWS
+    assert tuple(options["profile"].type.choices) == PROFILES
     assert options["tip_mm"].type.convert(options["tip_mm"].default, None, None) == TIP_M * 1e3
+
+
+def test_a_round_tip_presses_harder_in_its_middle_and_moves_less(run):
+    """The film stiffens, so that the same force moves the impedance less where it is not spread evenly."""
+    words = ["predict", "tri", "--force", "0:6:6", "--position", "50", "--json"]
+    even, round_ = (json.loads(run(*words, "--profile", name).out) for name in ("uniform", "parabola"))
+    assert (even["profile"], round_["profile"]) == ("uniform", "parabola")
+    moved = [found["im_ohm"][0][1][0] - found["im_ohm"][0][0][0] for found in (even, round_)]
+    assert 0.9 < moved[1] / moved[0] < 1.0
+    assert "tip 10 mm (parabola), compression" in run(*words[:-1], "--profile", "parabola").out
+
+
+def test_the_budget_stands_below_and_names_its_largest_term(run):
+    lines = run("predict", "reference", *PRESSES).out.splitlines()
+    assert "error budget at 6 N and 50 mm, at the worst tone:" in lines
+    assert any(line.startswith("  largest: ") for line in lines)
+    assert max(map(len, lines[lines.index("error budget at 6 N and 50 mm, at the worst tone:") :])) <= 80
+
+
+def test_an_accuracy_that_the_budget_misses_is_said(run):
+    out = " ".join(run("predict", "reference", "--accuracy", "1e-2").out.split())
+    assert "an accuracy of 0.01 of |Z| is met by the models, but not by what the materials are known to" in out
+    assert "above it alone: resistivity, permittivity of x60" in out
+
+
+@pytest.mark.parametrize("value", ["0", "-1", "nan", "much"])
+def test_an_accuracy_is_a_number_above_0(run, value):
+    said = run("predict", "reference", "--accuracy", value)
+    assert said.code == 2
+    assert "expected" in said.line
+
+
+def test_a_law_that_does_not_speak_of_the_shape_is_refused(run):
+    said = run("predict", "reference", "--compression", "solved", "--force", "1")
+    assert said.code == 2
+    assert "reference is a solid plate: expected the law 'unconfined' or 'bonded'" in said.line

@@ -83,10 +83,11 @@ def prediction_lines(predicted: Mapping[str, Any]) -> Iterator[str]:
 def presses(predicted: Mapping[str, Any], moves: Sequence[Mapping[str, float]], noise: float) -> Iterator[str]:
     """R and X over force and position, as lines: their ranges, how far they move, and corners at the highest tone."""
     force, at = predicted["force_n"], predicted["position_mm"]
-    law = predicted["model"]["compression"]
+    law, profile = predicted["model"]["compression"], predicted["profile"]
+    spread = "" if profile == "uniform" else f" ({profile})"
     yield (
         f"{predicted['design']}: {_axis(force, 'force', 'N')}, {_axis(at, 'position', 'mm')}; "
-        f"tip {predicted['tip_mm']:g} mm ({predicted['profile']}), compression {law}"
+        f"tip {predicted['tip_mm']:g} mm{spread}, compression {law}"
     )
     yield from (f"doubtful: {doubt}" for doubt in predicted["doubts"])
     yield ""

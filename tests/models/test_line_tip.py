@@ -1,0 +1,179 @@
+"""A tip that presses unevenly: against mpmath, against one patch, its balance of force, and how its pieces converge."""
+
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+from line_cases import TONES, matrix, terminated
+
+from sensorgen.errors import OutOfRange
+from sensorgen.models import compression, line_tip
+from sensorgen.models.pressure import pieces
+from sensorgen.sensor import Sensor
+from sensorgen.units import EPS0_F_PER_M
+
+PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), EPS0_F_PER_M * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))
+SOFT = replace(
+    PLATE, compression=compression.curve("soft", "made up", [0, 2e4, 5e4, 1e5], [1, 1.1, 1.2, 1.3]),
+    piezoresistance_per_n=(0.01, -0.02), tan_delta=0.01, leak_s_per_m=1e-9,
+)  # fmt: skip
+TONE = np.array(TONES)
+PLACES = [0.0, 0.002, 0.0048, 0.03, 0.0976, 0.1]  # of the tip's centre; its half is 5 mm
+
+
+def by_hand(sensor, force, position, f):
+    """Z in 40 digits from the printed formulas, piece by piece, numbers of mpmath."""
+    mp, w = mpmath.mpf, sensor.width_m
+    with mpmath.workdps(40):
+        low, high = position - sensor.tip_m / 2, position + sensor.tip_m / 2
+        left, right = max(low, 0.0), min(high, sensor.length_m)
+        share = {
+            "hertz": lambda u: (
+                (2 * mpmath.asin(mpmath.sqrt(u)) - mpmath.sin(4 * mpmath.asin(mpmath.sqrt(u))) / 2) / mpmath.pi
+            ),
+            "parabola": lambda u: u * u * (3 - 2 * u),
+        }[sensor.profile]
+        a, b = (mp(left) - mp(low)) / mp(sensor.tip_m), (mp(right) - mp(low)) / mp(sensor.tip_m)
+        r = [mp(rho) / (mp(h) * mp(w)) for rho, h in zip(sensor.resistivity_ohm_m, sensor.electrode_m, strict=True)]
+
+        def section(length, weight, thinning):
+            rise = [1 + mp(s) * force * weight for s in sensor.piezoresistance_per_n]
+            c = mp(sensor.capacitance_f_per_m) / (1 - thinning)
+            y = sensor.leak_s_per_m + (mp(sensor.tan_delta) + 1j) * 2 * mpmath.pi * mp(f) * c
+            return matrix(sum(x * k for x, k in zip(r, rise, strict=True)), y, length)
+
+        whole = section(mp(left), 0, mp(0))
+        n = sensor.pieces
+        for k in range(n):
+            t0, t1 = ((1 - mpmath.cos(mpmath.pi * j / n)) / 2 for j in (k, k + 1))
+            borne = (share(a + (b - a) * t1) - share(a + (b - a) * t0)) / (share(b) - share(a))
+            length = (mp(right) - mp(left)) * (t1 - t0)
+            stress = float(force * borne / (w * length))
+            thinning = mp(float(sensor.compression.thinning(np.asarray(stress))[0]))
+            whole = whole * section(length, borne / (t1 - t0), thinning)
+        whole = whole * section(mp(sensor.length_m) - mp(right), 0, mp(0))
+        return complex(terminated(whole, sensor.far_end))
+
+
+@pytest.mark.parametrize("profile", ["hertz", "parabola"])
+@pytest.mark.parametrize("position", PLACES)
+@pytest.mark.parametrize("far_end", ["open", "short", 5e4])
+def test_against_mpmath(profile, position, far_end):
+    sensor = replace(SOFT, profile=profile, pieces=3, far_end=far_end)
+    for f in (1.1e3, 99.7e3):
+        expected, found = by_hand(sensor, 2.0, position, f), complex(sensor.impedance(f, 2.0, position))
+        assert found.real == pytest.approx(expected.real, rel=1e-11, abs=0)
+        assert found.imag == pytest.approx(expected.imag, rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize("sensor", [PLATE, SOFT, replace(SOFT, far_end="short")])
+@pytest.mark.parametrize("count", [1, 5])
+def test_pieces_of_even_pressure_are_one_patch(sensor, count):
+    one = sensor.response(TONE[:, None], 3.0, np.array(PLACES))
+    tip = replace(sensor, profile="hertz")._tip(np.asarray(3.0), np.array(PLACES))
+    cut = replace(tip, pieces=pieces("uniform", count))
+    many = line_tip.response(sensor._track(), cut, sensor.compression, TONE[:, None])
+    assert line_tip.impedance(sensor._track(), cut, sensor.compression, TONE[:, None]) == pytest.approx(
+        one[0], rel=1e-14
+    )
+    for found, expected in zip(many, one, strict=True):
+        assert found.real == pytest.approx(expected.real, rel=1e-9, abs=1e-12)
+        assert found.imag == pytest.approx(expected.imag, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("profile", ["hertz", "parabola"])
+@pytest.mark.parametrize("position", PLACES)
+@pytest.mark.parametrize("force", [0.5, 2.0])
+def test_slopes_against_differences(profile, position, force):
+    """By Richardson's rule from two steps; at the very ends from inside."""
+    sensor, inside = replace(SOFT, profile=profile), min(max(position, 1e-3), 0.099)
+
+    def by(step, move):
+        ahead = [
+            (sensor.impedance(TONE, *move(h)) - sensor.impedance(TONE, *move(-h))) / (2 * h) for h in (step, step / 2)
+        ]
+        return (4 * ahead[1] - ahead[0]) / 3
+
+    found = sensor.response(TONE, force, inside)
+    for part in (np.real, np.imag):
+        assert part(found.by_force_ohm_per_n) == pytest.approx(part(by(2e-3, lambda h: (force + h, inside))), rel=2e-6)
+        assert part(found.by_position_ohm_per_m) == pytest.approx(
+            part(by(1e-4, lambda h: (force, inside + h))), rel=1e-3, abs=1e-3
+        )
+
+
+@pytest.mark.parametrize("profile", ["hertz", "parabola"])
+@pytest.mark.parametrize("position", [0.002, 0.05])
+def test_pieces_converge_with_the_square_of_their_number(profile, position):
+    sensor = replace(PLATE, profile=profile)
+    exact = replace(sensor, pieces=2048).response(TONE, 6.0, position)
+    errors = []
+    for count in (8, 16, 32, 64):
+        found = replace(sensor, pieces=count).response(TONE, 6.0, position)
+        errors.append([abs(a - b).max() for a, b in zip(found[:2], exact[:2], strict=True)])
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert orders == pytest.approx(2.0, abs=0.15)
+
+
+def test_a_light_press_does_not_care_how_it_is_spread():
+    """Where film and force are in proportion, at low frequency, only the mean counts: 2nd order in the force."""
+    change = {
+        p: replace(PLATE, profile=p).impedance(1.1e3, 1e-3, 0.05) - PLATE.impedance(1.1e3, 0.0, 0.05)
+        for p in ("uniform", "hertz", "parabola")
+    }
+    assert change["hertz"].imag == pytest.approx(change["uniform"].imag, rel=1e-5)
+    assert change["parabola"].imag == pytest.approx(change["uniform"].imag, rel=1e-5)
+
+
+def test_spread_raises_the_capacitance_of_a_plate():
+    """C ~ 1 / (1 - s) is convex: uneven pressure makes more of it (Jensen), the more uneven the more."""
+    even, hertz, parabola = (
+        replace(PLATE, profile=p).impedance(1.1e3, 6.0, 0.05).imag for p in ("uniform", "hertz", "parabola")
+    )
+    assert even < hertz < parabola < 0
+
+
+def test_turned_around_it_is_the_same_from_the_other_side():
+    """A line open at both ends has the same capacitance whichever side the tip presses."""
+    sensor = replace(SOFT, profile="hertz", piezoresistance_per_n=(0.0, 0.0), resistivity_ohm_m=(0.0, 0.0))
+    assert complex(sensor.impedance(1e3, 2.0, 0.003)) == pytest.approx(
+        complex(sensor.impedance(1e3, 2.0, 0.097)), rel=1e-12
+    )
+
+
+def test_without_force_there_is_no_trace_of_position():
+    found = replace(SOFT, profile="hertz").response(TONE[:, None], 0.0, np.linspace(0, 0.1, 7))
+    assert not found.by_position_ohm_per_m[:, 1:-1].any()
+    assert abs(found.by_position_ohm_per_m).max() < 1e-6  # at the ends, where the patch grows, rounding is left
+    assert found.by_force_ohm_per_n.all()
+
+
+def test_the_highest_pressure_is_what_counts():
+    assert replace(PLATE, profile="parabola", pieces=64).stress_pa(6.0, 0.05) == pytest.approx(9e4, rel=1e-3)
+    assert replace(PLATE, profile="hertz", pieces=64).stress_pa(6.0, [0.05, 0.0])[1] == pytest.approx(
+        2 * 4 / np.pi * 6e4, rel=1e-2
+    )  # half the tip rests, its highest end among it
+    assert PLATE.stress_pa(6.0, 0.05) == pytest.approx(6e4)
+
+
+def test_what_an_uneven_tip_cannot():
+    sensor = replace(PLATE, profile="hertz")
+    with pytest.raises(OutOfRange, match="makes no single patch"):
+        sensor.line_inputs(1e3, 1.0, 0.05)
+    with pytest.raises(OutOfRange, match="electrodes touch"):
+        sensor.impedance(1e3, 500.0, 0.05)  # 5 MPa on average, 6.4 in the middle
+    with pytest.raises(OutOfRange, match="negative"):
+        replace(sensor, piezoresistance_per_n=(-0.5, -0.5)).impedance(1e3, 1.9, 0.05)  # only in the middle
+    with pytest.raises(OutOfRange, match="no derivative"):
+        sensor.response(0.0, 1.0, 0.05)
+
+
+def test_whole_tips_of_a_grid_are_the_same_press():
+    """One patch for all of them keeps the axes apart; beside clipped ones it is the same to the last digit."""
+    inside, ends = np.linspace(0.006, 0.094, 9), np.array([0.0, 0.1])
+    apart = PLATE.impedance(TONE[:, None], 3.0, inside)
+    together = PLATE.impedance(TONE[:, None], 3.0, np.concatenate([ends, inside]))[:, 2:]
+    assert (apart == together).all()
+    assert PLATE.patch(inside).length_m.shape == ()
+    assert PLATE.whole([0.0, 0.0051, 0.05, 0.0949, 0.0951]).tolist() == [False, True, True, True, False]
