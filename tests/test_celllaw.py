@@ -70,34 +70,21 @@ def test_without_the_solver_a_plate_stands_in_and_that_is_said(monkeypatch):
 
 
 def test_an_unknown_cell_is_solved_once(monkeypatch):
-    """A wider period bears its load on fewer cogs: softer than the prototype, and stiffer again with a stiffer film."""
+    """A period that is 10 nm off the prototype's is another cell, with the stored curve: to the 0.6 % that it claims.
+
+    What it is solved for is kept: pressing it again would fail.
+    """
     pytest.importorskip("netgen", reason="solves a cell: pip install sensorgen[fem]")
     from sensorgen.models import press2d
 
-    law = law_of(make(OTHER), GAPS, "solved")
-    prototype = compression.solved("tri", vars(make({"shape": "tri"}).params), {"x60": 6e6, "etpu": 22e6})
-    at = np.array([1e4, 5e4, 1e5])
-    moved = [np.diff(np.log(1 / (1 - c.thinning(at)[0]))) for c in (law.compression, prototype)]
-    assert law.compression.stress_pa == (0.0, 5e3, *(1e4 * k for k in range(1, 11)))
-    assert 0.5 < moved[0].sum() / moved[1].sum() < 1.5
+    drawn = make({"shape": "tri", "parameters": {"period_mm": 2.00001}})
+    law = law_of(drawn, GAPS, "solved")
+    stored = compression.solved("tri", vars(make({"shape": "tri"}).params), {"x60": 6e6, "etpu": 22e6})
+    at = np.array([1e4, 3e4, 6e4, 1e5])
+    rise, expected = (1 / (1 - c.thinning(at)[0]) - 1 for c in (law.compression, stored))
+    within = (law.others[1].ratio[-1] - 1) / (law.compression.ratio[-1] - 1) - 1
+    assert 0.00599 <= within < 0.02
+    assert rise == pytest.approx(expected, rel=0.006 + within)
     assert {t.quantity for t in law.taken} == {"youngs_modulus_pa", "poisson_ratio"}
-    within = law.others[1].ratio[-1] - 1
-    assert 0.006 <= within / (law.compression.ratio[-1] - 1) - 1 < 0.02
     monkeypatch.setattr(press2d, "press", None)
-    assert law_of(make(OTHER), GAPS, solve=True).compression == law.compression
-
-
-def test_the_prototype_solved_anew_is_the_stored_one():
-    """Stored curves have a source of their own: within the 0.6 % that they claim, and this mesh's own error."""
-    pytest.importorskip("netgen", reason="solves a cell: pip install sensorgen[fem]")
-    from sensorgen.celllaw import _pressed, _values
-    from sensorgen.planner import permittivities
-
-    drawn = make({"shape": "tri"})
-    moduli, ratios = (_values(drawn, key) for key in ("youngs_modulus_pa", "poisson_ratio"))
-    eps = {t.material: t.value for t in permittivities(drawn)}
-    found = _pressed(drawn, {n: (moduli[n].value, ratios[n].value) for n in moduli}, eps)
-    stored = compression.solved("tri", vars(drawn.params), {n: t.value for n, t in moduli.items()})
-    at = np.asarray(found["stress_pa"][2:])
-    rise = 1 / (1 - stored.thinning(at)[0]) - 1
-    assert np.asarray(found["ratio"][2:]) - 1 == pytest.approx(rise, rel=0.006 + found["within"])
+    assert law_of(drawn, GAPS, solve=True).compression == law.compression

@@ -85,10 +85,10 @@ def law_of(design: Design, answer: Answer, name: str = "", *, solve: bool = Fals
     if known and name != "unconfined":
         return _cell(known, moduli, _STORED)
     if name == "solved":
-        return _solved(design, moduli)
+        return solved(design)
     if solve and not name:
         try:
-            return _solved(design, moduli)
+            return solved(design)
         except SensorgenError as error:
             return _as_plate(design, moduli, str(error))
     return _as_plate(design, moduli, "ask for the law 'solved', which takes some seconds")
@@ -121,13 +121,27 @@ def _cell(found: Curve, moduli: Mapping[str, Taken], within: float, doubts: tupl
     return Law(found, tuple(moduli.values()), doubts, others, held)
 
 
-def _solved(design: Design, moduli: Mapping[str, Taken]) -> Law:
-    """Solve a cell by finite elements, or take it from the cache."""
-    ratios, eps = _values(design, "poisson_ratio"), {t.material: t.value for t in permittivities(design)}
+def solved(design: Design, **held: str) -> Law:
+    """The law of a cell by finite elements, or from the cache.
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    **held : str
+        How it is held and touched, as of :class:`sensorgen.models._press.support.Held`.
+
+    Raises
+    ------
+    MissingValue, BadInput, OutOfRange
+        No modulus or Poisson's ratio, no NGSolve; a cell that is no prism; a solution that is not to be trusted.
+    """
+    moduli, ratios = _values(design, "youngs_modulus_pa"), _values(design, "poisson_ratio")
+    eps = {t.material: t.value for t in permittivities(design)}
     solids = {name: (moduli[name].value, ratios[name].value) for name in moduli}
     scene = sha256(dumps(asdict(design.in_use), sort_keys=True).encode()).hexdigest()
-    question = {"what": "compression", "scene": scene, "solids": solids, "permittivity": eps, "stress_pa": STRESS_PA}
-    found = cached.answer(question, lambda: _pressed(design, solids, eps))
+    question = {"what": "compression", "scene": scene, "solids": solids, "permittivity": eps, "held": held}
+    found = cached.answer(question | {"stress_pa": STRESS_PA}, lambda: _pressed(design, solids, eps, held))
     doubts: tuple[str, ...] = ()
     if found["stress_pa"][-1] < STRESS_PA[-1]:
         doubts = (f"the solution of the cell ended at {found['stress_pa'][-1] / 1e3:.3g} kPa",)
@@ -135,21 +149,24 @@ def _solved(design: Design, moduli: Mapping[str, Taken]) -> Law:
     return _cell(curve, {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, found["within"], doubts)
 
 
-def _pressed(design: Design, solids: Mapping[str, tuple[float, float]], eps: Mapping[str, float]) -> dict[str, Any]:
+def _pressed(
+    design: Design, solids: Mapping[str, tuple[float, float]], eps: Mapping[str, float], given: Mapping[str, str]
+) -> dict[str, Any]:
     """The curve of a cell on two meshes, as plain data; as far as it converged."""
     from sensorgen.models import press2d
     from sensorgen.models._press.mesh import Fineness
+    from sensorgen.models._press.support import Held
 
     cell = press2d.cell(design.in_use, getattr(design.params, "period_mm", None))
     elastic = {name: press2d.Elastic(*pair) for name, pair in solids.items()}
-    fine, stress = Fineness(), list(STRESS_PA)
-    found = press2d.press(cell, elastic, stress, eps)
+    held, fine, stress = Held(**given), Fineness(), list(STRESS_PA)
+    found = press2d.press(cell, elastic, stress, eps, held)
     if 0 < found.converged_pa < stress[-1]:
         stress = [p for p in stress if p <= found.converged_pa]
-        found = press2d.press(cell, elastic, stress, eps)
+        found = press2d.press(cell, elastic, stress, eps, held)
     curve = press2d.curve_of(found)
     coarse = replace(fine, corner_mm=_COARSER * fine.corner_mm, coarse_mm=_COARSER * fine.coarse_mm)
-    other = press2d.curve_of(press2d.press(cell, elastic, stress, eps, fineness=coarse))
+    other = press2d.curve_of(press2d.press(cell, elastic, stress, eps, held, coarse))
     rises = zip(curve.ratio[1:], other.ratio[1:], strict=False)
     within = max(abs((b - 1) / (a - 1) - 1) for a, b in rises)
     return {"source": curve.source, "stress_pa": curve.stress_pa, "ratio": curve.ratio, "within": max(within, _STORED)}

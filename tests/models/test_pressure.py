@@ -1,5 +1,7 @@
 """Profiles of pressure against their own integrals, and the pieces that they are cut into."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy import integrate, special
@@ -44,7 +46,7 @@ def test_a_piece_has_the_mean_pressure_of_its_place(name):
     whole = integrate.quad(density, begin, end)[0]
     edges = begin + (end - begin) * np.concatenate([[0], np.cumsum(found.length)])
     edges[-1] = end
-    means = [integrate.quad(density, a, b)[0] / (b - a) * (end - begin) / whole for a, b in zip(edges, edges[1:])]
+    means = [integrate.quad(density, a, b)[0] / (b - a) * (end - begin) / whole for a, b in pairwise(edges)]
     assert found.pressure == pytest.approx(means, rel=1e-8)
 
 
@@ -56,7 +58,9 @@ def test_slopes_along_with_the_ends(name, ends, slopes):
     """Against differences, their own error some 1e-9."""
     ends, slopes = (tuple(map(np.asarray, pair)) for pair in (ends, slopes))
     step = 1e-5
-    ahead, behind = (pieces(name, 6, tuple(e + s * h for e, s in zip(ends, slopes))).pressure for h in (step, -step))
+    ahead, behind = (
+        pieces(name, 6, tuple(e + s * h for e, s in zip(ends, slopes, strict=True))).pressure for h in (step, -step)
+    )
     found = pieces(name, 6, ends, slopes).pressure_slope
     assert found == pytest.approx((ahead - behind) / (2 * step), rel=1e-6, abs=1e-8)
 
