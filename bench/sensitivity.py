@@ -1,0 +1,124 @@
+"""Sensitivity of tri and rect beside the plate, all held in the same way: the table and picture of docs/sensitivity.md.
+
+Run with NGSolve installed: python bench/sensitivity.py. Cells are solved once and kept (SENSORGEN_CACHE).
+"""
+
+import sys
+from itertools import product
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from rect_linear import rises
+
+from sensorgen import cached
+from sensorgen.celllaw import STRESS_PA, solved
+from sensorgen.design import Design, make
+from sensorgen.models import compression
+from sensorgen.models.compression import Compression
+from sensorgen.predict import TONES_HZ
+from sensorgen.sensitivity import HELD, Sensitivity, sensitivity
+
+FORCE_N, RHO_OHM_M = 6.0, 0.135
+SOLIDS = {"x60": (6e6, 0.4999), "etpu": (22e6, 0.4999)}
+EPS = {"x60": 4.68, "air": 1.00059}
+PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "sensitivity.png"
+DESIGNS = {
+    "plate": {"shape": "reference"},
+    "tri 0.1": {"shape": "tri", "parameters": {"dielectric_mm": 0.1}},
+    "tri 0.2": {"shape": "tri", "parameters": {"dielectric_mm": 0.2}},
+    "rect 0.1": {"shape": "rect", "parameters": {"dielectric_mm": 0.1}},
+    "rect 0.2": {"shape": "rect", "parameters": {"dielectric_mm": 0.2}},
+}
+
+
+def law(name: str, design: Design, boundary: str) -> Compression:
+    """The law of a cell: of tri and plate in two dimensions, of rect in three for small strains."""
+    if not name.startswith("rect"):
+        return solved(design, **HELD[boundary]).compression
+    question = {"what": "rect", "parameters": vars(design.params), "free": boundary == "free"}
+    stress = list(STRESS_PA[1:])
+    free = boundary == "free"
+    ratio = cached.answer(question, lambda: rises(design, SOLIDS, EPS, stress, free=free, mesh_mm=0.15)[1])
+    return compression.curve("rect", "linear elasticity in 3D", STRESS_PA, [1.0, *ratio])
+
+
+def rows() -> list[tuple[str, str, Compression, Sensitivity]]:
+    """Every cell and boundary; the plate also as the thesis has it and bonded over the width of the sensor."""
+    plate = make(DESIGNS["plate"])
+    laws = [
+        ("plate", "B.49", compression.unconfined(6e6)),
+        ("plate", "bonded, 10 mm", compression.bonded(6e6, 0.01, 6e-4)),
+    ]
+    laws += [(name, held, law(name, make(DESIGNS[name]), held)) for held, name in product(HELD, DESIGNS)]
+    found = []
+    for name, held, how in laws:
+        design = plate if name == "plate" else make(DESIGNS[name])
+        accuracy = 1e-3 if not name.startswith("rect") else 1e-2
+        seen = sensitivity(design, how, TONES_HZ, FORCE_N, resistivity_ohm_m=RHO_OHM_M, accuracy=accuracy)
+        found.append((name, held, how, seen))
+    return found
+
+
+def table(found: list[tuple[str, str, Compression, Sensitivity]]) -> str:
+    """As Markdown; the plate that is held in the same way is 1."""
+    plates = {held: seen.per_newton for name, held, _, seen in found if name == "plate"}
+    head = (
+        "cell",
+        "held",
+        "C [pF]",
+        "rise at 60 kPa",
+        "its slope, per N",
+        "over the plate's",
+        "sigma_F [N]",
+        "sigma_x [mm]",
+    )
+    lines = ["| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
+    for name, held, _, s in found:
+        times = s.per_newton / plates[held]
+        lines.append(
+            f"| {name} | {held} | {s.capacitance_f * 1e12:.1f} | {_percent(s.rise)} | {_percent(s.per_newton)} | "
+            f"{times:.3g} | {s.sigma_force_n:.3g} | {s.sigma_position_m * 1e3:.3g} |"
+        )
+    return "\n".join(lines)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %"
+
+
+def draw(found: list[tuple[str, str, Compression, Sensitivity]]) -> None:
+    """Rise over stress, and the bound of the force."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import numpy as np
+    from matplotlib import pyplot as plt
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained")
+    colours = dict(zip(DESIGNS, ("#555555", "#c0392b", "#e59866", "#1f618d", "#7fb3d5"), strict=True))
+    stress = np.linspace(1e3, 1e5, 200)
+    for name, held, how, _ in found:
+        if held in HELD:
+            thinning = how.thinning(stress)[0]
+            style = "-" if held == "free" else "--"
+            rise = 100 * thinning / (1 - thinning)
+            left.semilogy(stress / 1e3, rise, style, color=colours[name], label=f"{name}, {held}")
+    left.set(xlabel="stress [kPa]", ylabel="rise of the capacitance [%]", xlim=(0, 100))
+    left.grid(alpha=0.3)
+    figure.legend(*left.get_legend_handles_labels(), fontsize=8, ncols=5, loc="outside lower center")
+    labels = [f"{name}\n{held}" for name, held, _, _ in found]
+    right.barh(range(len(found)), [s.sigma_force_n for *_, s in found], color=[colours[n] for n, *_ in found])
+    right.set_yticks(range(len(found)), [text.replace("\n", ", ") for text in labels], fontsize=8)
+    right.invert_yaxis()
+    right.set(xscale="log", xlabel="standard error of a press of 6 N, at 0.1 % noise [N]")
+    right.axvline(FORCE_N, color="black", lw=0.8, ls=":")
+    right.text(FORCE_N * 1.15, len(found) - 0.6, "the press itself", fontsize=7, va="bottom")
+    right.grid(alpha=0.3, axis="x")
+    figure.savefig(PICTURE, dpi=130)
+
+
+if __name__ == "__main__":
+    everything = rows()
+    print(table(everything))
+    draw(everything)
