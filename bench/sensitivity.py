@@ -25,10 +25,10 @@ EPS = {"x60": 4.68, "air": 1.00059}
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "sensitivity.png"
 DESIGNS = {
     "plate": {"shape": "reference"},
-    "tri 0.1": {"shape": "tri", "parameters": {"dielectric_mm": 0.1}},
-    "tri 0.2": {"shape": "tri", "parameters": {"dielectric_mm": 0.2}},
-    "rect 0.1": {"shape": "rect", "parameters": {"dielectric_mm": 0.1}},
-    "rect 0.2": {"shape": "rect", "parameters": {"dielectric_mm": 0.2}},
+    "tri, 0.1 mm": {"shape": "tri", "parameters": {"dielectric_mm": 0.1}},
+    "tri, 0.2 mm": {"shape": "tri", "parameters": {"dielectric_mm": 0.2}},
+    "rect, 0.1 mm": {"shape": "rect", "parameters": {"dielectric_mm": 0.1}},
+    "rect, 0.2 mm": {"shape": "rect", "parameters": {"dielectric_mm": 0.2}},
 }
 
 
@@ -108,13 +108,14 @@ def draw(found: list[tuple[str, str, Compression, Sensitivity]]) -> None:
     left.grid(alpha=0.3)
     figure.legend(*left.get_legend_handles_labels(), fontsize=8, ncols=5, loc="outside lower center")
     labels = [f"{name}\n{held}" for name, held, _, _ in found]
-    right.barh(range(len(found)), [s.sigma_force_n for *_, s in found], color=[colours[n] for n, *_ in found])
+    for k, (name, _, _, seen) in enumerate(found):
+        right.plot(seen.sigma_force_n, k, "o", ms=8, color=colours[name])
     right.set_yticks(range(len(found)), [text.replace("\n", ", ") for text in labels], fontsize=8)
     right.invert_yaxis()
     right.set(xscale="log", xlabel="standard error of a press of 6 N, at 0.1 % noise [N]")
     right.axvline(FORCE_N, color="black", lw=0.8, ls=":")
     right.text(FORCE_N * 1.15, len(found) - 0.6, "the press itself", fontsize=7, va="bottom")
-    right.grid(alpha=0.3, axis="x")
+    right.grid(alpha=0.3)
     figure.savefig(PICTURE, dpi=130)
 
 
