@@ -197,6 +197,11 @@ def _ordered(width: float, model: str) -> list[Candidate]:
     return sorted(found, key=lambda c: _rank(c, loaded[c.model].COST, width))
 
 
+def names() -> list[str]:
+    """Names of the models of capacitance."""
+    return list(_capacitance_models())
+
+
 def _capacitance_models() -> dict[str, ModuleType]:
     loaded = {name: registry.load(models, name) for name in registry.names(models)}
     return {name: module for name, module in loaded.items() if hasattr(module, "capacitance")}
@@ -262,13 +267,13 @@ def _timed(name: str, scene: Scene, permittivity: Mapping[str, float], width: fl
     model = registry.load(models, name)
     given = (model.WIDTH if width == inf else width,) if hasattr(model, "WIDTH") else ()
     if given:
-        _load_solver()
+        load_solver()
     start = time.perf_counter()
     found: Interval = model.capacitance(scene, permittivity, *given)
     return found, time.perf_counter() - start
 
 
-def _load_solver() -> None:
+def load_solver() -> None:
     """Import the solver ahead of the clock, if it is there."""
     try:
         if find_spec(SOLVER):
