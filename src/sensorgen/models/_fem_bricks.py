@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.cells import Band, Cell, Slice, mirrored
-from sensorgen.models._fem_bounds import Mesh
 from sensorgen.scene import Scene
 
 RATIO = 0.15  # of a layer's distance from an edge to the next layer's
@@ -139,7 +138,7 @@ def _reached(fill: Ints, terminal: int) -> NDArray[np.bool_]:
         found = grown
 
 
-def bricks(coarse: Grid, layers: int) -> tuple[Mesh, list[tuple[str, float]]]:
+def layered(coarse: Grid, layers: int) -> Grid:
     """Cut a grid into layers that shrink towards its inner planes.
 
     Parameters
@@ -148,31 +147,11 @@ def bricks(coarse: Grid, layers: int) -> tuple[Mesh, list[tuple[str, float]]]:
         A cell.
     layers : int
         How many times the distance from a plane shrinks [-].
-
-    Returns
-    -------
-    (Mesh, list of (str, float))
-        Bricks; and the material and share of each region.
     """
     parts = [_graded(planes, _layers(coarse.fill, axis, layers)) for axis, planes in enumerate(coarse.planes_mm)]
-    fine = coarse.fill[np.ix_(*(owner for _, owner in parts))]
-    shares = coarse.shares[np.ix_(parts[0][1], parts[1][1])][:, :, None] * np.ones(fine.shape)
-    planes = [p for p, _ in parts]
-    number = np.arange(np.prod([len(p) for p in planes])).reshape([len(p) for p in planes])
-    inside = fine > 1
-    keys = [(coarse.names[m], s) for m, s in zip(fine[inside].tolist(), shares[inside].tolist(), strict=True)]
-    regions = sorted(set(keys))
-    order = {key: n for n, key in enumerate(regions)}
-    elements = np.stack([c[inside] for c in _corners(number)], axis=1)
-    terminals = {name: _faces(number, fine, code) for code, name in ((0, "bottom"), (1, "top"))}
-    used, compact = np.unique(elements, return_inverse=True)
-    points = np.stack(np.meshgrid(*planes, indexing="ij"), axis=-1).reshape(-1, 3)[used]
-    return Mesh(
-        points,
-        compact.reshape(elements.shape).astype(np.int32),
-        np.array([order[k] for k in keys], dtype=np.int32),
-        {name: np.searchsorted(used, faces).astype(np.int32) for name, faces in terminals.items()},
-    ), regions
+    owners = [owner for _, owner in parts]
+    x, y, z = (planes for planes, _ in parts)
+    return Grid((x, y, z), coarse.fill[np.ix_(*owners)], coarse.names, coarse.shares[np.ix_(*owners[:2])])
 
 
 def _layers(fill: Ints, axis: int, layers: int) -> list[int]:
@@ -193,22 +172,3 @@ def _graded(planes: NDArray[np.float64], layers: list[int]) -> tuple[NDArray[np.
         found += inner
         owners += [k] * len(inner)
     return np.array(found), np.array(owners)
-
-
-def _corners(number: Ints) -> list[Ints]:
-    """Numbers of the eight corners of every brick, as NGSolve turns them: the floor round, then the lid."""
-    turn = ((0, 0), (1, 0), (1, 1), (0, 1))
-    n, m, o = (s - 1 for s in number.shape)
-    return [number[i : i + n, j : j + m, k : k + o] for k in (0, 1) for i, j in turn]
-
-
-def _faces(number: Ints, fine: Ints, code: int) -> Ints:
-    """Corners of all faces between the dielectric and one electrode."""
-    found = []
-    for axis in range(3):
-        here, ids = np.moveaxis(fine, axis, 0), np.moveaxis(number, axis, 0)
-        touch = ((here[1:] == code) & (here[:-1] > 1)) | ((here[1:] > 1) & (here[:-1] == code))
-        inner = ids[1:-1]
-        corners = (inner[:, :-1, :-1], inner[:, 1:, :-1], inner[:, 1:, 1:], inner[:, :-1, 1:])
-        found.append(np.stack([c[touch] for c in corners], axis=1))
-    return np.concatenate(found)
