@@ -66,7 +66,18 @@ class Solution:
         return found
 
 
-_Front = tuple[Ints, Ints, Matrix]  # keys, how many boxes of the block share each, energy
+@dataclass(frozen=True)
+class _Front:
+    """What a block of boxes looks like to those around it.
+
+    ``keys`` (n,), those that no box outside shares first, of which there are ``inner``; ``shared`` (n,), by how many
+    boxes of the block; ``energy`` (n, n).
+    """
+
+    keys: Ints
+    shared: Ints
+    inner: int
+    energy: Matrix
 
 
 def least(elements: Elements, keep: bool = False) -> Solution:
@@ -74,11 +85,10 @@ def least(elements: Elements, keep: bool = False) -> Solution:
     free = np.isnan(elements.held)
     keys, counts = np.unique(elements.keys[free], return_counts=True)
     found = Solution()
-    block = _Dissection(elements, free, keys, counts, found.steps if keep else None)
-    left, _, energy = block.front(np.arange(len(elements.boxes)))
-    if left.tolist() != [TOP]:
-        raise ArithmeticError(f"{len(left)} unknowns are left: this is a fault of the solver")
-    found.energy = energy[0, 0]
+    left = _Dissection(elements, free, keys, counts, found.steps if keep else None).outside(np.arange(len(free)))
+    if left.keys.tolist() != [TOP]:
+        raise ArithmeticError(f"{len(left.keys)} unknowns are left: this is a fault of the solver")
+    found.energy = left.energy[0, 0]
     return found
 
 
@@ -90,45 +100,52 @@ class _Dissection:
     all_counts: Ints
     steps: list[tuple[Ints, Ints, Matrix]] | None
 
-    def front(self, block: Ints) -> _Front:
-        """What a block of boxes looks like to those around it."""
+    def outside(self, block: Ints) -> _Front:
+        """A block of boxes without the unknowns that no box outside it shares."""
         if len(block) == 1:
-            return self._eliminated(self._leaf(int(block[0])))
-        first, second = self._halves(block)
-        return self._eliminated(_added(self.front(first), self.front(second)))
+            return self._eliminated(self._sum([self._leaf(int(block[0]))]))
+        return self._eliminated(self._sum([self.outside(half) for half in self._halves(block)]))
 
     def _leaf(self, box: int) -> _Front:
         energy, free = self.elements.energy(box), self.free[box]
         top = np.where(self.elements.held[box] == 1, self.elements.one, 0.0)
-        keys = self.elements.keys[box][free]
-        if not top.any():
-            return keys, np.ones_like(keys), energy[np.ix_(free, free)]
-        keep = np.column_stack([top, np.eye(len(top))[:, free]])
-        return np.concatenate([[TOP], keys]), np.ones(len(keys) + 1, dtype=np.int64), keep.T @ energy @ keep
+        keys, energy = self.elements.keys[box][free], (energy[free][:, free], energy)[int(top.any())]
+        if top.any():
+            keep = np.column_stack([np.eye(len(top))[:, free], top])
+            keys, energy = np.append(keys, TOP), keep.T @ energy @ keep
+        return _Front(keys, np.ones_like(keys), 0, energy)
 
     def _halves(self, block: Ints) -> tuple[Ints, Ints]:
         """Two halves of a block, cut across its longest side."""
         places = self.elements.boxes[block]
         axis = int(np.ptp(places, axis=0).argmax())
         order = np.argsort(places[:, axis], kind="stable")
-        along = places[order, axis]
-        edges = np.flatnonzero(np.diff(along)) + 1
+        edges = np.flatnonzero(np.diff(places[order, axis])) + 1
         cut = int(edges[np.abs(edges - len(block) / 2).argmin()])
         return block[order[:cut]], block[order[cut:]]
 
-    def _eliminated(self, front: _Front) -> _Front:
-        """A block without the unknowns that no box outside it shares."""
-        keys, shared, energy = front
+    def _sum(self, parts: list[_Front]) -> _Front:
+        """Blocks as one, the unknowns that no box outside them shares first."""
+        keys, at = np.unique(np.concatenate([p.keys for p in parts]), return_inverse=True)
+        shared = np.bincount(at, np.concatenate([p.shared for p in parts])).astype(np.int64)
         total = self.all_counts[np.searchsorted(self.all_keys, keys).clip(max=len(self.all_keys) - 1)]
-        gone = (shared == total) & (keys != TOP)
-        if not gone.any():
+        outer = (shared < total) | (keys == TOP)
+        order = np.argsort(outer, kind="stable")
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        energy = np.zeros((len(keys),) * 2, dtype=parts[0].energy.dtype)
+        for part, here in zip(parts, np.split(place[at], [len(parts[0].keys)]), strict=False):
+            energy[np.ix_(here, here)] += part.energy
+        return _Front(keys[order], shared[order], int((~outer).sum()), energy)
+
+    def _eliminated(self, front: _Front) -> _Front:
+        n = front.inner
+        if not n:
             return front
-        left = ~gone
-        inner, coupling = energy[np.ix_(gone, gone)], energy[np.ix_(gone, left)]
-        rest = energy[np.ix_(left, left)]
+        inner, coupling, rest = front.energy[:n, :n], front.energy[:n, n:], front.energy[n:, n:]
         if self.steps is not None:
-            self.steps.append((keys[gone], keys[left], np.linalg.solve(inner, coupling)))
-        return keys[left], shared[left], rest - _taken(inner, coupling)
+            self.steps.append((front.keys[:n], front.keys[n:], np.linalg.solve(inner, coupling)))
+        return _Front(front.keys[n:], front.shared[n:], 0, rest - _taken(inner, coupling))
 
 
 def _taken(inner: Matrix, coupling: Matrix) -> Matrix:
@@ -138,19 +155,8 @@ def _taken(inner: Matrix, coupling: Matrix) -> Matrix:
     if np.iscomplexobj(inner):
         found: Matrix = coupling.T @ np.linalg.solve(inner, coupling)
         return found
-    half = solve_triangular(np.linalg.cholesky(inner), coupling, lower=True, check_finite=False, overwrite_b=True)
+    half = solve_triangular(np.linalg.cholesky(inner), coupling, lower=True, check_finite=False)
     return half.T @ half
-
-
-def _added(first: _Front, second: _Front) -> _Front:
-    """Two blocks as one."""
-    keys, at = np.unique(np.concatenate([first[0], second[0]]), return_inverse=True)
-    energy = np.zeros((len(keys),) * 2, dtype=np.result_type(first[2], second[2]))
-    shared = np.zeros(len(keys), dtype=np.int64)
-    for (_, count, part), here in zip((first, second), np.split(at, [len(first[0])]), strict=True):
-        shared[here] += count
-        energy[np.ix_(here, here)] += part
-    return keys, shared, energy
 
 
 def energies_of(elements: Elements, values: dict[int, Any], weights: Sequence[float]) -> Any:

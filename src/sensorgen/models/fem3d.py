@@ -29,10 +29,10 @@ _MOST_BRICKS = 6000  # of one rung: more would not fit in 4 GB
 def unfit(scene: Scene) -> str | None:
     """Why this model cannot speak of this scene, or None."""
     try:
-        mesh = layered(grid(scene), _RUNGS[0][0])
+        coarse = grid(scene)
     except ValueError as error:
         return str(error)
-    boxes = int((mesh.fill > 1).sum())
+    boxes = int((coarse.fill > 1).sum())
     if boxes > _MOST_BRICKS:
         return f"its cell has {boxes} bricks on the coarsest mesh; at most {_MOST_BRICKS} fit in the memory"
     return None
@@ -95,9 +95,9 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
 def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[Step]:
     """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
     coarse = grid(scene)
+    values = [permittivity.get(name, 0.0) for name in coarse.names]
     for layers, order, flux_order in _RUNGS:
-        fine = layered(coarse, layers)
-        values = [permittivity.get(name, 0.0) for name in fine.names]
+        fine = layered(coarse, values, layers)
         upper, part, shared = _least(fine, values, potential(order))
         lower, _, faces = _least(fine, values, flux(flux_order))
         found = fem.Energies(lower, upper, part, max(shared, faces))
