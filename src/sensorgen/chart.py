@@ -1,4 +1,4 @@
-"""Speed against accuracy: every model of a cell's capacitance on every standard scene, timed and held against what is known.
+"""Speed against accuracy: every model of a cell's capacitance on every standard scene, timed and held against truth.
 
 Times are the processor's, imports left out, so that a busy machine shows nearly what an idle one does.
 """
@@ -45,8 +45,8 @@ def _film(shape: str, dielectric_mm: float) -> dict[str, Any]:
     return {"shape": shape, "parameters": {"dielectric_mm": dielectric_mm}}
 
 
-# Relative permittivities 4.68 and 1.00059. tri: hp finite elements, agreeing with two other programs; rect: H1 and H(div)
-# elements, agreeing with finite volumes; the plate is exact.
+# Relative permittivities 4.68 and 1.00059. tri: hp finite elements, agreeing with two other programs; rect: H1 and
+# H(div) elements, agreeing with finite volumes; the plate is exact.
 STANDARD = {
     "tri, 0.1 mm": Standard(_film("tri", 0.1), 1.5965204052211506e-10 / 2e-3, 9e-10),
     "tri, 0.2 mm": Standard(_film("tri", 0.2), 1.2851365895937111e-10 / 2e-3, 8e-10),

@@ -32,6 +32,10 @@ class Unpredictable(SensorgenError):
     """No model can speak of the scene; the message holds what each one said."""
 
 
+class Contradiction(SensorgenError):
+    """Two models whose bounds exclude each other: a fault, and no result."""
+
+
 @dataclass(frozen=True)
 class Candidate:
     """A model in a plan: what was expected of it, and what came of it.
@@ -149,6 +153,8 @@ def capacitance(
     ------
     Unpredictable
         No model can speak of the scene, or the one that is named cannot.
+    Contradiction
+        The bounds of two models exclude each other.
     UnknownName
         No model of capacitance goes by that name.
     OutOfRange
@@ -247,11 +253,23 @@ def _asked(scene: Scene, permittivity: Mapping[str, float], width: float, model:
             continue
         found, seconds = _timed(candidate.model, scene, permittivity, width)
         bounds[candidate.model] = found
+        _refuse_contradiction(bounds)
         plan.append(replace(candidate, width=found.width(), seconds=seconds))
     if not bounds:
         raise Unpredictable("; ".join(refused))
     best = min(bounds, key=lambda name: bounds[name].width())
     return Answer(best, bounds[best], tuple(refused), width, tuple(plan))
+
+
+def _refuse_contradiction(bounds: Mapping[str, Interval]) -> None:
+    """All intervals hold the truth: any two of them overlap."""
+    lower = max(bounds, key=lambda name: bounds[name].lower)
+    upper = min(bounds, key=lambda name: bounds[name].upper)
+    if bounds[lower].lower > bounds[upper].upper * (1 + _EXACT):
+        raise Contradiction(
+            f"{lower} says at least {bounds[lower].lower:.9g} F, {upper} at most {bounds[upper].upper:.9g} F: one of "
+            "them fails on this scene; report it, and use neither"
+        )
 
 
 def _idle(candidate: Candidate, bounds: Mapping[str, Interval], width: float) -> str:
@@ -266,7 +284,7 @@ def _timed(name: str, scene: Scene, permittivity: Mapping[str, float], width: fl
     """A model's bounds, and how long they took once everything is loaded [s]."""
     model = registry.load(models, name)
     given = (model.WIDTH if width == inf else width,) if hasattr(model, "WIDTH") else ()
-    if given:
+    if hasattr(model, "NEEDS"):
         load_solver()
     start = time.perf_counter()
     found: Interval = model.capacitance(scene, permittivity, *given)

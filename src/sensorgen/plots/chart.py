@@ -24,14 +24,17 @@ def png(points: Sequence[Point]) -> bytes:
     columns = min(3, len(scenes) + 1)
     rows = -(-(len(scenes) + 1) // columns)
     figure = Figure(figsize=(columns * _SIDE_IN[0], rows * _SIDE_IN[1]), dpi=100, layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
     for panel, scene in zip(panels, scenes, strict=False):
         _panel(panel, scene, [p for p in points if p.scene == scene], models)
     for panel in panels[len(scenes) :]:
         panel.set_axis_off()
     bounded = {p.model for p in points if p.bounded}
     keys = [
-        Line2D([], [], linestyle="", marker=_MARKERS[k % 9], color=_COLOURS[k % 9], mfc=None if m in bounded else "none", label=m)
+        Line2D(
+            [], [], linestyle="", marker=_MARKERS[k % 9], color=_COLOURS[k % 9], mfc=None if m in bounded else "none",
+            label=m,
+        )
         for k, m in enumerate(models)
     ]  # fmt: skip
     keys.append(Line2D([], [], color="0.4", lw=1, ls="--", label="Pareto front"))
@@ -84,7 +87,7 @@ def html(points: Sequence[Point]) -> str:
             if mine:
                 figure.add_trace(go.Scatter(**_marks(mine, k, model not in shown)), **place)
                 shown.add(model)
-        figure.add_trace(go.Scatter(**_front(here, number == 0)), **place)
+        figure.add_trace(go.Scatter(**_front(here, scene == scenes[-1])), **place)
     figure.update_xaxes(type="log", title_text=_TIME, exponentformat="power", dtick=1)
     figure.update_yaxes(type="log", title_text=_ERROR, exponentformat="power", dtick=2)
     figure.update_layout(
