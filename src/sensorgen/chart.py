@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from sensorgen import design as designs
-from sensorgen import models, planner, registry
+from sensorgen import planner
 from sensorgen.design import Design
 from sensorgen.interval import Interval
 from sensorgen.models import thesis_cells
@@ -115,8 +115,7 @@ def _bounds(name: str, design: Design, budget_s: float) -> Iterator[Point]:
     """Every model with bounds, from coarse to fine."""
     eps = {t.material: t.value for t in planner.permittivities(design)}
     area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
-    for model in planner.names():
-        module = registry.load(models, model)
+    for model, module in planner.capacitance_models().items():
         if module.unfit(design.in_use):
             continue
         for wanted, interval, seconds in _rungs(module.capacitance, (design.in_use, eps), module, budget_s):

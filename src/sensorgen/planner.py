@@ -22,6 +22,7 @@ from sensorgen.design import Design
 from sensorgen.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.interval import Interval
 from sensorgen.scene import Scene
+from sensorgen.sections import overlap
 
 SOLVER = "ngsolve"  # the optional package that dear models need
 _EXACT = 1e-9  # relative width of a capacitance's bounds below which the scene is a plate
@@ -152,7 +153,7 @@ def capacitance(
     Raises
     ------
     Unpredictable
-        No model can speak of the scene, or the one that is named cannot.
+        Bodies overlap; no model can speak of the scene, or the one that is named cannot.
     Contradiction
         The bounds of two models exclude each other.
     UnknownName
@@ -194,7 +195,7 @@ def weighed(scene: Scene, width: float = inf, model: str = "") -> tuple[Candidat
 
 
 def _ordered(width: float, model: str) -> list[Candidate]:
-    loaded = _capacitance_models()
+    loaded = capacitance_models()
     if model and model not in loaded:
         raise UnknownName("model of capacitance", model, loaded)
     found = [
@@ -203,18 +204,14 @@ def _ordered(width: float, model: str) -> list[Candidate]:
     return sorted(found, key=lambda c: _rank(c, loaded[c.model].COST, width))
 
 
-def names() -> list[str]:
-    """Names of the models of capacitance."""
-    return list(_capacitance_models())
-
-
-def _capacitance_models() -> dict[str, ModuleType]:
+def capacitance_models() -> dict[str, ModuleType]:
+    """The models of capacitance, by name; loads all models."""
     loaded = {name: registry.load(models, name) for name in registry.names(models)}
     return {name: module for name, module in loaded.items() if hasattr(module, "capacitance")}
 
 
 def _unfit(candidate: Candidate, scene: Scene) -> str:
-    return registry.load(models, candidate.model).unfit(scene) or ""
+    return capacitance_models()[candidate.model].unfit(scene) or ""
 
 
 def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float]:
@@ -240,6 +237,9 @@ def _expectations() -> dict[str, list[tuple[float, float]]]:
 
 
 def _asked(scene: Scene, permittivity: Mapping[str, float], width: float, model: str) -> Answer:
+    overlaps = overlap(scene)
+    if overlaps:
+        raise Unpredictable(f"{overlaps}; expected each place to belong to one body")
     plan: list[Candidate] = []
     refused: list[str] = []
     bounds: dict[str, Interval] = {}
@@ -282,7 +282,7 @@ def _idle(candidate: Candidate, bounds: Mapping[str, Interval], width: float) ->
 
 def _timed(name: str, scene: Scene, permittivity: Mapping[str, float], width: float) -> tuple[Interval, float]:
     """A model's bounds, and how long they took once everything is loaded [s]."""
-    model = registry.load(models, name)
+    model = capacitance_models()[name]
     given = (model.WIDTH if width == inf else width,) if hasattr(model, "WIDTH") else ()
     if hasattr(model, "NEEDS"):
         load_solver()

@@ -28,7 +28,11 @@ Complex = NDArray[np.complex128]
 
 
 def prediction(
-    design: Design, frequency_hz: Sequence[float] = TONES_HZ, law: str = "", tip_m: float = TIP_M
+    design: Design,
+    frequency_hz: Sequence[float] = TONES_HZ,
+    law: str = "",
+    tip_m: float = TIP_M,
+    accuracy: float = math.inf,
 ) -> dict[str, Any]:
     """Everything that is predicted of a design, as plain data for ``prediction.json`` (SI units).
 
@@ -40,13 +44,15 @@ def prediction(
         Tones of the impedance [Hz].
     law, tip_m : str, float
         Law of compression and length of the tip [m] for the identifiability card, as of :func:`sensorgen.sensing.sensor_of`.
+    accuracy : float
+        How far the bounds of the capacitance may be apart, relative to their middle; any if not given [-].
 
     Notes
     -----
     A scene that no model can speak of, as a short, or a material without a value has a reason in place of numbers.
     """
     try:
-        found = unloaded(design)
+        found = unloaded(design, accuracy)
     except (Unpredictable, MissingValue) as error:
         return {"capacitance_f": None, "reason": str(error)}
     area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
@@ -54,6 +60,7 @@ def prediction(
     return {
         "model": {"capacitance": found.answer.model, "line": "line"},
         "refused": list(found.answer.refused),
+        "relative_width": found.answer.capacitance_f.width(),
         "capacitance_f": _bounds(found.answer.capacitance_f),
         "capacitance_per_area_f_per_m2": _bounds(found.answer.capacitance_f.times(1 / area)),
         "electrode_resistance_ohm": resistance,

@@ -1,5 +1,6 @@
 """``sensorgen predict``: what the bench should measure."""
 
+import math
 import os
 import sys
 from collections.abc import Iterator, Sequence
@@ -10,9 +11,9 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from sensorgen import units
-from sensorgen.cli import card_text, show
+from sensorgen.cli import FOUND_ERRORS, card_text, show
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import Length, OneOf, Values
+from sensorgen.cli.words import Length, OneOf, Ratio, Values
 from sensorgen.errors import BadInput, Unwritable
 
 if TYPE_CHECKING:
@@ -39,6 +40,10 @@ OWN: list[click.Parameter] = [
         ["--compression"], type=OneOf(("unconfined", "bonded")),
         help="How a plate gives way; the best that is known of the cell if not given.",
     ),
+    click.Option(
+        ["--accuracy"], type=Ratio(),
+        help="How far the bounds of the unpressed capacitance may be apart, as a share of their middle.",
+    ),
     click.Option(["--json", "as_json"], is_flag=True, help="Print as JSON."),
     click.Option(["--csv", "as_csv"], is_flag=True, help="Print R and X as CSV, a row per force and position."),
     click.Option(["--plot"], metavar="DIR", help="Draw R, X, sensitivities and inverse maps there, as PNG and HTML."),
@@ -54,6 +59,7 @@ def _work(
     position_mm: Sequence[float] | None,
     tip_mm: float,
     compression: str | None,
+    accuracy: float | None,
     **how: Any,
 ) -> int:
     from sensorgen.predict import FORCES_N, TONES_HZ, positions_mm, prediction
@@ -62,12 +68,26 @@ def _work(
     _refuse_two(how)
     tones = frequency_hz or TONES_HZ
     if not (force_n or position_mm or how["as_csv"] or how["plot"]):
-        predicted = prediction(design, tones, compression or "", tip_mm * units.M_PER_MM)
+        predicted = prediction(design, tones, compression or "", tip_mm * units.M_PER_MM, accuracy or math.inf)
         _deliver(_unpressed(predicted, as_json=how["as_json"]), how["output"])
-        return 0
+        return _verdict(predicted, accuracy)
+    if accuracy:
+        raise BadInput("--accuracy is for the sensor that is not pressed; leave it out, or --force and --position")
     sensed = sensor_of(design, compression or "", tip_mm * units.M_PER_MM)
     _pressed(design, sensed, (tones, force_n or FORCES_N, position_mm or positions_mm(design)), how)
     return 0
+
+
+def _verdict(predicted: dict[str, Any], accuracy: float | None) -> int:
+    """0, or 1 and a word where the capacitance is not known as well as wanted."""
+    if accuracy is None or predicted["capacitance_f"] is None or predicted["relative_width"] <= accuracy:
+        return 0
+    why = "".join(f"; {reason}" for reason in predicted["refused"])
+    click.echo(
+        f"sensorgen: an accuracy of {accuracy:g} was not reached; the best is {predicted['relative_width']:.2g}{why}",
+        err=True,
+    )
+    return FOUND_ERRORS
 
 
 def _refuse_two(how: dict[str, Any]) -> None:
