@@ -172,5 +172,5 @@ def test_the_command_refuses_other_scenes():
     from sensorgen.cli.chart_command import command
     from sensorgen.errors import UnknownName
 
-    with pytest.raises(UnknownName, match="standard scene 'tri, 0.3 mm'; did you mean 'tri, 0.2 mm'|'tri, 0.1 mm'"):
+    with pytest.raises(UnknownName, match=r"standard scene 'tri, 0.3 mm'; did you mean 'tri, 0.2 mm'|'tri, 0.1 mm'"):
         command.main(["--scene", "tri, 0.3 mm"], standalone_mode=False)

@@ -19,9 +19,8 @@ def design(values, shape="reference", **rest):
 def test_a_value_goes_before_every_source():
     x60 = materials.load("x60").with_values({"relative_permittivity": 3.0})
     for source in ("", "thesis-3.2", "thesis-4.1"):
-        assert (x60.value("relative_permittivity", source).value, x60.value("relative_permittivity", source).source) == (
-            3.0, "set by the user",
-        )  # fmt: skip
+        found = x60.value("relative_permittivity", source)
+        assert (found.value, found.source) == (3.0, "set by the user")
     assert x60.value("youngs_modulus_pa").value == 6e6
     assert materials.load("x60").value("relative_permittivity").value == 4.68
     assert x60.sources() == materials.load("x60").sources()

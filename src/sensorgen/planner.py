@@ -205,9 +205,8 @@ def _ordered(width: float, model: str) -> list[Candidate]:
 
 
 def capacitance_models() -> dict[str, ModuleType]:
-    """The models of capacitance, by name; loads all models."""
-    loaded = {name: registry.load(models, name) for name in registry.names(models)}
-    return {name: module for name, module in loaded.items() if hasattr(module, "capacitance")}
+    """The models of capacitance, by name."""
+    return {name: registry.load(models, name) for name in registry.defining(models, "capacitance")}
 
 
 def _unfit(candidate: Candidate, scene: Scene) -> str:
