@@ -179,15 +179,16 @@ def _candidates(slices: list[Slice]) -> list[float]:
 def _pairs(places: list[float], end_mm: float) -> Iterator[Point]:
     """Pairs of places, the nearest first, of which the first lies no further from the start than they are apart.
 
-    In windows of twice the size each, so that a long sensor's pattern is found in its first periods.
+    The whole has to hold two of the pieces between them, or it would not show that they repeat. In windows of twice the size each, so that a long sensor's pattern is found in its first periods.
     """
     at = np.array(places) - places[0]
     reach = float(np.diff(at).min())
-    while reach / 2 < end_mm - places[0]:
+    most = (end_mm - places[0]) / 2 + ROUNDING_MM
+    while reach / 2 < most:
         near = at[: min(int(np.searchsorted(at, 2 * reach + ROUNDING_MM)), _MOST_PLACES)]
         i, j = np.triu_indices(len(near), 1)
         apart = near[j] - near[i]
-        fits = (near[i] <= apart + ROUNDING_MM) & (reach / 2 < apart) & (apart <= reach)
+        fits = (near[i] <= apart + ROUNDING_MM) & (reach / 2 < apart) & (apart <= min(reach, most))
         order = np.argsort(apart[fits], kind="stable")
         yield from ((places[a], places[b]) for a, b in zip(i[fits][order], j[fits][order], strict=True))
         reach *= 2

@@ -125,10 +125,10 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
     part, off = np.sqrt(found.part), np.sqrt((most - least) * gap)
     lower = least * found.lower + max(part - off, 0.0) ** 2
     upper = least * found.upper + (part + off) ** 2
-    return Interval(float(min(lower, upper)), float(upper))
+    return Interval(float(min(lower, upper) * (1 - ROUNDING)), float(upper * (1 + ROUNDING)))
 
 
-ROUNDING = 1e-10  # relative: by how much bounds that have met may seem to cross
+ROUNDING = 1e-10  # relative: what doubles may lose in a solve, by which both bounds are moved outwards
 
 
 def _ngsolve(mesh: Mesh) -> Any:
