@@ -12,7 +12,7 @@ In the eigenvectors of g the unknowns inside a box do not couple, so that they a
 """
 
 from dataclasses import dataclass
-from functools import cache, reduce
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +69,8 @@ class Element:
         shared, coupling, inner = (
             sum(s * g for s, g in zip(scale, of, strict=True)) for of in (self.outer, self.coupling, self.inner)
         )
-        return shared - coupling.T @ (coupling / inner[:, None])
+        found: NDArray[np.float64 | np.complex128] = shared - coupling.T @ (coupling / inner[:, None])
+        return found
 
 
 @cache
@@ -82,7 +83,7 @@ def potential(order: int) -> Element:
     shared, inside = ends.any(1), ~ends.any(1)
     lattice = np.array([0, order, *range(1, order)])  # both ends, then the modes between them
     numbers = np.column_stack([lattice[places[shared]], np.zeros(shared.sum(), dtype=np.int64)])
-    whole = np.stack([reduce(np.kron, [pair[int(a != axis)] for a in range(3)]) for axis in range(3)])
+    whole = np.stack([_product([pair[int(a != axis)] for a in range(3)]) for axis in range(3)])
     return Element(
         _three(whole[:, shared][:, :, shared]),
         _three(whole[:, inside][:, :, shared]),
@@ -91,6 +92,11 @@ def potential(order: int) -> Element:
         numbers,
         order,
     )
+
+
+def _product(factors: list[Array]) -> Array:
+    first, second, third = factors
+    return np.kron(np.kron(first, second), third)
 
 
 def _modes(order: int) -> tuple[Array, Array]:
@@ -132,7 +138,7 @@ def flux(order: int) -> Element:
 def _worked_out(order: int) -> tuple[Array, Array, Array, Array]:
     """In one dimension: energy of a flux driven by potentials at two ends and between them, in the latter's modes.
 
-    Returns the ends' matrix, that between modes and ends, the modes' own energies, and the modes (orthonormal Legendre).
+    Returns the ends' matrix, that between modes and ends, the modes' energies, and the modes (orthonormal Legendre).
     """
     at, weight = np.polynomial.legendre.leggauss(order + 2)
     norm = np.sqrt(np.arange(order + 2) + 0.5)

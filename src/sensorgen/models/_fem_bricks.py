@@ -61,13 +61,17 @@ def _raster(scene: Scene) -> tuple[tuple[NDArray[np.float64], ...], Ints, list[s
     prisms = [(body, p) for body in scene.bodies for p in body.prisms]
     if not all(p.is_box() for _, p in prisms):
         raise ValueError("not all of it is boxes")
-    ends = [{0.0, size} | {x for _, p in prisms for x in p.span(axis)} for axis, size in zip("xyz", scene.size_mm, strict=True)]
+    ends = [
+        {0.0, size} | {x for _, p in prisms for x in p.span(axis)}
+        for axis, size in zip("xyz", scene.size_mm, strict=True)
+    ]
     planes = tuple(_distinct(np.array(sorted(e))) for e in ends)
     names = ["@bottom", "@top", *sorted({b.material for b in scene.bodies if not b.terminal} | {"air"})]
     fill = np.full([len(p) - 1 for p in planes], -1)
     for body, prism in prisms:
         here = tuple(
-            slice(*np.searchsorted(p, np.array(prism.span(a)) - _ROUNDING_MM)) for a, p in zip("xyz", planes, strict=True)
+            slice(*np.searchsorted(p, np.array(prism.span(a)) - _ROUNDING_MM))
+            for a, p in zip("xyz", planes, strict=True)
         )
         if (fill[here] >= 0).any():
             raise ValueError(f"{body.name} overlaps its neighbour")
@@ -77,7 +81,8 @@ def _raster(scene: Scene) -> tuple[tuple[NDArray[np.float64], ...], Ints, list[s
 
 
 def _distinct(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return values[np.concatenate([[True], np.diff(values) > _ROUNDING_MM])]
+    found: NDArray[np.float64] = values[np.concatenate([[True], np.diff(values) > _ROUNDING_MM])]
+    return found
 
 
 def _slices(planes: NDArray[np.float64], fill: Ints) -> list[Slice]:
@@ -137,7 +142,8 @@ def _reached(fill: Ints, terminal: int) -> NDArray[np.bool_]:
             ahead[:-1] |= back[1:]
         grown &= allowed
         if (grown == found).all():
-            return found & (fill > 1)
+            reached: NDArray[np.bool_] = found & (fill > 1)
+            return reached
         found = grown
 
 

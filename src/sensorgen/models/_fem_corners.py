@@ -39,7 +39,7 @@ def exponents(mesh: Triangles, permittivity: dict[str, float]) -> dict[int, floa
         for corner in corners:
             around[corner].append(number)
     known: dict[Any, float] = {}
-    found = {}
+    found: dict[int, float] = {}
     for corner, here in around.items():
         sectors, ends = _sectors(mesh, corner, here, permittivity)
         for fan, fixed in zip(sectors, ends, strict=True):

@@ -156,7 +156,8 @@ def _taken(inner: Matrix, coupling: Matrix) -> Matrix:
         found: Matrix = coupling.T @ np.linalg.solve(inner, coupling)
         return found
     half = solve_triangular(np.linalg.cholesky(inner), coupling, lower=True, check_finite=False)
-    return half.T @ half
+    taken: Matrix = half.T @ half
+    return taken
 
 
 def energies_of(elements: Elements, values: dict[int, Any], weights: Sequence[float]) -> Any:

@@ -22,8 +22,8 @@ COST = 3
 
 WIDTH = 1e-3  # of the interval, where the caller does not say
 
-_RUNGS = ((1, 4, 3), (2, 5, 4), (3, 6, 5))  # layers, order of the potential, order of the flux
-_MOST_BRICKS = 6000  # of one rung: more would not fit in 4 GB
+_RUNGS = ((1, 3, 2), (1, 5, 4), (2, 6, 5), (3, 7, 6))  # layers, order of the potential, order of the flux
+_MOST_BRICKS = 2500  # of one rung: more would take hours
 
 
 def unfit(scene: Scene) -> str | None:
