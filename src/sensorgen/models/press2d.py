@@ -16,7 +16,7 @@ from sensorgen.interval import Interval
 from sensorgen.models import compression
 from sensorgen.models._press.cell import AIR, Cell, cell_of
 from sensorgen.models._press.contact import Faces
-from sensorgen.models._press.mesh import Fineness, Mesh, mesh_of
+from sensorgen.models._press.mesh import Fineness, Mesh, Unmeshed, mesh_of
 from sensorgen.models._press.support import CHOICES, Held
 from sensorgen.scene import Scene
 
@@ -34,6 +34,8 @@ _DEEPEST = 0.3  # penetration over the side it happens on [-]
 _BALANCE = 0.01  # by which work and energy may differ [-]
 _LEVELS = 0.01  # by which two meshes may differ [-]
 _FIELD_GROWTH = 0.5  # of the triangles of the capacitance's mesh, per distance [-]
+_NARROW = 2e-3  # a bracket of the capacitance wider than this is a poor mesh [-]
+_COARSER = (4, 8, 16)  # times the size of the triangles at an apex, where the finer ones do not converge [-]
 
 Real = NDArray[np.float64]
 
@@ -67,8 +69,12 @@ class Pressed:
         The deformed cell at each pressure; empty when no capacitance was asked for.
     volume_ratio, penetration, imbalance : (n,) array
         Least J, largest penetration over the side that it happens on, and work over energy less 1 [-].
+    fall_m : float
+        How far the top came down before anything carried it: feet that do not touch as drawn [m].
     faults : tuple of str
         Why the answer is not to be trusted; empty when every check holds.
+    doubts : tuple of str
+        What else to know of it.
     """
 
     stress_pa: Real
@@ -78,7 +84,9 @@ class Pressed:
     volume_ratio: Real
     penetration: Real
     imbalance: Real
+    fall_m: float
     faults: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
     @property
     def converged_pa(self) -> float:
@@ -119,12 +127,24 @@ def press(
         The mesher is not installed.
     """
     held, fineness = held or Held(), fineness or Fineness()
-    _check(cell, stress_pa, held)
-    found = _solved(cell, solids, stress_pa, permittivity, held, fineness)
-    if found.converged_pa < stress_pa[-1]:
-        again = _solved(cell, solids, stress_pa, permittivity, held, replace(fineness, apex_mm=2 * fineness.apex_mm))
-        found = max(found, again, key=lambda pressed: pressed.converged_pa)
-    return found
+    _check(stress_pa, held)
+    first = best = _solved(cell, solids, stress_pa, permittivity, held, fineness)
+    for factor in _COARSER:
+        if best.converged_pa == stress_pa[-1]:
+            break
+        coarser = replace(fineness, apex_mm=factor * fineness.apex_mm)
+        again = _solved(cell, solids, stress_pa, permittivity, held, coarser)
+        if again.converged_pa > best.converged_pa:
+            best = replace(again, doubts=(*again.doubts, _coarsened(first, again, coarser)))
+    return best
+
+
+def _coarsened(first: Pressed, again: Pressed, coarser: Fineness) -> str:
+    """What coarser triangles at the apex cost, where the finer ones converged too."""
+    both = len(first.stress_pa)
+    apart = float(np.abs(again.displacement_m[1:both] / first.displacement_m[1:] - 1).max(initial=0.0))
+    known = f"displacement {apart:.1%} off up to {first.converged_pa / 1e3:.4g} kPa" if both > 1 else "error not known"
+    return f"triangles of {coarser.apex_mm * 1e3:.3g} um at the apex, because finer ones do not converge: {known}"
 
 
 def compared(found: Pressed, finer: Pressed) -> Pressed:
@@ -151,14 +171,12 @@ def curve_of(pressed: Pressed, name: str = "solved") -> compression.Curve:
     return compression.curve(name, SOURCE, [float(p) for p, _ in known], ratio)
 
 
-def _check(cell: Cell, stress_pa: Sequence[float], held: Held) -> None:
+def _check(stress_pa: Sequence[float], held: Held) -> None:
     if len(stress_pa) < 2 or stress_pa[0] != 0 or any(b <= a for a, b in pairwise(stress_pa)):
         raise OutOfRange("stresses must begin with 0 and rise, as in 0:100:10")
     for key, choices in CHOICES.items():
         if getattr(held, key) not in choices:
             raise BadInput(f"{key} {getattr(held, key)!r}: expected {' or '.join(choices)}")
-    if not cell.mirrored:
-        raise BadInput("this cell is not its own mirror image: only cells with mirrors can be pressed")
 
 
 def _solved(
@@ -178,10 +196,11 @@ def _solved(
     problem = load.Problem(
         element.Elements(mesh, element.law(e, nu)),
         contact.faces_of(mesh),
-        support.free_of(mesh, held, mirrored=cell.mirrored, tied=tied),
+        support.free_of(mesh, held, mirrored=True, tied=tied),
         support.top_load(mesh),
         max(_LEAST_PENALTY_PA, _PENALTY * float(e.min())),
         held.contact == "stick",
+        tied,
     )
     states = list(load.curve(problem, stress_pa, _STEP * float(e.min())))
     down = np.array([problem.load @ s.u_m / np.abs(problem.load).sum() for s in states])
@@ -189,13 +208,23 @@ def _solved(
     depth = np.array([_depth(problem.gaps(s.pairs, s.u_m) / s.pairs.length_m) for s in states])
     energy = np.array([problem.elements.energy_j_per_m(s.u_m, s.inner) + problem.contact_energy(s) for s in states])
     stress = np.array([s.pressure_pa for s in states])
-    imbalance = _imbalance(stress, down * np.abs(problem.load).sum(), energy)
+    fall = problem.fall_m(states[0])
+    imbalance = _imbalance(stress, (down - fall) * np.abs(problem.load).sum(), energy)
     fields = [_field(cell, mesh, problem.faces, tied, s.u_m, permittivity) for s in states] if permittivity else []
     unknown = sum(c is None for c, _ in fields)
     faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance, states[-1].stale, unknown))
     return Pressed(
-        stress, down, tuple(c for c, _ in fields), tuple(o for _, o in fields), volume, depth, imbalance, faults
-    )
+        stress, down, tuple(c for c, _ in fields), tuple(o for _, o in fields), volume, depth, imbalance, fall, faults,
+        _doubts(cell, fall),
+    )  # fmt: skip
+
+
+def _doubts(cell: Cell, fall_m: float) -> tuple[str, ...]:
+    said = {
+        "mirrors stand at both ends of the period, though it is not its own mirror image": not cell.mirrored,
+        f"feet hang free as drawn: the top falls {fall_m * 1e6:.4g} um before they carry": fall_m > 0,
+    }
+    return tuple(words for words, holds in said.items() if holds)
 
 
 def _depth(gaps: Real) -> float:
@@ -208,25 +237,32 @@ def _field(
     """Capacitance and outlines of a deformed cell; gaps are closed a little more or less where a mesh fails."""
     from sensorgen.models._press import deformed, field
 
+    best: tuple[Interval | None, Cell] = (None, cell)
     for closed in deformed.CLOSED:
         outline = deformed.deformed(cell, mesh, faces, tied, u_m, closed)
         try:
-            return field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH), outline
-        except field.Unmeshed:
+            found = field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH)
+        except Unmeshed:
+            best = best if best[0] else (None, outline)
             continue
-    return None, outline
+        if best[0] is None or found.width() < best[0].width():
+            best = found, outline
+        if found.width() < _NARROW:
+            break
+    return best
 
 
 def _imbalance(stress: Real, moved: Real, energy: Real) -> Real:
-    """Work of the load over the energy stored, less 1; between two loads they follow a power law."""
+    """Work of the load less the energy stored, from the first load on, over the energy stored [-].
+
+    Between two loads stress and displacement follow a power law; before the first, feet may still be landing.
+    """
     found = np.zeros(len(stress))
     if len(stress) < 3:
         return found
     powers = np.log(moved[2:] / moved[1:-1]) / np.log(stress[2:] / stress[1:-1])
-    powers = np.concatenate([powers[:1], powers])
-    ends = stress * moved
-    work = np.cumsum(powers / (1 + powers) * np.diff(ends))
-    found[1:] = work / energy[1:] - 1
+    work = np.cumsum(powers / (1 + powers) * np.diff((stress * moved)[1:]))
+    found[2:] = (work - (energy[2:] - energy[1])) / energy[2:]
     return found
 
 

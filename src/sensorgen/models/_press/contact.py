@@ -18,6 +18,7 @@ Whole = NDArray[np.int64]
 _S, _W = np.polynomial.legendre.leggauss(3)
 _S, _W = (_S + 1) / 2, _W / 2
 _REACH = 1e-9  # how far past its ends a face still carries [-]
+_HALF = 0.5  # of the weights of the upper nodes, which add up to 1 where all are loose [-]
 _UPRIGHT = 1e-6  # faces whose normal is nearer to level than this neither look up nor down [-]
 
 
@@ -111,10 +112,20 @@ def _joined(a: Pairs, b: Pairs) -> Pairs:
     return Pairs(vstack([a.gap, b.gap]).tocsr(), vstack([a.slip, b.slip]).tocsr(), *both)
 
 
+def _some(pairs: Pairs, which: NDArray[np.bool_], sticks: NDArray[np.bool_]) -> Pairs:
+    rest = (pairs.stiffness_pa[which], pairs.length_m[which], pairs.point[which], sticks[which])
+    return Pairs(pairs.gap[which], pairs.slip[which], *rest)
+
+
+def carrying(pairs: Pairs, loose: NDArray[np.bool_]) -> Pairs:
+    """The pairs between a loose piece above and one below that is held; ``loose`` says it of each node."""
+    share = np.asarray(pairs.gap[:, 1::2] @ loose.astype(float))
+    return _some(pairs, share > _HALF, pairs.sticks)
+
+
 def stuck(pairs: Pairs, which: NDArray[np.bool_]) -> Pairs:
     """Some of the pairs, which hold fast from now on."""
-    rest = (pairs.stiffness_pa[which], pairs.length_m[which], pairs.point[which])
-    return Pairs(pairs.gap[which], pairs.slip[which], *rest, np.ones(which.sum(), bool))
+    return _some(pairs, which, np.ones_like(which))
 
 
 def _partners(here: Real, upper: Real, depth: Real) -> tuple[Whole, Real]:

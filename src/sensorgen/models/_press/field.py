@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 from sensorgen.errors import OutOfRange
 from sensorgen.interval import Interval
 from sensorgen.models._press.cell import AIR, OUTSIDE, Cell, Edge
-from sensorgen.models._press.mesh import Mesh, Net, Whole, of_triangles, triangulated
+from sensorgen.models._press.mesh import Mesh, Net, Unmeshed, Whole, of_triangles, triangulated
 from sensorgen.models._press.wedge import Wedge, fan, wedges
 from sensorgen.scene import Point
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
@@ -29,10 +29,6 @@ Edges = Mapping[Edge, tuple[int, int]]
 _ROUNDING = 1e-9
 _HOLE = 1e-6  # area that a mesh may miss, as a share
 _MIDS = np.array([[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])  # middles of the sides: exact to degree 2
-
-
-class Unmeshed(Exception):
-    """No sound mesh of these outlines was found."""
 
 
 def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float, growth: float) -> Interval:
@@ -81,10 +77,7 @@ def _meshed(edges: Edges, air: int, coarse_mm: float, growth: float) -> Mesh:
             cut[key] = (-number, cut[key][1]) if place == 0 else (cut[key][0], -number)
         if wedge.first[-1] != wedge.second[-1]:
             cut[wedge.first[-1], wedge.second[-1]] = (-number, air)
-    try:
-        net = triangulated(cut, coarse_mm, growth)
-    except Exception as error:  # the mesher's own kind of exception, known only where it is installed
-        raise Unmeshed(str(error)) from None
+    net = triangulated(cut, coarse_mm, growth)
     new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
     corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])
     _refuse_holes(edges, net.points_m[corners])

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.errors import MissingValue
+from sensorgen.errors import BadInput, MissingValue
 from sensorgen.models._press.cell import OUTSIDE, Cell, Edge
 from sensorgen.scene import Point
 from sensorgen.units import M_PER_MM
@@ -18,6 +18,10 @@ Run = tuple[int, int]
 
 _SAME = 1e-9  # of the cell's size: places nearer than this are one
 _SIDES = ((0, 1), (1, 2), (2, 0))
+
+
+class Unmeshed(BadInput):
+    """No sound mesh of these outlines was found."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +149,10 @@ def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth
                 numbers[p] = geometry.AppendPoint(*p)
         domains = {"leftdomain": max(left, 0), "rightdomain": max(right, 0)}
         geometry.Append(["line", numbers[a], numbers[b]], **domains)
-    made = geometry.GenerateMesh(maxh=coarse_mm, grading=growth)
+    try:
+        made = geometry.GenerateMesh(maxh=coarse_mm, grading=growth)
+    except Exception as error:  # the mesher's own kind of exception, known only where it is installed
+        raise Unmeshed(f"these outlines cannot be meshed ({error}): do bodies overlap, or leave slivers?") from None
     elements, sides = made.Elements2D().NumPy(), made.Elements1D().NumPy()
     points = np.asarray(made.Coordinates(), float)[:, :2] * M_PER_MM
     behind = [min(pair) for pair in edges.values()]
