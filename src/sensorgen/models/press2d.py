@@ -130,11 +130,11 @@ def press(
     _check(stress_pa, held)
     first = best = _solved(cell, solids, stress_pa, permittivity, held, fineness)
     for factor in _COARSER:
-        if best.converged_pa == stress_pa[-1]:
+        if not best.faults:
             break
         coarser = replace(fineness, apex_mm=factor * fineness.apex_mm)
         again = _solved(cell, solids, stress_pa, permittivity, held, coarser)
-        if again.converged_pa > best.converged_pa:
+        if (again.converged_pa, -len(again.faults)) > (best.converged_pa, -len(best.faults)):
             best = replace(again, doubts=(*again.doubts, _coarsened(first, again, coarser)))
     return best
 
@@ -212,7 +212,7 @@ def _solved(
     imbalance = _imbalance(stress, (down - fall) * np.abs(problem.load).sum(), energy)
     fields = [_field(cell, mesh, problem.faces, tied, s.u_m, permittivity) for s in states] if permittivity else []
     unknown = sum(c is None for c, _ in fields)
-    faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance, states[-1].stale, unknown))
+    faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance, sum(s.stale > 0 for s in states), unknown))
     return Pressed(
         stress, down, tuple(c for c, _ in fields), tuple(o for _, o in fields), volume, depth, imbalance, fall, faults,
         _doubts(cell, fall),
@@ -275,7 +275,7 @@ def _faults(
         f"faces run into each other by {depth.max():.2g} of a side": depth.max() > _DEEPEST,
         f"work and energy differ by {imbalance[-1]:.1%}": abs(imbalance[-1]) > _BALANCE,
         f"no capacitance at {unknown} of {len(stress)} stresses: the deformed outlines could not be meshed": unknown > 0,
-        f"{stale} load steps with old contact partners": stale > 0,
+        f"old contact partners at {stale} of {len(stress)} stresses": stale > 0,
     }
     return [words for words, holds in said.items() if holds]
 

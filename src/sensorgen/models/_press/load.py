@@ -22,7 +22,7 @@ _STILL = 1e-10  # a step so much shorter than the way is rounding: nu near 1/2 t
 _MOST_STEPS = 25
 _LEAST_J = 0.05  # a step may not squeeze a triangle below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
-_MOST_CUTS = 12  # failed load steps in all before a cell is given up
+_MOST_CUTS = 8  # failed load steps in all before a cell is given up
 _FLAT = 1e-3  # gaps that differ by less than this share of their side close at once [-]
 _DEEPEST = 0.1  # how far a foot may sink in to begin with, over the length of a side [-]
 _ROUNDING = 1e-9
@@ -195,7 +195,7 @@ class Problem:
         if second is None:
             settled = self.newton(first, pressure_pa, first.pairs, _ENOUGH)
             return replace(settled, stale=first.stale + 1) if settled else None
-        return replace(second, stuck=stuck)
+        return replace(second, stuck=stuck, stale=0)
 
     def _stuck(self, state: State) -> Pairs:
         return contact.stuck(state.pairs, self.gaps(state.pairs, state.u_m) < 0)
