@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from sensorgen.design import make
 from sensorgen.invert import Estimator, Prior, Status
 from sensorgen.models import line_fit
-from sensorgen.planner import sensor_of
+from sensorgen.sensing import sensor_of
 from sensorgen.predict import TONES_HZ
 
 RESULTS = Path(__file__).parent / "results"

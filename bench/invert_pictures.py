@@ -11,7 +11,7 @@ import numpy as np
 
 from sensorgen.design import make
 from sensorgen.invert import Estimator, Prior, Status
-from sensorgen.planner import sensor_of
+from sensorgen.sensing import sensor_of
 from sensorgen.predict import TONES_HZ
 
 mpl.use("Agg")

@@ -12,8 +12,8 @@ from sensorgen.card.fisher import Setup
 from sensorgen.card.verdict import required
 from sensorgen.design import make
 from sensorgen.models import compression
-from sensorgen.planner import sensor_of
 from sensorgen.predict import TONES_HZ
+from sensorgen.sensing import sensor_of
 from sensorgen.sensor import Sensor
 
 EPS0 = 8.8541878128e-12

@@ -14,8 +14,8 @@ from sensorgen.invert import Estimator, Prior, Status, estimate
 from sensorgen.invert.forward import Forward
 from sensorgen.invert.verdict import chi2_limit
 from sensorgen.models.compression import unconfined
-from sensorgen.planner import sensor_of
 from sensorgen.predict import TONES_HZ
+from sensorgen.sensing import sensor_of
 from sensorgen.sensor import Sensor
 
 TONES = np.array(TONES_HZ)

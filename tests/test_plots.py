@@ -17,9 +17,9 @@ from sensorgen.design import make
 from sensorgen.errors import MissingValue, OutOfRange
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
-from sensorgen.planner import sensor_of
 from sensorgen.plots import inverse, library, maps, page, panels
 from sensorgen.plots.field import LARGEST, MOST_TONES, QUANTITIES, field, scale, tone
+from sensorgen.sensing import sensor_of
 from sensorgen.sensor import Sensor
 
 PLATE = {

@@ -16,7 +16,7 @@ from sensorgen.design import make
 from sensorgen.errors import MissingValue, OutOfRange
 from sensorgen.interval import Interval
 from sensorgen.models import line
-from sensorgen.planner import Unpredictable, capacitance, sensor_of
+from sensorgen.planner import Unpredictable, capacitance
 from sensorgen.predict import (
     FORCES_N,
     LARGEST,
@@ -30,6 +30,7 @@ from sensorgen.predict import (
     prediction,
     presses,
 )
+from sensorgen.sensing import sensor_of
 
 EPS = {"x60": 4.68, "air": 1.00059}
 TABLE_3_2 = {"top_electrode": "etpu@thesis-3.2", "bottom_electrode": "etpu@thesis-3.2"}  # 1.2 S/m

@@ -152,7 +152,7 @@ def _loads(design: Design) -> dict[int, Load]:
 
 def _load(design: Design, name: str) -> Load:
     infill = design.infill.get(name, Infill())
-    return Load(materials.load(name), design.used()[name], infill.percent, infill.pattern)
+    return Load(design.material(name), design.used()[name], infill.percent, infill.pattern)
 
 
 def _parts(design: Design, held: Review) -> list[threemf.Part]:

@@ -67,6 +67,11 @@ class Design(Strict):
     shape: str
     parameters: dict[str, float | str] = Field(default={})
     materials: Slots = Slots()
+    material_values: dict[str, dict[str, float]] = Field(
+        default={},
+        description="Material to quantity to a value, in its name's unit, that goes before every source's.",
+        examples=[{"x60": {"relative_permittivity": 3.0}}],
+    )
     printer: str = "diabase-h5"
     quality: str = "fine"
     nozzle_mm: Annotated[float, Field(ge=0.05, le=5.0)] | None = Field(
@@ -108,10 +113,14 @@ class Design(Strict):
         """The print quality."""
         return load_quality(self.quality)
 
+    def material(self, name: str) -> material_files.Material:
+        """A material by name, with the values that this design sets itself."""
+        return material_files.load(name).with_values(self.material_values.get(name, {}))
+
     def slot(self, part: str) -> tuple[material_files.Material, str]:
         """Material of a part, and the source to take its values from."""
         name, _, source = (getattr(self.materials, part) or "").partition("@")
-        return material_files.load(name), source
+        return self.material(name), source
 
     def used(self) -> dict[str, str]:
         """Materials of the scene's bodies with their source; the first slot that names one decides."""
@@ -161,7 +170,7 @@ class Design(Strict):
         """Everything that decides the sensor, with all defaults and the values of material and printer filled in."""
         stuff = {}
         for name, source in sorted(self.used().items()):
-            stuff[name] = material_files.load(name).model_dump() | {"source": source}
+            stuff[name] = self.material(name).model_dump() | {"source": source}
         return {
             "sensorgen": __version__,
             **self.model_dump(exclude={"name", "parameters", "printer", "quality", "waivers"}),
@@ -291,6 +300,8 @@ def _check_names(design: Design) -> None:
             if material.conductor != part.endswith("_electrode"):
                 kind = "conducts" if material.conductor else "does not conduct"
                 raise BadInput(f"materials.{part}: {material.name} {kind}")
+    for name, values in design.material_values.items():
+        material_files.check_own(name, values)
     _one_source_each(design)
     _soluble(design)
     _refuse_stacks(design)
@@ -367,7 +378,8 @@ def name_of(design: Design) -> str:
         parts.append("" if given == usual else re.sub("[^A-Za-z0-9._]+", "-", Path(given).stem).strip(".-_"))
     if design.orientation != default.orientation:
         parts.append("upside-down")
-    others = design.model_dump(include={"materials", "nozzle_mm", "tools", "infill", "shrinkage"})
+    said_if_set = {"material_values"} if design.material_values else set()
+    others = design.model_dump(include={"materials", "nozzle_mm", "tools", "infill", "shrinkage"} | said_if_set)
     if others != default.model_dump(include=set(others)):
         parts.append(_digest(others))
     whole = "-".join(filter(None, parts))

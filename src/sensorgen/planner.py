@@ -1,25 +1,68 @@
-"""The cheapest model that can speak of a design, for each thing that has to be known of it; and the sensor it makes."""
+"""The cheapest model that can speak of a design, for each thing that has to be known of it before it is pressed.
 
-from dataclasses import dataclass
+Models that cost next to nothing are always asked: their own bounds tell whether more is needed. The dear ones are
+weighed first, by what they cost and reached on a known scene (``models/expected.yaml``), and asked one after the other.
+"""
+
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from hashlib import sha256
+from importlib import import_module, resources
+from importlib.util import find_spec
+from json import dumps
+from math import inf
+from pathlib import Path
 from types import ModuleType
+from typing import Any
 
-from sensorgen import materials, models, registry
+from sensorgen import cached, materials, models, registry, yamlfile
 from sensorgen.design import Design
 from sensorgen.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.interval import Interval
-from sensorgen.models import compression
-from sensorgen.models.compression import Compression
 from sensorgen.scene import Scene
-from sensorgen.sensor import Sensor
-from sensorgen.units import M_PER_MM
 
-TIP_M = 0.01  # thesis, Table C.1: L_press
-LAWS = ("unconfined", "bonded")  # of a plate's compression
+SOLVER = "ngsolve"  # the optional package that dear models need
 _EXACT = 1e-9  # relative width of a capacitance's bounds below which the scene is a plate
+_CHEAP = 1  # up to this cost, a model is asked before it is weighed
 
 
 class Unpredictable(SensorgenError):
     """No model can speak of the scene; the message holds what each one said."""
+
+
+class Contradiction(SensorgenError):
+    """Two models whose bounds exclude each other: a fault, and no result."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A model in a plan: what was expected of it, and what came of it.
+
+    Attributes
+    ----------
+    model : str
+        Its name.
+    expected_width, expected_seconds : float or None
+        Width of the bounds relative to their middle [-], and time [s], as on the scene that it was measured on; None
+        where it never was.
+    passed_over : str
+        Why it was not asked, or "".
+    width, seconds : float or None
+        What it gave, and how long it took, its imports left out.
+    """
+
+    model: str
+    expected_width: float | None = None
+    expected_seconds: float | None = None
+    passed_over: str = ""
+    width: float | None = None
+    seconds: float | None = None
+
+    def reach(self) -> float:
+        """Expected width; 0 where nothing is known, so that it is tried."""
+        return self.expected_width or 0.0
 
 
 @dataclass(frozen=True)
@@ -33,12 +76,29 @@ class Answer:
     capacitance_f : Interval
         Of the whole sensor [F].
     refused : tuple of str
-        Why other models were passed over.
+        Why other models cannot speak of the scene.
+    wanted : float
+        How wide the interval might be, relative to its middle [-].
+    plan : tuple of Candidate
+        All models, in the order in which they were weighed.
+    known : bool
+        Whether the answer was known from before.
     """
 
     model: str
     capacitance_f: Interval
     refused: tuple[str, ...]
+    wanted: float = inf
+    plan: tuple[Candidate, ...] = ()
+    known: bool = False
+
+    def reached(self) -> bool:
+        """Whether the interval is as narrow as wanted."""
+        return self.capacitance_f.width() <= self.wanted
+
+    def seconds(self) -> float:
+        """Time that all models took together, imports left out [s]."""
+        return sum(c.seconds or 0.0 for c in self.plan)
 
 
 @dataclass(frozen=True)
@@ -70,65 +130,224 @@ class Unloaded:
     taken: tuple[Taken, ...]
 
 
-@dataclass(frozen=True)
-class Sensed:
-    """A design's sensor in numbers, and what they rest on.
-
-    Attributes
-    ----------
-    sensor : Sensor
-        With the capacitance midway between its bounds.
-    taken : tuple of Taken
-        Material values.
-    doubts : tuple of str
-        Why its answers are to be taken with care.
-    """
-
-    sensor: Sensor
-    taken: tuple[Taken, ...]
-    doubts: tuple[str, ...]
-
-
-def capacitance(scene: Scene, permittivity: dict[str, float], width: float = float("inf")) -> Answer:
-    """Ask the models, cheapest first, for the capacitance of a scene.
+def capacitance(
+    scene: Scene, permittivity: Mapping[str, float], width: float = inf, model: str = "", keep: bool = True
+) -> Answer:
+    """Ask models, the cheapest that will do, for the capacitance of a scene.
 
     Parameters
     ----------
     scene : Scene
         As drawn.
-    permittivity : dict of str to float
+    permittivity : mapping of str to float
         Relative permittivity of each dielectric, and of "air" [-].
     width : float
         How wide the interval may be, relative to its middle; the narrowest one where none is that narrow [-].
+    model : str
+        The only model to ask, or "".
+    keep : bool
+        Take an answer that is known from before, and keep a new one. Answers of any width are never kept: they cost
+        next to nothing.
 
     Raises
     ------
     Unpredictable
-        No model can speak of the scene.
+        No model can speak of the scene, or the one that is named cannot.
+    Contradiction
+        The bounds of two models exclude each other.
+    UnknownName
+        No model of capacitance goes by that name.
+    OutOfRange
+        A width that is not above 0.
+
+    Notes
+    -----
+    A known answer is given without loading any model.
     """
+    if not width > 0:
+        raise OutOfRange(f"an accuracy of {width:g}; expected a number above 0, as 1e-4")
+    if not keep or (width == inf and not model):
+        return _asked(scene, permittivity, width, model)
+    question = _question(scene, permittivity, width, model)
+    found = cached.known(question)
+    if found is not None:
+        return replace(_of_plain(found), known=True)
+    answer = _asked(scene, permittivity, width, model)
+    cached.keep(question, _plain(answer))
+    return answer
+
+
+def is_known(scene: Scene, permittivity: Mapping[str, float], width: float, model: str = "") -> bool:
+    """Whether the answer to :func:`capacitance` is known from before."""
+    return cached.known(_question(scene, permittivity, width, model)) is not None
+
+
+def weighed(scene: Scene, width: float = inf, model: str = "") -> tuple[Candidate, ...]:
+    """The plan before anything is asked: all models of capacitance in the order in which they would be.
+
+    Parameters
+    ----------
+    scene, width, model : Scene, float, str
+        As of :func:`capacitance`.
+    """
+    return tuple(replace(c, passed_over=c.passed_over or _unfit(c, scene)) for c in _ordered(width, model))
+
+
+def _ordered(width: float, model: str) -> list[Candidate]:
+    loaded = _capacitance_models()
+    if model and model not in loaded:
+        raise UnknownName("model of capacitance", model, loaded)
+    found = [
+        Candidate(name, *_expected(name, width), "" if model in ("", name) else f"--model {model}") for name in loaded
+    ]
+    return sorted(found, key=lambda c: _rank(c, loaded[c.model].COST, width))
+
+
+def names() -> list[str]:
+    """Names of the models of capacitance."""
+    return list(_capacitance_models())
+
+
+def _capacitance_models() -> dict[str, ModuleType]:
+    loaded = {name: registry.load(models, name) for name in registry.names(models)}
+    return {name: module for name, module in loaded.items() if hasattr(module, "capacitance")}
+
+
+def _unfit(candidate: Candidate, scene: Scene) -> str:
+    return registry.load(models, candidate.model).unfit(scene) or ""
+
+
+def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float]:
+    """Cheap models first, then those that should do by their cost, then the others by what they should reach."""
+    short = cost > _CHEAP and candidate.reach() > width
+    return short, candidate.reach() if short else 0.0, cost
+
+
+def _expected(model: str, width: float) -> tuple[float | None, float | None]:
+    """Width and seconds of the cheapest measurement that did, or of the one that came nearest."""
+    points = _expectations().get(model, [])
+    enough = [point for point in points if point[0] <= width]
+    nearest = min(enough, key=lambda p: p[1]) if enough else min(points, default=None)
+    return (nearest[0], nearest[1]) if nearest else (None, None)
+
+
+@cache
+def _expectations() -> dict[str, list[tuple[float, float]]]:
+    """Width and seconds of each model on its scene."""
+    file = "expected.yaml"
+    data = yamlfile.parse((resources.files(models) / file).read_text("utf-8"), file)
+    return {name: [(width, seconds) for width, seconds in entry["points"]] for name, entry in data.items()}
+
+
+def _asked(scene: Scene, permittivity: Mapping[str, float], width: float, model: str) -> Answer:
+    plan: list[Candidate] = []
     refused: list[str] = []
-    answers: list[tuple[Interval, str]] = []
-    for name, model in _capacitance_models():
-        reason = model.unfit(scene)
+    bounds: dict[str, Interval] = {}
+    for candidate in _ordered(width, model):
+        reason = candidate.passed_over or _idle(candidate, bounds, width)
+        if not reason:
+            reason = _unfit(candidate, scene)
+            refused += [f"{candidate.model}: {reason}"] if reason else []
         if reason:
-            refused.append(f"{name}: {reason}")
+            plan.append(replace(candidate, passed_over=reason))
             continue
-        answers.append((model.capacitance(scene, permittivity), name))
-        if answers[-1][0].width() <= width:
-            break
-    if not answers:
+        found, seconds = _timed(candidate.model, scene, permittivity, width)
+        bounds[candidate.model] = found
+        _refuse_contradiction(bounds)
+        plan.append(replace(candidate, width=found.width(), seconds=seconds))
+    if not bounds:
         raise Unpredictable("; ".join(refused))
-    best, name = min(answers, key=lambda answer: answer[0].width())
-    return Answer(name, best, tuple(refused))
+    best = min(bounds, key=lambda name: bounds[name].width())
+    return Answer(best, bounds[best], tuple(refused), width, tuple(plan))
 
 
-def _capacitance_models() -> list[tuple[str, ModuleType]]:
-    loaded = [(name, registry.load(models, name)) for name in registry.names(models)]
-    return sorted(((n, m) for n, m in loaded if hasattr(m, "capacitance")), key=lambda pair: pair[1].COST)
+def _refuse_contradiction(bounds: Mapping[str, Interval]) -> None:
+    """All intervals hold the truth: any two of them overlap."""
+    lower = max(bounds, key=lambda name: bounds[name].lower)
+    upper = min(bounds, key=lambda name: bounds[name].upper)
+    if bounds[lower].lower > bounds[upper].upper * (1 + _EXACT):
+        raise Contradiction(
+            f"{lower} says at least {bounds[lower].lower:.9g} F, {upper} at most {bounds[upper].upper:.9g} F: one of "
+            "them fails on this scene; report it, and use neither"
+        )
 
 
-def unloaded(design: Design) -> Unloaded:
+def _idle(candidate: Candidate, bounds: Mapping[str, Interval], width: float) -> str:
+    """Why a model that might speak need not."""
+    best = min((found.width() for found in bounds.values()), default=inf)
+    if bounds and best <= width:
+        return "not needed"
+    return f"not expected to come nearer than {candidate.reach():.2g}" if candidate.reach() >= best else ""
+
+
+def _timed(name: str, scene: Scene, permittivity: Mapping[str, float], width: float) -> tuple[Interval, float]:
+    """A model's bounds, and how long they took once everything is loaded [s]."""
+    model = registry.load(models, name)
+    given = (model.WIDTH if width == inf else width,) if hasattr(model, "WIDTH") else ()
+    if hasattr(model, "NEEDS"):
+        load_solver()
+    start = time.perf_counter()
+    found: Interval = model.capacitance(scene, permittivity, *given)
+    return found, time.perf_counter() - start
+
+
+def load_solver() -> None:
+    """Import the solver ahead of the clock, if it is there."""
+    try:
+        if find_spec(SOLVER):
+            import_module(SOLVER)
+    except (ImportError, OSError) as error:
+        raise SensorgenError(
+            f"NGSolve is installed but does not load ({error}): pip install --force-reinstall ngsolve"
+        ) from None
+
+
+def _question(scene: Scene, permittivity: Mapping[str, float], width: float, model: str) -> dict[str, Any]:
+    """Everything that decides an answer: the scene's content, materials, what is wanted, and the solver's version."""
+    look = [
+        (body.name, body.material, body.terminal, [(p.axis, p.outline, p.start_mm, p.end_mm) for p in body.prisms])
+        for body in scene.bodies
+    ]
+    return {
+        "what": "capacitance",
+        "scene": sha256(dumps([look, scene.size_mm]).encode()).hexdigest(),
+        "permittivity": dict(permittivity),
+        "width": width if width < inf else None,
+        "model": model,
+        SOLVER: _solver_version(),
+    }
+
+
+@cache
+def _solver_version() -> str:
+    """Version of the solver, "" where it is not installed; without importlib.metadata, which takes 30 ms to load."""
+    spec = find_spec(SOLVER)
+    folders = Path(spec.origin).parent.parent.glob(f"{SOLVER}-*.dist-info") if spec and spec.origin else ()
+    return " ".join(sorted(folder.stem for folder in folders)) or ("unknown" if spec else "")
+
+
+def _plain(answer: Answer) -> dict[str, Any]:
+    """An answer as plain data."""
+    return asdict(answer) | {"wanted": answer.wanted if answer.wanted < inf else None}
+
+
+def _of_plain(data: dict[str, Any]) -> Answer:
+    """An answer from plain data."""
+    return Answer(
+        data["model"], Interval(**data["capacitance_f"]), tuple(data["refused"]),
+        inf if data["wanted"] is None else data["wanted"], tuple(Candidate(**c) for c in data["plan"]),
+    )  # fmt: skip
+
+
+def unloaded(design: Design, width: float = inf) -> Unloaded:
     """Capacitance and resistivities of a design, its support gone.
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    width : float
+        How wide the bounds of the capacitance may be, relative to their middle [-].
 
     Raises
     ------
@@ -137,43 +356,10 @@ def unloaded(design: Design) -> Unloaded:
     MissingValue
         No source gives a material value that is needed.
     """
-    permittivities = _permittivities(design)
-    answer = capacitance(design.in_use, {t.material: t.value for t in permittivities})
+    taken = permittivities(design)
+    answer = capacitance(design.in_use, {t.material: t.value for t in taken}, width)
     top, bottom = (_take(*design.slot(f"{end}_electrode"), "resistivity_ohm_m") for end in ("top", "bottom"))
-    return Unloaded(answer, (top.value, bottom.value), (*permittivities, top, bottom))
-
-
-def sensor_of(design: Design, law: str = "", tip_m: float = TIP_M) -> Sensed:
-    """The sensor that a design makes, for the line and all that rests on it.
-
-    Parameters
-    ----------
-    design : Design
-        As drawn.
-    law : str
-        Of compression: one of ``LAWS``, or "" for the best that is known.
-    tip_m : float
-        Length of the tip along the sensor [m].
-
-    Raises
-    ------
-    Unpredictable, MissingValue
-        As :func:`unloaded`.
-    UnknownName, OutOfRange
-        No such law; or a law that does not speak of this shape.
-    """
-    found, p = unloaded(design), design.params
-    how, moduli, doubts = _compression(design, found.answer, law)
-    sensor = Sensor(
-        length_m=p.length_mm * M_PER_MM,
-        width_m=p.width_mm * M_PER_MM,
-        electrode_m=(p.electrode_mm * M_PER_MM,) * 2,
-        resistivity_ohm_m=found.resistivity_ohm_m,
-        capacitance_f_per_m=found.answer.capacitance_f.middle() / (p.length_mm * M_PER_MM),
-        compression=how,
-        tip_m=tip_m,
-    )
-    return Sensed(sensor, (*found.taken, *moduli), doubts)
+    return Unloaded(answer, (top.value, bottom.value), (*taken, top, bottom))
 
 
 def is_plate(answer: Answer) -> bool:
@@ -181,49 +367,11 @@ def is_plate(answer: Answer) -> bool:
     return answer.capacitance_f.width() < _EXACT
 
 
-def _compression(design: Design, answer: Answer, law: str) -> tuple[Compression, tuple[Taken, ...], tuple[str, ...]]:
-    """The law of compression, the moduli that it rests on, and what to doubt about it."""
-    if law not in ("", *LAWS):
-        raise UnknownName("law of compression", law, LAWS)
-    moduli = {t.material: t for t in _moduli(design)}
-    film = moduli[design.materials.dielectric.partition("@")[0]]
-    solved = compression.solved(design.shape, vars(design.params), {n: t.value for n, t in moduli.items()})
-    if solved and not law:
-        return solved, tuple(moduli.values()), ()
-    if law == "bonded":
-        if not is_plate(answer):
-            raise OutOfRange(
-                f"the law 'bonded' speaks of a solid plate; {design.shape} has gaps: expected 'unconfined'"
-            )
-        return compression.bonded(film.value, design.params.width_mm * M_PER_MM, _gap_m(design)), (film,), ()
-    doubt = "a plate free to give way sideways: bonded to its electrodes it would be stiffer"
-    if not is_plate(answer):
-        doubt = (
-            f"{design.shape} taken to give way as a free solid plate of {film.material} (B.49): its cell was not solved"
-        )
-    return compression.unconfined(film.value), (film,), (doubt,)
-
-
-def _gap_m(design: Design) -> float:
-    """Distance of the electrodes of a plate [m]."""
-    spans = {
-        end: [p.span("z") for b in design.in_use.bodies if b.terminal == end for p in b.prisms]
-        for end in ("top", "bottom")
-    }
-    return (min(low for low, _ in spans["top"]) - max(high for _, high in spans["bottom"])) * M_PER_MM
-
-
-def _permittivities(design: Design) -> list[Taken]:
+def permittivities(design: Design) -> list[Taken]:
     """Relative permittivity of every dielectric in the sensor, and of air."""
     used = design.used() | {"air": ""}
     names = {body.material for body in design.in_use.bodies if not body.terminal} | {"air"}
-    return [_take(materials.load(name), used[name], "relative_permittivity") for name in sorted(names)]
-
-
-def _moduli(design: Design) -> list[Taken]:
-    """Young's modulus of every material in the sensor."""
-    used, names = design.used(), {body.material for body in design.in_use.bodies}
-    return [_take(materials.load(name), used[name], "youngs_modulus_pa") for name in sorted(names)]
+    return [_take(design.material(name), used[name], "relative_permittivity") for name in sorted(names)]
 
 
 def _take(material: materials.Material, source: str, quantity: str) -> Taken:

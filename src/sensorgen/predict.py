@@ -13,7 +13,8 @@ from sensorgen.design import Design
 from sensorgen.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.interval import Interval
 from sensorgen.models import line
-from sensorgen.planner import TIP_M, Sensed, Unloaded, Unpredictable, is_plate, sensor_of, unloaded
+from sensorgen.planner import Unloaded, Unpredictable, is_plate, unloaded
+from sensorgen.sensing import TIP_M, Sensed, sensor_of
 from sensorgen.sensor import Sensor
 from sensorgen.units import M_PER_MM, frequency_text
 
@@ -38,7 +39,7 @@ def prediction(
     frequency_hz : sequence of float
         Tones of the impedance [Hz].
     law, tip_m : str, float
-        Law of compression and length of the tip [m] for the identifiability card, as of :func:`planner.sensor_of`.
+        Law of compression and length of the tip [m] for the identifiability card, as of :func:`sensorgen.sensing.sensor_of`.
 
     Notes
     -----

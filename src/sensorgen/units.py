@@ -75,8 +75,8 @@ class Quantity:
 
     def _no(self, text: str, advice: str) -> BadInput:
         units = [name for name in self.units if name.isascii()]
-        known = f"{', '.join(units[:-1])} or {units[-1]}"
-        return BadInput(f"{_short(text)} is not a {self.name}: write a number, with {known} if you like{advice}")
+        known = f", with {', '.join(units[:-1])} or {units[-1]} if you like" if units else " without a unit"
+        return BadInput(f"{_short(text)} is not a {self.name}: write a number{known}{advice}")
 
 
 def _table(**units: str) -> dict[str, Decimal]:
@@ -85,6 +85,7 @@ def _table(**units: str) -> dict[str, Decimal]:
 
 LENGTH_MM = Quantity("length", _table(mm="1", um="1e-3", cm="10", m="1000") | {"µm": Decimal("1e-3")})
 FREQUENCY_HZ = Quantity("frequency", _table(Hz="1", mHz="1e-3", kHz="1e3", MHz="1e6", GHz="1e9"))
+NUMBER = Quantity("number", {})
 FORCE_N = Quantity("force", _table(N="1", mN="1e-3", kN="1e3", MN="1e6", gf="9.80665e-3", kgf="9.80665"))
 
 

@@ -258,7 +258,7 @@ def test_help_does_not_load_numpy(real):
 
 def test_options_are_what_the_planner_knows():
     from sensorgen.cli.predict_command import OWN
-    from sensorgen.planner import LAWS, TIP_M
+    from sensorgen.sensing import LAWS, TIP_M
 
     options = {option.name: option for option in OWN}
     assert tuple(options["compression"].type.choices) == LAWS

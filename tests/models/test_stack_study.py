@@ -7,8 +7,8 @@ from sensorgen.design import make
 from sensorgen.errors import OutOfRange
 from sensorgen.models.compression import unconfined
 from sensorgen.models.stack import Body, Film, Press, Stack, Track
-from sensorgen.planner import sensor_of
 from sensorgen.predict import TONES_HZ
+from sensorgen.sensing import sensor_of
 from sensorgen.stacked import study
 from sensorgen.stacked.designs import halves, stack_of, stacked
 from sensorgen.stacked.differencing import bounds

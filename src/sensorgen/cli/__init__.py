@@ -12,7 +12,21 @@ import click
 from sensorgen import __version__
 from sensorgen.errors import SensorgenError, Unprintable
 
-COMMANDS = ("build", "check", "draw", "predict", "invert", "sheet", "stack", "list", "schema", "completion")
+COMMANDS = (
+    "build",
+    "check",
+    "draw",
+    "predict",
+    "cell",
+    "chart",
+    "compress",
+    "invert",
+    "sheet",
+    "stack",
+    "list",
+    "schema",
+    "completion",
+)
 WRONG_INPUT = 2
 FOUND_ERRORS = 1
 

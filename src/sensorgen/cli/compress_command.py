@@ -62,12 +62,11 @@ def stresses_kpa(text: str) -> list[float]:
 
 
 def _solids(design: "Design") -> dict[str, "Elastic"]:
-    from sensorgen import materials
     from sensorgen.models.press2d import Elastic
 
     used = design.used()
     names = {body.material for body in design.in_use.bodies}
-    loaded = {name: materials.load(name) for name in sorted(names)}
+    loaded = {name: design.material(name) for name in sorted(names)}
     return {
         name: Elastic(m.value("youngs_modulus_pa", used[name]).value, m.value("poisson_ratio", used[name]).value)
         for name, m in loaded.items()
@@ -75,11 +74,9 @@ def _solids(design: "Design") -> dict[str, "Elastic"]:
 
 
 def _permittivity(design: "Design") -> dict[str, float]:
-    from sensorgen import materials
-
     used = design.used() | {"air": ""}
     names = {body.material for body in design.in_use.bodies if not body.terminal} | {"air"}
-    return {name: materials.load(name).value("relative_permittivity", used[name]).value for name in sorted(names)}
+    return {name: design.material(name).value("relative_permittivity", used[name]).value for name in sorted(names)}
 
 
 def _plain(found: "Pressed", held: dict[str, str]) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Words on the command line to a design: a shape with options, or a file with changes to it."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -10,6 +10,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from sensorgen import registry, shapes, units
+from sensorgen.cli.settings import merged, pairs, setting
 from sensorgen.cli.words import Length, OneOf, Share, completed
 from sensorgen.errors import BadInput, SensorgenError, UnknownName
 
@@ -161,7 +162,8 @@ def _design_options() -> list[click.Parameter]:
         option("--infill-pattern", "[MATERIAL=]PATTERN", "Pattern of the infill: rectilinear, grid ...", multiple=True),
         option("--shrinkage", "SHARE", "Shrinkage in the plane to print against, as in 0.2.", type=Share()),
         option(
-            "--set settings", "KEY=VALUE", "Any parameter, or key of the design file, as in infill.x60.percent=80.",
+            "--set settings", "KEY=VALUE",
+            "Any parameter, a material's value as eps_x60=3.0, or a key of the design file as infill.x60.percent=80.",
             multiple=True,
         ),
         option("--name", None, "Name of folder and files; made from the parameters if not given."),
@@ -184,7 +186,7 @@ def _design(base: Data, given: Data, word: str) -> "Design":
     from sensorgen import design
 
     unnamed = {k: v for k, v in base.items() if k != "name"}
-    data = _merged(unnamed, _changes(base, given))
+    data = merged(unnamed, _changes(base, given))
     if given["name"] is not None:
         data["name"] = given["name"]
     elif data == unnamed and "name" in base:
@@ -206,24 +208,15 @@ def _changes(base: Data, given: Data) -> Data:
     changes = {
         "parameters": parameters,
         "materials": slots,
-        "tools": {key: _integer(value, "--tool") for key, value in _pairs(given["tool"], "--tool")},
+        "tools": {key: _integer(value, "--tool") for key, value in pairs(given["tool"], "--tool")},
         "infill": _infill(given, dielectric),
         **{
             k: given[k] for k in ("orientation", "printer", "quality", "nozzle_mm", "shrinkage") if given[k] is not None
         },
     }
-    for key, value in _pairs(given["settings"], "--set"):
-        changes = _merged(changes, _setting(key, value, known))
+    for key, value in pairs(given["settings"], "--set"):
+        changes = merged(changes, setting(key, value, known))
     return {k: v for k, v in changes.items() if v != {}}
-
-
-def _merged(base: Any, change: Any) -> Any:
-    if isinstance(base, Mapping) and isinstance(change, Mapping):
-        return {
-            k: _merged(base[k], change[k]) if k in base and k in change else {**base, **change}[k]
-            for k in {**base, **change}
-        }
-    return change
 
 
 def _size(text: str) -> Data:
@@ -236,7 +229,7 @@ def _size(text: str) -> Data:
 
 def _slots(words: tuple[str, ...]) -> Data:
     slots: Data = {}
-    for part, value in _pairs(words, "--material"):
+    for part, value in pairs(words, "--material"):
         slots |= {"top_electrode": value, "bottom_electrode": value} if part == "electrode" else {part: value}
     return slots
 
@@ -261,45 +254,6 @@ def _infill(given: Data, dielectric: str) -> Data:
             entry = _number(value.removesuffix("%"), "--infill") if key == "percent" else value
             found.setdefault(material or dielectric, {})[key] = entry
     return found
-
-
-def _setting(key: str, value: str, known: set[str]) -> Data:
-    """One ``--set``: a parameter of the shape, or a key of the design file with dots between its parts."""
-    path = ["parameters", key] if key in known else key.split(".")
-    if path[0] == "parameters":
-        end: Any = _parameter(value)
-    else:
-        end = _plain(value)
-    from sensorgen.design import Design
-
-    if path[0] not in Design.model_fields or len(path) > 3:
-        raise UnknownName("key of --set", key, known | set(Design.model_fields))
-    for part in reversed(path):
-        end = {part: end}
-    return dict(end)
-
-
-def _parameter(value: str) -> float | str:
-    try:
-        return units.length_mm(value)
-    except SensorgenError:
-        return value
-
-
-def _plain(value: str) -> Any:
-    for kind in (int, float):
-        try:
-            return kind(value)
-        except ValueError:
-            continue
-    return None if value == "none" else value
-
-
-def _pairs(words: tuple[str, ...], option: str) -> list[tuple[str, str]]:
-    for word in words:
-        if "=" not in word.strip("="):
-            raise BadInput(f"{option} {word!r}: expected KEY=VALUE")
-    return [(k.strip(), v.strip()) for k, _, v in (word.partition("=") for word in words)]
 
 
 def _integer(value: str, option: str) -> int:

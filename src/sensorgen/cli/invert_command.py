@@ -98,7 +98,7 @@ def _estimator(
 ) -> "tuple[Estimator, tuple[str, ...]]":
     """The estimator for this design, and what to doubt about its sensor."""
     from sensorgen.invert import FORCE_LIMIT_N, Estimator
-    from sensorgen.planner import sensor_of
+    from sensorgen.sensing import sensor_of
 
     sensed = sensor_of(design, compression or "", tip_mm * units.M_PER_MM)
     limit = FORCE_LIMIT_N if force_limit_n is None else force_limit_n

@@ -17,7 +17,7 @@ from sensorgen.errors import BadInput, Unwritable
 
 if TYPE_CHECKING:
     from sensorgen.design import Design
-    from sensorgen.planner import Sensed
+    from sensorgen.sensing import Sensed
 
 Axes = tuple[Sequence[float], Sequence[float], Sequence[float]]
 
@@ -56,8 +56,8 @@ def _work(
     compression: str | None,
     **how: Any,
 ) -> int:
-    from sensorgen.planner import sensor_of
     from sensorgen.predict import FORCES_N, TONES_HZ, positions_mm, prediction
+    from sensorgen.sensing import sensor_of
 
     _refuse_two(how)
     tones = frequency_hz or TONES_HZ

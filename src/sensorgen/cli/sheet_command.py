@@ -45,8 +45,8 @@ def _work(
     noise: float, as_json: bool, plot: Path | None,
 ) -> int:  # fmt: skip
     from sensorgen.models.sheet import contact_sets, localise
-    from sensorgen.planner import sensor_of
     from sensorgen.predict import TONES_HZ
+    from sensorgen.sensing import sensor_of
 
     if len(force) != 1:
         raise BadInput(f"--force takes one number, not {len(force)}: bounds are those of one press")

@@ -64,6 +64,22 @@ class Share(click.ParamType):  # type: ignore[type-arg]
             raise BadInput(f"{_said(param)}: {value!r} is not a share; expected 0.2 or 20%") from None
 
 
+class Ratio(click.ParamType):  # type: ignore[type-arg]
+    """A relative width or error: a number above 0."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:  # noqa: ARG002
+        """Read ``1e-4`` [-]."""
+        try:
+            found = float(value)
+        except ValueError:
+            raise BadInput(f"{_said(param)}: {value!r} is not a number; expected one above 0, as 1e-4") from None
+        if not 0 < found < float("inf"):
+            raise BadInput(f"{_said(param)}: {found:g}; expected a number above 0, as 1e-4")
+        return found
+
+
 def completed(names: Callable[[], Iterable[str]]) -> Callable[[click.Context, click.Parameter, str], list[Any]]:
     """What the shell offers for an option: the names that begin as typed, looked up only then."""
     return lambda ctx, param, begun: [name for name in names() if name.startswith(begun)]  # noqa: ARG005

@@ -4,15 +4,20 @@ A material is a YAML file beside this one; see ``etpu.yaml``. A design names a m
 likes, the source to take: ``x60`` or ``x60@thesis-4.1``.
 """
 
+from collections.abc import Mapping
 from functools import cache
 from importlib import resources
+from math import inf
 from typing import Annotated
 
 from pydantic import Field
 
 from sensorgen import yamlfile
-from sensorgen.errors import BadInput, MissingValue, UnknownName
+from sensorgen.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.records import Strict, checked
+
+SET = "set by the user"  # source of a value that stands in a design itself
+_RANGES = {"poisson_ratio": (-1.0, 0.5)}  # both ends belong to it; anything else is above 0
 
 
 class Value(Strict):
@@ -41,10 +46,22 @@ class Material(Strict):
 
     def sources(self) -> set[str]:
         """Names of all sources that this material quotes."""
-        return {v.source for group in (self.properties, self.print) for values in group.values() for v in values}
+        groups = (self.properties, self.print)
+        return {v.source for group in groups for values in group.values() for v in values} - {SET}
+
+    def with_values(self, values: Mapping[str, float]) -> "Material":
+        """The material with values of the user's own, which go before every source's.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Number by quantity, in the unit of the quantity's name.
+        """
+        own = {key: [Value(value=value, source=SET), *self.properties.get(key, [])] for key, value in values.items()}
+        return self.model_copy(update={"properties": self.properties | own})
 
     def value(self, quantity: str, source: str = "") -> Value:
-        """The value of a quantity from ``source``, or the default where that source is silent.
+        """The value of a quantity that the user set, else from ``source``, or the default where that source is silent.
 
         Parameters
         ----------
@@ -59,7 +76,8 @@ class Material(Strict):
             No source gives it, or only an implausible one that a design must name to get.
         """
         values = self.properties.get(quantity, []) + self.print.get(quantity, [])
-        chosen = [v for v in values if v.source == source] or [v for v in values if v.default]
+        own = [v for v in values if v.source == SET]
+        chosen = own or [v for v in values if v.source == source] or [v for v in values if v.default]
         if not chosen:
             named = ", ".join(sorted(v.source for v in values))
             raise MissingValue(
@@ -73,6 +91,32 @@ def names() -> list[str]:
     """Names of the materials that ship with sensorgen."""
     files = resources.files(__name__).iterdir()
     return sorted(f.name.removesuffix(".yaml") for f in files if f.name.endswith(".yaml") and f.name != "sources.yaml")
+
+
+@cache
+def quantities() -> list[str]:
+    """Names of all quantities that any material's file gives, those of printing left out."""
+    return sorted({quantity for name in names() for quantity in load(name).properties})
+
+
+def check_own(name: str, values: Mapping[str, float]) -> None:
+    """Refuse values of the user's own that no material can have.
+
+    Raises
+    ------
+    UnknownName
+        No such material, or no such quantity; the nearest one is offered.
+    OutOfRange
+        A number that the quantity cannot be.
+    """
+    load(name)
+    for quantity, value in values.items():
+        if quantity not in quantities():
+            raise UnknownName(f"quantity of {name}", quantity, quantities())
+        low, high = _RANGES.get(quantity, (0.0, inf))
+        if not low <= value <= high or (value in (0.0, inf) and quantity not in _RANGES):
+            expected = f"{low:g} to {high:g}" if quantity in _RANGES else "a number above 0"
+            raise OutOfRange(f"{quantity} of {name} is {value:g}; expected {expected}")
 
 
 @cache

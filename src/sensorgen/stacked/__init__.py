@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from sensorgen.design import Design
 from sensorgen.models.stack import Body
-from sensorgen.planner import TIP_M
+from sensorgen.sensing import TIP_M
 from sensorgen.stacked.designs import press_at, stacked
 from sensorgen.stacked.differencing import bounds
 from sensorgen.stacked.touching import WIRINGS, Touching, table

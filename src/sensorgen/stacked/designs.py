@@ -8,7 +8,7 @@ from typing import Any
 from sensorgen.design import Design, make
 from sensorgen.errors import OutOfRange
 from sensorgen.models.stack import Film, Press, Stack, Track
-from sensorgen.planner import TIP_M, Sensed, sensor_of
+from sensorgen.sensing import TIP_M, Sensed, sensor_of
 from sensorgen.sensor import Sensor
 from sensorgen.units import M_PER_MM
 
@@ -40,7 +40,7 @@ class Stacked:
 
 
 def stacked(design: Design, law: str = "", tip_m: float = TIP_M) -> Stacked:
-    """The stacks that a design makes; parameters and errors as :func:`sensorgen.planner.sensor_of`."""
+    """The stacks that a design makes; parameters and errors as :func:`sensorgen.sensing.sensor_of`."""
     found = [sensor_of(half, law, tip_m) for half in halves(design)]
     lower, upper = found[0], found[-1]
     double = stack_of([lower.sensor, upper.sensor])
@@ -62,7 +62,7 @@ def halves(design: Design) -> list[Design]:
     if design.shape != "double":
         return [design]
     p = design.params
-    data = design.model_dump(include={"printer", "quality", "tools"}) | {"shape": "reference"}
+    data = design.model_dump(include={"printer", "quality", "tools", "material_values"}) | {"shape": "reference"}
     envelope = {f.name: getattr(p, f.name) for f in dataclasses.fields(p) if not f.name.endswith("dielectric_mm")}
     slots = design.model_dump(include={"materials"})["materials"]
     return [

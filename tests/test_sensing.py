@@ -4,7 +4,7 @@ import pytest
 
 from sensorgen.design import make
 from sensorgen.errors import MissingValue, OutOfRange, UnknownName
-from sensorgen.planner import sensor_of
+from sensorgen.sensing import sensor_of
 
 
 def sensed(shape, law="", **rest):

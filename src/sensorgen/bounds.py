@@ -1,0 +1,176 @@
+"""The capacitance of designs between bounds, one design or many: what ``sensorgen cell`` answers, as plain data."""
+
+import os
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+from sensorgen import planner
+from sensorgen.design import Design
+from sensorgen.errors import SensorgenError
+from sensorgen.planner import Answer, Unpredictable
+from sensorgen.scene import Scene
+from sensorgen.units import M_PER_MM
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked about every design.
+
+    Attributes
+    ----------
+    width : float
+        How wide the bounds may be, relative to their middle [-].
+    model : str
+        The only model to ask, or "".
+    keep : bool
+        Take answers that are known from before, and keep new ones.
+    """
+
+    width: float = inf
+    model: str = ""
+    keep: bool = True
+
+
+def answer(design: Design, asked: Asked) -> dict[str, Any]:
+    """Bounds of one design's capacitance per area, unpressed and as drawn.
+
+    Parameters
+    ----------
+    design : Design
+        Its support is taken to be gone.
+    asked : Asked
+        Accuracy and model.
+
+    Raises
+    ------
+    Unpredictable, UnknownName, OutOfRange
+        As :func:`sensorgen.planner.capacitance`.
+    MissingValue
+        A dielectric without a permittivity.
+    """
+    return _plain(design, _solved(design.in_use, _permittivity(design), asked))
+
+
+def answers(designs: Sequence[Design], asked: Asked, jobs: int, done: Callable[[], None]) -> list[dict[str, Any]]:
+    """The same for many designs, each as a process of its own where it is not known from before.
+
+    A design that no model can speak of has a reason in place of numbers.
+
+    Parameters
+    ----------
+    designs : sequence of Design
+        In the order of the answers.
+    asked : Asked
+        Accuracy and model.
+    jobs : int
+        How many processes at once, 1 or more.
+    done : callable
+        Called after each design.
+
+    Raises
+    ------
+    UnknownName, OutOfRange, MissingValue
+        As :func:`answer`.
+    SensorgenError
+        A process ended before its answer, as when the memory is full.
+    """
+    inputs = [(design.in_use, _permittivity(design), asked) for design in designs]
+    missing = [
+        k for k, (scene, eps, _) in enumerate(inputs)
+        if not (asked.keep and planner.is_known(scene, eps, asked.width, asked.model))
+    ]  # fmt: skip
+    found: dict[int, Answer | str] = {}
+    for k in sorted(set(range(len(inputs))) - set(missing)):
+        found[k] = _said(*inputs[k])
+        done()
+    for k, result in _in_parallel([inputs[k] for k in missing], jobs):
+        found[missing[k]] = result
+        done()
+    return [_plain(design, found[k]) for k, design in enumerate(designs)]
+
+
+def _solved(scene: Scene, permittivity: dict[str, float], asked: Asked) -> Answer:
+    return planner.capacitance(scene, permittivity, asked.width, asked.model, asked.keep)
+
+
+def _said(scene: Scene, permittivity: dict[str, float], asked: Asked) -> Answer | str:
+    """The answer, or why there is none."""
+    try:
+        return _solved(scene, permittivity, asked)
+    except Unpredictable as error:
+        return str(error)
+
+
+def _in_parallel(inputs: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[tuple[int, Answer | str]]:
+    """Number and answer of each, as they come."""
+    if not inputs:
+        return
+    from concurrent.futures import Future, as_completed
+    from concurrent.futures.process import BrokenProcessPool
+
+    with _pool(min(jobs, len(inputs))) as pool:
+        numbers: dict[Future[Answer | str], int] = {pool.submit(_said, *each): k for k, each in enumerate(inputs)}
+        try:
+            for future in as_completed(numbers):
+                yield numbers[future], future.result()
+        except BrokenProcessPool:
+            raise SensorgenError(
+                "a process ended before its answer, as when the memory is full: ask for less accuracy, or --jobs 1"
+            ) from None
+
+
+@contextmanager
+def _pool(jobs: int) -> Iterator["ProcessPoolExecutor"]:
+    """Fresh processes, so that solver and CAD kernel never meet in one; ended at once if anything goes wrong."""
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _quietly)
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in multiprocessing.active_children():
+            process.terminate()
+        raise
+    pool.shutdown()
+
+
+def _quietly() -> None:
+    """End without a word on Ctrl-C, and use one thread: there is a process for every core."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+def _permittivity(design: Design) -> dict[str, float]:
+    return {t.material: t.value for t in planner.permittivities(design)}
+
+
+def _plain(design: Design, found: Answer | str) -> dict[str, Any]:
+    """What is printed of an answer."""
+    data: dict[str, Any] = {"design": design.name, "model": None, "lower_f_per_m2": None, "upper_f_per_m2": None}
+    if isinstance(found, str):
+        return data | {"reason": found}
+    area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
+    per_area = found.capacitance_f.times(1 / area)
+    return data | {
+        "model": found.model,
+        "lower_f_per_m2": per_area.lower,
+        "upper_f_per_m2": per_area.upper,
+        "relative_width": per_area.width(),
+        "accuracy": found.wanted if found.wanted < inf else None,
+        "reached": found.reached(),
+        "seconds": found.seconds(),
+        "known": found.known,
+        "area_m2": area,
+        "refused": list(found.refused),
+        "plan": [asdict(c) for c in found.plan],
+        "values": [vars(t) for t in planner.permittivities(design)],
+    }

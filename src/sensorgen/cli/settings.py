@@ -1,0 +1,127 @@
+"""``--set KEY=VALUE`` and ``--sweep KEY=VALUES``: parameters, keys of the design file, and values of materials."""
+
+from typing import TYPE_CHECKING, Any
+
+from sensorgen import units
+from sensorgen.errors import BadInput, SensorgenError, UnknownName
+
+if TYPE_CHECKING:
+    from sensorgen.design import Design
+
+Data = dict[str, Any]
+
+SYMBOLS = {"eps": "relative_permittivity", "nu": "poisson_ratio", "rho": "resistivity_ohm_m"}
+
+
+def pairs(words: tuple[str, ...], option: str) -> list[tuple[str, str]]:
+    """Words of the form KEY=VALUE, taken apart."""
+    for word in words:
+        if "=" not in word.strip("="):
+            raise BadInput(f"{option} {word!r}: expected KEY=VALUE")
+    return [(k.strip(), v.strip()) for k, _, v in (word.partition("=") for word in words)]
+
+
+def setting(key: str, value: str, parameters: set[str]) -> Data:
+    """One setting as the part of a design file that it stands for.
+
+    Parameters
+    ----------
+    key : str
+        A parameter of the shape, a material's value as ``eps_x60``, or a key of the file with dots between its parts.
+    value : str
+        As typed.
+    parameters : set of str
+        Names of the shape's parameters.
+
+    Raises
+    ------
+    UnknownName
+        The key is none of these; the nearest is offered.
+
+    Examples
+    --------
+    >>> setting("dielectric_mm", "100um", {"dielectric_mm"}), setting("eps_x60", "3", set())
+    ({'parameters': {'dielectric_mm': 0.1}}, {'material_values': {'x60': {'relative_permittivity': 3}}})
+    """
+    from sensorgen.design import Design
+
+    path = ["parameters", key] if key in parameters else key.split(".")
+    if len(path) == 1 and key not in Design.model_fields:
+        path = _of_material(key) or path
+    if path[0] not in Design.model_fields or len(path) > 3:
+        raise UnknownName("key of --set", key, parameters | set(Design.model_fields) | {"eps_x60"})
+    end: Any = _parameter(value) if path[0] == "parameters" else _plain(value)
+    for part in reversed(path):
+        end = {part: end}
+    return dict(end)
+
+
+def _of_material(key: str) -> list[str] | None:
+    """The place of a material's value: ``eps_x60`` or ``youngs_modulus_x60``, its unit left out if one likes."""
+    from sensorgen import materials
+
+    word, _, name = key.rpartition("_")
+    quantity = SYMBOLS.get(word) or next((q for q in materials.quantities() if f"{q}_".startswith(f"{word}_")), "")
+    if not word or not (quantity or name in materials.names()):
+        return None
+    if name not in materials.names():
+        raise UnknownName("material", name, materials.names())
+    if not quantity:
+        raise UnknownName(f"quantity of {name}", word, {*SYMBOLS, *materials.quantities()})
+    return ["material_values", name, quantity]
+
+
+def sweep(text: str, design: "Design") -> tuple[str, list[tuple[float | str, "Design"]]]:
+    """A sweep as typed: its key, and the design for each value.
+
+    Parameters
+    ----------
+    text : str
+        KEY=START:STOP:STEP or KEY=VALUE,VALUE,...; keys as of :func:`setting`.
+    design : Design
+        That is varied.
+
+    Raises
+    ------
+    SensorgenError
+        A key or values that mean nothing, or a value that this design cannot have: before any work.
+    """
+    from sensorgen import design as designs
+
+    ((key, typed),) = pairs((text,), "--sweep")
+    fields = designs.fields(design.shape)
+    same = design.model_dump(exclude={"name"})
+    return key, [
+        (value, designs.make(merged(same, setting(key, str(value), set(fields))), f"{key}={value}"))
+        for value in _values(typed, fields.get(key))
+    ]
+
+
+def _values(typed: str, field: Any) -> list[Any]:
+    """Numbers, or the words that a parameter may be."""
+    if field is not None and "choices" in field.metadata:
+        return typed.split(",")
+    return list(units.values(typed, units.NUMBER if field is None else units.LENGTH_MM))
+
+
+def merged(base: Any, change: Any) -> Any:
+    """Plain data with a change to it: mappings key by key, anything else in place of what was there."""
+    if isinstance(base, dict) and isinstance(change, dict):
+        return base | {k: merged(base[k], v) if k in base else v for k, v in change.items()}
+    return change
+
+
+def _parameter(value: str) -> float | str:
+    try:
+        return units.length_mm(value)
+    except SensorgenError:
+        return value
+
+
+def _plain(value: str) -> Any:
+    for kind in (int, float):
+        try:
+            return kind(value)
+        except ValueError:
+            continue
+    return None if value == "none" else value

@@ -1,0 +1,125 @@
+"""Finite elements in three dimensions for scenes of boxes: a potential from above, a flux from below.
+
+Bricks in layers that shrink towards every edge of the electrodes fill the part of a cell between its mirrors; see
+docs/cells.md.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from sensorgen.interval import Interval
+from sensorgen.models import _fem_bounds as fem
+from sensorgen.models._fem_boxes import Element, flux, potential
+from sensorgen.models._fem_bricks import Grid, grid, layered
+from sensorgen.models._fem_dissection import Elements, energies_of, least
+from sensorgen.scene import Scene
+from sensorgen.units import EPS0_F_PER_M, M_PER_MM
+
+SOURCE = "Dirichlet's and Thomson's principles; graded hexahedra, H1 and H(div) (NGSolve)"
+COST = 3
+
+WIDTH = 1e-3  # of the interval, where the caller does not say
+
+_RUNGS = ((1, 4, 3), (2, 5, 4), (3, 6, 5))  # layers, order of the potential, order of the flux
+_MOST_BRICKS = 6000  # of one rung: more would not fit in 4 GB
+
+
+def unfit(scene: Scene) -> str | None:
+    """Why this model cannot speak of this scene, or None."""
+    try:
+        coarse = grid(scene)
+    except ValueError as error:
+        return str(error)
+    boxes = int((coarse.fill > 1).sum())
+    if boxes > _MOST_BRICKS:
+        return f"its cell has {boxes} bricks on the coarsest mesh; at most {_MOST_BRICKS} fit in the memory"
+    return None
+
+
+@dataclass(frozen=True)
+class Step:
+    """One mesh on the way to an accuracy.
+
+    Attributes
+    ----------
+    layers, order, flux_order : int
+        That shrink towards edges; orders of the potential's and of the flux's polynomials.
+    elements, unknowns : int
+        Bricks, and the unknowns that they couple.
+    interval : Interval
+        Capacitance of the whole sensor [F].
+    """
+
+    layers: int
+    order: int
+    flux_order: int
+    elements: int
+    unknowns: int
+    interval: Interval
+
+
+def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:
+    """Bounds of the capacitance between the terminals, fringes at the sensor's edge left out.
+
+    Parameters
+    ----------
+    scene : Scene
+        As drawn, for which :func:`unfit` is None.
+    permittivity : mapping of str to float
+        Relative permittivity of each material that lies between the electrodes, and of "air", above 0 [-].
+    width : float
+        How wide the interval may be, relative to its middle; it is wider where the finest mesh is reached [-].
+
+    Returns
+    -------
+    Interval
+        Capacitance of the whole sensor [F].
+
+    Raises
+    ------
+    OutOfRange
+        A permittivity is not above 0, or the width is.
+    KeyError
+        A material between the electrodes has no permittivity.
+    ValueError
+        The scene is unfit.
+    CrossedBounds
+        The lower bound lies above the upper one: a fault of the solver.
+    """
+    fem.check(permittivity, width)
+    return min((step.interval for step in steps(scene, permittivity, width)), key=Interval.width)
+
+
+def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[Step]:
+    """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
+    coarse = grid(scene)
+    values = [permittivity.get(name, 0.0) for name in coarse.names]
+    for layers, order, flux_order in _RUNGS:
+        fine = layered(coarse, values, layers)
+        upper, part, shared = _least(fine, values, potential(order))
+        lower, _, faces = _least(fine, values, flux(flux_order))
+        found = fem.Energies(lower, upper, part, max(shared, faces))
+        interval = fem.whole(found, fine.shares.ravel().tolist()).times(EPS0_F_PER_M * M_PER_MM)
+        yield Step(layers, order, flux_order, int((fine.fill > 1).sum()), found.unknowns, interval)
+        if interval.width() <= width:
+            return
+
+
+def _least(fine: Grid, values: list[float], kind: Element) -> tuple[float, float, int]:
+    """Energy at 1 V over eps0, its part in columns that occur more often than others, and the unknowns."""
+    boxes = np.argwhere(fine.fill > 1)
+    count = np.array(fine.fill.shape)
+    keys = kind.keys(boxes, count)
+    held = np.full(keys.shape, np.nan)
+    for code, value in ((0, 0.0), (1, 1.0)):
+        held[np.isin(keys, kind.keys(np.argwhere(fine.fill == code), count))] = value
+    eps = np.array(values)[fine.fill[tuple(boxes.T)]]
+    edges = np.column_stack([np.diff(p)[boxes[:, axis]] for axis, p in enumerate(fine.planes_mm)])
+    scales = eps[:, None] * edges.prod(1)[:, None] / (2 * edges**2)
+    elements = Elements(boxes, keys, held, kind.one, lambda box: kind.condensed(scales[box]))
+    more = fine.shares[boxes[:, 0], boxes[:, 1]] - fine.shares.min()
+    solved = least(elements, keep=bool(more.any()))
+    part = energies_of(elements, solved.values(), more.tolist()) if more.any() else 0.0
+    return float(solved.energy), part, len(np.unique(keys[np.isnan(held)]))
