@@ -4,7 +4,7 @@ Near-incompressible neo-Hookean solids at large strain; gaps close and open, wit
 checked: load reached, volume kept, faces not run into each other, work equal to the energy stored.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -25,6 +25,8 @@ SOURCE = (
     "frozen partners; bounds of the capacitance by Dirichlet's and Thomson's principles"
 )
 COST = 2
+
+__all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "curve_of", "press", "unfit"]
 
 _PENALTY = 10.0  # over the least Young's modulus of a solid [-]
 _LEAST_PENALTY_PA = 60e6
@@ -101,13 +103,14 @@ def press(
     permittivity: Mapping[str, float] | None = None,
     held: Held | None = None,
     fineness: Fineness | None = None,
+    step: Callable[[float], None] | None = None,
 ) -> Pressed:
     """Press a cell from above.
 
     Parameters
     ----------
     cell : Cell
-        From :func:`sensorgen.models._press.cell.cell_of`.
+        From :func:`cell`.
     solids : mapping of str to Elastic
         By material.
     stress_pa : sequence of float
@@ -118,6 +121,8 @@ def press(
         Base, period, top and contact.
     fineness : Fineness, optional
         Of the mesh.
+    step : callable, optional
+        Told every pressure of ``stress_pa`` that is reached [Pa].
 
     Raises
     ------
@@ -128,12 +133,13 @@ def press(
     """
     held, fineness = held or Held(), fineness or Fineness()
     _check(stress_pa, held)
-    first = best = _solved(cell, solids, stress_pa, permittivity, held, fineness)
+    told = step or (lambda _: None)
+    first = best = _solved(cell, solids, stress_pa, permittivity, held, fineness, told)
     for factor in _COARSER:
         if not best.faults:
             break
         coarser = replace(fineness, apex_mm=factor * fineness.apex_mm)
-        again = _solved(cell, solids, stress_pa, permittivity, held, coarser)
+        again = _solved(cell, solids, stress_pa, permittivity, held, coarser, told)
         if (again.converged_pa, -len(again.faults)) > (best.converged_pa, -len(best.faults)):
             best = replace(again, doubts=(*again.doubts, _coarsened(first, again, coarser)))
     return best
@@ -186,6 +192,7 @@ def _solved(
     permittivity: Mapping[str, float] | None,
     held: Held,
     fineness: Fineness,
+    step: Callable[[float], None],
 ) -> Pressed:
     from sensorgen.models._press import contact, element, load, support
 
@@ -202,7 +209,10 @@ def _solved(
         held.contact == "stick",
         tied,
     )
-    states = list(load.curve(problem, stress_pa, _STEP * float(e.min())))
+    states = []
+    for state in load.curve(problem, stress_pa, _STEP * float(e.min())):
+        states.append(state)
+        step(state.pressure_pa)
     down = np.array([problem.load @ s.u_m / np.abs(problem.load).sum() for s in states])
     volume = np.array([problem.elements.volume_ratio(s.u_m, s.inner).min() for s in states])
     depth = np.array([_depth(problem.gaps(s.pairs, s.u_m) / s.pairs.length_m) for s in states])
@@ -280,6 +290,28 @@ def _faults(
     return [words for words, holds in said.items() if holds]
 
 
+def unfit(scene: Scene) -> str | None:
+    """Why this model cannot speak of a scene, or None."""
+    try:
+        cell_of(scene, None)
+    except BadInput as error:
+        return str(error)
+    return None
+
+
 def cell(scene: Scene, period_mm: float | None) -> Cell:
-    """The cell of a scene, to be pressed; see :func:`sensorgen.models._press.cell.cell_of`."""
+    """The cell of a prismatic scene: half a period between two mirrors where there are such, else a whole one.
+
+    Parameters
+    ----------
+    scene : Scene
+        As drawn or as printed, its support gone.
+    period_mm : float or None
+        Period of the pattern; None for a scene without one, as a plate [mm].
+
+    Raises
+    ------
+    BadInput
+        The scene is no prism, or shorter than its period.
+    """
     return cell_of(scene, period_mm)
