@@ -9,6 +9,8 @@ from sensorgen.errors import OutOfRange
 from sensorgen.models import press2d, springs
 from sensorgen.models.press2d import Elastic, Fineness, Held
 
+__all__ = ["MODELS", "Held", "answer", "stresses_kpa"]
+
 Data = dict[str, Any]
 MODELS = ("press2d", "springs")
 
@@ -124,9 +126,7 @@ def _springs(design: Design, solids: Mapping[str, Elastic], stress_pa: Sequence[
     """What springs of columns know: a displacement, and no capacitance."""
     why = press2d.unfit(design.in_use)
     plane = why is None
-    moduli = {
-        name: s.youngs_modulus_pa / ((1 - s.poisson_ratio**2) if plane else 1.0) for name, s in solids.items()
-    }
+    moduli = {name: s.youngs_modulus_pa / ((1 - s.poisson_ratio**2) if plane else 1.0) for name, s in solids.items()}
     moved = springs.displacement_m(design.in_use, moduli, stress_pa)
     boxes = all(prism.is_box() for body in design.in_use.bodies for prism in body.prisms)
     said = "at most this, at small strain under a stiff plate" if boxes else "a guess: columns that know no neighbours"

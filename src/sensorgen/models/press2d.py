@@ -1,7 +1,7 @@
 """Prismatic cells under pressure: plane-strain finite elements with contact, and the capacitance when deformed.
 
-Near-incompressible neo-Hookean solids at large strain; gaps close and open, without friction or sticking. Each answer is
-checked: load reached, volume kept, faces not run into each other, work equal to the energy stored.
+Near-incompressible neo-Hookean solids at large strain; gaps close and open, without friction or sticking. Each answer
+is checked: load reached, volume kept, faces not run into each other, work equal to the energy stored.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -53,7 +53,8 @@ class Elastic:
         """Refuse what is no elastic solid."""
         if not (self.youngs_modulus_pa > 0 and 0 < self.poisson_ratio <= 0.5):
             raise OutOfRange(
-                f"E {self.youngs_modulus_pa:g} Pa, nu {self.poisson_ratio:g}: expected E above 0 and nu above 0, up to 0.5"
+                f"E {self.youngs_modulus_pa:g} Pa, nu {self.poisson_ratio:g}: "
+                "expected E above 0 and nu above 0, up to 0.5"
             )
 
 
@@ -198,7 +199,10 @@ def _solved(
 
     mesh = mesh_of(cell, fineness)
     materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in cell.regions]
-    e, nu = (np.array([getattr(m, key) for m in materials])[mesh.region - 1] for key in ("youngs_modulus_pa", "poisson_ratio"))
+    e, nu = (
+        np.array([getattr(m, key) for m in materials])[mesh.region - 1]
+        for key in ("youngs_modulus_pa", "poisson_ratio")
+    )
     tied = support.tied_nodes(mesh)
     problem = load.Problem(
         element.Elements(mesh, element.law(e, nu)),
@@ -284,7 +288,8 @@ def _faults(
         f"a triangle is squeezed to {volume.min():.2g} of its volume": volume.min() < _LEAST_VOLUME,
         f"faces run into each other by {depth.max():.2g} of a side": depth.max() > _DEEPEST,
         f"work and energy differ by {imbalance[-1]:.1%}": abs(imbalance[-1]) > _BALANCE,
-        f"no capacitance at {unknown} of {len(stress)} stresses: the deformed outlines could not be meshed": unknown > 0,
+        f"no capacitance at {unknown} of {len(stress)} stresses: the deformed outlines could not be meshed": unknown
+        > 0,
         f"old contact partners at {stale} of {len(stress)} stresses": stale > 0,
     }
     return [words for words, holds in said.items() if holds]

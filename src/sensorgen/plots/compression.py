@@ -26,12 +26,12 @@ def png(data: Mapping[str, Any]) -> bytes:
     with mpl.rc_context({"font.size": 9}):
         figure = Figure(figsize=(8.4, 3.4) if known else (4.4, 3.4), layout="constrained")
         axes = figure.subplots(1, 2 if known else 1, squeeze=False)[0]
-        axes[0].plot(data["stress_kpa"], data["displacement_um"], "o-", ms=3, color="#0072b2")
+        axes[0].plot(data["stress_kpa"], data["displacement_um"], "o-", ms=3, clip_on=False, color="#0072b2")
         axes[0].set(xlabel=KPA, ylabel=UM, xlim=(0, None), ylim=(0, None))
         if known:
             stress, low, high = zip(*known, strict=True)
-            axes[1].plot(stress, high, "v", ms=4, color="#d55e00", label="upper bound")
-            axes[1].plot(stress, low, "^", ms=4, color="#0072b2", label="lower bound")
+            axes[1].plot(stress, high, "v", ms=4, clip_on=False, color="#d55e00", label="upper bound")
+            axes[1].plot(stress, low, "^", ms=4, clip_on=False, color="#0072b2", label="lower bound")
             axes[1].set(xlabel=KPA, ylabel=NF, xlim=(0, None))
             axes[1].legend(frameon=False)
         for ax in axes:

@@ -142,7 +142,7 @@ def _partners(here: Real, upper: Real, depth: Real) -> tuple[Whole, Real]:
 
 
 def _meet(x: Real, nodes: Real) -> tuple[Real, NDArray[np.bool_]]:
-    """Where on a side (0 to 1) its place is x: the root of a quadratic, by its form that is stable when nearly straight."""
+    """Where on a side (0 to 1) its place is x: a root of a quadratic, in the form that bears nearly straight sides."""
     a, b, m = nodes[..., 0], nodes[..., 1], nodes[..., 2]
     c2, c1, c0 = 2 * (a + b - 2 * m), 4 * m - 3 * a - b, a - x
     root = np.sqrt(np.maximum(c1**2 - 4 * c2 * c0, 0.0))

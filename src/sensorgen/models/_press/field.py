@@ -86,7 +86,9 @@ def _meshed(edges: Edges, air: int, coarse_mm: float, growth: float) -> Mesh:
 
 def _refuse_holes(edges: Edges, corners: Real) -> None:
     """Compare the area within the edges with that of the triangles (m, 3, 2), none of which may be turned over."""
-    area = sum(0.5 * (a[0] * b[1] - a[1] * b[0]) * ((left > 0) - (right > 0)) for (a, b), (left, right) in edges.items())
+    area = sum(
+        0.5 * (a[0] * b[1] - a[1] * b[0]) * ((left > 0) - (right > 0)) for (a, b), (left, right) in edges.items()
+    )
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     parts = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / M_PER_MM**2
     if parts.min() <= 0 or abs(parts.sum() / area - 1) > _HOLE:
@@ -130,7 +132,7 @@ def _between(triangles: Whole, region: Whole, ends: list[Mask]) -> tuple[Whole, 
     beside = coo_matrix((np.ones(middles.size), (middles.ravel(), middles[:, [1, 2, 0]].ravel())), (n, n))
     _, piece = connected_components(beside)
     touched = [np.unique(piece[middles[end[middles].any(axis=1), 0]]) for end in ends]
-    inside = np.isin(piece[middles[:, 0]], np.intersect1d(*touched))
+    inside = np.isin(piece[middles[:, 0]], np.intersect1d(touched[0], touched[1]))
     return triangles[inside], region[inside]
 
 
@@ -158,4 +160,4 @@ def _stiffness(points: Real, triangles: Whole) -> Real:
     jacobian = np.stack([b - a, c - a], axis=2)
     g = np.einsum("qnk,mki->mqni", gradients(*_MIDS.T)[:, :6], np.linalg.inv(jacobian))
     g = g.transpose(0, 2, 1, 3).reshape(len(triangles), 6, 6)
-    return np.matmul(g, g.transpose(0, 2, 1)) * (np.linalg.det(jacobian) / 6)[:, None, None]
+    return np.asarray(np.matmul(g, g.transpose(0, 2, 1)) * (np.linalg.det(jacobian) / 6)[:, None, None])

@@ -12,9 +12,10 @@ from scipy.sparse.linalg import splu
 
 from sensorgen.models._press import contact
 from sensorgen.models._press.contact import Faces, Pairs
-from sensorgen.models._press.element import Elements, Inner
+from sensorgen.models._press.element import Elements, Inner, Tangent
 
 Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
 
 _ENOUGH = 1e-6  # residual over load
 _NEARLY = 1e-3  # the same before the contact partners are looked for anew
@@ -30,7 +31,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class State:
-    """An equilibrium: pressure [Pa], displacements (2n) [m], the triangles' own unknowns, and the contact it rests on."""
+    """An equilibrium: pressure [Pa], displacements (2n) [m], the triangles' own unknowns, and its contact."""
 
     pressure_pa: float
     u_m: Real
@@ -69,7 +70,7 @@ class Problem:
     load: Real
     penalty_pa: float
     stick: bool = False
-    tied: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    tied: Whole = field(default_factory=lambda: np.empty((0, 2), np.int64))
 
     def start(self) -> State:
         """Nothing presses."""
@@ -121,7 +122,7 @@ class Problem:
         return np.asarray(pairs.gap @ self.places(u).ravel())
 
     @cached_property
-    def _places_of_entries(self) -> tuple[Real, Real]:
+    def _places_of_entries(self) -> tuple[Whole, Whole]:
         freedoms = self.elements.freedoms
         return np.repeat(freedoms, 12, axis=1).ravel(), np.tile(freedoms, (1, 12)).ravel()
 
@@ -143,12 +144,14 @@ class Problem:
         slip = state.pairs.slip @ self.places(state.u_m).ravel() * state.pairs.sticks
         return float(0.5 * (k * ((gap < 0) * gap**2 + slip**2)).sum())
 
-    def residual(self, u: Real, inner: Inner, pairs: Pairs, pressure_pa: float) -> tuple[Real, csr_matrix, object]:
+    def residual(self, u: Real, inner: Inner, pairs: Pairs, pressure_pa: float) -> tuple[Real, csr_matrix, Tangent]:
         """Forces out of balance on the free displacements, their derivative, and the triangles' condensed part."""
         local = self.elements.tangent(u, inner)
         force, stiffness = self._touching(pairs, u)
         np.add.at(force, self.elements.freedoms.ravel(), local.force.ravel())
-        whole = coo_matrix((local.stiffness.ravel(), self._places_of_entries), shape=stiffness.shape).tocsr() + stiffness
+        whole = (
+            coo_matrix((local.stiffness.ravel(), self._places_of_entries), shape=stiffness.shape).tocsr() + stiffness
+        )
         return self.free.T @ (force - pressure_pa * self.load), self.free.T @ whole @ self.free, local
 
     def newton(self, state: State, pressure_pa: float, pairs: Pairs, enough: float) -> State | None:

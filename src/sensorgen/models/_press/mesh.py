@@ -124,7 +124,9 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
     The edges are cut here, because a mesher that smooths its sizes forgets the small ones at an apex.
     """
     sharp = pinches(cell)
-    faces = [e for e, sides in cell.edges.items() if OUTSIDE not in sides and cell.solid(sides[0]) != cell.solid(sides[1])]
+    faces = [
+        e for e, sides in cell.edges.items() if OUTSIDE not in sides and cell.solid(sides[0]) != cell.solid(sides[1])
+    ]
     exposed = {p for edge in faces for p in edge}
     sizes = dict.fromkeys(exposed, fineness.corner_mm) | dict.fromkeys(sharp, fineness.apex_mm)
     pieces: dict[Edge, tuple[int, int]] = {}
@@ -132,7 +134,7 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
         ends = [sizes.get(p, fineness.coarse_mm) for p in (a, b)]
         shares = cuts(float(np.hypot(b[0] - a[0], b[1] - a[1])), ends[0], ends[1], fineness)
         places = [a, *((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])) for t in shares), b]
-        open_sides = tuple(k if cell.solid(k) else OUTSIDE for k in sides)
+        open_sides = (sides[0] * cell.solid(sides[0]), sides[1] * cell.solid(sides[1]))
         if open_sides != (OUTSIDE, OUTSIDE):
             pieces |= dict.fromkeys(pairwise(places), open_sides)
     net = triangulated(pieces, fineness.coarse_mm, fineness.growth)
@@ -184,4 +186,5 @@ def _grown(reach: float, size: float, fineness: Fineness) -> Real:
     turns = np.log(fineness.coarse_mm / size) / growth
     whole = np.log1p(growth * reach / size) / growth if reach < bend else turns + (reach - bend) / fineness.coarse_mm
     t = whole * np.arange(1, max(1, round(whole)) + 1) / max(1, round(whole))
-    return np.where(t < turns, size / growth * np.expm1(growth * t), bend + (t - turns) * fineness.coarse_mm)
+    grown = np.where(t < turns, size / growth * np.expm1(growth * t), bend + (t - turns) * fineness.coarse_mm)
+    return np.asarray(grown)
