@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from sensorgen.errors import OutOfRange, SensorgenError
 from sensorgen.interval import Interval
+from sensorgen.scene import Scene
 
 Number = float | complex
 
@@ -98,6 +99,13 @@ def energies(
     return Energies(lower, upper, part, unknowns)
 
 
+def third_electrode(scene: Scene) -> str | None:
+    """Why bounds between two terminals cannot speak of a scene of more, or None."""
+    if {body.terminal for body in scene.bodies} - {"", "top", "bottom"}:
+        return "more than two electrodes: sensorgen stack speaks of them"
+    return None
+
+
 def check(permittivity: Mapping[str, complex], width: float) -> None:
     """Refuse permittivities and accuracies that mean nothing."""
     for material, value in permittivity.items():
@@ -122,8 +130,8 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
     below, above = float(np.real(found.lower)), float(np.real(found.upper))
     if not 0 < below <= above * (1 + ROUNDING):
         raise CrossedBounds(
-            f"lower bound {below:.12g} above upper bound {above:.12g}: the solver failed on this scene; report it, and use "
-            "--model columns meanwhile"
+            f"lower bound {below:.12g} above upper bound {above:.12g}: the solver failed on this scene; report it, "
+            "and use --model columns meanwhile"
         )
     least, most = min(shares), max(shares)
     part, off = np.sqrt(float(np.real(found.part))), np.sqrt((most - least) * max(above - below, 0.0))

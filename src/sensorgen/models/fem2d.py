@@ -41,7 +41,7 @@ def unfit(scene: Scene) -> str | None:
         _triangles(scene)
     except ValueError as error:
         return str(error)
-    return None
+    return fem.third_electrode(scene)
 
 
 def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:

@@ -1,6 +1,7 @@
 """Finite elements in three dimensions for scenes of boxes: a potential from above, a flux from below.
 
-Bricks in layers that shrink towards every edge of the electrodes fill the part of a cell between its mirrors; see
+Bricks in layers that shrink towards edges where the field is infinite fill the part of a cell between its mirrors. On
+boxes all matrices are known in closed form, and elimination from the inside out needs no solver: NumPy is enough. See
 docs/cells.md.
 """
 
@@ -17,7 +18,7 @@ from sensorgen.models._fem_dissection import Elements, energies_of, least
 from sensorgen.scene import Scene
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
-SOURCE = "Dirichlet's and Thomson's principles; graded hexahedra, H1 and H(div) (NGSolve)"
+SOURCE = "Dirichlet's and Thomson's principles; graded boxes, H1 and hybrid H(div), nested dissection"
 COST = 3
 
 WIDTH = 1e-3  # of the interval, where the caller does not say
@@ -28,6 +29,8 @@ _MOST_BRICKS = 2500  # of one rung: more would take hours
 
 def unfit(scene: Scene) -> str | None:
     """Why this model cannot speak of this scene, or None."""
+    if reason := fem.third_electrode(scene):
+        return reason
     try:
         coarse = grid(scene)
     except ValueError as error:
