@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from sensorgen import planner, registry
 from sensorgen import models as model_files
+from sensorgen import planner, registry
 from sensorgen.design import make
 from sensorgen.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.interval import Interval
@@ -127,7 +127,7 @@ def test_refusals_are_told_and_others_answer(fake):
 def test_nobody_can_speak(fake):
     fake.add("one", 1, 0.1, unfit="too round")
     fake.add("two", 2, 0.1, unfit="too flat")
-    with pytest.raises(Unpredictable, match="^one: too round; two: too flat$"):
+    with pytest.raises(Unpredictable, match=r"^one: too round; two: too flat$"):
         capacitance(PLATE, EPS, 1e-3)
 
 
@@ -138,14 +138,14 @@ def test_a_model_by_name(fake):
     with pytest.raises(UnknownName, match="model of capacitance 'deer'; did you mean 'dear'"):
         capacitance(PLATE, EPS, 1e-3, "deer")
     fake.models["dear"].unfit = lambda scene: "too round"
-    with pytest.raises(Unpredictable, match="^dear: too round$"):
+    with pytest.raises(Unpredictable, match=r"^dear: too round$"):
         capacitance(PLATE, EPS, 1e-3, "dear")
 
 
 def test_bounds_that_exclude_each_other_stop(fake):
     fake.add("cheap", 1, 0.4)
     fake.add("wrong", 2, 1e-6, middle=1.3)
-    with pytest.raises(Contradiction, match="wrong says at least 1.2999995 F, cheap at most 1.2 F"):
+    with pytest.raises(Contradiction, match=r"wrong says at least 1.2999995 F, cheap at most 1.2 F"):
         capacitance(PLATE, EPS, 1e-3)
 
 
@@ -205,7 +205,7 @@ def test_a_solver_that_does_not_load_is_told(fake, monkeypatch):
 
     monkeypatch.setattr(planner, "find_spec", lambda name: SimpleNamespace(origin=None))
     monkeypatch.setattr(planner, "import_module", broken)
-    with pytest.raises(SensorgenError, match="does not load .libnglib.so: cannot open.: pip install"):
+    with pytest.raises(SensorgenError, match=r"does not load .libnglib.so: cannot open.: pip install"):
         capacitance(PLATE, EPS, 1e-3, keep=False)
 
 
