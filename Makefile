@@ -10,7 +10,7 @@ READY_DEV = $(VENV)/.ready-dev
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 8
 
-demo: $(READY) ## set up, and build the triangular sensor with a film of 0.2 mm
+demo: $(READY) ## set up (with the solver NGSolve), and build the triangular sensor with a film of 0.2 mm
 	$(BIN)/sensorgen build tri --dielectric 0.2
 
 test: $(READY_DEV) ## set up, with slicers, ngspice and Chromium where apt may, and run all tests
@@ -35,7 +35,7 @@ clean: ## remove everything that is derived
 $(READY): pyproject.toml constraints.txt scripts/system-packages
 	scripts/system-packages
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[fem]'
 	touch $@
 
 $(READY_DEV): $(READY)

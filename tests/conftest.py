@@ -1,4 +1,12 @@
-"""What the tests have to say besides passing."""
+"""What the tests have to say besides passing, and a cache of its own for each."""
+
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def _cache(monkeypatch, tmp_path_factory):
+    """No test finds what another one, or the user, has kept."""
+    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path_factory.mktemp("cache")))
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -173,7 +173,7 @@ def ladder(monkeypatch):
     """A function that puts models, cheapest first, in the place of the registered ones."""
 
     def put(*found: Model) -> None:
-        monkeypatch.setattr(planner, "_capacitance_models", lambda: [(f"m{k}", m) for k, m in enumerate(found)])
+        monkeypatch.setattr(planner, "capacitance_models", lambda: {f"m{k}": m for k, m in enumerate(found)})
 
     return put
 

@@ -51,3 +51,13 @@ def test_unprintable_names_its_first_finding_that_stands():
     ]
     assert str(Unprintable(findings)).startswith("8-bed, too large; nothing was written")
     assert Unprintable(findings).findings == findings
+
+
+def test_modules_are_found_by_what_they_define(tmp_path):
+    (tmp_path / "one.py").write_text("def speak(word):\n    def answer():\n        pass\n")
+    (tmp_path / "two.py").write_text("# def answer(\nraise ImportError\n\n\ndef answer(\n    word): ...\n")
+    (tmp_path / "_three.py").write_text("def answer(): ...\n")
+    package = type("Package", (), {"__path__": [str(tmp_path)]})
+    assert registry.defining(package, "answer") == ["two"]
+    assert registry.defining(package, "answ") == []
+    assert registry.defining(models, "capacitance") == ["columns", "fem2d", "fem3d"]

@@ -59,7 +59,7 @@ def answer(design: Design, asked: Asked) -> dict[str, Any]:
 
 
 def answers(designs: Sequence[Design], asked: Asked, jobs: int, done: Callable[[], None]) -> list[dict[str, Any]]:
-    """The same for many designs, each as a process of its own where it is not known from before.
+    """The same for many designs, those that are not known from before in several processes.
 
     A design that no model can speak of has a reason in place of numbers.
 
@@ -110,7 +110,8 @@ def _said(scene: Scene, permittivity: dict[str, float], asked: Asked) -> Answer 
 
 def _in_parallel(inputs: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[tuple[int, Answer | str]]:
     """Number and answer of each, as they come."""
-    if not inputs:
+    if min(jobs, len(inputs)) < 2:
+        yield from ((k, _said(*each)) for k, each in enumerate(inputs))
         return
     from concurrent.futures import Future, as_completed
     from concurrent.futures.process import BrokenProcessPool

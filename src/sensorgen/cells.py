@@ -101,7 +101,12 @@ def cell(section: Section, height_mm: float) -> Cell:
     ValueError
         Outlines overlap, or an outline is open.
     """
-    return mirrored([_slice(c, height_mm) for c in columns(section)])
+    return mirrored(section_slices(section, height_mm))
+
+
+def section_slices(section: Section, height_mm: float) -> list[Slice]:
+    """The whole section in strips, air included; raises ValueError where outlines overlap."""
+    return [_slice(c, height_mm) for c in columns(section)]
 
 
 def mirrored(slices: list[Slice]) -> Cell:
@@ -179,15 +184,17 @@ def _candidates(slices: list[Slice]) -> list[float]:
 def _pairs(places: list[float], end_mm: float) -> Iterator[Point]:
     """Pairs of places, the nearest first, of which the first lies no further from the start than they are apart.
 
-    In windows of twice the size each, so that a long sensor's pattern is found in its first periods.
+    The whole has to hold two of the pieces between them, or it would not show that they repeat. In windows of twice the
+    size each, so that a long sensor's pattern is found in its first periods.
     """
     at = np.array(places) - places[0]
     reach = float(np.diff(at).min())
-    while reach / 2 < end_mm - places[0]:
+    most = (end_mm - places[0]) / 2 + ROUNDING_MM
+    while reach / 2 < most:
         near = at[: min(int(np.searchsorted(at, 2 * reach + ROUNDING_MM)), _MOST_PLACES)]
         i, j = np.triu_indices(len(near), 1)
         apart = near[j] - near[i]
-        fits = (near[i] <= apart + ROUNDING_MM) & (reach / 2 < apart) & (apart <= reach)
+        fits = (near[i] <= apart + ROUNDING_MM) & (reach / 2 < apart) & (apart <= min(reach, most))
         order = np.argsort(apart[fits], kind="stable")
         yield from ((places[a], places[b]) for a, b in zip(i[fits][order], j[fits][order], strict=True))
         reach *= 2
@@ -244,7 +251,9 @@ def _cell(slices: list[Slice], low: float, high: float) -> Cell:
     """The piece between two places, cut where a sensor's end falls into it, and how often each part occurs."""
     pieces = [(p.left_mm, p.right_mm) for p in _folded(slices, low, high)]
     inside = _cut(slices, low, high)
-    ends = _distinct(sorted({x for piece in pieces for x in piece} | {x for s in inside for x in (s.left_mm, s.right_mm)}))
+    ends = _distinct(
+        sorted({x for piece in pieces for x in piece} | {x for s in inside for x in (s.left_mm, s.right_mm)})
+    )
     parts = [p for a, b in pairwise(ends) for p in _cut(inside, a, b)]
     middles = [(p.left_mm + p.right_mm) / 2 for p in parts]
     shares = [float(sum(a < m < b for a, b in pieces)) for m in middles]

@@ -22,6 +22,7 @@ from sensorgen.design import Design
 from sensorgen.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.interval import Interval
 from sensorgen.scene import Scene
+from sensorgen.sections import overlap
 
 SOLVER = "ngsolve"  # the optional package that dear models need
 _EXACT = 1e-9  # relative width of a capacitance's bounds below which the scene is a plate
@@ -30,6 +31,10 @@ _CHEAP = 1  # up to this cost, a model is asked before it is weighed
 
 class Unpredictable(SensorgenError):
     """No model can speak of the scene; the message holds what each one said."""
+
+
+class Contradiction(SensorgenError):
+    """Two models whose bounds exclude each other: a fault, and no result."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +153,9 @@ def capacitance(
     Raises
     ------
     Unpredictable
-        No model can speak of the scene, or the one that is named cannot.
+        Bodies overlap; no model can speak of the scene, or the one that is named cannot.
+    Contradiction
+        The bounds of two models exclude each other.
     UnknownName
         No model of capacitance goes by that name.
     OutOfRange
@@ -188,7 +195,7 @@ def weighed(scene: Scene, width: float = inf, model: str = "") -> tuple[Candidat
 
 
 def _ordered(width: float, model: str) -> list[Candidate]:
-    loaded = _capacitance_models()
+    loaded = capacitance_models()
     if model and model not in loaded:
         raise UnknownName("model of capacitance", model, loaded)
     found = [
@@ -197,13 +204,13 @@ def _ordered(width: float, model: str) -> list[Candidate]:
     return sorted(found, key=lambda c: _rank(c, loaded[c.model].COST, width))
 
 
-def _capacitance_models() -> dict[str, ModuleType]:
-    loaded = {name: registry.load(models, name) for name in registry.names(models)}
-    return {name: module for name, module in loaded.items() if hasattr(module, "capacitance")}
+def capacitance_models() -> dict[str, ModuleType]:
+    """The models of capacitance, by name."""
+    return {name: registry.load(models, name) for name in registry.defining(models, "capacitance")}
 
 
 def _unfit(candidate: Candidate, scene: Scene) -> str:
-    return registry.load(models, candidate.model).unfit(scene) or ""
+    return capacitance_models()[candidate.model].unfit(scene) or ""
 
 
 def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float]:
@@ -229,6 +236,9 @@ def _expectations() -> dict[str, list[tuple[float, float]]]:
 
 
 def _asked(scene: Scene, permittivity: Mapping[str, float], width: float, model: str) -> Answer:
+    overlaps = overlap(scene)
+    if overlaps:
+        raise Unpredictable(f"{overlaps}; expected each place to belong to one body")
     plan: list[Candidate] = []
     refused: list[str] = []
     bounds: dict[str, Interval] = {}
@@ -242,11 +252,23 @@ def _asked(scene: Scene, permittivity: Mapping[str, float], width: float, model:
             continue
         found, seconds = _timed(candidate.model, scene, permittivity, width)
         bounds[candidate.model] = found
+        _refuse_contradiction(bounds)
         plan.append(replace(candidate, width=found.width(), seconds=seconds))
     if not bounds:
         raise Unpredictable("; ".join(refused))
     best = min(bounds, key=lambda name: bounds[name].width())
     return Answer(best, bounds[best], tuple(refused), width, tuple(plan))
+
+
+def _refuse_contradiction(bounds: Mapping[str, Interval]) -> None:
+    """All intervals hold the truth: any two of them overlap."""
+    lower = max(bounds, key=lambda name: bounds[name].lower)
+    upper = min(bounds, key=lambda name: bounds[name].upper)
+    if bounds[lower].lower > bounds[upper].upper * (1 + _EXACT):
+        raise Contradiction(
+            f"{lower} says at least {bounds[lower].lower:.9g} F, {upper} at most {bounds[upper].upper:.9g} F: one of "
+            "them fails on this scene; report it, and use neither"
+        )
 
 
 def _idle(candidate: Candidate, bounds: Mapping[str, Interval], width: float) -> str:
@@ -259,16 +281,16 @@ def _idle(candidate: Candidate, bounds: Mapping[str, Interval], width: float) ->
 
 def _timed(name: str, scene: Scene, permittivity: Mapping[str, float], width: float) -> tuple[Interval, float]:
     """A model's bounds, and how long they took once everything is loaded [s]."""
-    model = registry.load(models, name)
+    model = capacitance_models()[name]
     given = (model.WIDTH if width == inf else width,) if hasattr(model, "WIDTH") else ()
-    if given:
-        _load_solver()
+    if hasattr(model, "NEEDS"):
+        load_solver()
     start = time.perf_counter()
     found: Interval = model.capacitance(scene, permittivity, *given)
     return found, time.perf_counter() - start
 
 
-def _load_solver() -> None:
+def load_solver() -> None:
     """Import the solver ahead of the clock, if it is there."""
     try:
         if find_spec(SOLVER):

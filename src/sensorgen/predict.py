@@ -62,6 +62,7 @@ def prediction(
     return {
         "model": {"capacitance": found.answer.model, "line": "line"},
         "refused": list(found.answer.refused),
+        "relative_width": found.answer.capacitance_f.width(),
         "capacitance_f": _bounds(found.answer.capacitance_f),
         "capacitance_per_area_f_per_m2": _bounds(found.answer.capacitance_f.times(1 / area)),
         "electrode_resistance_ohm": resistance,

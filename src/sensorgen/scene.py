@@ -48,7 +48,8 @@ class Prism:
     def is_box(self) -> bool:
         """Whether its six faces are square to the axes."""
         (a0, a1), (b0, b1) = (self.span(axis) for axis in PLANE[self.axis])
-        return len(self.outline) == 4 and set(self.outline) == {(a0, b0), (a1, b0), (a1, b1), (a0, b1)}
+        corners = {(a0, b0), (a1, b0), (a1, b1), (a0, b1)}
+        return len(self.outline) == 4 and set(self.outline) == corners and area_mm2(self.outline) != 0
 
     def cut(self, axis: str, at_mm: float) -> list[Outline]:
         """Outlines in which the plane ``axis = at_mm`` cuts it, in ``PLANE[axis]`` [mm].

@@ -115,6 +115,21 @@ def columns(section: Section) -> list[Column]:
     ]
 
 
+def overlap(scene: Scene) -> str | None:
+    """Where bodies run into each other, or an outline into itself; None where nowhere, or where no section tells."""
+    try:
+        found = sections(scene)
+    except ValueError:
+        return None
+    for section in found:
+        for column in columns(section):
+            for below, above in pairwise(column.layers):
+                if min(a - b for a, b in zip(above.bottom_mm, below.top_mm, strict=True)) < -ROUNDING_MM:
+                    names = " and ".join(dict.fromkeys((below.body.name, above.body.name)))
+                    return f"outlines overlap near {section.across} = {column.left_mm:g} mm: {names}"
+    return None
+
+
 def _layers(section: Section, edges: list[tuple[Point, int]]) -> Iterator[Layer]:
     by_region: dict[int, list[Point]] = {}
     for line, number in edges:

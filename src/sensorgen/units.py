@@ -86,6 +86,7 @@ def _table(**units: str) -> dict[str, Decimal]:
 LENGTH_MM = Quantity("length", _table(mm="1", um="1e-3", cm="10", m="1000") | {"µm": Decimal("1e-3")})
 FREQUENCY_HZ = Quantity("frequency", _table(Hz="1", mHz="1e-3", kHz="1e3", MHz="1e6", GHz="1e9"))
 NUMBER = Quantity("number", {})
+STRESS_KPA = Quantity("stress", _table(kPa="1", Pa="1e-3", MPa="1e3"))
 FORCE_N = Quantity("force", _table(N="1", mN="1e-3", kN="1e3", MN="1e6", gf="9.80665e-3", kgf="9.80665"))
 
 

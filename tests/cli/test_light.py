@@ -3,7 +3,7 @@
 import pytest
 
 HEAVY = ("numpy", "pydantic", "yaml", "build123d", "trimesh", "OCP", "manifold3d")
-CAD = ("build123d", "trimesh", "OCP", "matplotlib", "scipy", "plotly", "sensorgen.plots")
+CAD = ("build123d", "trimesh", "OCP", "matplotlib", "scipy", "plotly", "sensorgen.plots", "ngsolve", "netgen")
 LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))"
 
 
@@ -18,6 +18,9 @@ LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))
         (["check", "tri"], CAD),
         (["predict", "tri"], CAD),
         (["predict", "tri", "--force", "0:6:1"], CAD),
+        (["cell", "tri", "--help"], HEAVY),
+        (["chart", "--help"], HEAVY),
+        (["cell", "reference"], CAD),
         (["draw", "tri", "-o", "-"], CAD),
         (["build", "tri", "--no-cad"], CAD),
         (["list", "materials"], CAD),

@@ -266,7 +266,7 @@ def half_covered() -> Scene:
         (rect_cell(0.0), "touch"),
         (half_covered(), "does not cover"),
         (tri_cell(0.1).turned_over(), "does not cover"),  # the bottom terminal is above
-        (plates(Body("step", "etpu", (box(0, 1, 0, 2, 0.3, 0.4),), "bottom")), "not flat"),
+        (plates(Body("step", "etpu", (box(0, 1, 0, 1, 0.3, 0.4),), "bottom")), "not flat"),
         (plates(Body("wedge", "x60", (Prism("z", ((0, 0), (1, 0), (0, 1)), 0.3, 0.5),))), "constant cross-sections"),
     ],
 )

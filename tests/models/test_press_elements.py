@@ -82,7 +82,9 @@ def test_the_residual_is_the_derivative_of_the_energy():
     du, di, h = rng.normal(size=len(u)), rng.normal(size=(8, 5)), 1e-6
     up, down = (e.energy_j_per_m(u + s * du, inner.moved(di, s)) for s in (h, -h))
     residual, _ = e.full(u, inner)
-    assert (up - down) / (2 * h) == pytest.approx((residual * np.concatenate([du[e.freedoms], di], axis=1)).sum(), rel=1e-6)
+    assert (up - down) / (2 * h) == pytest.approx(
+        (residual * np.concatenate([du[e.freedoms], di], axis=1)).sum(), rel=1e-6
+    )
 
 
 @pytest.mark.parametrize(("thick", "stiffer"), [(0.6, 94), (0.2, 835), (0.1, 3335)])
@@ -153,7 +155,12 @@ def _linear(mesh, modulus, nu, n):
     right = np.flatnonzero(p[:, 0] == 48.0)
     force[2 * right + 1] = 1 / n
     force[2 * right[[0, -1]] + 1] = 0.5 / n
-    return whole, force, np.flatnonzero(np.repeat(p[:, 0] > 0, 2)), int(np.argmin(abs(p[:, 0] - 48) + abs(p[:, 1] - 60)))
+    return (
+        whole,
+        force,
+        np.flatnonzero(np.repeat(p[:, 0] > 0, 2)),
+        int(np.argmin(abs(p[:, 0] - 48) + abs(p[:, 1] - 60))),
+    )
 
 
 def test_cooks_membrane_locks_with_linear_triangles_and_not_with_ours():

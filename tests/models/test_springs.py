@@ -13,7 +13,7 @@ def test_a_plate_is_springs_in_series():
 
 
 def test_a_wedge_closes_with_the_root_of_the_stress():
-    """Compliant electrodes apart, a wedge of slope k over a bed of constant yielding s: stress ~ displacement squared."""
+    """Compliant electrodes apart, a wedge over a bed of constant yielding: stress as displacement squared."""
     scene = make({"shape": "tri"}).in_use
     low, high = springs.displacement_m(scene, {"x60": 6e6, "etpu": 22e6}, [5e3, 2e4])
     assert high / low == pytest.approx(2.0, rel=0.03)

@@ -1,127 +1,107 @@
 """``sensorgen compress``: how a cell gives way under stress, and what that does to its capacitance."""
 
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import show
+from sensorgen import units
+from sensorgen.cli import FOUND_ERRORS, show
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import OneOf
-from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.cli.words import OneOf, Values
 
 if TYPE_CHECKING:
     from sensorgen.design import Design
-    from sensorgen.models.press2d import Elastic, Pressed
 
-_MOST_POINTS = 200
+Data = dict[str, Any]
+
+
+def _choice(flag: str, name: str, choices: list[str], about: str) -> click.Option:
+    return click.Option([flag, name], type=OneOf(choices), default=choices[0], show_default=True, help=about)
+
 
 OWN: list[click.Parameter] = [
-    click.Option(["--stress"], default="0:100:10", metavar="FIRST:LAST:STEP", help="Stresses [kPa]."),
-    click.Option(["--base"], type=OneOf(["bonded", "sliding"]), default="bonded", help="How the bottom is held."),
-    click.Option(["--sides", "period"], type=OneOf(["fixed", "free"]), default="fixed", help="Whether the sides of the cell stay, or give way."),
-    click.Option(["--top"], type=OneOf(["even", "rigid"]), default="even", help="Even pressure, or a stiff plate."),
-    click.Option(["--contact"], type=OneOf(["frictionless", "stick"]), default="frictionless", help="Faces that touch."),
+    click.Option(
+        ["--stress"], type=Values(units.STRESS_KPA, zero=True), default="0:100:10", show_default=True,
+        help="Stresses on the top [kPa]; 0 is put before them.",
+    ),
+    _choice("--base", "base", ["bonded", "sliding"], "How the bottom is held."),
+    _choice("--sides", "period", ["fixed", "free"], "Whether the sides of the cell stay, or give way (base sliding)."),
+    _choice("--top", "top", ["even", "rigid"], "Even pressure, or a stiff plate."),
+    _choice("--contact", "contact", ["frictionless", "stick"], "What faces do that touch."),
+    click.Option(
+        ["--model"], type=OneOf(["press2d", "springs"]), default=None,
+        help="Finite elements, or springs of columns; the first that can speak of the scene if not given.",
+    ),
     click.Option(["--check-mesh"], is_flag=True, help="Solve on a finer mesh too, and compare."),
-    click.Option(["--plot"], metavar="FILE", help="Draw displacement and capacitance over stress."),
+    click.Option(["--no-cache"], is_flag=True, help="Solve anew, and keep nothing."),
+    click.Option(["--plot"], metavar="FILE.png", help="Draw displacement and capacitance over stress."),
     click.Option(["--json", "as_json"], is_flag=True, help="Print the curve as JSON."),
-]
+]  # fmt: skip
 
 
-def _work(design: "Design", *, stress: str, check_mesh: bool, plot: str | None, as_json: bool, **held: str) -> int:
-    from sensorgen.models import press2d
-    from sensorgen.models._press.mesh import Fineness
-    from sensorgen.models._press.support import Held
+def _work(
+    design: "Design", *, stress: tuple[float, ...], model: str | None, check_mesh: bool, no_cache: bool,
+    plot: str | None, as_json: bool, **held: str,
+) -> int:  # fmt: skip
+    from sensorgen import compressed
 
-    cell = press2d.cell(design.in_use, getattr(design.params, "period_mm", None))
-    inputs = (cell, _solids(design), [1e3 * kpa for kpa in stresses_kpa(stress)], _permittivity(design))
-    found = press2d.press(*inputs, held=Held(**held))
-    if check_mesh:
-        found = press2d.compared(found, press2d.press(*inputs, held=Held(**held), fineness=Fineness().finer()))
-    data = _plain(found, held)
+    stresses = compressed.stresses_kpa(stress)
     if plot:
-        _draw(data, plot)
-    show.as_json(data) if as_json else _table(data)
-    return 0
+        from sensorgen.plots.library import needed
+
+        needed("matplotlib")
+    with _bar(stresses) as step:
+        data = compressed.answer(
+            design, stresses, compressed.Held(**held), model or "", check_mesh=check_mesh, keep=not no_cache, step=step
+        )
+    if plot:
+        from sensorgen import store
+        from sensorgen.plots import compression
+
+        store.replace(Path(plot), compression.png(data))
+    if as_json:
+        show.as_json(data)
+    else:
+        _table(data)
+    return _verdict(data)
 
 
-def stresses_kpa(text: str) -> list[float]:
-    """Stresses from FIRST:LAST:STEP [kPa]; the first is 0.
-
-    >>> stresses_kpa("0:100:50")
-    [0.0, 50.0, 100.0]
-    """
-    try:
-        first, last, step = (float(word) for word in text.split(":"))
-    except ValueError:
-        raise BadInput(f"--stress {text!r}: expected FIRST:LAST:STEP in kPa, as in 0:100:10") from None
-    if not (first == 0 < step <= last < float("inf")):
-        raise OutOfRange(f"--stress {text!r}: expected 0 first, then a last stress and a step above 0")
-    if last / step > _MOST_POINTS:
-        raise OutOfRange(f"--stress {text!r}: {last / step:.0f} points; expected at most {_MOST_POINTS}")
-    return [step * k for k in range(int(last / step * (1 + 1e-12)) + 1)]
+def _verdict(data: Data) -> int:
+    """0 where every check held; else what did not, and 1."""
+    for fault in data["faults"]:
+        click.echo(f"sensorgen: not to be trusted: {fault}", err=True)
+    return FOUND_ERRORS if data["faults"] else 0
 
 
-def _solids(design: "Design") -> dict[str, "Elastic"]:
-    from sensorgen.models.press2d import Elastic
-
-    used = design.used()
-    names = {body.material for body in design.in_use.bodies}
-    loaded = {name: design.material(name) for name in sorted(names)}
-    return {
-        name: Elastic(m.value("youngs_modulus_pa", used[name]).value, m.value("poisson_ratio", used[name]).value)
-        for name, m in loaded.items()
-    }
-
-
-def _permittivity(design: "Design") -> dict[str, float]:
-    used = design.used() | {"air": ""}
-    names = {body.material for body in design.in_use.bodies if not body.terminal} | {"air"}
-    return {name: design.material(name).value("relative_permittivity", used[name]).value for name in sorted(names)}
-
-
-def _plain(found: "Pressed", held: dict[str, str]) -> dict[str, Any]:
-    return {
-        "model": "press2d",
-        "held": held,
-        "stress_kpa": [p / 1e3 for p in found.stress_pa.tolist()],
-        "displacement_um": [d * 1e6 for d in found.displacement_m.tolist()],
-        "lower_f_per_m2": [c.lower if c else None for c in found.capacitance_f_per_m2],
-        "upper_f_per_m2": [c.upper if c else None for c in found.capacitance_f_per_m2],
-        "converged_kpa": found.converged_pa / 1e3,
-        "faults": list(found.faults),
-        "bounds": "of the capacitance of the deformed outlines as computed; the outlines' own error is not in them",
-    }
-
-
-def _table(data: dict[str, Any]) -> None:
+def _table(data: Data) -> None:
     click.echo(f"{'stress [kPa]':>12}  {'displacement [um]':>17}  capacitance [pF/m2]")
     rows = zip(*(data[k] for k in ("stress_kpa", "displacement_um", "lower_f_per_m2", "upper_f_per_m2")), strict=True)
     for stress, moved, lower, upper in rows:
-        bounds = f"{lower * 1e12:.6g} to {upper * 1e12:.6g}" if lower is not None else "not known: no mesh"
+        bounds = f"{lower * 1e12:.7g} to {upper * 1e12:.7g}" if lower is not None else "not known"
         click.echo(f"{stress:12.4g}  {moved:17.4g}  {bounds}")
-    click.echo(f"converged up to {data['converged_kpa']:.4g} kPa; {', '.join(f'{k} {v}' for k, v in data['held'].items())}")
-    for fault in data["faults"]:
-        click.echo(click.style(f"not to be trusted: {fault}", fg="red"))
+    held = ", ".join(f"{key} {value}" for key, value in data["held"].items())
+    click.echo(f"{data['model']}, converged up to {data['converged_kpa']:.4g} kPa; {held}")
+    for doubt in data["doubts"]:
+        click.echo(f"doubt: {doubt}")
 
 
-def _draw(data: dict[str, Any], file: str) -> None:
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
-    left.plot(data["stress_kpa"], data["displacement_um"], "o-", ms=3)
-    left.set(xlabel="stress [kPa]", ylabel="displacement of the top [µm]", ylim=(0, None))
-    known = [k for k, c in enumerate(data["lower_f_per_m2"]) if c is not None]
-    middle = [(data["lower_f_per_m2"][k] * data["upper_f_per_m2"][k]) ** 0.5 * 1e9 for k in known]
-    right.plot([data["stress_kpa"][k] for k in known], middle, "o-", ms=3)
-    right.set(xlabel="stress [kPa]", ylabel="capacitance [nF/m²]")
-    figure.savefig(file, dpi=150)
+@contextmanager
+def _bar(stresses: tuple[float, ...]) -> Iterator[Callable[[float], None]]:
+    """A progress bar that stands at the highest stress reached so far, only for a person."""
+    with click.progressbar(
+        length=len(stresses), file=sys.stderr, hidden=not sys.stderr.isatty(), label="pressing"
+    ) as bar:
+        bar.render_progress()
+        yield lambda reached_pa: bar.update(sum(1e3 * kpa <= reached_pa for kpa in stresses) - bar.pos)
 
 
 command = DesignGroup(
     _work, OWN, name="compress",
-    help="Press a cell: displacement and capacitance over stress, by plane-strain finite elements with contact.",
+    help="Press a cell: displacement and capacitance over stress, by plane-strain finite elements with contact. Exit "
+    "code 1 where a check says that the answer is not to be trusted.",
     short_help="Displacement and capacitance under stress.",
 )  # fmt: skip

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from sensorgen import units
-from sensorgen.cli import budget_text, card_text, show
+from sensorgen.cli import FOUND_ERRORS, budget_text, card_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Length, OneOf, Ratio, Values
 from sensorgen.errors import BadInput, Unwritable
@@ -77,10 +77,22 @@ def _work(
     if not (force_n or position_mm or how["as_csv"] or how["plot"]):
         predicted = prediction(design, tones, law, tip_m, profile=profile, accuracy=wanted)
         _deliver(_unpressed(predicted, as_json=how["as_json"]), how["output"])
-        return 0
+        return _verdict(predicted, accuracy)
     sensed = sensor_of(design, law, tip_m, profile=profile, accuracy=wanted)
     _pressed(design, sensed, (tones, force_n or FORCES_N, position_mm or positions_mm(design)), wanted, how)
     return 0
+
+
+def _verdict(predicted: dict[str, Any], accuracy: float | None) -> int:
+    """0, or 1 and a word where the capacitance is not known as well as wanted."""
+    if accuracy is None or predicted["capacitance_f"] is None or predicted["relative_width"] <= accuracy:
+        return 0
+    why = "".join(f"; {reason}" for reason in predicted["refused"])
+    click.echo(
+        f"sensorgen: an accuracy of {accuracy:g} was not reached; the best is {predicted['relative_width']:.2g}{why}",
+        err=True,
+    )
+    return FOUND_ERRORS
 
 
 def _refuse_two(how: dict[str, Any]) -> None:

@@ -1,9 +1,9 @@
-r"""Both bounds of a capacitance on one mesh, by NGSolve: potentials from above, fluxes from below.
+r"""Both bounds of a capacitance: potentials from above, fluxes from below; on triangles by NGSolve.
 
 Dirichlet: any continuous u, 0 and 1 V on the electrodes, has :math:`C \le \int \varepsilon |\nabla u|^2`.
 Thomson: any D of continuous normal component, without sources, tangential at the mirrors, has
 :math:`C \ge 2 Q(D) - \int |D|^2 / \varepsilon`, Q its flux into the electrode at 1 V.
-Both are quadratic and stationary at their best field: what a solver leaves unsolved enters squared, and to the safe side.
+Both are stationary at their best field: what a solver leaves unsolved enters squared, and to the safe side.
 """
 
 import os
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from sensorgen.errors import OutOfRange, SensorgenError
 from sensorgen.interval import Interval
+from sensorgen.scene import Scene
 
 Number = float | complex
 
@@ -26,18 +27,18 @@ class CrossedBounds(SensorgenError):
 
 @dataclass(frozen=True)
 class Mesh:
-    """Elements that NGSolve is to fill with polynomials.
+    """Triangles that NGSolve is to fill with polynomials.
 
     Attributes
     ----------
-    points : (n, d) array
+    points : (n, 2) array
         Corners [mm].
-    elements : (m, k) array
-        Corners of each element: triangles where d is 2, bricks where it is 3.
+    elements : (m, 3) array
+        Corners of each triangle.
     regions : (m,) array
         Number of each element's region, from 0.
-    terminals : dict of str to (k, d or 4) array
-        Edges or faces that lie on "top" and on "bottom".
+    terminals : dict of str to (k, 2) array
+        Edges that lie on "top" and on "bottom".
     """
 
     points: NDArray[np.float64]
@@ -48,7 +49,7 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Energies:
-    """What one mesh and order give, each over eps0 and, in two dimensions, per depth [- or mm].
+    """What one mesh and order give, each over eps0: [mm], or per depth in two dimensions [-].
 
     Attributes
     ----------
@@ -69,7 +70,7 @@ class Energies:
 def energies(
     mesh: Mesh, permittivity: Sequence[Number], weights: Sequence[float], order: int, flux_order: int
 ) -> Energies:
-    """Solve both problems with polynomials of one order.
+    """Solve both problems on triangles with polynomials of one order.
 
     Parameters
     ----------
@@ -85,23 +86,24 @@ def energies(
     Raises
     ------
     CrossedBounds
-        The lower bound lies above the upper one by more than rounding.
+        The flux does not balance its energy: it was not solved.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # elements are small: threads would only wait for each other
     import ngsolve as ng
 
     lossy = any(np.imag(e) != 0 for e in permittivity)
-    direct = mesh.points.shape[1] == 2 or lossy
     space = _ngsolve(mesh)
     eps = ng.CoefficientFunction([complex(e) if lossy else float(np.real(e)) for e in permittivity])
-    upper, part = _potential(space, eps, weights, order, lossy, direct)
-    lower, unknowns = _flux(space, eps, flux_order, lossy, direct)
-    if not lossy and not 0 < lower <= upper * (1 + ROUNDING):
-        raise CrossedBounds(
-            f"lower bound {lower:.12g} above upper bound {upper:.12g} (order {order}): the solver failed on this scene; "
-            "report it, and use --model columns meanwhile"
-        )
+    upper, part = _potential(space, eps, weights, order, lossy)
+    lower, unknowns = _flux(space, eps, flux_order, lossy)
     return Energies(lower, upper, part, unknowns)
+
+
+def third_electrode(scene: Scene) -> str | None:
+    """Why bounds between two terminals cannot speak of a scene of more, or None."""
+    if {body.terminal for body in scene.bodies} - {"", "top", "bottom"}:
+        return "more than two electrodes: sensorgen stack speaks of them"
+    return None
 
 
 def check(permittivity: Mapping[str, complex], width: float) -> None:
@@ -119,16 +121,26 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
     With weights w up to W on parts of the cell, the energy norm of the exact field differs from the computed one by at
     most :math:`\sqrt{W (C_{upper} - C_{lower})}`, since its error over the whole cell is
     :math:`\|u_h - u\|^2 = C_{upper} - C`.
+
+    Raises
+    ------
+    CrossedBounds
+        The lower bound lies above the upper one by more than rounding.
     """
+    below, above = float(np.real(found.lower)), float(np.real(found.upper))
+    if not 0 < below <= above * (1 + ROUNDING):
+        raise CrossedBounds(
+            f"lower bound {below:.12g} above upper bound {above:.12g}: the solver failed on this scene; report it, "
+            "and use --model columns meanwhile"
+        )
     least, most = min(shares), max(shares)
-    gap = max(found.upper - found.lower, 0.0)
-    part, off = np.sqrt(found.part), np.sqrt((most - least) * gap)
-    lower = least * found.lower + max(part - off, 0.0) ** 2
-    upper = least * found.upper + (part + off) ** 2
-    return Interval(float(min(lower, upper)), float(upper))
+    part, off = np.sqrt(float(np.real(found.part))), np.sqrt((most - least) * max(above - below, 0.0))
+    lower = least * below + max(part - off, 0.0) ** 2
+    upper = least * above + (part + off) ** 2
+    return Interval(float(min(lower, upper) * (1 - ROUNDING)), float(upper * (1 + ROUNDING)))
 
 
-ROUNDING = 1e-10  # relative: by how much bounds that have met may seem to cross
+ROUNDING = 1e-10  # relative: what doubles may lose in a solve, by which both bounds are moved outwards
 
 
 def _ngsolve(mesh: Mesh) -> Any:
@@ -136,31 +148,23 @@ def _ngsolve(mesh: Mesh) -> Any:
     import netgen.meshing as netgen
     import ngsolve as ng
 
-    dim = mesh.points.shape[1]
     size = np.ptp(mesh.points, axis=0).max()
     points = np.zeros((len(mesh.points), 3))
-    points[:, :dim] = (mesh.points - mesh.points.min(axis=0)) / size
-    made = netgen.Mesh(dim)
+    points[:, :2] = (mesh.points - mesh.points.min(axis=0)) / size
+    made = netgen.Mesh(2)
     made.AddPoints(points)
-    if dim == 2:
-        for number in range(int(mesh.regions.max()) + 1):
-            made.Add(netgen.FaceDescriptor(surfnr=number + 1, domin=number + 1, domout=0, bc=number + 1))
-    else:
-        for number in range(len(mesh.terminals)):
-            made.Add(netgen.FaceDescriptor(surfnr=number + 1, domin=1, domout=0, bc=number + 1))
     for number in range(int(mesh.regions.max()) + 1):
+        made.Add(netgen.FaceDescriptor(surfnr=number + 1, domin=number + 1, domout=0, bc=number + 1))
         here = np.ascontiguousarray(mesh.elements[mesh.regions == number])
-        made.AddElements(dim=dim, index=number + 1, data=here, base=0)
+        made.AddElements(dim=2, index=number + 1, data=here, base=0)
         made.SetMaterial(number + 1, str(number))
-    for number, (name, faces) in enumerate(mesh.terminals.items()):
-        made.AddElements(dim=dim - 1, index=number + 1, data=np.ascontiguousarray(faces), base=0)
+    for number, (name, edges) in enumerate(mesh.terminals.items()):
+        made.AddElements(dim=1, index=number + 1, data=np.ascontiguousarray(edges), base=0)
         made.SetBCName(number, name)
     return ng.Mesh(made)
 
 
-def _potential(
-    space: Any, eps: Any, weights: Sequence[float], order: int, lossy: bool, direct: bool
-) -> tuple[Number, Number]:
+def _potential(space: Any, eps: Any, weights: Sequence[float], order: int, lossy: bool) -> tuple[Number, Number]:
     """Least energy of a potential, and its weighted part."""
     import ngsolve as ng
 
@@ -169,7 +173,7 @@ def _potential(
     form = ng.BilinearForm(eps * ng.grad(u) * ng.grad(v) * ng.dx, symmetric=True, condense=True)
     found = ng.GridFunction(fes)
     found.Set(ng.CF(1), definedon=space.Boundaries("top"))
-    _solve(form, found, direct)
+    _solve(form, found)
     density = eps * ng.grad(found) * ng.grad(found)
     whole = ng.Integrate(density, space, order=2 * order + _MORE)
     if not any(weights):
@@ -177,7 +181,7 @@ def _potential(
     return whole, ng.Integrate(ng.CoefficientFunction(list(weights)) * density, space, order=2 * order + _MORE)
 
 
-def _flux(space: Any, eps: Any, order: int, lossy: bool, direct: bool) -> tuple[Number, int]:
+def _flux(space: Any, eps: Any, order: int, lossy: bool) -> tuple[Number, int]:
     """Most that Thomson's functional reaches, by fluxes that facets' potentials keep continuous.
 
     The sign makes what is left after the elements' own unknowns positive definite.
@@ -195,41 +199,26 @@ def _flux(space: Any, eps: Any, order: int, lossy: bool, direct: bool) -> tuple[
     form += -(w * (e * normal) + z * (d * normal)) * ng.dx(element_boundary=True)
     found = ng.GridFunction(fes)
     found.components[2].Set(ng.CF(1), definedon=space.Boundaries("top"))
-    unsolved = _solve(form, found, direct)
+    _solve(form, found)
     field = found.components[0]
     outwards = found.components[2] * (field * normal) * ng.dx(element_boundary=True, bonus_intorder=order)
     into_top = -ng.Integrate(outwards, space)  # facets inside cancel: the normal component is continuous there
     energy = ng.Integrate(field * field / eps, space, order=2 * order + _MORE)
     if not abs(into_top - energy) <= _BALANCE * abs(energy):
-        raise CrossedBounds(f"flux {into_top:.9g} and its energy {energy:.9g} differ (order {order}): the solver failed")
-    return 2 * into_top - energy - unsolved, facet.ndof
+        raise CrossedBounds(
+            f"flux {into_top:.9g} and its energy {energy:.9g} differ (order {order}): the solver failed"
+        )
+    return 2 * into_top - energy, facet.ndof
 
 
-_MORE = 4  # orders of quadrature beyond twice the polynomials': a flux on a brick has higher ones than its order says
+_MORE = 2  # orders of quadrature beyond twice the polynomials'
 _BALANCE = 1e-7  # relative: at the best flux, what flows into the electrode at 1 V is its energy
-_CG = {"tol": 1e-6, "maxiter": 2000}  # of the error's energy norm; the energy's error is its square
 
 
-def _solve(form: Any, found: Any, direct: bool) -> Number:
-    """Solve for the unknowns that elements share, then for their own; returns an upper bound of the energy missed.
-
-    The preconditioner (BDDC) has no eigenvalue of P^-1 A below 1, so that r P^-1 r is no less than the error's energy.
-    """
-    import ngsolve as ng
-    from ngsolve.krylovspace import CGSolver
-
-    free = found.space.FreeDofs(True)
-    coarse = None if direct else ng.Preconditioner(form, "bddc")
+def _solve(form: Any, found: Any) -> None:
+    """Solve for the unknowns that elements share, then for their own."""
     form.Assemble()
-    residual, step = found.vec.CreateVector(), found.vec.CreateVector()
+    residual = found.vec.CreateVector()
     residual.data = form.mat * found.vec
-    inverse = form.mat.Inverse(free, "sparsecholesky") if coarse is None else CGSolver(form.mat, coarse.mat, **_CG)
-    found.vec.data -= inverse * residual
-    unsolved = 0.0
-    if coarse is not None:
-        step.data = form.mat * found.vec
-        residual.data = ng.Projector(free, True) * step
-        step.data = coarse.mat * residual
-        unsolved = float(ng.InnerProduct(residual, step))
+    found.vec.data -= form.mat.Inverse(found.space.FreeDofs(True), "sparsecholesky") * residual
     found.vec.data += form.harmonic_extension * found.vec
-    return unsolved

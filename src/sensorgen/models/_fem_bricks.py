@@ -1,5 +1,6 @@
 """A scene of boxes as a grid of bricks: its repeating cell, and layers that shrink towards every edge."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -7,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.cells import Band, Cell, Slice, mirrored
-from sensorgen.models._fem_bounds import Mesh
+from sensorgen.models._fem_corners import exponent
 from sensorgen.scene import Scene
 
 RATIO = 0.15  # of a layer's distance from an edge to the next layer's
 _ROUNDING_MM = 1e-9
+_INFINITE = 1 - 1e-6  # exponents of the potential below this: the field is infinite
 
 Ints = NDArray[np.int_]
 
@@ -59,13 +61,17 @@ def _raster(scene: Scene) -> tuple[tuple[NDArray[np.float64], ...], Ints, list[s
     prisms = [(body, p) for body in scene.bodies for p in body.prisms]
     if not all(p.is_box() for _, p in prisms):
         raise ValueError("not all of it is boxes")
-    ends = [{0.0, size} | {x for _, p in prisms for x in p.span(axis)} for axis, size in zip("xyz", scene.size_mm, strict=True)]
+    ends = [
+        {0.0, size} | {x for _, p in prisms for x in p.span(axis)}
+        for axis, size in zip("xyz", scene.size_mm, strict=True)
+    ]
     planes = tuple(_distinct(np.array(sorted(e))) for e in ends)
     names = ["@bottom", "@top", *sorted({b.material for b in scene.bodies if not b.terminal} | {"air"})]
     fill = np.full([len(p) - 1 for p in planes], -1)
     for body, prism in prisms:
         here = tuple(
-            slice(*np.searchsorted(p, np.array(prism.span(a)) - _ROUNDING_MM)) for a, p in zip("xyz", planes, strict=True)
+            slice(*np.searchsorted(p, np.array(prism.span(a)) - _ROUNDING_MM))
+            for a, p in zip("xyz", planes, strict=True)
         )
         if (fill[here] >= 0).any():
             raise ValueError(f"{body.name} overlaps its neighbour")
@@ -75,7 +81,8 @@ def _raster(scene: Scene) -> tuple[tuple[NDArray[np.float64], ...], Ints, list[s
 
 
 def _distinct(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return values[np.concatenate([[True], np.diff(values) > _ROUNDING_MM])]
+    found: NDArray[np.float64] = values[np.concatenate([[True], np.diff(values) > _ROUNDING_MM])]
+    return found
 
 
 def _slices(planes: NDArray[np.float64], fill: Ints) -> list[Slice]:
@@ -135,51 +142,53 @@ def _reached(fill: Ints, terminal: int) -> NDArray[np.bool_]:
             ahead[:-1] |= back[1:]
         grown &= allowed
         if (grown == found).all():
-            return found & (fill > 1)
+            reached: NDArray[np.bool_] = found & (fill > 1)
+            return reached
         found = grown
 
 
-def bricks(coarse: Grid, layers: int) -> tuple[Mesh, list[tuple[str, float]]]:
-    """Cut a grid into layers that shrink towards its inner planes.
+def layered(coarse: Grid, values: Sequence[float], layers: int) -> Grid:
+    """Cut a grid into layers that shrink towards planes in which the field is infinite at some edge.
 
     Parameters
     ----------
     coarse : Grid
         A cell.
+    values : list of float
+        Relative permittivity of each name; its modulus where it is complex [-].
     layers : int
-        How many times the distance from a plane shrinks [-].
-
-    Returns
-    -------
-    (Mesh, list of (str, float))
-        Bricks; and the material and share of each region.
+        How many times the distance from a plane shrinks where it holds an edge of an electrode; half as often where
+        dielectrics meet [-].
     """
-    parts = [_graded(planes, _layers(coarse.fill, axis, layers)) for axis, planes in enumerate(coarse.planes_mm)]
-    fine = coarse.fill[np.ix_(*(owner for _, owner in parts))]
-    shares = coarse.shares[np.ix_(parts[0][1], parts[1][1])][:, :, None] * np.ones(fine.shape)
-    planes = [p for p, _ in parts]
-    number = np.arange(np.prod([len(p) for p in planes])).reshape([len(p) for p in planes])
-    inside = fine > 1
-    keys = [(coarse.names[m], s) for m, s in zip(fine[inside].tolist(), shares[inside].tolist(), strict=True)]
-    regions = sorted(set(keys))
-    order = {key: n for n, key in enumerate(regions)}
-    elements = np.stack([c[inside] for c in _corners(number)], axis=1)
-    terminals = {name: _faces(number, fine, code) for code, name in ((0, "bottom"), (1, "top"))}
-    used, compact = np.unique(elements, return_inverse=True)
-    points = np.stack(np.meshgrid(*planes, indexing="ij"), axis=-1).reshape(-1, 3)[used]
-    return Mesh(
-        points,
-        compact.reshape(elements.shape).astype(np.int32),
-        np.array([order[k] for k in keys], dtype=np.int32),
-        {name: np.searchsorted(used, faces).astype(np.int32) for name, faces in terminals.items()},
-    ), regions
+    counts = [np.zeros(len(p), dtype=int) for p in coarse.planes_mm]
+    for axis in range(3):
+        first, second = (a for a in range(3) if a != axis)
+        boxes = np.moveaxis(coarse.fill, axis, 2)
+        around = np.stack([boxes[i : i - 1 or None, j : j - 1 or None] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))])
+        patterns, which = np.unique(around.reshape(4, -1), axis=1, return_inverse=True)
+        wanted = np.array([_wanted(p, values, layers) for p in patterns.T.tolist()])[which].reshape(around.shape[1:])
+        counts[first][1:-1] = np.maximum(counts[first][1:-1], wanted.max((1, 2), initial=0))
+        counts[second][1:-1] = np.maximum(counts[second][1:-1], wanted.max((0, 2), initial=0))
+    parts = [_graded(planes, count.tolist()) for planes, count in zip(coarse.planes_mm, counts, strict=True)]
+    owners = [owner for _, owner in parts]
+    x, y, z = (planes for planes, _ in parts)
+    return Grid((x, y, z), coarse.fill[np.ix_(*owners)], coarse.names, coarse.shares[np.ix_(*owners[:2])])
 
 
-def _layers(fill: Ints, axis: int, layers: int) -> list[int]:
-    """Layers beside each plane: all at the edges of electrodes, fewer where dielectrics meet, none at the ends."""
-    boxes = np.moveaxis(fill, axis, 0)
-    ends = ((a > 1) != (b > 1) for a, b in pairwise(boxes))
-    return [0, *(layers if at_electrode.any() else layers // 2 for at_electrode in ends), 0]
+def _wanted(around: list[int], values: Sequence[float], layers: int) -> int:
+    """Layers that an edge asks for, by what fills the four boxes around it in turn."""
+    free = [code > 1 for code in around]
+    if not any(free):
+        return 0
+    if all(free):
+        fan = [(np.pi / 2, values[code]) for code in around]
+        return layers // 2 if exponent(fan, None) < _INFINITE else 0
+    starts = [k for k in range(4) if free[k] and not free[k - 1]]
+    for start in starts:
+        run = [around[(start + k) % 4] for k in range(next(k for k in range(1, 4) if not free[(start + k) % 4]))]
+        if exponent([(np.pi / 2, values[code]) for code in run], (True, True)) < _INFINITE:
+            return layers
+    return 0
 
 
 def _graded(planes: NDArray[np.float64], layers: list[int]) -> tuple[NDArray[np.float64], Ints]:
@@ -193,22 +202,3 @@ def _graded(planes: NDArray[np.float64], layers: list[int]) -> tuple[NDArray[np.
         found += inner
         owners += [k] * len(inner)
     return np.array(found), np.array(owners)
-
-
-def _corners(number: Ints) -> list[Ints]:
-    """Numbers of the eight corners of every brick, as NGSolve turns them: the floor round, then the lid."""
-    turn = ((0, 0), (1, 0), (1, 1), (0, 1))
-    n, m, o = (s - 1 for s in number.shape)
-    return [number[i : i + n, j : j + m, k : k + o] for k in (0, 1) for i, j in turn]
-
-
-def _faces(number: Ints, fine: Ints, code: int) -> Ints:
-    """Corners of all faces between the dielectric and one electrode."""
-    found = []
-    for axis in range(3):
-        here, ids = np.moveaxis(fine, axis, 0), np.moveaxis(number, axis, 0)
-        touch = ((here[1:] == code) & (here[:-1] > 1)) | ((here[1:] > 1) & (here[:-1] == code))
-        inner = ids[1:-1]
-        corners = (inner[:, :-1, :-1], inner[:, 1:, :-1], inner[:, 1:, 1:], inner[:, :-1, 1:])
-        found.append(np.stack([c[touch] for c in corners], axis=1))
-    return np.concatenate(found)

@@ -39,13 +39,13 @@ def exponents(mesh: Triangles, permittivity: dict[str, float]) -> dict[int, floa
         for corner in corners:
             around[corner].append(number)
     known: dict[Any, float] = {}
-    found = {}
+    found: dict[int, float] = {}
     for corner, here in around.items():
         sectors, ends = _sectors(mesh, corner, here, permittivity)
         for fan, fixed in zip(sectors, ends, strict=True):
             key = (tuple((round(w, 9), eps) for w, eps in fan), fixed)
             if key not in known:
-                known[key] = _exponent(fan, fixed)
+                known[key] = exponent(fan, fixed)
             value = known[key]
             if value < _HIGHEST:
                 found[corner] = min(value, found.get(corner, value))
@@ -112,8 +112,12 @@ def _reference() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return (slope.T * weight) @ slope, (value.T * weight) @ value
 
 
-def _exponent(fan: _Fan, fixed: tuple[bool, bool] | None) -> float:
-    """The lowest exponent that is no whole number, or infinity."""
+def exponent(fan: _Fan, fixed: tuple[bool, bool] | None) -> float:
+    """The lowest exponent that is no whole number, or infinity.
+
+    ``fan`` holds angle [rad] and permittivity [-] of the sectors in turn; ``fixed`` says whether an electrode bounds
+    the first and the last, and is None where they close to a ring.
+    """
     parts = [(angle / n, eps) for angle, eps in fan for n in [int(np.ceil(angle / _WIDEST))] for _ in range(n)]
     size = _DEGREE * len(parts) + 1
     stiffness, mass = np.zeros((size, size)), np.zeros((size, size))

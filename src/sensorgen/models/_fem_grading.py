@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Iterator
+from itertools import pairwise
 from math import ceil, log
 
 import numpy as np
@@ -61,10 +62,10 @@ class _Splitter:
             new = list(self._parts(corners))
             triangles += new
             regions += [region] * len(new)
-        terminals = {}
+        terminals: dict[Edge, str] = {}
         for (a, b), name in self.mesh.terminals.items():
             chain = [a, *self._chain(a, b), b]
-            terminals |= {(min(e), max(e)): name for e in zip(chain, chain[1:], strict=False)}
+            terminals |= {(min(e), max(e)): name for e in pairwise(chain)}
         return Triangles(np.array(self.points), triangles, regions, terminals)
 
     def _length(self, edge: Edge) -> float:

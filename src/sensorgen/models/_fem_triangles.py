@@ -60,7 +60,7 @@ def triangles(cell: Cell) -> Triangles:
         names = {found[n][1][0] for n in sides}
         if names & {"@top", "@bottom"} and any(n in inside for n in sides):
             terminals[edge] = next(n[1:] for n in names if n.startswith("@"))
-    _refuse_open(points, found, owners, inside, cell)
+    _refuse_open(points, owners, inside, cell)
     kept = sorted(inside)
     return Triangles(points, [found[n][0] for n in kept], [found[n][1] for n in kept], terminals)
 
@@ -139,7 +139,9 @@ _FLAT = 1e-12  # sine of the angle of three corners on a line
 
 
 def _refuse_contact(points: NDArray[np.float64], found: _Found) -> None:
-    top, bottom = ({p for corners, (what, _) in found if what == f"@{end}" for p in corners} for end in ("top", "bottom"))
+    top, bottom = (
+        {p for corners, (what, _) in found if what == f"@{end}" for p in corners} for end in ("top", "bottom")
+    )
     places = sorted((*points[p], p in top) for p in top | bottom)
     for (x, z, end), (at, above, other) in pairwise(places):
         if x == at and above - z < _CONTACT_MM and end != other:
@@ -182,9 +184,7 @@ def _piece(found: _Found, beside: dict[int, list[int]], left: set[int]) -> tuple
     return piece, ends
 
 
-def _refuse_open(
-    points: NDArray[np.float64], found: _Found, owners: dict[Edge, list[int]], inside: set[int], cell: Cell
-) -> None:
+def _refuse_open(points: NDArray[np.float64], owners: dict[Edge, list[int]], inside: set[int], cell: Cell) -> None:
     """Refuse a field that would reach the box's floor or lid: beyond them lies more than the scene says."""
     last = cell.slices[0].bands
     ends = (last[0].bottom_mm[0], last[-1].top_mm[0])
@@ -193,4 +193,3 @@ def _refuse_open(
             z = points[list(edge), 1]
             if any(np.abs(z - end).max() < ROUNDING_MM for end in ends):
                 raise ValueError("an electrode does not cover the whole sensor")
-

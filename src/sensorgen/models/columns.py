@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.interval import Interval
+from sensorgen.models._straight import energy as straight
 from sensorgen.scene import Scene
 from sensorgen.sections import Column, Layer, sections
 from sensorgen.sections import columns as cut_columns
@@ -39,8 +40,8 @@ def unfit(scene: Scene) -> str | None:
         return "an electrode does not cover the whole sensor"
     if min(min(g.thickness_mm()) for g in gaps if g is not None) <= 0:
         return "the electrodes touch: the capacitance grows without bound"
-    if len({z for g in gaps if g is not None for z in g.bottom_mm}) > 1:
-        return "the bottom electrode is not flat"
+    if len(sections(scene)) > 1 and len({z for g in gaps if g is not None for z in g.bottom_mm}) > 1:
+        return "the bottom electrode is not flat, nor is the scene one cross-section"
     return None
 
 
@@ -51,8 +52,8 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
 
     .. math:: C_{upper} = \varepsilon_0 \int \varepsilon_r |\nabla u|^2 dV
 
-    with the column potential u, rising by dz / (s eps) in each layer; or u = z / g up to the narrowest gap g,
-    whichever is less.
+    with the column potential u, rising by dz / (s eps) in each layer; or u = z / g up to the narrowest gap g; or, where
+    neither is continuous, the best u that is straight on each of the section's triangles: whichever is least.
 
     Parameters
     ----------
@@ -84,7 +85,11 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
         trial += section.depth_mm * (below + sum(s.sideways() for s in stacks))
         slab += section.depth_mm * sum(s.within(narrowest) for s in stacks)
     smooth = len(found) == 1 and all(_meet(a, b) for a, b in pairwise(found[0][1]))
-    upper = min(trial, slab) if smooth else slab
+    flat = np.ptp([s.heights_mm[0] for _, stacks in found for s in stacks]) == 0
+    tries = [energy for energy, fits in ((slab, flat), (trial, smooth)) if fits]
+    if not tries or (len(found) == 1 and not smooth):
+        tries.append(found[0][0].depth_mm * straight(found[0][0], scene.size_mm[2], permittivity))
+    upper = min(tries)
     if upper < lower * (1 - _ROUNDING):
         raise ArithmeticError(f"bounds in the wrong order, {lower} above {upper}: this is a fault of the model")
     return Interval(lower, max(lower, upper)).times(EPS0_F_PER_M * M_PER_MM)

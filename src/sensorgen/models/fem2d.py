@@ -41,7 +41,7 @@ def unfit(scene: Scene) -> str | None:
         _triangles(scene)
     except ValueError as error:
         return str(error)
-    return None
+    return fem.third_electrode(scene)
 
 
 def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:
@@ -130,8 +130,8 @@ def _more(now: float, width: float) -> int:
 def estimate(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDTH) -> tuple[complex, float]:
     r"""Complex capacitance where materials lose or leak, and how far it may be off.
 
-    :math:`\varepsilon = \varepsilon' (1 - j\tan\delta) - j\sigma / (\omega\varepsilon_0)`. Neither principle bounds a complex
-    value; both fields are stationary there, and half of their distance is the estimated error.
+    :math:`\varepsilon = \varepsilon' (1 - j\tan\delta) - j\sigma / (\omega\varepsilon_0)`. Neither principle bounds a
+    complex value; both fields are stationary there, and half of their distance is the estimated error.
 
     Parameters
     ----------
@@ -192,4 +192,6 @@ def _energies(mesh: Triangles, permittivity: Mapping[str, complex], order: int) 
         np.array([names.index(r) for r in mesh.regions], dtype=np.int32),
         {name: np.array(found, dtype=np.int32) for name, found in edges.items()},
     )
-    return fem.energies(ngsolve_mesh, [permittivity[m] for m, _ in names], [s - least for _, s in names], order, order - 1)
+    return fem.energies(
+        ngsolve_mesh, [permittivity[m] for m, _ in names], [s - least for _, s in names], order, order - 1
+    )

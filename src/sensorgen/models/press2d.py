@@ -1,10 +1,10 @@
 """Prismatic cells under pressure: plane-strain finite elements with contact, and the capacitance when deformed.
 
-Near-incompressible neo-Hookean solids at large strain; gaps close and open, without friction or sticking. Each answer is
-checked: load reached, volume kept, faces not run into each other, work equal to the energy stored.
+Near-incompressible neo-Hookean solids at large strain; gaps close and open, without friction or sticking. Each answer
+is checked: load reached, volume kept, faces not run into each other, work equal to the energy stored.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -16,7 +16,7 @@ from sensorgen.interval import Interval
 from sensorgen.models import compression
 from sensorgen.models._press.cell import AIR, Cell, cell_of
 from sensorgen.models._press.contact import Faces
-from sensorgen.models._press.mesh import Fineness, Mesh, mesh_of
+from sensorgen.models._press.mesh import Fineness, Mesh, Unmeshed, mesh_of
 from sensorgen.models._press.support import CHOICES, Held
 from sensorgen.scene import Scene
 
@@ -26,6 +26,8 @@ SOURCE = (
 )
 COST = 2
 
+__all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "curve_of", "press", "unfit"]
+
 _PENALTY = 10.0  # over the least Young's modulus of a solid [-]
 _LEAST_PENALTY_PA = 60e6
 _STEP = 1 / 600  # longest load step over the least Young's modulus: 10 kPa for 6 MPa [-]
@@ -34,6 +36,8 @@ _DEEPEST = 0.3  # penetration over the side it happens on [-]
 _BALANCE = 0.01  # by which work and energy may differ [-]
 _LEVELS = 0.01  # by which two meshes may differ [-]
 _FIELD_GROWTH = 0.5  # of the triangles of the capacitance's mesh, per distance [-]
+_NARROW = 2e-3  # a bracket of the capacitance wider than this is a poor mesh [-]
+_COARSER = (4, 8, 16)  # times the size of the triangles at an apex, where the finer ones do not converge [-]
 
 Real = NDArray[np.float64]
 
@@ -49,7 +53,8 @@ class Elastic:
         """Refuse what is no elastic solid."""
         if not (self.youngs_modulus_pa > 0 and 0 < self.poisson_ratio <= 0.5):
             raise OutOfRange(
-                f"E {self.youngs_modulus_pa:g} Pa, nu {self.poisson_ratio:g}: expected E above 0 and nu above 0, up to 0.5"
+                f"E {self.youngs_modulus_pa:g} Pa, nu {self.poisson_ratio:g}: "
+                "expected E above 0 and nu above 0, up to 0.5"
             )
 
 
@@ -67,8 +72,12 @@ class Pressed:
         The deformed cell at each pressure; empty when no capacitance was asked for.
     volume_ratio, penetration, imbalance : (n,) array
         Least J, largest penetration over the side that it happens on, and work over energy less 1 [-].
+    fall_m : float
+        How far the top came down before anything carried it: feet that do not touch as drawn [m].
     faults : tuple of str
         Why the answer is not to be trusted; empty when every check holds.
+    doubts : tuple of str
+        What else to know of it.
     """
 
     stress_pa: Real
@@ -78,7 +87,9 @@ class Pressed:
     volume_ratio: Real
     penetration: Real
     imbalance: Real
+    fall_m: float
     faults: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
     @property
     def converged_pa(self) -> float:
@@ -93,13 +104,14 @@ def press(
     permittivity: Mapping[str, float] | None = None,
     held: Held | None = None,
     fineness: Fineness | None = None,
+    step: Callable[[float], None] | None = None,
 ) -> Pressed:
     """Press a cell from above.
 
     Parameters
     ----------
     cell : Cell
-        From :func:`sensorgen.models._press.cell.cell_of`.
+        From :func:`cell`.
     solids : mapping of str to Elastic
         By material.
     stress_pa : sequence of float
@@ -110,6 +122,8 @@ def press(
         Base, period, top and contact.
     fineness : Fineness, optional
         Of the mesh.
+    step : callable, optional
+        Told every pressure of ``stress_pa`` that is reached [Pa].
 
     Raises
     ------
@@ -119,12 +133,25 @@ def press(
         The mesher is not installed.
     """
     held, fineness = held or Held(), fineness or Fineness()
-    _check(cell, stress_pa, held)
-    found = _solved(cell, solids, stress_pa, permittivity, held, fineness)
-    if found.converged_pa < stress_pa[-1]:
-        again = _solved(cell, solids, stress_pa, permittivity, held, replace(fineness, apex_mm=2 * fineness.apex_mm))
-        found = max(found, again, key=lambda pressed: pressed.converged_pa)
-    return found
+    _check(stress_pa, held)
+    told = step or (lambda _: None)
+    first = best = _solved(cell, solids, stress_pa, permittivity, held, fineness, told)
+    for factor in _COARSER:
+        if not best.faults:
+            break
+        coarser = replace(fineness, apex_mm=factor * fineness.apex_mm)
+        again = _solved(cell, solids, stress_pa, permittivity, held, coarser, told)
+        if (again.converged_pa, -len(again.faults)) > (best.converged_pa, -len(best.faults)):
+            best = replace(again, doubts=(*again.doubts, _coarsened(first, again, coarser)))
+    return best
+
+
+def _coarsened(first: Pressed, again: Pressed, coarser: Fineness) -> str:
+    """What coarser triangles at the apex cost, where the finer ones converged too."""
+    both = len(first.stress_pa)
+    apart = float(np.abs(again.displacement_m[1:both] / first.displacement_m[1:] - 1).max(initial=0.0))
+    known = f"displacement {apart:.1%} off up to {first.converged_pa / 1e3:.4g} kPa" if both > 1 else "error not known"
+    return f"triangles of {coarser.apex_mm * 1e3:.3g} um at the apex, because finer ones do not converge: {known}"
 
 
 def compared(found: Pressed, finer: Pressed) -> Pressed:
@@ -151,14 +178,12 @@ def curve_of(pressed: Pressed, name: str = "solved") -> compression.Curve:
     return compression.curve(name, SOURCE, [float(p) for p, _ in known], ratio)
 
 
-def _check(cell: Cell, stress_pa: Sequence[float], held: Held) -> None:
+def _check(stress_pa: Sequence[float], held: Held) -> None:
     if len(stress_pa) < 2 or stress_pa[0] != 0 or any(b <= a for a, b in pairwise(stress_pa)):
         raise OutOfRange("stresses must begin with 0 and rise, as in 0:100:10")
     for key, choices in CHOICES.items():
         if getattr(held, key) not in choices:
             raise BadInput(f"{key} {getattr(held, key)!r}: expected {' or '.join(choices)}")
-    if not cell.mirrored:
-        raise BadInput("this cell is not its own mirror image: only cells with mirrors can be pressed")
 
 
 def _solved(
@@ -168,34 +193,52 @@ def _solved(
     permittivity: Mapping[str, float] | None,
     held: Held,
     fineness: Fineness,
+    step: Callable[[float], None],
 ) -> Pressed:
     from sensorgen.models._press import contact, element, load, support
 
     mesh = mesh_of(cell, fineness)
     materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in cell.regions]
-    e, nu = (np.array([getattr(m, key) for m in materials])[mesh.region - 1] for key in ("youngs_modulus_pa", "poisson_ratio"))
+    e, nu = (
+        np.array([getattr(m, key) for m in materials])[mesh.region - 1]
+        for key in ("youngs_modulus_pa", "poisson_ratio")
+    )
     tied = support.tied_nodes(mesh)
     problem = load.Problem(
         element.Elements(mesh, element.law(e, nu)),
         contact.faces_of(mesh),
-        support.free_of(mesh, held, mirrored=cell.mirrored, tied=tied),
+        support.free_of(mesh, held, mirrored=True, tied=tied),
         support.top_load(mesh),
         max(_LEAST_PENALTY_PA, _PENALTY * float(e.min())),
         held.contact == "stick",
+        tied,
     )
-    states = list(load.curve(problem, stress_pa, _STEP * float(e.min())))
+    states = []
+    for state in load.curve(problem, stress_pa, _STEP * float(e.min())):
+        states.append(state)
+        step(state.pressure_pa)
     down = np.array([problem.load @ s.u_m / np.abs(problem.load).sum() for s in states])
     volume = np.array([problem.elements.volume_ratio(s.u_m, s.inner).min() for s in states])
     depth = np.array([_depth(problem.gaps(s.pairs, s.u_m) / s.pairs.length_m) for s in states])
     energy = np.array([problem.elements.energy_j_per_m(s.u_m, s.inner) + problem.contact_energy(s) for s in states])
     stress = np.array([s.pressure_pa for s in states])
-    imbalance = _imbalance(stress, down * np.abs(problem.load).sum(), energy)
+    fall = problem.fall_m(states[0])
+    imbalance = _imbalance(stress, (down - fall) * np.abs(problem.load).sum(), energy)
     fields = [_field(cell, mesh, problem.faces, tied, s.u_m, permittivity) for s in states] if permittivity else []
     unknown = sum(c is None for c, _ in fields)
-    faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance, states[-1].stale, unknown))
+    faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance, sum(s.stale > 0 for s in states), unknown))
     return Pressed(
-        stress, down, tuple(c for c, _ in fields), tuple(o for _, o in fields), volume, depth, imbalance, faults
-    )
+        stress, down, tuple(c for c, _ in fields), tuple(o for _, o in fields), volume, depth, imbalance, fall, faults,
+        _doubts(cell, fall),
+    )  # fmt: skip
+
+
+def _doubts(cell: Cell, fall_m: float) -> tuple[str, ...]:
+    said = {
+        "mirrors stand at both ends of the period, though it is not its own mirror image": not cell.mirrored,
+        f"feet hang free as drawn: the top falls {fall_m * 1e6:.4g} um before they carry": fall_m > 0,
+    }
+    return tuple(words for words, holds in said.items() if holds)
 
 
 def _depth(gaps: Real) -> float:
@@ -208,25 +251,32 @@ def _field(
     """Capacitance and outlines of a deformed cell; gaps are closed a little more or less where a mesh fails."""
     from sensorgen.models._press import deformed, field
 
+    best: tuple[Interval | None, Cell] = (None, cell)
     for closed in deformed.CLOSED:
         outline = deformed.deformed(cell, mesh, faces, tied, u_m, closed)
         try:
-            return field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH), outline
-        except field.Unmeshed:
+            found = field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH)
+        except Unmeshed:
+            best = best if best[0] else (None, outline)
             continue
-    return None, outline
+        if best[0] is None or found.width() < best[0].width():
+            best = found, outline
+        if found.width() < _NARROW:
+            break
+    return best
 
 
 def _imbalance(stress: Real, moved: Real, energy: Real) -> Real:
-    """Work of the load over the energy stored, less 1; between two loads they follow a power law."""
+    """Work of the load less the energy stored, from the first load on, over the energy stored [-].
+
+    Between two loads stress and displacement follow a power law; before the first, feet may still be landing.
+    """
     found = np.zeros(len(stress))
     if len(stress) < 3:
         return found
     powers = np.log(moved[2:] / moved[1:-1]) / np.log(stress[2:] / stress[1:-1])
-    powers = np.concatenate([powers[:1], powers])
-    ends = stress * moved
-    work = np.cumsum(powers / (1 + powers) * np.diff(ends))
-    found[1:] = work / energy[1:] - 1
+    work = np.cumsum(powers / (1 + powers) * np.diff((stress * moved)[1:]))
+    found[2:] = (work - (energy[2:] - energy[1])) / energy[2:]
     return found
 
 
@@ -238,12 +288,35 @@ def _faults(
         f"a triangle is squeezed to {volume.min():.2g} of its volume": volume.min() < _LEAST_VOLUME,
         f"faces run into each other by {depth.max():.2g} of a side": depth.max() > _DEEPEST,
         f"work and energy differ by {imbalance[-1]:.1%}": abs(imbalance[-1]) > _BALANCE,
-        f"no capacitance at {unknown} of {len(stress)} stresses: the deformed outlines could not be meshed": unknown > 0,
-        f"{stale} load steps with old contact partners": stale > 0,
+        f"no capacitance at {unknown} of {len(stress)} stresses: the deformed outlines could not be meshed": unknown
+        > 0,
+        f"old contact partners at {stale} of {len(stress)} stresses": stale > 0,
     }
     return [words for words, holds in said.items() if holds]
 
 
+def unfit(scene: Scene) -> str | None:
+    """Why this model cannot speak of a scene, or None."""
+    try:
+        cell_of(scene, None)
+    except BadInput as error:
+        return str(error)
+    return None
+
+
 def cell(scene: Scene, period_mm: float | None) -> Cell:
-    """The cell of a scene, to be pressed; see :func:`sensorgen.models._press.cell.cell_of`."""
+    """The cell of a prismatic scene: half a period between two mirrors where there are such, else a whole one.
+
+    Parameters
+    ----------
+    scene : Scene
+        As drawn or as printed, its support gone.
+    period_mm : float or None
+        Period of the pattern; None for a scene without one, as a plate [mm].
+
+    Raises
+    ------
+    BadInput
+        The scene is no prism, or shorter than its period.
+    """
     return cell_of(scene, period_mm)

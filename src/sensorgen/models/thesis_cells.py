@@ -191,7 +191,11 @@ def swept(p: tri.Params, turned_rad: float) -> tri.Params:
     if not 0 < lower < hang:
         raise OutOfRange(f"turned by {turned_rad:g} rad: no air is left; expected less")
     return replace(
-        p, period_mm=4 * base, hang_height_mm=hang, lower_height_mm=lower, dielectric_mm=p.dielectric_mm * quarter / base
+        p,
+        period_mm=4 * base,
+        hang_height_mm=hang,
+        lower_height_mm=lower,
+        dielectric_mm=p.dielectric_mm * quarter / base,
     )
 
 

@@ -1,1 +1,1 @@
-"""Plane-strain compression of a cell: outline, mesh, elements, contact, load steps, and the capacitance when deformed."""
+"""Plane-strain compression of a cell: outline, mesh, elements, contact, load steps, deformed capacitance."""

@@ -113,13 +113,31 @@ def _look(strip: Strip) -> tuple[object, ...]:
 
 
 def _strips(whole: list[Column], left: float, right: float) -> list[Strip]:
-    """The columns between two places, cut there: left, right, and each region with its bottom and top line."""
-    found = []
+    """The columns between two places, cut there: left, right, and each region with its bottom and top line.
+
+    Columns that only go on with what the one before them began are one.
+    """
+    found: list[Strip] = []
     for c in whole:
         a, b = max(c.left_mm, left), min(c.right_mm, right)
         if b - a > _SLIVER_MM:
-            found.append((a, b, _filled([_layer(c, x, a, b) for x in c.layers])))
+            strip = (a, b, _filled([_layer(c, x, a, b) for x in c.layers]))
+            found[-1:] = _joined(found[-1], strip) if found else [strip]
     return found
+
+
+def _joined(one: Strip, other: Strip) -> list[Strip]:
+    """Two neighbours, as one strip where every line of them runs on straight."""
+    (a, b, before), (_, c, after) = one, other
+    if [r for r, *_ in before] != [r for r, *_ in after]:
+        return [one, other]
+    for (_, *lines), (_, *others) in zip(before, after, strict=True):
+        for u, v in zip(lines, others, strict=True):
+            bent = (v[1] - v[0]) * (b - a) - (u[1] - u[0]) * (c - b)
+            if abs(u[1] - v[0]) > _SLIVER_MM or abs(bent) > _SLIVER_MM * (c - a):
+                return [one, other]
+    layers = [(r, (u[0], x[1]), (v[0], y[1])) for (r, u, v), (_, x, y) in zip(before, after, strict=True)]
+    return [(a, c, layers)]
 
 
 def _layer(column: Column, layer: Layer, left: float, right: float) -> tuple[Region, Point, Point]:

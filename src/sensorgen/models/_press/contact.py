@@ -18,6 +18,7 @@ Whole = NDArray[np.int64]
 _S, _W = np.polynomial.legendre.leggauss(3)
 _S, _W = (_S + 1) / 2, _W / 2
 _REACH = 1e-9  # how far past its ends a face still carries [-]
+_HALF = 0.5  # of the weights of the upper nodes, which add up to 1 where all are loose [-]
 _UPRIGHT = 1e-6  # faces whose normal is nearer to level than this neither look up nor down [-]
 
 
@@ -111,10 +112,20 @@ def _joined(a: Pairs, b: Pairs) -> Pairs:
     return Pairs(vstack([a.gap, b.gap]).tocsr(), vstack([a.slip, b.slip]).tocsr(), *both)
 
 
+def _some(pairs: Pairs, which: NDArray[np.bool_], sticks: NDArray[np.bool_]) -> Pairs:
+    rest = (pairs.stiffness_pa[which], pairs.length_m[which], pairs.point[which], sticks[which])
+    return Pairs(pairs.gap[which], pairs.slip[which], *rest)
+
+
+def carrying(pairs: Pairs, loose: NDArray[np.bool_]) -> Pairs:
+    """The pairs between a loose piece above and one below that is held; ``loose`` says it of each node."""
+    share = np.asarray(pairs.gap[:, 1::2] @ loose.astype(float))
+    return _some(pairs, share > _HALF, pairs.sticks)
+
+
 def stuck(pairs: Pairs, which: NDArray[np.bool_]) -> Pairs:
     """Some of the pairs, which hold fast from now on."""
-    rest = (pairs.stiffness_pa[which], pairs.length_m[which], pairs.point[which])
-    return Pairs(pairs.gap[which], pairs.slip[which], *rest, np.ones(which.sum(), bool))
+    return _some(pairs, which, np.ones_like(which))
 
 
 def _partners(here: Real, upper: Real, depth: Real) -> tuple[Whole, Real]:
@@ -131,7 +142,7 @@ def _partners(here: Real, upper: Real, depth: Real) -> tuple[Whole, Real]:
 
 
 def _meet(x: Real, nodes: Real) -> tuple[Real, NDArray[np.bool_]]:
-    """Where on a side (0 to 1) its place is x: the root of a quadratic, by its form that is stable when nearly straight."""
+    """Where on a side (0 to 1) its place is x: a root of a quadratic, in the form that bears nearly straight sides."""
     a, b, m = nodes[..., 0], nodes[..., 1], nodes[..., 2]
     c2, c1, c0 = 2 * (a + b - 2 * m), 4 * m - 3 * a - b, a - x
     root = np.sqrt(np.maximum(c1**2 - 4 * c2 * c0, 0.0))

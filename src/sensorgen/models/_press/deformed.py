@@ -63,10 +63,8 @@ def _edges(cell: Cell, mesh: Mesh) -> Sides:
     return {run: sides for run, sides in found.items() if sides[0] != sides[1]}
 
 
-def _closed(
-    edges: Sides, air: int, places: Real, faces: Faces, tied: Whole, drawn: Real, closed: float
-) -> Sides:
-    """Edges with the upper faces laid along the lower ones where they touch; ``places`` of corners may move a little."""
+def _closed(edges: Sides, air: int, places: Real, faces: Faces, tied: Whole, drawn: Real, closed: float) -> Sides:
+    """Edges with the upper faces laid along the lower ones where they touch; corners in ``places`` may move a bit."""
     lower, upper = (_runs(side) for side in (faces.lower, faces.upper))
     if not (lower and upper):
         return edges

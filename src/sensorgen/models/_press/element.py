@@ -1,4 +1,4 @@
-r"""Near-incompressible neo-Hookean triangles: six nodes and a bubble for the displacement, a linear pressure of its own.
+r"""Near-incompressible neo-Hookean triangles: six nodes and a bubble for the displacement, and a linear pressure.
 
 .. math:: \Pi = \int \tfrac{\mu}{2} (F : F - 2) - \mu \ln J + p (J - 1) - \frac{p^2}{2 \lambda}
 
@@ -31,7 +31,9 @@ def gradients(xi: Real, eta: Real) -> Real:
     da, db, dc = (-one, -one), (one, o), (o, one)
     both = range(2)
     rows = [[(4 * x - 1) * d[k] for k in both] for x, d in ((a, da), (b, db), (c, dc))]
-    rows += [[4 * (x * dy[k] + y * dx[k]) for k in both] for x, dx, y, dy in ((a, da, b, db), (b, db, c, dc), (c, dc, a, da))]
+    rows += [
+        [4 * (x * dy[k] + y * dx[k]) for k in both] for x, dx, y, dy in ((a, da, b, db), (b, db, c, dc), (c, dc, a, da))
+    ]
     rows += [[27 * (da[k] * b * c + a * db[k] * c + a * b * dc[k]) for k in both]]
     return np.moveaxis(np.array(rows), 2, 0)
 
@@ -82,7 +84,7 @@ class Tangent:
 
     def inner_step(self, du: Real) -> Real:
         """Step of bubble and pressure that belongs to a step of the nodes (m, 12)."""
-        return self.offset - np.einsum("mij,mj->mi", self.slope, du)
+        return np.asarray(self.offset - np.einsum("mij,mj->mi", self.slope, du))
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,7 @@ class Elements:
         """Entries 11, 12, 21, 22 of F at each quadrature point (m, points, 4)."""
         local = np.concatenate([u[self.freedoms], inner.bubble], axis=1)
         found: Real = np.matmul(self._strains[0].reshape(len(local), -1, 14), local[:, :, None])
-        return found.reshape(len(local), -1, 4) + np.array([1.0, 0.0, 0.0, 1.0])
+        return np.asarray(found.reshape(len(local), -1, 4) + np.array([1.0, 0.0, 0.0, 1.0]))
 
     def volume_ratio(self, u: Real, inner: Inner) -> Real:
         """J at each quadrature point (m, points)."""
@@ -146,7 +148,10 @@ class Elements:
         solved = np.linalg.solve(k[:, o:, o:], inside)
         condensed = np.matmul(k[:, :o, o:], solved)
         return Tangent(
-            k[:, :o, :o] - condensed[..., :-1], residual[:, :o] - condensed[..., -1], -solved[..., -1], solved[..., :-1],
+            k[:, :o, :o] - condensed[..., :-1],
+            residual[:, :o] - condensed[..., -1],
+            -solved[..., -1],
+            solved[..., :-1],
             self.law.mu_pa,
         )
 

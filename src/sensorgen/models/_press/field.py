@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 from sensorgen.errors import OutOfRange
 from sensorgen.interval import Interval
 from sensorgen.models._press.cell import AIR, OUTSIDE, Cell, Edge
-from sensorgen.models._press.mesh import Mesh, Net, Whole, of_triangles, triangulated
+from sensorgen.models._press.mesh import Mesh, Net, Unmeshed, Whole, of_triangles, triangulated
 from sensorgen.models._press.wedge import Wedge, fan, wedges
 from sensorgen.scene import Point
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
@@ -29,10 +29,6 @@ Edges = Mapping[Edge, tuple[int, int]]
 _ROUNDING = 1e-9
 _HOLE = 1e-6  # area that a mesh may miss, as a share
 _MIDS = np.array([[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])  # middles of the sides: exact to degree 2
-
-
-class Unmeshed(Exception):
-    """No sound mesh of these outlines was found."""
 
 
 def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float, growth: float) -> Interval:
@@ -81,10 +77,7 @@ def _meshed(edges: Edges, air: int, coarse_mm: float, growth: float) -> Mesh:
             cut[key] = (-number, cut[key][1]) if place == 0 else (cut[key][0], -number)
         if wedge.first[-1] != wedge.second[-1]:
             cut[wedge.first[-1], wedge.second[-1]] = (-number, air)
-    try:
-        net = triangulated(cut, coarse_mm, growth)
-    except Exception as error:  # the mesher's own kind of exception, known only where it is installed
-        raise Unmeshed(str(error)) from None
+    net = triangulated(cut, coarse_mm, growth)
     new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
     corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])
     _refuse_holes(edges, net.points_m[corners])
@@ -93,7 +86,9 @@ def _meshed(edges: Edges, air: int, coarse_mm: float, growth: float) -> Mesh:
 
 def _refuse_holes(edges: Edges, corners: Real) -> None:
     """Compare the area within the edges with that of the triangles (m, 3, 2), none of which may be turned over."""
-    area = sum(0.5 * (a[0] * b[1] - a[1] * b[0]) * ((left > 0) - (right > 0)) for (a, b), (left, right) in edges.items())
+    area = sum(
+        0.5 * (a[0] * b[1] - a[1] * b[0]) * ((left > 0) - (right > 0)) for (a, b), (left, right) in edges.items()
+    )
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     parts = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / M_PER_MM**2
     if parts.min() <= 0 or abs(parts.sum() / area - 1) > _HOLE:
@@ -137,7 +132,7 @@ def _between(triangles: Whole, region: Whole, ends: list[Mask]) -> tuple[Whole, 
     beside = coo_matrix((np.ones(middles.size), (middles.ravel(), middles[:, [1, 2, 0]].ravel())), (n, n))
     _, piece = connected_components(beside)
     touched = [np.unique(piece[middles[end[middles].any(axis=1), 0]]) for end in ends]
-    inside = np.isin(piece[middles[:, 0]], np.intersect1d(*touched))
+    inside = np.isin(piece[middles[:, 0]], np.intersect1d(touched[0], touched[1]))
     return triangles[inside], region[inside]
 
 
@@ -165,4 +160,4 @@ def _stiffness(points: Real, triangles: Whole) -> Real:
     jacobian = np.stack([b - a, c - a], axis=2)
     g = np.einsum("qnk,mki->mqni", gradients(*_MIDS.T)[:, :6], np.linalg.inv(jacobian))
     g = g.transpose(0, 2, 1, 3).reshape(len(triangles), 6, 6)
-    return np.matmul(g, g.transpose(0, 2, 1)) * (np.linalg.det(jacobian) / 6)[:, None, None]
+    return np.asarray(np.matmul(g, g.transpose(0, 2, 1)) * (np.linalg.det(jacobian) / 6)[:, None, None])

@@ -1,33 +1,37 @@
 """Newton's method, and load steps that are cut when it fails."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix, diags
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from sensorgen.models._press import contact
 from sensorgen.models._press.contact import Faces, Pairs
-from sensorgen.models._press.element import Elements, Inner
+from sensorgen.models._press.element import Elements, Inner, Tangent
 
 Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
 
-_ENOUGH = 1e-8  # residual over load
+_ENOUGH = 1e-6  # residual over load
 _NEARLY = 1e-3  # the same before the contact partners are looked for anew
 _STILL = 1e-10  # a step so much shorter than the way is rounding: nu near 1/2 turns it into forces
 _MOST_STEPS = 25
 _LEAST_J = 0.05  # a step may not squeeze a triangle below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
-_LEAST_CUT = 1 / 64  # of the longest load step
+_MOST_CUTS = 8  # failed load steps in all before a cell is given up
+_FLAT = 1e-3  # gaps that differ by less than this share of their side close at once [-]
+_DEEPEST = 0.1  # how far a foot may sink in to begin with, over the length of a side [-]
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class State:
-    """An equilibrium: pressure [Pa], displacements (2n) [m], the triangles' own unknowns, and the contact it rests on."""
+    """An equilibrium: pressure [Pa], displacements (2n) [m], the triangles' own unknowns, and its contact."""
 
     pressure_pa: float
     u_m: Real
@@ -56,6 +60,8 @@ class Problem:
         Contact pressure per penetration, times the length of the side [Pa].
     stick : bool
         What has touched sticks.
+    tied : (k, 2) array
+        Nodes that move as one.
     """
 
     elements: Elements
@@ -64,11 +70,44 @@ class Problem:
     load: Real
     penalty_pa: float
     stick: bool = False
+    tied: Whole = field(default_factory=lambda: np.empty((0, 2), np.int64))
 
     def start(self) -> State:
         """Nothing presses."""
         u = np.zeros(len(self.load))
         return State(0.0, u, self.elements.start(), self.project(u))
+
+    def rested(self, state: State, pressure_pa: float) -> State:
+        """The start, with what hangs loose let down until it rests on what is below it.
+
+        It sinks in as far as the penalty needs to carry a pressure, because a contact that only just touches has no
+        stiffness to begin with.
+        """
+        pairs = contact.carrying(state.pairs, self.loose)
+        if not pairs.point.size:
+            return state
+        gap = self.gaps(pairs, state.u_m)
+        first = gap < gap.min() + _FLAT * pairs.length_m
+        sunk = pressure_pa * np.abs(self.load).sum() / pairs.stiffness_pa[first].sum()
+        u = state.u_m.copy()
+        u[1::2] -= self.loose * (gap.min() + min(sunk, _DEEPEST * pairs.length_m[first].min()))
+        return replace(state, u_m=u, pairs=self.project(u))
+
+    def fall_m(self, state: State) -> float:
+        """How far the top comes down before anything carries it [m]."""
+        pairs = contact.carrying(state.pairs, self.loose)
+        return float(self.gaps(pairs, state.u_m).min()) if pairs.point.size else 0.0
+
+    @cached_property
+    def loose(self) -> NDArray[np.bool_]:
+        """Nodes of pieces that nothing holds up."""
+        triangles, tied = self.elements.mesh.triangles, self.tied
+        starts = np.concatenate([np.repeat(triangles[:, 0], 5), tied[:, 0]])
+        ends = np.concatenate([triangles[:, 1:].ravel(), tied[:, 1]])
+        nodes = len(self.elements.mesh.points_m)
+        _, piece = connected_components(coo_matrix((np.ones(len(starts)), (starts, ends)), (nodes, nodes)))
+        moves = np.diff(self.free.indptr)[1::2] > 0
+        return ~np.isin(piece, piece[~moves])
 
     def places(self, u: Real) -> Real:
         """Where the nodes are [m]."""
@@ -83,7 +122,7 @@ class Problem:
         return np.asarray(pairs.gap @ self.places(u).ravel())
 
     @cached_property
-    def _places_of_entries(self) -> tuple[Real, Real]:
+    def _places_of_entries(self) -> tuple[Whole, Whole]:
         freedoms = self.elements.freedoms
         return np.repeat(freedoms, 12, axis=1).ravel(), np.tile(freedoms, (1, 12)).ravel()
 
@@ -105,12 +144,14 @@ class Problem:
         slip = state.pairs.slip @ self.places(state.u_m).ravel() * state.pairs.sticks
         return float(0.5 * (k * ((gap < 0) * gap**2 + slip**2)).sum())
 
-    def residual(self, u: Real, inner: Inner, pairs: Pairs, pressure_pa: float) -> tuple[Real, csr_matrix, object]:
+    def residual(self, u: Real, inner: Inner, pairs: Pairs, pressure_pa: float) -> tuple[Real, csr_matrix, Tangent]:
         """Forces out of balance on the free displacements, their derivative, and the triangles' condensed part."""
         local = self.elements.tangent(u, inner)
         force, stiffness = self._touching(pairs, u)
         np.add.at(force, self.elements.freedoms.ravel(), local.force.ravel())
-        whole = coo_matrix((local.stiffness.ravel(), self._places_of_entries), shape=stiffness.shape).tocsr() + stiffness
+        whole = (
+            coo_matrix((local.stiffness.ravel(), self._places_of_entries), shape=stiffness.shape).tocsr() + stiffness
+        )
         return self.free.T @ (force - pressure_pa * self.load), self.free.T @ whole @ self.free, local
 
     def newton(self, state: State, pressure_pa: float, pairs: Pairs, enough: float) -> State | None:
@@ -126,7 +167,10 @@ class Problem:
                 return None
             if np.abs(residual).max() < enough * scale and local.imbalance() < enough:
                 return replace(state, pressure_pa=pressure_pa, u_m=u, inner=inner, pairs=pairs)
-            du = self.free @ _solved(stiffness, -residual)
+            step = _solved(stiffness, -residual)
+            if step is None:
+                return None
+            du = self.free @ step
             inside = local.inner_step(du[self.elements.freedoms])
             share = self._share(u, inner, du, inside)
             if share is None:
@@ -154,18 +198,18 @@ class Problem:
         if second is None:
             settled = self.newton(first, pressure_pa, first.pairs, _ENOUGH)
             return replace(settled, stale=first.stale + 1) if settled else None
-        return replace(second, stuck=stuck)
+        return replace(second, stuck=stuck, stale=0)
 
     def _stuck(self, state: State) -> Pairs:
         return contact.stuck(state.pairs, self.gaps(state.pairs, state.u_m) < 0)
 
 
-def _solved(stiffness: csr_matrix, right: Real) -> Real:
-    """Solve a symmetric system, pivots taken from the diagonal where they can be."""
-    solver = splu(
-        stiffness.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.001, options={"SymmetricMode": True}
-    )
-    found: Real = solver.solve(right)
+def _solved(stiffness: csr_matrix, right: Real) -> Real | None:
+    """The step that a force makes, or None where a piece has nothing that holds it."""
+    try:
+        found: Real = splu(stiffness.tocsc()).solve(right)
+    except RuntimeError:  # exactly singular
+        return None
     return found
 
 
@@ -173,16 +217,16 @@ def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) ->
     """Equilibria at rising pressures, in steps of at most ``longest_pa``; ends early where even small steps fail."""
     state = problem.start()
     yield state
+    state = problem.rested(state, min(pressures_pa[1], longest_pa))
+    step = longest_pa
     for target in pressures_pa[1:]:
-        step = whole = min(target - state.pressure_pa, longest_pa)
         while state.pressure_pa < target:
             left = target - state.pressure_pa
             reached = problem.stepped(state, target if left < step * (1 + _ROUNDING) else state.pressure_pa + step)
             if reached is not None:
-                state = reached
+                state, step = reached, min(2 * step, longest_pa)
                 continue
-            step /= 2
-            if step < _LEAST_CUT * whole:
+            state, step = replace(state, cuts=state.cuts + 1), min(step, left) / 2
+            if state.cuts > _MOST_CUTS:
                 return
-            state = replace(state, cuts=state.cuts + 1)
         yield state

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.errors import MissingValue
+from sensorgen.errors import BadInput, MissingValue
 from sensorgen.models._press.cell import OUTSIDE, Cell, Edge
 from sensorgen.scene import Point
 from sensorgen.units import M_PER_MM
@@ -18,6 +18,10 @@ Run = tuple[int, int]
 
 _SAME = 1e-9  # of the cell's size: places nearer than this are one
 _SIDES = ((0, 1), (1, 2), (2, 0))
+
+
+class Unmeshed(BadInput):
+    """No sound mesh of these outlines was found."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +124,9 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
     The edges are cut here, because a mesher that smooths its sizes forgets the small ones at an apex.
     """
     sharp = pinches(cell)
-    faces = [e for e, sides in cell.edges.items() if OUTSIDE not in sides and cell.solid(sides[0]) != cell.solid(sides[1])]
+    faces = [
+        e for e, sides in cell.edges.items() if OUTSIDE not in sides and cell.solid(sides[0]) != cell.solid(sides[1])
+    ]
     exposed = {p for edge in faces for p in edge}
     sizes = dict.fromkeys(exposed, fineness.corner_mm) | dict.fromkeys(sharp, fineness.apex_mm)
     pieces: dict[Edge, tuple[int, int]] = {}
@@ -128,7 +134,7 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
         ends = [sizes.get(p, fineness.coarse_mm) for p in (a, b)]
         shares = cuts(float(np.hypot(b[0] - a[0], b[1] - a[1])), ends[0], ends[1], fineness)
         places = [a, *((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])) for t in shares), b]
-        open_sides = tuple(k if cell.solid(k) else OUTSIDE for k in sides)
+        open_sides = (sides[0] * cell.solid(sides[0]), sides[1] * cell.solid(sides[1]))
         if open_sides != (OUTSIDE, OUTSIDE):
             pieces |= dict.fromkeys(pairwise(places), open_sides)
     net = triangulated(pieces, fineness.coarse_mm, fineness.growth)
@@ -145,7 +151,10 @@ def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth
                 numbers[p] = geometry.AppendPoint(*p)
         domains = {"leftdomain": max(left, 0), "rightdomain": max(right, 0)}
         geometry.Append(["line", numbers[a], numbers[b]], **domains)
-    made = geometry.GenerateMesh(maxh=coarse_mm, grading=growth)
+    try:
+        made = geometry.GenerateMesh(maxh=coarse_mm, grading=growth)
+    except Exception as error:  # the mesher's own kind of exception, known only where it is installed
+        raise Unmeshed(f"these outlines cannot be meshed ({error}): do bodies overlap, or leave slivers?") from None
     elements, sides = made.Elements2D().NumPy(), made.Elements1D().NumPy()
     points = np.asarray(made.Coordinates(), float)[:, :2] * M_PER_MM
     behind = [min(pair) for pair in edges.values()]
@@ -177,4 +186,5 @@ def _grown(reach: float, size: float, fineness: Fineness) -> Real:
     turns = np.log(fineness.coarse_mm / size) / growth
     whole = np.log1p(growth * reach / size) / growth if reach < bend else turns + (reach - bend) / fineness.coarse_mm
     t = whole * np.arange(1, max(1, round(whole)) + 1) / max(1, round(whole))
-    return np.where(t < turns, size / growth * np.expm1(growth * t), bend + (t - turns) * fineness.coarse_mm)
+    grown = np.where(t < turns, size / growth * np.expm1(growth * t), bend + (t - turns) * fineness.coarse_mm)
+    return np.asarray(grown)

@@ -1,0 +1,71 @@
+"""``sensorgen chart``: every model on every standard scene, time against error."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from sensorgen.cli import show
+from sensorgen.cli.words import Ratio
+from sensorgen.errors import UnknownName, Unwritable
+
+if TYPE_CHECKING:
+    from sensorgen.chart import Point
+
+FILES = ("chart.csv", "chart.png", "chart.html")
+
+
+@click.command("chart", short_help="Draw time against error of every model.")
+@click.option("--scene", multiple=True, metavar="NAME", help="A standard scene, as 'tri, 0.1 mm'; all if not given.")
+@click.option(
+    "--budget", type=Ratio(), default="60", show_default=True, metavar="SECONDS", help="Leave out what takes longer."
+)
+@click.option("--output", "-o", default="out/chart", show_default=True, metavar="DIR", help="Folder of the files.")
+@click.option("--json", "as_json", is_flag=True, help="Print what was measured as JSON, too.")
+def command(scene: tuple[str, ...], budget: float, output: str, as_json: bool) -> None:
+    """Measure every model of capacitance on every standard scene.
+
+    Writes processor time against error, with the Pareto front marked: chart.png, chart.html to ask with the mouse,
+    and chart.csv. The scenes are cells whose capacitance is known from elsewhere.
+    """
+    from sensorgen import chart
+    from sensorgen.plots.library import needed
+
+    needed("matplotlib", "plotly")
+    for name in scene:
+        if name not in chart.STANDARD:
+            raise UnknownName("standard scene", name, chart.STANDARD)
+    names = scene or tuple(chart.STANDARD)
+    with show.progress(names) as step:
+        points = chart.points(names, budget, step)
+    _write(Path(output), points)
+    if as_json:
+        show.as_json([vars(p) for p in points])
+    else:
+        for name in FILES:
+            click.echo(str(Path(output) / name))
+
+
+def _write(folder: Path, points: Sequence["Point"]) -> None:
+    from sensorgen import store
+    from sensorgen.plots import chart
+
+    files = dict(zip(FILES, (_csv(points).encode(), chart.png(points), chart.html(points).encode()), strict=True))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Unwritable(f"cannot write to {str(folder)!r}: {error.strerror or error}") from None
+    for name, content in files.items():
+        store.replace(folder / name, content)
+
+
+def _csv(points: Sequence["Point"]) -> str:
+    import csv
+    import io
+
+    text = io.StringIO()
+    table = csv.DictWriter(text, list(vars(points[0])), lineterminator="\n")
+    table.writeheader()
+    table.writerows(vars(p) for p in points)
+    return text.getvalue()

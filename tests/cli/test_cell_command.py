@@ -1,0 +1,277 @@
+"""``sensorgen cell``: bounds, plan, cache and sweep, from the outside; and values of materials in words."""
+
+import csv
+import io
+import json
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from sensorgen import planner
+from sensorgen.models import fem2d
+
+pytest.importorskip("ngsolve", reason="the extra fem is not installed")
+
+# Known to 1e-9 and 3e-5; see tests/reference/README.md
+KNOWN = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
+TRI = {case["d"]: case["C_F_per_m"] / 2e-3 for case in KNOWN["tri"]}
+RECT = {case["d"]: case["C_F"] / 4e-6 for case in KNOWN["rect"]}
+LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))"
+
+
+def answer(said):
+    assert said.code == 0, said.err
+    return json.loads(said.out)
+
+
+@pytest.mark.parametrize("film", [0.1, 0.2])
+@pytest.mark.parametrize("accuracy", ["1e-2", "1e-6"])
+def test_bounds_hold_the_reference_and_are_as_near_as_asked(run, film, accuracy):
+    found = answer(run("cell", "tri", "--dielectric", film, "--accuracy", accuracy, "--json"))
+    lower, upper = found["lower_f_per_m2"], found["upper_f_per_m2"]
+    assert lower * (1 - 1e-9) <= TRI[film] <= upper * (1 + 1e-9)
+    assert (upper - lower) / TRI[film] <= float(accuracy) * (1 + 1e-9)
+    assert (found["model"], found["reached"], found["known"]) == ("fem2d", True, False)
+    assert 0 < found["seconds"] == pytest.approx(sum(c["seconds"] or 0 for c in found["plan"]))
+
+
+def test_strips_in_three_dimensions(run):
+    found = answer(run("cell", "rect", "--dielectric", 0.2, "--accuracy", "5e-3", "--json"))
+    assert found["model"] == "fem3d"
+    assert found["lower_f_per_m2"] <= RECT[0.2] * (1 + 3e-5)
+    assert found["upper_f_per_m2"] >= RECT[0.2] * (1 - 3e-5)
+    assert found["relative_width"] <= 5e-3
+
+
+def test_set_values_reach_the_model(run):
+    """Two of a kind: all permittivities times three give three times the capacitance."""
+    one = answer(run("cell", "tri", "--accuracy", "1e-5", "--json", "--set", "eps_x60=1.5", "--set", "eps_air=1"))
+    three = answer(run("cell", "tri", "--accuracy", "1e-5", "--json", "--set", "eps_x60=4.5", "--set", "eps_air=3"))
+    assert three["lower_f_per_m2"] == pytest.approx(3 * one["lower_f_per_m2"], rel=1e-5, abs=0)
+    values = {(v["material"], v["value"], v["source"]) for v in one["values"]}
+    assert values == {("x60", 1.5, "set by the user"), ("air", 1, "set by the user")}
+
+
+def test_a_known_answer_loads_no_numbers(run, real):
+    first = answer(run("cell", "tri", "--json"))
+    said = real("cell", "tri", "--json", before=LOADED)
+    text, _, loaded = said.out.rpartition("loaded: ")
+    assert not {"numpy", "ngsolve", "scipy", "build123d", "multiprocessing", "matplotlib"} & set(loaded.split())
+    assert json.loads(text) == first | {"known": True}
+    assert "known from before" in run("cell", "tri").out
+
+
+def test_no_cache_solves_anew_and_keeps_nothing(run):
+    assert not answer(run("cell", "tri", "--json", "--no-cache"))["known"]
+    assert not answer(run("cell", "tri", "--json"))["known"]
+    assert not answer(run("cell", "tri", "--json", "--no-cache"))["known"]
+    assert answer(run("cell", "tri", "--json"))["known"]
+
+
+def test_explain_tells_the_plan_and_what_came_of_it(run):
+    said = run("cell", "tri", "--explain", "--no-cache")
+    plan, _, measured = said.out.partition("measured")
+    assert said.code == 0
+    assert plan.startswith("plan for an accuracy of 0.001\n")
+    for name in ("columns", "fem2d"):
+        assert f"\n  {name}" in plan
+        assert f"\n  {name}" in measured
+    assert "not all of it is boxes" in plan
+    assert "not needed" in measured
+    assert "fem2d, " in measured.rpartition("model")[2]
+
+
+def test_an_accuracy_below_what_is_possible(run):
+    said = run("cell", "tri", "--accuracy", "1e-3", "--model", "columns")
+    assert said.code == 1
+    assert "by columns" in said.line
+    assert "an accuracy of 0.001 was not reached; the best is 0.5" in said.line
+    assert "F/m2" in said.out
+
+
+@pytest.fixture
+def no_solver(monkeypatch):
+    for module in (planner, fem2d):
+        monkeypatch.setattr(module, "find_spec", lambda name: None)
+    planner._solver_version.cache_clear()
+    yield
+    planner._solver_version.cache_clear()
+
+
+def test_without_the_solver_it_says_how_and_answers_with_what_it_has(run, no_solver):
+    said = run("cell", "tri", "--dielectric", 0.1, "--json")
+    found = json.loads(said.out)
+    assert (said.code, found["model"], found["reached"]) == (1, "columns", False)
+    assert found["lower_f_per_m2"] < TRI[0.1] < found["upper_f_per_m2"]
+    assert "NGSolve is not installed: pip install 'sensorgen[fem]'" in said.line
+    assert "the best is 0.48" in said.line
+
+
+def test_what_was_answered_without_the_solver_is_asked_again_with_it(run, monkeypatch):
+    with monkeypatch.context() as without:
+        for module in (planner, fem2d):
+            without.setattr(module, "find_spec", lambda name: None)
+        planner._solver_version.cache_clear()
+        assert run("cell", "tri").code == 1
+    planner._solver_version.cache_clear()
+    assert answer(run("cell", "tri", "--json"))["model"] == "fem2d"
+
+
+def test_predict_takes_an_accuracy(run):
+    found = answer(run("predict", "tri", "--dielectric", 0.1, "--accuracy", "1e-4", "--json"))
+    per_area = found["capacitance_per_area_f_per_m2"]
+    assert found["model"]["capacitance"] == "fem2d"
+    assert per_area["lower"] <= TRI[0.1] <= per_area["upper"]
+    assert per_area["upper"] / per_area["lower"] - 1 <= 1.0001e-4
+
+
+def test_predict_says_when_an_accuracy_is_not_reached(run, no_solver):
+    said = run("predict", "tri", "--accuracy", "1e-4")
+    assert said.code == 1
+    assert "was not reached; the best is 0.5; fem2d: NGSolve is not installed" in said.line
+
+
+SWEEP = ["cell", "tri", "--sweep", "dielectric_mm=0.1:0.2:0.1", "--jobs", "2"]
+
+
+def test_a_sweep_as_csv_and_json(run):
+    rows = list(csv.DictReader(io.StringIO(run(*SWEEP, "--csv").out)))
+    assert [float(row["dielectric_mm"]) for row in rows] == [0.1, 0.2]
+    for row in rows:
+        film = float(row["dielectric_mm"])
+        assert float(row["lower_f_per_m2"]) <= TRI[film] <= float(row["upper_f_per_m2"])
+        assert (row["model"], row["reached"], row["reason"]) == ("fem2d", "true", "")
+    found = answer(run(*SWEEP, "--json"))
+    assert [entry["known"] for entry in found] == [True, True]
+    assert [repr(entry["lower_f_per_m2"]) for entry in found] == [row["lower_f_per_m2"] for row in rows]
+    longer = answer(run("cell", "tri", "--sweep", "dielectric_mm=0.1,0.15,0.2", "--json"))
+    assert [entry["known"] for entry in longer] == [True, False, True]
+    lowers = [entry["lower_f_per_m2"] for entry in longer]
+    assert lowers == sorted(lowers, reverse=True)
+    assert lowers[::2] == [entry["lower_f_per_m2"] for entry in found]
+
+
+def test_a_sweep_over_a_material_and_over_words(run):
+    found = answer(run("cell", "reference", "--sweep", "eps_x60=2,4", "--json", "--jobs", "1"))
+    assert [entry["eps_x60"] for entry in found] == [2, 4]
+    assert found[1]["lower_f_per_m2"] == pytest.approx(2 * found[0]["lower_f_per_m2"], rel=1e-12, abs=0)
+    table = run(
+        "cell", "rect", "--sweep", "along=xy,yx", "--model", "columns", "--accuracy", "2", "--jobs", "1"
+    ).out.splitlines()
+    assert [line.split()[0] for line in table[1:]] == ["xy", "yx"]
+    assert table[1].split()[1] == table[2].split()[1]  # turned by a right angle
+
+
+def test_a_point_without_an_answer_leaves_the_others(run):
+    said = run("cell", "tri", "--sweep", "dielectric_mm=0,0.2", "--csv", "--jobs", "1")
+    bad, good = csv.DictReader(io.StringIO(said.out))
+    assert (said.code, bad["model"], bad["lower_f_per_m2"]) == (1, "", "")
+    assert "the electrodes touch" in bad["reason"]
+    assert good["model"] == "fem2d"
+    assert "trix-d0 has no answer" in said.line
+
+
+def test_a_file_is_written_whole(run, contents, tmp_path):
+    assert run("cell", "reference", "--json", "-o", "answer.json").out == "answer.json\n"
+    assert list(contents(tmp_path)) == ["answer.json"]
+    assert json.loads(Path("answer.json").read_text())["model"] == "columns"
+
+
+def test_ctrl_c_leaves_nothing_half_written(start, contents, tmp_path):
+    """Some points are solved by then, and known the next time; others are not, and nobody works on."""
+    words = ["cell", "tri", "--sweep", "dielectric_mm=0.1:0.4:0.01", "--accuracy", "1e-5", "--jobs", "2", "-o", "s.csv"]
+    cache = tmp_path / "kept"
+    process = start(*words, "--csv", SENSORGEN_CACHE=str(cache))
+    until = time.monotonic() + 100
+    while not list(cache.rglob("*.json")) and time.monotonic() < until:
+        time.sleep(0.05)
+    children = children_of(process.pid)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=30)
+    assert (process.returncode, out) == (130, "")
+    assert err.strip() == "sensorgen: interrupted; no file is half-written"
+    names = list(contents(tmp_path))
+    assert names
+    assert all(name.startswith("kept/") and name.endswith(".json") for name in names)
+    assert len(names) < 31
+    assert children
+    assert not [pid for pid in children if alive(pid)]
+
+
+def children_of(pid):
+    return [int(p.name) for p in Path("/proc").glob("[0-9]*") if stat(p.name).get("PPid") == str(pid)]
+
+
+def alive(pid):
+    """Whether a process still runs, a moment of grace given."""
+    for _ in range(100):
+        if stat(pid).get("State", "Z").startswith("Z"):
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def stat(pid):
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    except OSError:
+        return {}
+    return {key: value.strip() for key, _, value in (line.partition(":") for line in lines)}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--accuracy", "0"], "--accuracy: 0; expected a number above 0"),
+        (["--accuracy", "nan"], "--accuracy: nan; expected a number above 0"),
+        (["--accuracy", "high"], "--accuracy: 'high' is not a number"),
+        (["--model", "fem4d"], "unknown model of capacitance 'fem4d'; did you mean 'fem"),
+        (["--model", "fem3d"], "fem3d: not all of it is boxes"),
+        (["--model", "line"], "unknown model of capacitance 'line'"),
+        (["--dielectric", "0"], "the electrodes touch: the capacitance grows without bound"),
+        (["--set", "eps_x61=3"], "unknown material 'x61'; did you mean 'x60'"),
+        (["--set", "epz_x60=3"], "unknown quantity of x60 'epz'; did you mean 'eps'"),
+        (["--set", "eps_x60=soft"], "material_values.x60.relative_permittivity is 'soft'; expected a number"),
+        (["--set", "eps_x60=-1"], "relative_permittivity of x60 is -1; expected a number above 0"),
+        (["--set", "dielctric_mm=1"], "unknown key of --set 'dielctric_mm'; did you mean 'dielectric_mm'"),
+        (["--material", "film=x60@thesis-9"], "source of x60 'thesis-9'"),
+        (["--csv"], "--csv is for a sweep"),
+        (["--explain", "--json"], "--json holds the plan too"),
+        (["--sweep", "eps_x60=1,2", "--json", "--csv"], "--json and --csv at once"),
+        (["--sweep", "eps_x60"], "--sweep 'eps_x60': expected KEY=VALUE"),
+        (["--sweep", "eps_x60=1:a:2"], "'a' is not a number: write a number without a unit"),
+        (["--sweep", "eps_x60=3mm"], "'3mm' is not a number"),
+        (["--sweep", "eps_x60=0,1"], "eps_x60=0.0: relative_permittivity of x60 is 0"),
+        (["--sweep", "dielectric_mm=0.2:0.1:0.05"], "expected a step above 0"),
+        (["--sweep", "dielectric_mm=99"], "dielectric_mm=99.0: dielectric_mm is 99; expected"),
+        (["--sweep", "nosuch=1,2"], "unknown key of --set 'nosuch'"),
+        (["--sweep", "along=x,z"], "along=z: unknown value of along 'z'"),
+        (["--jobs", "0"], "--jobs"),
+    ],
+)
+def test_wrong_words(run, words, said):
+    got = run("cell", "tri", *words)
+    assert (got.code, got.out) == (2, "")
+    assert said in got.line
+
+
+@pytest.mark.parametrize(
+    ("word", "quantity", "value"),
+    [
+        ("eps_x60=3.0", "relative_permittivity", 3.0),
+        ("relative_permittivity_x60=3", "relative_permittivity", 3),
+        ("youngs_modulus_x60=3e6", "youngs_modulus_pa", 3e6),
+        ("youngs_modulus_pa_x60=3e6", "youngs_modulus_pa", 3e6),
+        ("nu_x60=0.45", "poisson_ratio", 0.45),
+        ("rho_x60=1e9", "resistivity_ohm_m", 1e9),
+        ("density_x60=1100", "density_kg_m3", 1100),
+        ("material_values.x60.poisson_ratio=0.3", "poisson_ratio", 0.3),
+    ],
+)
+def test_values_of_materials_in_words(word, quantity, value):
+    from sensorgen.cli.settings import setting
+
+    key, _, typed = word.partition("=")
+    assert setting(key, typed, {"dielectric_mm"}) == {"material_values": {"x60": {quantity: value}}}

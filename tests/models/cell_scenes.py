@@ -1,0 +1,68 @@
+"""Scenes of cells that several tests speak of."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from sensorgen.scene import Body, Fill, Prism, Scene, box
+from sensorgen.shapes import rect, tri
+
+EPS = {"x60": 4.68, "air": 1.00059}
+MM = 1e-3
+
+
+def tri_cell(film_mm: float, **options) -> Scene:
+    """One period, 1 mm deep."""
+    return tri.scene(tri.Params(length_mm=2.0, width_mm=1.0, dielectric_mm=film_mm, **options), Fill())
+
+
+def rect_cell(film_mm: float, **options) -> Scene:
+    return rect.scene(rect.Params(length_mm=2.0, width_mm=2.0, dielectric_mm=film_mm, **options), Fill())
+
+
+def prism(*points: tuple[float, float], depth: float = 1.0) -> Prism:
+    """Along y."""
+    return Prism("y", tuple((float(u), float(v)) for u, v in points), 0.0, depth)
+
+
+def plates(*bodies: Body, gap_mm: float = 1.0, length_mm: float = 2.0) -> Scene:
+    """Bodies between two flat electrodes of 0.2 mm, 1 mm deep."""
+    top = 0.2 + gap_mm
+    ends = (
+        Body("low", "etpu", (box(0, length_mm, 0, 1, 0, 0.2),), "bottom"),
+        Body("high", "etpu", (box(0, length_mm, 0, 1, top, top + 0.2),), "top"),
+    )
+    return Scene((ends[0], *bodies, ends[1]), (length_mm, 1.0, top + 0.2))
+
+
+def stairs(steps: int = 3, end_mm: float = 2.0) -> Scene:
+    """A cog printed in layers, over a film."""
+    width, rise = 0.5 / steps, 0.4 / steps
+    cog = tuple(box(0, width * (k + 1), 0, 1, 0.5 + rise * k, 0.5 + rise * (k + 1)) for k in range(steps))
+    return Scene(
+        (
+            Body("low", "etpu", (box(0, end_mm, 0, 1, 0, 0.3),), "bottom"),
+            Body("film", "x60", (box(0, end_mm, 0, 1, 0.3, 0.4),)),
+            Body("top", "etpu", (*cog, box(0, end_mm, 0, 1, 0.9, 1.2)), "top"),
+        ),
+        (end_mm, 1.0, 1.2),
+    )
+
+
+def bumps(corners: int = 24, eps: str = "x60") -> Scene:
+    """Half discs of dielectric that stand on the lower electrode and almost touch the upper one."""
+    angle = np.linspace(0, np.pi, corners + 1)
+    outline = [(1 + 0.5 * np.cos(a), 0.2 + 0.5 * np.sin(a)) for a in angle]
+    outline[-1], outline[0] = (0.5, 0.2), (1.5, 0.2)
+    return plates(Body("bump", eps, (prism(*outline),)), gap_mm=0.55)
+
+
+def between_curves(lower: Callable, upper: Callable, x: np.ndarray, height: float) -> Scene:
+    """Two electrodes that meet the air between them along curves, drawn with straight lines between given places."""
+    low, high = [(u, lower(u)) for u in x], [(u, upper(u)) for u in x]
+    bottom = [(x[0], 0.0), (x[-1], 0.0), *low[::-1]]
+    top = [*high, (x[-1], height), (x[0], height)]
+    return Scene(
+        (Body("low", "etpu", (prism(*bottom),), "bottom"), Body("high", "etpu", (prism(*top),), "top")),
+        (float(x[-1] - x[0]), 1.0, height),
+    )

@@ -1,0 +1,154 @@
+"""The cache of answers: what it keeps, what it forgets, and what it survives."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sensorgen import cached
+
+QUESTION = {"what": "sum", "terms": [1, 2.5], "eps": {"x60": 4.68}}
+
+
+def never():
+    raise AssertionError("solved again")
+
+
+def entries():
+    return [p for p in cached.folder().rglob("*") if p.is_file()]
+
+
+def test_a_question_is_worked_out_once():
+    calls = []
+    for _ in range(3):
+        assert cached.answer(QUESTION, lambda: calls.append(1) or {"value": 0.1 + 0.2}) == {"value": 0.1 + 0.2}
+    assert calls == [1]
+    assert cached.known(QUESTION) == {"value": 0.1 + 0.2}
+    assert len(entries()) == 1
+
+
+def test_the_order_of_keys_does_not_matter_and_every_value_does():
+    cached.answer(QUESTION, lambda: 1)
+    assert cached.answer(dict(reversed(QUESTION.items())), never) == 1
+    for change in ({"what": "product"}, {"terms": [2.5, 1]}, {"eps": {"x60": 4.680000000000001}}, {"more": None}):
+        assert cached.known(QUESTION | change) is None
+
+
+def test_an_answer_of_nothing_is_asked_again():
+    assert cached.answer(QUESTION, lambda: None) is None
+    assert cached.answer(QUESTION, lambda: 2) == 2
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: "",
+        lambda text: text[: len(text) // 2],
+        lambda text: text.replace("12345", "12346"),
+        lambda text: text.replace("4.68", "4.67"),
+        lambda text: "[" * 100_000,
+        lambda text: '"text"',
+        lambda text: text + "\0",
+    ],
+)
+def test_damaged_entries_are_ignored_and_rewritten(damage):
+    cached.answer(QUESTION, lambda: {"value": 12345})
+    (file,) = entries()
+    sound = file.read_text()
+    file.write_text(damage(sound))
+    assert file.read_text() != sound
+    assert cached.known(QUESTION) is None
+    assert cached.answer(QUESTION, lambda: {"value": 12345}) == {"value": 12345}
+    assert file.read_text() == sound
+
+
+def test_bytes_that_are_no_text_are_ignored():
+    cached.answer(QUESTION, lambda: 1)
+    (file,) = entries()
+    file.write_bytes(b"\xff\xfe")
+    assert cached.answer(QUESTION, lambda: 2) == 2
+
+
+def test_what_fails_is_not_kept():
+    with pytest.raises(KeyboardInterrupt):
+        cached.answer(QUESTION, lambda: (_ for _ in ()).throw(KeyboardInterrupt))
+    assert entries() == []
+    assert cached.answer(QUESTION, lambda: 1) == 1
+
+
+def test_a_question_that_is_not_finite_is_refused():
+    with pytest.raises(ValueError, match="JSON compliant"):
+        cached.answer({"width": float("inf")}, lambda: 1)
+
+
+def test_a_folder_that_cannot_be_written_costs_nothing_but_time(monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / "file" / "below"))
+    assert [cached.answer(QUESTION, lambda k=k: k) for k in (1, 2)] == [1, 2]
+
+
+def test_other_code_asks_anew(monkeypatch):
+    cached.answer(QUESTION, lambda: 1)
+    monkeypatch.setattr(cached, "_version", lambda: "other")
+    assert cached.answer(QUESTION, lambda: 2) == 2
+
+
+def test_the_version_covers_the_models_and_what_they_stand_on(monkeypatch, tmp_path):
+    package = tmp_path / "sensorgen"
+    (package / "models" / "_deep").mkdir(parents=True)
+    files = ["models/a.py", "models/_deep/b.py", "models/c.yaml", "cells.py", "scene.py", "sections.py"]
+    for name in files:
+        (package / name).write_text("1")
+    monkeypatch.setattr(cached, "__file__", str(package / "cached.py"))
+    found = []
+    for name in (None, *files):
+        if name:
+            (package / name).write_text("2")
+        cached._version.cache_clear()
+        found.append(cached._version())
+    cached._version.cache_clear()
+    assert len(set(found)) == len(found)
+
+
+@pytest.mark.parametrize(
+    ("platform", "environment", "expected"),
+    [
+        ("linux", {"XDG_CACHE_HOME": "/fast"}, "/fast/sensorgen"),
+        ("linux", {"XDG_CACHE_HOME": "relative"}, "~/.cache/sensorgen"),
+        ("linux", {}, "~/.cache/sensorgen"),
+        ("darwin", {"XDG_CACHE_HOME": "/fast"}, "~/Library/Caches/sensorgen"),
+        ("win32", {"LOCALAPPDATA": "/local"}, "/local/sensorgen"),
+        ("win32", {}, "~/AppData/Local/sensorgen"),
+        ("linux", {"XDG_CACHE_HOME": "/fast", "SENSORGEN_CACHE": "/own"}, "/own"),
+    ],
+)
+def test_where_it_is(monkeypatch, platform, environment, expected):
+    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA", "SENSORGEN_CACHE"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(cached.sys, "platform", platform)
+    assert cached.folder() == Path(expected).expanduser()
+
+
+WRITER = """
+import sys
+from sensorgen import cached
+for k in range(200):
+    question = {"k": k % 7}
+    assert cached.answer(question, lambda: [k % 7] * 1000) == [k % 7] * 1000
+    cached.keep(question, [k % 7] * 1000)
+"""
+
+
+def test_writers_at_once():
+    """Three processes write and read the same entries: none sees half of one."""
+    writers = [subprocess.Popen([sys.executable, "-c", WRITER], stderr=subprocess.PIPE) for _ in range(3)]
+    said = [writer.communicate(timeout=120)[1] for writer in writers]
+    assert said == [b"", b"", b""]
+    assert [w.returncode for w in writers] == [0, 0, 0]
+    files = entries()
+    assert len(files) == 7
+    assert all(json.loads(f.read_text())["answer"] for f in files)

@@ -1,0 +1,105 @@
+"""Values of the user's own: they go before every source's, everywhere, and are told as such."""
+
+import pytest
+
+from sensorgen import materials
+from sensorgen.compressed import _permittivity, _solids
+from sensorgen.design import make
+from sensorgen.errors import BadInput, OutOfRange, UnknownName
+from sensorgen.planner import unloaded
+from sensorgen.predict import prediction
+from sensorgen.sensing import sensor_of
+from sensorgen.stacked.designs import stacked
+
+
+def design(values, shape="reference", **rest):
+    return make({"shape": shape, "material_values": values} | rest)
+
+
+def test_a_value_goes_before_every_source():
+    x60 = materials.load("x60").with_values({"relative_permittivity": 3.0})
+    for source in ("", "thesis-3.2", "thesis-4.1"):
+        found = x60.value("relative_permittivity", source)
+        assert (found.value, found.source) == (3.0, "set by the user")
+    assert x60.value("youngs_modulus_pa").value == 6e6
+    assert materials.load("x60").value("relative_permittivity").value == 4.68
+    assert x60.sources() == materials.load("x60").sources()
+
+
+def test_a_missing_value_can_be_set():
+    assert materials.load("pla").with_values({"youngs_modulus_pa": 3e9}).value("youngs_modulus_pa").value == 3e9
+
+
+def test_permittivity_scales_a_plate():
+    """C = eps0 eps A / d."""
+    plain, half = (
+        unloaded(design(v)).answer.capacitance_f.lower for v in ({}, {"x60": {"relative_permittivity": 2.34}})
+    )
+    assert half == pytest.approx(plain / 2, rel=1e-12, abs=0)
+
+
+def test_the_source_is_told_and_the_name_of_the_design_is_another():
+    own = design({"x60": {"relative_permittivity": 3.0}})
+    taken = {(t.material, t.quantity): (t.value, t.source) for t in unloaded(own).taken}
+    assert taken["x60", "relative_permittivity"] == (3.0, "set by the user")
+    assert taken["air", "relative_permittivity"] == (1.00059, "thesis-3.2")
+    assert own.name != design({}).name == "reference"
+    assert own.id() != design({}).id()
+    other = design({"x60": {"relative_permittivity": 3.1}})
+    assert len({own.name, other.name}) == len({own.id(), other.id()}) == 2
+
+
+def test_resistivity_reaches_both_electrodes():
+    found = prediction(design({"etpu": {"resistivity_ohm_m": 0.1}}))["electrode_resistance_ohm"]
+    assert found == pytest.approx({"top": 0.1 * 0.1 / (3e-4 * 0.01), "bottom": 0.1 * 0.1 / (3e-4 * 0.01)})
+
+
+def test_stiffness_and_force_go_together():
+    """Twice the modulus and twice the force: the same impedance."""
+    soft, hard = (sensor_of(design({m: {"youngs_modulus_pa": e} for m in ("x60", "etpu")})).sensor for e in (3e6, 6e6))
+    for force in (1.0, 2.5):
+        assert soft.impedance(1.1e3, force, 0.05) == pytest.approx(hard.impedance(1.1e3, 2 * force, 0.05), rel=1e-12)
+    assert soft.impedance(1.1e3, 1.0, 0.05) != hard.impedance(1.1e3, 1.0, 0.05)
+
+
+def test_compression_of_cells_gets_them():
+    x60 = {"youngs_modulus_pa": 3e6, "poisson_ratio": 0.45, "relative_permittivity": 3.0}
+    own = design({"x60": x60, "air": {"relative_permittivity": 2.0}}, "tri")
+    assert (_solids(own)["x60"].youngs_modulus_pa, _solids(own)["x60"].poisson_ratio) == (3e6, 0.45)
+    assert _solids(own)["etpu"].youngs_modulus_pa == 22e6
+    assert _permittivity(own) == {"x60": 3.0, "air": 2.0}
+
+
+def test_the_halves_of_a_double_sensor_get_them():
+    own = design({"x60": {"relative_permittivity": 3.0}}, "double")
+    assert stacked(own).isolation_eps_r == 3.0
+    values = {(v["material"], v["value"]) for v in stacked(own).taken if v["quantity"] == "relative_permittivity"}
+    assert {value for material, value in values if material == "x60"} == {3.0}
+
+
+@pytest.mark.parametrize(
+    ("values", "error", "said"),
+    [
+        ({"x61": {"relative_permittivity": 3.0}}, UnknownName, "unknown material 'x61'; did you mean 'x60'"),
+        ({"x60": {"permitivity": 3.0}}, UnknownName, "unknown quantity of x60 'permitivity'"),
+        (
+            {"x60": {"relative_permittivity": 0.0}},
+            OutOfRange,
+            "relative_permittivity of x60 is 0; expected a number above",
+        ),
+        ({"x60": {"relative_permittivity": -1.0}}, OutOfRange, "is -1; expected a number above 0"),
+        ({"x60": {"youngs_modulus_pa": float("nan")}}, OutOfRange, "is nan"),
+        ({"x60": {"youngs_modulus_pa": float("inf")}}, OutOfRange, "is inf"),
+        ({"x60": {"poisson_ratio": 0.51}}, OutOfRange, "poisson_ratio of x60 is 0.51; expected -1 to 0.5"),
+        ({"x60": {"relative_permittivity": "3"}}, BadInput, "material_values.x60.relative_permittivity is '3'"),
+        ({"x60": 3.0}, BadInput, "material_values.x60 is 3.0"),
+    ],
+)
+def test_what_no_material_can_have(values, error, said):
+    with pytest.raises(error, match=said):
+        design(values)
+
+
+@pytest.mark.parametrize("nu", [0.5, 0.4999, 0.0, -1.0])
+def test_limits_of_nu(nu):
+    assert design({"x60": {"poisson_ratio": nu}}).material("x60").value("poisson_ratio").value == nu

@@ -1,0 +1,253 @@
+"""The planner: which model is asked, on what grounds, and what is kept."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from sensorgen import models as model_files
+from sensorgen import planner, registry
+from sensorgen.design import make
+from sensorgen.errors import OutOfRange, SensorgenError, UnknownName
+from sensorgen.interval import Interval
+from sensorgen.planner import Contradiction, Unpredictable, capacitance
+from sensorgen.scene import Body, Prism, Scene, box
+
+EPS = {"x60": 4.68, "air": 1.00059}
+PLATE = Scene(
+    (
+        Body("low", "etpu", (box(0, 10, 0, 1, 0, 0.3),), "bottom"),
+        Body("film", "x60", (box(0, 10, 0, 1, 0.3, 0.9),)),
+        Body("high", "etpu", (box(0, 10, 0, 1, 0.9, 1.2),), "top"),
+    ),
+    (10, 1, 1.2),
+)
+
+
+class Fake:
+    """Models that note what they are asked; ``width`` is what they give, or a function of what is wanted."""
+
+    def __init__(self, monkeypatch):
+        self.models, self.expected, self.asked = {}, {}, []
+        monkeypatch.setattr(planner, "capacitance_models", lambda: dict(self.models))
+        monkeypatch.setattr(planner, "_expectations", lambda: self.expected)
+
+    def add(self, name, cost, width, *points, unfit=None, middle=1.0):
+        def work(scene, permittivity, wanted=None):
+            self.asked.append((name, wanted))
+            apart = (1 - 1e-9) * (width(wanted) if callable(width) else width)
+            return Interval(middle - apart / 2, middle + apart / 2)
+
+        model = SimpleNamespace(COST=cost, unfit=lambda scene: unfit, capacitance=work)
+        if cost > 1:
+            model.WIDTH = 1e-3
+        self.models[name] = model
+        if points:
+            self.expected[name] = list(points)
+
+    @property
+    def names(self):
+        return [name for name, _ in self.asked]
+
+
+@pytest.fixture
+def fake(monkeypatch):
+    return Fake(monkeypatch)
+
+
+def ladder(fake, **changes):
+    """A cheap model, and two dear ones that do as they are expected to."""
+    fake.add("cheap", 1, changes.get("cheap", 0.4), (0.4, 1e-3))
+    fake.add("mid", 2, changes.get("mid", lambda w: max(w, 1e-8)), (1e-2, 0.1), (1e-4, 0.2), (1e-8, 1.0))
+    fake.add("dear", 3, changes.get("dear", lambda w: max(w, 1e-4)), (1e-2, 5.0), (1e-4, 60.0))
+
+
+@pytest.mark.parametrize(
+    ("width", "asked", "taken"),
+    [
+        (float("inf"), ["cheap"], "cheap"),
+        (0.5, ["cheap"], "cheap"),
+        (0.4, ["cheap"], "cheap"),
+        (0.399, ["cheap", "mid"], "mid"),
+        (1e-4, ["cheap", "mid"], "mid"),
+        (1e-9, ["cheap", "mid"], "mid"),  # dear is not expected to come near what mid reached
+    ],
+)
+def test_the_cheapest_that_will_do(fake, width, asked, taken):
+    ladder(fake)
+    found = capacitance(PLATE, EPS, width)
+    assert (fake.names, found.model) == (asked, taken)
+    assert found.reached() == (width > 1e-9)
+    assert [w for name, w in fake.asked if name == "mid"] == [width] * (len(asked) - 1)
+
+
+def test_a_model_that_falls_short_is_followed_by_the_next(fake):
+    ladder(fake, mid=0.1)
+    found = capacitance(PLATE, EPS, 1e-4)
+    assert fake.names == ["cheap", "mid", "dear"]
+    assert (found.model, found.reached()) == ("dear", True)
+    assert [c.width for c in found.plan] == pytest.approx([0.4, 0.1, 1e-4])
+    assert found.seconds() == pytest.approx(sum(c.seconds for c in found.plan))
+
+
+def test_a_dear_model_that_should_do_comes_before_one_that_should_not(fake):
+    fake.add("weak", 2, 1e-2, (1e-2, 0.1))
+    fake.add("strong", 3, 1e-6, (1e-6, 9.0))
+    assert capacitance(PLATE, EPS, 1e-5).model == "strong"
+    assert fake.names == ["strong"]
+    fake.asked.clear()
+    assert capacitance(PLATE, EPS, 1e-8).model == "strong"  # neither should: the nearest first, the other is no use
+    assert fake.names == ["strong"]
+
+
+def test_a_model_that_was_never_measured_is_tried(fake):
+    fake.add("cheap", 1, 0.4, (0.4, 1e-3))
+    fake.add("new", 2, 1e-6)
+    assert capacitance(PLATE, EPS, 1e-5).model == "new"
+
+
+def test_what_is_expected_is_the_quickest_measurement_that_does(fake):
+    ladder(fake)
+    plan = {c.model: c for c in planner.weighed(PLATE, 1e-3)}
+    assert (plan["mid"].expected_width, plan["mid"].expected_seconds) == (1e-4, 0.2)
+    assert (plan["dear"].expected_width, plan["dear"].expected_seconds) == (1e-4, 60.0)
+    assert (plan["cheap"].expected_width, plan["cheap"].expected_seconds) == (0.4, 1e-3)
+    assert [c.model for c in planner.weighed(PLATE, 1e-6)] == ["cheap", "mid", "dear"]
+    assert {c.model: c for c in planner.weighed(PLATE, 1e-6)}["dear"].expected_width == 1e-4
+
+
+def test_refusals_are_told_and_others_answer(fake):
+    ladder(fake)
+    fake.models["mid"].unfit = lambda scene: "it is not installed"
+    found = capacitance(PLATE, EPS, 1e-2)
+    assert (found.model, found.refused) == ("dear", ("mid: it is not installed",))
+    assert {c.model: c.passed_over for c in found.plan}["mid"] == "it is not installed"
+
+
+def test_nobody_can_speak(fake):
+    fake.add("one", 1, 0.1, unfit="too round")
+    fake.add("two", 2, 0.1, unfit="too flat")
+    with pytest.raises(Unpredictable, match=r"^one: too round; two: too flat$"):
+        capacitance(PLATE, EPS, 1e-3)
+
+
+def test_a_model_by_name(fake):
+    ladder(fake)
+    found = capacitance(PLATE, EPS, 1e-9, "dear")
+    assert (fake.names, found.model, found.reached()) == (["dear"], "dear", False)
+    with pytest.raises(UnknownName, match="model of capacitance 'deer'; did you mean 'dear'"):
+        capacitance(PLATE, EPS, 1e-3, "deer")
+    fake.models["dear"].unfit = lambda scene: "too round"
+    with pytest.raises(Unpredictable, match=r"^dear: too round$"):
+        capacitance(PLATE, EPS, 1e-3, "dear")
+
+
+def test_bounds_that_exclude_each_other_stop(fake):
+    fake.add("cheap", 1, 0.4)
+    fake.add("wrong", 2, 1e-6, middle=1.3)
+    with pytest.raises(Contradiction, match=r"wrong says at least 1.2999995 F, cheap at most 1.2 F"):
+        capacitance(PLATE, EPS, 1e-3)
+
+
+@pytest.mark.parametrize("width", [0.0, -1.0, float("nan")])
+def test_accuracies_that_mean_nothing(width):
+    with pytest.raises(OutOfRange, match="expected a number above 0"):
+        capacitance(PLATE, EPS, width)
+
+
+def test_known_answers(fake):
+    ladder(fake)
+    first = capacitance(PLATE, EPS, 1e-4)
+    assert not first.known
+    assert planner.is_known(PLATE, EPS, 1e-4)
+    again = capacitance(PLATE, EPS, 1e-4)
+    assert fake.names == ["cheap", "mid"]
+    assert again == replace(first, known=True)
+
+
+def test_what_makes_a_question_another_one(fake, monkeypatch):
+    ladder(fake)
+    capacitance(PLATE, EPS, 1e-4)
+    thicker = replace(PLATE, size_mm=(10, 1, 1.3))
+    body = replace(PLATE.bodies[1], prisms=(box(0, 10, 0, 1, 0.3, 0.9 + 1e-9),))
+    moved = replace(PLATE, bodies=(PLATE.bodies[0], body, PLATE.bodies[2]))
+    swapped = replace(PLATE, bodies=(*PLATE.bodies[:2], replace(PLATE.bodies[2], terminal="")))
+    others = [
+        (thicker, EPS, 1e-4), (moved, EPS, 1e-4), (swapped, EPS, 1e-4), (PLATE, EPS | {"x60": 4.69}, 1e-4),
+        (PLATE, EPS, 1e-5), (PLATE, EPS, 1e-4, "mid"),
+    ]  # fmt: skip
+    assert not any(planner.is_known(*other) for other in others)
+    monkeypatch.setattr(planner, "_solver_version", lambda: "ngsolve-9")
+    assert not planner.is_known(PLATE, EPS, 1e-4)
+
+
+def test_any_width_and_no_cache_keep_nothing(fake):
+    ladder(fake)
+    capacitance(PLATE, EPS)
+    capacitance(PLATE, EPS, 1e-2, keep=False)
+    assert not planner.is_known(PLATE, EPS, float("inf"))
+    assert not planner.is_known(PLATE, EPS, 1e-2)
+
+
+def test_an_answer_to_a_named_model_of_any_width_can_be_kept(fake):
+    ladder(fake)
+    first = capacitance(PLATE, EPS, model="dear")
+    assert fake.asked == [("dear", 1e-3)]  # its own width, where none is wanted
+    assert capacitance(PLATE, EPS, model="dear") == replace(first, known=True)
+
+
+def test_a_solver_that_does_not_load_is_told(fake, monkeypatch):
+    fake.add("dear", 2, 1e-6)
+    fake.models["dear"].NEEDS = "the solver"
+
+    def broken(name):
+        raise ImportError("libnglib.so: cannot open")
+
+    monkeypatch.setattr(planner, "find_spec", lambda name: SimpleNamespace(origin=None))
+    monkeypatch.setattr(planner, "import_module", broken)
+    with pytest.raises(SensorgenError, match=r"does not load .libnglib.so: cannot open.: pip install"):
+        capacitance(PLATE, EPS, 1e-3, keep=False)
+
+
+BOWTIE = ((0, 0.3), (10, 0.3), (0, 0.9), (10, 0.9))
+
+
+@pytest.mark.parametrize(
+    ("prisms", "named"),
+    [
+        ([(box(0, 10, 0, 1, 0.3, 0.7),), (box(0, 10, 0, 1, 0.6, 0.9),)], "film0 and film1"),
+        ([(box(0, 10, 0, 1, 0.3, 0.9),), (box(4, 5, 0, 1, 0.5, 0.6),)], "film1 and film0"),
+        ([(box(0, 10, 0, 1, 0.2, 0.9),)], "low and film0"),
+        ([(Prism("y", BOWTIE, 0, 1),)], "film0"),
+    ],
+)
+def test_overlapping_outlines_are_refused_before_any_model(fake, prisms, named):
+    ladder(fake)
+    films = [Body(f"film{k}", "x60", p) for k, p in enumerate(prisms)]
+    scene = replace(PLATE, bodies=(PLATE.bodies[0], *films, PLATE.bodies[2]))
+    with pytest.raises(Unpredictable, match=f"outlines overlap near x = .* mm: {named}; expected each place"):
+        capacitance(scene, EPS)
+    assert fake.asked == []
+
+
+def test_bodies_that_only_touch_do_not_overlap():
+    for shape in ("tri", "rect", "reference", "double"):
+        assert planner.overlap(make({"shape": shape}).in_use) is None
+
+
+def test_expectations_are_of_models_that_exist_and_fall():
+    found = planner._expectations()
+    assert set(found) <= set(registry.names(model_files))
+    for points in found.values():
+        widths, seconds = zip(*points, strict=True)
+        assert list(widths) == sorted(widths, reverse=True)
+        assert list(seconds) == sorted(seconds)
+        assert min(seconds) > 0
+
+
+def test_a_real_plate_is_exact_without_any_solver():
+    design = make({"shape": "reference"})
+    found = planner.unloaded(design, 1e-12).answer
+    assert found.model == "columns"
+    assert found.capacitance_f.lower == pytest.approx(69.06266493984e-12, rel=1e-10, abs=0)
+    assert [c.passed_over for c in found.plan if c.model != "columns"] == ["not needed"] * (len(found.plan) - 1)
