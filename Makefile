@@ -25,6 +25,7 @@ lint: $(READY_DEV) ## style, types, and which module may import which
 
 docs: $(READY_DEV) ## write docs/reference.md from the --help texts, and the pictures of README and docs
 	$(BIN)/python docs/generate.py
+	$(BIN)/python docs/pictures.py
 
 bench: $(READY_DEV) ## measure speed, memory and accuracy; write bench/results
 	set -e; for program in bench/*.py; do $(BIN)/python $$program; done

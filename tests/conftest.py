@@ -1,4 +1,24 @@
-"""What the tests have to say besides passing."""
+"""What the tests have to say besides passing, and the programs that some of them run."""
+
+import os
+import shutil
+
+import pytest
+
+
+@pytest.fixture
+def program():
+    """Path of a program by the names that it may have; without it a test is skipped, but never on CI."""
+
+    def path(package, *names):
+        found = next(filter(None, map(shutil.which, names)), None)
+        if found is None and os.environ.get("CI"):
+            pytest.fail(f"{names[0]} is not installed, though scripts/system-packages --programs installs it")
+        if found is None:
+            pytest.skip(f"{names[0]} is not installed (Debian: apt install {package})")
+        return found
+
+    return path
 
 
 def pytest_terminal_summary(terminalreporter):
