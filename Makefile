@@ -16,6 +16,7 @@ demo: $(READY) ## set up, and build the triangular sensor with a film of 0.2 mm
 test: $(READY_DEV) ## set up, with slicers, ngspice and Chromium where apt may, and run all tests
 	scripts/system-packages --programs
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest -m kernel tests/geometry $(ARGS)
 
 lint: $(READY_DEV) ## style, types, and which module may import which
 	$(BIN)/ruff format --check src tests bench docs

@@ -2,8 +2,16 @@
 
 import os
 import shutil
+import sys
 
 import pytest
+
+
+@pytest.fixture(autouse=True, scope="module")
+def one_kernel():
+    """build123d and NGSolve bring two versions of one CAD kernel, which crash together: tests load one or the other."""
+    yield
+    assert not {"build123d", "ngsolve"} <= sys.modules.keys()
 
 
 @pytest.fixture

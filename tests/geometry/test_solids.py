@@ -19,6 +19,7 @@ from sensorgen.errors import CadFailed, Unwritable
 from sensorgen.geometry import solids
 from sensorgen.scene import Body, Fill, Prism, Scene, box
 
+pytestmark = pytest.mark.kernel
 COLOURS = ("#202428", "#f0e6d2", "#3080ff", "#202428")
 HOSTILE = 'Größe µ € 😀 it\'s "23 triX" \\X2\\ #5 ; /* @1@ */'
 L_OUTLINE = ((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
