@@ -16,6 +16,7 @@ demo: $(READY) ## set up (with the solver NGSolve), and build the triangular sen
 test: $(READY_DEV) ## set up, with slicers, ngspice and Chromium where apt may, and run all tests
 	scripts/system-packages --programs
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest -m kernel tests/geometry $(ARGS)
 
 lint: $(READY_DEV) ## style, types, and which module may import which
 	$(BIN)/ruff format --check src tests bench docs
@@ -25,6 +26,7 @@ lint: $(READY_DEV) ## style, types, and which module may import which
 
 docs: $(READY_DEV) ## write docs/reference.md from the --help texts, and the pictures of README and docs
 	$(BIN)/python docs/generate.py
+	$(BIN)/python docs/pictures.py
 
 bench: $(READY_DEV) ## measure speed, memory and accuracy; write bench/results
 	set -e; for program in bench/*.py; do $(BIN)/python $$program; done

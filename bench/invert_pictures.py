@@ -75,7 +75,7 @@ def run(path):
 
 def two_presses(path):
     """The sum of squares over all presses, for a reading that two of them explain."""
-    sensor, force, position = tri(1 / 1.2), 4.3, 0.0947
+    sensor, force, position = tri(1 / 1.2), 4.25, 0.0883
     z = sensor.impedance(TONES, force, position)
     f, x = np.meshgrid(np.linspace(3.5, 6.5, 241), np.linspace(0.07, 0.1, 241), indexing="ij")
     square = (abs(np.log(z)[:, None, None] - np.log(sensor.impedance(TONES[:, None, None], f, x))) ** 2).sum(0)
@@ -84,12 +84,14 @@ def two_presses(path):
     levels = [0, 0.1, 1, 2.3, 4.6, 9.2, 30, 100, 300, 1000, 3000, 1e4]
     norm = mpl.colors.BoundaryNorm(levels, 256)
     filled = ax.contourf(x * 1e3, f, square / NOISE**2, levels, cmap="viridis_r", norm=norm)
-    figure.colorbar(filled, label="chi squared at 0.1 % noise", ticks=levels)
+    figure.colorbar(filled, label="chi squared at 0.1 % noise", ticks=levels, format="%g")
     ax.contour(x * 1e3, f, square / NOISE**2, [9.21], colors="w", linewidths=1.2)
     ax.plot(found.position_m * 1e3, found.force_n, "o", color="w", mec="k", label="the best press (the true one)")
     ax.plot(found.other_position_m * 1e3, found.other_force_n, "s", color="w", mec="k", label="the other one")
     ax.axvline(95, color="k", ls=":", lw=1)
-    ax.text(95.1, 3.55, "from here the tip\noverhangs the end", fontsize="small", va="bottom")
+    ax.text(
+        94.9, 3.55, "right of here the tip\noverhangs the end", fontsize="small", va="bottom", ha="right", color="w"
+    )
     ax.set(xlabel="position [mm]", ylabel="force [N]", title="One reading, two presses (inside the white line: 99 %)")
     ax.legend(loc="upper left")
     figure.tight_layout()
@@ -118,6 +120,10 @@ def prior(path):
         ax.axvline(0.1, color="0.8", lw=4, zorder=0, label="0.1 %, the bench")
         ax.set(xlabel="noise [% of |Z|]", ylabel=f"rms error of {unit}")
         ax.grid(alpha=0.3)
+        ax.xaxis.set_major_formatter("{x:g}")
+        ax.yaxis.set_major_formatter("{x:g}")
+        ax.yaxis.set_minor_formatter("")
+    axes[1].set_yticks([5, 10, 20, 50])
     axes[0].legend(fontsize="small")
     figure.suptitle("The thesis's plate with its own electrodes, 0 to 6 N over the whole sensor")
     figure.tight_layout()

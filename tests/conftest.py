@@ -1,4 +1,8 @@
-"""What the tests have to say besides passing, and a cache of its own for each."""
+"""What the tests have to say besides passing, a cache of its own for each, and the programs that some of them run."""
+
+import os
+import shutil
+import sys
 
 import pytest
 
@@ -7,6 +11,28 @@ import pytest
 def _cache(monkeypatch, tmp_path_factory):
     """No test finds what another one, or the user, has kept."""
     monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path_factory.mktemp("cache")))
+
+
+@pytest.fixture(autouse=True, scope="module")
+def one_kernel():
+    """build123d and NGSolve bring two versions of one CAD kernel, which crash together: tests load one or the other."""
+    yield
+    assert not {"build123d", "ngsolve"} <= sys.modules.keys()
+
+
+@pytest.fixture
+def program():
+    """Path of a program by the names that it may have; without it a test is skipped, but never on CI."""
+
+    def path(package, *names):
+        found = next(filter(None, map(shutil.which, names)), None)
+        if found is None and os.environ.get("CI"):
+            pytest.fail(f"{names[0]} is not installed, though scripts/system-packages --programs installs it")
+        if found is None:
+            pytest.skip(f"{names[0]} is not installed (Debian: apt install {package})")
+        return found
+
+    return path
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -32,8 +32,8 @@ def printed(capsys, sensor=PLATE, tones=TONES_HZ, **more) -> str:
 )
 def test_it_fits_the_screen(capsys, more):
     lines = printed(capsys, **more).splitlines()
-    assert len(lines) <= 25
-    assert max(len(line) for line in lines) <= 100
+    assert len(lines) <= 28
+    assert max(len(line) for line in lines) <= 80
 
 
 def test_it_says_what_the_plate_cannot_do(capsys):

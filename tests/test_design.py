@@ -106,7 +106,7 @@ def test_names_made_from_odd_file_names_are_safe(tmp_path, stem):
 
 
 BAD = [
-    ({}, BadInput, "shape is missing; expected rect, reference, tri"),
+    ({}, BadInput, "shape is missing; expected double, rect, reference, tri"),
     ({"shape": 3}, BadInput, "shape is 3; expected text"),
     ({"shape": "tri", 1: 2}, BadInput, "1 is 1; expected"),
     ({"shape": "tri", "parameters": {"period_mm": True}}, BadInput, "period_mm is True; expected a number"),

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from sensorgen.design import make
 from sensorgen.errors import BadInput, OutOfRange
-from sensorgen.invert import Estimator, Prior, Status, estimate
+from sensorgen.invert import Estimator, Prior, Status, answers, estimate
 from sensorgen.invert.forward import Forward
 from sensorgen.invert.verdict import chi2_limit
 from sensorgen.models.compression import unconfined
@@ -172,12 +172,54 @@ def test_the_thesis_plate_senses_neither():
     assert deviation == pytest.approx([2.23, 0.225], rel=0.02)
 
 
+def test_noise_above_the_signal_says_nothing():
+    sensor, tones = SENSORS["5 ohm m, tones to 1 MHz"]
+    z = noisy(readings(sensor, tones, *presses(300)), 0.5)
+    found = estimate(sensor, tones, z, 0.5)
+    assert np.mean(found.status == Status.NOT_IDENTIFIABLE) > 0.9  # the logarithm of such noise has a long tail: no fit
+    assert (found.status >= Status.NOT_IDENTIFIABLE).mean() > 0.98
+    assert not np.isnan(found.force_n).any()
+    known = estimate(sensor, tones, z, 0.5, Prior())  # nothing is left but the prior
+    assert np.median(known.force_n) == pytest.approx(6.5, abs=1.0)
+    assert np.median(known.position_m) == pytest.approx(0.05, abs=0.01)
+    assert np.median(np.sqrt(known.covariance[:, 1, 1])) == pytest.approx(0.1 / math.sqrt(12), rel=0.15)
+
+
+def test_tones_that_all_read_alike_are_no_sensor():
+    sensor, tones = SENSORS["5 ohm m"]
+    found = estimate(sensor, tones, np.full((3, 7), sensor.impedance(tones[3], 3.0, 0.05)))
+    assert set(found.status.tolist()) == {Status.NO_FIT}
+
+
+def test_the_order_of_the_tones_does_not_matter():
+    sensor, tones = SENSORS["5 ohm m, tones to 1 MHz"]
+    force, position = presses(200, force=(1.0, 6.0), ends=0.01)
+    z, order = noisy(readings(sensor, tones, force, position)), np.array([3, 0, 6, 1, 5, 2, 4])
+    one, other = estimate(sensor, tones, z), estimate(sensor, tones[order], z[:, order])
+    for name, error in (("force_n", 0), ("position_m", 1)):
+        off = getattr(other, name) - getattr(one, name)
+        assert (abs(off) < 0.05 * np.sqrt(one.covariance[:, error, error])).all()
+
+
 def test_what_no_press_explains_is_no_fit():
     sensor, tones = SENSORS["5 ohm m"]
     z = readings(sensor, tones, [3.0], [0.05]) * np.exp(0.02j * np.arange(7))
     found = estimate(sensor, tones, z)
     assert found.status.tolist() == [Status.NO_FIT]
     assert found.chi2[0] > chi2_limit(np.array([12]))[0]
+
+
+@pytest.mark.parametrize(("square", "status"), [(36.0, Status.OK), (46.0, Status.NO_FIT)])
+def test_the_limit_counts_two_numbers_per_tone_less_force_and_position(square, status):
+    """Chi-squared with 12 degrees of freedom exceeds 39.1 once in 10 000 times, with 14 it exceeds 42.6."""
+    sensor, tones = SENSORS["5 ohm m"]
+    z, wrong = readings(sensor, tones, [3.0], [0.05]), 1e-3 * np.array([1, -1, 1j, -1j, 1, 1j, -1])
+    first = estimate(sensor, tones, z * np.exp(wrong)).chi2[0]
+    reading = z * np.exp(wrong * math.sqrt(square / first))
+    found = estimate(sensor, tones, reading)
+    assert found.chi2[0] == pytest.approx(square, rel=0.05)
+    assert found.status.tolist() == [status]
+    assert Estimator(sensor, tones).one(reading[0]).status == status
 
 
 @pytest.mark.parametrize("degrees", [4, 12, 40])
@@ -256,6 +298,30 @@ def test_both_presses_are_told():
     assert np.isnan(found.other_force_n[found.status == Status.OK]).all()
 
 
+def test_both_presses_are_written_in_newtons_and_millimetres():
+    sensor, tones = SENSORS["eTPU at 0.83 ohm m"]
+    found = estimate(sensor, tones, readings(sensor, tones, [4.25], [0.0883]))
+    row = dict(zip(answers.COLUMNS, answers.rows([[]], found).strip().split(","), strict=True))
+    assert row["status"] == "two presses"
+    other = readings(sensor, tones, [float(row["other_force_n"])], [float(row["other_position_mm"]) * 1e-3])
+    assert np.sum(abs(np.log(other / readings(sensor, tones, [4.25], [0.0883]))) ** 2) / NOISE**2 < 9.3
+    assert float(row["other_position_mm"]) > 95
+
+
+def test_of_two_presses_the_better_one_is_the_answer():
+    sensor, tones = SENSORS["eTPU at 0.83 ohm m"]
+    rng = np.random.default_rng(12)
+    z = noisy(readings(sensor, tones, rng.uniform(3, 6, 4000), rng.uniform(0.085, 0.1, 4000)))
+    found = estimate(sensor, tones, z)
+    two = np.flatnonzero(found.status == Status.AMBIGUOUS)
+    assert len(two) > 5
+    presses_ = (found.force_n, found.position_m), (found.other_force_n, found.other_position_m)
+    first, second = (
+        np.sum(abs(np.log(readings(sensor, tones, f[two], x[two]) / z[two])) ** 2, 1) / NOISE**2 for f, x in presses_
+    )
+    assert (first < second + 0.01).all()
+
+
 def test_brute_force_finds_no_third_and_no_better_press():
     sensor, tones = SENSORS["5 ohm m, tones to 1 MHz"]
     force, position = presses(30, force=(0.5, 6.0), seed=7)
@@ -283,6 +349,7 @@ def test_streams_and_batches_agree():
     covariances = np.array([s.covariance for s in stream])
     ratio = covariances[told][:, [0, 1], [0, 1]] / batch.covariance[told][:, [0, 1], [0, 1]]
     assert np.percentile(abs(ratio - 1), 95) < 0.02  # both take the information of one step before the last
+    assert np.corrcoef(covariances[told, 0, 1], batch.covariance[told, 0, 1])[0, 1] > 0.99
 
 
 def test_blocks_do_not_show():

@@ -5,7 +5,6 @@ import html as entities
 import json
 import os
 import re
-import shutil
 import struct
 import subprocess
 
@@ -194,7 +193,7 @@ def test_a_sensor_that_a_press_does_not_move_is_drawn_too():
 
 def test_a_missing_library_is_named(monkeypatch):
     monkeypatch.setattr(library.importlib.util, "find_spec", lambda name: None if name == "plotly" else name)
-    with pytest.raises(MissingValue, match=r"plots need plotly: pip install 'sensorgen\[plot\]'"):
+    with pytest.raises(MissingValue, match=r"plots need plotly: pip install plotly"):
         library.needed("matplotlib", "plotly")
 
 
@@ -257,11 +256,8 @@ addEventListener("load", () => setTimeout(async () => {
 
 
 @pytest.fixture
-def chromium():
-    path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if path is None:
-        pytest.skip("chromium is not installed (Debian: apt install chromium)")
-    return path
+def chromium(program):
+    return program("chromium", "chromium", "chromium-browser", "google-chrome")
 
 
 def test_the_page_in_a_browser(chromium, answer, tmp_path):

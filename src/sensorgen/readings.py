@@ -70,7 +70,7 @@ class Readings:
     """
 
     def __init__(self, name: str, file: IO[str]) -> None:
-        self.name, self._file, self._next = name, file, 2
+        self.name, self._file, self._next = name, file, 1
         header = self._lines(1)
         if not header or not header[0].strip():
             raise BadInput(f"{name}: the file is empty; expected a header with {_WANTED}")
@@ -92,7 +92,7 @@ class Readings:
         """
         found = False
         while lines := self._lines(size):
-            first, self._next = self._next, self._next + len(lines)
+            first = self._next - len(lines)
             filled = [(first + i, line) for i, line in enumerate(lines) if not line.isspace()]
             if filled:
                 found = True
@@ -101,12 +101,21 @@ class Readings:
             raise BadInput(f"{self.name}: no rows below the header")
 
     def _lines(self, count: int) -> list[str]:
+        lines = list(islice(self._file, count))
+        for row, line in enumerate(lines, self._next):
+            if not line.isascii():
+                self._check_utf8(row, line)
+        self._next += len(lines)
+        return lines
+
+    def _check_utf8(self, row: int, line: str) -> None:
+        """Refuse bytes that were no UTF-8: they stand in the text as lone surrogates."""
         try:
-            return list(islice(self._file, count))
-        except UnicodeDecodeError as error:
+            line.encode()
+        except UnicodeEncodeError as error:
             raise BadInput(
-                f"{self.name}: byte {error.object[error.start]:#04x} after row {self._next - 1} is not UTF-8; "
-                "save the file as CSV in UTF-8"
+                f"{self.name}, row {row}, character {error.start + 1}: byte {ord(line[error.start]) & 0xFF:#04x} "
+                "is not UTF-8; save the file as CSV in UTF-8"
             ) from None
 
     def _block(self, rows: list[int], lines: list[str]) -> Block:
@@ -145,15 +154,15 @@ class Readings:
             return None
 
     def _cells(self, rows: list[int], lines: list[str]) -> list[list[str]]:
-        header = self._header
-        try:
-            found = [next(csv.reader([line], delimiter=header.separator, strict=True)) for line in lines]
-        except csv.Error as error:
-            bad = next(r for r, line in zip(rows, lines, strict=True) if line.count('"') % 2)
-            raise BadInput(f"{self.name}, row {bad}: {error}; a quotation mark is not closed") from None
-        for row, cells in zip(rows, found, strict=True):
-            if len(cells) != len(header.names):
-                raise BadInput(f"{self.name}, row {row}: {self._miscounted(len(cells))}")
+        header, found = self._header, []
+        for row, line in zip(rows, lines, strict=True):
+            try:
+                cells = _split(line, header.separator)
+                if len(cells) != len(header.names):
+                    raise BadInput(self._miscounted(len(cells)))
+            except BadInput as error:
+                raise error.within(f"{self.name}, row {row}") from None
+            found.append(cells)
         return found
 
     def _miscounted(self, count: int) -> str:
@@ -196,20 +205,20 @@ def readings(path: str) -> Iterator[Readings]:
 
 def _opened(path: str) -> IO[str]:
     try:
-        return Path(path).open(encoding="utf-8-sig", newline="\n")
+        return Path(path).open(encoding="utf-8-sig", errors="surrogateescape", newline="\n")
     except (OSError, ValueError) as error:
         raise BadInput(f"cannot read {path!r}: {getattr(error, 'strerror', None) or error}") from None
 
 
 def _as_utf8(file: IO[str]) -> IO[str]:
     if hasattr(file, "reconfigure"):
-        file.reconfigure(encoding="utf-8-sig", errors="strict")
+        file.reconfigure(encoding="utf-8-sig", errors="surrogateescape", newline="\n")
     return file
 
 
 def _header(line: str) -> _Header:
     separator = max(";\t,", key=line.count)
-    names = [name.strip() for name in next(csv.reader([line], delimiter=separator))]
+    names = [name.strip() for name in _split(line, separator)]
     parts: dict[str, dict[float, int]] = {"re": {}, "im": {}}
     kept = []
     for i, name in enumerate(names):
@@ -224,6 +233,16 @@ def _header(line: str) -> _Header:
     _check_pairs(parts, names)
     tones = list(parts["re"])
     return _Header(names, separator, tones, list(parts["re"].values()), [parts["im"][f] for f in tones], kept)
+
+
+def _split(line: str, separator: str) -> list[str]:
+    try:
+        return next(csv.reader([line], delimiter=separator, strict=True))
+    except csv.Error as error:
+        raise BadInput(
+            f"this is no row of a CSV file ({error}); close every quotation mark just before a separator, and end rows "
+            "with a line feed"
+        ) from None
 
 
 def _check_pairs(parts: dict[str, dict[float, int]], names: Sequence[str]) -> None:
@@ -256,7 +275,9 @@ def _number(text: str, separator: str) -> float:
     try:
         value = float(plain) if plain else np.nan
     except ValueError:
-        raise BadInput(f"{text!r} is not a number") from None
+        value = None
+    if value is None or "_" in plain or not plain.isascii():  # Python reads 1_0 and other scripts' digits as well
+        raise BadInput(f"{text!r} is not a number")
     if np.isinf(value):
         raise BadInput(f"{text!r} is not finite; leave the cell empty where nothing was measured")
     return value

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, BinaryIO
 
 from sensorgen.errors import Unwritable
 
@@ -117,11 +117,28 @@ def replace(path: Path, content: bytes) -> None:
     Unwritable
         The place cannot be written to, or the disk is full.
     """
+    with replacing(path) as file:
+        file.write(content)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """A file to write to piece by piece, which takes its place when it is whole; a missing folder is made.
+
+    Raises
+    ------
+    Unwritable
+        The place cannot be written to, or the disk is full.
+    """
     part = path.parent / f".{path.name}.{os.getpid()}.part"
     try:
         if path.exists() and not path.is_file():
             raise Unwritable(f"cannot write {str(path)!r}: it is a folder or a device; expected a file")
-        write(part.parent, {part.name: content})
+        part.parent.mkdir(parents=True, exist_ok=True)
+        with part.open("wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
         part.replace(path)
     except OSError as error:
         raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from None

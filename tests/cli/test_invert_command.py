@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import os
 import subprocess
 import sys
 
@@ -65,6 +66,19 @@ def test_there_and_back(run, tmp_path):
         low, high = float(row["position_low_mm"]), float(row["position_high_mm"])
         assert high - low == pytest.approx(2 * 1.6449 * float(row["position_error_mm"]), rel=1e-3)
     assert [p.name for p in tmp_path.iterdir() if p.name.startswith(".")] == []
+
+
+def test_the_covariance_is_the_bound_in_newtons_and_millimetres(run, tmp_path):
+    (tmp_path / "m.csv").write_text(table())
+    run("invert", *DESIGN, "m.csv", "-o", "o.csv")
+    sensor = sensor_of(make(PLAIN)).sensor
+    for row, force, position in zip(answers((tmp_path / "o.csv").read_text()), FORCE, POSITION, strict=True):
+        z, by_force, by_position = sensor.response(np.array(list(TONES.values())), force, position * 1e-3)
+        j = np.stack([by_force / abs(z), by_position * 1e-3 / abs(z)], -1) / 1e-3
+        bound = np.linalg.inv((j.conj().T @ j).real)
+        assert float(row["covariance_n_mm"]) == pytest.approx(bound[0, 1], rel=0.02)
+        assert float(row["force_error_n"]) == pytest.approx(np.sqrt(bound[0, 0]), rel=0.01)
+        assert float(row["position_error_mm"]) == pytest.approx(np.sqrt(bound[1, 1]), rel=0.01)
 
 
 def test_predictions_come_back(run, tmp_path):
@@ -171,6 +185,7 @@ def test_a_pipe_is_answered_line_by_line(tmp_path):
     head, *rows = table().splitlines(keepends=True)
     process = subprocess.Popen(
         [sys.executable, "-c", LIVE, "invert", *DESIGN, "-"], cwd=tmp_path, text=True, bufsize=1,
+        env={k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"},
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
     process.stdin.write(head)

@@ -19,6 +19,7 @@ from sensorgen.errors import CadFailed, Unwritable
 from sensorgen.geometry import solids
 from sensorgen.scene import Body, Fill, Prism, Scene, box
 
+pytestmark = pytest.mark.kernel
 COLOURS = ("#202428", "#f0e6d2", "#3080ff", "#202428")
 HOSTILE = 'Größe µ € 😀 it\'s "23 triX" \\X2\\ #5 ; /* @1@ */'
 L_OUTLINE = ((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
@@ -50,7 +51,8 @@ def scenes() -> Iterator[Any]:
             label = "-".join((name, *choice.values()))
             yield pytest.param(made, id=label)
             yield pytest.param(made.turned_over(), id=f"{label}-turned")
-        bare = shape.Params(length_mm=5.3, width_mm=4.7, dielectric_mm=0.0)  # tri: feet that touch along edges
+        films = [f.name for f in fields(shape.Params) if f.name.endswith("dielectric_mm")]
+        bare = shape.Params(length_mm=5.3, width_mm=4.7, **dict.fromkeys(films, 0.0))  # tri: feet touch along edges
         yield pytest.param(shape.scene(bare, Fill()), id=f"{name}-no-film")
 
 

@@ -104,3 +104,8 @@ def test_stress_that_has_no_answer_is_refused(law, stress, said):
 def test_points_that_make_no_curve_are_refused(stress, ratio):
     with pytest.raises(OutOfRange, match="both rising"):
         compression.curve("bad", "made up", stress, ratio)
+
+
+def test_a_breath_keeps_its_digits():
+    (thinning,), (slope,) = tri().thinning(np.array([1e-9]))
+    assert thinning == pytest.approx(1e-9 * slope, rel=1e-12)

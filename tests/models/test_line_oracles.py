@@ -1,8 +1,6 @@
 """Other people's programs on the same line: scikit-rf's media and ngspice's circuits."""
 
-import os
 import re
-import shutil
 import subprocess
 
 import numpy as np
@@ -11,8 +9,6 @@ from line_cases import PLATE
 
 from sensorgen.models import line, line_ladder
 from sensorgen.models._line_inputs import read
-
-NGSPICE = shutil.which("ngspice")
 
 
 def through_scikit_rf(inputs) -> complex:
@@ -65,24 +61,21 @@ def netlist(inputs, cells: int) -> str:
     return "\n".join([*lines, *control, ".endc", ".end", ""])
 
 
-def through_ngspice(inputs, cells: int, folder) -> complex:
+def through_ngspice(ngspice: str, inputs, cells: int, folder) -> complex:
     """Z of the ladder, from the voltage that 1 A drives."""
     file = folder / "ladder.cir"
     file.write_text(netlist(inputs, cells), "utf-8")
-    done = subprocess.run([NGSPICE, "-b", str(file)], capture_output=True, text=True, timeout=60, cwd=folder)
+    done = subprocess.run([ngspice, "-b", str(file)], capture_output=True, text=True, timeout=60, cwd=folder)
     found = re.search(r"v\(n0\) = ([-+.e\d]+),([-+.e\d]+)", done.stdout)
     assert found, done.stdout + done.stderr
     return complex(float(found[1]), float(found[2]))
 
 
 @pytest.mark.parametrize("f", [1.1e3, 99.7e3, 1e6])
-def test_ngspice_solves_the_same_ladder(f, tmp_path):
-    if NGSPICE is None:
-        if os.environ.get("CI"):
-            pytest.fail("ngspice is not installed, though scripts/system-packages --programs installs it")
-        pytest.skip("ngspice is not installed: scripts/system-packages --programs")
+def test_ngspice_solves_the_same_ladder(f, tmp_path, program):
+    ngspice = program("ngspice", "ngspice")
     inputs = PLATE | {"f_Hz": f}
-    theirs = through_ngspice(inputs, 100, tmp_path)
+    theirs = through_ngspice(ngspice, inputs, 100, tmp_path)
     assert theirs == pytest.approx(line_ladder.impedance(100, **inputs), rel=1e-8)
     z = line.impedance(**inputs)
     assert abs(theirs - z) < 1e-4 * abs(z)

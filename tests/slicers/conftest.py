@@ -1,28 +1,15 @@
-"""Real slicers for the tests of this folder: skipped where they are missing, but never on CI."""
-
-import os
-import shutil
+"""Real slicers for the tests of this folder."""
 
 import pytest
 
 
-def _needed(program: str, package: str) -> str:
-    path = shutil.which(program)
-    if path is not None:
-        return path
-    reason = f"{program} is not installed (Debian: apt install {package})"
-    if os.environ.get("CI"):
-        pytest.fail(f"{reason}; CI must have it")
-    pytest.skip(reason)
-
-
 @pytest.fixture
-def prusa_slicer() -> str:
+def prusa_slicer(program) -> str:
     """Path of PrusaSlicer."""
-    return _needed("prusa-slicer", "prusa-slicer")
+    return program("prusa-slicer", "prusa-slicer")
 
 
 @pytest.fixture
-def cura_engine() -> str:
+def cura_engine(program) -> str:
     """Path of CuraEngine."""
-    return _needed("CuraEngine", "cura-engine cura")
+    return program("cura-engine cura", "CuraEngine")

@@ -8,12 +8,13 @@ import click
 
 from sensorgen.cli.show import si
 
-WIDTH = 100
+WIDTH = 80
+_COLUMNS = (10, 11, 11, 13, 14, 9)
 TONES = 7  # of more, those with most to tell of position are shown
 
 
 def card(found: Mapping[str, Any]) -> None:
-    """Print what :func:`sensorgen.card.card` found: some twenty lines of at most ``WIDTH`` columns."""
+    """Print what :func:`sensorgen.card.card` found: less than thirty lines of at most ``WIDTH`` columns."""
     for line in lines(found):
         click.echo(line)
 
@@ -43,16 +44,18 @@ def lines(found: Mapping[str, Any]) -> Iterator[str]:
 
 def _tones(tones: list[Mapping[str, Any]]) -> Iterator[str]:
     """Relative changes per newton and millimetre, to be held against the noise."""
-    yield f"{'':12}{'frequency':>10} {'|Z|':>13} {'by force':>13} {'by place':>14} {'share told of force, place':>28}"
+    yield _row("frequency", "|Z|", "by force", "by place", "told of force", "of place")
     told = sorted(tones, key=lambda tone: -(tone["share_of_position_information"] or 0.0))[:TONES]
     for tone in sorted(told, key=lambda tone: float(tone["frequency_hz"])):
         by_force = 100 * abs(_complex(tone["relative_by_force_per_n"]))
         by_place = 100 * abs(_complex(tone["relative_by_position_per_m"])) * 1e-3
         shares = [_percent(tone[f"share_of_{what}_information"]) for what in ("force", "position")]
-        yield (
-            f"{'':12}{si(tone['frequency_hz'], 'Hz'):>10} {si(tone['magnitude_ohm'], 'ohm'):>13} "
-            f"{f'{by_force:.2g} %/N':>13} {f'{by_place:.2g} %/mm':>14} {shares[0]:>20} {shares[1]:>7}"
-        )
+        magnitude = si(tone["magnitude_ohm"], "ohm")
+        yield _row(si(tone["frequency_hz"], "Hz"), magnitude, f"{by_force:.2g} %/N", f"{by_place:.2g} %/mm", *shares)
+
+
+def _row(*cells: str) -> str:
+    return f"{'':4}" + " ".join(f"{cell:>{width}}" for cell, width in zip(cells, _COLUMNS, strict=True))
 
 
 def _over(found: Mapping[str, Any]) -> Iterator[str]:

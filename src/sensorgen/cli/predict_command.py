@@ -1,12 +1,10 @@
 """``sensorgen predict``: what the bench should measure."""
 
-import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -14,7 +12,7 @@ from sensorgen import units
 from sensorgen.cli import FOUND_ERRORS, budget_text, card_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Length, OneOf, Ratio, Values
-from sensorgen.errors import BadInput, Unwritable
+from sensorgen.errors import BadInput
 
 if TYPE_CHECKING:
     from sensorgen.design import Design
@@ -137,10 +135,6 @@ def _plot(sensed: "Sensed", axes: Axes, folder: Path) -> None:
     with show.progress(plots.STEPS) as step:
         for name, content in plots.files(sensed.sensor, *axes):
             step(name)
-            try:
-                folder.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise Unwritable(f"cannot write to {str(folder)!r}: {error.strerror or error}") from None
             store.replace(folder / name, content)
     for name in plots.STEPS:
         click.echo(str(folder / name))
@@ -152,32 +146,14 @@ def _deliver(pieces: Iterator[str], output: str | None, rows: int = 0) -> None:
         for piece in pieces:
             sys.stdout.write(piece)
         return
+    from sensorgen import store
     from sensorgen.predict import ROWS
 
-    with show.progress([f"{share} %" for share in range(101)]) as step, _beside(Path(str(output))) as file:
+    with show.progress([f"{share} %" for share in range(101)]) as step, store.replacing(Path(str(output))) as file:
         for k, piece in enumerate(pieces):
             step(f"{100 * k * ROWS // rows if rows else 100} %")
-            file.write(piece)
+            file.write(piece.encode())
     click.echo(output)
-
-
-@contextmanager
-def _beside(path: Path) -> Iterator[TextIO]:
-    """A file to write to piece by piece, which takes its place when it is whole."""
-    part = path.parent / f".{path.name}.{os.getpid()}.part"
-    try:
-        if path.exists() and not path.is_file():
-            raise Unwritable(f"cannot write {str(path)!r}: it is a folder or a device; expected a file")
-        with part.open("w", encoding="utf-8", newline="\n") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    except OSError as error:
-        raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from None
-    finally:
-        with suppress(OSError):
-            part.unlink()
 
 
 command = DesignGroup(

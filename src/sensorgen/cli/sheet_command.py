@@ -57,9 +57,11 @@ def _work(
     tones = frequencies or TONES_HZ
     bounds = {name: localise(film, pairs, tones, press, per_newton, noise) for name, pairs in ports.items()}
     if plot is not None:
-        from sensorgen.cli import sheet_plot
+        from sensorgen import store
+        from sensorgen.plots import sheet
 
-        where = sheet_plot.write(plot / f"{design.name}-sheet.png", film, bounds, ports)
+        where = plot / f"{design.name}-sheet.png"
+        store.replace(where, sheet.png(film, bounds, ports))
         if not as_json:
             click.echo(f"wrote {where}")
     given = {"force_n": force[0], "tip_mm": tip, "noise": noise, "doubts": list(sensed.doubts)}

@@ -96,7 +96,7 @@ def descend(target: Target, model: Model, start: Real, offset: float) -> Fit:
     start : (n, 2) array
         Scaled presses [-].
     offset : float
-        Share of the residual at which a sample is done [-].
+        Share of the residual at which a sample is done, below noise the residual's share of that [-].
     """
     best = target.fit(start.copy(), model(start))
     damping, active = np.zeros(len(start)), np.arange(len(start))
@@ -105,7 +105,8 @@ def descend(target: Target, model: Model, start: Real, offset: float) -> Fit:
         now = best.rows(active)
         step = _step(now, damping[active])
         gain = np.einsum("ni,ni->n", step, now.gradient)
-        going = gain > offset**2 * now.chi2 + rounding[active]
+        done_at = offset**2 * now.chi2 * np.minimum(now.chi2, 1.0)  # what is far below noise goes on to the end
+        going = gain > done_at + rounding[active]
         done = active[~going]  # one last step, unchecked: its error is of second order
         best.press[done] += step[~going]
         best.chi2[done] = np.maximum(best.chi2[done] - gain[~going], 0.0)

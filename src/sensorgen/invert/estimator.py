@@ -112,8 +112,9 @@ class Estimator:
         self._sigma = _noise(noise, len(self.frequency_hz))
         self._table = Table(self._forward, self._forward.force_limit_n(force_limit_n))
         self.scale = self._table.scale
-        self._rivals = self._table.rivals(self._sigma)
-        self._single = Single(self._forward, self._table, self._sigma, self._rivals[1] < _RIVAL)
+        rival, gap = self._table.rivals(self._sigma)
+        self._rival = np.where(gap < _RIVAL, rival, -1)
+        self._single = Single(self._forward, self._table, self._sigma, self._rival)
         self._expected, self._information = (prior or Prior()).scaled(self.scale)
 
     @property
@@ -192,12 +193,11 @@ class Estimator:
         table = self._table
         start = table.nearest(target.response, target.weight)
         best = descend(target, self._exact, descend(target, table.at, start, LOOSE).press, TIGHT)
-        rival, gap = self._rivals
-        cell = table.cell(best.press)
-        rows = np.flatnonzero(gap[cell] < _RIVAL)
+        rival = self._rival[table.cell(best.press)]
+        rows = np.flatnonzero(rival >= 0)
         if not rows.size:
             return _Pair(best, rows, np.empty((0, 2)))
-        second = descend(target.rows(rows), table.at, table.middles[rival[cell[rows]]], LOOSE)
+        second = descend(target.rows(rows), table.at, table.middles[rival[rows]], LOOSE)
         close = np.flatnonzero(second.chi2 < best.chi2[rows] + 2 * PAIR)
         rows = rows[close]
         second = descend(target.rows(rows), self._exact, second.press[close], TIGHT)

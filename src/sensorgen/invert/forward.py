@@ -1,13 +1,10 @@
 """The forward model of one sensor at fixed tones: everything that no press changes is worked out once."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.errors import BadInput, OutOfRange
-from sensorgen.models._line_inputs import far_load
-from sensorgen.models._tanhc import tanhc
+from sensorgen.models import line
 from sensorgen.sensor import Sensor
 
 Real = NDArray[np.float64]
@@ -30,8 +27,6 @@ class Forward:
         Per length, unpressed: omega C', and the whole admittance of the film [S/m].
     track, track_per_newton : float
         Resistance of both electrodes per length, and how it rises under the tip [ohm/m], [ohm/m/N].
-    load : array or None
-        Resistor at the far end [ohm]; None where it is open.
 
     Examples
     --------
@@ -50,12 +45,11 @@ class Forward:
         ]
         self.track = sum(tracks)
         self.track_per_newton = sum(t * s for t, s in zip(tracks, sensor.piezoresistance_per_n, strict=True))
-        self.load: Real | None = far_load(sensor.far_end)
 
     def log_impedance(self, force_n: Real, position_m: Real) -> Complex:
         """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.line_inputs`.
 
-        The recursion of :mod:`sensorgen.models.line` without its checks, which a search would repeat at every step.
+        As :meth:`Sensor.impedance`, but what the tones share and a search would repeat at every step is done once.
         """
         sensor, force = self.sensor, force_n[:, None]
         patch = sensor.patch(position_m[:, None])
@@ -63,17 +57,12 @@ class Forward:
         pressed = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * (self.susceptance / (1 - thinning))
         under = self.track + force * self.track_per_newton
         right = np.maximum(sensor.length_m - patch.left_m - patch.length_m, 0.0)
-        loose = self.loose, self.track
-        return self._from_far_end((right, *loose), (patch.length_m, pressed, under), (patch.left_m, *loose))
-
-    def _from_far_end(self, *sections: tuple[Real, NDArray[Any], Any]) -> Complex:
-        """Pass admittance on from an open end, impedance from any other: one law with y and r exchanged."""
-        q: Any = 0.0 if self.load is None else self.load
-        for length, y, r in sections:
-            u, v = (y, r) if self.load is None else (r, y)
-            along = length * tanhc(y * r * (length * length))
-            q = (q + u * along) / (1.0 + q * (v * along))
-        return np.asarray(-np.log(q) if self.load is None else np.log(q))
+        return np.log(
+            line.cascade(
+                [self.track, under, self.track], [self.loose, pressed, self.loose],
+                [patch.left_m, patch.length_m, right], sensor.far_end,
+            )
+        )  # fmt: skip
 
     def force_limit_n(self, most_n: float = FORCE_LIMIT_N) -> float:
         """The largest force up to ``most_n`` that the sensor bears anywhere, the tip half over its end [N]."""

@@ -5,6 +5,7 @@ import cmath
 import numpy as np
 
 from sensorgen.invert.forward import Forward
+from sensorgen.models import line
 
 Section = tuple[float, list[complex], float]
 
@@ -32,7 +33,8 @@ class Scalar:
         self._susceptance = forward.susceptance.tolist()
         self._loose = forward.loose.tolist()
         self._track = forward.track, forward.track_per_newton
-        self._load = None if forward.load is None else float(forward.load)
+        far_ohm = complex(line.cascade([0.0], [0.0], [0.0], self._sensor.far_end))  # of no line: what lies behind it
+        self._load = None if cmath.isinf(far_ohm) else far_ohm
 
     def log_impedance(self, force_n: float, position_m: float) -> list[complex]:
         """Natural logarithm of Z/ohm, tone by tone; errors as :meth:`Sensor.line_inputs`."""
@@ -49,7 +51,7 @@ class Scalar:
 
     def _from_far_end(self, *sections: Section) -> list[complex]:
         """As :meth:`Forward._from_far_end`."""
-        passed = [0j if self._load is None else complex(self._load)] * len(self._loose)
+        passed = [self._load or 0j] * len(self._loose)
         for length, y, r in sections:
             if length > 0:
                 step = self._open if self._load is None else self._closed

@@ -5,17 +5,17 @@ from bisect import bisect_right
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sensorgen.invert.descent import REACH, ROUNDING, TIGHT
+from sensorgen.invert.descent import LOOSE, REACH, ROUNDING, TIGHT
 from sensorgen.invert.forward import Forward, Real
 from sensorgen.invert.scalar import Scalar
-from sensorgen.invert.table import Table, parts
-from sensorgen.invert.verdict import Status, chi2_limit
+from sensorgen.invert.table import Index, Table, parts
+from sensorgen.invert.verdict import PAIR, Status, chi2_limit
 
 _ROUGH = 2  # steps on the table before the exact model has its say
-_STEPS = 8
+_STEPS = 6
 _FIRST_ORDER = [2, 1]  # by force, by position; the others are the value and the mixed derivative
+_SAME = PAIR / 2  # far below PAIR, the table being only near the truth
 _GUESS = 1 / 12  # variance of a guess on the unit length
 
 
@@ -38,13 +38,28 @@ class _Normal(NamedTuple):
     by_position: float
     chi2: float
 
-    def step(self) -> tuple[float, float]:
-        """The undamped step."""
+    def step(self, force: float, position: float) -> tuple[float, float]:
+        """The undamped step; as the batch's, along an edge where it would leave the square."""
         determinant = self.ff * self.xx - self.fx * self.fx
         if not determinant > 0:
             return math.nan, math.nan
-        force = (self.xx * self.by_force - self.fx * self.by_position) / determinant
-        return force, (self.ff * self.by_position - self.fx * self.by_force) / determinant
+        by_force = (self.xx * self.by_force - self.fx * self.by_position) / determinant
+        by_position = (self.ff * self.by_position - self.fx * self.by_force) / determinant
+        inside = _inside(position, min(max(by_position, -REACH), REACH))
+        if inside != by_position:
+            by_force = (self.by_force - self.fx * inside) / self.ff
+        within = _inside(force, by_force)
+        if within != by_force:
+            inside = _inside(position, (self.by_position - self.fx * within) / self.xx)
+        return within, inside
+
+    def gain(self, by_force: float, by_position: float) -> float:
+        """What the step takes from the sum of squares."""
+        return by_force * self.by_force + by_position * self.by_position
+
+    def distance(self, force: float, position: float) -> float:
+        """Square of the distance of two presses, in units of noise."""
+        return self.ff * force * force + 2 * self.fx * force * position + self.xx * position * position
 
 
 class Single:
@@ -58,12 +73,12 @@ class Single:
         Its table.
     sigma : (2 n_tones,) array
         Standard deviations of ln Z.
-    contested : (n_cells,) array of bool
-        Cells at which another press may explain the reading as well.
+    rival : (n_cells,) array
+        For every cell, the cell whose presses may explain its readings as well, or -1.
     """
 
-    def __init__(self, forward: Forward, table: Table, sigma: Real, contested: NDArray[np.bool_]) -> None:
-        self._model, self._table, self._weight, self._contested = Scalar(forward), table, 1 / sigma, contested
+    def __init__(self, forward: Forward, table: Table, sigma: Real, rival: Index) -> None:
+        self._model, self._table, self._weight, self._rival = Scalar(forward), table, 1 / sigma, rival.tolist()
         self._edges = [edges.tolist() for edges in table.edges]
         self._limit = float(chi2_limit(np.array([len(sigma) - 2]))[0])
         self._rounding = ROUNDING**2 * float(self._weight @ self._weight)
@@ -72,18 +87,20 @@ class Single:
     def press(self, response: Real) -> Press | None:
         """The press behind ln Z (1, 2 n_tones); None where the batch has to look at it."""
         force, position = self._table.nearest(response, self._weight[None])[0].tolist()
-        for step in range(_STEPS):
-            normal = self._normal(response[0], force, position, exact=step >= _ROUGH)
-            by_force, by_position = normal.step()
+        for _ in range(_ROUGH):
+            by_force, by_position = self._normal(response[0], force, position).step(force, position)
             force, position = force + by_force, position + by_position
-            if not (0 < force < 1 and 0 < position < 1 and abs(by_position) < REACH):
+        for _ in range(_STEPS):
+            normal = self._normal(response[0], force, position, exact=True)
+            by_force, by_position = normal.step(force, position)
+            force, position = force + by_force, position + by_position
+            if not (0 < force < 1 and 0 < position < 1):
                 return None
-            gain = by_force * normal.by_force + by_position * normal.by_position
-            if step >= _ROUGH and gain <= TIGHT**2 * normal.chi2 + self._rounding:
-                return self._answer(force, position, normal)
+            if normal.gain(by_force, by_position) <= TIGHT**2 * normal.chi2 * min(normal.chi2, 1.0) + self._rounding:
+                return self._answer(response[0], force, position, normal)
         return None
 
-    def _normal(self, response: Real, force: float, position: float, exact: bool) -> _Normal:
+    def _normal(self, response: Real, force: float, position: float, exact: bool = False) -> _Normal:
         value, slope = self._table_at(force, position)
         if exact:
             value = parts(np.array(self._model.log_impedance(force * self._scale[0], position * self._scale[1])))
@@ -110,14 +127,35 @@ class Single:
         row = bisect_right(forces, force, 1, len(forces) - 1) - 1
         return row * self._table.shape[1] + bisect_right(positions, position, 1, len(positions) - 1) - 1
 
-    def _answer(self, force: float, position: float, normal: _Normal) -> Press | None:
+    def _alone(self, response: Real, press: tuple[float, float], best: _Normal) -> bool:
+        """Whether the rival's valley has no press of its own near this sum of squares; False if hard to tell."""
+        rival = self._rival[self._cell(*press)]
+        if rival < 0:
+            return True
+        force, position = self._table.middles[rival].tolist()
+        for _ in range(_STEPS):
+            normal = self._normal(response, force, position)
+            by_force, by_position = normal.step(force, position)
+            force, position = force + by_force, position + by_position
+            gain = normal.gain(by_force, by_position)
+            if gain <= LOOSE**2 * normal.chi2:
+                apart = best.distance(force - press[0], position - press[1])
+                return normal.chi2 - gain > best.chi2 + 2 * PAIR or apart < _SAME
+        return False
+
+    def _answer(self, response: Real, force: float, position: float, normal: _Normal) -> Press | None:
         """The press in SI units, unless its verdict is not the plain one."""
-        if self._contested[self._cell(force, position)]:
-            return None
         determinant = normal.ff * normal.xx - normal.fx**2
         variances = normal.xx / determinant, normal.ff / determinant
         if max(variances) > _GUESS or normal.chi2 > self._limit:
             return None
+        if not self._alone(response, (force, position), normal):
+            return None
         mixed = -normal.fx / determinant
         covariance = np.array([[variances[0], mixed], [mixed, variances[1]]]) * np.outer(self._scale, self._scale)
         return Press(force * self._scale[0], position * self._scale[1], covariance, Status.OK)
+
+
+def _inside(at: float, step: float) -> float:
+    """The step, or as much of it as stays on the unit length."""
+    return min(max(step, -at), 1.0 - at)

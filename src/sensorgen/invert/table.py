@@ -103,7 +103,7 @@ class Table:
         seed, shift = (np.concatenate(column) for column in zip(*found, strict=True))
         press = filters.seeds[seed]
         least = self.edges[0][1] / 2  # at no force nothing depends on the position: a search that starts there stays
-        press[:, 0] = np.clip(press[:, 0] + shift, least, 1.0)
+        press[:, 0] = np.minimum(np.maximum(press[:, 0] + shift, least), 1.0)
         return press  # type: ignore[no-any-return]
 
     def cell(self, press: Real) -> Index:
@@ -145,14 +145,16 @@ class _Filters(NamedTuple):
     squares: Single
     products: Single
     curvatures: Single
-    reach: Single
+    least: Single
+    most: Single
 
     @classmethod
     def around(cls, seeds: Real, response: Real, by_force: Real, reach: Real) -> "_Filters":
         """From presses (k, 2), their responses (k, 2 n_tones), derivatives by force, and how far these reach."""
         origin = response.mean(0)
         off, along = (response - origin).T, by_force.T
-        arrays = (2 * off, along, off * off, off * along, along * along, reach)
+        least = np.maximum(-reach, -seeds[:, 0])  # no force below 0, or it would explain what presses elsewhere do
+        arrays = (2 * off, along, off * off, off * along, along * along, least, reach)
         return cls(seeds, origin, *(np.ascontiguousarray(a, np.float32) for a in arrays))
 
     def nearest(self, response: Real, weight: Real) -> tuple[Index, Real]:
@@ -165,8 +167,8 @@ class _Filters(NamedTuple):
         curvature = square @ self.curvatures
         curvature += _TINY
         shift = along / curvature
-        np.minimum(shift, self.reach, out=shift)
-        np.maximum(shift, -self.reach, out=shift)
+        np.minimum(shift, self.most, out=shift)
+        np.maximum(shift, self.least, out=shift)
         along *= 2
         along -= curvature * shift
         along *= shift

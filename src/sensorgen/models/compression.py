@@ -5,7 +5,7 @@ The *thinning* is the share by which a plate of the same capacitance would be th
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from importlib import resources
 from typing import Any
 
@@ -96,8 +96,8 @@ class Curve:
                 f"a stress of {np.max(stress_pa):.4g} Pa; the curve {self.name!r} ends at {last:.4g} Pa and is "
                 f"extended up to {REACH:g} times that: press less, or with a larger tip"
             )
-        ratio, slope = self._ratio(stress_pa)
-        return 1 - 1 / ratio, slope / ratio**2
+        rise, slope = self._rise(stress_pa)
+        return rise / (1 + rise), slope / (1 + rise) ** 2
 
     def stiffer(self, factor: float) -> "Curve":
         """The same of materials that are all that many times as stiff: stresses scale."""
@@ -120,16 +120,23 @@ class Curve:
         last = self.stress_pa[-1]
         return f"above {last / _PA_PER_KPA:g} kPa the curve is extended by its last slope" if stress_pa > last else ""
 
-    def _ratio(self, at: Real) -> tuple[Real, Real]:
+    @cached_property
+    def _cubics(self) -> tuple[Real, ...]:
+        """Stress where each piece begins, its length, and its coefficients in the share of that length."""
         p, g, m = (np.asarray(values) for values in (self.stress_pa, self.ratio, self.slope_per_pa))
-        k = np.clip(np.searchsorted(p, at, side="right") - 1, 0, len(p) - 2)
-        h, inside = (p[1:] - p[:-1])[k], np.minimum(at, p[-1])
-        t, rise = (inside - p[k]) / h, (g[1:] - g[:-1])[k]
-        quadratic = 3 * rise - h * (2 * m[k] + m[k + 1])
-        cubic = h * (m[k] + m[k + 1]) - 2 * rise
-        value = g[k] + t * (h * m[k] + t * (quadratic + t * cubic))
-        slope = m[k] + t * (2 * quadratic + 3 * t * cubic) / h
-        return value + (at - inside) * m[-1], slope
+        h, rise = np.diff(p), np.diff(g)
+        return p[:-1], h, g[:-1] - 1, h * m[:-1], 3 * rise - h * (2 * m[:-1] + m[1:]), h * (m[:-1] + m[1:]) - 2 * rise
+
+    def _rise(self, at: Real) -> tuple[Real, Real]:
+        """C'/C'(0) - 1, which keeps its digits where little presses, and its derivative [1/Pa]."""
+        starts, *pieces = self._cubics
+        k = np.clip(np.searchsorted(starts, at, side="right") - 1, 0, None)
+        h, before, linear, quadratic, cubic = (piece[k] for piece in pieces)
+        inside = np.minimum(at, self.stress_pa[-1])
+        t = (inside - starts[k]) / h
+        value = before + t * (linear + t * (quadratic + t * cubic))
+        slope = (linear + t * (2 * quadratic + 3 * t * cubic)) / h
+        return value + (at - inside) * self.slope_per_pa[-1], slope
 
 
 Compression = Plate | Curve

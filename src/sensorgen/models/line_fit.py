@@ -1,6 +1,6 @@
 r"""The thesis's own inverse: polynomials for R and C, fitted, then solved for force and position.
 
-.. math:: C = C_0 + C_F F, \qquad R = R_0 + A F + E F x + B x^{2}\,(F)\ldots
+.. math:: C = C_0 + C_F F, \qquad R = R_0 + (A + E x + B x^2) F
 
 R is what the thesis reads off one tone, Re Z, and C is -1/(omega Im Z). The fit is linear, so one least-squares solve
 finds what the thesis's search was after. Kept for comparison; :mod:`sensorgen.invert` does the work.

@@ -15,4 +15,4 @@ def needed(*names: str) -> None:
     """
     missing = [name for name in names if importlib.util.find_spec(name) is None]
     if missing:
-        raise MissingValue(f"plots need {' and '.join(missing)}: pip install 'sensorgen[plot]'")
+        raise MissingValue(f"plots need {' and '.join(missing)}: pip install {' '.join(missing)}")

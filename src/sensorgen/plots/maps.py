@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.collections import QuadMesh
 
 _EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+_ROUNDING = 1e-6  # of the span: less is no other colour
 
 
 def png(field: Field, name: str) -> bytes:
@@ -27,7 +28,8 @@ def png(field: Field, name: str) -> bytes:
         shown = values[k] / divisor
         mesh = _map(panel, field, shown, shown[:, inside])
         limits = mesh.get_clim()
-        extend = _EXTEND[bool(shown.min() < limits[0]), bool(shown.max() > limits[1])]
+        least = _ROUNDING * (limits[1] - limits[0])
+        extend = _EXTEND[bool(shown.min() < limits[0] - least), bool(shown.max() > limits[1] + least)]
         figure.colorbar(mesh, ax=panel, extend=extend, ticks=panels.levels(*limits), format=panels.plain())
         panel.set_title(f"{quantity.symbol} [{unit}] at {tone(field.frequency_hz[k])}", fontsize="medium")
         first, last = panels.outer(k, len(axes))

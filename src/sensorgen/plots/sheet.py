@@ -1,10 +1,10 @@
 """Maps of how well a press is located on a sheet."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sensorgen.errors import Unwritable
+from sensorgen.plots import panels
+from sensorgen.plots.library import needed
 
 if TYPE_CHECKING:
     from sensorgen.models.sheet import Bounds, Port, Sheet
@@ -12,25 +12,28 @@ if TYPE_CHECKING:
 _MM = 1e3
 
 
-def write(path: Path, film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Sequence["Port"]]) -> Path:
-    """Draw the standard errors of x and y over the sheet, one column per set of contacts, on one logarithmic scale.
+def png(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Sequence["Port"]]) -> bytes:
+    """Standard errors of x and y over the sheet, one column per set of contacts, on one logarithmic scale.
+
+    Parameters
+    ----------
+    film : Sheet
+        What is pressed.
+    bounds : mapping of str to Bounds
+        By the name of the set of contacts.
+    ports : mapping of str to sequence of Port
+        The contacts of each set.
 
     Raises
     ------
-    Unwritable
-        The folder or the file cannot be written.
+    MissingValue
+        Matplotlib is not installed.
     """
-    figure = draw(film, bounds, ports)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=120)
-    except OSError as error:
-        raise Unwritable(f"cannot write {path}: {error.strerror or error}") from None
-    return path
+    needed("matplotlib")
+    return panels.png(_figure(film, bounds, ports))
 
 
-def draw(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Sequence["Port"]]) -> Any:
-    """The figure, for matplotlib to save."""
+def _figure(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Sequence["Port"]]) -> Any:
     import numpy as np
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.colors import LogNorm
@@ -38,7 +41,7 @@ def draw(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Sequ
 
     guess = next(iter(bounds.values())).guess_m[0] * _MM
     norm = LogNorm(guess / 30, guess)
-    figure = Figure(figsize=(1.8 + 2.3 * len(bounds), 5.4), layout="constrained")
+    figure = Figure(figsize=(1.8 + 2.3 * len(bounds), 5.4), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.subplots(2, len(bounds), squeeze=False, sharex=True, sharey=True)
     for column, (name, found) in enumerate(bounds.items()):

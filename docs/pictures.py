@@ -1,0 +1,82 @@
+"""Write the pictures of the docs that predictions, cards, sheets and stacks are shown with; run by `make docs`."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from generate import DOCS, sensorgen
+from matplotlib.figure import Figure
+
+from sensorgen.design import make
+from sensorgen.models.sheet import Patch, Sheet, contact_sets, localise
+from sensorgen.models.stack import Body
+from sensorgen.planner import sensor_of
+from sensorgen.plots import sheet
+from sensorgen.plots.card import figure
+from sensorgen.predict import TONES_HZ
+from sensorgen.stacked.designs import press_at, stacked
+from sensorgen.stacked.touching import WIRINGS, Touching
+from sensorgen.units import EPS0_F_PER_M
+
+PICTURES = DOCS / "pictures"
+SENSORS = {
+    "plate": ("solid plate, 0.6 mm", {"shape": "reference"}),
+    "tri": ("triangles over 0.1 mm", {"shape": "tri", "parameters": {"dielectric_mm": 0.1}}),
+}
+PREDICTED = ("resistance", "reactance", "resistance-by-position", "reactance-by-force", "inverse-position")
+
+
+def card(name: str) -> None:
+    """The identifiability card of one sensor."""
+    title, data = SENSORS[name]
+    drawn = figure(sensor_of(make(data)).sensor, TONES_HZ, title=title)
+    drawn.savefig(PICTURES / f"card-{name}.png", dpi=90)
+
+
+def predictions() -> None:
+    """R and X of the triangular sensor over force, position and tone."""
+    with tempfile.TemporaryDirectory() as folder:
+        sensorgen("predict", "tri", "--dielectric", "0.1", "--force", "0:6:0.1", "--plot", folder)
+        for name in PREDICTED:
+            (PICTURES / f"predict-{name}.png").write_bytes((Path(folder) / f"{name}.png").read_bytes())
+
+
+def bounds_on_a_sheet() -> None:
+    """Where on a sheet of 100 x 100 mm and 5 ohm m a press of 6 N is located, by contacts."""
+    film = Sheet(0.1, 0.1, (5.0 / 3e-4,) * 2, EPS0_F_PER_M * 4.68 / 6e-4)
+    factor = 1 / (1 - 0.05)
+    press, per_newton = Patch(0.0, 0.0, 0.02, 0.02, factor), {"capacitance_factor": factor**2 * 0.05 / 6}
+    ports = contact_sets(film)
+    tones = np.array(TONES_HZ)
+    bounds = {name: localise(film, pairs, tones, press, per_newton, places=7) for name, pairs in ports.items()}
+    (PICTURES / "sheet-bounds.png").write_bytes(sheet.png(film, bounds, ports))
+
+
+def touch() -> None:
+    """What an isolation layer of X60 leaves of a finger's touch, by wiring."""
+    drawn = Figure(figsize=(9, 3.6), layout="constrained")
+    thickness_mm = np.geomspace(0.02, 10, 40)
+    for axes, (title, data) in zip(drawn.subplots(1, 2, sharey=True), SENSORS.values(), strict=True):
+        found = stacked(make(data))
+        press = press_at(found, 6.0, 0.045)
+        touching = Touching(found.own, found.isolation_eps_r, np.array(TONES_HZ), press, 1e-3, Body())
+        for wiring in WIRINGS:
+            axes.loglog(thickness_mm, [abs(touching.force_n(mm, wiring)) for mm in thickness_mm], label=wiring.words)
+        axes.axhline(0.1, color="0.5", lw=0.8, ls="--")
+        axes.axvline(0.1, color="0.5", lw=0.8, ls=":")
+        axes.set(title=title, xlabel="isolation (X60) [mm]", ylim=(3e-4, 1e4))
+        axes.grid(alpha=0.3)
+    first, second = drawn.axes
+    first.set_ylabel("force that a touch is mistaken for [N]")
+    first.legend(fontsize=8)
+    second.text(10, 0.11, "0.1 N", ha="right", fontsize=8, color="0.4")
+    second.text(0.105, 3e3, "thesis: 0.1 mm", fontsize=8, color="0.4")
+    drawn.savefig(PICTURES / "stack-touch.png", dpi=110)
+
+
+if __name__ == "__main__":
+    for each in SENSORS:
+        card(each)
+    predictions()
+    bounds_on_a_sheet()
+    touch()
