@@ -135,3 +135,15 @@ def test_the_text_says_whether_it_is_met(accuracy, said):
     text = " ".join(" ".join(lines(found("reference", accuracy))).split())
     assert said in text
     assert "largest: resistivity (of the electrodes, 0.07 to 0.833 ohm m) for |Z|, R; " in text
+
+
+def test_what_no_source_can_mean_does_not_count():
+    from sensorgen.budget import _range
+    from sensorgen.materials import Value, load
+
+    values = [
+        Value(value=v, source=s, default=s == "a", implausible=s == "b") for v, s in ((2, "a"), (9, "b"), (3, "c"))
+    ]
+    made_up = load("x60").model_copy(update={"properties": {"stiffness": values}})
+    assert _range(made_up, "", "stiffness") == (2, 3)
+    assert _range(made_up, "b", "stiffness") == (2, 9)  # what a design names counts
