@@ -189,12 +189,15 @@ def _permittivity(design: Design, sensed: Sensed, seen: _Seen) -> Iterator[Term]
     """What other permittivities make of the capacitance, by the cheapest model, whose error mostly cancels."""
     known = {t.material: t for t in permittivities(design)}
     values = {name: t.value for name, t in known.items()}
-    middle = capacitance(design.in_use, values).capacitance_f.middle()
+    answer = sensed.unloaded.answer
+    cheap = answer if answer.wanted == inf else capacitance(design.in_use, values)
+    middle = cheap.capacitance_f.middle()
     used, sensor = design.used() | {"air": ""}, sensed.sensor
     for name, taken in known.items():
         low, high = _range(design.material(name), used[name], taken.quantity)
         if low < high:
-            found = [capacitance(design.in_use, values | {name: end}).capacitance_f.middle() for end in (low, high)]
+            others = [values | {name: end} for end in (low, high) if end != taken.value]
+            found = [capacitance(design.in_use, other).capacitance_f.middle() for other in others]
             ends = [replace(sensor, capacitance_f_per_m=sensor.capacitance_f_per_m * c / middle) for c in found]
             yield Term(f"permittivity of {name}", f"{low:g} to {high:g}", seen.change(*ends))
 

@@ -67,7 +67,7 @@ def prediction(
         "capacitance_per_area_f_per_m2": _bounds(found.answer.capacitance_f.times(1 / area)),
         "electrode_resistance_ohm": resistance,
         **_line(sum(resistance.values()), found.answer.capacitance_f, frequency_hz),
-        **_pressed(design, frequency_hz, law, tip_m, profile, accuracy),
+        **_pressed(design, found, frequency_hz, law, tip_m, profile, accuracy),
         "values": [vars(t) for t in found.taken],
         "assumptions": [
             "ideal electrodes and no fringe at the sensor's edge for the capacitance",
@@ -80,11 +80,17 @@ def prediction(
 
 
 def _pressed(
-    design: Design, frequency_hz: Sequence[float], law: str, tip_m: float, profile: str, accuracy: float
+    design: Design,
+    found: Unloaded,
+    frequency_hz: Sequence[float],
+    law: str,
+    tip_m: float,
+    profile: str,
+    accuracy: float,
 ) -> dict[str, Any]:
     """The identifiability card with the doubts about its sensor, and the error budget; or why there is none."""
     try:
-        sensed = sensor_of(design, law, tip_m, profile=profile, accuracy=accuracy)
+        sensed = sensor_of(design, law, tip_m, profile=profile, accuracy=accuracy, known=found)
         other = sensed.law.others[0] if is_plate(sensed.unloaded.answer) and not law else None
         stiffest = replace(sensed.sensor, compression=other) if other else None
         made = card(sensed.sensor, frequency_hz, NOISE, stiffest=stiffest) | {"doubts": list(sensed.doubts)}

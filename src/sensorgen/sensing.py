@@ -42,8 +42,9 @@ class Sensed:
 
 
 def sensor_of(
-    design: Design, law: str = "", tip_m: float = TIP_M, *, profile: str = UNIFORM, accuracy: float = inf
-) -> Sensed:
+    design: Design, law: str = "", tip_m: float = TIP_M, *, profile: str = UNIFORM, accuracy: float = inf,
+    known: Unloaded | None = None,
+) -> Sensed:  # fmt: skip
     """The sensor that a design makes, for the line and all that rests on it.
 
     Parameters
@@ -58,6 +59,8 @@ def sensor_of(
         How its pressure is spread: one of :data:`sensorgen.models.pressure.PROFILES`.
     accuracy : float
         Wanted of the capacitance, relative [-]; where one is, a cell that is not known is solved too.
+    known : Unloaded
+        What :func:`sensorgen.planner.unloaded` says to that accuracy, if it is at hand.
 
     Raises
     ------
@@ -66,7 +69,7 @@ def sensor_of(
     UnknownName, OutOfRange
         As :func:`sensorgen.celllaw.law_of`.
     """
-    found, p = unloaded(design, accuracy), design.params
+    found, p = known or unloaded(design, accuracy), design.params
     how = law_of(design, found.answer, law, solve=accuracy < inf)
     sensor = Sensor(
         length_m=p.length_mm * M_PER_MM,
