@@ -60,3 +60,16 @@ def test_what_cannot_be_is_refused():
 def test_a_modulus_that_no_source_gives_is_missing():
     with pytest.raises(MissingValue):
         sensed("tri", materials={"film": "pla"})
+
+
+def test_only_who_asks_for_an_accuracy_waits_for_an_unknown_cell(monkeypatch):
+    from sensorgen import celllaw
+    from sensorgen.errors import BadInput
+
+    def solver(_):
+        raise BadInput("solved in vain")
+
+    monkeypatch.setattr(celllaw, "solved", solver)
+    design = make({"shape": "tri", "parameters": {"period_mm": 2.5}})
+    assert "in vain" not in sensor_of(design).doubts[0]
+    assert "in vain" in sensor_of(design, accuracy=10.0).doubts[0]
