@@ -72,7 +72,7 @@ def test_a_foot_wider_below_than_above_is_no_graph_over_x():
     assert np.all(np.diff(found.displacement_m) > 0)
     slim = press2d.press(stacked(0.1, 0.1, 0.1), SOLIDS, [0.0, 1e4], fineness=QUICK)
     assert found.displacement_m[1] < slim.displacement_m[1]
-    assert [c.width() < 2e-3 for c in found.capacitance_f_per_m2] == [True] * 4
+    assert max(c.width() for c in found.capacitance_f_per_m2) < 0.01
 
 
 def test_contact_hands_an_even_pressure_on():
@@ -87,12 +87,15 @@ def test_contact_hands_an_even_pressure_on():
         return press2d.cell(Scene(bodies, (4.0, 10.0, 0.9 + lift)), 2.0)
 
     soft = {name: Elastic(s.youngs_modulus_pa, 0.4) for name, s in SOLIDS.items()}
-    loose, whole = (press2d.press(plates(lift), soft, [0.0, 2e4, 4e4], EPS) for lift in (1e-2, 0.0))
-    assert loose.faults == ()
-    carried = loose.displacement_m - loose.fall_m * (loose.stress_pa > 0)
-    # between two loads, so that how far the penalty lets the faces in to begin with counts as the compliance that it is
-    assert np.diff(carried)[1] == pytest.approx(np.diff(whole.displacement_m)[1], rel=0.02)
-    assert loose.capacitance_f_per_m2[2].middle() == pytest.approx(whole.capacitance_f_per_m2[2].middle(), rel=1e-3)
+    whole = press2d.press(plates(0.0), soft, [0.0, 2e4, 4e4], EPS)
+    softer = []
+    for fineness in (Fineness(), Fineness().finer()):
+        loose = press2d.press(plates(1e-2), soft, [0.0, 2e4, 4e4], EPS, fineness=fineness)
+        assert loose.faults == ()
+        softer.append(np.diff(loose.displacement_m)[1] - np.diff(whole.displacement_m)[1])
+        assert loose.capacitance_f_per_m2[2].middle() == pytest.approx(whole.capacitance_f_per_m2[2].middle(), rel=1e-3)
+    assert 0 < softer[0] < 2e4 * 0.15e-3 / 60e6  # what the penalty gives way: pressure times side over 60 MPa
+    assert softer[1] == pytest.approx(softer[0] / 2, rel=0.15)
 
 
 def test_a_gap_that_shuts_fully_leaves_a_solid():

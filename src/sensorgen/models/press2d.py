@@ -7,6 +7,7 @@ is checked: load reached, volume kept, faces not run into each other, work equal
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +16,12 @@ from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.interval import Interval
 from sensorgen.models import compression
 from sensorgen.models._press.cell import AIR, Cell, cell_of
-from sensorgen.models._press.contact import Faces
-from sensorgen.models._press.mesh import Fineness, Mesh, Unmeshed, mesh_of
+from sensorgen.models._press.mesh import Fineness, Unmeshed, mesh_of
 from sensorgen.models._press.support import CHOICES, Held
 from sensorgen.scene import Scene
+
+if TYPE_CHECKING:
+    from sensorgen.models._press.load import Problem, State
 
 SOURCE = (
     "neo-Hookean plane strain, displacement with bubble and pressure (Crouzeix and Raviart 1973), penalty contact with "
@@ -135,15 +138,15 @@ def press(
     held, fineness = held or Held(), fineness or Fineness()
     _check(stress_pa, held)
     told = step or (lambda _: None)
-    first = best = _solved(cell, solids, stress_pa, permittivity, held, fineness, told)
+    first, _ = best, run = _solved(cell, solids, stress_pa, held, fineness, told)
     for factor in _COARSER:
         if not best.faults:
             break
         coarser = replace(fineness, apex_mm=factor * fineness.apex_mm)
-        again = _solved(cell, solids, stress_pa, permittivity, held, coarser, told)
+        again, other = _solved(cell, solids, stress_pa, held, coarser, told)
         if (again.converged_pa, -len(again.faults)) > (best.converged_pa, -len(best.faults)):
-            best = replace(again, doubts=(*again.doubts, _coarsened(first, again, coarser)))
-    return best
+            best, run = replace(again, doubts=(*again.doubts, _coarsened(first, again, coarser))), other
+    return _with_fields(best, cell, run, permittivity) if permittivity else best
 
 
 def _coarsened(first: Pressed, again: Pressed, coarser: Fineness) -> str:
@@ -186,51 +189,79 @@ def _check(stress_pa: Sequence[float], held: Held) -> None:
             raise BadInput(f"{key} {getattr(held, key)!r}: expected {' or '.join(choices)}")
 
 
+@dataclass(frozen=True)
+class _Run:
+    """What was solved, and the equilibria that were found."""
+
+    problem: "Problem"
+    states: "list[State]"
+
+
 def _solved(
     cell: Cell,
     solids: Mapping[str, Elastic],
     stress_pa: Sequence[float],
-    permittivity: Mapping[str, float] | None,
     held: Held,
     fineness: Fineness,
     step: Callable[[float], None],
-) -> Pressed:
-    from sensorgen.models._press import contact, element, load, support
+) -> tuple[Pressed, _Run]:
+    from sensorgen.models._press import load
 
-    mesh = mesh_of(cell, fineness)
-    materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in cell.regions]
-    e, nu = (
-        np.array([getattr(m, key) for m in materials])[mesh.region - 1]
-        for key in ("youngs_modulus_pa", "poisson_ratio")
-    )
-    tied = support.tied_nodes(mesh)
-    problem = load.Problem(
-        element.Elements(mesh, element.law(e, nu)),
-        contact.faces_of(mesh),
-        support.free_of(mesh, held, mirrored=True, tied=tied),
-        support.top_load(mesh),
-        max(_LEAST_PENALTY_PA, _PENALTY * float(e.min())),
-        held.contact == "stick",
-        tied,
-    )
+    problem = _problem(cell, solids, held, fineness)
     states = []
-    for state in load.curve(problem, stress_pa, _STEP * float(e.min())):
+    for state in load.curve(problem, stress_pa, _STEP * _softest(cell, solids)):
         states.append(state)
         step(state.pressure_pa)
-    down = np.array([problem.load @ s.u_m / np.abs(problem.load).sum() for s in states])
+    width = np.abs(problem.load).sum()
+    down = np.array([problem.load @ s.u_m / width for s in states])
     volume = np.array([problem.elements.volume_ratio(s.u_m, s.inner).min() for s in states])
     depth = np.array([_depth(problem.gaps(s.pairs, s.u_m) / s.pairs.length_m) for s in states])
     energy = np.array([problem.elements.energy_j_per_m(s.u_m, s.inner) + problem.contact_energy(s) for s in states])
     stress = np.array([s.pressure_pa for s in states])
     fall = problem.fall_m(states[0])
-    imbalance = _imbalance(stress, (down - fall) * np.abs(problem.load).sum(), energy)
-    fields = [_field(cell, mesh, problem.faces, tied, s.u_m, permittivity) for s in states] if permittivity else []
+    imbalance = _imbalance(stress, (down - fall) * width, energy)
+    faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance, sum(s.stale > 0 for s in states)))
+    found = Pressed(stress, down, (), (), volume, depth, imbalance, fall, faults, _doubts(cell, fall))
+    return found, _Run(problem, states)
+
+
+def _softest(cell: Cell, solids: Mapping[str, Elastic]) -> float:
+    """Least Young's modulus [Pa]."""
+    return min(solids[r.material].youngs_modulus_pa for r in cell.regions if r.material != AIR)
+
+
+def _problem(cell: Cell, solids: Mapping[str, Elastic], held: Held, fineness: Fineness) -> "Problem":
+    from sensorgen.models._press import contact, element, load, support
+
+    mesh = mesh_of(cell, fineness)
+    materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in cell.regions]
+    moduli, ratios = (
+        np.array([getattr(m, key) for m in materials])[mesh.region - 1]
+        for key in ("youngs_modulus_pa", "poisson_ratio")
+    )
+    tied = support.tied_nodes(mesh)
+    return load.Problem(
+        element.Elements(mesh, element.law(moduli, ratios)),
+        contact.faces_of(mesh),
+        support.free_of(mesh, held, mirrored=True, tied=tied),
+        support.top_load(mesh),
+        max(_LEAST_PENALTY_PA, _PENALTY * _softest(cell, solids)),
+        held.contact == "stick",
+        tied,
+    )
+
+
+def _with_fields(found: Pressed, cell: Cell, run: _Run, permittivity: Mapping[str, float]) -> Pressed:
+    """The same with the capacitance of the deformed outlines."""
+    fields = [_field(cell, run.problem, s.u_m, permittivity) for s in run.states]
     unknown = sum(c is None for c, _ in fields)
-    faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance, sum(s.stale > 0 for s in states), unknown))
-    return Pressed(
-        stress, down, tuple(c for c, _ in fields), tuple(o for _, o in fields), volume, depth, imbalance, fall, faults,
-        _doubts(cell, fall),
-    )  # fmt: skip
+    said = f"no capacitance at {unknown} of {len(fields)} stresses: the deformed outlines could not be meshed"
+    return replace(
+        found,
+        capacitance_f_per_m2=tuple(c for c, _ in fields),
+        outlines=tuple(outline for _, outline in fields),
+        faults=(*found.faults, *([said] if unknown else [])),
+    )
 
 
 def _doubts(cell: Cell, fall_m: float) -> tuple[str, ...]:
@@ -246,14 +277,15 @@ def _depth(gaps: Real) -> float:
 
 
 def _field(
-    cell: Cell, mesh: Mesh, faces: Faces, tied: NDArray[np.int64], u_m: Real, permittivity: Mapping[str, float]
+    cell: Cell, problem: "Problem", u_m: Real, permittivity: Mapping[str, float]
 ) -> tuple[Interval | None, Cell]:
     """Capacitance and outlines of a deformed cell; gaps are closed a little more or less where a mesh fails."""
     from sensorgen.models._press import deformed, field
 
+    mesh = problem.elements.mesh
     best: tuple[Interval | None, Cell] = (None, cell)
     for closed in deformed.CLOSED:
-        outline = deformed.deformed(cell, mesh, faces, tied, u_m, closed)
+        outline = deformed.deformed(cell, mesh, problem.faces, problem.tied, u_m, closed)
         try:
             found = field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH)
         except Unmeshed:
@@ -280,16 +312,12 @@ def _imbalance(stress: Real, moved: Real, energy: Real) -> Real:
     return found
 
 
-def _faults(
-    stress: Real, asked: Sequence[float], volume: Real, depth: Real, imbalance: Real, stale: int, unknown: int
-) -> list[str]:
+def _faults(stress: Real, asked: Sequence[float], volume: Real, depth: Real, imbalance: Real, stale: int) -> list[str]:
     said = {
         f"converged up to {stress[-1] / 1e3:.4g} of {asked[-1] / 1e3:.4g} kPa": stress[-1] < asked[-1] * (1 - 1e-9),
         f"a triangle is squeezed to {volume.min():.2g} of its volume": volume.min() < _LEAST_VOLUME,
         f"faces run into each other by {depth.max():.2g} of a side": depth.max() > _DEEPEST,
         f"work and energy differ by {imbalance[-1]:.1%}": abs(imbalance[-1]) > _BALANCE,
-        f"no capacitance at {unknown} of {len(stress)} stresses: the deformed outlines could not be meshed": unknown
-        > 0,
         f"old contact partners at {stale} of {len(stress)} stresses": stale > 0,
     }
     return [words for words, holds in said.items() if holds]

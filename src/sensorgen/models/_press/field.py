@@ -77,11 +77,29 @@ def _meshed(edges: Edges, air: int, coarse_mm: float, growth: float) -> Mesh:
             cut[key] = (-number, cut[key][1]) if place == 0 else (cut[key][0], -number)
         if wedge.first[-1] != wedge.second[-1]:
             cut[wedge.first[-1], wedge.second[-1]] = (-number, air)
+    _refuse_crossings(np.array([edge for edge, sides in edges.items() if air in sides]).reshape(-1, 2, 2))
     net = triangulated(cut, coarse_mm, growth)
     new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
     corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])
     _refuse_holes(edges, net.points_m[corners])
     return of_triangles(net.points_m, corners, np.concatenate([net.region, np.full(len(new), air)]))
+
+
+def _refuse_crossings(edges: Real) -> None:
+    """Faces of air (k, 2, 2) that cross each other would keep the mesher busy for ever."""
+    a, b = edges[:, None, 0], edges[:, None, 1]
+    c, d = edges[None, :, 0], edges[None, :, 1]
+    apart = _side(a, b, c) * _side(a, b, d) < 0
+    if (apart & apart.T).any():
+        raise Unmeshed("the deformed outlines run into each other")
+
+
+def _side(a: Real, b: Real, p: Real) -> Real:
+    """On which side of the lines through a and b the points p lie: their sign."""
+    u, v = b - a, p - a
+    turn = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    size = np.abs(u[..., 0] * v[..., 1]) + np.abs(u[..., 1] * v[..., 0])
+    return np.asarray(np.where(np.abs(turn) > _ROUNDING * size, np.sign(turn), 0.0))
 
 
 def _refuse_holes(edges: Edges, corners: Real) -> None:

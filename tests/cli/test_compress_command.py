@@ -1,0 +1,130 @@
+"""``sensorgen compress``: words in, curves out."""
+
+import json
+import sys
+
+import pytest
+
+needs_mesher = pytest.mark.skipif("not __import__('importlib').util.find_spec('netgen')", reason="needs NGSolve")
+PLATE = ("compress", "reference", "--stress", "100", "--json")
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(monkeypatch, tmp_path):
+    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / "cache"))
+
+
+@needs_mesher
+def test_a_curve_as_json(run):
+    said = run("compress", "tri", "--dielectric", "0.1", "--stress", "0:20:10kPa", "--json")
+    assert (said.code, said.err) == (0, "")
+    found = json.loads(said.out)
+    assert found["stress_kpa"] == [0.0, 10.0, 20.0]
+    assert found["displacement_um"] == pytest.approx([0.0, 6.1323, 10.5282], rel=0.01)  # tests/reference/contact.json
+    assert found["lower_f_per_m2"][0] * 2e9 < 159.65204 < found["upper_f_per_m2"][0] * 2e9
+    assert (found["converged_kpa"], found["model"], found["faults"]) == (20.0, "press2d", [])
+
+
+@needs_mesher
+def test_values_of_materials_are_taken(run):
+    """Between fixed sides a plate gives way by thickness over E (1 - nu)/((1 + nu)(1 - 2 nu))."""
+    film = 0.6e-3 * 1e5 * 1.4 * 0.2 / (0.6 * 3e6) * 1e6
+    stiff = "youngs_modulus_etpu=1e12"
+    said = run(*PLATE, "--set", "youngs_modulus_x60=3e6", "--set", "nu_x60=0.4", "--set", stiff)
+    assert json.loads(said.out)["displacement_um"][1] == pytest.approx(film, rel=0.01)
+    said = run(*PLATE, "--set", "eps_x60=2.34")
+    assert json.loads(said.out)["lower_f_per_m2"][0] == pytest.approx(0.27625066e-12 / 4e-6 / 2, rel=1e-6, abs=0)
+
+
+@needs_mesher
+def test_sides_that_give_way(run):
+    free = json.loads(run(*PLATE, "--sides", "free", "--base", "sliding").out)
+    fixed = json.loads(run(*PLATE).out)
+    assert free["held"] == {"base": "sliding", "period": "free", "top": "even", "contact": "frictionless"}
+    assert free["displacement_um"][1] > 400 * fixed["displacement_um"][1]
+
+
+@needs_mesher
+def test_the_table_and_the_picture(run, tmp_path):
+    said = run("compress", "reference", "--stress", "0.1MPa", "--plot", "a.png")
+    assert said.code == 0
+    assert "converged up to 100 kPa" in said.out
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert [file.name for file in tmp_path.glob("*a.png*")] == ["a.png"]
+
+
+@needs_mesher
+def test_a_picture_that_has_no_place(run, tmp_path):
+    (tmp_path / "a.png").mkdir()
+    said = run("compress", "reference", "--stress", "100", "--plot", "a.png")
+    assert said.code == 2
+    assert "it is a folder" in said.line
+
+
+@needs_mesher
+def test_a_known_answer_is_taken(run, monkeypatch):
+    from sensorgen.models import press2d
+
+    first = run(*PLATE)
+    monkeypatch.setattr(press2d, "press", None)
+    assert run(*PLATE).out == first.out
+    with pytest.raises(TypeError):
+        run(*PLATE, "--no-cache")
+
+
+def test_three_dimensions_are_springs_and_say_so(run):
+    found = json.loads(run("compress", "rect", "--stress", "100", "--json").out)
+    assert found["model"] == "springs"
+    assert found["lower_f_per_m2"] == [None, None]
+    assert "at most this" in found["doubts"][0]
+    assert "solved in 3D" in found["doubts"][-1]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--stress", "-1"], "expected 0 or more"),
+        (["--stress", "0"], "expected a stress above 0"),
+        (["--stress", "much"], "is not a stress"),
+        (["--stress", "10:0:5"], "--stress"),
+        (["--stress", "5mm"], "is not a stress"),
+        (["--base", "glued"], "bonded"),
+        (["--contact", "slippy"], "frictionless"),
+        (["--model", "press3d"], "press2d"),
+        (["--set", "nu_x60=0.6"], "0.5"),
+        (["--set", "youngs_modulus_x60=0"], "youngs_modulus"),
+        (["--set", "youngs_modulus_x6=1e6"], "x6"),
+        (["--material", "dielectric=bvoh"], "bvoh"),
+        (["--model", "springs", "--stress", "9000MPa"], "flat"),
+    ],
+)
+def test_wrong_words_end_with_2_and_one_line(run, words, said):
+    found = run("compress", "tri", *words)
+    assert found.code == 2
+    assert said in found.line
+
+
+def test_without_the_mesher_it_says_how_to_install_it(run, monkeypatch):
+    for name in [n for n in sys.modules if n.partition(".")[0] == "netgen"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "netgen", None)
+    found = run("compress", "tri", "--stress", "10")
+    assert found.code == 2
+    assert "pip install 'sensorgen[fem]'" in found.line
+
+
+@needs_mesher
+def test_what_is_not_to_be_trusted_is_said_with_exit_code_1(run, monkeypatch):
+    from sensorgen.models import press2d
+
+    solved = press2d.press
+
+    def stalled(*args, **more):
+        from dataclasses import replace
+
+        return replace(solved(*args, **more), faults=("converged up to 5 of 100 kPa",))
+
+    monkeypatch.setattr(press2d, "press", stalled)
+    found = run("compress", "reference", "--stress", "5")
+    assert found.code == 1
+    assert "not to be trusted: converged up to 5 of 100 kPa" in found.line
