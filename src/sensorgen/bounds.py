@@ -5,7 +5,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import inf
 from typing import TYPE_CHECKING, Any
 
@@ -122,7 +122,11 @@ def answers(designs: Sequence[Design], asked: Asked, jobs: int, done: Callable[[
     for k in sorted(set(range(len(inputs))) - set(missing)):
         found[k] = _said(*inputs[k])
         done()
-    for k, result in _in_parallel([inputs[k] for k in missing], jobs):
+    anew = replace(asked, keep=False)  # this process alone writes: the others may be ended at any moment
+    for k, result in _in_parallel([(*inputs[k][:2], anew) for k in missing], jobs):
+        scene, eps, _ = inputs[missing[k]]
+        if asked.keep and isinstance(result, Answer):
+            planner.remember(scene, eps, asked.model, result)
         found[missing[k]] = result
         done()
     return [_plain(design, found[k]) for k, design in enumerate(designs)]

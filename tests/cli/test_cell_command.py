@@ -145,7 +145,7 @@ def test_predict_says_when_an_accuracy_is_not_reached(run, no_solver):
     assert "was not reached; the best is 0.5; fem2d: NGSolve is not installed" in said.line
 
 
-SWEEP = ["cell", "tri", "--sweep", "dielectric_mm=0.1:0.2:0.1", "--jobs", "2"]
+SWEEP = ["cell", "tri", "--dielectric", "0.3", "--sweep", "dielectric_mm=0.1:0.2:0.1", "--jobs", "2"]
 
 
 def test_a_sweep_as_csv_and_json(run):
