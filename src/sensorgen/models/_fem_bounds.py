@@ -140,7 +140,7 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
     return Interval(float(min(lower, upper) * (1 - ROUNDING)), float(upper * (1 + ROUNDING)))
 
 
-ROUNDING = 1e-10  # relative: what doubles may lose in a solve, by which both bounds are moved outwards
+ROUNDING = 1e-9  # relative: what doubles may lose in a solve, by which both bounds are moved outwards
 
 
 def _ngsolve(mesh: Mesh) -> Any:
@@ -217,7 +217,10 @@ _BALANCE = 1e-7  # relative: at the best flux, what flows into the electrode at 
 
 def _solve(form: Any, found: Any) -> None:
     """Solve for the unknowns that elements share, then for their own."""
-    form.Assemble()
+    try:
+        form.Assemble()
+    except Exception as error:  # NGSolve's own, of a type that it does not export
+        raise CrossedBounds(f"the solver failed on this scene ({error}); use --model columns meanwhile") from error
     residual = found.vec.CreateVector()
     residual.data = form.mat * found.vec
     found.vec.data -= form.mat.Inverse(found.space.FreeDofs(True), "sparsecholesky") * residual
