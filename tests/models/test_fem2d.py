@@ -262,7 +262,7 @@ def test_slivers_do_no_harm():
         exact = EPS0_F_PER_M * 2 * MM / ((1 - thin) / 4.68 + thin / 1.00059)
         try:
             assert fem2d.capacitance(gap, EPS, 1e-6).middle() == close(exact, 1e-6)
-        except _fem_bounds.CrossedBounds as error:
+        except _fem_bounds.Unsolved as error:
             assert "solver failed" in str(error)
 
 

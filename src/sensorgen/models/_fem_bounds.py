@@ -25,6 +25,10 @@ class CrossedBounds(SensorgenError):
     """A lower bound above its upper one: a fault of the solver, and no result."""
 
 
+class Unsolved(SensorgenError):
+    """A mesh so slender, or an order so high, that doubles do not solve it."""
+
+
 @dataclass(frozen=True)
 class Mesh:
     """Triangles that NGSolve is to fill with polynomials.
@@ -85,8 +89,8 @@ def energies(
 
     Raises
     ------
-    CrossedBounds
-        The flux does not balance its energy: it was not solved.
+    Unsolved
+        The flux does not balance its energy.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # elements are small: threads would only wait for each other
     import ngsolve as ng
@@ -205,14 +209,15 @@ def _flux(space: Any, eps: Any, order: int, lossy: bool) -> tuple[Number, int]:
     into_top = -ng.Integrate(outwards, space)  # facets inside cancel: the normal component is continuous there
     energy = ng.Integrate(field * field / eps, space, order=2 * order + _MORE)
     if not abs(into_top - energy) <= _BALANCE * abs(energy):
-        raise CrossedBounds(
-            f"flux {into_top:.9g} and its energy {energy:.9g} differ (order {order}): the solver failed"
+        raise Unsolved(
+            f"flux {into_top:.9g} and its energy {energy:.9g} differ (order {order}): the solver failed on this scene; "
+            "use --model columns"
         )
     return 2 * into_top - energy, facet.ndof
 
 
 _MORE = 2  # orders of quadrature beyond twice the polynomials'
-_BALANCE = 1e-7  # relative: at the best flux, what flows into the electrode at 1 V is its energy
+_BALANCE = 1e-8  # relative: at the best flux, what flows into the electrode at 1 V is its energy
 
 
 def _solve(form: Any, found: Any) -> None:
@@ -220,7 +225,7 @@ def _solve(form: Any, found: Any) -> None:
     try:
         form.Assemble()
     except Exception as error:  # NGSolve's own, of a type that it does not export
-        raise CrossedBounds(f"the solver failed on this scene ({error}); use --model columns meanwhile") from error
+        raise Unsolved(f"the solver failed on this scene ({str(error).strip()}); use --model columns") from error
     residual = found.vec.CreateVector()
     residual.data = form.mat * found.vec
     found.vec.data -= form.mat.Inverse(found.space.FreeDofs(True), "sparsecholesky") * residual
