@@ -43,7 +43,7 @@ def timed(*args, **more):
 
 
 def rise(found):
-    middle = np.array([c.middle() for c in found.capacitance_f_per_m2]) * 2e9
+    middle = np.array([c.middle() if c else np.nan for c in found.capacitance_f_per_m2]) * 2e9
     return middle - middle[0]
 
 
