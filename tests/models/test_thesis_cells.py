@@ -56,7 +56,9 @@ def test_strips_of_their_own_widths_are_the_columns():
 
 def test_triangles_are_the_columns():
     found = columns.capacitance(tri_cell(0.1), EPS | {"air": 1.0})
-    assert thesis_cells.triangles_f_per_m2(tri.Params(dielectric_mm=0.1), 4.68) * 2 * MM * MM == close(found.lower, 1e-9)
+    assert thesis_cells.triangles_f_per_m2(tri.Params(dielectric_mm=0.1), 4.68) * 2 * MM * MM == close(
+        found.lower, 1e-9
+    )
 
 
 def test_bulging_vanishes_at_rest_when_corrected():
