@@ -196,12 +196,19 @@ def test_mirrored_swapped_scaled_and_deeper():
         tri.scene(tri.Params(length_mm=1.0, width_mm=2.0, dielectric_mm=0.1, along="y"), Fill()), EPS, 1e-6
     )
     swapped = Scene(
-        tuple(replace(b, terminal={"top": "bottom", "bottom": "top"}.get(b.terminal, "")) for b in scene.turned_over().bodies),
+        tuple(
+            replace(b, terminal={"top": "bottom", "bottom": "top"}.get(b.terminal, ""))
+            for b in scene.turned_over().bodies
+        ),
         scene.size_mm,
     )
-    twice = fem2d.capacitance(tri.scene(
-        tri.Params(4.0, 1.0, dielectric_mm=0.2, hang_height_mm=1.0, lower_height_mm=0.48, period_mm=4.0), Fill()
-    ), EPS, 1e-6)
+    twice = fem2d.capacitance(
+        tri.scene(
+            tri.Params(4.0, 1.0, dielectric_mm=0.2, hang_height_mm=1.0, lower_height_mm=0.48, period_mm=4.0), Fill()
+        ),
+        EPS,
+        1e-6,
+    )
     many = tri.scene(tri.Params(length_mm=14.0, width_mm=3.0, dielectric_mm=0.1), Fill())
     assert along_y.middle() == close(one.middle(), 1e-6)
     assert fem2d.capacitance(swapped, EPS, 1e-6).middle() == close(one.middle(), 1e-6)

@@ -186,8 +186,12 @@ def test_what_it_cannot_speak_of():
     middle = plates(Body("mid", "etpu", (box(0, 2, 0, 1, 0.5, 0.6),), "middle"))
     half = Scene((plates().bodies[0], Body("high", "etpu", (box(0, 1, 0, 1, 1.2, 1.4),), "top")), (2.0, 1.0, 1.4))
     for scene, words in (
-        (touching, "touch"), (overlap, "overlaps"), (middle, "two electrodes"), (half, "does not cover"),
-        (tri_cell(0.1), "boxes"), (rect_cell(0.0), "touch"),
+        (touching, "touch"),
+        (overlap, "overlaps"),
+        (middle, "two electrodes"),
+        (half, "does not cover"),
+        (tri_cell(0.1), "boxes"),
+        (rect_cell(0.0), "touch"),
     ):
         assert words in (fem3d.unfit(scene) or "")
     assert fem3d.unfit(rect_cell(0.1)) is None

@@ -56,7 +56,9 @@ def test_strips_of_their_own_widths_are_the_columns():
 
 def test_triangles_are_the_columns():
     found = columns.capacitance(tri_cell(0.1), EPS | {"air": 1.0})
-    assert thesis_cells.triangles_f_per_m2(tri.Params(dielectric_mm=0.1), 4.68) * 2 * MM * MM == close(found.lower, 1e-9)
+    assert thesis_cells.triangles_f_per_m2(tri.Params(dielectric_mm=0.1), 4.68) * 2 * MM * MM == close(
+        found.lower, 1e-9
+    )
 
 
 def test_bulging_vanishes_at_rest_when_corrected():
@@ -68,7 +70,7 @@ def test_bulging_vanishes_at_rest_when_corrected():
     term = EPS0_F_PER_M * 4.68 * 0.35 * height * 1e3 / 4
     grown = 0.5 * term * (1 / (height - dh) ** 2 - 1 / height**2)
     assert pressed - rest == close(grown, 1e-9)
-    assert thesis_cells.bulging_f_per_m2(p, 4.68) > 1.2 * rest  # as printed it adds even at rest
+    assert thesis_cells.bulging_f_per_m2(p, 4.68) > 1.01 * rest  # as printed it adds even at rest
 
 
 def test_swept_keeps_the_flank_the_film_and_the_lower_triangle():

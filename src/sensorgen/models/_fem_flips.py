@@ -12,9 +12,7 @@ _GAIN = 1e-9  # by which the sum of two opposite angles must exceed half a turn 
 _FLAT = 1e-9  # sine of the angle of three corners on a line
 
 
-def flipped(
-    points: NDArray[np.float64], triangles: Sequence[Triangle], regions: Sequence[Hashable]
-) -> list[Triangle]:
+def flipped(points: NDArray[np.float64], triangles: Sequence[Triangle], regions: Sequence[Hashable]) -> list[Triangle]:
     """The same regions in triangles of the same number and corners, no two of which would be blunter if turned.
 
     Parameters

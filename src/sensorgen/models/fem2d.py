@@ -121,7 +121,10 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
         except fem.Unsolved:
             if last < np.inf:
                 return  # doubles end here: what was solved before stands
-            raise
+            if order - 3 < _ORDERS[0]:
+                raise
+            order -= 3
+            continue
         here = interval.times(EPS0_F_PER_M * M_PER_MM * section.depth_mm)
         yield Step(order, len(mesh.triangles), unknowns, here)
         if here.width() <= width or here.width() > _STALLED * last:
