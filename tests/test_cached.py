@@ -1,6 +1,7 @@
 """The cache of answers: what it keeps, what it forgets, and what it survives."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -87,6 +88,20 @@ def test_a_folder_that_cannot_be_written_costs_nothing_but_time(monkeypatch, tmp
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / "file" / "below"))
     assert [cached.answer(QUESTION, lambda k=k: k) for k in (1, 2)] == [1, 2]
+
+
+def test_an_entry_is_replaced_whole_or_not_at_all(monkeypatch):
+    """The disk fills up amid the writing: the old entry stays, and no piece of the new one."""
+    cached.keep(QUESTION, 1)
+
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as now:
+        now.setattr(os, "fsync", full)
+        cached.keep(QUESTION, 2)
+    assert cached.known(QUESTION) == 1
+    assert len(entries()) == 1
 
 
 def test_other_code_asks_anew(monkeypatch):

@@ -75,7 +75,9 @@ def test_rungs_end_where_nothing_is_gained(monkeypatch):
 def measured():
     pytest.importorskip("ngsolve", reason="the extra fem is not installed")
     said = []
-    found = chart.points(["tri, 0.2 mm", "plate, 0.6 mm"], 5.0, said.append)
+    with pytest.MonkeyPatch.context() as patch:  # by accuracy, not by time: a busy machine measures the same points
+        patch.setattr(chart, "_LEAST_WIDTH", 1e-6)
+        found = chart.points(["tri, 0.2 mm", "plate, 0.6 mm"], 1e9, said.append)
     assert said == ["tri, 0.2 mm", "plate, 0.6 mm"]
     return found
 
@@ -96,7 +98,7 @@ def test_what_is_known_of_errors(measured):
             slack = 1e-9 * known.capacitance_f_per_m2
             assert p.lower_f_per_m2 - slack <= known.capacitance_f_per_m2 <= p.upper_f_per_m2 + slack
         if p.scene.startswith("plate"):
-            assert p.error < 1e-9
+            assert p.error < 1e-8  # finite elements widen their bounds by what rounding may do
     off = {p.model: p.error for p in measured if p.scene == "tri, 0.2 mm" and not p.bounded}
     assert off["thesis-3.35"] == pytest.approx(0.2417, abs=2e-4)
     assert off["thesis-3.34-printed"] > 1

@@ -106,6 +106,14 @@ def test_a_model_that_was_never_measured_is_tried(fake):
     assert capacitance(PLATE, EPS, 1e-5).model == "new"
 
 
+def test_a_model_that_should_come_no_nearer_is_passed_over(fake):
+    fake.add("cheap", 1, 0.4)
+    fake.add("as near", 2, 0.1, (0.4, 0.1))
+    found = capacitance(PLATE, EPS, 1e-3)
+    assert fake.names == ["cheap"]
+    assert found.plan[1].passed_over == "not expected to come nearer than 0.4"
+
+
 def test_what_is_expected_is_the_quickest_measurement_that_does(fake):
     ladder(fake)
     plan = {c.model: c for c in planner.weighed(PLATE, 1e-3)}

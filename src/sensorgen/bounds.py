@@ -2,15 +2,17 @@
 
 import os
 import signal
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import inf
 from typing import TYPE_CHECKING, Any
 
 from sensorgen import planner
 from sensorgen.design import Design
 from sensorgen.errors import SensorgenError
+from sensorgen.models import thesis_cells
 from sensorgen.planner import Answer, Unpredictable
 from sensorgen.scene import Scene
 from sensorgen.units import M_PER_MM
@@ -58,6 +60,36 @@ def answer(design: Design, asked: Asked) -> dict[str, Any]:
     return _plain(design, _solved(design.in_use, _permittivity(design), asked))
 
 
+def formula(design: Design, name: str) -> dict[str, Any]:
+    """What one of the thesis's formulas gives for a design, which says nothing of how far it is off.
+
+    Parameters
+    ----------
+    design : Design
+        Of the shape that the formula speaks of.
+    name : str
+        Of ``thesis_cells.NAMED``.
+
+    Raises
+    ------
+    Unpredictable
+        The formula speaks of another shape.
+    OutOfRange
+        As the formula itself.
+    """
+    shape, work = thesis_cells.NAMED[name]
+    if design.shape != shape:
+        raise Unpredictable(f"{name} speaks of {shape}, not of {design.shape}")
+    taken = [t for t in planner.permittivities(design) if t.material == design.slot("film")[0].name]
+    start = time.perf_counter()
+    value = work(design.params, taken[0].value)
+    return {
+        "design": design.name, "model": name, "value_f_per_m2": value, "lower_f_per_m2": None, "upper_f_per_m2": None,
+        "seconds": time.perf_counter() - start, "values": [vars(t) for t in taken],
+        "reason": f"{thesis_cells.SOURCE}: a formula alone, without bounds; air is taken for 1",
+    }  # fmt: skip
+
+
 def answers(designs: Sequence[Design], asked: Asked, jobs: int, done: Callable[[], None]) -> list[dict[str, Any]]:
     """The same for many designs, those that are not known from before in several processes.
 
@@ -90,7 +122,11 @@ def answers(designs: Sequence[Design], asked: Asked, jobs: int, done: Callable[[
     for k in sorted(set(range(len(inputs))) - set(missing)):
         found[k] = _said(*inputs[k])
         done()
-    for k, result in _in_parallel([inputs[k] for k in missing], jobs):
+    anew = replace(asked, keep=False)  # this process alone writes: the others may be ended at any moment
+    for k, result in _in_parallel([(*inputs[k][:2], anew) for k in missing], jobs):
+        scene, eps, _ = inputs[missing[k]]
+        if asked.keep and isinstance(result, Answer):
+            planner.remember(scene, eps, asked.model, result)
         found[missing[k]] = result
         done()
     return [_plain(design, found[k]) for k, design in enumerate(designs)]

@@ -113,9 +113,11 @@ def mirrored(slices: list[Slice]) -> Cell:
     """The smallest run of slices that mirrors at its own two sides continue to all of them."""
     whole = _straightened(slices)
     places = _candidates(whole)
-    for low, high in _pairs(places, whole[-1].right_mm):
-        if _repeats(whole, low, high):
-            return _cell(whole, low, high)
+    end = whole[-1].right_mm
+    for fits in (_is_even, _has_room):
+        for low, high in _pairs(places, end):
+            if fits(low - places[0], high - low, end - places[0]) and _repeats(whole, low, high):
+                return _cell(whole, low, high)
     return Cell(tuple(whole), (1.0,) * len(whole))
 
 
@@ -181,11 +183,22 @@ def _candidates(slices: list[Slice]) -> list[float]:
     return sorted(edges | {(s.left_mm + s.right_mm) / 2 for s in slices if s.is_flat()})
 
 
+def _is_even(start_mm: float, piece_mm: float, whole_mm: float) -> bool:
+    """Whether a piece occurs a whole number of times, each of its parts as often as another."""
+    times = round(whole_mm / piece_mm)
+    return abs(times * piece_mm - whole_mm) < ROUNDING_MM and (times % 2 == 0 or start_mm < ROUNDING_MM)
+
+
+def _has_room(start_mm: float, piece_mm: float, whole_mm: float) -> bool:
+    """Whether two whole pieces follow each other: one alone would not show that it repeats."""
+    return start_mm + 2 * piece_mm <= whole_mm + ROUNDING_MM
+
+
 def _pairs(places: list[float], end_mm: float) -> Iterator[Point]:
     """Pairs of places, the nearest first, of which the first lies no further from the start than they are apart.
 
-    The whole has to hold two of the pieces between them, or it would not show that they repeat. In windows of twice the
-    size each, so that a long sensor's pattern is found in its first periods.
+    The whole has to hold two of the pieces between them, or it would not show that they repeat. In windows of twice
+    the size each, so that a long sensor's pattern is found in its first periods.
     """
     at = np.array(places) - places[0]
     reach = float(np.diff(at).min())

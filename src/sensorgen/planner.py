@@ -174,8 +174,13 @@ def capacitance(
     if found is not None:
         return replace(_of_plain(found), known=True)
     answer = _asked(scene, permittivity, width, model)
-    cached.keep(question, _plain(answer))
+    remember(scene, permittivity, model, answer)
     return answer
+
+
+def remember(scene: Scene, permittivity: Mapping[str, float], model: str, answer: Answer) -> None:
+    """Keep an answer to :func:`capacitance` for the next time."""
+    cached.keep(_question(scene, permittivity, answer.wanted, model), _plain(answer))
 
 
 def is_known(scene: Scene, permittivity: Mapping[str, float], width: float, model: str = "") -> bool:

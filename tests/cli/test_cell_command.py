@@ -91,6 +91,18 @@ def test_an_accuracy_below_what_is_possible(run):
     assert "F/m2" in said.out
 
 
+def test_a_formula_of_the_thesis_by_its_number(run):
+    """Off by -25 %: the spec's and docs/models.md's number for vertical columns."""
+    found = answer(run("cell", "tri", "--dielectric", 0.1, "--model", "thesis-3.35", "--json"))
+    assert found["value_f_per_m2"] / TRI[0.1] - 1 == pytest.approx(-0.252, abs=1e-3)
+    assert (found["lower_f_per_m2"], found["upper_f_per_m2"]) == (None, None)
+    assert "without bounds" in run("cell", "tri", "--model", "thesis-3.35").out
+    half = answer(run("cell", "tri", "--model", "thesis-film-only", "--set", "eps_x60=2.34", "--json"))
+    whole = answer(run("cell", "tri", "--model", "thesis-film-only", "--json"))
+    assert 2 * half["value_f_per_m2"] == pytest.approx(whole["value_f_per_m2"], rel=1e-12, abs=0)
+    assert "thesis-3.35 speaks of tri, not of rect" in run("cell", "rect", "--model", "thesis-3.35").line
+
+
 @pytest.fixture
 def no_solver(monkeypatch):
     for module in (planner, fem2d):
@@ -133,7 +145,7 @@ def test_predict_says_when_an_accuracy_is_not_reached(run, no_solver):
     assert "was not reached; the best is 0.5; fem2d: NGSolve is not installed" in said.line
 
 
-SWEEP = ["cell", "tri", "--sweep", "dielectric_mm=0.1:0.2:0.1", "--jobs", "2"]
+SWEEP = ["cell", "tri", "--dielectric", "0.3", "--sweep", "dielectric_mm=0.1:0.2:0.1", "--jobs", "2"]
 
 
 def test_a_sweep_as_csv_and_json(run):

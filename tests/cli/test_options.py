@@ -96,6 +96,7 @@ WHOLE = """
 name: whole
 shape: tri
 parameters: {period_mm: 2.5, along: y, dielectric_mm: 1e-1}
+material_values: {x60: {relative_permittivity: 3.0}}
 materials: {film: x60@thesis-4.1, support: bvoh}
 printer: prusa-xl5
 quality: extrafine
@@ -119,6 +120,7 @@ def test_a_file_with_every_key(taken, tmp_path):
         line.partition(":")[0] for line in WHOLE.splitlines() if line and line[0] != " "
     }
     assert (design.name, design.params.dielectric_mm, design.tools) == ("whole", 0.1, {"x60": 3})
+    assert design.material("x60").value("relative_permittivity", "thesis-4.1").value == 3.0
     assert [w.rule for w in design.waivers] == ["5-width", "9"]
 
 

@@ -168,4 +168,4 @@ def test_cooks_membrane_locks_with_linear_triangles_and_not_with_ours():
     assert cook(8, 0.4999, False) == pytest.approx(fine, rel=0.03)
     assert cook(8, 0.4999, True) < 0.6 * fine
     assert cook(8, 0.5, False) == pytest.approx(cook(8, 0.4999, False), rel=2e-3)
-    assert cook(32, 0.3, True) == pytest.approx(cook(32, 0.3, False), rel=0.03)  # the same membrane, where both can
+    assert cook(32, 0.3, True) == pytest.approx(cook(32, 0.3, False), rel=0.05)  # the same membrane, where both can

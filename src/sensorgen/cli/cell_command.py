@@ -28,7 +28,7 @@ OWN: list[click.Parameter] = [
         ["--accuracy"], type=Ratio(), default=str(ACCURACY), show_default=True,
         help="How far the bounds may be apart, as a share of their middle.",
     ),
-    click.Option(["--model"], metavar="NAME", default="", help="Ask this model only; sensorgen list models."),
+    click.Option(["--model"], metavar="NAME", default="", help="Ask this model only, as columns, or thesis-3.35."),
     click.Option(["--explain"], is_flag=True, help="Print the plan, and what came of it."),
     click.Option(["--no-cache"], is_flag=True, help="Solve anew, and keep nothing."),
     click.Option(
@@ -69,13 +69,25 @@ def _refuse_pairs(sweep: str | None, how: Data) -> None:
 
 def _one(design: "Design", asked: "Asked", how: Data) -> int:
     from sensorgen import bounds
+    from sensorgen.models import thesis_cells
 
+    if asked.model in thesis_cells.NAMED:
+        return _formula(bounds.formula(design, asked.model), how)
     if how["explain"]:
         _print_plan(design, asked)
     data = bounds.answer(design, asked)
     lines = [show.json_text(data)] if how["as_json"] else (f"{line}\n" for line in _lines(data, explain=how["explain"]))
     _deliver(lines, how["output"])
     return _verdict([data])
+
+
+def _formula(data: Data, how: Data) -> int:
+    lines = [
+        f"{data['design']}: {data['value_f_per_m2']:.10g} F/m2 by {data['model']}\n",
+        f"{data['reason']}\n",
+    ]
+    _deliver([show.json_text(data)] if how["as_json"] else lines, how["output"])
+    return 0
 
 
 def _many(key: str, points: Sequence[tuple[float | str, "Design"]], asked: "Asked", jobs: int, how: Data) -> int:

@@ -25,6 +25,10 @@ class CrossedBounds(SensorgenError):
     """A lower bound above its upper one: a fault of the solver, and no result."""
 
 
+class Unsolved(SensorgenError):
+    """A mesh so slender, or an order so high, that doubles do not solve it."""
+
+
 @dataclass(frozen=True)
 class Mesh:
     """Triangles that NGSolve is to fill with polynomials.
@@ -85,8 +89,8 @@ def energies(
 
     Raises
     ------
-    CrossedBounds
-        The flux does not balance its energy: it was not solved.
+    Unsolved
+        The flux does not balance its energy.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # elements are small: threads would only wait for each other
     import ngsolve as ng
@@ -140,7 +144,7 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
     return Interval(float(min(lower, upper) * (1 - ROUNDING)), float(upper * (1 + ROUNDING)))
 
 
-ROUNDING = 1e-10  # relative: what doubles may lose in a solve, by which both bounds are moved outwards
+ROUNDING = 1e-9  # relative: what doubles may lose in a solve, by which both bounds are moved outwards
 
 
 def _ngsolve(mesh: Mesh) -> Any:
@@ -205,19 +209,23 @@ def _flux(space: Any, eps: Any, order: int, lossy: bool) -> tuple[Number, int]:
     into_top = -ng.Integrate(outwards, space)  # facets inside cancel: the normal component is continuous there
     energy = ng.Integrate(field * field / eps, space, order=2 * order + _MORE)
     if not abs(into_top - energy) <= _BALANCE * abs(energy):
-        raise CrossedBounds(
-            f"flux {into_top:.9g} and its energy {energy:.9g} differ (order {order}): the solver failed"
+        raise Unsolved(
+            f"flux {into_top:.9g} and its energy {energy:.9g} differ (order {order}): the solver failed on this scene; "
+            "use --model columns"
         )
     return 2 * into_top - energy, facet.ndof
 
 
 _MORE = 2  # orders of quadrature beyond twice the polynomials'
-_BALANCE = 1e-7  # relative: at the best flux, what flows into the electrode at 1 V is its energy
+_BALANCE = 1e-8  # relative: at the best flux, what flows into the electrode at 1 V is its energy
 
 
 def _solve(form: Any, found: Any) -> None:
     """Solve for the unknowns that elements share, then for their own."""
-    form.Assemble()
+    try:
+        form.Assemble()
+    except Exception as error:  # NGSolve's own, of a type that it does not export
+        raise Unsolved(f"the solver failed on this scene ({str(error).strip()}); use --model columns") from error
     residual = found.vec.CreateVector()
     residual.data = form.mat * found.vec
     found.vec.data -= form.mat.Inverse(found.space.FreeDofs(True), "sparsecholesky") * residual

@@ -126,8 +126,11 @@ def _between(cut: Grid) -> Grid:
         raise ValueError("no dielectric lies between a top and a bottom electrode")
     if inside[:, :, [0, -1]].any():
         raise ValueError("an electrode does not cover the whole sensor")
-    outside = (cut.fill > 1) & ~inside
-    return Grid(cut.planes_mm, np.where(outside, -1, cut.fill), cut.names, cut.shares)
+    used = np.unique(cut.fill[inside])
+    number = np.full(len(cut.names), -1)
+    number[[0, 1, *used]] = np.arange(len(used) + 2)
+    fill = np.where(inside, number[cut.fill], np.where(cut.fill > 1, -1, cut.fill))
+    return Grid(cut.planes_mm, fill, ["@bottom", "@top", *(cut.names[k] for k in used)], cut.shares)
 
 
 def _reached(fill: Ints, terminal: int) -> NDArray[np.bool_]:

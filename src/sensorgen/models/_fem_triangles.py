@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.cells import Cell, Slice
+from sensorgen.models._fem_flips import flipped
 from sensorgen.sections import ROUNDING_MM
 
 Edge = tuple[int, int]
@@ -62,7 +63,8 @@ def triangles(cell: Cell) -> Triangles:
             terminals[edge] = next(n[1:] for n in names if n.startswith("@"))
     _refuse_open(points, owners, inside, cell)
     kept = sorted(inside)
-    return Triangles(points, [found[n][0] for n in kept], [found[n][1] for n in kept], terminals)
+    regions = [found[n][1] for n in kept]
+    return Triangles(points, flipped(points, [found[n][0] for n in kept], regions), regions, terminals)
 
 
 def edges_of(corners: Triangle) -> list[Edge]:

@@ -73,6 +73,8 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
         The scene is unfit.
     CrossedBounds
         The lower bound lies above the upper one: a fault of the solver.
+    Unsolved
+        The scene is too slender for doubles at any order.
 
     Notes
     -----
@@ -114,7 +116,15 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     mesh = graded(coarse, exponents(coarse, values), max(_CORNER_SHARE * width, _SMALLEST_SHARE))
     last, order = np.inf, int(np.clip(round(2.3 - 1.25 * np.log10(width)), *_ORDERS))
     while order <= _ORDERS[1]:
-        interval, unknowns = _solved(mesh, values, order)
+        try:
+            interval, unknowns = _solved(mesh, values, order)
+        except fem.Unsolved:
+            if last < np.inf:
+                return  # doubles end here: what was solved before stands
+            if order - 3 < _ORDERS[0]:
+                raise
+            order -= 3
+            continue
         here = interval.times(EPS0_F_PER_M * M_PER_MM * section.depth_mm)
         yield Step(order, len(mesh.triangles), unknowns, here)
         if here.width() <= width or here.width() > _STALLED * last:

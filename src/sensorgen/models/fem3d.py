@@ -98,7 +98,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
 def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[Step]:
     """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
     coarse = grid(scene)
-    values = [permittivity.get(name, 0.0) for name in coarse.names]
+    values = [0.0, 0.0, *(permittivity[name] for name in coarse.names[2:])]
     for layers, order, flux_order in _RUNGS:
         fine = layered(coarse, values, layers)
         upper, part, shared = _least(fine, values, potential(order))

@@ -255,12 +255,19 @@ def _with_fields(found: Pressed, cell: Cell, run: _Run, permittivity: Mapping[st
     """The same with the capacitance of the deformed outlines."""
     fields = [_field(cell, run.problem, s.u_m, permittivity) for s in run.states]
     unknown = sum(c is None for c, _ in fields)
-    said = f"no capacitance at {unknown} of {len(fields)} stresses: the deformed outlines could not be meshed"
+    known = [c.middle() for c, _ in fields if c]
+    said = {
+        f"no capacitance at {unknown} of {len(fields)} stresses: the deformed outlines could not be meshed": unknown
+        > 0,
+        "the capacitance falls under pressure: some outlines were closed in the wrong place": any(
+            after < before * (1 - _LEVELS) for before, after in pairwise(known)
+        ),
+    }
     return replace(
         found,
         capacitance_f_per_m2=tuple(c for c, _ in fields),
         outlines=tuple(outline for _, outline in fields),
-        faults=(*found.faults, *([said] if unknown else [])),
+        faults=(*found.faults, *(words for words, holds in said.items() if holds)),
     )
 
 

@@ -13,6 +13,7 @@ from sensorgen.shapes import rect, tri
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
 SOURCE = "Thesis 3.1.2, 3.2.1 and 3.2.2, Eqs. 3.24, 3.34, 3.35, 3.49 and 3.55"
+COST = 0
 
 
 def under_dielectric_f_per_m(p: tri.Params, eps_r: float) -> float:

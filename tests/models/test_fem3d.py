@@ -1,0 +1,206 @@
+"""Boxes between two bounds: references, the cross-section's elements, closed forms, symmetries, the solver by itself."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cell_scenes import EPS, MM, plates, rect_cell, stairs, tri_cell
+
+from sensorgen.errors import OutOfRange
+from sensorgen.models import columns, fem3d
+from sensorgen.models._fem_boxes import flux, potential
+from sensorgen.models._fem_bricks import grid, layered
+from sensorgen.scene import Body, Fill, Scene, box
+from sensorgen.shapes import rect
+from sensorgen.units import EPS0_F_PER_M
+
+CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
+
+
+def close(expected: float, rel: float):
+    return pytest.approx(expected, rel=rel, abs=0)
+
+
+@pytest.fixture(scope="module")
+def rungs() -> dict[float, list[fem3d.Step]]:
+    return {d: list(fem3d.steps(rect_cell(d), EPS, 1e-3)) for d in (0.1, 0.2)}
+
+
+@pytest.mark.parametrize("case", CELLS["rect"], ids=lambda c: f"d={c['d']}")
+def test_rect_lies_between_its_bounds(case, rungs):
+    off = case["rel_error_halfwidth"]
+    for step in rungs[case["d"]]:
+        assert step.interval.lower < case["C_F"] * (1 + off)
+        assert case["C_F"] * (1 - off) < step.interval.upper
+    assert rungs[case["d"]][-1].interval.width() < 1e-3
+
+
+def test_rungs_lie_within_each_other(rungs):
+    for steps in rungs.values():
+        bounds = [(s.interval.lower, s.interval.upper) for s in steps]
+        assert sorted(bounds) == bounds
+        assert [u for _, u in bounds] == sorted((u for _, u in bounds), reverse=True)
+
+
+def test_columns_lie_outside(rungs):
+    found, best = columns.capacitance(rect_cell(0.1), EPS), rungs[0.1][-1].interval
+    assert found.lower < best.lower < best.upper < found.upper
+
+
+def test_layers_of_plates_are_exact():
+    scene = plates(Body("a", "a", (box(0, 2, 0, 1, 0.2, 0.6),)), Body("b", "b", (box(0, 2, 0, 1, 0.6, 1.2),)))
+    found = fem3d.capacitance(scene, {"a": 3.0, "b": 7.0, "air": 1.0}, 1e-8)
+    exact = EPS0_F_PER_M * 2 / (0.4 / 3 + 0.6 / 7) * MM
+    assert (found.lower, found.upper) == close((exact, exact), 2e-9)
+
+
+def test_stairs_as_the_cross_section_has_them():
+    """An independent program (NGSolve, triangles) on the same scene, extruded."""
+    pytest.importorskip("ngsolve", reason="needs NGSolve")
+    from sensorgen.models import fem2d
+
+    flat, deep = fem2d.capacitance(stairs(2), EPS, 1e-6), fem3d.capacitance(stairs(2), EPS, 2e-2)
+    assert deep.lower < flat.lower < flat.upper < deep.upper
+
+
+def test_turned_swapped_and_scaled(rungs):
+    one = rungs[0.2][0].interval
+    turned = next(fem3d.steps(rect_cell(0.2, along="yx"), EPS)).interval
+    over = Scene(
+        tuple(
+            replace(b, terminal={"top": "bottom", "bottom": "top"}.get(b.terminal, ""))
+            for b in rect_cell(0.2).turned_over().bodies
+        ),
+        rect_cell(0.2).size_mm,
+    )
+    swapped = next(fem3d.steps(over, EPS)).interval
+    many = next(fem3d.steps(rect.scene(rect.Params(length_mm=12.0, width_mm=4.0), Fill()), EPS)).interval
+    for other, factor in ((turned, 1), (swapped, 1), (many, 12)):
+        assert (other.lower, other.upper) == close((one.lower * factor, one.upper * factor), 1e-9)
+
+
+def test_doubled_permittivities_double_it():
+    one, two = (next(fem3d.steps(rect_cell(0.2), {m: f * e for m, e in EPS.items()})).interval for f in (1, 2))
+    assert (two.lower, two.upper) == close((2 * one.lower, 2 * one.upper), 1e-9)
+
+
+def test_a_sensor_that_ends_amid_a_cell():
+    """2.5 x 2 cells hold half a cell of columns more than 2 x 2; the interval is wide, and right."""
+    cut = next(fem3d.steps(rect.scene(rect.Params(length_mm=5.0, width_mm=4.0), Fill()), EPS)).interval
+    one = CELLS["rect"][1]["C_F"]
+    assert 4 * one < cut.upper
+    assert cut.lower < 6 * one
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+@pytest.mark.parametrize("kind", [potential, flux])
+def test_no_energy_without_a_field(kind, order):
+    """A potential of 1 everywhere has no field; every other one has energy."""
+    element = kind(order)
+    matrix = element.condensed(np.array([0.3, 1.0, 2.5]))
+    assert matrix == pytest.approx(matrix.T, abs=1e-12)
+    assert matrix @ element.one == pytest.approx(np.zeros(len(matrix)), abs=1e-10)
+    assert np.sort(np.linalg.eigvalsh(matrix))[1] > 1e-6
+
+
+@pytest.mark.parametrize("kind", [potential, flux])
+def test_one_box_is_a_plate(kind):
+    """Energy at 1 V over one edge, the other sides free: eps times area over height."""
+    element = kind(3)
+    edges = np.array([2.0, 3.0, 0.5])
+    matrix = element.condensed(edges.prod() / (2 * edges**2))
+    lattice = element.numbers
+    low, high = ((lattice[:, 2] == z) & ((lattice[:, 3] == 2) | (kind is potential)) for z in (0, element.pitch))
+    free = ~(low | high)
+    held = np.where(high, element.one, 0.0)
+    held[free] = np.linalg.solve(matrix[free][:, free], -matrix[free] @ held)
+    assert held @ matrix @ held == pytest.approx(2 * 3 / 0.5, rel=1e-10)
+
+
+def test_elimination_is_the_dense_solution():
+    """All unknowns at once, without dissection."""
+    fine = layered(grid(rect_cell(0.2)), [0, 0, 1.00059, 4.68], 0)
+    kind = potential(2)
+    boxes = np.argwhere(fine.fill > 1)
+    count = np.array(fine.fill.shape)
+    keys = kind.keys(boxes, count)
+    names, at = np.unique(keys, return_inverse=True)
+    at = at.reshape(keys.shape)
+    edges = np.column_stack([np.diff(p)[boxes[:, a]] for a, p in enumerate(fine.planes_mm)])
+    eps = np.array([0, 0, 1.00059, 4.68])[fine.fill[tuple(boxes.T)]]
+    whole = np.zeros((len(names),) * 2)
+    for n, here in enumerate(at):
+        whole[np.ix_(here, here)] += kind.condensed(eps[n] * edges[n].prod() / (2 * edges[n] ** 2))
+    values = np.full(len(names), np.nan)
+    for code in (0, 1):
+        on = np.isin(keys, kind.keys(np.argwhere(fine.fill == code), count))
+        ones = np.broadcast_to(kind.one, keys.shape)
+        values[at[on]] = ones[on] * code
+    free = np.isnan(values)
+    values[free] = np.linalg.solve(whole[free][:, free], -whole[free][:, ~free] @ values[~free])
+    found, _, unknowns = fem3d._least(fine, [0, 0, 1.00059, 4.68], kind)
+    assert found == close(values @ whole @ values, 1e-10)
+    assert unknowns == free.sum()
+
+
+def test_scikit_fem_comes_from_above_and_near(rungs):
+    """Hexahedra of second order on the same boxes, graded by hand: above the lower bound, near the upper one."""
+    skfem = pytest.importorskip("skfem")
+    from skfem.helpers import dot, grad
+
+    fine = layered(grid(rect_cell(0.2)), [0, 0, 1.00059, 4.68], 1)
+    mesh = skfem.MeshHex.init_tensor(*fine.planes_mm)
+    middle = mesh.p[:, mesh.t].mean(1)
+    at = [np.searchsorted(p, m) - 1 for p, m in zip(fine.planes_mm, middle, strict=True)]
+    fill = fine.fill[tuple(at)]
+    basis = skfem.Basis(mesh, skfem.ElementHex2())
+    eps = skfem.Basis(mesh, skfem.ElementHex0(), quadrature=basis.quadrature).interpolate(
+        np.where(fill > 1, np.array([0, 0, 1.00059, 4.68])[fill], 1e-9)
+    )
+    matrix = skfem.BilinearForm(lambda u, v, w: w.eps * dot(grad(u), grad(v))).assemble(basis, eps=eps)
+    x = np.zeros(basis.N)
+    held = [np.unique(basis.element_dofs[:, fill == code]) for code in (0, 1)]
+    x[held[1]] = 1.0
+    x = skfem.solve(*skfem.condense(matrix, x=x, D=np.concatenate(held)))
+    above = float(x @ matrix @ x) * EPS0_F_PER_M * MM * 4
+    best = rungs[0.2][-1].interval
+    assert best.lower < above
+    assert above == close(best.upper, 8e-3)
+
+
+def test_it_needs_neither_ngsolve_nor_the_cad_kernel():
+    program = (
+        "import sys; from sensorgen.models import fem3d, columns\n"
+        "assert not {'ngsolve', 'netgen', 'build123d', 'OCP'} & set(sys.modules), sorted(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_what_it_cannot_speak_of():
+    touching = plates(Body("post", "etpu", (box(0, 1, 0, 1, 0.2, 1.2),), "top"))
+    overlap = plates(Body("a", "x60", (box(0, 2, 0, 1, 0.2, 0.6),)), Body("b", "pva", (box(0, 2, 0, 1, 0.5, 0.8),)))
+    middle = plates(Body("mid", "etpu", (box(0, 2, 0, 1, 0.5, 0.6),), "middle"))
+    half = Scene((plates().bodies[0], Body("high", "etpu", (box(0, 1, 0, 1, 1.2, 1.4),), "top")), (2.0, 1.0, 1.4))
+    for scene, words in (
+        (touching, "touch"),
+        (overlap, "overlaps"),
+        (middle, "two electrodes"),
+        (half, "does not cover"),
+        (tri_cell(0.1), "boxes"),
+        (rect_cell(0.0), "touch"),
+    ):
+        assert words in (fem3d.unfit(scene) or "")
+    assert fem3d.unfit(rect_cell(0.1)) is None
+
+
+def test_nonsense_is_refused():
+    with pytest.raises(OutOfRange, match="x60"):
+        fem3d.capacitance(rect_cell(0.1), EPS | {"x60": -1.0})
+    with pytest.raises(OutOfRange, match="accuracy"):
+        fem3d.capacitance(rect_cell(0.1), EPS, -1.0)
+    with pytest.raises(KeyError, match="x60"):
+        fem3d.capacitance(rect_cell(0.1), {"air": 1.0})
