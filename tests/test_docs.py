@@ -13,6 +13,7 @@ from sensorgen.cli import COMMANDS, cli
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "docs" / "tutorial.md"]
+READINGS = "re_ohm_1.1kHz,im_ohm_1.1kHz,re_ohm_99.7kHz,im_ohm_99.7kHz\n3000,-2.1e6,2997,-23435\n"
 DESIGN = re.compile(r"```yaml\n# (\S+\.yaml)\n(.*?)```", re.DOTALL)
 
 
@@ -42,6 +43,8 @@ def test_every_command_of_the_pages_works(words, tmp_path):
     for page in PAGES:
         for name, text in DESIGN.findall(page.read_text("utf-8")):
             (tmp_path / name).write_text(text, "utf-8")
+    for name in ("measured.csv", "flat-tri.csv"):
+        (tmp_path / name).write_text(READINGS, "utf-8")
     (tmp_path / "designs").symlink_to(ROOT / "designs")
     extra = ["--no-cad"] if words[0] == "build" else []
     done = subprocess.run(
