@@ -68,7 +68,9 @@ def test_a_plate_is_exact():
 
 
 def coaxial_quarter(corners: int) -> Scene:
-    """The upper quarter of a coaxial line of radii 1 and 2, between mirrors at 0 and 45 degrees turned to x: see test."""
+    """The upper quarter of a coaxial line of radii 1 and 2, between mirrors at 0 and 45 degrees turned to x:
+    see test.
+    """
     angle = np.linspace(np.pi / 2, 0, corners + 1)
     inner, outer = [(np.cos(a), np.sin(a)) for a in angle], [(2 * np.cos(a), 2 * np.sin(a)) for a in angle]
     low = prism((0, 0), (1, 0), *inner[::-1][1:-1], (0, 1))
@@ -126,7 +128,8 @@ def _open_floor(scene, permittivity, width):
 
 
 def test_interdigital_strips_on_a_half_space():
-    """Fingers of width g with gaps g in a plane: C = eps0 K(k')/K(k), k = sin(pi/4), is eps0 for each pair of half fingers.
+    """Fingers of width g with gaps g in a plane: C = eps0 K(k')/K(k), k = sin(pi/4), is eps0 for each pair of
+    half fingers.
 
     Between two fingers' middles the upper half space; its lid, 6 periods up, carries e^-18 of the field.
     """
@@ -224,7 +227,9 @@ def test_all_permittivities_twice_is_twice_the_capacitance():
 
 @pytest.mark.parametrize("film_mm", [0.2, 1e-2, 1e-4, 1e-5])
 def test_thin_films_down_to_a_nanometre(film_mm):
-    """From film to film a tenth as thick C' grows by 4.087e-11 F/m per e-fold, once the film is thin against the cell."""
+    """From film to film a tenth as thick C' grows by 4.087e-11 F/m per e-fold, once the film is thin against
+    the cell.
+    """
     found = fem2d.capacitance(tri_cell(film_mm), EPS, 1e-4).times(1 / MM)
     thinner = fem2d.capacitance(tri_cell(film_mm / 10), EPS, 1e-4).times(1 / MM)
     assert found.width() < 1e-4
@@ -241,7 +246,8 @@ def test_no_film_is_refused():
 
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 1e2, 1e3, 1e4])
 def test_permittivity_ratios(ratio):
-    """Where air wedges meet a film of high permittivity, energy sits in r^(2 lambda), lambda = 0.12 at 100, 0.012 at 1e4.
+    """Where air wedges meet a film of high permittivity, energy sits in r^(2 lambda), lambda = 0.12 at 100,
+    0.012 at 1e4.
 
     What lies within 1e-13 of the cell's size no double resolves: the interval says so by its width. Layers do not care.
     """
