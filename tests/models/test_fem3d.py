@@ -1,4 +1,4 @@
-"""Boxes between two bounds: references, the cross-section's elements, closed forms, symmetries, the solver by itself."""
+"""Boxes between two bounds: references, the cross-section's elements, limits, symmetries, the solver by itself."""
 
 import json
 import subprocess

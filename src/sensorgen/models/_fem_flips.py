@@ -1,4 +1,4 @@
-"""Blunter triangles from slender ones: edges flipped until no corner looks into its neighbour's circle (Lawson, 1977)."""
+"""Blunter triangles from slender ones: edges flipped until no corner lies in its neighbour's circle (Lawson)."""
 
 from collections.abc import Hashable, Sequence
 
