@@ -34,6 +34,8 @@ def test_values_of_materials_are_taken(run):
     assert json.loads(said.out)["displacement_um"][1] == pytest.approx(film, rel=0.01)
     said = run(*PLATE, "--set", "eps_x60=2.34")
     assert json.loads(said.out)["lower_f_per_m2"][0] == pytest.approx(0.27625066e-12 / 4e-6 / 2, rel=1e-6, abs=0)
+    said = run(*PLATE, "--set", "eps_x60=4.68")  # another question than the one before
+    assert json.loads(said.out)["lower_f_per_m2"][0] == pytest.approx(0.27625066e-12 / 4e-6, rel=1e-6, abs=0)
 
 
 @needs_mesher

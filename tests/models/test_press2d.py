@@ -144,3 +144,15 @@ def test_what_is_no_prism_or_no_solid_is_refused():
         press2d.Elastic(6e6, 0.51)
     with pytest.raises(BadInput, match="bonded or sliding"):
         press2d.press(tri(), solids(), [0.0, 1.0], held=Held(base="glued"))
+
+
+def test_work_and_energy_are_weighed():
+    """A linear spring stores half of stress times way; if it stores more or less, that is told as a share."""
+    stress = moved = np.array([0.0, 1.0, 2.0])
+    assert press2d._imbalance(stress, moved, np.array([0.0, 0.5, 2.0])) == pytest.approx([0, 0, 0], abs=1e-12)
+    assert press2d._imbalance(stress, moved, np.array([0.0, 0.5, 2.5]))[2] == pytest.approx(-0.2)
+
+
+def test_a_peak_stays_though_the_same_bodies_lie_on_both_sides():
+    points = {point for edge in tri().edges for point in edge}
+    assert any(x == pytest.approx(1.0) and y == pytest.approx(0.64) for x, y in points)

@@ -169,3 +169,10 @@ def test_cooks_membrane_locks_with_linear_triangles_and_not_with_ours():
     assert cook(8, 0.4999, True) < 0.6 * fine
     assert cook(8, 0.5, False) == pytest.approx(cook(8, 0.4999, False), rel=2e-3)
     assert cook(32, 0.3, True) == pytest.approx(cook(32, 0.3, False), rel=0.05)  # the same membrane, where both can
+
+
+def test_an_even_pressure_moves_a_confined_block_evenly():
+    mesh = grid(3, 3, bend=0.08)
+    _, state = pressed(mesh, 6.0, 0.4, support.Held("sliding", "fixed", "even"), 1.0)
+    top = state.u_m[1::2][mesh.points_m[:, 1] == 1.0]
+    assert top == pytest.approx(np.full_like(top, top[0]), rel=1e-6)
