@@ -20,8 +20,8 @@ from scipy.optimize import least_squares
 from sensorgen.design import make
 from sensorgen.invert import Estimator, Prior, Status
 from sensorgen.models import line_fit
-from sensorgen.sensing import sensor_of
 from sensorgen.predict import TONES_HZ
+from sensorgen.sensing import sensor_of
 
 RESULTS = Path(__file__).parent / "results"
 TONES = np.array(TONES_HZ)

@@ -11,8 +11,8 @@ import numpy as np
 
 from sensorgen.design import make
 from sensorgen.invert import Estimator, Prior, Status
-from sensorgen.sensing import sensor_of
 from sensorgen.predict import TONES_HZ
+from sensorgen.sensing import sensor_of
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from sensorgen.design import make
 from sensorgen.models.sheet import Patch, Sheet, contact_sets, localise
 from sensorgen.models.stack import Body
-from sensorgen.planner import sensor_of
 from sensorgen.plots import sheet
 from sensorgen.plots.card import figure
 from sensorgen.predict import TONES_HZ
+from sensorgen.sensing import sensor_of
 from sensorgen.stacked.designs import press_at, stacked
 from sensorgen.stacked.touching import WIRINGS, Touching
 from sensorgen.units import EPS0_F_PER_M
