@@ -8,6 +8,7 @@ from sensorgen.scene import Body, Prism, Scene, rectangle
 
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d
+from sensorgen.models._press import field
 from sensorgen.models.press2d import Elastic, Fineness, Held
 
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
@@ -134,3 +135,24 @@ def test_a_cell_without_mirrors_stands_between_mirrors():
     found = press2d.press(press2d.cell(Scene(bodies, (4.0, 10.0, 1.0)), 2.0), SOLIDS, [0.0, 1e4], EPS, fineness=QUICK)
     assert found.faults == ()
     assert "mirrors" in found.doubts[0]
+
+
+def test_a_peak_between_the_same_bodies_stays_and_a_line_that_runs_on_is_one():
+    bodies = (
+        Body("bottom_electrode", "etpu", prisms((0, 4, 0, 0.3)), "bottom"),
+        Body(
+            "film",
+            "x60",
+            (Prism("y", ((0, 0.3), (4, 0.3), (4, 0.5), (3, 0.7), (2, 0.5), (1, 0.7), (0, 0.5)), 0.0, 10.0),),
+        ),
+        Body("top_electrode", "etpu", prisms((0, 2, 1.0, 1.3), (2, 4, 1.0, 1.3)), "top"),
+    )
+    cell = press2d.cell(Scene(bodies, (4.0, 10.0, 1.3)), 4.0)
+    points = {point for edge in cell.edges for point in edge}
+    assert (1.0, 0.7) in points
+
+
+def test_outlines_that_cross_never_reach_the_mesher():
+    with pytest.raises(field.Unmeshed, match="run into each other"):
+        field._refuse_crossings(np.array([[(0.0, 0.0), (1.0, 1.0)], [(0.0, 1.0), (1.0, 0.0)]]))
+    field._refuse_crossings(np.array([[(0.0, 0.0), (1.0, 1.0)], [(1.0, 1.0), (2.0, 0.0)]]))  # they only touch

