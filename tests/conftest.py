@@ -2,9 +2,14 @@
 
 import os
 import shutil
+import signal
 import sys
+from contextlib import suppress
 
 import pytest
+
+with suppress(ValueError):  # not in the main thread
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job would hand down a deaf ear
 
 
 @pytest.fixture(autouse=True)

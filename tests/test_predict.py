@@ -338,11 +338,11 @@ def test_moves_are_counted_in_deviations_of_a_reading():
     """By hand: |Z| = 5 ohm at most, so a reading's deviation is 5 milliohm."""
     re = [[[3.0, 3.0, 3.0], [3.0, 3.01, 2.99]]]
     im = [[[-4.0, -4.0, -4.0], [-3.9, -3.98, -3.9]]]
-    (found,) = moves({"re_ohm": re, "im_ohm": im})
+    (found,) = moves({"re_ohm": re, "im_ohm": im, "noise": NOISE})
     assert found == pytest.approx(
         {"re_by_force": 2.0, "re_by_position": 4.0, "im_by_force": 4.0, "im_by_position": 16.0}, rel=1e-3
     )
-    (louder,) = moves({"re_ohm": re, "im_ohm": im}, noise=1e-2)
+    (louder,) = moves({"re_ohm": re, "im_ohm": im, "noise": 1e-2})
     assert louder["re_by_force"] == pytest.approx(found["re_by_force"] / 10)
     assert NOISE == 1e-3
 

@@ -17,7 +17,16 @@ from sensorgen import __version__, store
 from sensorgen.errors import Unwritable
 
 PLACE = "SENSORGEN_CACHE"  # environment variable with another folder
-_SOURCES = ("models", "cells.py", "interval.py", "scene.py", "sections.py", "units.py")  # what decides an answer
+_SOURCES = (
+    "models",
+    "cells.py",
+    "celllaw.py",
+    "compressed.py",
+    "interval.py",
+    "scene.py",
+    "sections.py",
+    "units.py",
+)  # what decides an answer
 
 JSON = Any  # None, bool, int, float, str, and lists and string-keyed dicts of these
 

@@ -17,7 +17,7 @@ from sensorgen.design import Design
 from sensorgen.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.interval import Interval
 from sensorgen.models import line
-from sensorgen.planner import Unloaded, Unpredictable, is_plate, unloaded
+from sensorgen.planner import Unloaded, Unpredictable, unloaded
 from sensorgen.sensing import TIP_M, Sensed, sensor_of
 from sensorgen.sensor import UNIFORM, Sensor
 from sensorgen.units import M_PER_MM, frequency_text
@@ -26,6 +26,7 @@ TONES_HZ = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)  # thesis, Tabl
 NOISE = 1e-3  # standard deviation of the real and of the imaginary part, relative to the impedance's magnitude [-]
 LARGEST = 2_000_000  # impedances that are kept in memory at once
 ROWS = 4096  # of CSV at a time
+_ASSUMED = "the cell was not solved, and is taken to give way as a solid plate"
 FORCES_N = tuple(k / 10 for k in range(61))  # up to the thesis's 6 N
 
 Complex = NDArray[np.complex128]
@@ -33,7 +34,7 @@ Complex = NDArray[np.complex128]
 
 def prediction(
     design: Design, frequency_hz: Sequence[float] = TONES_HZ, law: str = "", tip_m: float = TIP_M,
-    *, profile: str = UNIFORM, accuracy: float = inf,
+    *, profile: str = UNIFORM, accuracy: float = inf, noise: float = NOISE,
 ) -> dict[str, Any]:  # fmt: skip
     """Everything that is predicted of a design, as plain data for ``prediction.json`` (SI units).
 
@@ -48,6 +49,8 @@ def prediction(
         :func:`sensorgen.sensing.sensor_of`, for the card and the error budget.
     accuracy : float
         Wanted of abs(Z), relative [-]; the capacitance is bounded as nearly, and an unknown cell solved.
+    noise : float
+        Standard deviation of Re Z and of Im Z, each, as a share of abs(Z), for the card [-].
 
     Notes
     -----
@@ -67,7 +70,7 @@ def prediction(
         "capacitance_per_area_f_per_m2": _bounds(found.answer.capacitance_f.times(1 / area)),
         "electrode_resistance_ohm": resistance,
         **_line(sum(resistance.values()), found.answer.capacitance_f, frequency_hz),
-        **_pressed(design, found, frequency_hz, law, tip_m, profile, accuracy),
+        **_pressed(design, found, frequency_hz, (law, tip_m, profile), accuracy, noise),
         "values": [vars(t) for t in found.taken],
         "assumptions": [
             "ideal electrodes and no fringe at the sensor's edge for the capacitance",
@@ -83,21 +86,50 @@ def _pressed(
     design: Design,
     found: Unloaded,
     frequency_hz: Sequence[float],
-    law: str,
-    tip_m: float,
-    profile: str,
+    press: tuple[str, float, str],
     accuracy: float,
+    noise: float,
 ) -> dict[str, Any]:
-    """The identifiability card with the doubts about its sensor, and the error budget; or why there is none."""
+    """What can be judged of a press of ``FORCE_N`` in the middle, or why nothing can."""
+    law, tip_m, profile = press
     try:
         sensed = sensor_of(design, law, tip_m, profile=profile, accuracy=accuracy, known=found)
-        other = sensed.law.others[0] if is_plate(sensed.unloaded.answer) and not law else None
-        stiffest = replace(sensed.sensor, compression=other) if other else None
-        made = card(sensed.sensor, frequency_hz, NOISE, stiffest=stiffest) | {"doubts": list(sensed.doubts)}
-        middle = sensed.sensor.length_m / 2
-        return {"identifiability": made, "budget": budget(design, sensed, frequency_hz, FORCE_N, middle, accuracy)}
     except SensorgenError as error:
-        return {"identifiability": {"verdict": None, "reason": str(error)}, "budget": None}
+        return _unjudged(error)
+    return _judged(design, sensed, frequency_hz, (FORCE_N, sensed.sensor.length_m / 2), accuracy, noise)
+
+
+def _judged(
+    design: Design,
+    sensed: Sensed,
+    frequency_hz: Sequence[float],
+    press: tuple[float, float],
+    accuracy: float,
+    noise: float,
+) -> dict[str, Any]:
+    """Identifiability card and error budget of a press (force [N], position [m]); or why there are none."""
+    law, (force_n, position_m) = sensed.law, press
+    stiffest = (
+        replace(sensed.sensor, compression=law.others[0])
+        if law.compression.name == "unconfined" and law.bounded
+        else None
+    )
+    try:
+        made = card(
+            sensed.sensor, frequency_hz, noise, force_n=force_n or FORCE_N, position_m=position_m, stiffest=stiffest,
+            assumed="" if law.bounded else _ASSUMED,
+        )  # fmt: skip
+        doubts = [] if stiffest else list(sensed.doubts)  # the stiffest law says it in numbers
+        return {
+            "identifiability": made | {"doubts": doubts},
+            "budget": budget(design, sensed, frequency_hz, force_n, position_m, accuracy),
+        }
+    except SensorgenError as error:
+        return _unjudged(error)
+
+
+def _unjudged(error: SensorgenError) -> dict[str, Any]:
+    return {"identifiability": {"verdict": None, "reason": str(error)}, "budget": None}
 
 
 def _resistance_ohm(design: Design, found: Unloaded) -> dict[str, float]:
@@ -214,6 +246,7 @@ def presses(
     force_n: Sequence[float],
     position_mm: Sequence[float],
     accuracy: float = inf,
+    noise: float = NOISE,
 ) -> dict[str, Any]:
     """Impedance over tone, force and position, and what it rests on, as plain data.
 
@@ -227,6 +260,8 @@ def presses(
         Tones [Hz], forces [N] and centres of the tip [mm], each rising.
     accuracy : float
         Wanted of abs(Z), relative, for the error budget of the largest force at the middle position [-].
+    noise : float
+        As of :func:`prediction`, for the card of that press [-].
 
     Returns
     -------
@@ -250,7 +285,10 @@ def presses(
         "compression": law.source,
         "tip_mm": sensor.tip_m / M_PER_MM,
         "profile": sensor.profile,
-        "budget": budget(design, sensed, frequency_hz, force_n[-1], float(position_m[len(position_m) // 2]), accuracy),
+        "noise": noise,
+        **_judged(
+            design, sensed, frequency_hz, (force_n[-1], float(position_m[len(position_m) // 2])), accuracy, noise
+        ),
         "doubts": [*sensed.doubts, *([beyond] if beyond else [])],
         "values": [vars(t) for t in sensed.taken],
         "axes": ["frequency_hz", "force_n", "position_mm"],
@@ -272,27 +310,26 @@ def check_size(most: int, *axes: Sequence[float]) -> None:
         )
 
 
-def moves(predicted: Mapping[str, Any], noise: float = NOISE) -> list[dict[str, float]]:
+def moves(predicted: Mapping[str, Any]) -> list[dict[str, float | None]]:
     """How far presses move R and X of each tone, in standard deviations of one reading.
 
     Parameters
     ----------
     predicted : mapping
-        As of :func:`presses`.
-    noise : float
-        Of the real and of the imaginary part, relative to the impedance's magnitude [-].
+        As of :func:`presses`, with the noise of a reading.
 
     Returns
     -------
     list of dict
-        Per tone: by force at the middle position, and by position at the largest force [-].
+        Per tone: by force at the middle position, and by position at the largest force [-]; None along an axis of
+        one value.
     """
     found = []
     for re, im in zip(np.asarray(predicted["re_ohm"]), np.asarray(predicted["im_ohm"]), strict=True):
-        deviation, middle = noise * np.hypot(re, im).max(), re.shape[1] // 2
+        deviation, middle = predicted["noise"] * np.hypot(re, im).max(), re.shape[1] // 2
         found.append(
             {
-                f"{name}_by_{axis}": float(np.ptp(part) / deviation)
+                f"{name}_by_{axis}": float(np.ptp(part) / deviation) if len(part) > 1 else None
                 for name, values in (("re", re), ("im", im))
                 for axis, part in (("force", values[:, middle]), ("position", values[-1]))
             }

@@ -89,6 +89,16 @@ class Sensor:
     piezoresistance_per_n: tuple[float, float] = (0.0, 0.0)
     far_end: str | float = "open"
 
+    def __post_init__(self) -> None:
+        """Refuse what is no sensor, before arithmetic does."""
+        above = {"length_m": self.length_m, "width_m": self.width_m, "electrode_m": min(self.electrode_m)}
+        above |= {"capacitance_f_per_m": self.capacitance_f_per_m}
+        for name, value in above.items():
+            if not 0 < value < np.inf:
+                raise OutOfRange(f"{name} is {value:g}; expected a number above 0")
+        if not min(self.resistivity_ohm_m) >= 0:
+            raise OutOfRange(f"resistivity_ohm_m is {self.resistivity_ohm_m}; expected numbers from 0 on")
+
     def resistance_ohm(self) -> float:
         """Both electrodes together, end to end [ohm]."""
         per_m = (rho / (h * self.width_m) for rho, h in zip(self.resistivity_ohm_m, self.electrode_m, strict=True))
@@ -123,13 +133,13 @@ class Sensor:
         if whole.all():  # one length for all keeps the axes of a grid apart
             return Patch(low, np.asarray(self.tip_m), np.ones(()), np.zeros(()))
         left, right = np.maximum(low, 0.0), np.minimum(high, self.length_m)
-        moves_left, moves_right = (low > 0).astype(float), (high < self.length_m).astype(float)
+        moves_left, moves_right = (low >= 0).astype(float), (high <= self.length_m).astype(float)
         return Patch(left, np.where(whole, self.tip_m, right - left), moves_left, moves_right - moves_left)
 
     def whole(self, position_m: ArrayLike) -> NDArray[np.bool_]:
-        """Whether a tip centred at ``position_m`` [m] lies on the sensor with its whole length."""
+        """Whether a tip centred at ``position_m`` [m] lies on the sensor whole, flush with an end or not."""
         at = np.asarray(position_m, float)
-        return np.asarray((at - self.tip_m / 2 > 0) & (at + self.tip_m / 2 < self.length_m))
+        return np.asarray((at - self.tip_m / 2 >= 0) & (at + self.tip_m / 2 <= self.length_m))
 
     def stress_pa(self, force_n: ArrayLike, position_m: ArrayLike) -> Real:
         """Highest pressure under the tip [Pa], which a uniform one has everywhere; in the broadcast shape."""

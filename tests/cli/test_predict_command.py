@@ -106,10 +106,11 @@ def test_the_table(run):
     said = run("predict", "reference", *PRESSES)
     assert (said.code, said.err) == (0, "")
     lines = said.out.splitlines()
-    assert max(map(len, lines)) <= 100
-    assert lines[0] == "reference: 3 forces 0 to 6 N, 2 positions 20 to 50 mm; tip 10 mm, compression unconfined"
-    assert lines[1].startswith("doubtful: a plate free to give way sideways")
-    numbers = {row.split()[0]: row.split()[2:] for row in lines if "kHz  " in row}
+    assert max(map(len, lines)) <= 80
+    assert lines[0] == "reference: 3 forces 0 to 6 N, 2 positions 20 to 50 mm;"
+    assert lines[1] == "tip 10 mm, compression unconfined"
+    assert lines[2].startswith("doubtful: a plate free to give way sideways")
+    numbers = {row.split()[0]: row.split()[2:] for row in lines if "kHz" in row and len(row.split()) == 10}
     values = {(f, x): at_point(99.7e3, f, x) for f in (0, 3, 6) for x in (20, 50)}
     low, high, least, most, re_f, re_x, im_f, im_x = map(float, numbers["99.7"])
     assert low == pytest.approx(min(z.real for z in values.values()), rel=1e-5)
@@ -129,9 +130,31 @@ def test_the_table(run):
 
 def test_a_single_press(run):
     lines = run("predict", "reference", "--force", "2", "--position", "30").out.splitlines()
-    assert lines[0].startswith("reference: force 2 N, position 30 mm; tip 10 mm")
+    assert lines[0] == "reference: force 2 N, position 30 mm;"
     z = at_point(99.7e3, 2.0, 30.0)
     assert list(map(float, last_of_table(lines))) == pytest.approx([z.real, z.imag], rel=1e-6)
+    assert next(line for line in lines if "99.7 kHz" in line).split()[-4:] == ["-"] * 4  # one press moves nothing
+
+
+def test_the_card_is_of_the_greatest_press_and_the_noise_asked_for(run):
+    """Standard errors go with the noise: those of the plate at 0.1 % are 2.23 N and 225 mm."""
+    found = json.loads(run("predict", "reference", *PRESSES[:-2], "--noise", "1%", "--json").out)["identifiability"]
+    assert (found["noise"], found["press"]["force_n"], found["press"]["position_m"]) == (0.01, 6, 0.05)
+    assert found["sigma_force_n"] == pytest.approx(22.3, rel=1e-3)
+    assert found["sigma_position_m"] == pytest.approx(2.25, rel=1e-3)
+    said = run("predict", "reference", *PRESSES, "--noise", "1%").out
+    assert "verdict     at 1 % noise this design cannot sense force" in said
+
+
+def test_the_verdict_on_a_cell_that_nobody_solved_says_so(run):
+    found = json.loads(run("predict", "tri", "--dielectric", "0.15", "--json").out)["identifiability"]
+    assert found["verdict"].startswith(
+        "not known, as the cell was not solved, and is taken to give way as a solid plate;"
+    )
+    assert (found["senses_force"], found["locates"]) == (None, None)
+    assert not any("cell of triangles" in change["change"] for change in found["changes"])
+    solved = json.loads(run("predict", "tri", "--json").out)["identifiability"]
+    assert (solved["senses_force"], solved["assumed"]) == ("yes", None)
 
 
 @pytest.mark.parametrize("form", ["--csv", "--json", None])
@@ -180,6 +203,9 @@ def test_pictures(run, tmp_path):
 
 
 WRONG = [
+    (["--noise", "300%"], "--noise: 3; expected a share of |Z| above 0 and below 1"),
+    (["--tip=-1"], "a tip of -1 mm; expected up to the sensor's 100 mm"),
+    (["--compression", "solved"], "reference is a solid plate: expected the law 'unconfined' or 'bonded'"),
     (["--force", "0:6:0"], "--force: '0:6:0': expected a step above 0"),
     (["--force", "2,1"], "--force: '2,1': 1 stands after 2; expected rising values, each once"),
     (["--force", "-1"], "--force: -1; expected 0 or more"),
@@ -242,7 +268,7 @@ def test_json_is_plain(run):
     assert all(math.isfinite(x) for plane in found["re_ohm"] for row in plane for x in row)
     assert set(found) == {
         "design", "design_id", "model", "compression", "tip_mm", "doubts", "values", "axes", "frequency_hz", "force_n",
-        "position_mm", "re_ohm", "im_ohm", "profile", "budget",
+        "position_mm", "re_ohm", "im_ohm", "profile", "budget", "noise", "identifiability",
     }  # fmt: skip
 
 
@@ -264,12 +290,10 @@ def test_options_are_what_the_planner_knows():
     from sensorgen.celllaw import LAWS
     from sensorgen.cli.predict_command import OWN
     from sensorgen.models.pressure import PROFILES
-    from sensorgen.sensing import TIP_M
 
     options = {option.name: option for option in OWN}
     assert tuple(options["compression"].type.choices) == LAWS
     assert tuple(options["profile"].type.choices) == PROFILES
-    assert options["tip_mm"].type.convert(options["tip_mm"].default, None, None) == TIP_M * 1e3
 
 
 def test_a_round_tip_presses_harder_in_its_middle_and_moves_less(run):

@@ -1,6 +1,7 @@
 """The identifiability card: what a sensor's impedance tells of force and position, and what would make it tell more."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ def card(
     position_m: float | None = None,
     highest_hz: float = HIGHEST_HZ,
     stiffest: Sensor | None = None,
+    assumed: str = "",
 ) -> dict[str, Any]:
     """What impedance tells of force and position, as plain data in SI units; None where a number is undefined.
 
@@ -47,6 +49,8 @@ def card(
         Highest tone that the instrument can give [Hz].
     stiffest : Sensor
         The same sensor by its stiffest law of compression, where ``sensor`` has the softest (a plate).
+    assumed : str
+        What is taken for granted of how the film gives way, where nobody solved it; the verdict then hangs on it.
 
     Raises
     ------
@@ -59,7 +63,7 @@ def card(
     press or less, a press *located* where it is a tip's length or less; a quantity is not sensed where the error is
     that of a blind guess (range over the root of 12), and "roughly" in between.
     """
-    setup = _setup(sensor, frequency_hz, noise, force_n, position_m, highest_hz)
+    setup = replace(_setup(sensor, frequency_hz, noise, force_n, position_m, highest_hz), assumed=assumed)
     found = slopes(sensor, setup.frequency_hz, force_n, setup.position_m)
     limits, need, reason = bounds(found, noise), required(setup), undefined(setup, found)
     advised = changes.most_helpful(setup, need)
@@ -71,8 +75,9 @@ def card(
         "required": {"sigma_force_n": need.force_n, "sigma_position_m": need.position_m},
         **_sigma(limits),
         "reason": reason,
-        "senses_force": need.force(float(limits.force_n)),
-        "locates": need.position(float(limits.position_m)),
+        "assumed": assumed or None,
+        "senses_force": None if assumed else need.force(float(limits.force_n)),
+        "locates": None if assumed else need.position(float(limits.position_m)),
         "verdict": verdict(setup, limits, need, reason),
         "stiffest": stiff and {**_sigma(stiff), "verdict": bracket(limits, stiff, need)},
         "tones": _tones(setup, found),

@@ -50,6 +50,8 @@ class Setup:
         The press: force [N], centre of the tip [m].
     highest_hz : float
         Highest tone that the instrument can give [Hz].
+    assumed : str
+        What is taken for granted of how the film gives way, where nobody solved it; or "".
     """
 
     sensor: Sensor
@@ -58,6 +60,7 @@ class Setup:
     force_n: float
     position_m: float
     highest_hz: float
+    assumed: str = ""
 
     def bounds(self) -> Bounds:
         """What the tones tell of the press."""

@@ -69,8 +69,9 @@ def _grade(sigma: float, serves: float, guess: float) -> str:
 def verdict(setup: Setup, bounds: Bounds, need: Required, reason: str) -> str:
     """One plain sentence on what a design can do; ``reason`` says why position is undefined."""
     where = f"at {setup.force_n:g} N and {setup.position_m * 1e3:g} mm"
+    unless = f"not known, as {setup.assumed}; if it did: " if setup.assumed else ""
     return (
-        f"at {setup.noise * 100:g} % noise this design {_ability(bounds, need)}: {where} "
+        f"{unless}at {setup.noise * 100:g} % noise this design {_ability(bounds, need)}: {where} "
         f"{_known(bounds, reason)}; the sensor is {metres(setup.sensor.length_m)} long"
     )
 

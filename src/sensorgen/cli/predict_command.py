@@ -11,7 +11,7 @@ import click
 from sensorgen import units
 from sensorgen.cli import FOUND_ERRORS, budget_text, card_text, show
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import Length, OneOf, Ratio, Values
+from sensorgen.cli.words import Length, OneOf, Ratio, Share, Values
 from sensorgen.errors import BadInput
 
 if TYPE_CHECKING:
@@ -33,11 +33,15 @@ OWN: list[click.Parameter] = [
         ["--frequencies", "frequency_hz"], type=Values(units.FREQUENCY_HZ, zero=False),
         help="Tones, as in 1.1kHz,2.3kHz; the thesis's seven if not given.",
     ),
-    click.Option(["--tip", "tip_mm"], type=Length(), default="10mm", show_default=True, help="Length of the tip."),
+    click.Option(["--tip", "tip_mm"], type=Length(), default=None, help="Length of the tip.  [default: 10 mm]"),
     click.Option(
         ["--compression"], type=OneOf(("unconfined", "bonded", "solved")),
         help="How the film gives way: a plate free or bonded, a cell solved (needs NGSolve, takes some seconds); the "
         "best that is known of it if not given.",
+    ),
+    click.Option(
+        ["--noise"], type=Share(), default="0.1%", show_default=True,
+        help="Standard error of R and of X of a reading, relative to |Z|, for the identifiability card.",
     ),
     click.Option(
         ["--profile"], type=OneOf(("uniform", "hertz", "parabola")), default="uniform", show_default=True,
@@ -60,25 +64,37 @@ def _work(
     frequency_hz: Sequence[float] | None,
     force_n: Sequence[float] | None,
     position_mm: Sequence[float] | None,
-    tip_mm: float,
+    tip_mm: float | None,
     compression: str | None,
     profile: str,
     accuracy: float | None,
+    noise: float,
     **how: Any,
 ) -> int:
     from sensorgen.predict import FORCES_N, TONES_HZ, positions_mm, prediction
-    from sensorgen.sensing import sensor_of
+    from sensorgen.sensing import TIP_M, sensor_of
 
     _refuse_two(how)
+    if not 0 < noise < 1:
+        raise BadInput(f"--noise: {noise:g}; expected a share of |Z| above 0 and below 1, as 0.1%")
     tones, wanted = frequency_hz or TONES_HZ, accuracy or inf
-    law, tip_m = compression or "", tip_mm * units.M_PER_MM
+    law, tip_m = compression or "", TIP_M if tip_mm is None else tip_mm * units.M_PER_MM
     if not (force_n or position_mm or how["as_csv"] or how["plot"]):
-        predicted = prediction(design, tones, law, tip_m, profile=profile, accuracy=wanted)
+        predicted = prediction(design, tones, law, tip_m, profile=profile, accuracy=wanted, noise=noise)
+        if compression or tip_mm is not None:
+            _refuse_unjudged(predicted)
         _deliver(_unpressed(predicted, as_json=how["as_json"]), how["output"])
         return _verdict(predicted, accuracy)
     sensed = sensor_of(design, law, tip_m, profile=profile, accuracy=wanted)
-    _pressed(design, sensed, (tones, force_n or FORCES_N, position_mm or positions_mm(design)), wanted, how)
+    _pressed(design, sensed, (tones, force_n or FORCES_N, position_mm or positions_mm(design)), (wanted, noise), how)
     return 0
+
+
+def _refuse_unjudged(predicted: dict[str, Any]) -> None:
+    """A tip or a law that was asked for and cannot be is a wrong word, not a reason to leave out the card."""
+    found = predicted.get("identifiability")
+    if found and not found["verdict"]:
+        raise BadInput(found["reason"])
 
 
 def _verdict(predicted: dict[str, Any], accuracy: float | None) -> int:
@@ -105,24 +121,26 @@ def _unpressed(predicted: dict[str, Any], *, as_json: bool) -> Iterator[str]:
     if as_json:
         yield show.json_text(predicted)
     else:
-        lines = (*show.prediction_lines(predicted), *card_text.of_prediction(predicted))
-        yield from (f"{line}\n" for line in lines)
-        if predicted.get("budget"):
-            yield "\n"
-            yield from (f"{line}\n" for line in budget_text.lines(predicted["budget"]))
+        yield from (f"{line}\n" for line in (*show.prediction_lines(predicted), *_judgement(predicted)))
 
 
-def _pressed(design: "Design", sensed: "Sensed", axes: Axes, accuracy: float, how: dict[str, Any]) -> None:
-    from sensorgen.predict import NOISE, csv_blocks, moves, presses
+def _judgement(predicted: dict[str, Any]) -> Iterator[str]:
+    """The identifiability card and the error budget, as lines."""
+    yield from card_text.of_prediction(predicted)
+    if predicted.get("budget"):
+        yield from ("", *budget_text.lines(predicted["budget"]))
+
+
+def _pressed(design: "Design", sensed: "Sensed", axes: Axes, wanted: tuple[float, float], how: dict[str, Any]) -> None:
+    from sensorgen.predict import csv_blocks, moves, presses
 
     if how["plot"]:
         _plot(sensed, axes, Path(how["plot"]))
     elif how["as_csv"]:
         _deliver(csv_blocks(sensed.sensor, *axes), how["output"], len(axes[1]) * len(axes[2]))
     else:
-        predicted = presses(design, sensed, *axes, accuracy)
-        lines = (*show.presses(predicted, moves(predicted), NOISE), "", *budget_text.lines(predicted["budget"]))
-        text = (f"{line}\n" for line in lines)
+        predicted = presses(design, sensed, *axes, *wanted)
+        text = (f"{line}\n" for line in (*show.presses(predicted, moves(predicted)), *_judgement(predicted)))
         _deliver(show.json_lines(predicted) if how["as_json"] else text, how["output"])
 
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from sensorgen.findings import Finding
     from sensorgen.review import Review
 
+WIDTH = 80
 _COLOURS = {"error": "red", "warning": "yellow", "info": "blue"}
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
@@ -80,31 +81,38 @@ def prediction_lines(predicted: Mapping[str, Any]) -> Iterator[str]:
         yield f"{si(tone['frequency_hz'], 'Hz'):>17}  {tone['re']:11.5g}   {tone['im']:11.5g}   {low:.4g} .. {high:.4g}"
 
 
-def presses(predicted: Mapping[str, Any], moves: Sequence[Mapping[str, float]], noise: float) -> Iterator[str]:
+def presses(predicted: Mapping[str, Any], moves: Sequence[Mapping[str, float | None]]) -> Iterator[str]:
     """R and X over force and position, as lines: their ranges, how far they move, and corners at the highest tone."""
     force, at = predicted["force_n"], predicted["position_mm"]
     law, profile = predicted["model"]["compression"], predicted["profile"]
     spread = "" if profile == "uniform" else f" ({profile})"
-    yield (
-        f"{predicted['design']}: {_axis(force, 'force', 'N')}, {_axis(at, 'position', 'mm')}; "
-        f"tip {predicted['tip_mm']:g} mm{spread}, compression {law}"
-    )
-    yield from (f"doubtful: {doubt}" for doubt in predicted["doubts"])
+    yield f"{predicted['design']}: {_axis(force, 'force', 'N')}, {_axis(at, 'position', 'mm')};"
+    yield f"tip {predicted['tip_mm']:g} mm{spread}, compression {law}"
+    for doubt in predicted["doubts"]:
+        yield from textwrap.wrap(f"doubtful: {doubt}", WIDTH)
     yield ""
-    yield f"{'':10}  {'R [ohm]':^23}  {'X [ohm]':^23}   R moves, X moves by"
-    yield f"{'tone':>10}  {'least':>11} {'most':>11}  {'least':>11} {'most':>11}   force   pos.  force   pos."
+    yield f"{'':9} {'R [ohm]':^17}  {'X [ohm]':^25}  R moves by  X moves by"
+    yield f"{'tone':>9} {'least':>8} {'most':>8}  {'least':>12} {'most':>12} force  pos. force  pos."
     for f, re, im, move in zip(predicted["frequency_hz"], predicted["re_ohm"], predicted["im_ohm"], moves, strict=True):
-        ranges = "  ".join(f"{min(map(min, v)):11.6g} {max(map(max, v)):11.6g}" for v in (re, im))
-        yield f"{si(f, 'Hz'):>10}  {ranges}  " + " ".join(f"{value:6.2f}" for value in move.values())
-    yield f"Moves are in deviations of one reading, {noise:.2g} of |Z|: by force at {at[len(at) // 2]:g} mm,"
-    yield f"by position at {force[-1]:g} N. Below about 1 a reading alone does not tell."
+        (r, most_r), (x, most_x) = ((min(map(min, v)), max(map(max, v))) for v in (re, im))
+        moved = " ".join(map(_deviations, move.values()))
+        yield f"{si(f, 'Hz'):>9} {r:8.6g} {most_r:8.6g}  {x:12.6g} {most_x:12.6g} {moved}"
+    if len(force) > 1 or len(at) > 1:
+        yield f"Moves are in deviations of one reading, {predicted['noise']:.2g} of |Z|: by force at"
+        yield f"{at[len(at) // 2]:g} mm, by position at {force[-1]:g} N. Below about 1 a reading alone does not tell."
     yield ""
     yield f"R and X [ohm] at {si(predicted['frequency_hz'][-1], 'Hz')}"
     places = _ends_and_middle(at)
-    yield f"{'':>10}  " + "  ".join(f"{f'{at[k]:g} mm':^25}" for k in places)
+    yield f"{'':>7}" + "".join(f"{f'{at[k]:g} mm':^24}" for k in places).rstrip()
     for j in _ends_and_middle(force):
         cells = ((predicted["re_ohm"][-1][j][k], predicted["im_ohm"][-1][j][k]) for k in places)
-        yield f"{f'{force[j]:g} N':>10}  " + "  ".join(f"{re:12.7g} {im:12.7g}" for re, im in cells)
+        yield f"{f'{force[j]:g} N':>7}" + "".join(f"  {re:9.7g} {im:12.7g}" for re, im in cells)
+
+
+def _deviations(value: float | None) -> str:
+    if value is None:
+        return "    -"
+    return f"{value:5.2f}" if value < 100 else f"{value:5.3g}"
 
 
 def _axis(values: Sequence[float], name: str, unit: str) -> str:

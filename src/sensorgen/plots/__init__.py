@@ -6,7 +6,8 @@ from sensorgen.plots.field import QUANTITIES, field
 from sensorgen.sensor import Sensor
 
 PAGE = "predict.html"
-STEPS = (*(f"{name}.png" for name in QUANTITIES), "inverse-position.png", "inverse-force.png", PAGE)
+CARD = "identifiability.png"
+STEPS = (*(f"{name}.png" for name in QUANTITIES), "inverse-position.png", "inverse-force.png", CARD, PAGE)
 
 
 def files(
@@ -28,7 +29,7 @@ def files(
     MissingValue
         Matplotlib or Plotly is not installed.
     """
-    from sensorgen.plots import inverse, maps, page
+    from sensorgen.plots import card, inverse, maps, page, panels
     from sensorgen.plots.library import needed
 
     needed("matplotlib", "plotly")
@@ -37,4 +38,5 @@ def files(
         yield f"{name}.png", maps.png(answer, name)
     yield "inverse-position.png", inverse.png(answer, "position")
     yield "inverse-force.png", inverse.png(answer, "force")
+    yield CARD, panels.png(card.figure(sensor, frequency_hz, force_n=force_n[-1]))
     yield PAGE, page.html(answer).encode()
