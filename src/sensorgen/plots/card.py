@@ -67,7 +67,7 @@ def _map(axes: "Axes", force: Real, place: Real, sigma: Real, serves: float, qua
     bar = axes.figure.colorbar(drawn, ax=axes, extend="both", format="{x:g}", label=f"standard error [{unit}]")
     for level, style in ((serves, "solid"), (10 * serves, "dashed")):
         bar.ax.axhline(level, color="white", linestyle=style)
-        if np.nanmin(sigma) < level < np.nanmax(sigma):
+        if (sigma < level).any() and (sigma > level).any():
             axes.contour(place, force, sigma, levels=[level], colors="white", linestyles=style)
     axes.set(
         xlabel="position, centre of the tip [mm]",
