@@ -83,8 +83,8 @@ class _Section:
 
     @cached_property
     def by_length(self) -> Array:
-        """Derivative by l."""
-        return self.u - self.v * self.before * self.before
+        """Derivative by l: that of the flow, u - v q^2, is carried along by it, and before a long section cancels."""
+        return (self.u - self.v * self.q * self.q) * self.by_behind
 
     @cached_property
     def by_shift(self) -> Array:
@@ -126,8 +126,8 @@ class _Line:
         if name == "x_p_left_edge_m":
             yield self.gain(1) * patch.by_shift * self._contrast()
         if name == "L_p_m":
-            yield self.gain(1) * patch.by_length
-            yield -self.gain(2) * right.by_length
+            by_shunt, by_series = self._shunt_and_series(*self._raised())
+            yield self.gain(2) * (by_shunt - by_series * patch.q * patch.q)
         if name == "L_m":
             yield self.gain(2) * right.by_length
 
@@ -136,20 +136,28 @@ class _Line:
         if name not in _CHANGES:
             return
         away, pressed = _CHANGES[name](_Film(self.inputs))
-        for index, (by_r, by_y) in enumerate((away, pressed, away)):
-            by_shunt, by_series = (by_y, by_r) if self.opened else (by_r, by_y)
+        for index, change in enumerate((away, pressed, away)):
+            by_shunt, by_series = self._shunt_and_series(*change)
             if np.ndim(by_shunt) or by_shunt:
                 yield self.gain(index) * self.sections[index].by_shunt * by_shunt
             if np.ndim(by_series) or by_series:
                 yield self.gain(index) * self.sections[index].by_series * by_series
 
     def _contrast(self) -> Array:
-        """r0 y_p - r_p y0 [1/m2], from the changes themselves so that it is exactly 0 where nothing is pressed."""
+        """r0 y_p - r_p y0 [1/m2]."""
+        of_r, of_y = self._raised()
+        found = self._r * of_y - of_r * self._y
+        return np.asarray(found if self.opened else -found)
+
+    def _raised(self) -> tuple[Array, Array]:
+        """What pressing adds to r [ohm/m] and y [S/m], exactly 0 where nothing is pressed."""
         p = self.inputs
         strain = p.strain()
-        risen = (p["tan_delta"] + 1j) * (p.susceptance() * (strain / (1 - strain)))
-        found = self._r * risen - p.track_change() * self._y
-        return np.asarray(found if self.opened else -found)
+        return p.track_change(), (p["tan_delta"] + 1j) * (p.susceptance() * (strain / (1 - strain)))
+
+    def _shunt_and_series(self, of_r: Array, of_y: Array) -> tuple[Array, Array]:
+        """What the recursion takes for u and v: admittance is marched from an open end, impedance from any other."""
+        return (of_y, of_r) if self.opened else (of_r, of_y)
 
 
 class _Film:
