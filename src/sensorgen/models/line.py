@@ -169,7 +169,7 @@ def sensitivities(of: Iterable[str] | None = None, **inputs: Any) -> tuple[Compl
 
 
 def corner_frequency_hz(resistance_ohm: float, capacitance_f: float) -> float:
-    """Frequency above which a line is no longer short: 1 / (2 pi R C), both tracks together; inf where R or C is 0 [Hz].
+    """Frequency above which a line is no longer short, 1 / (2 pi R C), both tracks together; inf if either is 0 [Hz].
 
     >>> round(corner_frequency_hz(9000.0, 69.06e-12)), corner_frequency_hz(0.0, 69.06e-12)
     (256065, inf)
