@@ -156,7 +156,7 @@ def test_the_table_of_contacts(name):
     for cell, (rho, times) in zip(row[1:], SETTINGS, strict=True):
         film = Sheet(0.1, 0.1, (rho / 3e-4,) * 2, C)
         sigma = found(name, np.array(TONES) * times, places=7, film=film).sigma()
-        assert [metres(one) for one in cell.split(",")] == pytest.approx(np.median(sigma, (0, 1))[1:], rel=2e-2)
+        assert [metres(one) for one in cell.split(",")] == pytest.approx(np.median(sigma, (0, 1))[1:], rel=4e-2)
         assert 0.5 < np.median(sigma[..., 0]) < 1.65
 
 
@@ -175,7 +175,7 @@ def test_the_table_of_virtual_segments():
     for rho, tone, reach, *cells in rows:
         film = Sheet(0.1, 0.1, (float(rho) / 3e-4,) * 2, C)
         hertz = float(tone.split()[0]) * {"kHz": 1e3, "MHz": 1e6}[tone.split()[1]]
-        assert metres(reach) == pytest.approx(depth_m(film, hertz), rel=1e-2)
+        assert metres(reach) == pytest.approx(depth_m(film, hertz), rel=2e-2)
         places = [Patch(x, y, 0.02, 0.02, 1.05) for x, y in ((0.02, 0.02), (0.06, 0.02), (0.06, 0.06))]
         loose, *pressed = (
             complex(impedance(film, SETS["corner"], hertz, patch, cells=80)[0, 0, 0])

@@ -109,7 +109,7 @@ def contact_sets(sheet: Sheet) -> dict[str, tuple[Port, ...]]:
 
 def bounds(
     sheet: Sheet, ports: Sequence[Port], frequency_hz: ArrayLike, press: Patch, per_newton: Mapping[str, float],
-    noise: float, places: int, done: Callable[[int], object],
+    noise: float, places: int, done: Callable[[int], object] | None,
 ) -> Bounds:  # fmt: skip
     """Bounds over the sheet; see :func:`sensorgen.models.sheet.localise`."""
     check("noise", noise, above=True)
@@ -122,7 +122,8 @@ def bounds(
     x, y = (np.linspace(0.0, end, places) for end in (sheet.length_m - press.length_m, sheet.width_m - press.width_m))
     information = np.empty((places, places, len(tones), 3, 3))
     for count, (i, j) in enumerate(np.ndindex(places, places)):
-        done(count)
+        if done:
+            done(count)
         found = solution(sheet, ports, tones, _moved(press, float(x[i]), float(y[j])), BY, cells, ACCURACY)
         z = np.einsum("fpp->fp", found.impedance_ohm)
         by = {name: np.einsum("fpp->fp", value) / z for name, value in found.by.items()}

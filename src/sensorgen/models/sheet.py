@@ -139,7 +139,7 @@ def localise(
     per_newton: Mapping[str, float],
     noise: float = 1e-3,
     places: int = 7,
-    done: Callable[[int], object] = int,
+    done: Callable[[int], object] | None = None,
 ) -> Bounds:
     r"""Cramer-Rao bounds of force, x and y of a press, anywhere on the sheet.
 
