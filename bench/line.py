@@ -202,9 +202,9 @@ TARGETS = {  # impedances/s, and times scikit-rf's
 }
 
 
-def sweeps() -> dict[str, Any]:
-    """Errors of each method over frequency and over length, None where it has no number."""
-    known: dict[str, Method] = {
+def swept() -> dict[str, Method]:
+    """Methods whose errors are looked at over frequency and length."""
+    return {
         "recursion": line.impedance,
         "ABCD matrices": line_abcd.impedance,
         "exponentials, corrected": line_closed.impedance,
@@ -212,17 +212,46 @@ def sweeps() -> dict[str, Any]:
         "pi ladder, 100 cells": partial(line_ladder.impedance, 100),
         "scikit-rf": lambda **inputs: scikit_rf(**inputs)[0],
     }
-    frequencies = [PLATE | {"f_Hz": float(f)} for f in np.geomspace(1e-9, 1e9, 73)]
-    lengths = [
-        PLATE | {"L_m": float(length), "L_p_m": 0.1 * length, "x_p_left_edge_m": 0.45 * length, "F_N": 30.0 * length}
-        for length in np.geomspace(1e-3, 1e3, 49)
-    ]
+
+
+ALONG: dict[str, tuple[Any, Callable[[float], Inputs]]] = {
+    "f_Hz": (np.geomspace(1e-9, 1e9, 73), lambda f: PLATE | {"f_Hz": f}),
+    "L_m": (
+        np.geomspace(1e-3, 1e3, 49),
+        lambda length: (
+            PLATE | {"L_m": length, "L_p_m": 0.1 * length, "x_p_left_edge_m": 0.45 * length, "F_N": 30 * length}
+        ),
+    ),
+}
+
+
+def sweeps() -> dict[str, Any]:
+    """Errors of each method over frequency and over length, None where it has no number, and where its numbers end."""
     found: dict[str, Any] = {}
-    for along, runs in (("f_Hz", frequencies), ("L_m", lengths)):
+    for along, (places, inputs_at) in ALONG.items():
+        at = [float(place) for place in places]
+        runs = [inputs_at(place) for place in at]
         true = [exact(120, **inputs) for inputs in runs]
-        found[along] = {"at": [inputs[along] for inputs in runs]}
-        for name, method in known.items():
-            found[along][name] = [error_at(method, inputs, z) for inputs, z in zip(runs, true, strict=True)]
+        found[along] = {"at": at, "errors": {}}
+        for name, method in swept().items():
+            errors_ = [error_at(method, inputs, z) for inputs, z in zip(runs, true, strict=True)]
+            found[along]["errors"][name] = errors_
+        found[along]["ends"] = ends(along, at, found[along]["errors"])
+    return found
+
+
+def ends(along: str, at: list[float], errors_: dict[str, list[list[float] | None]]) -> dict[str, float]:
+    """Where each method's last number is, to a ten thousandth; methods that have one to the end are left out."""
+    found, inputs_at = {}, ALONG[along][1]
+    for name, pairs in errors_.items():
+        last = max(k for k, pair in enumerate(pairs) if pair)
+        if last + 1 == len(at):
+            continue
+        low, high = at[last : last + 2]
+        while high > low * 1.0001:
+            middle = (low * high) ** 0.5
+            low, high = (middle, high) if error_at(swept()[name], inputs_at(middle), 1.0) else (low, middle)
+        found[name] = low
     return found
 
 
@@ -325,17 +354,18 @@ def draw_stability(found: dict[str, Any]) -> None:
 
     figure, panels = plt.subplots(2, 2, figsize=(9, 6.6), sharex="col", sharey=True, layout="constrained")
     for column, (along, label) in enumerate((("f_Hz", "frequency [Hz]"), ("L_m", "length at 99.7 kHz [m]"))):
-        at = found[along]["at"]
+        at, errors_, last = (found[along][key] for key in ("at", "errors", "ends"))
         for row, part in enumerate(("Z", "Re Z")):
             axes = panels[row, column]
-            for name in (name for name in found[along] if name != "at"):
+            for name, pairs in errors_.items():
                 colour = next(c for start, (c, _) in FAMILIES.items() if name.startswith(start))
-                known = [(x, max(pair[row], 1e-17)) for x, pair in zip(at, found[along][name], strict=True) if pair]
+                known = [(x, max(pair[row], 1e-17)) for x, pair in zip(at, pairs, strict=True) if pair]
+                known += [(last[name], known[-1][1])] if name in last else []
                 top = name == "recursion"
                 axes.plot(
                     *zip(*known, strict=True), color=colour, lw=2.5 if top else 1.3, zorder=3 if top else 2, label=name
                 )
-                if known[-1][0] < at[-1]:
+                if name in last:
                     axes.plot(*known[-1], "x", color=colour, ms=9, mew=2.5, zorder=4)
             axes.set(xscale="log", yscale="log", ylim=(3e-18, 1e6), ylabel=f"relative error of {part}")
             axes.axhline(1, color="grey", lw=0.8, ls="--")

@@ -1,8 +1,12 @@
 """``sensorgen sheet``: words in, bounds out."""
 
 import json
+from contextlib import contextmanager
 
+import numpy as np
 import pytest
+
+from sensorgen.cli import show
 
 WORDS = ("sheet", "reference", "--size", "60x60", "--frequencies", "100kHz,1MHz")
 
@@ -35,6 +39,54 @@ def test_twice_the_noise_is_twice_the_error(run):
     assert two["sigma_x_m"][1][2] == pytest.approx(2 * one["sigma_x_m"][1][2], rel=1e-6)
 
 
+def test_contacts_of_ones_own_are_the_same_as_those_with_a_name(run):
+    """Pads of a tenth of the side in all corners, and an edge: what `corners` and `one-edge` are."""
+    corners = [w for x in ("0-6", "54-60") for y in ("0-6", "54mm-60mm") for w in ("--pad", f"{x},{y}")]
+    edge = ["--pad", "0,0-60"]
+    for own, name in ((corners, "corners"), (edge, "one-edge")):
+        found = json.loads(run(*WORDS, *own, "--contacts", name, "--json").out)["contacts"]
+        assert set(found) == {"pads", name}
+        assert found["pads"]["sigma_force_n"][1] == pytest.approx(found[name]["sigma_force_n"][1], rel=1e-6)
+        assert found["pads"]["impedance_ohm"]["re"][0][0] == pytest.approx(found[name]["impedance_ohm"]["re"][0][0])
+    assert set(json.loads(run(*WORDS, *edge, "--json").out)["contacts"]) == {"pads"}
+
+
+def test_the_impedance_from_one_edge_is_that_of_the_line(run):
+    """Unpressed: coth of both sheets and the film that the answer itself names."""
+    data = json.loads(run(*WORDS, "--contacts", "one-edge", "--json").out)
+    r = sum(data["sheet_resistance_ohm"].values()) / data["width_m"]
+    for k, hertz in enumerate((1e5, 1e6)):
+        y = 2j * np.pi * hertz * data["capacitance_f_per_m2"] * data["width_m"]
+        z = np.sqrt(r / y) / np.tanh(np.sqrt(r * y) * data["length_m"])
+        got = data["contacts"]["one-edge"]["impedance_ohm"]
+        assert got["re"][k][0][0] == pytest.approx(z.real, rel=2e-3)
+        assert got["im"][k][0][0] == pytest.approx(z.imag, rel=2e-3)
+
+
+def test_a_bonded_film_tells_less_of_force(run):
+    said = [run(*WORDS, "--contacts", "corners", "--json", *more) for more in ((), ("--compression", "bonded"))]
+    free, bonded = (json.loads(one.out)["capacitance_factor"] - 1 for one in said)
+    assert 0 < bonded < free / 3
+
+
+def test_it_fits_a_terminal(run):
+    said = run(*WORDS, "--contacts", "two-edges", "--pad", "0-10,0-10")
+    assert max(map(len, said.out.splitlines())) <= 80
+
+
+def test_a_bar_moves_with_the_places(run, monkeypatch):
+    """A person is told of every place; without a terminal there is no bar."""
+    steps = []
+
+    @contextmanager
+    def progress(names):
+        yield lambda name: steps.append(names.index(name))
+
+    monkeypatch.setattr(show, "progress", progress)
+    assert run(*WORDS, "--contacts", "opposite").code == 0
+    assert steps == list(range(49))
+
+
 def test_maps_are_drawn(run, tmp_path):
     said = run(*WORDS, "--contacts", "two-edges", "--plot", "maps")
     assert said.code == 0, said.err
@@ -47,15 +99,30 @@ def test_maps_are_drawn(run, tmp_path):
     ("words", "say"),
     [
         (["--contacts", "corner-pads"], "did you mean 'corners'"),
-        (["--force", "1,2"], "--force takes one number"),
+        (["--force", "1,2"], "--force: 2 values; expected one"),
+        (["--tip", "10,20"], "--tip: 2 values; expected one"),
         (["--force", "0"], "above 0"),
         (["--tip", "60"], "leaves no place"),
-        (["--tip", "0"], "leaves no place"),
+        (["--tip", "0"], "--tip: 0; expected above 0"),
+        (["--tip=-1"], "--tip: -1; expected above 0"),
         (["--frequencies", "1kHz,1kHz"], "twice"),
         (["--frequencies", "-1"], "--frequencies"),
         (["--noise", "much"], "--noise"),
-        (["--noise", "0"], "noise"),
-        (["--frequencies", "1GHz,900GHz"], "too coarse"),
+        (["--noise", "0"], "--noise 0; expected a share above 0"),
+        (["--noise", "300%"], "--noise 3; expected a share above 0 and below 1"),
+        (["--noise", "nan"], "--noise"),
+        (["--frequencies", "1GHz,900GHz"], "use frequencies up to"),
+        (["--frequencies", f"{10**99}"], "use frequencies up to"),
+        (["--frequencies", f"{10**140}"], "below 1e+100, not 1e+140"),
+        (["--compression", "bound"], "did you mean 'bonded'"),
+        (["--pad", "0-10"], "expected X0-X1,Y0-Y1 in mm"),
+        (["--pad", "0-10,0-10-20"], "expected X0-X1,Y0-Y1 in mm"),
+        (["--pad", "0-ten,0-10"], "--pad '0-ten,0-10': 'ten' is not a length"),
+        (["--pad=-5-10,0-10"], "expected X0-X1,Y0-Y1"),
+        (["--pad", "10-0,0-10"], "give the lower first"),
+        (["--pad", "0,0"], "without length"),
+        (["--pad", "55-65,0-10"], "beyond the sheet"),
+        (["--pad", "0-10,0-10", "--pad", "5-15,0-10"], "shorted"),
     ],
 )
 def test_wrong_words_are_one_line(run, words, say):

@@ -17,7 +17,18 @@ def test_it_prints_tables(run):
     assert (said.code, said.err) == (0, "")
     for word in ("lower film alone", "difference alone", "0.3 mm", "bare", "top driven", "bridge", "doubt:"):
         assert word in said.out
-    assert max(map(len, said.out.split("taken for granted")[0].splitlines())) <= 150
+    assert max(map(len, said.out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("words", [("tri", "--dielectric", "0.1"), ("double", "--force", "9mN", "--noise", "90%")])
+def test_cells_of_its_tables_stay_apart(run, words):
+    """Each row of a table has as many columns as its neighbours, whatever the size of its numbers."""
+    said = run("stack", *words, "--isolation", "0.37", "--frequencies", "1mHz,1GHz").out.splitlines()
+    for start, count, columns in (("1 mHz", 2, 8), ("bare", 1, 13), ("0.37 mm", 1, 14)):
+        first = next(k for k, line in enumerate(said) if line.strip().startswith(start))
+        for line in said[first : first + count]:
+            assert len(line) <= 80
+            assert len(line.split()) == columns, line
 
 
 def test_its_json_is_plain(run):
@@ -43,7 +54,9 @@ def test_tones_are_taken_as_typed(run):
         (["--noise", "nan"], "--noise"),
         (["--frequencies", "-1kHz"], "--frequencies"),
         (["--touch", "200"], "overhangs"),
-        (["--touch", "-1"], "tip"),
+        (["--touch=-3"], "--touch: -3; expected above 0"),
+        (["--touch", "0"], "--touch: 0; expected above 0"),
+        (["--touch", "5,10"], "--touch: 2 values; expected one"),
         (["--force", "9kN"], "touch"),
         (["--upper-dielectric", "0"], "touch"),
     ],

@@ -194,11 +194,30 @@ def test_what_is_needed_and_not_given_is_missing(name):
 
 
 def test_sections_that_do_not_match_or_are_active_are_refused():
-    with pytest.raises(OutOfRange, match="make no sections"):
+    with pytest.raises(BadInput, match="make no sections"):
         cascade([1.0], [1j, 1j], [1.0])
     for r, y, length in ((-1.0, 1j, 1.0), (1.0, -1j, 1.0), (1.0, 1j, np.nan)):
-        with pytest.raises(OutOfRange):
+        with pytest.raises(OutOfRange, match="negative or not finite; expected 0 or more"):
             cascade([r], [y], [length])
+
+
+@pytest.mark.parametrize(
+    ("r", "y", "far_end", "words"),
+    [
+        (1.0, "x", "open", "admittance takes numbers in SI units, not 'x'"),
+        ("x", 1j, "open", "resistance takes numbers"),
+        ([[1.0], [1.0, 2.0]], 1j, "open", "resistance takes numbers"),
+        ([1.0, 2.0], [1j, 1j, 1j], "open", "do not broadcast together"),
+        ([1.0, 2.0], 1j, [1.0, 2.0, 3.0], "do not broadcast together"),
+    ],
+)
+def test_sections_that_are_no_numbers_or_do_not_fit_are_refused(r, y, far_end, words):
+    with pytest.raises(BadInput, match=words):
+        cascade([r], [y], [1.0], far_end)
+
+
+def test_a_line_without_resistance_is_short_at_any_frequency():
+    assert corner_frequency_hz(0.0, 69e-12) == corner_frequency_hz(9e3, 0.0) == np.inf
 
 
 SLOPES = {
@@ -233,6 +252,34 @@ def test_derivatives_against_mpmath(corner):
             gap = mpmath.mpmathify(complex(found)) - true
             assert abs(gap) / abs(true) < 1e-11, name
             assert abs(gap.real) <= 1e-9 * abs(true.real) + 1e-15 * abs(true), name
+
+
+LOSSY = {
+    "20 m": {"L_m": 20.0, "x_p_left_edge_m": 9.0, "L_p_m": 2.0, "F_N": 600.0},
+    "50 m": {"L_m": 50.0, "x_p_left_edge_m": 22.5, "L_p_m": 5.0, "F_N": 1500.0},
+    "5 m, a small patch": {"L_m": 5.0, "F_N": 0.01},
+    "hardly pressed": {"F_N": 1e-4},
+}
+
+
+@pytest.mark.parametrize("far_end", ["open", "short", 2e3])
+@pytest.mark.parametrize("loss", [{}, {"tan_delta": 0.1, "S_n_top_per_N": 0.01}], ids=["pure", "loss"])
+@pytest.mark.parametrize("case", LOSSY)
+def test_derivatives_by_lengths_keep_their_digits_on_lossy_lines(case, loss, far_end):
+    """Nearly nothing comes back from the far end: what is left of dZ/dL is a tiny number, and as right as any."""
+    inputs = PLATE | LOSSY[case] | loss | {"far_end": far_end}
+    _, by = sensitivities(of=["L_m", "L_p_m"], **inputs)
+    with mpmath.workdps(400):
+        step = mpmath.mpf(10) ** -60
+        for name, found in by.items():
+            low, high = (exact(400, **(inputs | {name: mpmath.mpf(inputs[name]) + s * step})) for s in (-1, 1))
+            gap = mpmath.mpmathify(complex(found)) - (high - low) / (2 * step)
+            assert abs(gap) < 1e-11 * abs(high - low) / (2 * step), name
+
+
+def test_an_unpressed_patch_may_be_of_any_length():
+    for far_end in ("open", "short", 2e3):
+        assert sensitivities(of=["L_p_m"], **PLATE | {"F_N": 0.0, "far_end": far_end})[1]["L_p_m"] == 0
 
 
 def test_no_press_leaves_no_trace_of_position():

@@ -57,6 +57,16 @@ def test_two_extremes_at_once(pair):
         assert real < 1e-11
 
 
+def test_near_touching_it_keeps_what_the_strain_keeps():
+    """1 - F/(W L_p E) of numbers with 16 digits: docs/line.md says 5e-10 at 599.9999 N; of exact strain it is right."""
+    inputs, tones = PLATE | {"F_N": 599.9999}, (1e-3, 1.1e3, 99.7e3, 1e6)
+    errors = [off(impedance(**(inputs | {"f_Hz": f})), exact(120, **(inputs | {"f_Hz": f})))[0] for f in tones]
+    assert max(errors) == pytest.approx(5e-10, rel=0.2)
+    binary = PLATE | {"W_m": 2.0**-7, "L_p_m": 2.0**-7, "E_Pa": 2.0**22, "F_N": 256 * (1 - 2.0**-23)}
+    for f in tones:
+        assert max(off(impedance(**(binary | {"f_Hz": f})), exact(120, **(binary | {"f_Hz": f})))) < 1e-14
+
+
 def test_zeros_and_infinities_inside_an_array_stay_where_they_are():
     z = impedance(**(PLATE | {"f_Hz": np.array([0.0, 1.0, 0.0, 1e9])}))
     assert z[0] == z[2] == complex(np.inf, 0)

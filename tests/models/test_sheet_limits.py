@@ -57,6 +57,19 @@ def test_a_hundred_times_the_depth_chooses_a_finer_grid_and_beyond_that_says_so(
         solve(Sheet(0.1, 0.01, (450.0, 700.0), 7e-8), [PORT_NARROW], 1e3, accuracy=1e-14)
 
 
+@pytest.mark.parametrize("hertz", [1e50, 9e99])
+def test_a_number_of_cells_that_nobody_has_is_no_advice(hertz):
+    for cells in (20, None):
+        with pytest.raises(OutOfRange, match=r"too coarse.* long: use a lower frequency$"):
+            impedance(FILM, [PORT], hertz, cells=cells)
+
+
+@pytest.mark.parametrize("hertz", [1e100, 1e308, float("inf")])
+def test_frequencies_beyond_all_are_refused(hertz):
+    with pytest.raises(OutOfRange, match=r"below 1e\+100"):
+        impedance(FILM, [PORT], hertz)
+
+
 PORT_NARROW = tuple(Contact(side, (0.0, 0.0), (0.0, 0.01)) for side in ("top", "bottom"))
 
 

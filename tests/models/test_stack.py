@@ -257,8 +257,10 @@ def test_direct_current_through_leaks():
         (([[1e4, 1e4]], [[complex(np.nan)]], [0.1]), OutOfRange, "admittance"),
         (([[1e4, 1e4]], [[1j]], [-0.1]), OutOfRange, "length"),
         (([[1e4, np.inf]], [[1j]], [0.1]), OutOfRange, "resistance"),
-        (([[1e4, 1e4]], [[1j, 1j]], [0.1]), OutOfRange, "n \\+ 1 tracks"),
-        (([[1e4, 1e4]], [[1j]], [0.1, 0.2]), OutOfRange, "2 lengths"),
+        (([[1e4, 1e4]], [[1j, 1j]], [0.1]), BadInput, "n \\+ 1 tracks"),
+        (([[1e4, 1e4]], [[1j]], [0.1, 0.2]), BadInput, "2 lengths"),
+        (([[[1e4, 2e4], 1e4]], [[1j]], [[0.1, 0.1, 0.1]]), BadInput, "do not broadcast"),
+        (([[[1e4, 2e4], [1e4] * 3]], [[1j]], [0.1]), BadInput, "resistance in a section do not broadcast"),
         (([[1e4, "x"]], [[1j]], [0.1]), BadInput, "resistance"),
         (([[1e200, 1e200]], [[1e200j]], [1e200]), OutOfRange, "extreme"),
     ],
@@ -288,7 +290,7 @@ def pressed(f, force, left, tip=0.01, grown=(0, 0)):
     away, under, loose, tight = [], [], [], []
     for track in DOUBLE.tracks:
         away.append(mpmath.mpf(track.r_ohm_per_m))
-        under.append(away[-1] * (1 + mpmath.mpf(track.rise_per_n) * force))
+        under.append(away[-1] * (1 + mpmath.mpf(track.piezoresistance_per_n) * force))
     for film, modulus, by in zip(DOUBLE.films, (6e6, 1e6), grown, strict=True):
         turned = mpmath.mpc(film.tan_delta, 1) * omega * mpmath.mpf(film.capacitance_f_per_m) * mpmath.exp(by)
         loose.append(film.leak_s_per_m + turned)
@@ -380,6 +382,11 @@ def test_it_refuses_a_derivative_at_frequency_0_and_stacks_that_are_none():
         plain.impedance(-1.0)
     with pytest.raises(OutOfRange, match="one track more"):
         Stack(0.1, 0.01, (Track(1e4),), (Film(7e-10, FIRM.thinning),))
+
+
+def test_presses_that_do_not_broadcast_are_refused():
+    with pytest.raises(BadInput, match=r"frequency and press do not broadcast together: \(2,\), \(3,\)"):
+        DOUBLE.response([1e3, 1e4], Press([1.0, 2.0, 3.0], 0.03, 0.01))
 
 
 def test_tracks_and_films_count_from_the_bottom():

@@ -1,5 +1,7 @@
 """What the second film and the isolation are worth: known limits, and the sentences of docs/stack.md."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from sensorgen.models.stack import Body, Film, Press, Stack, Track
 from sensorgen.predict import TONES_HZ
 from sensorgen.sensing import sensor_of
 from sensorgen.stacked import study
-from sensorgen.stacked.designs import halves, stack_of, stacked
+from sensorgen.stacked.designs import halves, press_at, stack_of, stacked
 from sensorgen.stacked.differencing import bounds
 from sensorgen.stacked.touching import WIRINGS, Touching
 
@@ -117,3 +119,41 @@ def test_another_shape_is_stacked_twice():
 def test_a_press_that_overhangs_is_refused():
     with pytest.raises(OutOfRange, match="overhangs"):
         study(make({"shape": "reference"}), TONES_HZ, 6.0, 0.001, 1e-3, 0.1, 0.1)
+
+
+PAGE = (Path(__file__).parents[2] / "docs" / "stack.md").read_text("utf-8")
+ROWS = [[cell.strip() for cell in line.strip("|").split("|")] for line in PAGE.splitlines() if line.startswith("|")]
+
+
+def test_the_table_of_what_a_second_film_tells():
+    """docs/stack.md, row by row; the films are given by how much stiffer the lower one is."""
+    stiffer = {"equal plates, unconfined": 1, "lower ten times stiffer": 10, "lower bonded (94 E)": 94}
+    rows = [row for row in ROWS if row[0] in stiffer]
+    assert len(rows) == len(stiffer)
+    for name, *cells in rows:
+        films = tuple(Film(6.9e-10, unconfined(6e6 * times).thinning) for times in (stiffer[name], 1))
+        found = by_name(Stack(0.1, 0.01, EVEN, films))
+        ways = [found[way]["force_n"] for way in ("upper film alone", "both readings", "difference alone")]
+        for cell, force in zip(cells, [way[case] for case in ("known", "drifting") for way in ways], strict=True):
+            assert (
+                force is None if cell == "nothing" else float(cell.removesuffix(" N")) == pytest.approx(force, rel=3e-3)
+            )
+
+
+def test_the_table_of_what_a_touch_does():
+    designs = iter([{"shape": "reference"}, {"shape": "tri", "parameters": {"dielectric_mm": 0.1}}])
+    rows = [row for row in ROWS if len(row) == 7 and row[1] in {w.words for w in WIRINGS}]
+    assert len(rows) == 2 * len(WIRINGS)
+    for row, wiring in zip(rows, 2 * WIRINGS, strict=True):
+        if row[0]:
+            found = stacked(make(next(designs)))
+            of = Touching(found.own, found.isolation_eps_r, TONES, press_at(found, 6.0, 0.045), 1e-3, Body())
+        assert row[1] == wiring.words
+        for cell, thickness in zip(row[2:6], (0.0, 0.1, 0.5, 1.0), strict=True):
+            shift, force = (float(part.split()[0]) for part in cell.split(","))
+            modulus = np.abs(of.unloaded_ohm())
+            assert shift == pytest.approx(100 * np.max(np.abs(of.shift_ohm(thickness, wiring)) / modulus), rel=4e-2)
+            assert force == pytest.approx(abs(of.force_n(thickness, wiring)), rel=4e-2)
+        needed = of.thickness_mm(0.1, wiring)
+        said = {None: "not even 10 mm", 0.0: "none"}.get(needed)
+        assert row[6] == said if said else float(row[6].removesuffix(" mm")) == pytest.approx(needed, rel=2e-2)

@@ -11,7 +11,7 @@ import click
 from sensorgen import units
 from sensorgen.cli import FOUND_ERRORS, budget_text, card_text, show
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import Length, OneOf, Ratio, Share, Values
+from sensorgen.cli.words import Length, OneOf, Ratio, Share, Values, proper
 from sensorgen.errors import BadInput
 
 if TYPE_CHECKING:
@@ -75,8 +75,7 @@ def _work(
     from sensorgen.sensing import TIP_M, sensor_of
 
     _refuse_two(how)
-    if not 0 < noise < 1:
-        raise BadInput(f"--noise: {noise:g}; expected a share of |Z| above 0 and below 1, as 0.1%")
+    proper("--noise", noise)
     tones, wanted = frequency_hz or TONES_HZ, accuracy or inf
     law, tip_m = compression or "", TIP_M if tip_mm is None else tip_mm * units.M_PER_MM
     if not (force_n or position_mm or how["as_csv"] or how["plot"]):

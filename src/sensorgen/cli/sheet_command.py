@@ -1,61 +1,95 @@
 """``sensorgen sheet``: which contacts and tones locate a press in two dimensions."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from sensorgen import units
-from sensorgen.cli import show
+from sensorgen.cli import sheet_text, show
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import Length, OneOf, Share, Values
+from sensorgen.cli.words import OneOf, Share, Values, one, proper
 from sensorgen.errors import BadInput, OutOfRange
 
 if TYPE_CHECKING:
     from sensorgen.design import Design
-    from sensorgen.models.sheet import Bounds, Patch, Sheet
+    from sensorgen.models.sheet import Bounds, Patch, Port, Sheet
     from sensorgen.sensor import Sensor
 
 SETS = ("one-edge", "opposite", "two-edges", "corner", "corners")
+PLACES = 7  # along each side
 MM_PER_M = 1e3
+Rectangle = tuple[tuple[float, float], tuple[float, float]]  # [mm]
+
+
+class Pad(click.ParamType):  # type: ignore[type-arg]
+    """A rectangle on the sheet, or a stretch of an edge where it has no width."""
+
+    name = "X0-X1,Y0-Y1"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
+        """Read ``90-100,0-10``, or ``0,20-60`` for a stretch of an edge [mm]."""
+        spans = [span.split("-") for span in value.split(",")]
+        if len(spans) != 2 or any(len(span) > 2 for span in spans):
+            raise BadInput(f"--pad {value!r}; expected {self.name} in mm, as in 90-100,0-10, or 0,20-60 on an edge")
+        try:
+            return tuple((units.length_mm(span[0]), units.length_mm(span[-1])) for span in spans)
+        except BadInput as error:
+            raise error.within(f"--pad {value!r}") from None
+
 
 OWN: list[click.Parameter] = [
     click.Option(
-        ["--contacts"], type=OneOf([*SETS, "all"]), default="all",
-        help="Contacts to read: one edge, both ends, two edges that meet, one corner, or four.  [default: all]",
+        ["--contacts"], type=OneOf([*SETS, "all"]),
+        help="Contacts to read: one edge, both ends, two edges that meet, one corner, or four.  [default: all, or "
+        "those of --pad]",
+    ),
+    click.Option(
+        ["--pad", "pads"], type=Pad(), multiple=True,
+        help="Contacts of your own, on top and on the bottom at the same place; give one for each pair to read, as "
+        "in 90-100,0-10 [mm], or 0,20-60 for a stretch of an edge.",
     ),
     click.Option(
         ["--frequencies"], type=Values(units.FREQUENCY_HZ, zero=False),
         help="Tones, as in 10kHz,100kHz,1MHz; the thesis's seven if not given.",
     ),
     click.Option(
-        ["--force"], type=Values(units.FORCE_N, zero=False), default="6", help="Force of the press.  [default: 6 N]"
+        ["--force"], type=Values(units.FORCE_N, zero=False), metavar="N", default="6",
+        help="Force of the press.  [default: 6 N]",
     ),
-    click.Option(["--tip"], type=Length(), default="10", help="Side of the square tip.  [default: 10]"),
+    click.Option(
+        ["--tip"], type=Values(units.LENGTH_MM, zero=False), metavar="MM", default="10",
+        help="Side of the square tip.  [default: 10]",
+    ),
     click.Option(
         ["--noise"], type=Share(), default="0.1%", help="Standard error of R and X relative to |Z|.  [default: 0.1%]"
     ),
-    click.Option(["--json", "as_json"], is_flag=True, help="Print bounds, and their maps, as JSON."),
+    click.Option(
+        ["--compression"], type=OneOf(("unconfined", "bonded")),
+        help="How a plate gives way; the best that is known of the cell if not given.",
+    ),
+    click.Option(["--json", "as_json"], is_flag=True, help="Print impedances, bounds, and their maps, as JSON."),
     click.Option(["--plot"], type=click.Path(path_type=Path), metavar="DIR", help="Write maps of the bounds there."),
 ]  # fmt: skip
 
 
 def _work(
-    design: "Design", *, contacts: str, frequencies: tuple[float, ...] | None, force: tuple[float, ...], tip: float,
-    noise: float, as_json: bool, plot: Path | None,
+    design: "Design", *, contacts: str | None, pads: tuple[Rectangle, ...], frequencies: tuple[float, ...] | None,
+    force: tuple[float, ...], tip: tuple[float, ...], noise: float, compression: str | None, as_json: bool,
+    plot: Path | None,
 ) -> int:  # fmt: skip
-    from sensorgen.models.sheet import contact_sets, localise
+    from sensorgen.models.sheet import impedance
     from sensorgen.predict import TONES_HZ
     from sensorgen.sensing import sensor_of
 
-    if len(force) != 1:
-        raise BadInput(f"--force takes one number, not {len(force)}: bounds are those of one press")
-    sensed = sensor_of(design)
+    force_n, tip_mm, tones = one("--force", force), one("--tip", tip), frequencies or TONES_HZ
+    proper("--noise", noise)
+    sensed = sensor_of(design, compression or "")
     film = _sheet(sensed.sensor)
-    press, per_newton = _press(sensed.sensor, tip / MM_PER_M, force[0])
-    ports = {name: found for name, found in contact_sets(film).items() if contacts in (name, "all")}
-    tones = frequencies or TONES_HZ
-    bounds = {name: localise(film, pairs, tones, press, per_newton, noise) for name, pairs in ports.items()}
+    press, per_newton = _press(sensed.sensor, tip_mm * units.M_PER_MM, force_n)
+    ports = _ports(film, contacts, pads)
+    bounds = _bounds(film, ports, tones, press, per_newton, noise)
     if plot is not None:
         from sensorgen import store
         from sensorgen.plots import sheet
@@ -64,12 +98,44 @@ def _work(
         store.replace(where, sheet.png(film, bounds, ports))
         if not as_json:
             click.echo(f"wrote {where}")
-    given = {"force_n": force[0], "tip_mm": tip, "noise": noise, "doubts": list(sensed.doubts)}
+    given = {"force_n": force_n, "tip_mm": tip_mm, "noise": noise, "doubts": list(sensed.doubts)}
     if as_json:
-        show.as_json(given | _plain(film, press, bounds))
+        loose = {name: impedance(film, ports[name], tones, cells=found.cells) for name, found in bounds.items()}
+        found = {name: sheet_text.plain_bounds(bounds[name], loose[name]) for name in bounds}
+        show.as_json(given | sheet_text.plain(film, press, found))
     else:
-        _print(film, press, bounds, given)
+        for line in sheet_text.lines(film, press, bounds, given):
+            click.echo(line)
     return 0
+
+
+def _ports(film: "Sheet", contacts: str | None, pads: tuple[Rectangle, ...]) -> "dict[str, tuple[Port, ...]]":
+    """Sets of contacts by name: the usual ones, and the user's own."""
+    from sensorgen.models.sheet import Contact, contact_sets
+
+    own = [[(start * units.M_PER_MM, stop * units.M_PER_MM) for start, stop in pad] for pad in pads]
+    found = {"pads": tuple((Contact("top", x, y), Contact("bottom", x, y)) for x, y in own)} if pads else {}
+    wanted = contacts or ("" if pads else "all")
+    return found | {name: ports for name, ports in contact_sets(film).items() if wanted in (name, "all")}
+
+
+def _bounds(
+    film: "Sheet", ports: "dict[str, tuple[Port, ...]]", tones: tuple[float, ...], press: "Patch",
+    per_newton: dict[str, float], noise: float,
+) -> "dict[str, Bounds]":  # fmt: skip
+    """Bounds of each set, with a bar on the terminal: at high frequencies they take minutes."""
+    from sensorgen.models.sheet import localise
+
+    places = PLACES**2
+    with show.progress([f"{name} {k + 1}/{places}" for name in ports for k in range(places)]) as step:
+
+        def told(name: str) -> Callable[[int], None]:
+            return lambda count: step(f"{name} {count + 1}/{places}")
+
+        return {
+            name: localise(film, pairs, tones, press, per_newton, noise, PLACES, told(name))
+            for name, pairs in ports.items()
+        }
 
 
 def _sheet(sensor: "Sensor") -> "Sheet":
@@ -103,76 +169,6 @@ def _press(sensor: "Sensor", tip_m: float, force_n: float) -> tuple["Patch", dic
     per_newton = {"capacitance_factor": factor**2 * slope / area}
     per_newton |= {f"{end}_resistance_factor": rise for end, rise in zip(("top", "bottom"), rises, strict=True)}
     return Patch(0.0, 0.0, tip_m, tip_m, factor, (top, bottom)), per_newton
-
-
-def _print(film: "Sheet", press: "Patch", bounds: dict[str, "Bounds"], given: dict[str, Any]) -> None:
-    import numpy as np
-
-    from sensorgen.models.sheet import depth_m
-
-    tones = next(iter(bounds.values())).frequency_hz
-    top, bottom = film.sheet_resistance_ohm
-    click.echo(
-        f"sheet            {film.length_m * MM_PER_M:g} x {film.width_m * MM_PER_M:g} mm, {show.si(top, 'ohm')} and "
-        f"{show.si(bottom, 'ohm')} per square, {show.si(float(film.capacitances().mean()), 'F')}/m2"
-    )
-    click.echo(
-        f"press            {given['force_n']:g} N on {given['tip_mm']:g} x {given['tip_mm']:g} mm: capacitance there "
-        f"{press.capacitance_factor - 1:+.2%}; noise {given['noise']:g} of |Z|"
-    )
-    reach = [_mm(depth_m(film, float(f), press) * MM_PER_M) for f in (tones[0], tones[-1])]
-    click.echo(f"current reaches  {reach[0]} at {show.si(tones[0], 'Hz')}, {reach[1]} at {show.si(tones[-1], 'Hz')}")
-    for doubt in given["doubts"]:
-        click.echo(f"doubt            {doubt}")
-    click.echo(f"\n{'contacts':11}{'sigma F':>13}{'sigma x':>12}{'sigma y':>12}{'located':>10}  tones that tell most")
-    for name, found in bounds.items():
-        force, x, y = (float(np.median(found.sigma()[..., k])) for k in range(3))
-        best = ", ".join(show.si(float(found.frequency_hz[k]), "Hz") for k in found.best_tones()[:2])
-        newton = f"{force:.3g} N" if np.isfinite(force) else "none"
-        row = f"{name:11}{newton:>13}{_mm(x * MM_PER_M):>12}{_mm(y * MM_PER_M):>12}{found.located():10.0%}"
-        click.echo(f"{row}  {best}")
-    click.echo(
-        "\nmedians over the sheet of the smallest standard errors; located: twice as well as by a guess, in x and in y"
-    )
-    for name, found in bounds.items():
-        click.echo(f"{name:11}{found.verdict()}")
-
-
-def _mm(value: float) -> str:
-    if not value < float("inf"):
-        return "none"
-    return f"{value:.3g} mm" if value < MM_PER_M else f"{value / MM_PER_M:.3g} m"
-
-
-def _plain(film: "Sheet", press: "Patch", bounds: dict[str, "Bounds"]) -> dict[str, Any]:
-    return {
-        "length_m": film.length_m,
-        "width_m": film.width_m,
-        "sheet_resistance_ohm": dict(zip(("top", "bottom"), film.sheet_resistance_ohm, strict=True)),
-        "capacitance_f_per_m2": float(film.capacitances().mean()),
-        "capacitance_factor": press.capacitance_factor,
-        "contacts": {name: _bounds(found) for name, found in bounds.items()},
-    }
-
-
-def _bounds(found: "Bounds") -> dict[str, Any]:
-    sigma = found.sigma()
-    names = ("sigma_force_n", "sigma_x_m", "sigma_y_m")
-    return {
-        "verdict": found.verdict(),
-        "located": found.located(),
-        "frequency_hz": found.frequency_hz.tolist(),
-        "best_frequency_hz": [float(found.frequency_hz[k]) for k in found.best_tones()],
-        "cells": found.cells,
-        "x_m": found.x_m.tolist(),
-        "y_m": found.y_m.tolist(),
-        **{name: [[_number(v) for v in row] for row in sigma[..., k].tolist()] for k, name in enumerate(names)},
-    }
-
-
-def _number(value: float) -> float | None:
-    """JSON has no infinity."""
-    return value if value < float("inf") else None
 
 
 command = DesignGroup(

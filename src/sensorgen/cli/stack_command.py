@@ -1,6 +1,7 @@
 """``sensorgen stack``: what a second film tells that one does not, and what a touch does to a reading."""
 
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -8,11 +9,12 @@ import click
 from sensorgen import units
 from sensorgen.cli import show
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import Length, OneOf, Share, Values
-from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.cli.words import OneOf, Share, Values, one, proper
 
 if TYPE_CHECKING:
     from sensorgen.design import Design
+
+WIDTH = 80
 
 OWN: list[click.Parameter] = [
     click.Option(
@@ -28,7 +30,8 @@ OWN: list[click.Parameter] = [
         help="Tones, as in 1.1kHz,2.3kHz; the thesis's seven if not given.",
     ),
     click.Option(
-        ["--touch", "tip_mm"], type=Length(), default="10mm", show_default=True,
+        ["--touch", "tip_mm"], type=Values(units.LENGTH_MM, zero=False), metavar="MM", default="10mm",
+        show_default=True,
         help="Length of the tip that presses, and of the body that touches.",
     ),
     click.Option(
@@ -53,85 +56,89 @@ OWN: list[click.Parameter] = [
 
 def _work(
     design: "Design", *, force_n: Sequence[float], position_mm: Sequence[float] | None,
-    frequency_hz: Sequence[float] | None, tip_mm: float, noise: float, drift: float, within_n: Sequence[float],
-    compression: str | None, as_json: bool,
+    frequency_hz: Sequence[float] | None, tip_mm: Sequence[float], noise: float, drift: float,
+    within_n: Sequence[float], compression: str | None, as_json: bool,
 ) -> int:  # fmt: skip
     from sensorgen.predict import TONES_HZ
     from sensorgen.stacked import study
 
-    for option, share in (("--noise", noise), ("--drift", drift)):
-        if not 0 < share < 1:
-            raise OutOfRange(f"{option} {share:g}; expected a share above 0 and below 1, as in 0.1%")
-    at_mm = None if position_mm is None else _one("--position", position_mm)
+    at_mm = None if position_mm is None else one("--position", position_mm)
     found = study(
-        design, frequency_hz or TONES_HZ, _one("--force", force_n), None if at_mm is None else at_mm * units.M_PER_MM,
-        noise, drift, _one("--within", within_n), compression or "", tip_mm * units.M_PER_MM,
+        design, frequency_hz or TONES_HZ, one("--force", force_n), None if at_mm is None else at_mm * units.M_PER_MM,
+        proper("--noise", noise), proper("--drift", drift), one("--within", within_n), compression or "",
+        one("--touch", tip_mm) * units.M_PER_MM,
     )  # fmt: skip
     (show.as_json if as_json else _print)(found)
     return 0
 
 
-def _one(option: str, values: Sequence[float]) -> float:
-    if len(values) != 1:
-        raise BadInput(f"{option}: {len(values)} values; expected one")
-    return values[0]
-
-
 def _print(found: Mapping[str, Any]) -> None:
     """Tables for a person."""
-    click.echo(
-        f"{found['force_n']:g} N at {found['position_m'] / units.M_PER_MM:g} mm, noise {found['noise'] * 100:g} %; "
-        f"it moves a reading by {found['press_shift'] * 100:.3g} %\n"
-    )
-    _print_double(found)
-    _print_touch(found)
+    for line in (*_head(found), "", *_double(found), "", *_touch(found), ""):
+        click.echo(line)
     for doubt in found["doubts"]:
-        click.echo(f"doubt: {doubt}")
-    click.echo("taken for granted: " + "; ".join(found["assumptions"]))
+        _wrapped(f"doubt: {doubt}")
+    _wrapped("taken for granted: " + "; ".join(found["assumptions"]))
 
 
-def _print_double(found: Mapping[str, Any]) -> None:
-    click.echo("two films that share the middle electrode")
-    click.echo(f"{'':>11}  {'lower [ohm]':>24}  {'upper [ohm]':>24}  {'upper - lower [ohm]':>24}")
+def _wrapped(text: str) -> None:
+    click.echo(textwrap.fill(text, WIDTH, subsequent_indent="  "))
+
+
+def _head(found: Mapping[str, Any]) -> list[str]:
+    return textwrap.wrap(
+        f"{found['force_n']:g} N at {found['position_m'] / units.M_PER_MM:g} mm, noise {found['noise'] * 100:g} %; "
+        f"it moves a reading by {found['press_shift'] * 100:.3g} %",
+        WIDTH,
+    )
+
+
+def _double(found: Mapping[str, Any]) -> Iterator[str]:
+    yield "two films that share the middle electrode; R and X [ohm]"
+    yield f"{'':>9} {'lower':^22} {'upper':^22} {'upper - lower':^22}".rstrip()
     for row in found["readings_ohm"]:
         lower, upper = ((row[f"{name}_re"], row[f"{name}_im"]) for name in ("lower", "upper"))
         apart = (upper[0] - lower[0], upper[1] - lower[1])
-        said = "  ".join(f"{re:10.5g} {im:+12.5g}j" for re, im in (lower, upper, apart))
-        click.echo(f"{show.si(row['frequency_hz'], 'Hz'):>11}  {said}")
-    click.echo(
-        f"\n{'smallest standard errors':>25}{'permittivity known':>22}"
-        f"{'it may drift by ' + format(found['drift'] * 100, 'g') + ' %':>29}"
-    )
+        said = " ".join(f"{re:10.4g} {im:11.5g}" for re, im in (lower, upper, apart))
+        yield f"{show.si(row['frequency_hz'], 'Hz'):>9} {said}"
+    yield ""
+    drift = f"it may drift by {found['drift'] * 100:g} %"
+    yield f"{'standard errors':18} {'permittivity known':>23}   {drift:>27}"
     for row in found["bounds"]:
         known, drifting = (
-            f"{_said(row['force_n'][case], 'N'):>10}  {_said(row['position_m'][case], 'm'):>10}"
+            f"{_said(row['force_n'][case], 'N'):>11} {_said(row['position_m'][case], 'm'):>11}"
             for case in ("known", "drifting")
         )
-        click.echo(f"{row['reading']:>20}     {known}       {drifting}")
+        yield f"{row['reading']:18} {known}       {drifting}"
 
 
 def _said(value: float | None, unit: str) -> str:
     return "not told" if value is None else show.si(value, unit)
 
 
-def _print_touch(found: Mapping[str, Any]) -> None:
-    click.echo("\na body that touches the top beside the press: shift of the reading, and the force it is mistaken for")
-    thicknesses = [row["isolation_mm"] for row in found["touch"][0]["by_isolation"]]
-    names = ["bare" if t == 0 else f"{t:g} mm" for t in thicknesses]
-    click.echo(f"{'isolation':>24}" + "".join(f"{name:>20}" for name in names))
-    for row in found["touch"]:
-        cells = (f"{r['largest_shift'] * 100:.2g} %, {r['mistaken_for_n']:.3g} N" for r in row["by_isolation"])
-        click.echo(f"{row['wiring']:>24}" + "".join(f"{cell:>20}" for cell in cells))
-    click.echo(f"needed to stay within {found['within_n']:g} N:")
-    for row in found["touch"]:
-        click.echo(f"{row['wiring']:>24}  {_needed(row['needed_mm'])}")
-    click.echo("")
+def _touch(found: Mapping[str, Any]) -> Iterator[str]:
+    """One row per thickness and one pair of columns per wiring: thicknesses may be many, wirings are three."""
+    yield from textwrap.wrap(
+        "A body that touches the top beside the press: shift of the reading, and the force that it is mistaken for",
+        WIDTH,
+    )
+    yield _columns("isolation", [row["wiring"] for row in found["touch"]])
+    for rows in zip(*(row["by_isolation"] for row in found["touch"]), strict=True):
+        thickness = rows[0]["isolation_mm"]
+        cells = [f"{r['largest_shift'] * 100:.2g} % {r['mistaken_for_n']:8.3g} N" for r in rows]
+        yield _columns(f"{thickness:.4g} mm" if thickness else "bare", cells)
+    yield _columns("needed", [_needed(row["needed_mm"]) for row in found["touch"]])
+    yield f"needed: isolation from which on it stays within {found['within_n']:g} N"
+
+
+def _columns(head: str, cells: Sequence[str]) -> str:
+    return f"{head:>9} " + " ".join(f"{cell:>{width}}" for cell, width in zip(cells, (22, 22, 24), strict=True))
 
 
 def _needed(thickness_mm: float | None) -> str:
     if thickness_mm is None:
-        return "no isolation up to 10 mm does it"
-    return "none" if thickness_mm == 0 else f"{thickness_mm:.3g} mm or more"
+        return "not even 10 mm"
+    return "none" if thickness_mm == 0 else f"{thickness_mm:.3g} mm"
 
 
 command = DesignGroup(

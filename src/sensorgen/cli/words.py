@@ -1,12 +1,12 @@
 """Kinds of words on the command line: lengths with their units, and names from a list."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import click
 
 from sensorgen import units
-from sensorgen.errors import BadInput, UnknownName
+from sensorgen.errors import BadInput, OutOfRange, UnknownName
 
 
 class Length(click.ParamType):  # type: ignore[type-arg]
@@ -78,6 +78,20 @@ class Ratio(click.ParamType):  # type: ignore[type-arg]
         if not 0 < found < float("inf"):
             raise BadInput(f"{_said(param)}: {found:g}; expected a number above 0, as 1e-4")
         return found
+
+
+def one(option: str, values: Sequence[float]) -> float:
+    """The only one of the numbers that an option was given."""
+    if len(values) != 1:
+        raise BadInput(f"{option}: {len(values)} values; expected one")
+    return values[0]
+
+
+def proper(option: str, share: float) -> float:
+    """A share that is neither nothing nor all [-]."""
+    if not 0 < share < 1:
+        raise OutOfRange(f"{option} {share:g}; expected a share above 0 and below 1, as in 0.1%")
+    return share
 
 
 def completed(names: Callable[[], Iterable[str]]) -> Callable[[click.Context, click.Parameter, str], list[Any]]:

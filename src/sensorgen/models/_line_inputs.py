@@ -148,10 +148,34 @@ def read(given: Mapping[str, Any]) -> Inputs:
 
 def numbers(name: str, given: Any) -> Real:
     """Real numbers of any shape, or BadInput with the name."""
-    found = np.asarray(given)
-    if found.dtype.kind not in "biuf":
+    return _numbers(name, given, "biuf").astype(np.float64, copy=False)
+
+
+def _numbers(name: str, given: Any, kinds: str) -> NDArray[Any]:
+    try:
+        found = np.asarray(given)
+    except ValueError:  # rows of unequal length
+        found = np.asarray("")
+    if found.dtype.kind not in kinds:
         raise BadInput(f"{name} takes numbers in SI units, not {str(given)[:60]!r}")
-    return found.astype(np.float64, copy=False)
+    return found
+
+
+def passive(name: str, given: Any) -> NDArray[Any]:
+    """A quantity of a section of which no part may be below 0, complex if it is an admittance; errors name it."""
+    value = _numbers(name, given, "biufc").astype(np.complex128) if name == "admittance" else numbers(name, given)
+    if not (np.isfinite(value).all() and (value.real >= 0).all() and (value.imag >= 0).all()):
+        raise OutOfRange(f"{name} is negative or not finite; expected 0 or more")
+    return value
+
+
+def check_fit(what: str, values: Sequence[NDArray[Any]]) -> None:
+    """Raise BadInput where arrays do not broadcast together."""
+    shapes = {v.shape for v in values if v.ndim}
+    try:
+        np.broadcast_shapes(*shapes)
+    except ValueError:
+        raise BadInput(f"{what} do not broadcast together: {', '.join(map(str, sorted(shapes)))}") from None
 
 
 def _values(given: Mapping[str, Any]) -> dict[str, Real]:

@@ -83,8 +83,8 @@ class _Section:
 
     @cached_property
     def by_length(self) -> Array:
-        """Derivative by l."""
-        return self.u - self.v * self.before * self.before
+        """Derivative by l: that of the flow, u - v q^2, is carried along by it, and before a long section cancels."""
+        return (self.u - self.v * self.q * self.q) * self.by_behind
 
     @cached_property
     def by_shift(self) -> Array:
@@ -98,7 +98,7 @@ class Chain:
 
     def __init__(self, r: Sequence[Array], y: Sequence[Array], lengths: Sequence[Array], load: Array | None) -> None:
         self.opened = load is None
-        shunt, series = (y, r) if self.opened else (r, y)
+        shunt, series = self.shunt_and_series(r, y)
         q: Array = np.zeros(()) if load is None else load
         self.sections: list[_Section] = []
         for u, v, length in zip(reversed(shunt), reversed(series), reversed(lengths), strict=True):
@@ -113,9 +113,13 @@ class Chain:
             self._gains.append(self._gains[-1] * self.sections[len(self._gains) - 1].by_behind)
         return self._gains[index]
 
+    def shunt_and_series(self, of_r: Array, of_y: Array) -> tuple[Array, Array]:
+        """What the recursion takes for u and v: admittance is marched from an open end, impedance from any other."""
+        return (of_y, of_r) if self.opened else (of_r, of_y)
+
     def by_matter(self, index: int, by_r: Array | float, by_y: Array | float) -> Iterator[Array]:
         """What a change of resistance and admittance per length of a section does."""
-        by_shunt, by_series = (by_y, by_r) if self.opened else (by_r, by_y)
+        by_shunt, by_series = self.shunt_and_series(by_r, by_y)
         if np.ndim(by_shunt) or by_shunt:
             yield self.gain(index) * self.sections[index].by_shunt * by_shunt
         if np.ndim(by_series) or by_series:
@@ -149,8 +153,8 @@ class _Line(Chain):
         if name == "x_p_left_edge_m":
             yield self.by_shift(1, self._contrast())
         if name == "L_p_m":
-            yield self.by_length(1)
-            yield -self.by_length(2)
+            by_shunt, by_series = self.shunt_and_series(*self._raised())
+            yield self.gain(2) * (by_shunt - by_series * self.sections[1].q ** 2)
         if name == "L_m":
             yield self.by_length(2)
 
@@ -163,11 +167,15 @@ class _Line(Chain):
             yield from self.by_matter(index, *change)
 
     def _contrast(self) -> Array:
-        """r0 y_p - r_p y0 [1/m2], from the changes themselves so that it is exactly 0 where nothing is pressed."""
+        """r0 y_p - r_p y0 [1/m2]."""
+        of_r, of_y = self._raised()
+        return np.asarray(self._r * of_y - of_r * self._y)
+
+    def _raised(self) -> tuple[Array, Array]:
+        """What pressing adds to r [ohm/m] and y [S/m], exactly 0 where nothing is pressed."""
         p = self.inputs
         strain = p.strain()
-        risen = (p["tan_delta"] + 1j) * (p.susceptance() * (strain / (1 - strain)))
-        return np.asarray(self._r * risen - p.track_change() * self._y)
+        return p.track_change(), (p["tan_delta"] + 1j) * (p.susceptance() * (strain / (1 - strain)))
 
 
 class _Film:

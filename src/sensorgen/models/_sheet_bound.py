@@ -1,6 +1,6 @@
 """Cramer-Rao bounds of force and place of a press on a sheet, and the usual sets of contacts to compare."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,11 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 from sensorgen.errors import OutOfRange
 from sensorgen.models._sheet_links import BY
 from sensorgen.models._sheet_parts import SIDES, Contact, Patch, Port, Sheet, check
-from sensorgen.models._sheet_solve import solution
+from sensorgen.models._sheet_solve import depth_m, frequencies, solution
 
 Real = NDArray[np.float64]
 
 ACCURACY = 3e-2  # of the impedances behind a bound [-]
+SHALLOWEST = 1 / 20  # depth of the current over the longer side, under which places would take hours [-]
 _ROUNDING = 1e-11  # relative change of an impedance across the sheet [-] below which a derivative is only rounding
 _SINGULAR = 1e-13  # smallest eigenvalue of a correlation of derivatives that is told from 0 [-]
 
@@ -108,18 +109,21 @@ def contact_sets(sheet: Sheet) -> dict[str, tuple[Port, ...]]:
 
 def bounds(
     sheet: Sheet, ports: Sequence[Port], frequency_hz: ArrayLike, press: Patch, per_newton: Mapping[str, float],
-    noise: float, places: int,
+    noise: float, places: int, done: Callable[[int], object] | None,
 ) -> Bounds:  # fmt: skip
     """Bounds over the sheet; see :func:`sensorgen.models.sheet.localise`."""
     check("noise", noise, above=True)
     if places < 1:
         raise OutOfRange(f"bounds need one place or more along each side, not {places}")
+    tones = frequencies(frequency_hz)
+    _check_depth(sheet, float(tones.max()), press)
     middle = _moved(press, (sheet.length_m - press.length_m) / 2, (sheet.width_m - press.width_m) / 2)
-    cells = solution(sheet, ports, frequency_hz, middle, (), None, ACCURACY).cells
+    cells = solution(sheet, ports, tones, middle, (), None, ACCURACY).cells
     x, y = (np.linspace(0.0, end, places) for end in (sheet.length_m - press.length_m, sheet.width_m - press.width_m))
-    tones = np.atleast_1d(np.asarray(frequency_hz, float))
     information = np.empty((places, places, len(tones), 3, 3))
-    for i, j in np.ndindex(places, places):
+    for count, (i, j) in enumerate(np.ndindex(places, places)):
+        if done:
+            done(count)
         found = solution(sheet, ports, tones, _moved(press, float(x[i]), float(y[j])), BY, cells, ACCURACY)
         z = np.einsum("fpp->fp", found.impedance_ohm)
         by = {name: np.einsum("fpp->fp", value) / z for name, value in found.by.items()}
@@ -127,6 +131,17 @@ def bounds(
         information[i, j] = _information(np.stack([by_force, by["x_m"], by["y_m"]]), sheet, noise)
     guess = (sheet.length_m / 12**0.5, sheet.width_m / 12**0.5)
     return Bounds(x + press.length_m / 2, y + press.width_m / 2, tones, information, guess, cells)
+
+
+def _check_depth(sheet: Sheet, highest_hz: float, press: Patch) -> None:
+    """Refuse at once what would compute for hours: cells have to be as small as the depth, and each place has them."""
+    depth, side = depth_m(sheet, highest_hz, press), max(sheet.length_m, sheet.width_m)
+    if depth < SHALLOWEST * side:
+        most = highest_hz * (depth / (SHALLOWEST * side)) ** 2
+        raise OutOfRange(
+            f"at {highest_hz:g} Hz current reaches {depth:.3g} m; bounds take {SHALLOWEST:.0%} or more of the sheet's "
+            f"{side:g} m: use frequencies up to {most:.2g} Hz"
+        )
 
 
 def _moved(press: Patch, x_m: float, y_m: float) -> Patch:

@@ -15,6 +15,8 @@ from sensorgen.models._sheet_network import Complex, network
 from sensorgen.models._sheet_parts import Patch, Port, Sheet, check_patch, contacts_of
 
 COARSEST, FINEST = 10, 320  # cells between which a resolution is looked for
+_HIGHEST_HZ = 1e100
+_ANY_CELLS = 1e6  # along a side: more are no advice
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ def solution(
     cells: int | None, accuracy: float,
 ) -> Solution:  # fmt: skip
     """See :func:`sensorgen.models.sheet.solve`."""
-    names, tones = tuple(of), _frequencies(frequency_hz)
+    names, tones = tuple(of), frequencies(frequency_hz)
     _check(sheet, ports, patch, names)
     if cells is not None:
         return _once(sheet, ports, tones, patch, names, cells)
@@ -66,13 +68,14 @@ def depth_m(sheet: Sheet, frequency_hz: float, patch: Patch | None = None) -> fl
     return float(1 / np.sqrt(abs(y) * ohm)) if abs(y) * ohm else float("inf")
 
 
-def _frequencies(given: ArrayLike) -> NDArray[np.float64]:
+def frequencies(given: ArrayLike) -> NDArray[np.float64]:
+    """Tones as an array [Hz], or an error that names them."""
     found = np.atleast_1d(np.asarray(given))
     if found.dtype.kind not in "iuf" or found.ndim != 1 or not found.size:
         raise BadInput(f"frequency_hz takes numbers in Hz, not {str(given)[:60]!r}")
-    bad = found[~((found >= 0) & np.isfinite(found))]
+    bad = found[~((found >= 0) & (found < _HIGHEST_HZ))]
     if bad.size:
-        raise OutOfRange(f"frequency_hz has to be 0 or more and finite, not {bad[0]:g}")
+        raise OutOfRange(f"frequency_hz has to be 0 or more and below {_HIGHEST_HZ:g}, not {bad[0]:g}")
     return found.astype(float)
 
 
@@ -126,10 +129,11 @@ def _unfolded(
 def _check_depth(sheet: Sheet, patch: Patch | None, tones: NDArray[Any], longest_m: float, cells: int) -> None:
     depth = depth_m(sheet, float(tones.max()), patch)
     if longest_m > depth:
-        need = int(np.ceil(cells * longest_m / depth))
+        need = float(cells * longest_m / depth) if depth else float("inf")
+        finer = f"{int(np.ceil(need))} cells or more, or " if need < _ANY_CELLS else ""
         raise OutOfRange(
             f"grid too coarse: at {tones.max():g} Hz current reaches {depth:.3g} m and a cell is {longest_m:.3g} m "
-            f"long: use {need} cells or more, or a lower frequency"
+            f"long: use {finer}a lower frequency"
         )
 
 

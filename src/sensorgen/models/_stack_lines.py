@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.errors import OutOfRange
-from sensorgen.models._line_inputs import numbers
+from sensorgen.models._line_inputs import check_fit, passive
 from sensorgen.models._stack_piece import Line, Matrix, ahead, piece
 
 Real = NDArray[np.float64]
@@ -37,15 +37,9 @@ def inverse(admittance_s: Matrix) -> Matrix:
 
 def side_by_side(name: str, values: Sequence[ArrayLike]) -> NDArray[Any]:
     """The tracks' or films' values along a last axis."""
-    return np.stack(np.broadcast_arrays(*(passive(name, value) for value in values)), axis=-1)
-
-
-def passive(name: str, given: ArrayLike) -> NDArray[Any]:
-    """A quantity of which no part may be below 0; OutOfRange with its name otherwise."""
-    value = np.asarray(given, np.complex128) if name == "admittance" else numbers(name, given)
-    if not (np.isfinite(value).all() and (value.real >= 0).all() and (value.imag >= 0).all()):
-        raise OutOfRange(f"a {name} is negative or not finite; expected 0 or more")
-    return value
+    found = [passive(name, value) for value in values]
+    check_fit(f"the values of {name} in a section", found)
+    return np.stack(np.broadcast_arrays(*found), axis=-1)
 
 
 def loops(r: NDArray[Any]) -> NDArray[Any]:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sensorgen.errors import OutOfRange
-from sensorgen.models._line_inputs import HIGHEST_OHM, Complex, Inputs, far_load, in_blocks, numbers, read
+from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.models._line_inputs import HIGHEST_OHM, Complex, Inputs, check_fit, far_load, in_blocks, passive, read
 from sensorgen.models._line_slopes import slopes
 from sensorgen.models._tanhc import tanhc
 
@@ -108,7 +108,7 @@ def cascade(
     OutOfRange
         A value that is not finite, or a resistance, conductance, susceptance or length below 0.
     BadInput
-        Not one entry of each kind per section.
+        Not one entry of each kind per section; something that is no number; shapes that do not broadcast.
 
     Examples
     --------
@@ -118,19 +118,13 @@ def cascade(
     >>> round(float(z.real), 3)
     3000.0
     """
-    r = [_passive("resistance", value) for value in r_ohm_per_m]
-    y = [_passive("admittance", value) for value in y_s_per_m]
-    lengths = [_passive("length", value) for value in length_m]
+    r = [passive("resistance", value) for value in r_ohm_per_m]
+    y = [passive("admittance", value) for value in y_s_per_m]
+    lengths, load = [passive("length", value) for value in length_m], far_load(far_end)
     if not len(r) == len(y) == len(lengths):
-        raise OutOfRange(f"{len(r)} resistances, {len(y)} admittances and {len(lengths)} lengths make no sections")
-    return _through(r, y, lengths, far_load(far_end))
-
-
-def _passive(name: str, given: ArrayLike) -> NDArray[Any]:
-    value = np.asarray(given, np.complex128) if name == "admittance" else numbers(name, given)
-    if not (np.isfinite(value).all() and (value.real >= 0).all() and (value.imag >= 0).all()):
-        raise OutOfRange(f"a {name} of a section is negative or not finite")
-    return value
+        raise BadInput(f"{len(r)} resistances, {len(y)} admittances and {len(lengths)} lengths make no sections")
+    check_fit("the sections' values", [*r, *y, *lengths, *([] if load is None else [load])])
+    return _through(r, y, lengths, load)
 
 
 def sensitivities(of: Iterable[str] | None = None, **inputs: Any) -> tuple[Complex, dict[str, Complex]]:
@@ -175,12 +169,13 @@ def sensitivities(of: Iterable[str] | None = None, **inputs: Any) -> tuple[Compl
 
 
 def corner_frequency_hz(resistance_ohm: float, capacitance_f: float) -> float:
-    """Frequency above which a line is no longer short: 1 / (2 pi R C), both tracks together [Hz].
+    """Frequency above which a line is no longer short, 1 / (2 pi R C), both tracks together; inf if either is 0 [Hz].
 
-    >>> round(corner_frequency_hz(9000.0, 69.06e-12))
-    256065
+    >>> round(corner_frequency_hz(9000.0, 69.06e-12)), corner_frequency_hz(0.0, 69.06e-12)
+    (256065, inf)
     """
-    return float(1.0 / (2.0 * np.pi * resistance_ohm * capacitance_f))
+    turned = 2.0 * np.pi * resistance_ohm * capacitance_f
+    return float(1.0 / turned) if turned else float("inf")
 
 
 def _through(

@@ -3,7 +3,7 @@
 Finite volumes on grid lines that follow the contacts, with exact derivatives; see docs/sheet.md.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from numpy.typing import ArrayLike
 
@@ -139,6 +139,7 @@ def localise(
     per_newton: Mapping[str, float],
     noise: float = 1e-3,
     places: int = 7,
+    done: Callable[[int], object] | None = None,
 ) -> Bounds:
     r"""Cramer-Rao bounds of force, x and y of a press, anywhere on the sheet.
 
@@ -159,6 +160,8 @@ def localise(
         Standard error nu of resistance and of reactance, relative to \|Z\| [-].
     places : int
         Along each side [-].
+    done : callable
+        Told before each place how many are done: they may take minutes.
 
     Returns
     -------
@@ -168,7 +171,8 @@ def localise(
     Raises
     ------
     OutOfRange, BadInput
-        As :func:`solve`; a noise that is not above 0; a patch larger than the sheet.
+        As :func:`solve`; a noise that is not above 0; a patch larger than the sheet; a frequency at which current
+        reaches less than a twentieth of the longer side.
 
     Notes
     -----
@@ -188,4 +192,4 @@ def localise(
     for name in per_newton:
         if name not in BY:
             raise UnknownName("factor that a force moves", name, BY)
-    return bounds(sheet, ports, frequency_hz, press, per_newton, noise, places)
+    return bounds(sheet, ports, frequency_hz, press, per_newton, noise, places, done)

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sensorgen.errors import OutOfRange
-from sensorgen.models._line_inputs import numbers
+from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.models._line_inputs import check_fit, numbers, passive
 from sensorgen.models._stack_body import Body, Touch, reading, with_body
 from sensorgen.models._stack_bounds import standard_errors
-from sensorgen.models._stack_lines import diagonal, directions, inverse, loops, march, passive, side_by_side
+from sensorgen.models._stack_lines import diagonal, directions, inverse, loops, march, side_by_side
 from sensorgen.models._stack_piece import Line, Matrix
 
 __all__ = [
@@ -55,9 +55,9 @@ def impedance(
     Raises
     ------
     OutOfRange
-        A value that is not finite or below 0; not one entry of each kind per section; numbers too extreme.
+        A value that is not finite or below 0; numbers too extreme.
     BadInput
-        Something that is no number.
+        Not one entry of each kind per section; something that is no number; shapes that do not broadcast.
 
     Notes
     -----
@@ -84,12 +84,15 @@ def admittance(
     [[2j]]
     """
     if not len(r_ohm_per_m) == len(y_s_per_m) == len(length_m):
-        raise OutOfRange(f"{len(r_ohm_per_m)} resistances, {len(y_s_per_m)} admittances, {len(length_m)} lengths")
+        raise BadInput(
+            f"{len(r_ohm_per_m)} resistances, {len(y_s_per_m)} admittances and {len(length_m)} lengths make no sections"
+        )
     tracks = [side_by_side("resistance", section) for section in r_ohm_per_m]
     films = [side_by_side("admittance", section) for section in y_s_per_m]
     if any(r.shape[-1] != y.shape[-1] + 1 for r, y in zip(tracks, films, strict=True)):
-        raise OutOfRange("a stack of n films has n + 1 tracks, in every section")
+        raise BadInput("a stack of n films has n + 1 tracks, in every section")
     lengths = [passive("length", length) for length in length_m]
+    check_fit("the stack's values", [*lengths, *(section[..., 0] for section in (*tracks, *films))])
     lines = [Line(loops(r).astype(complex), diagonal(y)) for r, y in zip(tracks, films, strict=True)]
     return march(lines, lengths)[0]
 
@@ -125,7 +128,7 @@ class Track(NamedTuple):
     """An electrode: resistance per length [ohm/m], and its relative rise under the tip per force [1/N]."""
 
     r_ohm_per_m: float
-    rise_per_n: float = 0.0
+    piezoresistance_per_n: float = 0.0
 
 
 class Film(NamedTuple):
@@ -246,9 +249,12 @@ class Stack:
         ------
         OutOfRange
             A tip beyond the stack, a stress that its films' laws refuse, or a frequency below 0.
+        BadInput
+            Something that is no number; shapes that do not broadcast.
         """
         omega = 2 * np.pi * passive("frequency", frequency_hz)
         force, left, length = (numbers(*given) for given in zip(("force", "left edge", "length"), press, strict=True))
+        check_fit("frequency and press", [omega, force, left, length])
         if not np.isfinite(force).all():
             raise OutOfRange("a force is not finite; expected a number")
         right = self.length_m - left - length
@@ -266,7 +272,7 @@ class Stack:
         stress = force / (self.width_m * np.asarray(press.length_m, float))
         thinner = [film.thinning(stress)[0] for film in self.films]
         denser = [_turned(film, omega) * (s / (1 - s)) for film, s in zip(self.films, thinner, strict=True)]
-        return [track.r_ohm_per_m * track.rise_per_n * force for track in self.tracks], denser
+        return [track.r_ohm_per_m * track.piezoresistance_per_n * force for track in self.tracks], denser
 
     def response(self, frequency_hz: ArrayLike, press: Press) -> Response:
         r"""Impedance matrix and its exact derivatives.
@@ -321,7 +327,7 @@ class Stack:
     def _by_force(self, omega: Real, press: Press) -> tuple[Matrix, Matrix]:
         """How R and Y under the tip rise per newton."""
         area = self.width_m * np.asarray(press.length_m, float)
-        rise = [np.asarray(track.r_ohm_per_m * track.rise_per_n) for track in self.tracks]
+        rise = [np.asarray(track.r_ohm_per_m * track.piezoresistance_per_n) for track in self.tracks]
         stress = np.asarray(press.force_n, float) / area
         thinner = [film.thinning(stress) for film in self.films]
         slopes = [
