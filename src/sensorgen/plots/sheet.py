@@ -69,10 +69,10 @@ def _figure(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, S
 
 
 def _mark(share: float, guess_m: tuple[float, float]) -> str:
-    """What a share of a guess is in x and in y, once where both are alike.
+    r"""What a share of a guess is in x and in y, once where both are alike.
 
     >>> _mark(0.1, (0.03, 0.03)), _mark(0.1, (0.03, 0.015))
-    ('3 mm', 'x 3 mm\\ny 1.5 mm')
+    ('3 mm', 'x 3 mm\ny 1.5 mm')
     """
     x, y = (f"{share * guess * _MM:.2g}" for guess in guess_m)
     said = f"{x} mm" if x == y else f"x {x} mm\ny {y} mm"
