@@ -52,6 +52,7 @@ def test_tones_are_taken_as_typed(run):
         (["--force", "0"], "--force"),
         (["--noise", "0"], "--noise"),
         (["--noise", "nan"], "--noise"),
+        (["--drift", "0"], "--drift 0; expected a share"),
         (["--frequencies", "-1kHz"], "--frequencies"),
         (["--touch", "200"], "overhangs"),
         (["--touch=-3"], "--touch: -3; expected above 0"),
