@@ -33,12 +33,11 @@ def pressed(mesh, e, nu, held, stress, steps=5):
     return problem, list(load.curve(problem, np.linspace(0, stress, steps + 1), stress))[-1]
 
 
-@pytest.mark.parametrize("nu", [0.3, 0.4999, 0.5])
-@pytest.mark.parametrize("period", ["fixed", "free"])
+@pytest.mark.parametrize(
+    ("nu", "period"), [(0.3, "fixed"), (0.4999, "fixed"), (0.3, "free"), (0.4999, "free"), (0.5, "free")]
+)
 def test_a_block_follows_the_closed_form_on_any_mesh(nu, period):
     """Homogeneous neo-Hookean block: stretch a across, b along the load, nothing pulls sideways where free."""
-    if (nu, period) == (0.5, "fixed"):
-        pytest.skip("nothing can move")
     mesh = grid(3, 3, bend=0.08)
     problem, state = pressed(mesh, 6.0, nu, support.Held("sliding", period, "rigid"), 2.0)
     mu, lam = 6 / (2 * (1 + nu)), np.inf if nu == 0.5 else 6 * nu / ((1 + nu) * (1 - 2 * nu))
