@@ -1,20 +1,19 @@
 """``sensorgen invert``: force and position back from measured impedances."""
 
-import os
 import re
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen import units
+from sensorgen import store, units
 from sensorgen.cli import show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Length, OneOf, Share
-from sensorgen.errors import BadInput, Unwritable
+from sensorgen.errors import BadInput
 
 if TYPE_CHECKING:
     from sensorgen.design import Design
@@ -73,11 +72,9 @@ def _work(design: "Design", *, measured: str, output: str | None, as_json: bool,
         summary = Summary(estimator, doubts)
         live = measured == "-" and output is None
         place = "-" if live else output
-        with _sink(place) as sink:
+        with _sink(place) as write:
             for text in _answers(source, estimator, summary, live=live, written=place is not None):
-                sink.write(text)
-                if live:
-                    sink.flush()
+                write(text)
     beside = place == "-"
     for line in [show.json_text(summary.data()).rstrip()] if as_json else summary.lines():
         click.echo(line, err=beside)
@@ -143,26 +140,13 @@ def _answers(
 
 
 @contextmanager
-def _sink(output: str | None) -> Iterator[IO[str]]:
-    """Where the rows go, if there are any: the terminal, or a file that is there when it is whole."""
+def _sink(output: str | None) -> Iterator[Callable[[str], object]]:
+    """What takes the rows, if there are any: the terminal, at once, or a file that is there when it is whole."""
     if output is None or output == "-":
-        yield sys.stdout
+        yield partial(print, end="", flush=True)
         return
-    path = Path(output)
-    part = path.parent / f".{path.name}.{os.getpid()}.part"
-    try:
-        if path.exists() and not path.is_file():
-            raise Unwritable(f"cannot write {output!r}: it is a folder or a device; expected a file")
-        with part.open("w", encoding="utf-8", newline="\n") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    except OSError as error:
-        raise Unwritable(f"cannot write {output!r}: {error.strerror or error}") from None
-    finally:
-        with suppress(OSError):
-            part.unlink()
+    with store.replacing(Path(output)) as file:
+        yield lambda text: file.write(text.encode())
 
 
 command = DesignGroup(
