@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cell_scenes import EPS, MM, between_curves, bumps, plates, prism, rect_cell, stairs, tri_cell
+from scipy.spatial import Delaunay
 from scipy.special import ellipk
 
 from sensorgen.errors import OutOfRange
@@ -18,7 +19,10 @@ from sensorgen.units import EPS0_F_PER_M
 
 pytest.importorskip("ngsolve", reason="finite elements of cross-sections need NGSolve: pip install 'sensorgen[fem]'")
 
-from sensorgen.models import _fem_bounds, fem2d
+from sensorgen.models import _fem_bounds, fem2d, fem3d
+from sensorgen.models._fem_corners import exponent, exponents
+from sensorgen.models._fem_flips import flipped
+from sensorgen.models._fem_triangles import Triangles
 
 CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
 VACUUM = {"air": 1.0, "x60": 1.0}
@@ -127,19 +131,43 @@ def _open_floor(scene, permittivity, width):
         return fem2d.capacitance(scene, permittivity, width)
 
 
-def test_interdigital_strips_on_a_half_space():
-    """Fingers of width g with gaps g in a plane: C = eps0 K(k')/K(k), k = sin(pi/4), is eps0 for each pair of
-    half fingers.
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
+def test_interdigital_strips_on_a_half_space(share):
+    """Fingers that fill a share of their plane: C = eps0 K(k)/K(k') from one finger to the plane half way to the next,
+    k = sin(pi share / 2) (Igreja and Dias 2004), so half of it from finger to finger.
 
-    Between two fingers' middles the upper half space; its lid, 6 periods up, carries e^-18 of the field.
+    Between two fingers' middles the upper half space; its lid, 4 pitches up, carries e^-25 of the field.
     """
-    low = Body("low", "etpu", (box(0, 0.5, 0, 1, 0, 0.1),), "bottom")
-    high = Body("high", "etpu", (box(1.5, 2, 0, 1, 0, 0.1),), "top")
-    gap = Body("wall", "wall", (box(0.5, 1.5, 0, 1, 0, 0.1),))
+    edge = 2.0 * share / 2
+    low = Body("low", "etpu", (box(0, edge, 0, 1, 0, 0.1),), "bottom")
+    high = Body("high", "etpu", (box(2 - edge, 2, 0, 1, 0, 0.1),), "top")
+    gap = Body("wall", "wall", (box(edge, 2 - edge, 0, 1, 0, 0.1),))
     found = _open_floor(Scene((low, gap, high), (2.0, 1.0, 8.1)), {"air": 1.0, "wall": 1e-10}, 1e-6)
-    k = np.sin(np.pi / 4)
-    exact = EPS0_F_PER_M * ellipk(1 - k**2) / ellipk(k**2) / 2 * MM
-    assert found.middle() == close(2 * exact / 1, 2e-6) or found.middle() == close(exact, 2e-6)
+    k = np.sin(np.pi * share / 2)
+    assert found.middle() == close(EPS0_F_PER_M * ellipk(k**2) / ellipk(1 - k**2) / 2 * MM, 2e-6)
+
+
+def eccentric_half(corners: int, apart: float) -> Scene:
+    """The upper half of a line of radii 1 and 2 whose axes are apart, on a mirror through both."""
+    inner, outer = ([(r * np.cos(a), r * np.sin(a)) for a in np.linspace(np.pi, 0, corners + 1)] for r in (1, 2))
+    low = prism(*((x + apart + 2.2, z if 0 < k < corners else 0.0) for k, (x, z) in enumerate(inner)))
+    arc = [(x + 2.2, z if 0 < k < corners else 0.0) for k, (x, z) in enumerate(outer)]
+    high = prism((0, 0), *arc, (4.4, 0), (4.4, 2.2), (0, 2.2))
+    bodies = Body("low", "etpu", (_neat(low),), "bottom"), Body("high", "etpu", (_neat(high),), "top")
+    return Scene(bodies, (4.4, 1.0, 2.2))
+
+
+@pytest.mark.parametrize("apart", [0.3, 0.7])
+def test_eccentric_cylinders_are_met_with_the_square_of_their_corners(apart):
+    """C = 2 pi eps0 / acosh((a^2 + b^2 - e^2) / (2 a b)), a = 1, b = 2; half of it above the mirror."""
+    exact = np.pi * EPS0_F_PER_M / np.arccosh((5 - apart**2) / 4) * MM
+    errors = []
+    for corners in (8, 16):
+        found = _open_floor(eccentric_half(corners, apart), VACUUM, 1e-6)
+        assert found.width() < 1e-5
+        errors.append(found.middle() / exact - 1)
+    assert abs(errors[1]) < 4e-3
+    assert errors[0] / errors[1] > 3.9
 
 
 def test_confocal_ellipses():
@@ -370,11 +398,85 @@ def test_a_sensor_that_ends_amid_a_period_has_the_energy_of_its_length():
     assert one.middle() == close(CELLS["tri"][1]["C_F_per_m"] * MM, 1e-3)
 
 
-def test_crossed_bounds_stop():
+@pytest.mark.parametrize("model", ["fem2d", "fem3d", "columns"])
+def test_slabs_that_the_sensors_end_cuts(model):
+    """Slabs from plate to plate, side by side: C = sum of w eps / h, also where 2.25 periods of them are left."""
+    slabs = [Body(f"s{k}", "x60", (box(max(k - 0.2, 0), k + 0.2, 0, 1, 0.2, 1.2),)) for k in range(3)]
+    scene = plates(*slabs, length_mm=2.25)
+    solid = 0.2 + 2 * 0.4
+    exact = EPS0_F_PER_M * (solid * 4.68 + (2.25 - solid) * 1.00059) * MM
+    found = {"fem2d": fem2d, "fem3d": fem3d, "columns": columns}[model].capacitance(scene, EPS)
+    assert (found.lower, found.upper) == close((exact, exact), 1e-6)  # the root of what doubles lose
+
+
+def around(*fans: list[tuple[float, float]]) -> tuple[Triangles, dict[str, float]]:
+    """Triangles around one corner: electrodes between fans, each fan of angles [rad] and permittivities."""
+    points, corners, regions, terminals, at = [(0.0, 0.0)], [], [], {}, 0.0
+    for fan in fans:
+        first = len(points)
+        turns = np.cumsum([at, *(w for w, _ in fan)])
+        points += [(np.cos(a), np.sin(a)) for a in turns]
+        corners += [(0, first + k, first + k + 1) for k in range(len(fan))]
+        regions += [(f"{eps:g}", 1.0) for _, eps in fan]
+        terminals |= {(0, first): "top", (0, len(points) - 1): "top"}
+        at = turns[-1] + 0.2
+    return Triangles(np.array(points), corners, regions, terminals), {name: float(name) for name, _ in regions}
+
+
+def test_exponents_of_corners_that_textbooks_know():
+    """pi/w between electrodes w apart, pi/(2 w) from electrode to mirror; quadrants of eps, 1, eps, 1 in turn
+    (Kellogg): tan(lambda pi / 4) = eps^-1/2.
+    """
+    assert exponent([(1.5 * np.pi, 4.68)], (True, True)) == close(2 / 3, 1e-9)
+    assert exponent([(0.75 * np.pi, 4.68)], (True, False)) == close(2 / 3, 1e-9)
+    assert exponent([(0.75 * np.pi, 4.68)], (False, True)) == close(2 / 3, 1e-9)
+    for eps in (3.0, 161.4476):
+        quadrants = [(np.pi / 2, eps), (np.pi / 2, 1.0)] * 2
+        assert exponent(quadrants, None) == close(4 / np.pi * np.arctan(eps**-0.5), 1e-8)
+    assert exponent([(np.pi / 2, 2.0)] * 4, None) > 7  # smooth, as far as its polynomials go
+
+
+def test_the_lowest_exponent_of_all_that_meets_at_a_corner_counts():
+    """Two pieces of dielectric, 3.3 and 2.2 rad wide, meet at a point of the electrode, in either turn."""
+    wide, narrow = [(1.1, 2.0)] * 3, [(1.1, 3.0)] * 2
+    for fans in ((wide, narrow), (narrow, wide)):
+        assert exponents(*around(*fans))[0] == close(np.pi / 3.3, 1e-8)
+
+
+def test_flips_end_at_delaunays_triangles():
+    """From those of the same points drawn out eight times; SciPy has both."""
+    points = np.random.default_rng(2).random((60, 2))
+    start, best = (Delaunay(points * scale).simplices for scale in ((8.0, 1.0), (1.0, 1.0)))
+    corners = points[start]
+    across = np.linalg.det(np.diff(corners, axis=1))
+    turned = [tuple(t if turn > 0 else t[::-1]) for t, turn in zip(start.tolist(), across, strict=True)]
+    inner = {frozenset(t) for t in flipped(points, turned, [0] * len(turned))}
+    assert len(inner) == len(start)
+    assert len(inner ^ {frozenset(t) for t in best.tolist()}) <= 0.1 * len(start)  # slender ones at the hull
+
+
+@pytest.mark.parametrize("off", [0.5, 1e-2, 1e-4])
+def test_the_energy_of_cut_cells_lies_between_its_bounds(off):
+    """Whatever a field's error is, as long as it is square to the exact one: vectors stand for fields."""
+    random, shares = np.random.default_rng(1), np.array([3.0, 3.0, 4.0, 5.0])
+    for exact, error in random.normal(size=(200, 2, 4)):
+        error -= exact * (error @ exact) / (exact @ exact)
+        field = exact + error * off / np.hypot.reduce(error)
+        solved = _fem_bounds.Energies(exact @ exact, field @ field, (shares - 3) @ field**2, 1)
+        found = _fem_bounds.whole(solved, shares.tolist())
+        assert found.lower < shares @ exact**2 < found.upper
+        assert found.upper - found.lower < 20 * off * (exact @ exact + 1)
+
+
+def test_exact_bounds_are_moved_outwards():
+    found = _fem_bounds.whole(_fem_bounds.Energies(2.0, 2.0, 0.0, 1), [3.0, 3.0])
+    assert 6 * (1 - 2e-9) < found.lower < 6 < found.upper < 6 * (1 + 2e-9)
+
+
+@pytest.mark.parametrize("lower", [2.0, 1 + 1e-8, 0.0, -1.0, float("nan")])
+def test_crossed_bounds_stop(lower):
     with pytest.raises(_fem_bounds.CrossedBounds, match="lower bound"):
-        _fem_bounds.whole(_fem_bounds.Energies(2.0, 1.0, 0.0, 1), [1.0])
-    with pytest.raises(_fem_bounds.CrossedBounds):
-        _fem_bounds.whole(_fem_bounds.Energies(-1.0, 1.0, 0.0, 1), [1.0])
+        _fem_bounds.whole(_fem_bounds.Energies(lower, 1.0, 0.0, 1), [1.0])
 
 
 @pytest.mark.parametrize(
