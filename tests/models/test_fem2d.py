@@ -309,6 +309,9 @@ GENERAL = {
     "steeper": tri_cell(0.1, hang_height_mm=1.5, lower_height_mm=1.2),
     "isolated": tri_cell(0.1, isolation_mm=0.3),
     "supported": tri.scene(tri.Params(length_mm=2.0, width_mm=1.0), Fill(support="pva")),
+    "bent alike": between_curves(
+        lambda u: 0.6 - 0.4 * abs(u - 1), lambda u: 1.0 - 0.4 * abs(u - 1), np.arange(3.0), 1.2
+    ),
     "curved": between_curves(
         lambda u: 0.3 + 0.1 * np.cos(np.pi * u), lambda u: 0.7 + 0.2 * np.sin(3 * u), np.linspace(0, 2, 17), 1.2
     ),

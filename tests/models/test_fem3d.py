@@ -88,6 +88,11 @@ def test_doubled_permittivities_double_it():
     assert (two.lower, two.upper) == close((2 * one.lower, 2 * one.upper), 1e-9)
 
 
+def test_an_isolation_above_the_electrode_changes_nothing():
+    plain, isolated = (next(fem3d.steps(rect_cell(0.2, isolation_mm=t), EPS)).interval for t in (0.0, 0.3))
+    assert (isolated.lower, isolated.upper) == close((plain.lower, plain.upper), 1e-9)
+
+
 def test_a_sensor_that_ends_amid_a_cell():
     """2.5 x 2 cells hold half a cell of columns more than 2 x 2; the interval is wide, and right."""
     cut = next(fem3d.steps(rect.scene(rect.Params(length_mm=5.0, width_mm=4.0), Fill()), EPS)).interval
