@@ -67,6 +67,7 @@ SCENES = {
     "comb": comb(4, 0.5),
     "comb, from amid a ridge": comb(4, 0.0),
     "comb, cut anywhere": comb(3.7, 0.3),
+    "comb, whole periods from anywhere": comb(3, 0.75),
     "one wedge": Scene((LONELY.bodies[0], WEDGE, LONELY.bodies[-1]), LONELY.size_mm),
 }
 
@@ -79,9 +80,12 @@ def test_a_cell_times_its_shares_holds_all_that_is_drawn(name):
         assert mine.get(material, 0.0) == pytest.approx(area, abs=1e-7)
 
 
-@pytest.mark.parametrize(("name", "width", "times"), [("tri", 1.0, 14), ("comb", 0.5, 8), ("one wedge", 2.0, 1)])
+@pytest.mark.parametrize(
+    ("name", "width", "times"),
+    [("tri", 1.0, 14), ("comb", 0.5, 8), ("comb, whole periods from anywhere", 1.5, 2), ("one wedge", 2.0, 1)],
+)
 def test_the_smallest_piece_is_found(name, width, times):
-    """Half a period between mirrors; all of a section without such."""
+    """Half a period between mirrors, or more of which each part occurs equally often; all of a section without."""
     piece = found(SCENES[name])
     assert width_mm(piece) == pytest.approx(width)
     assert set(piece.shares) == {times}
