@@ -6,6 +6,7 @@ import numpy as np
 
 from sensorgen.scene import Body, Fill, Prism, Scene, box
 from sensorgen.shapes import rect, tri
+from sensorgen.units import EPS0_F_PER_M
 
 EPS = {"x60": 4.68, "air": 1.00059}
 MM = 1e-3
@@ -33,6 +34,14 @@ def plates(*bodies: Body, gap_mm: float = 1.0, length_mm: float = 2.0) -> Scene:
         Body("high", "etpu", (box(0, length_mm, 0, 1, top, top + 0.2),), "top"),
     )
     return Scene((ends[0], *bodies, ends[1]), (length_mm, 1.0, top + 0.2))
+
+
+def cut_slabs() -> tuple[Scene, float]:
+    """Slabs from plate to plate, 2.25 periods of them, and their exact capacitance: sum of w eps / h [F]."""
+    slabs = [Body(f"s{k}", "x60", (box(max(k - 0.2, 0), k + 0.2, 0, 1, 0.2, 1.2),)) for k in range(3)]
+    solid_mm = 0.2 + 2 * 0.4
+    exact = EPS0_F_PER_M * (solid_mm * EPS["x60"] + (2.25 - solid_mm) * EPS["air"]) * MM
+    return plates(*slabs, length_mm=2.25), exact
 
 
 def stairs(steps: int = 3, end_mm: float = 2.0) -> Scene:

@@ -10,10 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cell_scenes import stairs
 from scipy.integrate import quad
 
-from sensorgen.models.columns import capacitance, unfit
+from sensorgen.cells import cell
+from sensorgen.models._fem_triangles import triangles
+from sensorgen.models._straight import energy as straight
+from sensorgen.models.columns import _mean_min, capacitance, unfit
 from sensorgen.scene import Body, Fill, Prism, Scene, box
+from sensorgen.sections import sections
 from sensorgen.shapes import rect, reference, tri
 from sensorgen.units import EPS0_F_PER_M
 
@@ -199,6 +204,38 @@ def trial_energy(film: float, hang: float = 0.5, lower: float = 0.24, n: int = 1
 def test_the_upper_bound_is_the_energy_of_its_trial_potential(film):
     """By finite differences, good to some 1e-5 here; Dirichlet's principle does the rest."""
     assert tri_bounds(film)[1] == close(EPS0_F_PER_M * trial_energy(film), 1e-4)
+
+
+@pytest.mark.parametrize("ends", [(0.2, 0.6), (0.6, 0.1), (0.1, 0.2), (0.4, 0.5), (0.2, 0.2)])
+def test_heights_up_to_a_limit(ends):
+    """Mean of min(h, 0.3) for h straight between two values, by quadrature."""
+    exact = quad(lambda share: min(ends[0] + share * (ends[1] - ends[0]), 0.3), 0, 1, points=[0.25, 0.6], epsabs=1e-12)[
+        0
+    ]
+    assert _mean_min(np.array(ends), 0.3) == close(exact, 1e-9)
+
+
+def test_the_straight_potential_is_that_of_scikit_fem():
+    """First-order triangles on the same corners; stairs have no continuous potential of columns."""
+    skfem = pytest.importorskip("skfem")
+    from skfem.helpers import dot, grad
+
+    scene = stairs()
+    mesh = triangles(cell(sections(scene)[0], scene.size_mm[2]))
+    used, corners = np.unique(np.array(mesh.triangles), return_inverse=True)
+    drawn = skfem.MeshTri(mesh.points[used].T.copy(), corners.reshape(-1, 3).T.copy())
+    basis = skfem.Basis(drawn, skfem.ElementTriP1())
+    eps = basis.with_element(skfem.ElementTriP0()).interpolate(np.array([EPS[m] * share for m, share in mesh.regions]))
+    matrix = skfem.BilinearForm(lambda u, v, w: w.eps * dot(grad(u), grad(v))).assemble(basis, eps=eps)
+    ends = {
+        name: np.searchsorted(used, [e for e, n in mesh.terminals.items() if n == name]) for name in ("top", "bottom")
+    }
+    x = np.zeros(len(used))
+    x[ends["top"]] = 1.0
+    x = skfem.solve(*skfem.condense(matrix, x=x, D=np.unique(np.concatenate([e.ravel() for e in ends.values()]))))
+    exact = float(x @ matrix @ x)
+    assert straight(sections(scene)[0], scene.size_mm[2], EPS) == close(exact, 1e-9)
+    assert capacitance(scene, EPS).upper == close(exact * EPS0_F_PER_M * MM, 1e-9)
 
 
 @pytest.mark.parametrize("bound", [0, 1])

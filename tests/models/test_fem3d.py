@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cell_scenes import EPS, MM, plates, rect_cell, stairs, tri_cell
+from cell_scenes import EPS, MM, cut_slabs, plates, rect_cell, stairs, tri_cell
 
 from sensorgen.errors import OutOfRange
 from sensorgen.models import columns, fem3d
@@ -86,6 +86,29 @@ def test_turned_swapped_and_scaled(rungs):
 def test_doubled_permittivities_double_it():
     one, two = (next(fem3d.steps(rect_cell(0.2), {m: f * e for m, e in EPS.items()})).interval for f in (1, 2))
     assert (two.lower, two.upper) == close((2 * one.lower, 2 * one.upper), 1e-9)
+
+
+def test_an_isolation_above_the_electrode_changes_nothing():
+    plain, isolated = (next(fem3d.steps(rect_cell(0.2, isolation_mm=t), EPS)).interval for t in (0.0, 0.3))
+    assert (isolated.lower, isolated.upper) == close((plain.lower, plain.upper), 1e-9)
+
+
+def test_slabs_that_the_sensors_end_cuts():
+    scene, exact = cut_slabs()
+    found = fem3d.capacitance(scene, EPS)
+    assert (found.lower, found.upper) == close((exact, exact), 1e-6)  # the root of what doubles lose
+
+
+def test_layers_stand_where_dielectrics_meet_at_a_corner():
+    """A box of another permittivity between plates, touching neither; none where all is of one kind."""
+    post = plates(Body("post", "x60", (box(0.5, 1.5, 0, 1, 0.5, 0.9),)))
+    coarse = grid(post)
+    same, other = (layered(coarse, [0, 0, *eps], 2) for eps in ([4.0, 4.0], [1.0, 4.68]))
+    planes = [[len(p) for p in found.planes_mm] for found in (coarse, same, other)]
+    assert planes[1] == planes[0]
+    assert planes[2][0] > planes[0][0]
+    assert planes[2][1] == planes[0][1]  # along the edges the field is smooth
+    assert planes[2][2] > planes[0][2]
 
 
 def test_a_sensor_that_ends_amid_a_cell():

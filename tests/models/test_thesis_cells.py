@@ -48,9 +48,10 @@ def test_the_formulas_are_off_by_what_is_known():
     assert 100 * (thesis_cells.strips_f_per_m2(r, 4.68) / exact_rect - 1) == pytest.approx(-16.7, abs=0.1)
 
 
-def test_strips_of_their_own_widths_are_the_columns():
-    found = columns.capacitance(rect_cell(0.1), EPS | {"air": 1.0})
-    own = thesis_cells.strips_f_per_m2(rect.Params(dielectric_mm=0.1), 4.68, even=False) * (2 * MM) ** 2
+@pytest.mark.parametrize("heights", [{}, {"upper_height_mm": 0.2, "lower_height_mm": 0.45}])
+def test_strips_of_their_own_widths_are_the_columns(heights):
+    found = columns.capacitance(rect_cell(0.1, **heights), EPS | {"air": 1.0})
+    own = thesis_cells.strips_f_per_m2(rect.Params(dielectric_mm=0.1, **heights), 4.68, even=False) * (2 * MM) ** 2
     assert own == close(found.lower, 1e-9)
 
 
