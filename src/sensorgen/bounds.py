@@ -1,6 +1,5 @@
 """The capacitance of designs between bounds, one design or many: what ``sensorgen cell`` answers, as plain data."""
 
-import os
 import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -181,9 +180,8 @@ def _pool(jobs: int) -> Iterator["ProcessPoolExecutor"]:
 
 
 def _quietly() -> None:
-    """End without a word on Ctrl-C, and use one thread: there is a process for every core."""
+    """End without a word on Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def _permittivity(design: Design) -> dict[str, float]:

@@ -147,7 +147,7 @@ def test_one_tone_says_so(run, tmp_path):
         (["m.csv", "--prior", "force=a+-1"], "not a force"),
         (["m.csv", "--prior", "force=1+-0"], "standard deviation above 0"),
         (["m.csv", "--force-limit", "0"], "force limit of 0 N"), (["m.csv", "--force-limit", "x"], "--force-limit"),
-        (["m.csv", "-o", "."], "cannot write '.'"), (["m.csv", "-o", "m.csv/where.csv"], "cannot write 'm.csv/where.csv'"),
+        (["m.csv", "-o", "."], "cannot write '.'"), (["m.csv", "-o", "m.csv/x.csv"], "cannot write 'm.csv/x.csv'"),
         (["bad.csv", "-o", "o.csv"], "bad.csv, row 6, column re_ohm_1.1kHz: 'x' is not a number"),
     ],
 )  # fmt: skip
