@@ -450,3 +450,9 @@ def test_the_force_limit_is_what_the_sensor_bears():
     assert estimator.scale[0] == pytest.approx(0.01 * 0.005 * 1e5, rel=1e-5)  # half the tip on the sensor
     with pytest.raises(OutOfRange, match="force limit"):
         Estimator(soft, TONES, force_limit_n=0.0)
+
+
+def test_a_pressure_that_is_not_uniform_is_refused():
+    sensor, tones = SENSORS["5 ohm m"]
+    with pytest.raises(OutOfRange, match="a pressure like a 'hertz'; the way back is known for a uniform one only"):
+        Estimator(dataclasses.replace(sensor, profile="hertz"), tones)

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.models import line
-from sensorgen.sensor import Sensor
+from sensorgen.sensor import UNIFORM, Sensor
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -37,6 +37,8 @@ class Forward:
     """
 
     def __init__(self, sensor: Sensor, frequency_hz: ArrayLike) -> None:
+        if sensor.profile != UNIFORM:
+            raise OutOfRange(f"a pressure like a {sensor.profile!r}; the way back is known for a uniform one only")
         self.sensor, self.frequency_hz = sensor, tones(frequency_hz)
         self.susceptance: Real = 2 * np.pi * self.frequency_hz * sensor.capacitance_f_per_m
         self.loose = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * self.susceptance
