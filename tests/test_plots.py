@@ -16,7 +16,7 @@ from sensorgen.design import make
 from sensorgen.errors import MissingValue, OutOfRange
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
-from sensorgen.plots import inverse, library, maps, page, panels
+from sensorgen.plots import inverse, libraries, maps, page, panels
 from sensorgen.plots.field import LARGEST, MOST_TONES, QUANTITIES, field, scale, tone
 from sensorgen.sensing import sensor_of
 from sensorgen.sensor import Sensor
@@ -192,9 +192,9 @@ def test_a_sensor_that_a_press_does_not_move_is_drawn_too():
 
 
 def test_a_missing_library_is_named(monkeypatch):
-    monkeypatch.setattr(library.importlib.util, "find_spec", lambda name: None if name == "plotly" else name)
+    monkeypatch.setattr(libraries.importlib.util, "find_spec", lambda name: None if name == "plotly" else name)
     with pytest.raises(MissingValue, match=r"plots need plotly: pip install plotly"):
-        library.needed("matplotlib", "plotly")
+        libraries.needed("matplotlib", "plotly")
 
 
 def decoded(values):

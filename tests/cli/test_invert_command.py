@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -188,6 +189,8 @@ def test_a_pipe_is_answered_line_by_line(tmp_path):
         env={k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"},
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
+    hung = threading.Timer(120, process.kill)  # an answer that is held back would be waited for without end
+    hung.start()
     process.stdin.write(head)
     process.stdin.flush()
     assert process.stdout.readline().startswith("time_s,force_n,position_mm")
@@ -196,5 +199,6 @@ def test_a_pipe_is_answered_line_by_line(tmp_path):
         process.stdin.flush()
         assert float(process.stdout.readline().split(",")[1]) == pytest.approx(force, abs=1e-8)
     out, err = process.communicate(timeout=30)
+    hung.cancel()
     assert (process.returncode, out) == (0, "")
     assert "4 samples: 4 ok" in err

@@ -30,7 +30,7 @@ def command(scene: tuple[str, ...], budget: float, output: str, as_json: bool) -
     and chart.csv. The scenes are cells whose capacitance is known from elsewhere.
     """
     from sensorgen import chart
-    from sensorgen.plots.library import needed
+    from sensorgen.plots.libraries import needed
 
     needed("matplotlib", "plotly")
     for name in scene:

@@ -51,7 +51,7 @@ def _work(
 
     stresses = compressed.stresses_kpa(stress)
     if plot:
-        from sensorgen.plots.library import needed
+        from sensorgen.plots.libraries import needed
 
         needed("matplotlib")
     with _bar(stresses) as step:

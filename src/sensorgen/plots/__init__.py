@@ -30,7 +30,7 @@ def files(
         Matplotlib or Plotly is not installed.
     """
     from sensorgen.plots import card, inverse, maps, page, panels
-    from sensorgen.plots.library import needed
+    from sensorgen.plots.libraries import needed
 
     needed("matplotlib", "plotly")
     answer = field(sensor, frequency_hz, force_n, position_mm)

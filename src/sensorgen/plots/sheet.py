@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.plots import panels
-from sensorgen.plots.library import needed
+from sensorgen.plots.libraries import needed
 
 if TYPE_CHECKING:
     from sensorgen.models.sheet import Bounds, Port, Sheet
