@@ -127,6 +127,14 @@ def test_an_even_angle_is_the_smallest_tangent():
     assert found.weight[2.0] == close(2 * np.cos(np.pi / 8), 1e-12)
 
 
+def test_the_middle_is_nearer_the_less_permittivities_turn():
+    """Half of eta squared times the root of (1 + t) / (1 - t), with a t of 1/2."""
+    turn = turned([1.0, np.exp(-2j * np.arctan(0.5))])
+    found = disc(Fields(1 - 1j, 1.1 - 1j, 0j, 0.0, 0.1, 7), turn, [2.0])
+    assert found.centre == close(2.1 - 2j, 1e-12)
+    assert found.radius == close(0.1 * 3**0.5, 1e-6)
+
+
 def test_a_tangent_of_one_and_more_leaves_the_wide_disc():
     found = disc(Fields(1 - 1j, 1.1 - 1j, 0j, 0.0, 0.1, 7), turned([1.0, np.exp(-0.51j * np.pi)]), [2.0])
     assert found.centre == 2.2 - 2j
