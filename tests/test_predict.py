@@ -389,3 +389,11 @@ def test_csv_of_many_rows_needs_no_more_memory(plate):
         tracemalloc.stop()
     assert rows == 80_001
     assert peaks[1] < 1.1 * peaks[0] < 10e6
+
+
+def test_a_loss_that_is_set_and_left_out_is_said():
+    lossy = make({"shape": "reference", "material_values": {"x60": {"loss_tangent": 0.02}}})
+    said = [a for a in prediction(lossy)["assumptions"] if "loss" in a]
+    assert said == [
+        "no dielectric loss and no leak: loss_tangent of x60 as set is left out here, sensorgen cell takes it"
+    ]

@@ -16,6 +16,7 @@ from sensorgen.card import FORCE_N, card
 from sensorgen.design import Design
 from sensorgen.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.interval import Interval
+from sensorgen.losses import set_losses
 from sensorgen.models import line
 from sensorgen.planner import Unloaded, Unpredictable, unloaded
 from sensorgen.sensing import TIP_M, Sensed, sensor_of
@@ -75,11 +76,18 @@ def prediction(
         "assumptions": [
             "ideal electrodes and no fringe at the sensor's edge for the capacitance",
             "electrode resistance of the plates alone: cogs can only lower it",
-            "no dielectric loss and no leak: the sources give none",
+            _lossless(design),
             "resistivity under the tip as elsewhere: no source says how it moves with pressure",
             "unloaded, as drawn",
         ],
     }
+
+
+def _lossless(design: Design) -> str:
+    said = [f"{t.quantity} of {t.material}" for t in set_losses(design)]
+    if said:
+        return f"no dielectric loss and no leak: {' and '.join(said)} as set is left out here, sensorgen cell takes it"
+    return "no dielectric loss and no leak: the sources give none"
 
 
 def _pressed(
