@@ -8,7 +8,7 @@ import pytest
 from sensorgen import models as model_files
 from sensorgen import planner, registry
 from sensorgen.design import make
-from sensorgen.errors import OutOfRange, SensorgenError, UnknownName
+from sensorgen.errors import OutOfRange, UnknownName
 from sensorgen.interval import Interval
 from sensorgen.planner import Contradiction, Unpredictable, capacitance
 from sensorgen.scene import Body, Prism, Scene, box
@@ -213,8 +213,14 @@ def test_a_solver_that_does_not_load_is_told(fake, monkeypatch):
 
     monkeypatch.setattr(planner, "find_spec", lambda name: SimpleNamespace(origin=None))
     monkeypatch.setattr(planner, "import_module", broken)
-    with pytest.raises(SensorgenError, match=r"does not load .libnglib.so: cannot open.: pip install"):
+    with pytest.raises(Unpredictable, match=r"does not load .libnglib.so: cannot open.: pip install"):
         capacitance(PLATE, EPS, 1e-3, keep=False)
+    fake.add("cheap", 0, 0.3)
+    found = capacitance(PLATE, EPS, 1e-3)
+    assert (found.model, found.reached(), found.hampered) == ("cheap", False, True)
+    assert "does not load" in found.refused[0]
+    monkeypatch.setattr(planner, "import_module", lambda name: None)
+    assert capacitance(PLATE, EPS, 1e-3).model == "dear"  # mended: what was answered meanwhile was not kept
 
 
 BOWTIE = ((0, 0.3), (10, 0.3), (0, 0.9), (10, 0.9))

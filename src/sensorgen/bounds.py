@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from sensorgen import losses, planner
 from sensorgen.design import Design
-from sensorgen.errors import SensorgenError
+from sensorgen.errors import OutOfRange, SensorgenError
 from sensorgen.models import thesis_cells
 from sensorgen.planner import Answer, Unpredictable
 from sensorgen.scene import Scene
@@ -92,6 +92,24 @@ def formula(design: Design, name: str) -> dict[str, Any]:
         "seconds": time.perf_counter() - start, "values": [vars(t) for t in taken],
         "reason": f"{thesis_cells.SOURCE}: a formula alone, without bounds; air is taken for 1",
     }  # fmt: skip
+
+
+def formulas(designs: Sequence[Design], name: str) -> list[dict[str, Any]]:
+    """The same for many designs; one that the formula cannot speak of has a reason in place of a number.
+
+    Raises
+    ------
+    Unpredictable
+        The formula speaks of another shape, or knows no losses.
+    """
+    return [_formula_or_why(design, name) for design in designs]
+
+
+def _formula_or_why(design: Design, name: str) -> dict[str, Any]:
+    try:
+        return formula(design, name)
+    except OutOfRange as error:
+        return {"design": design.name, "model": None, "value_f_per_m2": None, "reason": str(error)}
 
 
 def answers(designs: Sequence[Design], asked: Asked, jobs: int, done: Callable[[], None]) -> list[dict[str, Any]]:

@@ -34,6 +34,10 @@ class Unpredictable(SensorgenError):
     """No model can speak of the scene; the message holds what each one said."""
 
 
+class Unloadable(SensorgenError):
+    """The solver is installed, but does not load."""
+
+
 class Contradiction(SensorgenError):
     """Two models whose bounds exclude each other: a fault, and no result."""
 
@@ -87,6 +91,8 @@ class Answer:
         Whether the answer was known from before.
     loss_f : Interval or None
         Minus the imaginary part, where dielectrics lose [F].
+    hampered : bool
+        Whether a model that might have come nearer did not load; such an answer is not kept.
     """
 
     model: str
@@ -96,6 +102,7 @@ class Answer:
     plan: tuple[Candidate, ...] = ()
     known: bool = False
     loss_f: Interval | None = None
+    hampered: bool = False
 
     def reached(self) -> bool:
         """Whether the interval is as narrow as wanted."""
@@ -191,6 +198,8 @@ def capacitance(
 
 def remember(scene: Scene, permittivity: Mapping[str, complex], model: str, answer: Answer) -> None:
     """Keep an answer to :func:`capacitance` for the next time."""
+    if answer.hampered:
+        return
     cached.keep(_question(scene, permittivity, answer.wanted, model), _plain(answer))
 
 
@@ -261,6 +270,7 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
         raise Unpredictable(f"{overlaps}; expected each place to belong to one body")
     plan: list[Candidate] = []
     refused: list[str] = []
+    hampered = False
     bounds: dict[str, Interval | Disc] = {}
     kind = _kind(permittivity)
     for candidate in _ordered(width, model):
@@ -271,7 +281,13 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
         if reason:
             plan.append(replace(candidate, passed_over=reason))
             continue
-        found, seconds = _timed(candidate.model, kind, scene, permittivity, width)
+        try:
+            found, seconds = _timed(candidate.model, kind, scene, permittivity, width)
+        except Unloadable as error:  # the others answer as well as they can
+            refused.append(f"{candidate.model}: {error}")
+            plan.append(replace(candidate, passed_over=str(error)))
+            hampered = True
+            continue
         bounds[candidate.model] = found
         _refuse_contradiction(bounds)
         plan.append(replace(candidate, width=found.width(), seconds=seconds))
@@ -279,7 +295,7 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
         raise Unpredictable("; ".join(refused))
     best = min(bounds, key=lambda name: bounds[name].width())
     real, loss = _parts(bounds[best])
-    return Answer(best, real, tuple(refused), width, tuple(plan), loss_f=loss)
+    return Answer(best, real, tuple(refused), width, tuple(plan), loss_f=loss, hampered=hampered)
 
 
 def _kind(permittivity: Mapping[str, complex]) -> str:
@@ -335,12 +351,18 @@ def _timed(
 
 
 def load_solver() -> None:
-    """Import the solver ahead of the clock, if it is there."""
+    """Import the solver ahead of the clock, if it is there.
+
+    Raises
+    ------
+    Unloadable
+        It is there, and fails.
+    """
     try:
         if find_spec(SOLVER):
             import_module(SOLVER)
     except (ImportError, OSError) as error:
-        raise SensorgenError(
+        raise Unloadable(
             f"NGSolve is installed but does not load ({error}): pip install --force-reinstall ngsolve"
         ) from None
 

@@ -165,6 +165,18 @@ def test_a_sweep_as_csv_and_json(run):
     assert lowers[::2] == [entry["lower_f_per_m2"] for entry in found]
 
 
+def test_a_sweep_of_a_formula(run):
+    """Value by value what the formula gives alone, as JSON, CSV and table."""
+    words = ("cell", "rect", "--sweep", "dielectric_mm=0.1,0.2", "--model", "thesis-3.49-own-widths")
+    rows = answer(run(*words, "--json"))
+    alone = [answer(run("cell", "rect", "--dielectric", d, *words[4:], "--json")) for d in (0.1, 0.2)]
+    assert [r["value_f_per_m2"] for r in rows] == [a["value_f_per_m2"] for a in alone]
+    table = list(csv.DictReader(io.StringIO(run(*words, "--csv").out)))
+    assert [float(r["value_f_per_m2"]) for r in table] == [r["value_f_per_m2"] for r in rows]
+    assert len(run(*words).out.splitlines()) == 3
+    assert "thesis-3.49-own-widths speaks of rect, not of tri" in run("cell", "tri", *words[2:]).err
+
+
 def test_a_sweep_over_a_material_and_over_words(run):
     found = answer(run("cell", "reference", "--sweep", "eps_x60=2,4", "--json", "--jobs", "1"))
     assert [entry["eps_x60"] for entry in found] == [2, 4]

@@ -113,7 +113,10 @@ def _formula(data: Data, how: Data) -> int:
 
 def _many(key: str, points: Sequence[tuple[float | str, "Design"]], asked: "Asked", jobs: int, how: Data) -> int:
     from sensorgen import bounds
+    from sensorgen.models import thesis_cells
 
+    if asked.model in thesis_cells.NAMED:
+        return _formulas(key, points, asked.model, how)
     with _bar(len(points)) as done:
         found = bounds.answers([design for _, design in points], asked, jobs, done)
     rows = [{key: value} | data for (value, _), data in zip(points, found, strict=True)]
@@ -122,6 +125,22 @@ def _many(key: str, points: Sequence[tuple[float | str, "Design"]], asked: "Aske
     else:
         _deliver(_csv(key, rows) if how["as_csv"] else _table(key, rows), how["output"])
     return _verdict(found)
+
+
+def _formulas(key: str, points: Sequence[tuple[float | str, "Design"]], model: str, how: Data) -> int:
+    from sensorgen import bounds
+
+    found = bounds.formulas([design for _, design in points], model)
+    rows = [{key: value} | data for (value, _), data in zip(points, found, strict=True)]
+    columns = ("value_f_per_m2", "model", "reason")
+    if how["as_json"]:
+        _deliver([show.json_text(rows)], how["output"])
+    elif how["as_csv"]:
+        _deliver(_csv(key, rows, columns), how["output"])
+    else:
+        lines = (f"{_cell(row[key]):>16}  {_cell(row['value_f_per_m2']):>24}  {row['reason']}\n" for row in rows)
+        _deliver([f"{key:>16}  {f'{model} [F/m2]':>24}\n", *lines], how["output"])
+    return 0 if all(row["model"] for row in rows) else FOUND_ERRORS
 
 
 def _verdict(found: Sequence[Data]) -> int:
@@ -213,14 +232,14 @@ def _table(key: str, rows: Sequence[Data]) -> Iterator[str]:
             )
 
 
-def _csv(key: str, rows: Sequence[Data]) -> Iterator[str]:
+def _csv(key: str, rows: Sequence[Data], columns: Sequence[str] = COLUMNS) -> Iterator[str]:
     import csv
     import io
 
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow([key, *COLUMNS])
-    table.writerows([_cell(row[key]), *(_cell(row.get(name)) for name in COLUMNS)] for row in rows)
+    table.writerow([key, *columns])
+    table.writerows([_cell(row[key]), *(_cell(row.get(name)) for name in columns)] for row in rows)
     yield text.getvalue()
 
 
