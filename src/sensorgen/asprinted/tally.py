@@ -151,11 +151,8 @@ def findings(rows: Iterable[Row], scene: Scene) -> list[Finding]:
 def _finding(row: Row, scene: Scene) -> Finding:
     gone, sampled = row.printed_mm3 == 0, row.strips > 0
     support = next(b for b in scene.bodies if b.name == row.body).is_support()
-    what = (
-        ("is not printed at all" if sampled else "ends short of its middle: not printed")
-        if gone
-        else f"prints {row.ratio:.2f} times its volume"
-    )
+    lost = "is not printed at all" if sampled else "ends short of its middle: not printed"
+    what = lost if gone else f"prints {row.ratio:.2f} times its volume"
     more = [f"{row.vanished} of {row.strips} strips vanish"] if row.vanished and not gone else []
     more += [f"{row.fused} fuse"] if row.fused else []
     return Finding(
