@@ -15,6 +15,8 @@ from sensorgen.errors import SensorgenError, Unprintable
 COMMANDS = (
     "build",
     "check",
+    "slice",
+    "gcode",
     "draw",
     "predict",
     "cell",
