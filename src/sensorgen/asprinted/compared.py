@@ -124,12 +124,18 @@ def resistance_ohm(
     """
     return {
         end: [solid * _ratio(design, printed, end, rho, contact) for contact in contacts_ohm_m2]
-        for end, (solid, rho) in _solid_ohm(design).items()
+        for end, (solid, rho) in solid_ohm(design).items()
     }
 
 
-def _solid_ohm(design: Design) -> dict[str, tuple[float, float]]:
-    """Of each electrode rho L / (H W) [ohm], and rho [ohm m]."""
+def solid_ohm(design: Design) -> dict[str, tuple[float, float]]:
+    """Of each electrode rho L / (H W) of its plate alone [ohm], and rho [ohm m].
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    """
     p, found = design.params, {}
     for end in ("top", "bottom"):
         material, source = design.slot(f"{end}_electrode")
