@@ -14,7 +14,7 @@ from sensorgen.asprinted.rules import ROUND
 from sensorgen.asprinted.strips import Strips, drawn
 from sensorgen.checks.slices import Slices
 from sensorgen.design import Design
-from sensorgen.errors import BadInput, UnknownName
+from sensorgen.errors import UnknownName
 from sensorgen.gcode.paths import Paths
 from sensorgen.scene import SLIVER_MM, Point, Scene
 
@@ -70,11 +70,6 @@ def beads(design: Design, paths: Paths, centre_mm: Point | None = None) -> Beads
         Lines of the file, with the printer's own tool numbers.
     centre_mm : (float, float), optional
         Middle of the piece on the printer's bed [mm]; the middle of the bed if not given.
-
-    Raises
-    ------
-    BadInput
-        The file prints nothing where the piece stands, or with other tools.
     """
     scene, machine = design.printed, design.machine
     corner = np.array(centre_mm or machine.bed_centre_mm()) - np.array(scene.size_mm[:2]) / 2
@@ -87,11 +82,6 @@ def beads(design: Design, paths: Paths, centre_mm: Point | None = None) -> Beads
     middle, margin = (ends[0] + ends[1]) / 2, machine.line_mm()
     here &= ((middle > -margin) & (middle < np.array(scene.size_mm[:2]) + margin)).all(1)
     here &= np.isin(found.tool, sorted(tools))
-    if not here.any():
-        raise BadInput(
-            f"no line of {design.name} in this G-code: expected tools {sorted(tools)} around {corner[0]:g}, "
-            f"{corner[1]:g} mm in layers of {design.layers.layer_mm:g} mm; was it sliced from this design?"
-        )
     height = np.diff(heights)[layer]
     volume = found.volume_mm3(machine.filament_mm)
     width = volume / (found.length_mm() * height)

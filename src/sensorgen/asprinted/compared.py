@@ -14,7 +14,7 @@ from sensorgen.asprinted.strips import Strips, drawn, scene_of
 from sensorgen.asprinted.window import cut, window
 from sensorgen.checks.slices import Slices
 from sensorgen.design import Design
-from sensorgen.errors import OutOfRange
+from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.gcode.paths import Paths
 from sensorgen.interval import Interval
 from sensorgen.models import traxels
@@ -55,8 +55,14 @@ def estimated(design: Design, walls: str = "arachne") -> Printed:
 
 
 def sliced(design: Design, paths: Paths, source: str, centre_mm: tuple[float, float] | None = None) -> Printed:
-    """What a slicer's G-code makes of a design; raises as :func:`sensorgen.asprinted.beads.beads`."""
+    """What a slicer's G-code makes of a design; raises BadInput where it prints nothing at the design's place."""
     lines = beads(design, paths, centre_mm)
+    if not len(lines.number):
+        tools = sorted({design.tool(body.material) for body in design.printed.bodies})
+        raise BadInput(
+            f"no line of {design.name} in this G-code: expected tools {tools} in layers of "
+            f"{design.layers.layer_mm:g} mm at its place on the bed; was it sliced from this design?"
+        )
     return Printed(source, {name: layers(design, lines, name) for name in CONVENTIONS}, lines)
 
 

@@ -40,7 +40,7 @@ def report(design: Design, printed: Printed, accuracy: float = ACCURACY) -> dict
         "capacitance_f": {"drawn": _drawn_f(design, accuracy), **_printed_f(design, printed, accuracy)},
         "electrode_resistance_ohm": _resistance(design, printed),
         "contact_ohm_m2": list(CONTACTS_OHM_M2),
-        "layers": [vars(row) | {"ratio": row.ratio} for row in rows],
+        "layers": [row.as_dict() for row in rows],
         "findings": [f.as_dict() for f in design.waived(findings(rows, design.printed))],
     }
 

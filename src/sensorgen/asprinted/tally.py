@@ -1,8 +1,9 @@
 """Rule 7: what was printed of each body in each layer, held against what was drawn."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
+from typing import Any
 
 from sensorgen.asprinted.beads import Beads, beads, layers
 from sensorgen.asprinted.intervals import Intervals, length_mm, within
@@ -51,6 +52,10 @@ class Row:
         """Printed over exact volume; infinite where nothing is drawn [-]."""
         return self.printed_mm3 / self.exact_mm3 if self.exact_mm3 > 0 else float("inf")
 
+    def as_dict(self) -> dict[str, Any]:
+        """The row with its ratio, for JSON; None where nothing is drawn."""
+        return asdict(self) | {"ratio": self.ratio if self.exact_mm3 > 0 else None}
+
 
 def rule7(design: Design, paths: Paths, centre_mm: Point | None = None) -> tuple[list[Row], list[Finding]]:
     """Printed against exact volume per body and layer, of a slicer's G-code.
@@ -72,8 +77,8 @@ def rule7(design: Design, paths: Paths, centre_mm: Point | None = None) -> tuple
 
     Raises
     ------
-    BadInput, NoStrips
-        See :func:`sensorgen.asprinted.beads.beads` and :func:`sensorgen.asprinted.beads.layers`.
+    NoStrips
+        See :func:`sensorgen.asprinted.beads.layers`.
     """
     lines = beads(design, paths, centre_mm)
     rows = tally(design, layers(design, lines), lines)

@@ -74,4 +74,4 @@ def _wide(name: str) -> int:
 def _cell(row: Mapping[str, Any]) -> str:
     lost = f" -{row['vanished']}" if row["vanished"] else ""
     fused = f" +{row['fused']}" if row["fused"] else ""
-    return f"{row['ratio']:.2f}{lost}{fused}"
+    return f"{'extra' if row['ratio'] is None else format(row['ratio'], '.2f')}{lost}{fused}"
