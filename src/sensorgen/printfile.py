@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from sensorgen import __version__, store
+from sensorgen.asprinted.tally import Row, rule7
 from sensorgen.design import Design
 from sensorgen.errors import Unprintable
+from sensorgen.findings import Finding
+from sensorgen.gcode import paths
 from sensorgen.gcode.check import Checked, check
 from sensorgen.review import Review, review
 from sensorgen.slicer.run import TIMEOUT_S
@@ -33,6 +36,10 @@ class Printed:
         What the check of the file found, and what it takes.
     sha256 : str
         Of the file.
+    rows, printed : tuple of Row, tuple of Finding
+        Printed over exact volume per body and layer, and what rule 7 says of it.
+    forced : bool
+        Whether errors of the design were to be accepted.
     """
 
     design: Design
@@ -44,11 +51,15 @@ class Printed:
     review: Review
     checked: Checked
     sha256: str
+    rows: tuple[Row, ...]
+    printed: tuple[Finding, ...]
+    forced: bool
 
     @property
     def code(self) -> int:
-        """Exit code: 1 where the printer's file has errors [-]."""
-        return 1 if self.checked.errors() else 0
+        """Exit code: 1 where the printer's file has errors, or a body is missing from a layer against the will [-]."""
+        lost = any(f.severity == "error" and not f.waiver for f in self.printed) and not self.forced
+        return 1 if lost or self.checked.errors() else 0
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, for JSON; times are not in it, so that equal slicing gives equal bytes."""
@@ -62,6 +73,10 @@ class Printed:
             "printer": self.design.machine.name,
             "quality": self.design.layers.name,
             "design_findings": [f.as_dict() for f in self.review.findings],
+            "printed": {
+                "layers": [row.as_dict() for row in self.rows],
+                "findings": [f.as_dict() for f in self.printed],
+            },
             **self.checked.as_dict(),
         }
 
@@ -117,17 +132,29 @@ def slice_design(
         made = sliced([alone(design)], slicer, Path(stage), program=program, time_limit_s=time_limit_s, step=step)
         content = made.ready.read_bytes()
         checked = check(made.ready, design.machine, {design.tool(name): name for name in design.used()})
-    result = _printed(design, target, made, held, checked, content)
+        rows = rule7(design, paths.read(made.raw, design.machine, "slicer"))
+    result = _printed(design, target, made, held, (checked, *rows), content, forced=force)
     store.replace(target, content)
     text = json.dumps(result.as_dict() | {"gcode": target.name}, indent=2, ensure_ascii=False) + "\n"
     store.replace(folder / f"{target.name}.json", text.encode())
     return result
 
 
-def _printed(design: Design, target: Path, made: Sliced, held: Review, checked: Checked, content: bytes) -> Printed:
+def _printed(
+    design: Design,
+    target: Path,
+    made: Sliced,
+    held: Review,
+    found: tuple[Checked, list[Row], list[Finding]],
+    content: bytes,
+    *,
+    forced: bool,
+) -> Printed:
     from hashlib import sha256
+
+    checked, rows, printed = found
 
     return Printed(
         design, target, made.slicer, made.version, made.seconds, made.own_seconds, held, checked,
-        sha256(content).hexdigest(),
+        sha256(content).hexdigest(), tuple(rows), tuple(printed), forced,
     )  # fmt: skip

@@ -1,6 +1,7 @@
 """``sensorgen predict``: what the bench should measure."""
 
 import sys
+import tempfile
 from collections.abc import Iterator, Sequence
 from math import inf
 from pathlib import Path
@@ -9,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sensorgen import units
-from sensorgen.cli import FOUND_ERRORS, budget_text, card_text, show
+from sensorgen.cli import FOUND_ERRORS, asprinted_text, budget_text, card_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Length, OneOf, Ratio, Share, Values, proper
 from sensorgen.errors import BadInput
 
 if TYPE_CHECKING:
+    from sensorgen.asprinted.compared import Printed
     from sensorgen.design import Design
     from sensorgen.sensing import Sensed
 
@@ -51,6 +53,18 @@ OWN: list[click.Parameter] = [
         ["--accuracy"], type=Ratio(), default=None,
         help="Wanted of |Z|, as 1e-3: bounds the capacitance as nearly, solves an unknown cell, says what misses it.",
     ),
+    click.Option(
+        ["--as-printed"], is_flag=True,
+        help="Drawn against printed: electrode gap, capacitance, electrode resistance, volume per body and layer.",
+    ),
+    click.Option(
+        ["--slicer"], type=OneOf(("prusa", "cura")),
+        help="With --as-printed: slice for real; estimated from each layer's mid-plane if not given.",
+    ),
+    click.Option(
+        ["--walls"], type=OneOf(("arachne", "classic", "cura", "cura-gaps")),
+        help="With --as-printed and no slicer: whose walls are estimated.  [default: arachne]",
+    ),
     click.Option(["--json", "as_json"], is_flag=True, help="Print as JSON."),
     click.Option(["--csv", "as_csv"], is_flag=True, help="Print R and X as CSV, a row per force and position."),
     click.Option(["--plot"], metavar="DIR", help="Draw R, X, sensitivities and inverse maps there, as PNG and HTML."),
@@ -71,6 +85,9 @@ def _work(
     noise: float,
     **how: Any,
 ) -> int:
+    if how["as_printed"] or how["slicer"] or how["walls"]:
+        _refuse_strangers(how, (frequency_hz, force_n, position_mm, tip_mm, compression))
+        return _as_printed(design, accuracy, how)
     from sensorgen.predict import FORCES_N, TONES_HZ, positions_mm, prediction
     from sensorgen.sensing import TIP_M, sensor_of
 
@@ -87,6 +104,42 @@ def _work(
     sensed = sensor_of(design, law, tip_m, profile=profile, accuracy=wanted)
     _pressed(design, sensed, (tones, force_n or FORCES_N, position_mm or positions_mm(design)), (wanted, noise), how)
     return 0
+
+
+def _as_printed(design: "Design", accuracy: float | None, how: dict[str, Any]) -> int:
+    """Drawn against printed; 1 where a body is missing from a layer and nobody has waived it."""
+    from sensorgen.asprinted import compared
+    from sensorgen.asprinted.report import report
+
+    if how["slicer"]:
+        with tempfile.TemporaryDirectory() as folder:
+            printed = _sliced(design, how["slicer"], Path(folder))
+    else:
+        printed = compared.estimated(design, how["walls"] or "arachne")
+    found = report(design, printed, accuracy or compared.ACCURACY)
+    text = (f"{line}\n" for line in asprinted_text.lines(found))
+    _deliver(iter([show.json_text(found)]) if how["as_json"] else text, how["output"])
+    return FOUND_ERRORS if any(f["severity"] == "error" and not f["waiver"] for f in found["findings"]) else 0
+
+
+def _sliced(design: "Design", slicer: str, folder: Path) -> "Printed":
+    from sensorgen import slicing
+    from sensorgen.asprinted import compared
+    from sensorgen.gcode import paths
+
+    with show.progress(slicing.STEPS) as step:
+        made = slicing.sliced([slicing.alone(design)], slicer, folder, step=step)
+    return compared.sliced(design, paths.read(made.raw, design.machine, "slicer"), f"{slicer} {made.version}")
+
+
+def _refuse_strangers(how: dict[str, Any], pressed: Sequence[object]) -> None:
+    """What is printed is told of the sensor at rest."""
+    if not how["as_printed"]:
+        raise BadInput("--slicer and --walls say how it is printed; expected --as-printed with them")
+    if how["slicer"] and how["walls"]:
+        raise BadInput("--slicer and --walls at once; expected one: the slicer's profile says what walls it makes")
+    if any(given is not None for given in pressed) or how["as_csv"] or how["plot"]:
+        raise BadInput("--as-printed speaks of the sensor at rest; expected no tones, presses, --csv or --plot with it")
 
 
 def _refuse_unjudged(predicted: dict[str, Any]) -> None:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import gcode_text, show
+from sensorgen.cli import asprinted_text, gcode_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf
 from sensorgen.errors import OutOfRange
@@ -70,6 +70,9 @@ def _work(
     click.echo(f"{design.name}: {show.summary(made.review)} (sensorgen check tells them)")
     for line in (*gcode_text.findings(made.checked), *gcode_text.report(made.checked.report)):
         click.echo(line)
+    for line in asprinted_text.table([row.as_dict() for row in made.rows]):
+        click.echo(line)
+    show.findings(made.printed)
     click.echo(f"{made.gcode}: {made.slicer} {made.version}, {made.seconds:.1f} s; {gcode_text.summary(made.checked)}")
     return made.code
 

@@ -1,0 +1,197 @@
+"""A design as drawn beside the same as printed: electrode gap, capacitance, electrode resistance."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+
+from sensorgen import planner
+from sensorgen.asprinted import estimate
+from sensorgen.asprinted.beads import CONVENTIONS, Beads, beads, layers
+from sensorgen.asprinted.rectilinear import plate
+from sensorgen.asprinted.strips import Strips, drawn, scene_of
+from sensorgen.asprinted.window import cut, window
+from sensorgen.checks.slices import Slices
+from sensorgen.design import Design
+from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.gcode.paths import Paths
+from sensorgen.interval import Interval
+from sensorgen.models import traxels
+from sensorgen.models._traxel_lines import Lines
+from sensorgen.scene import Scene
+from sensorgen.units import M_PER_MM
+
+ACCURACY = 0.02  # of the capacitance: the conventions for a line's width differ by more
+CONTACTS_OHM_M2 = (0.0, 1e-6, 1e-5, 1e-4)  # no source gives the contact resistivity of printed eTPU
+DEGREES = 45.0  # direction of PrusaSlicer's infill in our profiles, turned by 90 from layer to layer
+_CLAMP_LINES = 2.6  # the contacts hold what lies nearer to an end than this many lines: walls and turns of infill
+_JOINED_MM = 1e-4
+
+
+@dataclass(frozen=True)
+class Printed:
+    """What is printed of a design.
+
+    Attributes
+    ----------
+    source : str
+        Which slicer says so, or that it is an estimate.
+    layers : mapping of str to list of Strips
+        Layers, by the convention for a line's width.
+    lines : Beads or None
+        The lines; None for an estimate.
+    """
+
+    source: str
+    layers: Mapping[str, Sequence[Strips]]
+    lines: Beads | None
+
+
+def estimated(design: Design, walls: str = "arachne") -> Printed:
+    """What a slicer should make of a design, without one; raises as :func:`sensorgen.asprinted.estimate.layers`."""
+    found = estimate.layers(design.printed, design.machine, design.layers, walls)
+    return Printed(f"estimate from mid-planes, {walls} walls", {"mid-plane": found}, None)
+
+
+def sliced(design: Design, paths: Paths, source: str, centre_mm: tuple[float, float] | None = None) -> Printed:
+    """What a slicer's G-code makes of a design; raises BadInput where it prints nothing at the design's place."""
+    lines = beads(design, paths, centre_mm)
+    if not len(lines.number):
+        tools = sorted({design.tool(body.material) for body in design.printed.bodies})
+        raise BadInput(
+            f"no line of {design.name} in this G-code: expected tools {tools} in layers of "
+            f"{design.layers.layer_mm:g} mm at its place on the bed; was it sliced from this design?"
+        )
+    return Printed(source, {name: layers(design, lines, name) for name in CONVENTIONS}, lines)
+
+
+def cell(design: Design, printed: Sequence[Strips]) -> tuple[Scene, float]:
+    """One period of a print as a scene, bottom electrode down, and how many of its plan the sensor has [-]."""
+    scene = design.printed
+    plan = window(drawn(scene, Slices(scene, design.layers)), scene)
+    found = scene_of(cut(printed, plan), replace(scene, size_mm=(*plan.sides_mm(), scene.size_mm[2])))
+    if design.orientation == "upside-down":
+        found = found.turned_over()
+    kept = replace(found, bodies=tuple(b for b in found.bodies if not b.is_support()))
+    smaller = kept.stretched(1.0 - design.shrinkage) if design.shrinkage else kept
+    return smaller, scene.size_mm[0] * scene.size_mm[1] / plan.area_mm2()
+
+
+def gap_mm(scene: Scene) -> float:
+    """Smallest distance of top and bottom electrode in a scene of boxes; infinite where one is missing [mm]."""
+    tops, bottoms = (
+        np.array([[p.span(a) for a in "xyz"] for b in scene.bodies if b.terminal == end for p in b.prisms])
+        for end in ("top", "bottom")
+    )
+    if not len(tops) or not len(bottoms):
+        return float("inf")
+    apart = np.maximum(tops[:, None, :, 0] - bottoms[None, :, :, 1], bottoms[None, :, :, 0] - tops[:, None, :, 1])
+    return float(np.round(np.sqrt((apart.clip(0) ** 2).sum(2)).min(), 9))
+
+
+def capacitance_f(design: Design, printed: Printed, width: float = ACCURACY) -> dict[str, Interval | str]:
+    """Capacitance of the whole sensor, by convention [F]; why there is none where no model can speak of it.
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    printed : Printed
+        What is printed of it.
+    width : float
+        How wide the bounds may be, relative to their middle [-].
+    """
+    permittivity = {t.material: t.value for t in planner.permittivities(design)}
+    found: dict[str, Interval | str] = {}
+    for name, made in printed.layers.items():
+        scene, times = cell(design, made)
+        try:
+            # Of a print that has shrunk back, as many cells make the sensor.
+            found[name] = planner.capacitance(scene, permittivity, width).capacitance_f.times(times)
+        except planner.Unpredictable as error:
+            found[name] = str(error)
+    return found
+
+
+def resistance_ohm(
+    design: Design, printed: Printed, contacts_ohm_m2: Sequence[float] = CONTACTS_OHM_M2
+) -> dict[str, list[float]]:
+    """Resistance of each electrode from end to end, one for each contact resistivity [ohm].
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    printed : Printed
+        What is printed of it; without lines, a plate of walls and infill as PrusaSlicer would lay them.
+    contacts_ohm_m2 : sequence of float
+        Contact resistivities between lines [ohm m2].
+    """
+    return {
+        end: [solid * _ratio(design, printed, end, rho, contact) for contact in contacts_ohm_m2]
+        for end, (solid, rho) in solid_ohm(design).items()
+    }
+
+
+def solid_ohm(design: Design) -> dict[str, tuple[float, float]]:
+    """Of each electrode rho L / (H W) of its plate alone [ohm], and rho [ohm m].
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    """
+    p, found = design.params, {}
+    for end in ("top", "bottom"):
+        material, source = design.slot(f"{end}_electrode")
+        rho = material.value("resistivity_ohm_m", source).value
+        found[end] = rho * p.length_mm / (p.electrode_mm * p.width_mm) / M_PER_MM, rho
+    return found
+
+
+def _ratio(design: Design, printed: Printed, end: str, rho: float, contact: float) -> float:
+    length, width, _ = design.printed.size_mm
+    lines = _estimated_lines(design) if printed.lines is None else electrode(design, printed.lines, end)
+    clamp = _CLAMP_LINES * design.machine.line_mm()
+    if length <= 4 * clamp:
+        raise OutOfRange(f"an electrode of {length:g} mm; expected more than {4 * clamp:g} mm to tell its resistance")
+    area = design.params.electrode_mm * width * M_PER_MM**2
+    reach = (length / 2 - clamp) * M_PER_MM
+    return traxels.resistance(lines, rho, contact, (-reach, reach), area).ratio
+
+
+def _estimated_lines(design: Design) -> Lines:
+    length, width, _ = design.printed.size_mm
+    count = max(ceil(design.params.electrode_mm / design.layers.layer_mm - 1e-9), 1)
+    height = design.params.electrode_mm / count
+    line = width / round(width / design.machine.line_mm())
+    return plate(length, width, line, height, [DEGREES + 90 * (k % 2) for k in range(count)])
+
+
+def electrode(design: Design, lines: Beads, end: str) -> Lines:
+    """The lines of one electrode, its middle at the origin.
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    lines : Beads
+        Of the whole sensor.
+    end : str
+        "top" or "bottom".
+
+    Raises
+    ------
+    OutOfRange
+        None of it is printed.
+    """
+    mine = [k for k, body in enumerate(design.printed.bodies) if body.terminal == end]
+    found = lines.of(np.isin(lines.body, mine))
+    if not len(found.number):
+        raise OutOfRange(f"no line prints the {end} electrode")
+    middle = np.array(design.printed.size_mm[:2]) / 2
+    start, stop = ((p - middle) * M_PER_MM for p in (found.start_mm, found.end_mm))
+    meets = np.append(False, (np.abs(start[1:] - stop[:-1]) < _JOINED_MM * M_PER_MM).all(1))
+    meets[1:] &= found.layer[1:] == found.layer[:-1]
+    return Lines(start, stop, found.width_mm * M_PER_MM, found.height_mm * M_PER_MM, found.layer, meets)

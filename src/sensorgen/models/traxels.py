@@ -1,0 +1,114 @@
+r"""An electrode as the network of lines that it is printed from: bulk along each line, contacts between lines.
+
+Each line is a conductor of its cross-section w h. Its potential is straight between nodes, which sit at its ends and
+wherever it crosses a line of the layer above or below. What couples two lines is a resistor in the network:
+
+- side by side, over a length l at a distance d of their middles: :math:`h l / (\rho d + \sigma_c)`;
+- crossing, one on the other: :math:`w_1 w_2 / \sin\varphi / (\rho h + \sigma_c)`;
+- an end on a side: :math:`w h / \sin\varphi / (\rho d + \sigma_c)`, half of it where the line turns.
+
+Each resistor joins places straight across from each other, by interpolation between nodes where there is none. So any
+potential that is linear in space is a solution where contacts cost nothing, and lines of any direction then conduct as
+the solid does. Nodes away from the crossings would join places that differ in plan, and short-circuit the layers.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.errors import OutOfRange
+from sensorgen.models import _traxel_links as links
+from sensorgen.models._traxel_lines import Lines
+from sensorgen.models._traxel_nodes import Nodes
+
+SOURCE = "Lines as in Dijkshoorn et al., Sensors 2021, 21, 3710 (traxel model); network derived anew"
+COST = 2
+
+
+@dataclass(frozen=True)
+class Resistance:
+    """What a network of lines says.
+
+    Attributes
+    ----------
+    ratio : float
+        To a solid electrode's rho L / (H W) [-].
+    unknowns, resistors : int
+        Of the network.
+    """
+
+    ratio: float
+    unknowns: int
+    resistors: int
+
+
+def resistance(
+    lines: Lines, resistivity_ohm_m: float, contact_ohm_m2: float, ends_m: tuple[float, float], area_m2: float
+) -> Resistance:
+    """Resistance along x between two planes, beyond which the potential rises as in a solid.
+
+    Parameters
+    ----------
+    lines : Lines
+        All of one electrode.
+    resistivity_ohm_m : float
+        Bulk resistivity along a line [ohm m], above 0.
+    contact_ohm_m2 : float
+        Contact resistivity between two lines [ohm m2], 0 or more; infinite where they do not conduct.
+    ends_m : (float, float)
+        Where the planes stand on x [m]; each needs lines beyond it.
+    area_m2 : float
+        Cross-section of the solid electrode, H W [m2].
+
+    Raises
+    ------
+    OutOfRange
+        A resistivity or the planes make no sense, no line reaches beyond a plane, or nothing conducts between them.
+    """
+    _check(resistivity_ohm_m, contact_ohm_m2, ends_m, area_m2)
+    pairs = links.near(lines)
+    crossings = links.crossings(lines, pairs)
+    nodes = Nodes.of(lines, crossings.places())
+    found = links.gathered(lines, nodes, pairs, crossings)
+    conductance = found.conductance_s(resistivity_ohm_m, contact_ohm_m2)
+    current, unknowns = _current(nodes, found, conductance, ends_m)
+    if not current > 0:
+        raise OutOfRange("no line conducts from one end to the other: expected lines that meet, or a contact that does")
+    return Resistance(float(area_m2 / (resistivity_ohm_m * current)), unknowns, len(conductance))
+
+
+def _check(resistivity_ohm_m: float, contact_ohm_m2: float, ends_m: tuple[float, float], area_m2: float) -> None:
+    if not 0 < resistivity_ohm_m < np.inf:
+        raise OutOfRange(f"a resistivity of {resistivity_ohm_m:g} ohm m; expected a number above 0")
+    if not contact_ohm_m2 >= 0:
+        raise OutOfRange(f"a contact resistivity of {contact_ohm_m2:g} ohm m2; expected 0 or more")
+    if not ends_m[1] > ends_m[0] or not area_m2 > 0:
+        raise OutOfRange(
+            f"ends at {ends_m[0]:g} and {ends_m[1]:g} m, area {area_m2:g} m2; expected a length and an area"
+        )
+
+
+def _current(
+    nodes: Nodes, found: links.Links, conductance: NDArray[np.float64], ends_m: tuple[float, float]
+) -> tuple[float, int]:
+    """Current along x in a mean field of 1 V/m [A], and the unknowns that it took."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.sparse.linalg import splu
+
+    x = nodes.place_m[:, 0]
+    left, right = x <= ends_m[0], x >= ends_m[1]
+    if not left.any() or not right.any():
+        raise OutOfRange(f"no line reaches beyond {ends_m[0]:g} and {ends_m[1]:g} m: put the ends within the electrode")
+    values = conductance[:, None, None] * found.weight[:, :, None] * found.weight[:, None, :]
+    rows, columns = np.broadcast_arrays(found.node[:, :, None], found.node[:, None, :])
+    matrix = coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(len(x), len(x))).tocsr()
+    matrix.eliminate_zeros()
+    _, part = connected_components(matrix, directed=False)
+    free = ~(left | right) & np.isin(part, part[left | right])
+    u = np.where(free, 0.0, x)
+    if free.any():
+        solver = splu(matrix[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        u[free] = solver.solve(-(matrix @ np.where(left | right, x, 0.0))[free])
+    return float((matrix @ u)[right].sum()), int(free.sum())

@@ -1,0 +1,154 @@
+"""The mid-plane estimate against sections drawn by hand, and against what the slicers were found to print."""
+
+from dataclasses import replace
+
+import pytest
+
+from sensorgen import design
+from sensorgen.asprinted import window
+from sensorgen.asprinted.estimate import estimate, layers
+from sensorgen.asprinted.strips import NoStrips, drawn, scene_of
+from sensorgen.checks.slices import Slices
+from sensorgen.errors import UnknownName
+from sensorgen.models import columns
+from sensorgen.scene import Body, Prism, Scene, area_mm2, box
+
+COG = "top_electrode_with_cogs"
+EPS = {"air": 1.00059, "x60": 4.68}
+
+# Half widths of the cog per layer [mm], from 0.4 mm up: thesis' triX with a film of 0.1 mm, sliced for real.
+SLICED = {
+    "arachne": (0.0, 0.170, 0.239, 0.340, 0.440),
+    "classic": (0.0, 0.0, 0.239, 0.339, 0.439),
+    "cura": (0.0, 0.0, 0.25, 0.35, 0.45),
+    "cura-gaps": (0.05, 0.155, 0.25, 0.35, 0.45),
+}
+# Capacitance of one period of 2 mm [pF/m]: the rules by hand, solved by another program's finite elements.
+SOLVED = {"arachne": 147.07, "classic": 80.02, "cura": 81.89, "cura-gaps": 208.07}
+# What the slicers' own G-code gives, and how near the estimate has to come.
+REAL = {"arachne": (147.43, 0.02), "classic": (79.82, 0.02), "cura": (80.95, 0.07), "cura-gaps": (209.75, 0.07)}
+
+
+def tri(quality="fine", orientation="as-drawn", **more):
+    parameters = {"dielectric_mm": 0.1, "length_mm": 12.0} | more
+    return design.make({"shape": "tri", "parameters": parameters, "quality": quality, "orientation": orientation})
+
+
+def one_period(d, walls):
+    scene = d.printed
+    plan = window.window(drawn(scene, Slices(scene, d.layers)), scene)
+    found = window.cut(layers(scene, d.machine, d.layers, walls), plan)
+    return scene_of(found, replace(scene, size_mm=(*plan.sides_mm(), scene.size_mm[2]))), plan
+
+
+def half_widths(scene):
+    found = []
+    for z in (0.45, 0.55, 0.65, 0.75, 0.85):
+        boxes = [o for p in scene.body(COG).prisms for o in p.cut("z", z)]
+        found.append(sum(area_mm2(o) for o in boxes) / scene.size_mm[1] / 2)
+    return found
+
+
+@pytest.mark.parametrize("walls", SLICED)
+def test_cogs_are_as_wide_as_the_slicers_print_them(walls):
+    scene, _ = one_period(tri(), walls)
+    assert half_widths(scene) == pytest.approx(SLICED[walls], abs=0.0055)
+
+
+@pytest.mark.parametrize("walls", SOLVED)
+@pytest.mark.parametrize("along", ["x", "y"])
+def test_capacitance_of_the_rules(walls, along):
+    from sensorgen.models import fem2d
+
+    if fem2d.unfit(tri().drawn):
+        pytest.skip("NGSolve is not installed")
+    sides = {"length_mm": 12.0, "width_mm": 10.0}
+    scene, plan = one_period(tri(along=along, **sides), walls)
+    found = fem2d.capacitance(scene, EPS, 1e-3).middle() / (plan.area_mm2() / 2 * 1e-3) * 1e12
+    assert found == pytest.approx(SOLVED[walls], rel=4e-4)
+    real, within = REAL[walls]
+    assert found == pytest.approx(real, rel=within)
+
+
+def test_a_sensor_printed_upside_down_is_the_same_sensor():
+    as_drawn, _ = one_period(tri(), "arachne")
+    turned, _ = one_period(tri(orientation="upside-down"), "arachne")
+    assert half_widths(turned.turned_over()) == pytest.approx(half_widths(as_drawn), abs=1e-9)
+
+
+def test_strips_across_strips_keep_their_place_and_lose_a_rounding():
+    d = design.make({"shape": "rect", "parameters": {"dielectric_mm": 0.1, "length_mm": 8, "width_mm": 8}})
+    scene, plan = one_period(d, "arachne")
+    assert (plan.x_mm, plan.y_mm) == ((3.35, 5.35), (3.35, 5.35))
+    lower, upper = (
+        {round(o[1][k] - o[0][k], 4) for p in scene.body(COG).prisms for o in p.cut("z", z)}
+        for k, z in ((0, 0.55), (0, 0.85))
+    )
+    assert lower == {0.6785}  # 0.7 less 0.1 (1 - pi / 4): along x the lower strips are cut
+    assert upper == {2.0}
+
+
+def test_a_plate_comes_out_as_drawn():
+    d = design.make({"shape": "reference"})
+    made = estimate(d.printed, d.machine, d.layers, "classic")
+    assert made.body("bottom_electrode") == d.printed.body("bottom_electrode")
+    assert columns.capacitance(made, EPS).middle() == pytest.approx(
+        columns.capacitance(d.printed, EPS).middle(), rel=1e-12, abs=0
+    )
+
+
+@pytest.mark.parametrize(("quality", "film", "height"), [("fine", 0.1, 1.2), ("extrafine", 0.12, 1.2)])
+def test_heights_are_whole_layers(quality, film, height):
+    d = tri(quality)
+    made = estimate(d.printed, d.machine, d.layers, "cura-gaps")
+    film_top = min(p.end_mm for p in made.body("film_and_lower").prisms if p.span("x")[1] == 12.0)
+    assert film_top - 0.3 == pytest.approx(film, abs=1e-9)
+    assert made.size_mm[2] == pytest.approx(height, abs=1e-9)
+
+
+def test_where_bodies_swell_into_each_other_the_electrode_keeps_the_place():
+    scene = Scene(
+        (
+            Body("rib", "x60", (box(4.0, 4.2, 0, 5, 0, 0.1),)),
+            Body("wire", "etpu", (box(4.2, 4.4, 0, 5, 0, 0.1),), "top"),
+        ),
+        (10.0, 5.0, 0.1),
+    )
+    d = tri()
+    made = estimate(scene, d.machine, d.layers, "arachne")
+    (wire,), (rib,) = made.body("wire").prisms, made.body("rib").prisms
+    assert wire.span("x") == pytest.approx((4.13, 4.47))
+    assert rib.span("x") == pytest.approx((3.93, 4.13))
+
+
+def test_slanted_plans_are_refused():
+    corner = Prism("z", ((0, 0), (5, 0), (0, 5)), 0, 0.1)
+    scene = Scene((Body("corner", "x60", (corner,)),), (5.0, 5.0, 0.1))
+    with pytest.raises(NoStrips, match=r"layer 1, from 0 to 0.1 mm"):
+        estimate(scene, tri().machine, tri().layers)
+    crossed = Scene((Body("plate", "x60", (box(0, 2, 0, 5, 0, 0.1), box(2, 5, 0, 2, 0, 0.1))),), (5.0, 5.0, 0.1))
+    with pytest.raises(NoStrips):
+        estimate(crossed, tri().machine, tri().layers)
+
+
+def test_an_unknown_way_of_walls():
+    with pytest.raises(UnknownName, match="arachne"):
+        estimate(tri().printed, tri().machine, tri().layers, "arachn")
+
+
+def test_a_window_is_the_whole_where_nothing_repeats():
+    d = design.make({"shape": "tri", "parameters": {"length_mm": 2.0}})
+    plan = window.window(drawn(d.printed, Slices(d.printed, d.layers)), d.printed)
+    assert (plan.x_mm, plan.y_mm) == ((0.0, 2.0), (0.0, 10.0))
+
+
+def test_edges_that_rounding_parted_become_one():
+    lines = [{"along": "y", "bottom_mm": 0.0, "top_mm": 0.1}, {"along": "y", "bottom_mm": 0.1, "top_mm": 0.2}]
+    from sensorgen.asprinted.strips import Strips
+
+    found = window.cut(
+        [Strips(**lines[0], runs={"a": ((1.0, 2.0005),)}), Strips(**lines[1], runs={"a": ((1.001, 2.4),)})],
+        window.Window((1.0, 3.0), (0.0, 1.0)),
+    )
+    assert found[0].runs["a"] == ((0.0, 1.0005),)
+    assert found[1].runs["a"] == ((0.0, 1.4),)

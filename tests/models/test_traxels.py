@@ -1,0 +1,108 @@
+"""The network of lines against solids, stacks of strips and a fine grid."""
+
+import numpy as np
+import pytest
+
+from sensorgen.asprinted.rectilinear import plate
+from sensorgen.errors import OutOfRange
+from sensorgen.models import traxels
+from sensorgen.models._traxel_lines import Lines
+
+RHO, W, H = 0.2, 0.42e-3, 0.1e-3
+ENDS = (-9e-3, 9e-3)
+
+
+def strips(n, along):
+    """Parallel lines that touch, along x or along y, 10 mm wide."""
+    at = (np.arange(n) - (n - 1) / 2) * W
+    reach = np.full(n, 5e-3)
+    start, end = (np.stack([-reach, at], 1), np.stack([reach, at], 1))
+    if along == "y":
+        start, end = start[:, ::-1], end[:, ::-1]
+    full = np.ones(n)
+    return Lines(start, end, full * W, full * H, np.zeros(n, np.int64), np.zeros(n, bool))
+
+
+def ratio(lines, contact, ends=ENDS, area=None):
+    area = area or (lines.layer.max() + 1) * H * 10e-3
+    return traxels.resistance(lines, RHO, contact, ends, area).ratio
+
+
+@pytest.mark.parametrize("degrees", [0, 15, 30, 45, 60, 75, 90])
+@pytest.mark.parametrize("layers", [1, 3])
+def test_without_contact_resistance_every_direction_conducts_as_the_solid(degrees, layers):
+    angles = [degrees + 90 * k for k in range(layers)]
+    lines = plate(20.0, 9.24, W * 1e3, H * 1e3, angles)
+    assert ratio(lines, 0.0, area=layers * H * 9.24e-3) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("contact", [0.0, 1e-6, 1e-3, np.inf])
+def test_lines_along_the_current_do_not_feel_contacts(contact):
+    assert ratio(strips(20, "x"), contact, (-4.5e-3, 4.5e-3), 20 * W * H) == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("contact", [0.0, 1e-6, 1e-4, 1e-2])
+def test_across_lines_each_contact_adds_its_own(contact):
+    n = 12
+    lines = strips(n, "y")
+    x = lines.start_m[:, 0]
+    gaps = ratio(lines, contact, (x[0], x[-1]), H * 10e-3)
+    whole = (1 + (n - 1) * gaps) / n  # half a line more at each end
+    assert whole == pytest.approx(1 + (n - 1) / n * contact / (RHO * W), rel=1e-9)
+
+
+def test_lines_of_two_layers_that_cross():
+    """One line along x over one along y: the current goes up through their common square alone."""
+    lines = Lines(
+        np.array([[-5e-3, 0.0], [0.0, -5e-3], [0.0, 3e-3]]), np.array([[0.0, 0.0], [0.0, 5e-3], [5e-3, 3e-3]]),
+        np.full(3, W), np.full(3, H), np.array([0, 1, 0]), np.zeros(3, bool),
+    )  # fmt: skip
+    contact = 1e-6
+    found = traxels.resistance(lines, RHO, contact, (-4e-3, 4e-3), H * W)
+    along = RHO / (W * H)
+    joint = (RHO * H + contact) / W**2
+    # Held are the nodes at -5 and 5 mm: 5 mm, a joint, 3 mm along y, a joint and 5 mm, in a field of 1 V/m over 10 mm.
+    expected = (13e-3 * along + 2 * joint) / (along * 10e-3)
+    assert found.ratio == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_turned_sensor_of_many_directions_lies_between_both_axes():
+    contact = 1e-4
+    found = [
+        ratio(plate(20.0, 9.24, W * 1e3, H * 1e3, [a, a + 90, a]), contact, area=3 * H * 9.24e-3) for a in (0, 45, 90)
+    ]
+    assert found[0] < found[1] < found[2]
+    assert found[2] / found[0] > 1.1
+
+
+def test_contacts_can_only_add():
+    lines = plate(20.0, 9.24, W * 1e3, H * 1e3, [30, 120, 30])
+    found = [ratio(lines, c, area=3 * H * 9.24e-3) for c in (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)]
+    assert found == sorted(found)
+
+
+def test_a_mirrored_plate_is_the_same_plate():
+    one, other = (plate(20.0, 9.24, W * 1e3, H * 1e3, [a, a + 90]) for a in (30, 150))
+    assert ratio(one, 1e-5) == pytest.approx(ratio(other, 1e-5), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("rho", "contact", "ends", "area", "word"),
+    [
+        (0.0, 0.0, ENDS, 1e-6, "resistivity of 0"),
+        (np.inf, 0.0, ENDS, 1e-6, "resistivity of inf"),
+        (RHO, -1e-9, ENDS, 1e-6, "contact resistivity"),
+        (RHO, np.nan, ENDS, 1e-6, "contact resistivity"),
+        (RHO, 0.0, (1e-3, 1e-3), 1e-6, "expected a length"),
+        (RHO, 0.0, ENDS, 0.0, "area"),
+        (RHO, 0.0, (-1.0, 1.0), 1e-6, "within the electrode"),
+    ],
+)
+def test_nonsense_is_refused(rho, contact, ends, area, word):
+    with pytest.raises(OutOfRange, match=word):
+        traxels.resistance(plate(20.0, 5.0, 0.42, 0.1, [0]), rho, contact, ends, area)
+
+
+def test_lines_that_do_not_meet_conduct_nothing():
+    with pytest.raises(OutOfRange, match="no line conducts"):
+        ratio(strips(12, "y"), np.inf, (-2e-3, 2e-3))
