@@ -23,6 +23,7 @@ from sensorgen.records import shown
 
 MAX_LETTERS = 100
 THICKEST_MM = 10.0  # film that a design may have
+_PLATE_MM = 0.6  # thickness of the plain plate, which its name does not tell
 GRAMMAR = "<iteration> <triX|triY|sqXY|sqYX|SX60> [.1mm|.2mm] [replicate] [fine|x fine] [r|l|m], as in '23 triY .2mm 3'"
 QUALITIES = {"": "", "fine": "fine", "x fine": "extrafine", "xfine": "extrafine", "xtrafine": "extrafine"}
 _WORDS = {"tri": "tri", "rect": "sq", "reference": "SX60", "double": "double"}
@@ -259,3 +260,31 @@ def design_of(specimen: Specimen) -> Design | None:
     if specimen.axes:
         given["along"] = specimen.axes.lower()
     return make({"shape": specimen.shape, "parameters": given, "quality": specimen.quality or "fine"})
+
+
+def named(design: Design, iteration: int, copy: int) -> Specimen:
+    """The name of a copy of a design.
+
+    Parameters
+    ----------
+    design : Design
+        Whose shape, axes, film and quality the name tells; nothing else of it does.
+    iteration, copy : int
+        Its iteration, and which copy it is, from 1.
+
+    Examples
+    --------
+    >>> named(make({"shape": "tri", "quality": "extrafine"}), 26, 3).name
+    '26 triX .2mm 3 x fine'
+    """
+    params = design.params
+    usual = design.shape == "reference" and params.dielectric_mm == _PLATE_MM  # type: ignore[attr-defined]
+    film_mm = 0.0 if usual else float(getattr(params, "dielectric_mm", 0.0))
+    return Specimen(
+        iteration=iteration,
+        shape=design.shape,
+        axes=str(getattr(params, "along", "")).upper(),
+        film_mm=round(film_mm, 6),
+        replicate=copy,
+        slicing={"fine": "fine", "extrafine": "x fine"}.get(design.layers.name, ""),
+    )
