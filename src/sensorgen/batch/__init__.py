@@ -147,7 +147,7 @@ def make(
     held = {key: review(design) for key, design in found.designs.items()}
     _refuse_unprintable(found, held, force=force, strict=strict)
     step("predictions")
-    predicted = {key: prediction(design) for key, design in found.designs.items()}
+    predicted = {key: prediction(design, judged=False) for key, design in found.designs.items()}
     folder = out / found.plan.name
     with store.staging(folder) as stage:
         step("3MF")

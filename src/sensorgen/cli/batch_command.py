@@ -82,11 +82,11 @@ def _say(made: "Batch") -> None:
     click.echo("\nchecklist")
     for line in record["checklist"]:
         click.echo(f"  [ ] {line}")
+    click.echo("\nfindings, as sensorgen check shows them")
     for name, found in made.findings.items():
-        open_ones = [f for f in found if not f.waiver]
-        worst = [f"{sum(f.severity == s for f in open_ones)} {s}s" for s in ("error", "warning")]
-        click.echo(f"\n{name}: {', '.join(worst)} (sensorgen check shows them)", nl=False)
-    click.echo(f"\n\n{made.folder}: {len(record['files']) + 1} files")
+        severities = [f.severity for f in found if not f.waiver]
+        click.echo(f"  {name}: {severities.count('error')} errors, {severities.count('warning')} warnings")
+    click.echo(f"\n{made.folder}: {len(record['files']) + 1} files")
 
 
 def _expected(expected: dict[str, Any]) -> str:
