@@ -35,12 +35,15 @@ def staging(folder: Path) -> Iterator[Path]:
             stage.mkdir()
             yield stage
         except OSError as error:
-            raise Unwritable(
-                f"cannot write to {str(folder)!r}: {error.strerror or error}; name another place with --out"
-            ) from None
+            raise unwritable(folder, error) from None
     finally:
         with _undisturbed():
             shutil.rmtree(stage, ignore_errors=True)
+
+
+def unwritable(path: Path, error: OSError) -> Unwritable:
+    """What to raise where a place cannot be written to."""
+    return Unwritable(f"cannot write to {str(path)!r}: {error.strerror or error}; name another place with --out")
 
 
 def _refuse_file(folder: Path) -> None:
