@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from sensorgen import store
-from sensorgen.batch import picture, record, sheet, tab
+from sensorgen.batch import picture, printing, record, sheet, tab
 from sensorgen.batch.layout import Plate, Room, Size, column, packed, room
 from sensorgen.batch.pieces import Piece, pieces, shuffled, tools
 from sensorgen.batch.plan import Plan, load
-from sensorgen.batch.printing import gcodes, threemfs
 from sensorgen.build import json_bytes, versions
 from sensorgen.design import Design
 from sensorgen.errors import BadInput, Unprintable
@@ -152,10 +151,11 @@ def make(
     with store.staging(folder) as stage:
         step("3MF")
         store.write(stage, {"plan.yaml": path.read_bytes()})
-        for name, content in _files(found):
+        on_plate = printing.placed(found.plan, found.pieces, found.plate)
+        for name, content in [*printing.threemfs(found.plan.name, on_plate), *_files(found)]:
             store.write(stage, {name: content})
-        step("slicing")
-        sliced = gcodes(found.plan, found.pieces, found.plate, stage) if gcode else {}
+        slicers = found.plan.slicers if gcode else ()
+        sliced: dict[str, Any] = {s: printing.gcode(found.plan.name, on_plate, s, stage, step) for s in slicers}
         step("record")
         made = record.sealed(_record(found, predicted, sliced, stage))
         store.write(stage, {record.RECORD: json_bytes(made)})
@@ -171,9 +171,8 @@ def _refuse_unprintable(found: Arranged, held: Mapping[str, Review], *, force: b
 
 
 def _files(found: Arranged) -> Iterator[tuple[str, bytes]]:
-    """Everything that needs no slicer."""
+    """What is for people: designs, plate and labels."""
     plan, machine = found.plan, found.pieces[0].design.machine
-    yield from threemfs(plan, found.pieces, found.plate)
     for key, design in found.designs.items():
         yield f"designs/{key}.json", json_bytes(design.model_dump(mode="json"))
     yield "plate.svg", picture.svg(plan.name, machine, found.room, found.plate, found.pieces).encode()

@@ -1,72 +1,80 @@
 """What slicers get, and what they give: the plate as one 3MF per family, and as G-code."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict
 from pathlib import Path
+from shutil import rmtree
 from typing import Any
 
-import numpy as np
-
-from sensorgen import materials, threemf
+from sensorgen import slicing, store, threemf
 from sensorgen.batch import tab
-from sensorgen.batch.layout import Plate, Rect
+from sensorgen.batch.layout import Plate
 from sensorgen.batch.pieces import Piece
 from sensorgen.batch.plan import Plan
-from sensorgen.design import Infill
-from sensorgen.geometry import meshes
-from sensorgen.printer import Printer
-from sensorgen.scene import Body
-from sensorgen.slicer import prusa
-from sensorgen.slicer.loads import Load
+from sensorgen.build import json_bytes
+from sensorgen.review import Step
+from sensorgen.slicer import curaengine
+from sensorgen.slicing import Placed
 
 
-def threemfs(plan: Plan, pieces: Sequence[Piece], plate: Plate) -> Iterator[tuple[str, bytes]]:
-    """Name and content of the plate's 3MF for each family of slicers."""
-    machine = pieces[0].design.machine
-    parts = [part for number, place in plate.items() for part in _parts(plan, pieces[number], place)]
-    middle = _middle_mm(parts)
+def placed(plan: Plan, pieces: Sequence[Piece], plate: Plate) -> list[Placed]:
+    """The specimens of a plate as slicing knows them, each with its tab where the plan wants them."""
+    return [
+        Placed(
+            pieces[number].design, place.centre_mm, pieces[number].name,
+            tab.bodies(pieces[number].design, pieces[number].name) if plan.labels.tab else (),
+        )
+        for number, place in plate.items()
+    ]  # fmt: skip
+
+
+def threemfs(name: str, found: Sequence[Placed]) -> Iterator[tuple[str, bytes]]:
+    """Name and content of the 3MF of a plate called ``name``, for each family of slicers."""
     for family in threemf.FAMILIES:
-        yield (
-            f"{plan.name}.{family}.3mf",
-            threemf.content(family, plan.name, parts, _bed_mm(machine, family, middle)),
-        )
+        yield f"{name}.{family}.3mf", slicing.plate_3mf(found, family, name)
 
 
-def _parts(plan: Plan, piece: Piece, place: Rect) -> Iterator[threemf.Part]:
-    design = piece.design
-    bodies: tuple[Body, ...] = design.printed.bodies
-    if plan.labels.tab:
-        bodies += tab.bodies(design, piece.name)
-    shift = np.array([place.x0, place.y0, 0.0])
-    for body in bodies:
-        tool = design.tool(body.material)
-        infill = design.infill.get(body.material, Infill())
-        load = Load(design.material(body.material), design.used()[body.material], infill.percent, infill.pattern)
-        mesh = meshes.mesh(body)
-        yield threemf.Part(
-            name=f"{piece.name}: {body.name}",
-            material=materials.load(body.material).title,
-            colour=materials.load(body.material).colour,
-            extruder=design.machine.slicer_index(tool),
-            mesh=replace(mesh, vertices_mm=mesh.vertices_mm + shift),
-            settings=prusa.volume_settings(design.machine, design.layers, tool, load),
-        )
+def gcode(name: str, found: Sequence[Placed], slicer: str, folder: Path, step: Step) -> dict[str, Any]:
+    """Slice a plate into ``folder``, and say by what.
+
+    Parameters
+    ----------
+    name : str
+        Of the batch; ``<name>.<slicer>.gcode`` is for the printer.
+    found : sequence of Placed
+        The specimens.
+    slicer : str
+        ``prusa`` or ``cura``.
+    folder : Path
+        Of the batch; the slicer's own G-code and its settings go to a folder of its name in there.
+    step : callable
+        Told again and again while the slicer works.
+
+    Returns
+    -------
+    dict
+        Version of the slicer, and the names of its files.
+    """
+    inside, own, ready = folder / f".{slicer}", folder / slicer, folder / f"{name}.{slicer}.gcode"
+    made = slicing.sliced(found, slicer, inside, step=lambda _: step("slicing"))
+    own.mkdir()
+    made.raw.replace(own / "raw.gcode")
+    made.ready.replace(ready)
+    if slicer == "prusa":
+        settings = "profile.ini"
+        (inside / settings).replace(own / settings)
+    else:
+        settings = "settings.json"
+        store.write(own, {settings: json_bytes(_engine_settings(found))})
+    rmtree(inside)  # what is left are the bodies again, as the slicer took them
+    return {
+        "version": made.version,
+        "gcode": ready.name,
+        "raw": f"{slicer}/raw.gcode",
+        "profile": f"{slicer}/{settings}",
+    }
 
 
-def _middle_mm(parts: Sequence[threemf.Part]) -> tuple[float, float]:
-    low = np.min([part.mesh.vertices_mm.min(axis=0) for part in parts], axis=0)
-    high = np.max([part.mesh.vertices_mm.max(axis=0) for part in parts], axis=0)
-    return float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2
-
-
-def _bed_mm(machine: Printer, family: str, place: tuple[float, float]) -> tuple[float, float]:
-    """A place as a slicer family counts it: Cura from the front left corner, whatever the printer does."""
-    if family != "cura":
-        return place
-    (x, y), (bed_x, bed_y) = machine.bed_centre_mm(), machine.bed_mm
-    return place[0] - x + bed_x / 2, place[1] - y + bed_y / 2
-
-
-def gcodes(plan: Plan, pieces: Sequence[Piece], plate: Plate, folder: Path) -> dict[str, Any]:
-    """Slice the plate into ``folder``; what each slicer was, by its name."""
-    raise NotImplementedError
+def _engine_settings(found: Sequence[Placed]) -> dict[str, Any]:
+    design = found[0].design
+    return asdict(curaengine.engine_settings(design.machine, design.layers, slicing.plate_loads(found)))
