@@ -39,7 +39,7 @@ class Clock:
 
 
 def rows():
-    yield "| specimens | lines | ours [s] | of it checks, predictions | 3MF, labels | G-code | slicer [s] | ours/slicer |"
+    yield "| specimens | lines | ours [s] | checks, predictions | 3MF, labels | G-code | slicer [s] | ours/slicer |"
     yield "|---|---|---|---|---|---|---|---|"
     for number in (NUMBERS[0], *NUMBERS):  # the first fills caches
         with tempfile.TemporaryDirectory() as folder:

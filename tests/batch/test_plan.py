@@ -9,7 +9,7 @@ import pytest
 
 from sensorgen import design
 from sensorgen.batch.pieces import pieces, shuffled, tools
-from sensorgen.batch.plan import load
+from sensorgen.batch.plan import Plan, load
 from sensorgen.errors import BadInput, OutOfRange, SensorgenError, UnknownName
 
 ROOT = Path(__file__).parents[2]
@@ -172,3 +172,10 @@ def test_a_huge_specimen_fits_nowhere(plan):
 
     with pytest.raises(OutOfRange, match="fits on no plate"):
         arranged(plan(HEAD + "  - {shape: tri, parameters: {length_mm: 400}}\n"))
+
+
+def test_the_page_shows_the_example_and_every_key_of_a_plan():
+    page = (ROOT / "docs" / "batch.md").read_text("utf-8")
+    shown = page.partition("```yaml\n")[2].partition("```")[0]
+    assert EXAMPLE.read_text("utf-8").partition("\n")[2] == shown
+    assert not [key for key in Plan.model_fields if f"`{key}`" not in page]
