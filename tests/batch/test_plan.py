@@ -55,6 +55,12 @@ def test_a_plan_overrides_quality_and_printer_of_its_designs(plan):
     assert piece.name == "26 triX .2mm 1 x fine"
 
 
+def test_a_plan_assigns_tools(plan, tmp_path):
+    (tmp_path / "own.yaml").write_text("shape: rect\ntools: {x60: 2, bvoh: 1}\n")
+    path = plan("tools: {x60: 5, etpu: 4}\n" + HEAD + "  - {shape: tri}\n  - {design: own.yaml}\n")
+    assert tools([p.design for p in read(path)]) == {4: "etpu", 5: "x60"}
+
+
 def test_parameters_and_materials_go_before_those_of_the_file(plan, tmp_path):
     (tmp_path / "own.yaml").write_text("name: mine\nshape: tri\nparameters: {dielectric_mm: 0.3, length_mm: 50}\n")
     path = plan(HEAD + "  - {design: own.yaml, parameters: {dielectric_mm: 0.1}, materials: {film: x60@thesis-4.1}}\n")
