@@ -1,6 +1,7 @@
 """The page of labels: every code read back by another program's eye."""
 
 import re
+import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from sensorgen.batch import sheet
 from sensorgen.batch.pieces import Piece, pieces
 from sensorgen.batch.plan import load
 from sensorgen.design import make
+from sensorgen.errors import MissingValue
 from sensorgen.specimen import named, parse
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
@@ -62,6 +64,12 @@ def test_the_page_needs_nothing_else_and_holds_text_as_text():
     assert "&lt;b&gt;&amp;" in page
     assert not re.findall(r"(?:src|href)\s*=", page)
     assert set(re.findall(r"https?://[^\"' ]+", page)) <= {"http://www.w3.org/2000/svg"}
+
+
+def test_without_the_library_of_codes_it_is_said_what_to_do(monkeypatch):
+    monkeypatch.setitem(sys.modules, "segno", None)
+    with pytest.raises(MissingValue, match=r"pip install segno, or set 'labels: \{sheet: false\}'"):
+        sheet.page(labels(), "a")
 
 
 def test_the_same_batch_gives_the_same_page():

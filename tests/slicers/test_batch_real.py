@@ -165,6 +165,19 @@ def test_a_slicer_that_fails_leaves_nothing_and_says_why(tmp_path, monkeypatch):
     assert list((tmp_path / "out").rglob("*")) == []
 
 
+def test_a_batch_that_fails_leaves_the_earlier_one_as_it_was(tmp_path, monkeypatch):
+    path = tmp_path / "plan.yaml"
+    path.write_text(SMALL, "utf-8")
+    folder = make(path, tmp_path / "out", gcode=False).folder
+    stand_in(tmp_path, monkeypatch, "exit 1")
+    path.write_text(SMALL.replace("seed: 3", "seed: 4"), "utf-8")
+    with pytest.raises(SlicerFailed):
+        make(path, tmp_path / "out")
+    assert not differences(folder)
+    assert json.loads((folder / RECORD).read_text("utf-8"))["seed"] == 3
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["plan"]
+
+
 def test_a_slicer_that_is_missing_leaves_nothing_and_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(SlicerFailed, match="not installed"):

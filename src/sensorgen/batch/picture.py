@@ -9,6 +9,7 @@ from sensorgen.printer import Printer
 
 COLOURS = ("#cfe3f5", "#f8d9c0", "#d5ecd0", "#e6d8ef", "#f6e7a8", "#d3d3d3", "#f5cfe0", "#c9ebe8")
 _ROW_MM = 5.0
+_LETTERS = 48  # of a line of the list, which is 95 mm wide
 _LETTER = 0.62  # width of a letter in font sizes, as sans-serif fonts have it at most on average
 _STYLE = "text { font-family: sans-serif; fill: #111 } .thin { fill: none; stroke: #555; stroke-width: .3 }"
 
@@ -93,11 +94,15 @@ def _list(plate: Plate, pieces: Sequence[Piece], columns: int, rows: int, top: f
     return [
         _text(
             (order // rows) * 95, top + (order % rows) * _ROW_MM, 3.6,
-            f"{order + 1}: {pieces[number].name}, {pieces[number].design.name}"[:52],
+            _cut(f"{order + 1}: {pieces[number].name}, {pieces[number].design.name}"),
         )
         for order, number in enumerate(plate)
         if order < columns * rows
     ]  # fmt: skip
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _LETTERS else text[: _LETTERS - 1] + "…"
 
 
 def _box(place: Rect, bed: Rect) -> str:
