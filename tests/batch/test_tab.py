@@ -38,11 +38,11 @@ def test_what_is_written_can_be_read():
         " #   # #",
         " ### ###",
         "",
-        " ### ### ### # #",
-        "  #  # #  #  # #",
-        "  #  ##   #   #",
-        "  #  # #  #  # #",
-        "  #  # # ### # #",
+        " ### #### ### #   #",
+        "  #  #  #  #  ## ##",
+        "  #  ####  #   ###",
+        "  #  # #   #  ## ##",
+        "  #  # ## ### #   #",
         "",
         " ###",
         "   #",
@@ -97,6 +97,14 @@ def test_letters_that_look_alike_never_change_a_name():
     glyphs = tab._FONT
     alike = {(a, b) for a in glyphs for b in glyphs if a < b and glyphs[a] == glyphs[b]}
     assert alike <= {("0", "O"), ("5", "S")}  # digits stand in numbers alone, O and S in words
+
+
+@pytest.mark.parametrize("letter", tab._FONT)
+def test_no_dot_of_a_letter_hangs_on_its_corners_alone(letter):
+    dots = np.pad(np.array([[dot == "#" for dot in row] for row in tab._FONT[letter].split()]), 1)
+    beside = np.roll(dots, 1, 0) | np.roll(dots, -1, 0) | np.roll(dots, 1, 1) | np.roll(dots, -1, 1)
+    assert dots.any()
+    assert (beside | ~dots).all()
 
 
 def test_narrow_sensors_are_told():
