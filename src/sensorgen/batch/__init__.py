@@ -71,6 +71,10 @@ class Batch:
     record: dict[str, Any]
     findings: dict[str, list[Finding]]
 
+    def gcode_errors(self) -> int:
+        """How many findings of severity error the check of the G-code has [-]."""
+        return sum(f["severity"] == "error" for used in self.record["slicers"].values() for f in used["findings"])
+
 
 def arranged(path: Path) -> Arranged:
     """A plan's file laid out on its plate.

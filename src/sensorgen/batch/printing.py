@@ -9,9 +9,10 @@ from typing import Any
 from sensorgen import slicing, store, threemf
 from sensorgen.batch import tab
 from sensorgen.batch.layout import Plate
-from sensorgen.batch.pieces import Piece
+from sensorgen.batch.pieces import Piece, tools
 from sensorgen.batch.plan import Plan
 from sensorgen.build import json_bytes
+from sensorgen.gcode.check import check
 from sensorgen.review import Step
 from sensorgen.slicer import curaengine
 from sensorgen.slicing import Placed
@@ -53,7 +54,7 @@ def gcode(name: str, found: Sequence[Placed], slicer: str, folder: Path, step: S
     Returns
     -------
     dict
-        Version of the slicer, and the names of its files.
+        Version of the slicer, the names of its files, what the check of the printer's file found, and what it takes.
     """
     inside, own, ready = folder / f".{slicer}", folder / slicer, folder / f"{name}.{slicer}.gcode"
     made = slicing.sliced(found, slicer, inside, step=lambda _: step("slicing"))
@@ -67,11 +68,13 @@ def gcode(name: str, found: Sequence[Placed], slicer: str, folder: Path, step: S
         settings = "settings.json"
         store.write(own, {settings: json_bytes(_engine_settings(found))})
     rmtree(inside)  # what is left are the bodies again, as the slicer took them
+    checked = check(ready, found[0].design.machine, tools(piece.design for piece in found))
     return {
         "version": made.version,
         "gcode": ready.name,
         "raw": f"{slicer}/raw.gcode",
         "profile": f"{slicer}/{settings}",
+        **checked.as_dict(),
     }
 
 

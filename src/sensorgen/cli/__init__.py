@@ -16,6 +16,8 @@ COMMANDS = (
     "build",
     "batch",
     "check",
+    "slice",
+    "gcode",
     "draw",
     "predict",
     "cell",

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from sensorgen.batch import Batch
     from sensorgen.batch.record import Differences
 
-FOUND_DIFFERENCES = 1
+FOUND_ERRORS = FOUND_DIFFERENCES = 1
 
 
 class _PlanGroup(click.Group):
@@ -70,7 +70,7 @@ def _make(plan: str, *, out: str, no_gcode: bool, force: bool, strict: bool, as_
         show.as_json({"folder": str(made.folder), **made.record})
     else:
         _say(made)
-    return 0
+    return FOUND_ERRORS if made.gcode_errors() else 0
 
 
 def _say(made: "Batch") -> None:
@@ -86,7 +86,20 @@ def _say(made: "Batch") -> None:
     for name, found in made.findings.items():
         severities = [f.severity for f in found if not f.waiver]
         click.echo(f"  {name}: {severities.count('error')} errors, {severities.count('warning')} warnings")
+    for slicer, used in record["slicers"].items():
+        click.echo(f"\n{slicer} {used['version']}: {_taken(used)}")
+        for f in used["findings"]:
+            click.echo(f"  {f['severity']}: line {f['line']}: {f['message']}; {f['advice']}")
     click.echo(f"\n{made.folder}: {len(record['files']) + 1} files")
+
+
+def _taken(used: dict[str, Any]) -> str:
+    """Time and filament of a file, as its check sums them up."""
+    spools = (
+        f"T{t['tool']} {t['filament_mm'] / 1000:.2f} m" + (f", {t['mass_g']:.1f} g" if t["mass_g"] is not None else "")
+        for t in used["tools"]
+    )
+    return f"at least {used['time_s'] / 3600:.1f} h; {'; '.join(spools)}; {used['tool_changes']} tool changes"
 
 
 def _expected(expected: dict[str, Any]) -> str:

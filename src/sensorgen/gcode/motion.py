@@ -24,10 +24,16 @@ DEFAULT_FEED_MM_MIN = 3000.0  # RepRapFirmware's, until a line says another
 NO_TOOL = -1
 INCH_MM = 25.4
 COLUMNS = 10
+MOST_FAULTS = 10_000  # enough to know that a file is none
 MOST_MM = 1e9  # beyond this a number is a slip, and differences of it are noise
 
 _N = f"({words.NUMBER})"
-_PLAIN = re.compile(rf"G[01](?: +F{_N})?(?: +X{_N})?(?: +Y{_N})?(?: +Z{_N})?(?: +E{_N})?(?: +F{_N})? *(?:;.*)?[\r\n]*$")
+_PLAIN = re.compile(
+    rf"G[01](?: +F{_N})?(?: +X{_N})?(?: +Y{_N})?(?: +Z{_N})?(?: +E{_N})?(?: +F{_N})? *(?:;[ -~\t]*)?[\r\n]*$"
+)
+
+
+_TOOL = re.compile("-?[0-9]{1,6}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +51,7 @@ class Fault:
 
     number: int
     what: str
+    severe: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +118,8 @@ class Motion:
         What could not be read or followed.
     lines : int
         How many lines the file has.
+    maker : str
+        Slicer that names itself at the top, where that tells something; else "".
     """
 
     rows: Floats
@@ -126,6 +135,7 @@ class Motion:
     absolute_e: Track
     faults: Sequence[Fault]
     lines: int
+    maker: str
 
     @property
     def start_mm(self) -> Floats:
@@ -204,6 +214,7 @@ class _Follower:
         self.tools, self.kind, self.width = Track(), Track(), Track()
         self.height, self.layer, self.relative, self.absolute = Track(), Track(), Track(), Track()
         self.kinds: dict[str, int] = {"": 0}
+        self.maker = ""
         self.tool = NO_TOOL
         self.owed_by: defaultdict[int, float] = defaultdict(float)
         head, _, tail = prime_macro.partition("{tool}")
@@ -236,7 +247,7 @@ class _Follower:
                 elif to_e:
                     owed, extruded = -extruded, 0.0
                 put((from_x, from_y, from_z, x, y, z, extruded, moved, feed, number))
-            elif line[:1] == ";":
+            elif line[:1] == ";" and line.isascii():
                 self._note(line[1:])
             elif not line.isspace():
                 self.x, self.y, self.z, self.e, self.owed, self.feed = x, y, z, e, owed, feed
@@ -253,7 +264,7 @@ class _Follower:
         self._judge(rows)
         return Motion(
             rows, self.events, self.changes, self.tools, tuple(self.kinds), self.kind, self.width, self.height,
-            self.layer, self.relative, self.absolute, sorted(self.faults, key=lambda f: f.number), count,
+            self.layer, self.relative, self.absolute, sorted(self.faults, key=lambda f: f.number), count, self.maker,
         )  # fmt: skip
 
     def _judge(self, rows: Floats) -> None:
@@ -267,9 +278,15 @@ class _Follower:
         """How many moves there are so far."""
         return len(self.rows) // COLUMNS
 
+    def _fault(self, number: int, what: str, *, severe: bool = True) -> None:
+        if len(self.faults) < MOST_FAULTS:
+            self.faults.append(Fault(number, what, severe))
+
     def _note(self, remark: str) -> None:
         for quantity, value in remarks.read(remark):
-            if isinstance(value, str):
+            if quantity == remarks.MAKER:
+                self.maker = str(value)
+            elif isinstance(value, str):
                 self.kind.put(self.row, self.kinds.setdefault(value, len(self.kinds)))
             elif quantity == remarks.WIDTH:
                 self.width.put(self.row, value)
@@ -283,7 +300,11 @@ class _Follower:
         said = words.parse(line)
         if said.remark:
             self._note(said.remark)
-        self.faults += [Fault(number, what) for what in said.faults]
+        if not line.isascii():
+            foreign = not line.partition(";")[0].isascii()
+            self._fault(number, "characters that are not ASCII" + ("" if foreign else " in a comment"), severe=foreign)
+        for what in said.faults:
+            self._fault(number, what, severe=not words.is_meta(line))
         for command in said.commands:
             if command.code[0] == "T":
                 self._select(command.code[1:], number)
@@ -303,7 +324,7 @@ class _Follower:
         clockwise = command.code == "G2"
         centre = self._centre(command, start, end, clockwise) if self.flat else None
         if centre is None:
-            self.faults.append(Fault(number, f"{command.code} without a centre that fits; taken as a straight line"))
+            self._fault(number, f"{command.code} without a centre that fits; taken as a straight line")
             self._put(end, moved, number)
             return
         ends = list(arcs.chords(start, end, centre, clockwise=clockwise))
@@ -354,16 +375,15 @@ class _Follower:
     def _number(self, command: Command, letter: str, number: int) -> float | None:
         value = command.number(letter)
         if value is not None and math.isnan(value):
-            self.faults.append(Fault(number, f"{letter}{command.text(letter)} of {command.code} is no number"))
+            self._fault(number, f"{letter}{command.text(letter)} of {command.code} is no number")
             return None
         return value
 
     def _select(self, digits: str, number: int, *, macro: bool = False) -> None:
-        try:
-            tool = int(digits)
-        except ValueError:
-            self.faults.append(Fault(number, f"T{digits} is no tool"))
+        if not _TOOL.fullmatch(digits):
+            self._fault(number, f"T{digits[:20]} is no tool")
             return
+        tool = int(digits)
         self.owed_by[self.tool] = self.owed
         self.tool = tool if tool >= 0 else NO_TOOL
         self.owed = self.owed_by[self.tool]
@@ -371,7 +391,7 @@ class _Follower:
         self.changes.append(Change(self.row, number, self.tool, macro))
 
     def _call(self, command: Command, number: int) -> None:
-        if self.macro and (found := self.macro.fullmatch(command.text("P") or "")):
+        if self.macro and (found := self.macro.fullmatch(macro_name(command))):
             self._select(found[1], number, macro=True)
 
     def _mode(self, command: Command, _: int) -> None:
@@ -403,6 +423,11 @@ class _Follower:
         self.y = self.y if y is None else y * self.scale
         self.z = self.z if z is None else z * self.scale
         self.e = self.e if e is None else e * self.scale
+
+
+def macro_name(command: Command) -> str:
+    """File that ``M98`` calls, without drive and folders."""
+    return (command.text("P") or "").rpartition(":")[2].rpartition("/")[2]
 
 
 def _nothing(_: Command, __: int) -> None:

@@ -13,8 +13,9 @@ comments, moves and everything else stay as they are. What changes is the printe
 - commands after the printer's last one are never reached and go.
 """
 
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import pairwise
+from math import isfinite
 
 import numpy as np
 
@@ -63,15 +64,14 @@ def ready(lines: Iterable[str], motion: Motion, machine: Printer) -> Iterator[st
     """
     _refuse_absolute(motion, machine)
     writer = _Writer(machine)
-    before = defaultdict(list, _preheats(motion, machine))
+    before = dict(_preheats(motion, machine))
     end = _last_line(motion)
     for number, line in enumerate(lines, 1):
-        if number in before:
-            yield from before[number]
-        if line[:3] in _MOVES:
+        is_move = line[:3] in _MOVES
+        if is_move:
             yield from writer.take()
-            yield line
-        elif line[:1] == ";" or line.isspace():
+        yield from before.get(number, ())
+        if is_move or line[:1] == ";" or line.isspace():
             yield line
         else:
             yield from writer.line(line)
@@ -103,7 +103,7 @@ def _preheats(motion: Motion, machine: Printer) -> Iterator[tuple[int, list[str]
         return
     clock = np.concatenate([[0.0], np.cumsum(seconds(motion, machine.max_speed_mm_s))])
     numbers = motion.number
-    for last, change in zip(motion.changes, motion.changes[1:], strict=False):
+    for last, change in pairwise(motion.changes):
         if NO_TOOL in (last.tool, change.tool) or change.tool == last.tool or change.row == last.row:
             continue
         row = int(np.searchsorted(clock, clock[change.row] - machine.control.preheat_s))
@@ -111,12 +111,12 @@ def _preheats(motion: Motion, machine: Printer) -> Iterator[tuple[int, list[str]
         yield int(numbers[row]), [f"M568 P{_own(machine, change.tool)} A2\n"]
 
 
-def _own(machine: Printer, index: int) -> int:
+def _own(machine: Printer, index: float) -> int:
     """The printer's number of a tool that a slicer counts from 0."""
     count = len(machine.tool_numbers)
-    if not 0 <= index < count:
-        raise BadInput(f"the slicer's file takes tool {index}, counted from 0; {machine.name} has {count} tools")
-    return machine.tool_numbers[index]
+    if index not in range(count):
+        raise BadInput(f"the slicer's file takes tool {index:g}, counted from 0; {machine.name} has {count} tools")
+    return machine.tool_numbers[int(index)]
 
 
 class _Writer:
@@ -169,7 +169,7 @@ class _Writer:
         return self.changes.get(command.code, _stays)(command)
 
     def _change(self, command: Command) -> Sequence[str]:
-        self.tool = _own(self.machine, int(float(command.code[1:])))
+        self.tool = _own(self.machine, float(command.code[1:]))
         texts = [_text(Command(f"T{self.tool}", command.words))[0]]
         if self.control.names_tools:
             texts.append(f"M116 P{self.tool}")
@@ -186,7 +186,7 @@ class _Writer:
         if not command.has("SR"):
             return None  # retraction by the firmware, or offsets of a place of work
         index = command.number("P")
-        tool = self.tool if index is None else _own(self.machine, int(index))
+        tool = self.tool if index is None else _own(self.machine, index)
         active, standby = command.number("S"), command.number("R")
         if tool is None or not self.control.names_tools:
             return None
@@ -199,7 +199,7 @@ class _Writer:
         index = command.number("T")
         if index is None and active <= 0:
             return [text.strip() for text in self.cold()]
-        tool = self.tool if index is None else _own(self.machine, int(index))
+        tool = self.tool if index is None else _own(self.machine, index)
         if tool is None:
             raise BadInput(f"{command.code} of the slicer's file names no tool, and none is taken yet")
         waits = [f"M116 P{tool}"] if command.code == "M109" else []
@@ -213,6 +213,8 @@ class _Writer:
         elif active == 0 and tool in self.hot:
             self.hot.remove(tool)
         given = [("S", active), ("R", standby)]
+        if any(value is not None and not isfinite(value) for _, value in given):
+            raise BadInput(f"the slicer's file sets tool {tool} to a temperature that is no number")
         return " ".join([f"G10 P{tool}", *(f"{letter}{value:g}" for letter, value in given if value is not None)])
 
     def _fan(self, command: Command) -> Sequence[str] | None:
@@ -230,7 +232,7 @@ class _Writer:
         index = command.number("P")
         if index is None:
             return None
-        own = str(_own(self.machine, int(index)))
+        own = str(_own(self.machine, index))
         return _text(Command(command.code, tuple((n, own if n == "P" else t) for n, t in command.words)))
 
 

@@ -22,6 +22,7 @@ _TOKEN = re.compile(
     )""",
     re.VERBOSE | re.IGNORECASE | re.DOTALL,
 )
+_MOST_FAULTS = 5  # of one line: a line of noise needs no more
 _META = re.compile(r"\s*(?:if|elif|else|while|break|continue|var|global|set|echo|abort|skip)\b", re.IGNORECASE)
 _FREE_TEXT = re.compile(r"\s*(?:N[0-9]+\s*)?(M(?:23|28|30|32|36|38|117))(?![0-9])\s*(.*)", re.IGNORECASE | re.DOTALL)
 _NUMBER = re.compile(NUMBER)
@@ -92,9 +93,14 @@ def parse(text: str) -> Line:
     if free := _FREE_TEXT.match(text):
         code, rest = free.groups()
         return Line((Command(code.upper(), (("", rest.partition(";")[0].strip()),)),))
-    if _META.match(text):
+    if is_meta(text):
         return Line((), "", (f"a line of the firmware's own language, which is not followed: {text.strip()[:60]!r}",))
     return _read(text)
+
+
+def is_meta(text: str) -> bool:
+    """Whether a line is of the firmware's own language, as ``if`` and ``while``."""
+    return _META.match(text) is not None
 
 
 def _read(text: str) -> Line:
@@ -114,7 +120,7 @@ def _read(text: str) -> Line:
         else:
             faults.append(f"{token['junk']!r} means nothing here")
     made = tuple(Command(code, tuple(words)) for code, words in commands)
-    return Line(made, remark, tuple(faults))
+    return Line(made, remark, tuple(faults[:_MOST_FAULTS]))
 
 
 def _take(commands: list[tuple[str, list[tuple[str, str]]]], letter: str, value: str) -> list[str]:
