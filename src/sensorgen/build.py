@@ -90,7 +90,7 @@ def build(
             store.write(stage, {name: content})
         if job:
             _await(job, step)
-        store.write(stage, {store.MANIFEST: _json(_manifest(design, stage))})
+        store.write(stage, {store.MANIFEST: json_bytes(_manifest(design, stage))})
         store.publish(stage, folder)
         step("done")
     return Built(folder, held, predicted)
@@ -109,9 +109,9 @@ def _files(design: Design, held: Review, predicted: dict[str, Any], step: Step) 
         yield path, text.encode()
     step("drawing")
     yield f"{name}.svg", draw(design, held).encode()
-    yield "check.json", _json(report(design, held))
-    yield "prediction.json", _json(predicted)
-    yield "design.json", _json(design.model_dump(mode="json"))
+    yield "check.json", json_bytes(report(design, held))
+    yield "prediction.json", json_bytes(predicted)
+    yield "design.json", json_bytes(design.model_dump(mode="json"))
 
 
 def _await(job: "Future[None]", step: Step) -> None:
@@ -178,7 +178,7 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _json(data: Mapping[str, Any]) -> bytes:
+def json_bytes(data: Mapping[str, Any]) -> bytes:
     """Indented JSON that ends in a newline; infinity, which JSON lacks, becomes a word."""
     return (json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
 

@@ -17,6 +17,7 @@ from sensorgen.gcode.motion import follow
 from sensorgen.gcode.ready import ready
 from sensorgen.geometry import meshes
 from sensorgen.geometry.mesh import Mesh
+from sensorgen.scene import Body
 from sensorgen.slicer import curaengine, prusa, stl
 from sensorgen.slicer.loads import Load
 from sensorgen.slicer.run import TIMEOUT_S, Runner
@@ -32,11 +33,16 @@ Step = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Placed:
-    """A sensor on the plate: its middle in the printer's own coordinates [mm], and a name of its own."""
+    """A sensor on the plate: its middle in the printer's own coordinates [mm], and a name of its own.
+
+    ``extra`` are bodies printed with it, as a tab with its name, in the coordinates of the printed sensor; the middle
+    is that of all.
+    """
 
     design: Design
     centre_mm: tuple[float, float]
     name: str
+    extra: tuple[Body, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -233,7 +239,8 @@ def plate_parts(pieces: Sequence[Placed]) -> list[threemf.Part]:
         key = piece.design.id()
         if key not in made:
             made[key] = parts(piece.design, {body.name: meshes.mesh(body) for body in piece.design.printed.bodies})
-        found += threemf.placed(made[key], piece.centre_mm, piece.name)
+        extra = [_part(piece.design, body.name, body.material, meshes.mesh(body)) for body in piece.extra]
+        found += threemf.placed([*made[key], *extra], piece.centre_mm, piece.name)
     return found
 
 

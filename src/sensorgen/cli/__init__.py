@@ -14,6 +14,7 @@ from sensorgen.errors import SensorgenError, Unprintable
 
 COMMANDS = (
     "build",
+    "batch",
     "check",
     "slice",
     "gcode",
