@@ -23,6 +23,7 @@ COMMANDS = (
     "invert",
     "sheet",
     "stack",
+    "log",
     "list",
     "schema",
     "completion",
