@@ -1,16 +1,19 @@
 """Recordings of the bench into the log: what is counted when they come in, and their files kept whole."""
 
 import json
-import uuid
+import math
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sensorgen.errors import BadInput
 from sensorgen.log import files
-from sensorgen.log.entries import BenchRun, Entry, RawFile
+from sensorgen.log.entries import BenchRun, Entry
 from sensorgen.log.logbook import Log
 from sensorgen.log.words import design_of_name, named
+
+if TYPE_CHECKING:
+    from sensorgen.recording import Joined, Recording
 
 
 def take(log: Log, specimen: str, recording: Path, rig: Path | None = None, remark: str = "") -> list[Entry]:
@@ -54,6 +57,37 @@ def take(log: Log, specimen: str, recording: Path, rig: Path | None = None, rema
     return [row for row in log.add([*kept, run]) if isinstance(row, BenchRun)]
 
 
-def _facts(recording: Path, rig: Path | None) -> dict[str, Any]:
-    """What is counted in a recording, as plain data."""
-    return {}
+def _facts(path: Path, rig: Path | None) -> dict[str, Any]:
+    """What is counted in a recording and in the rig's log, and how their clocks differ, as plain data."""
+    from sensorgen import recording
+
+    found = recording.read_all(path)
+    facts: dict[str, Any] = {"lockins": [_of_recording(r) for r in found]}
+    if rig:
+        log = recording.rig(rig)
+        facts["rig"] = {**log.counts(), "notes": list(log.notes), **_of_clocks(recording.joined(found[0], log))}
+    return facts
+
+
+def _of_recording(r: "Recording") -> dict[str, Any]:
+    source = {name: _plain(value) for name, value in vars(r.source).items() if name != "file"}
+    tones = [float(tone) for tone in r.tones_hz]
+    return {
+        "tones_hz": tones,
+        "counts": r.counts(),
+        "seconds": float(r.time_s[-1]),
+        "epoch_s": _plain(r.epoch_s),
+        **source,
+    }
+
+
+def _of_clocks(joined: "Joined") -> dict[str, Any]:
+    names = ("offset_s", "offset_error_s", "skew", "skew_error", "explained")
+    return {"clocks": joined.words()} | {name: _plain(getattr(joined, name)) for name in names}
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it: no nan, no tuples."""
+    if isinstance(value, tuple):
+        return list(value)
+    return None if isinstance(value, float) and not math.isfinite(value) else value

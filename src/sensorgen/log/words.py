@@ -13,6 +13,8 @@ from sensorgen.specimen import Specimen as Name
 from sensorgen.specimen import design_of, parse
 
 MOST_LETTERS = 10_000  # of a remark
+NO_FILM = "no film named: none"  # doubtful only where names had no place for a film yet:
+FIRST_WITH_FILMS = 22  # iteration; the thesis writes films into names after this one, and in none before
 _UNBAKED = re.compile(r"\b(not|un|never)[\s-]*baked\b|\bbefore (the )?bak(e|ing)\b", re.IGNORECASE)
 
 
@@ -76,13 +78,13 @@ def reading(
     columns, name = named(written)
     said = {axis: _resistance(axis, words) for axis, words in (("y", y_words), ("z", z_words))}
     unbaked = bool(_UNBAKED.search(remark))
-    doubts = [*name.assumed]
+    doubts = [doubt for doubt in name.assumed if doubt != NO_FILM or (name.iteration or 0) < FIRST_WITH_FILMS]
     for axis, found in said.items():
         doubts += [f"{axis}: {doubt}" for doubt in found.doubts if not (mega and "read as mega" in doubt)]
     doubts += _blanks(*(found.ohm for found in said.values())) if table else []
     if unbaked and baked:
         doubts.append("said to be baked, and the remark says that it is not")
-    design_id, design = _design(dataclasses.replace(name, iteration=None, replicate=None, place=""))
+    design_id, design = design_of_name(name)
     return Reading(
         **{"uid": uuid.uuid4().hex, "design_id": design_id, "design": design} | columns | more,  # type: ignore[arg-type]
         written=written,
@@ -110,9 +112,13 @@ def _blanks(y_ohm: tuple[float, ...], z_ohm: tuple[float, ...]) -> Iterator[str]
         yield f"{'z' if y_ohm else 'y'} blank: not measured, or an overload"
 
 
+def design_of_name(name: Name) -> tuple[str, str]:
+    """Identity and name of the design that a specimen's name stands for, "" where it does not tell."""
+    return _design(dataclasses.replace(name, iteration=None, replicate=None, place=""))
+
+
 @lru_cache(maxsize=256)
 def _design(name: Name) -> tuple[str, str]:
-    """Identity and name of the design that a name stands for, "" where it does not tell."""
     try:
         design = design_of(name)
     except SensorgenError:  # a film that no design may have
