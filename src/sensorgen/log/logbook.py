@@ -33,6 +33,19 @@ TABLES: dict[type[Any], str] = {
 _NULL_FOR_NONE = ("supersedes", "rig_file")  # text that is NULL where it is "", so that it may be a key
 _KINDS: tuple[type[Any], ...] = (Specimen, *TABLES)
 _CODECS = {kind: {name: CODECS[hint] for name, hint in columns(kind).items()} for kind in _KINDS}
+_TIES = ("batch", "design_id", "design")
+_PRINTED = (
+    "SELECT batch.batch, print.design_id, print.design FROM print JOIN batch ON batch.uid = print.batch_uid "
+    "WHERE print.specimen = ? ORDER BY print.number DESC LIMIT 1"
+)
+
+
+def _insert_into(table: str, names: Sequence[str], otherwise: str = "") -> str:
+    marks = ", ".join("?" * len(names))
+    return f"INSERT {otherwise} INTO {table} ({', '.join(names)}) VALUES ({marks})"  # noqa: S608 - our own names
+
+
+_OF_NAME = _insert_into("specimen", SPECIMEN_COLUMNS, "OR IGNORE")
 _Kind = TypeVar("_Kind", bound=Entry)
 
 
@@ -188,19 +201,17 @@ class Log:
             return [new for entry in entries if (new := self._add(entry, now))]
 
     def _add(self, entry: Entry, now: str) -> Entry | None:
-        known = next(self.entries(type(entry), superseded=True, uid=entry.uid), None)
-        if known:
-            _check_same(known, entry)
+        if self._connection.execute(_KNOWN[type(entry)], [entry.uid]).fetchone():
+            _check_same(next(self.entries(type(entry), superseded=True, uid=entry.uid)), entry)
             return None
         if isinstance(entry, Specimen):
-            self._insert("specimen", SPECIMEN_COLUMNS, entry, "OR IGNORE")
+            self._insert(_OF_NAME, SPECIMEN_COLUMNS, entry)
         if isinstance(entry, Reading | BenchRun):
             self._check_correction(entry)
             entry = self._tied(entry)
         entry = dataclasses.replace(entry, logged_at=entry.logged_at or now, number=0)
-        names = tuple(name for name in _columns(type(entry)) if name != "number")
-        number = self._insert(TABLES[type(entry)], names, entry)
-        return dataclasses.replace(entry, number=number)
+        sql, names = _INSERTIONS[type(entry)]
+        return dataclasses.replace(entry, number=self._insert(sql, names, entry))
 
     def _check_correction(self, entry: Reading | BenchRun) -> None:
         if not entry.supersedes:
@@ -217,16 +228,11 @@ class Log:
         """The entry with design and batch of the print bed that its specimen came from, if that is known."""
         if entry.batch or entry.logged_at:
             return entry
-        printed = list(self.entries(Print, specimen=entry.specimen, last=1))
-        if not printed:
-            return entry
-        batch = next(self.entries(Batch, uid=printed[0].batch_uid))
-        return dataclasses.replace(entry, batch=batch.batch, design_id=printed[0].design_id, design=printed[0].design)
+        printed = self._connection.execute(_PRINTED, [entry.specimen]).fetchone()
+        return dataclasses.replace(entry, **dict(zip(_TIES, printed, strict=True))) if printed else entry
 
-    def _insert(self, table: str, names: Sequence[str], entry: Entry, otherwise: str = "") -> int:
+    def _insert(self, sql: str, names: Sequence[str], entry: Entry) -> int:
         values = [_to_sql(type(entry), name, getattr(entry, name)) for name in names]
-        marks = ", ".join("?" * len(names))
-        sql = f"INSERT {otherwise} INTO {table} ({', '.join(names)}) VALUES ({marks})"  # noqa: S608 - our own names
         return int(self._connection.execute(sql, values).lastrowid or 0)
 
     def _reading(self) -> Any:
@@ -257,11 +263,6 @@ def _home(kind: type[Entry], name: str) -> str:
     return "specimen" if issubclass(kind, Specimen) and name in SPECIMEN_COLUMNS[1:] else TABLES[kind]
 
 
-def _columns(kind: type[Entry]) -> tuple[str, ...]:
-    """Columns of a kind's own table."""
-    return tuple(name for name in columns(kind) if _home(kind, name) == TABLES[kind])
-
-
 def _to_sql(kind: type[Any], name: str, value: Any) -> Any:
     if name in _NULL_FOR_NONE and value == "":
         return None
@@ -279,3 +280,13 @@ def _record(kind: type[Any], row: Sequence[Any], path: str) -> Any:
                 f"the log {path!r} is damaged: column {name} of a {kind.__name__} holds {value!r:.60}"
             ) from None
     return kind(**found)
+
+
+def _insertion(kind: type[Any]) -> tuple[str, tuple[str, ...]]:
+    """The SQL that inserts a row, and the columns that it takes."""
+    own = tuple(name for name in columns(kind) if name != "number" and _home(kind, name) == TABLES[kind])
+    return _insert_into(TABLES[kind], own), own
+
+
+_INSERTIONS = {kind: _insertion(kind) for kind in TABLES}
+_KNOWN = {kind: f"SELECT 1 FROM {table} WHERE uid = ?" for kind, table in TABLES.items()}  # noqa: S608 - our own names
