@@ -82,13 +82,14 @@ def _export(place: str, file: str | None) -> None:
 
 def _verify(file: str | None) -> int:
     """Check database, references and the SHA-256 of every raw file; exit code 1 where something is wrong."""
+    from sensorgen.cli import log_text
     from sensorgen.log import TABLES
     from sensorgen.log.verify import faults
 
     with opened(file) as log:
         found = list(faults(log))
         for fault in found:
-            click.echo(fault)
+            click.echo(log_text.visible(fault))
         if not found:
             rows = sum(log.count(kind, superseded=True) for kind in TABLES)
             click.echo(f"{log.path} is sound: {rows} rows")

@@ -45,7 +45,7 @@ def take(log: Log, specimen: str, recording: Path, rig: Path | None = None, rema
     facts = _facts(recording, rig)
     kept = [files.keep(log.files, path) for path in (recording, rig) if path]
     if kept != before:
-        raise BadInput(f"{str(recording)!r} changes while it is read; log it when it is complete")
+        raise BadInput(f"{str(recording)!r} {files.CHANGES}")
     design_id, design = design_of_name(name)
     run = BenchRun(
         uid=sha256(" ".join([str(columns["specimen"]), *(file.uid for file in kept)]).encode()).hexdigest()[:32],

@@ -12,11 +12,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from sensorgen.errors import BadInput, SensorgenError, Unwritable
+from sensorgen.log.leftovers import part_of, sweep
 from sensorgen.log.schema import APPLICATION_ID, STEPS, VERSION
 
 WAIT_S = 20.0  # for another writer to finish
 _MAGIC = b"SQLite format 3\0"
 _ID = slice(68, 72)  # of the header: PRAGMA application_id
+_FORMAT = slice(18, 20)  # of the header: versions to write and to read
+_WAL = bytes((2, 2))
 _BUSY = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
 _UNWRITABLE = (
     sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM,
@@ -83,6 +86,8 @@ def told(path: Path) -> Iterator[None]:
         yield
     except sqlite3.Error as error:
         raise _in_our_words(error, str(path)) from None
+    except UnicodeDecodeError as error:
+        raise _damaged(str(path), f"text that is no UTF-8: {error.object[:20]!r}") from None
     except UnicodeEncodeError as error:
         raise BadInput(f"{error.object[:60]!r} is not text: it has bytes that are no UTF-8") from None
     except OverflowError:
@@ -94,16 +99,17 @@ def told(path: Path) -> Iterator[None]:
 def _in_our_words(error: sqlite3.Error, path: str) -> SensorgenError:
     code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
     if code in _BUSY:
-        return Unwritable(
-            f"the log {path!r} is in use by another program for {WAIT_S:g} s; nothing was logged, try again"
-        )
+        return Unwritable(f"another program keeps the log {path!r} to itself; nothing was logged, try again")
     if code in _UNWRITABLE:
         return Unwritable(f"cannot write to the log {path!r}: {error}; nothing was logged")
     if code == sqlite3.SQLITE_CONSTRAINT:
         return BadInput(f"the log {path!r} does not take this: {error}")
-    return BadInput(
-        f"the log {path!r} is damaged ({error}); take its latest copy, or save what is left with sqlite3's .recover"
-    )
+    return _damaged(path, str(error))
+
+
+def _damaged(path: str, how: str) -> BadInput:
+    advice = "take its latest copy, or save what is left with the .recover of sqlite3"
+    return BadInput(f"the log {path!r} is damaged: {how}; {advice}")
 
 
 def _check_header(path: Path) -> None:
@@ -120,13 +126,12 @@ def _check_header(path: Path) -> None:
 
 
 def _open(path: Path) -> sqlite3.Connection:
-    connection = sqlite3.connect(
-        f"{path.absolute().as_uri()}?mode=rw", uri=True, timeout=WAIT_S, isolation_level=None, cached_statements=64
-    )
+    how = "mode=rw" if _writable(path) else "immutable=1"
+    connection = sqlite3.connect(f"{path.absolute().as_uri()}?{how}", uri=True, timeout=WAIT_S, isolation_level=None)
     try:
         for pragma in (
             "trusted_schema = OFF", "cell_size_check = ON", "foreign_keys = ON", "recursive_triggers = ON",
-            "synchronous = FULL",
+            "journal_mode = WAL", "synchronous = FULL",
         ):  # fmt: skip
             connection.execute(f"PRAGMA {pragma}")
     except BaseException:
@@ -135,29 +140,49 @@ def _open(path: Path) -> sqlite3.Connection:
     return connection
 
 
+def _writable(path: Path) -> bool:
+    """Whether this user may write there; where not, a log without a write-ahead log beside it cannot change either."""
+    own = {"effective_ids": True} if os.access in os.supports_effective_ids else {}
+    return os.access(path.parent, os.W_OK, **own) or Path(f"{path}-wal").exists()
+
+
 def _make(path: Path) -> None:
     """Make an empty log beside its place, and link it there unless somebody else was first."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.parent / f".{path.name}.{os.getpid()}.part"
-    part.unlink(missing_ok=True)
+    sweep(path.parent)
+    part = part_of(path)
     try:
-        connection = sqlite3.connect(part, isolation_level=None)
-        try:
-            connection.execute("PRAGMA journal_mode = WAL")
-            connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-            connection.execute("BEGIN")
-            _take_steps(connection, 0)
-            connection.execute("COMMIT")
-        finally:
-            connection.close()
-        _to_disk(part)
-        with suppress(FileExistsError):
-            os.link(part, path)
+        with part.open("wb") as file:
+            file.write(_empty())
+            file.flush()
+            os.fsync(file.fileno())
+        _put(part, path)
         _to_disk(path.parent)
     finally:
-        for name in (part, Path(f"{part}-wal"), Path(f"{part}-shm")):
-            with suppress(OSError):
-                name.unlink()
+        with suppress(OSError):
+            part.unlink()
+
+
+def _put(part: Path, path: Path) -> None:
+    try:
+        os.link(part, path)
+    except FileExistsError:
+        pass
+    except OSError:  # a file system without links
+        part.rename(path)
+
+
+def _empty() -> bytes:
+    """An empty log as it is on disk."""
+    connection = sqlite3.connect(":memory:", isolation_level=None)
+    try:
+        connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+        _take_steps(connection, 0)
+        content = bytearray(connection.serialize())
+    finally:
+        connection.close()
+    content[_FORMAT] = _WAL  # SQLite's file format, 1.3: memory has no write-ahead log that it could be told to keep
+    return bytes(content)
 
 
 def _to_disk(path: Path) -> None:
@@ -181,7 +206,7 @@ def _bring_up_to_date(connection: sqlite3.Connection, path: Path) -> None:
     version = _version(connection)
     if version > VERSION or version < 1:
         raise BadInput(
-            f"the log {str(path)!r} is of version {version}; this sensorgen reads up to {VERSION}: take a newer one"
+            f"the log {str(path)!r} is of version {version}; expected up to {VERSION}: take a newer sensorgen"
         )
     if version < VERSION:
         with transaction(connection, path):
@@ -203,8 +228,8 @@ def _check_tables(connection: sqlite3.Connection, path: Path) -> None:
     found = _objects(connection)
     wrong = (wanted - found) | {thing for thing in found - wanted if thing[0] == "trigger"}
     if wrong:
-        names = ", ".join(sorted({name for _, name, _ in wrong}))
-        raise BadInput(f"the log {str(path)!r} is damaged: {names} not as sensorgen made it; take its latest copy")
+        names = ", ".join(sorted({f"{name!r:.40}" for _, name, _ in wrong}))
+        raise _damaged(str(path), f"{names:.200} not as sensorgen made it")
 
 
 def _objects(connection: sqlite3.Connection) -> set[tuple[str, str, str]]:

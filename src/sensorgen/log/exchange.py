@@ -16,6 +16,7 @@ from sensorgen.log.codec import CODECS
 from sensorgen.log.entries import Entry, RawFile
 from sensorgen.log.logbook import TABLES, Log
 from sensorgen.log.tables import Sheet
+from sensorgen.records import shown
 
 FORMATS = ("csv", "parquet")
 FILES = {kind: f"{table.replace('_', '-')}s" if table != "batch" else "batches" for kind, table in TABLES.items()}
@@ -106,10 +107,11 @@ def from_parquet(path: Path) -> tuple[type[Entry], list[Entry]]:
         table = pyarrow.parquet.read_table(path)
         rows = table.to_pylist()
     except (OSError, ValueError, pyarrow.ArrowException) as error:
-        raise BadInput(f"{str(path)!r} is no Parquet file that can be read: {error!s:.200}") from None
+        said = " ".join(str(error).split())
+        raise BadInput(f"{str(path)!r} is no Parquet file that can be read: {said:.200}") from None
     kind = kind_of(table.column_names)
     if kind is None:
-        raise BadInput(f"{str(path)!r}: columns {', '.join(table.column_names):.100}; expected those of a log's export")
+        raise BadInput(f"{str(path)!r}: columns {shown(table.column_names)}; expected those of the export of a log")
     wanted = columns(kind)
     return kind, [
         kind(**{name: _checked(wanted[name], value, f"{path}, row {k}, column {name}") for name, value in row.items()})

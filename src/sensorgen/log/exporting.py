@@ -10,6 +10,7 @@ from sensorgen import store
 from sensorgen.errors import BadInput, Unwritable
 from sensorgen.log import exchange, files
 from sensorgen.log.entries import Entry, RawFile, Reading
+from sensorgen.log.leftovers import part_of
 from sensorgen.log.logbook import Log
 
 
@@ -46,7 +47,7 @@ def export(log: Log, place: Path) -> int:
 
 
 def _folder(log: Log, folder: Path) -> int:
-    part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+    part = part_of(folder)
     try:
         (part / "files").mkdir(parents=True)
         rows = sum(_table(log, kind, part / f"{name}.csv", "csv") for kind, name in exchange.FILES.items())

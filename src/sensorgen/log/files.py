@@ -14,7 +14,9 @@ from pathlib import Path
 
 from sensorgen.errors import BadInput, Unwritable
 from sensorgen.log.entries import RawFile
+from sensorgen.log.leftovers import part_of, sweep
 
+CHANGES = "changes while it is read: log it when it is complete"
 _BLOCK = 1 << 20
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _SUFFIX = re.compile(r"\.[A-Za-z0-9]{1,8}")
@@ -49,16 +51,17 @@ def keep(folder: Path, path: Path, known: RawFile | None = None) -> RawFile:
     """
     found = known or raw_file(path)
     target = place(folder, found)
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    part = part_of(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
+        sweep(target.parent)
         with path.open("rb") as source, part.open("wb") as copy:
             while block := source.read(_BLOCK):
                 copy.write(block)
             copy.flush()
             os.fsync(copy.fileno())
         if digest(part) != found.uid:
-            raise BadInput(f"{str(path)!r} changes while it is read; log it when it is complete")
+            raise BadInput(f"{str(path)!r} {'is not the file of that SHA-256' if known else CHANGES}")
         part.chmod(0o444)
         part.replace(target)
         _folders_to_disk(target.parent)

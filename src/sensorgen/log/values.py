@@ -2,7 +2,6 @@
 
 import math
 import re
-import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
@@ -26,6 +25,7 @@ _LETTER_AS_POINT = re.compile(r"([0-9]+)([kKMGR])([0-9]+)")  # IEC 60062: 4k7
 _OVER = re.compile(r"\+?(o\.?l\.?|0\.?l|ovld|ovrld|overload|over ?range|inf(inity)?|∞|open)|>.*", re.IGNORECASE)
 _NOTHING = re.compile(r"[-–—]*|n\.?/?a\.?|nan|none|\?+", re.IGNORECASE)
 _THOUSANDS = re.compile(r"[-+]?[0-9]{1,3},[0-9]{3}")
+_SIGNS = str.maketrans({"\u2126": "Ω", "\u2212": "-"})  # the ohm sign apart from omega, the true minus sign
 _FACTOR = {"": "1", "k": "1e3", "m": "1e6", "meg": "1e6", "g": "1e9"}
 
 
@@ -71,7 +71,7 @@ def read(words: str) -> Resistances:
     """
     if len(words) > MAX_LETTERS:
         raise BadInput(f"{shown(words)} has {len(words)} letters; expected {EXPECTED}")
-    plain = unicodedata.normalize("NFKC", words).replace("\u2212", "-").strip()
+    plain = words.translate(_SIGNS).strip()
     if _NOTHING.fullmatch(plain):
         return Resistances((), (f"{shown(plain)} taken for no reading",) if plain else ())
     found = [_one(part.strip(), words) for part in re.split("[/;|]", plain)]

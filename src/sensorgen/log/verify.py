@@ -19,8 +19,10 @@ def faults(log: Log) -> Iterator[str]:
         An open one.
     """
     try:
-        yield from (f"database: {said}" for said in log.pragma("integrity_check") if said != "ok")
-        yield from (f"{table}: a row refers to one that is not there" for table in log.pragma("foreign_key_check"))
+        unsound = (said for said in log.pragma("integrity_check") if said != "ok")
+        yield from (f"database: {' '.join(said.split()):.200}" for said in unsound)
+        lost = log.pragma("foreign_key_check")
+        yield from (f"{table!r:.60}: a row refers to one that is not there" for table in lost)
         for kind in TABLES:
             for _ in log.entries(kind, superseded=True):
                 pass  # reading it says what is wrong
