@@ -17,7 +17,7 @@ from pathlib import Path
 from sensorgen.log import BenchRun, Log, Reading, files, verify
 
 ROWS = 20  # of a table
-LONGEST_S = 0.08
+MOST = 2  # imports that a child may end before it is killed in the next one
 NAME = {"specimen": "23 triX", "iteration": 23, "shape": "tri", "written": "23 triX"}
 
 
@@ -36,8 +36,8 @@ def work(path, run, pipe):
         os.write(pipe, f"{key}\n".encode())
 
 
-def killed(path, run, rng):
-    """What a child promised until it was killed."""
+def killed(path, run, rng, pace):
+    """What a child promised until it was killed in the midst of an import; ``pace`` holds how long one takes [s]."""
     read, write = os.pipe()
     child = os.fork()
     if child == 0:
@@ -47,13 +47,17 @@ def killed(path, run, rng):
         finally:
             os._exit(1)
     os.close(write)
-    time.sleep(rng.uniform(0, LONGEST_S))
-    os.kill(child, signal.SIGKILL)
-    _, status = os.waitpid(child, 0)
     with os.fdopen(read) as promised:
-        said = promised.read().split()
+        began = time.monotonic()
+        said = [promised.readline() for _ in range(rng.randrange(MOST + 1))]
+        if said:
+            pace[0] = (time.monotonic() - began) / len(said)
+        time.sleep(rng.uniform(0, 1.2 * pace[0]))
+        os.kill(child, signal.SIGKILL)
+        said += promised
+    _, status = os.waitpid(child, 0)
     assert os.WIFSIGNALED(status), "the child ended by itself"
-    return said
+    return [line.strip() for line in said if line.endswith("\n")]
 
 
 def look(path, promised):
@@ -79,9 +83,9 @@ def look(path, promised):
 def main(folder, kills, seed):
     """Kill, look, and say what was seen."""
     path, rng = Path(folder) / "log.db", random.Random(seed)
-    promised, faults, idle = [], [], 0
+    promised, faults, idle, pace = [], [], 0, [0.01]
     for run in range(kills):
-        said = killed(path, run, rng)
+        said = killed(path, run, rng, pace)
         idle += not said
         promised += said
         faults += look(path, promised)

@@ -30,7 +30,7 @@ def seen(program, folder, count):
 def test_killed_at_random_moments(tmp_path):
     found = seen("kills.py", tmp_path, KILLS)
     assert found["faults"] == []
-    assert found["promised"] > KILLS / 4  # the kills fell among imports, not before them
+    assert found["promised"] > KILLS
     assert [p.name for p in tmp_path.glob(".*.part")] == []
 
 

@@ -61,7 +61,7 @@ def _truth_text(text: str) -> bool:
 
 def _numbers_text(numbers: tuple[float, ...]) -> str:
     """Numbers as JSON, which has no infinity: SQLite and Python read 9e999 as one."""
-    return "[" + ", ".join("9e999" if number == math.inf else repr(number) for number in numbers) + "]"
+    return "[" + ", ".join(repr(number).replace("inf", "9e999") for number in numbers) + "]"
 
 
 def _numbers(text: str) -> tuple[float, ...]:

@@ -43,7 +43,7 @@ def csv_pieces(kind: type[Entry], rows: Iterable[Entry]) -> Iterator[str]:
 
 def _line(cells: Sequence[str]) -> str:
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow(cells)
+    csv.writer(text, lineterminator="\r\n").writerow(cells)  # \n alone leaves a bare \r unquoted
     return text.getvalue()
 
 

@@ -33,17 +33,11 @@ class Meter:
     """
 
     def __init__(self, address: str) -> None:
-        self.address = address
-        visa = _pyvisa()
-        self._failures = (visa.errors.Error, OSError, ValueError, UnicodeError)
+        self.address, self._visa = address, _pyvisa()
+        self._failures = (self._visa.errors.Error, OSError, ValueError)
+        self._open: list[Any] = []
         try:
-            self._manager = visa.ResourceManager()
-            self._port = self._manager.open_resource(address)
-            self._port.read_termination = self._port.write_termination = "\n"
-            self._port.timeout = TIMEOUT_S * 1e3
-        except self._failures as error:
-            raise self._failed(error) from None
-        try:
+            self._port = self._connected()
             if address.upper().startswith("ASRL"):
                 self._tell("SYST:REM")  # over RS-232 the 34401A takes no orders before this
             self.name = self._checked_name()
@@ -79,6 +73,18 @@ class Meter:
             raise InstrumentFailed(f"{self.name} at {self.address} reports {said!r:.100}")
         return answer
 
+    def _connected(self) -> Any:
+        try:
+            self._open.append(manager := self._visa.ResourceManager())
+            self._open.append(port := manager.open_resource(self.address))
+            if not isinstance(port, self._visa.resources.MessageBasedResource):
+                raise ValueError("not the address of an instrument that takes orders, as GPIB0::22::INSTR")
+            port.read_termination = port.write_termination = "\n"
+            port.timeout = TIMEOUT_S * 1e3
+            return port
+        except self._failures as error:
+            raise self._failed(error) from None
+
     def _checked_name(self) -> str:
         said = self._ask("*IDN?")
         name = next((name for word, name in KNOWN.items() if f",{word}," in re.sub(r"\s*,\s*", ",", said.upper())), "")
@@ -108,8 +114,8 @@ class Meter:
         )
 
     def _close(self) -> None:
-        self._port.close()
-        self._manager.close()
+        while self._open:
+            self._open.pop().close()
 
 
 def _pyvisa() -> Any:
