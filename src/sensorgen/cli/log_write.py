@@ -1,7 +1,7 @@
 """``sensorgen log multimeter|import|bench|predict``: what goes into the log."""
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,18 +39,18 @@ def _multimeter(
         how["source"] = meter["visa"]
     if not (y_words.strip() or z_words.strip() or how["remark"]):
         raise BadInput("nothing to log; expected --y, --z, --visa or --remark")
-    mega = _asked_mega(y_words, z_words)
+    mega = _asked_mega(y=y_words, z=z_words)
     with opened(file, create=True) as log:
         supersedes = _uid(log, corrects) if corrects is not None else ""
         new = log.add([words.reading(specimen, y_words, z_words, mega=mega, supersedes=supersedes, **how)])
         _say_logged(new, log, as_json=as_json)
 
 
-def _asked_mega(*typed: str) -> bool:
+def _asked_mega(**typed: str) -> bool:
     """Whether a person says that a small m means mega; nobody is asked where there is no m, or no person."""
-    from sensorgen.log.values import read
+    from sensorgen.log.words import resistance
 
-    found = [word for words in typed for word in read(words).mega]
+    found = [word for axis, words in typed.items() for word in resistance(axis, words).mega]
     if not found or not sys.stdin.isatty():
         return False
     if not click.confirm(f"{', '.join(found)}: is m mega (a million)?", default=True, err=True):
@@ -82,7 +82,8 @@ def _uid(log: "Log", number: int) -> str:
     return old.uid
 
 
-def _say_logged(new: Iterable["Entry"], log: "Log", *, as_json: bool) -> None:
+def _say_logged(new: Sequence["Entry"], log: "Log", *, as_json: bool, known: str = "") -> None:
+    """Say what was logged, or that it was ``known``, and where."""
     from sensorgen.cli import log_text
 
     if as_json:
@@ -90,6 +91,8 @@ def _say_logged(new: Iterable["Entry"], log: "Log", *, as_json: bool) -> None:
         return
     for entry in new:
         click.echo("logged " + "\n".join(log_text.of(entry)))
+    if not new:
+        click.echo(known)
     click.echo(f"in {log.path}")
 
 
@@ -123,7 +126,7 @@ def _bench(specimen: str, lcr_file: str, rig_file: str | None, remark: str, file
 
     with opened(file, create=True) as log:
         new = bench.take(log, specimen, Path(lcr_file), Path(rig_file) if rig_file else None, remark)
-        _say_logged(new, log, as_json=as_json)
+        _say_logged(new, log, as_json=as_json, known=f"{specimen}: the log has this very recording")
 
 
 def _predict(design: "Design", *, file: str | None, as_json: bool) -> int:
@@ -132,10 +135,7 @@ def _predict(design: "Design", *, file: str | None, as_json: bool) -> int:
 
     with opened(file, create=True) as log:
         new = log.add([prediction(design.id(), design.name, predicted(design))])
-        if new or as_json:
-            _say_logged(new, log, as_json=as_json)
-        else:
-            click.echo(f"{design.name}: the log has this very prediction\nin {log.path}")
+        _say_logged(new, log, as_json=as_json, known=f"{design.name}: the log has this very prediction")
     return 0
 
 
