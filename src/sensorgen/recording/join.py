@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sensorgen.errors import BadInput
+from sensorgen.recording.movement import strongest
 from sensorgen.recording.rig import RigLog
 from sensorgen.recording.samples import Real, Recording
 
@@ -154,26 +155,9 @@ def _troubled(rig: RigLog, at: Real) -> np.ndarray[tuple[int], np.dtype[np.bool_
 def _estimated(recording: Recording, time: Real, rig: RigLog, within_s: float) -> _Offset:
     valid = np.flatnonzero(recording.valid())
     stride = max(1, len(valid) // _MOST_FITTED)
-    signal = _signal(recording, valid)
+    signal = strongest(recording.impedance_ohm[valid])
     coarse = _correlated(time[valid], signal, rig, within_s)
     return _refined(time[valid][::stride], signal[::stride], rig, coarse)
-
-
-def _signal(recording: Recording, valid: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Real:
-    """The direction in which ln Z moves most, in units of its noise, without its straight trend."""
-    z = recording.impedance_ohm[valid]
-    channels = np.hstack([np.log(np.abs(z)), np.unwrap(np.angle(z), axis=0)])
-    noise = np.median(np.abs(np.diff(channels, axis=0)), axis=0)
-    spread = np.ptp(channels, axis=0)
-    told = spread > 0
-    if not told.any():
-        raise BadInput("the readings are all the same: nothing in them tells the time")
-    channels = channels[:, told] / np.where(noise > 1e-9 * spread, noise, spread)[told]
-    t = np.linspace(-1, 1, len(valid))
-    basis = np.column_stack([np.ones_like(t), t])
-    channels = channels - basis @ np.linalg.lstsq(basis, channels, rcond=None)[0]
-    _, _, directions = np.linalg.svd(channels.T @ channels)
-    return np.asarray(channels @ directions[0])
 
 
 def _force(rig: RigLog) -> tuple[Real, Real, Real]:
