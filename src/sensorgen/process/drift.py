@@ -16,7 +16,7 @@ from sensorgen.errors import BadInput
 from sensorgen.recording.samples import Bools, Complex, Real
 
 SETTLE_S = 1.0
-_TAUS = 25
+_TAUS = 9
 _FASTEST = 300.0  # of the run: a time constant that short is a step
 _LEAST = 30
 
@@ -83,13 +83,11 @@ def fitted(time_s: Real, impedance_ohm: Complex, valid: Bools, force_n: Real, se
     t, z = time_s[rest] - start, impedance_ohm[rest]
     values = np.log(np.abs(z)) + 1j * np.unwrap(np.angle(z), axis=0)
     scale = np.maximum(np.abs(np.diff(values, axis=0)).mean(axis=0), 1e-300)  # tones count by their noise
-    tau = min(
-        np.geomspace(max(t[-1], 1e-9) / _FASTEST, max(t[-1], 1e-9), _TAUS), key=lambda tau: _left(t, values, tau, scale)
-    )
-    weights = np.linalg.lstsq(_basis(t, float(tau)), values, rcond=None)[0]
-    left = values - _basis(t, float(tau)) @ weights
+    tau = _best_tau(t, values / scale)
+    weights = np.linalg.lstsq(_basis(t, tau), values, rcond=None)[0]
+    left = values - _basis(t, tau) @ weights
     scatter = np.sqrt((left.real**2).mean(axis=0)) + 1j * np.sqrt((left.imag**2).mean(axis=0))
-    return Drift(start, float(tau), weights, scatter)
+    return Drift(start, tau, weights, scatter)
 
 
 def _disturbed(time_s: Real, force_n: Real, settle_s: float) -> Bools:
@@ -104,7 +102,17 @@ def _basis(time_s: Real, tau_s: float) -> Real:
     return np.column_stack([np.ones_like(time_s), time_s, np.log1p(np.maximum(time_s, 0) / tau_s)])
 
 
-def _left(time_s: Real, values: Complex, tau_s: float, scale: Real) -> float:
-    basis = _basis(time_s, tau_s)
-    left = (values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]) / scale
-    return float((np.abs(left) ** 2).sum())
+def _best_tau(time_s: Real, values: Complex) -> float:
+    """The time constant that leaves least: the best of a few, then between its neighbours."""
+    from scipy.optimize import minimize_scalar
+
+    def left(log_tau: float) -> float:
+        basis = _basis(time_s, float(np.exp(log_tau)))
+        rest = values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
+        return float((np.abs(rest) ** 2).sum())
+
+    longest = max(float(time_s[-1]), 1e-9)
+    grid = np.log(np.geomspace(longest / _FASTEST, longest, _TAUS))
+    best = int(np.argmin([left(log_tau) for log_tau in grid]))
+    around = (grid[max(best - 1, 0)], grid[min(best + 1, _TAUS - 1)])
+    return float(np.exp(minimize_scalar(left, bounds=around, method="bounded").x))

@@ -11,7 +11,7 @@ from math import comb, isnan, nan, prod
 from statistics import median
 
 from sensorgen.errors import OutOfRange
-from sensorgen.process.verdicts import Evidence, Verdict
+from sensorgen.process.verdicts import ORDER, Evidence, Verdict
 
 CONFIDENCE = 0.95
 _MOST_TABLES = 1_000_000
@@ -44,7 +44,7 @@ class Group:
     intact : Share
         The yield: those that are intact, of those that a verdict was possible on.
     shorted : Share
-        Those whose R_Z is of the order of their R_Y or below, of those that have both.
+        Those whose R_Z is of the order of their R_Y or below, of those that have both readings.
     median_ratio : float
         Median of R_Z over R_Y [-]; nan where none has both.
     words : mapping of str to int
@@ -93,7 +93,10 @@ def share(count: int, total: int, confidence: float = CONFIDENCE) -> Share:
 
 
 def groups(
-    judged: Iterable[Judged], by: Callable[[Evidence], tuple[Hashable, ...]], confidence: float = CONFIDENCE
+    judged: Iterable[Judged],
+    by: Callable[[Evidence], tuple[Hashable, ...]],
+    confidence: float = CONFIDENCE,
+    order: float = ORDER,
 ) -> list[Group]:
     """Yield of every group, in the order of their keys.
 
@@ -105,25 +108,28 @@ def groups(
         What they are grouped by, as ``lambda of: (of.shape, of.film_mm)``.
     confidence : float
         Of the intervals [-].
+    order : float
+        R_Z over R_Y up to which a specimen counts as shorted [-].
     """
     found: dict[tuple[Hashable, ...], list[Verdict]] = {}
     for of, verdict in judged:
         found.setdefault(by(of), []).append(verdict)
     return [
-        _group(key, found[key], confidence) for key in sorted(found, key=lambda key: [(k is None, str(k)) for k in key])
+        _group(key, found[key], confidence, order)
+        for key in sorted(found, key=lambda key: [(k is None, str(k)) for k in key])
     ]
 
 
-def _group(key: tuple[Hashable, ...], verdicts: Sequence[Verdict], confidence: float) -> Group:
+def _group(key: tuple[Hashable, ...], verdicts: Sequence[Verdict], confidence: float, order: float) -> Group:
     known = [v for v in verdicts if v.word != "unknown"]
-    both = [v for v in verdicts if v.same_order is not None]
+    both = [v for v in verdicts if not isnan(v.ratio)]
     words: dict[str, int] = {}
     for v in verdicts:
         words[v.word] = words.get(v.word, 0) + 1
     return Group(
         key, share(sum(v.word == "intact" for v in known), len(known), confidence),
-        share(sum(bool(v.same_order) for v in both), len(both), confidence),
-        median([v.ratio for v in both if not isnan(v.ratio)]) if both else nan, words,
+        share(sum(v.ratio <= order for v in both), len(both), confidence),
+        median([v.ratio for v in both]) if both else nan, words,
     )  # fmt: skip
 
 
@@ -159,7 +165,7 @@ def independence(table: Sequence[tuple[int, int]]) -> float:
     >>> round(independence([(4, 0), (0, 4)]), 4)
     0.0286
     """
-    if any(n < 0 for row in table for n in row) or prod(a + b + 1 for a, b in table) > _MOST_TABLES:
+    if any(n < 0 for row in table for n in row) or prod(sorted(a + b + 1 for a, b in table)[:-1]) > _MOST_TABLES:
         raise OutOfRange("expected counts from 0 on, in fewer or smaller groups")
     sizes, did = [a + b for a, b in table], sum(a for a, _ in table)
     ways = _ways([a for a, _ in table], sizes)
