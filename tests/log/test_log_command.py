@@ -135,7 +135,7 @@ def test_a_prediction_is_kept_when_it_is_made(run, path):
 
 
 BATCH = {
-    "name": "26",
+    "batch": "26",
     "specimens": {
         "26 triX .1mm": {"design": "trix-d0.1", "design_id": "a" * 16, "expected": {"capacitance_f": {"lower": 1e-11}}},
         "26 triX .1mm 2": {

@@ -31,7 +31,7 @@ def rows(path: Path, file: RawFile) -> Iterator[Entry]:
         Not the record of a batch; with the file's name, and the specimen's.
     """
     record = _record(path)
-    batch = str(record.get("name") or path.parent.name or path.stem)
+    batch = str(record.get("batch") or path.absolute().parent.name)
     yield file
     yield Batch(uid=file.uid, batch=batch, file=file.uid)
     for written, piece in _mapping(record.get("specimens"), f"{path}: specimens").items():
