@@ -59,3 +59,7 @@ class CadFailed(SensorgenError):
 
 class SlicerFailed(SensorgenError):
     """A slicer is missing, or could not slice; the message carries its own words."""
+
+
+class InstrumentFailed(SensorgenError):
+    """An instrument that is not there, is another one, or does not answer as it should."""

@@ -7,7 +7,7 @@ empty or NaN were not measured. Rows are counted as an editor does: the header i
 import csv
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
@@ -22,6 +22,7 @@ from sensorgen.errors import BadInput
 
 BLOCK = 1 << 14
 _TONE = re.compile(r"(re|im)_ohm_(.*)", re.IGNORECASE)
+_AS_THEY_ARE: Mapping[str, str] = {}
 _WANTED = "two columns per tone, as re_ohm_1.1kHz and im_ohm_1.1kHz"
 
 
@@ -37,11 +38,14 @@ class Block:
         Readings [ohm]; nan where a cell is empty or says so.
     kept : list of list of str
         The cells of the other columns, row by row, as they stand there.
+    numbers : (n, k) array
+        Columns beside the tones that were asked for as numbers; nan where a cell is empty.
     """
 
     rows: list[int]
     impedance_ohm: NDArray[np.complex128]
     kept: list[list[str]]
+    numbers: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,7 @@ class _Header:
     re: list[int]
     im: list[int]
     kept: list[int]
+    numbers: list[int]
 
 
 class Readings:
@@ -66,20 +71,25 @@ class Readings:
     frequency_hz : (n_tones,) array
         Tones, in the order of their real parts' columns [Hz].
     kept : list of str
-        Names of the columns that belong to no tone.
+        Names of the columns that belong to no tone and were not asked for.
+    numbers : list of str
+        Names of the columns that were asked for and are there.
     """
 
-    def __init__(self, name: str, file: IO[str]) -> None:
+    def __init__(
+        self, name: str, file: IO[str], columns: Mapping[str, str] = _AS_THEY_ARE, beside: Sequence[str] = ()
+    ) -> None:
         self.name, self._file, self._next = name, file, 1
         header = self._lines(1)
         if not header or not header[0].strip():
             raise BadInput(f"{name}: the file is empty; expected a header with {_WANTED}")
         try:
-            self._header = _header(header[0])
+            self._header = _header(header[0], columns, beside)
         except BadInput as error:
             raise error.within(f"{name}, row 1") from None
         self.frequency_hz = np.array(self._header.frequency_hz)
         self.kept = [self._header.names[i] for i in self._header.kept]
+        self.numbers = [self._header.names[i] for i in self._header.numbers]
 
     def blocks(self, size: int = BLOCK) -> Iterator[Block]:
         """The rows, up to ``size`` at a time.
@@ -132,8 +142,8 @@ class Readings:
             kept = [[] for _ in rows]
         n = len(header.re)
         impedance = np.empty((len(rows), n), np.complex128)
-        impedance.real, impedance.imag = values[:, :n], values[:, n:]
-        return Block(rows, impedance, kept)
+        impedance.real, impedance.imag = values[:, :n], values[:, n : 2 * n]
+        return Block(rows, impedance, kept, values[:, 2 * n :])
 
     def _plain(self, lines: list[str]) -> bool:
         """Whether every separator separates: no quotes, and as many cells as the header has."""
@@ -148,7 +158,12 @@ class Readings:
             lines = [line.replace(",", ".") for line in lines]
         try:
             return np.loadtxt(
-                lines, delimiter=header.separator, usecols=header.re + header.im, comments=None, ndmin=2, dtype=float
+                lines,
+                delimiter=header.separator,
+                usecols=header.re + header.im + header.numbers,
+                comments=None,
+                ndmin=2,
+                dtype=float,
             )
         except ValueError:
             return None
@@ -174,7 +189,7 @@ class Readings:
 
     def _one_by_one(self, rows: list[int], cells: list[list[str]]) -> NDArray[np.float64]:
         header = self._header
-        columns = header.re + header.im
+        columns = header.re + header.im + header.numbers
         found = np.empty((len(rows), len(columns)))
         for i, (row, line) in enumerate(zip(rows, cells, strict=True)):
             for j, column in enumerate(columns):
@@ -186,8 +201,17 @@ class Readings:
 
 
 @contextmanager
-def readings(path: str) -> Iterator[Readings]:
+def readings(path: str, columns: Mapping[str, str] = _AS_THEY_ARE, beside: Sequence[str] = ()) -> Iterator[Readings]:
     """Open a file of readings; "-" is the standard input.
+
+    Parameters
+    ----------
+    path : str
+        The file.
+    columns : mapping of str to str
+        What the file calls its columns, to what we call them.
+    beside : sequence of str
+        Columns beside the tones that are to be read as numbers where they are there.
 
     Raises
     ------
@@ -197,10 +221,10 @@ def readings(path: str) -> Iterator[Readings]:
     if path != "-" and Path(path).is_dir():
         raise BadInput(f"{path} is a folder; expected a CSV file with {_WANTED}")
     if path == "-":
-        yield Readings("standard input", _as_utf8(sys.stdin))
+        yield Readings("standard input", _as_utf8(sys.stdin), columns, beside)
         return
     with _opened(path) as file:
-        yield Readings(path, file)
+        yield Readings(path, file, columns, beside)
 
 
 def _opened(path: str) -> IO[str]:
@@ -216,9 +240,9 @@ def _as_utf8(file: IO[str]) -> IO[str]:
     return file
 
 
-def _header(line: str) -> _Header:
+def _header(line: str, columns: Mapping[str, str], beside: Sequence[str]) -> _Header:
     separator = max(";\t,", key=line.count)
-    names = [name.strip() for name in _split(line, separator)]
+    names = _renamed([name.strip() for name in _split(line, separator)], columns, beside)
     parts: dict[str, dict[float, int]] = {"re": {}, "im": {}}
     kept = []
     for i, name in enumerate(names):
@@ -232,7 +256,21 @@ def _header(line: str) -> _Header:
         parts[part][frequency] = i
     _check_pairs(parts, names)
     tones = list(parts["re"])
-    return _Header(names, separator, tones, list(parts["re"].values()), [parts["im"][f] for f in tones], kept)
+    numbers = [i for i in kept if names[i] in beside]
+    kept = [i for i in kept if names[i] not in beside]
+    return _Header(names, separator, tones, list(parts["re"].values()), [parts["im"][f] for f in tones], kept, numbers)
+
+
+def _renamed(names: list[str], columns: Mapping[str, str], beside: Sequence[str]) -> list[str]:
+    """Columns by our names; those that matter must be there once."""
+    for given in columns:
+        if given not in names:
+            raise BadInput(f"no column {given!r}, which the map of columns names; there are {', '.join(names[:12])}")
+    found = [columns.get(name, name) for name in names]
+    for name in beside:
+        if found.count(name) > 1:
+            raise BadInput(f"{found.count(name)} columns are {name}; expected one")
+    return found
 
 
 def _split(line: str, separator: str) -> list[str]:

@@ -59,11 +59,11 @@ def _sweep(folder: Path) -> None:
     """Remove what a killed run of this name has left."""
     for left in folder.parent.glob(f".{folder.name}.*.part"):
         pid = left.name.split(".")[-2]
-        if re.fullmatch("[0-9]{1,9}", pid) and not _alive(int(pid)):
+        if re.fullmatch("[0-9]{1,9}", pid) and not alive(int(pid)):
             shutil.rmtree(left, ignore_errors=True)
 
 
-def _alive(pid: int) -> bool:
+def alive(pid: int) -> bool:
     """Whether another process of that number runs; on Windows, where asking would end it, always."""
     if pid == os.getpid():  # left by an earlier process of our number, as containers have them
         return False

@@ -26,6 +26,7 @@ COMMANDS = (
     "invert",
     "sheet",
     "stack",
+    "log",
     "list",
     "schema",
     "completion",

@@ -1,0 +1,36 @@
+"""``sensorgen log``: what was measured of printed specimens, kept for good."""
+
+from typing import Any
+
+import click
+
+from sensorgen.cli import log_read, log_write
+from sensorgen.errors import UnknownName
+
+
+class _Group(click.Group):
+    """The commands in the order in which they are used; the nearest is offered where another is typed."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        return list(self.commands)
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        if not ctx.resilient_parsing and not args[0].startswith("-") and args[0] not in self.commands:
+            raise UnknownName("command of log", args[0], self.commands)
+        return super().resolve_command(ctx, args)
+
+
+@click.group("log", cls=_Group, short_help="Keep what was measured of printed specimens.")
+def command() -> None:
+    """Keep what was measured of printed specimens.
+
+    Readings of a multimeter, recordings of the bench and what was predicted, in one file that only grows: nothing is
+    taken out, and a correction is a new row.
+    """
+
+
+for _each in (
+    log_write.multimeter, log_write.table, log_write.bench, log_write.predict,
+    log_read.listing, log_read.showing, log_read.exporting, log_read.verifying,
+):  # fmt: skip
+    command.add_command(_each)

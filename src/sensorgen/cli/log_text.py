@@ -1,0 +1,119 @@
+"""The log as a person at a terminal, or a program, wants to read it."""
+
+import dataclasses
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from sensorgen.cli.show import si
+
+if TYPE_CHECKING:
+    from sensorgen.log import BenchRun, Entry, Reading
+
+_REMARK = 28  # letters of a remark in a list
+
+
+def visible(text: str) -> str:
+    """Text of strangers, its control characters shown instead of obeyed by the terminal."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def ohms(values: Sequence[float]) -> str:
+    """Readings for people; nothing where nothing was measured."""
+    return ", ".join("OL" if math.isinf(value) else si(value, "ohm") for value in values) or "-"
+
+
+def readings(found: Sequence["Reading"]) -> Iterator[str]:
+    """A line for each reading."""
+    yield f"{'no.':>6}  {'specimen':24} {'Y':>20} {'Z':>20}  {'':2}remark"
+    for r in found:
+        doubtful = "? " if r.doubts else "  "
+        state = {None: "", True: "baked; ", False: "" if "bake" in r.remark else "not baked; "}[r.baked]
+        remark = visible(state + r.remark)
+        short = remark if len(remark) <= _REMARK else remark[: _REMARK - 1] + "…"
+        line = f"{r.number:6}  {visible(r.specimen):24} {ohms(r.y_ohm):>20} {ohms(r.z_ohm):>20}  {doubtful}{short}"
+        yield line.rstrip("; ")
+
+
+def runs(found: Sequence["BenchRun"]) -> Iterator[str]:
+    """A line for each recording of the bench."""
+    for run in found:
+        yield f"{run.number:6}  {visible(run.specimen):24} recording {run.file[:12]}  {visible(run.remark)}".rstrip()
+
+
+def reading(r: "Reading") -> Iterator[str]:
+    """Everything about one reading."""
+    yield f"reading {r.number}: {visible(r.specimen)}" + (
+        f", written {visible(r.written)!r}" if r.written != r.specimen else ""
+    )
+    facts = {
+        "Y": _said(r.y_words, r.y_ohm),
+        "Z": _said(r.z_words, r.z_ohm),
+        "baked": {None: "", True: "yes", False: "no"}[r.baked],
+        "remark": r.remark,
+        "measured": r.measured_at,
+        "instrument": r.instrument,
+        "design": f"{r.design} ({r.design_id})" if r.design_id else "",
+        "batch": r.batch,
+        "source": r.source + (f", row {r.source_row}" if r.source_row is not None else ""),
+        "logged": r.logged_at,
+    }
+    yield from (f"  {name:11}{visible(fact)}" for name, fact in facts.items() if fact)
+    yield from (f"  {'doubtful':11}{visible(doubt)}" for doubt in r.doubts)
+
+
+def _said(words: str, ohm: Sequence[float]) -> str:
+    return f"{ohms(ohm)}, written {words!r}" if words else ""
+
+
+def run(b: "BenchRun") -> Iterator[str]:
+    """Everything about one recording."""
+    yield f"recording {b.number}: {visible(b.specimen)}"
+    facts = {name: getattr(b, name) for name in ("file", "rig_file", "remark", "design", "batch", "logged_at")}
+    yield from (f"  {name:11}{visible(fact)}" for name, fact in facts.items() if fact)
+    yield from (f"  {visible(line)}" for line in _counted(json.loads(b.facts)))
+
+
+def _counted(facts: Mapping[str, Any]) -> Iterator[str]:
+    """What was counted in a recording when it came in."""
+    for lockin in facts.get("lockins", ()):
+        counts = dict(lockin["counts"])
+        samples, valid = counts.pop("samples"), counts.pop("valid")
+        marks = ", ".join(f"{count} {mark}" for mark, count in counts.items() if count)
+        tones = ", ".join(si(tone, "Hz") for tone in lockin["tones_hz"])
+        yield f"lock-in {lockin['lockin']}  {samples} samples, {valid} of them sound; {marks or 'no marks'}"
+        yield f"{'':11}{tones}; {lockin['seconds']:.5g} s by {lockin['program'] or lockin['format']}"
+    if "rig" in facts:
+        rig = facts["rig"]
+        yield f"{'rig':11}{rig['rows']} rows, {rig['errors']} with errors; {rig['clocks']}"
+
+
+def plain(entry: "Entry") -> dict[str, Any]:
+    """A row as data for JSON, which has no infinity: an overload is "OL"."""
+    return {name: _plain(value) for name, value in dataclasses.asdict(entry).items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return "OL" if isinstance(value, float) and math.isinf(value) else value
+
+
+def of(entry: "Entry") -> Iterator[str]:
+    """Everything about any row."""
+    from sensorgen.log import BenchRun, Reading
+
+    if isinstance(entry, Reading):
+        return reading(entry)
+    if isinstance(entry, BenchRun):
+        return run(entry)
+    return other(entry)
+
+
+def other(entry: "Entry") -> Iterator[str]:
+    """A print or a prediction, in a few words."""
+    names = ("specimen", "design", "design_id", "batch_uid")
+    said = ", ".join(f"{name} {visible(str(value))}" for name, value in vars(entry).items() if name in names)
+    yield f"{type(entry).__name__.lower()} {entry.number}: {said}"
+    yield f"  {'logged':11}{entry.logged_at}"

@@ -1,0 +1,38 @@
+"""Words that the commands of ``sensorgen log`` share, and what opens the log that they name."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from sensorgen.log import Log
+
+
+def where() -> click.Option:
+    """Which log."""
+    about = "The log; what SENSORGEN_LOG says, or the one of this user, if not given."
+    return click.Option(["--log", "file"], metavar="FILE", help=about)
+
+
+def as_json() -> click.Option:
+    """For programs."""
+    return click.Option(["--json", "as_json"], is_flag=True, help="Print as JSON.")
+
+
+def remark() -> click.Option:
+    """Of whoever measures."""
+    return click.Option(["--remark"], metavar="TEXT", default="", help="Anything worth knowing, in your own words.")
+
+
+def made(work: Callable[..., Any], name: str, about: str, *params: click.Parameter) -> click.Command:
+    """A command that does some work, its help being what the work's docstring says."""
+    return click.Command(name, params=list(params), callback=work, help=work.__doc__, short_help=about)
+
+
+def opened(file: str | None, *, create: bool = False) -> "Log":
+    """The log that ``--log`` names, or the usual one."""
+    from sensorgen.log import Log, place
+
+    return Log(Path(file) if file else place(), create=create)

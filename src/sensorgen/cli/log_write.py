@@ -1,0 +1,181 @@
+"""``sensorgen log multimeter|import|bench|predict``: what goes into the log."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sensorgen.cli import show
+from sensorgen.cli.designs import DesignGroup
+from sensorgen.cli.log_words import as_json as json_option
+from sensorgen.cli.log_words import made, opened, remark, where
+from sensorgen.cli.settings import pairs
+from sensorgen.cli.words import OneOf
+from sensorgen.errors import BadInput
+
+if TYPE_CHECKING:
+    from sensorgen.design import Design
+    from sensorgen.log import Entry, Log
+
+
+def _multimeter(
+    specimen: str, y_words: str, z_words: str, file: str | None, corrects: int | None, *, as_json: bool, **how: Any
+) -> None:
+    """Log the resistances of one specimen, named as in '23 triY .2mm 3'.
+
+    Several readings have / between them, as in --z '2.3k / 3.8k'. A small m is taken for mega, and asked for on a
+    terminal.
+    """
+    from sensorgen.log import words
+
+    meter = {key: how.pop(key) for key in ("visa", "axis", "wires")}
+    if meter["visa"] and (y_words or z_words):
+        raise BadInput("--visa beside --y or --z; expected the meter's readings or words, not both")
+    words.named(specimen)  # a wrong name is told before anybody measures
+    if meter["visa"]:
+        y_words, z_words, how["instrument"] = _measured(**meter)
+        how["source"] = meter["visa"]
+    if not (y_words.strip() or z_words.strip() or how["remark"]):
+        raise BadInput("nothing to log; expected --y, --z, --visa or --remark")
+    mega = _asked_mega(y=y_words, z=z_words)
+    with opened(file, create=True) as log:
+        supersedes = _uid(log, corrects) if corrects is not None else ""
+        new = log.add([words.reading(specimen, y_words, z_words, mega=mega, supersedes=supersedes, **how)])
+        _say_logged(new, log, as_json=as_json)
+
+
+def _asked_mega(**typed: str) -> bool:
+    """Whether a person says that a small m means mega; nobody is asked where there is no m, or no person."""
+    from sensorgen.log.words import resistance
+
+    found = [word for axis, words in typed.items() for word in resistance(axis, words).mega]
+    if not found or not sys.stdin.isatty():
+        return False
+    if not click.confirm(f"{', '.join(found)}: is m mega (a million)?", default=True, err=True):
+        raise BadInput(f"{found[0]!r} is not logged; write M for mega, or 0.0011 for 1.1 milliohm")
+    return True
+
+
+def _measured(visa: str, axis: str | None, wires: str) -> tuple[str, str, str]:
+    """Words of a meter for Y and Z, and what it calls itself; leads are moved between the two."""
+    from sensorgen.log.meter import Meter
+
+    if axis is None and not sys.stdin.isatty():
+        raise BadInput("--visa without --axis needs somebody to move the leads; expected --axis y or --axis z")
+    found = {"y": "", "z": ""}
+    with Meter(visa) as meter:
+        for which in [axis] if axis else ["y", "z"]:
+            if axis is None:
+                click.pause(f"Leads to {which.upper()}, then any key ...", err=True)
+            found[which] = meter.resistance(wires=int(wires))
+        return found["y"], found["z"], meter.name
+
+
+def _uid(log: "Log", number: int) -> str:
+    from sensorgen.log import Reading
+
+    old = next(log.entries(Reading, superseded=True, number=number), None)
+    if old is None:
+        raise BadInput(f"--corrects {number}: no such reading; sensorgen log list shows their numbers")
+    return old.uid
+
+
+def _say_logged(new: Sequence["Entry"], log: "Log", *, as_json: bool, known: str = "") -> None:
+    """Say what was logged, or that it was ``known``, and where."""
+    from sensorgen.cli import log_text
+
+    if as_json:
+        show.as_json([log_text.plain(entry) for entry in new])
+        return
+    for entry in new:
+        click.echo("logged " + "\n".join(log_text.of(entry)))
+    if not new:
+        click.echo(known)
+    click.echo(f"in {log.path}")
+
+
+def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, thesis: bool, as_json: bool) -> None:
+    """Log all rows of a file, or none of them.
+
+    A table of readings as CSV, the batch.json of a print bed, or what 'log export' wrote. Rows that the log has are
+    passed over.
+    """
+    from sensorgen.log import importing
+
+    if thesis == bool(path):
+        raise BadInput(f"{'both' if path else 'neither'} of FILE and --thesis given; expected one of them")
+    named = dict(pairs(columns, "--column"))
+    with opened(file, create=True) as log:
+        done = importing.thesis(log) if thesis else importing.take(log, Path(str(path)), named)
+        if as_json:
+            show.as_json(vars(done))
+            return
+        for line in done.lines():
+            click.echo(line)
+        click.echo(f"in {log.path}")
+
+
+def _bench(specimen: str, lcr_file: str, rig_file: str | None, remark: str, file: str | None, *, as_json: bool) -> None:
+    """Log a recording of one specimen, its files kept whole.
+
+    LCR_FILE is the impedance analyser's, RIG_FILE the rig's with force and position.
+    """
+    from sensorgen.log import bench
+
+    with opened(file, create=True) as log:
+        new = bench.take(log, specimen, Path(lcr_file), Path(rig_file) if rig_file else None, remark)
+        _say_logged(new, log, as_json=as_json, known=f"{specimen}: the log has this very recording")
+
+
+def _predict(design: "Design", *, file: str | None, as_json: bool) -> int:
+    from sensorgen.log.batches import prediction
+    from sensorgen.predict import prediction as predicted
+
+    with opened(file, create=True) as log:
+        new = log.add([prediction(design.id(), design.name, predicted(design))])
+        _say_logged(new, log, as_json=as_json, known=f"{design.name}: the log has this very prediction")
+    return 0
+
+
+multimeter = made(
+    _multimeter, "multimeter", "Log resistances of one specimen.",
+    click.Argument(["specimen"]),
+    click.Option(["--y", "y_words"], metavar="WORDS", default="", help="Resistance along an electrode, as 0.65k."),
+    click.Option(["--z", "z_words"], metavar="WORDS", default="", help="Resistance between the electrodes."),
+    click.Option(["--baked/--unbaked"], default=None, help="Whether the specimen was baked before."),
+    remark(),
+    click.Option(["--measured-at"], metavar="WHEN", default="", help="When it was measured, in your own words."),
+    click.Option(["--corrects"], metavar="NUMBER", type=int, help="Reading that this one corrects."),
+    click.Option(["--visa"], metavar="ADDRESS", help="Read the meter there, as GPIB0::22::INSTR: first Y, then Z."),
+    click.Option(["--axis"], type=OneOf(("y", "z")), help="Let the meter read this one only."),
+    click.Option(["--wires"], type=OneOf(("2", "4")), default="2", show_default=True, help="Leads of the meter."),
+    where(),
+    json_option(),
+)  # fmt: skip
+table = made(
+    _import, "import", "Log a table, a print bed, or an export of a log.",
+    click.Argument(["path"], metavar="[FILE]", required=False),
+    click.Option(["--thesis"], is_flag=True, help="Table D.1 of the thesis, 69 rows; sensorgen brings it along."),
+    click.Option(
+        ["--column", "columns"], metavar="OURS=THEIRS", multiple=True,
+        help="Which column is which, as y='Resistance in Y': specimen, y, z, remark, baked, measured_at.",
+    ),
+    where(),
+    json_option(),
+)  # fmt: skip
+bench = made(
+    _bench, "bench", "Log a recording of one specimen.",
+    click.Argument(["specimen"]),
+    click.Argument(["lcr_file"]),
+    click.Argument(["rig_file"], required=False),
+    remark(),
+    where(),
+    json_option(),
+)  # fmt: skip
+predict = DesignGroup(
+    _predict, [where(), json_option()], name="predict",
+    help="Keep what a design is expected to measure, so that no later comparison can be tuned.",
+    short_help="Log what a design is expected to measure.",
+)  # fmt: skip

@@ -1,0 +1,93 @@
+"""Recordings of the bench into the log: what is counted when they come in, and their files kept whole."""
+
+import json
+import math
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sensorgen.errors import BadInput
+from sensorgen.log import files
+from sensorgen.log.entries import BenchRun, Entry
+from sensorgen.log.logbook import Log
+from sensorgen.log.words import design_of_name, named
+
+if TYPE_CHECKING:
+    from sensorgen.recording import Joined, Recording
+
+
+def take(log: Log, specimen: str, recording: Path, rig: Path | None = None, remark: str = "") -> list[Entry]:
+    """Log a recording of one specimen.
+
+    Parameters
+    ----------
+    log : Log
+        An open one.
+    specimen : str
+        The specimen's name.
+    recording, rig : Path
+        The impedance analyser's file, and the rig's, if there is one.
+    remark : str
+        In anybody's words.
+
+    Returns
+    -------
+    list of Entry
+        What is new; nothing where the log has the same files of the same specimen.
+
+    Raises
+    ------
+    BadInput
+        A name or a file that cannot be read. Nothing is logged or kept then.
+    """
+    columns, name = named(specimen)
+    before = [files.raw_file(path) for path in (recording, rig) if path]
+    facts = _facts(recording, rig)
+    kept = [files.keep(log.files, path) for path in (recording, rig) if path]
+    if kept != before:
+        raise BadInput(f"{str(recording)!r} {files.CHANGES}")
+    design_id, design = design_of_name(name)
+    run = BenchRun(
+        uid=sha256(" ".join([str(columns["specimen"]), *(file.uid for file in kept)]).encode()).hexdigest()[:32],
+        **columns,  # type: ignore[arg-type]
+        written=specimen, design_id=design_id, design=design, remark=remark, source=recording.name,
+        file=kept[0].uid, rig_file=kept[1].uid if rig else "",
+        facts=json.dumps(facts, sort_keys=True, allow_nan=False),
+    )  # fmt: skip
+    return [row for row in log.add([*kept, run]) if isinstance(row, BenchRun)]
+
+
+def _facts(path: Path, rig: Path | None) -> dict[str, Any]:
+    """What is counted in a recording and in the rig's log, and how their clocks differ, as plain data."""
+    from sensorgen import recording
+
+    found = recording.read_all(path)
+    facts: dict[str, Any] = {"lockins": [_of_recording(r) for r in found]}
+    if rig:
+        log = recording.rig(rig)
+        facts["rig"] = {**log.counts(), "notes": list(log.notes), **_of_clocks(recording.joined(found[0], log))}
+    return facts
+
+
+def _of_recording(r: "Recording") -> dict[str, Any]:
+    source = {name: _plain(value) for name, value in vars(r.source).items() if name != "file"}
+    tones = [float(tone) for tone in r.tones_hz]
+    return {
+        "tones_hz": tones,
+        "counts": r.counts(),
+        "seconds": float(r.time_s[-1]),
+        "epoch_s": _plain(r.epoch_s),
+        **source,
+    }
+
+
+def _of_clocks(joined: "Joined") -> dict[str, Any]:
+    names = ("offset_s", "offset_error_s", "skew", "skew_error", "explained")
+    return {"clocks": joined.words()} | {name: _plain(getattr(joined, name)) for name in names}
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it: no nan, no tuples."""
+    if isinstance(value, tuple):
+        return list(value)
+    return None if isinstance(value, float) and not math.isfinite(value) else value

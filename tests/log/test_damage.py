@@ -1,0 +1,144 @@
+"""Files that are no log, or no longer one: told by name, and left as they are."""
+
+import os
+import sqlite3
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from sensorgen.errors import BadInput, SensorgenError
+from sensorgen.log import Log, files, verify
+from sensorgen.log.tables import thesis
+
+
+@pytest.fixture
+def sound(path):
+    """A log with Table D.1."""
+    with Log(path, create=True) as log:
+        log.add(thesis())
+    return path
+
+
+def zipped(path):
+    content = path.read_bytes()
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("log.db", content)
+
+
+def another(path):
+    path.unlink()
+    with sqlite3.connect(path) as connection:
+        connection.execute("CREATE TABLE t (x)")
+    connection.close()
+
+
+def cut(path, share):
+    content = path.read_bytes()
+    path.write_bytes(content[: int(len(content) * share)])
+
+
+def overwritten(path, at):
+    content = bytearray(path.read_bytes())
+    content[at : at + 4096] = os.urandom(4096)
+    path.write_bytes(content)
+
+
+def typed_wrongly(path):
+    """A row that no version of sensorgen writes, by the back door."""
+    connection = sqlite3.connect(path, isolation_level=None)
+    columns = [name for _, name, *_ in connection.execute("PRAGMA table_info(reading)")]
+    other = {"number": "99", "uid": "'u'", "y_ohm": "'[nan'"}
+    values = ", ".join(other.get(name, name) for name in columns)
+    connection.execute(f"INSERT INTO reading SELECT {values} FROM reading LIMIT 1")
+    connection.close()
+
+
+DAMAGE = {
+    "empty": (lambda p: p.write_bytes(b""), "is empty; expected a log"),
+    "text": (lambda p: p.write_text("specimen,y,z\n" * 99), "is no SQLite file"),
+    "short": (lambda p: cut(p, 0.0005), "is no SQLite file"),
+    "zip": (zipped, "is no SQLite file"),
+    "pickle": (
+        lambda p: p.write_bytes(b"\x80\x04cos\nsystem\n(S'touch pwned'\ntR." + b"\0" * 200),
+        "is no SQLite file",
+    ),
+    "another program's": (another, "is another program's database"),
+    "cut in half": (lambda p: cut(p, 0.5), "is damaged"),
+    "cut a little": (lambda p: cut(p, 0.97), "is damaged"),
+    "first page lost": (lambda p: overwritten(p, 200), "is damaged"),
+    "a page lost": (lambda p: overwritten(p, 5 * 4096), "is damaged|database: "),
+    "a row of nonsense": (typed_wrongly, "is damaged: column y_ohm of a Reading holds"),
+}
+
+
+@pytest.mark.parametrize(("damage", "message"), DAMAGE.values(), ids=DAMAGE)
+def test_a_damaged_log_is_told_by_name(sound, damage, message, run, tmp_path):
+    import re
+
+    damage(sound)
+    before = sound.read_bytes()
+    said = run("verify")
+    assert said.code in (1, 2)
+    text = said.out + said.err
+    assert re.search(message, text), text
+    assert str(sound) in text or "database: " in text
+    assert "Traceback" not in text
+    assert max(map(len, text.splitlines())) < 500
+    for words in (
+        ["list"],
+        ["show", "23 triX"],
+        ["export", "x.csv"],
+        ["list", "--all", "--json"],
+        ["import", "--thesis"],
+    ):
+        assert "Traceback" not in run(*words).err
+    if said.code == 2:
+        assert sound.read_bytes() == before
+    assert not (tmp_path / "pwned").exists()
+
+
+def test_folders_devices_and_pipes_are_no_log(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for place in (tmp_path, tmp_path / "pipe", Path("/dev/zero"), Path("/dev/full")):
+        with pytest.raises(BadInput, match="is no file; expected a log"):
+            Log(place, create=True)
+
+
+def test_a_log_in_a_place_that_cannot_be(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(SensorgenError, match="cannot use the log"):
+        Log(tmp_path / "file" / "log.db", create=True)
+    with pytest.raises(SensorgenError, match=r"cannot use the log|no log"):
+        Log(tmp_path / ("x" * 300), create=True)
+
+
+def test_raw_files_are_checked(log, tmp_path):
+    (tmp_path / "a.csv").write_text("a")
+    (tmp_path / "b").write_text("b")
+    kept = [files.keep(log.files, tmp_path / name) for name in ("a.csv", "b")]
+    log.add(kept)
+    assert list(verify.faults(log)) == []
+    first, second = (files.place(log.files, file) for file in kept)
+    assert first.name == f"{kept[0].uid}.csv"
+    first.chmod(0o644)
+    first.write_text("A")
+    second.unlink()
+    assert list(verify.faults(log)) == [
+        f"raw file a.csv ({first}) is not what was logged",
+        f"raw file b ({second}): No such file or directory",
+    ]
+
+
+def test_a_prediction_that_was_tuned_is_found(log, path):
+    from sensorgen.log.batches import prediction
+
+    log.add([prediction("d", "trix", {"capacitance_f": 1e-11})])
+    assert list(verify.faults(log)) == []
+    connection = sqlite3.connect(path, isolation_level=None)
+    sql = connection.execute("SELECT sql FROM sqlite_schema WHERE name = 'prediction_no_update'").fetchone()[0]
+    connection.execute("DROP TRIGGER prediction_no_update")
+    connection.execute("UPDATE prediction SET data = replace(data, '1', '2')")
+    connection.execute(sql)
+    connection.close()
+    assert list(verify.faults(log)) == ["prediction 1 is not what was made then"]

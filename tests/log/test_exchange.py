@@ -1,0 +1,236 @@
+"""Out and in again: everything that was logged is the very same, in CSV, in Parquet and in spreadsheets' hands."""
+
+import csv
+import dataclasses
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sensorgen.errors import BadInput, MissingValue, Unwritable
+from sensorgen.log import (
+    TABLES,
+    Batch,
+    BenchRun,
+    Log,
+    Prediction,
+    Print,
+    RawFile,
+    Reading,
+    codec,
+    exchange,
+    exporting,
+    files,
+    importing,
+    verify,
+)
+from sensorgen.log.batches import prediction
+from sensorgen.log.tables import parsed
+from sensorgen.log.words import reading
+
+REMARKS = [
+    "=1+1",
+    "+1",
+    "-1",
+    "@x",
+    "'quoted",
+    "''=1",
+    "\tx",
+    "x\r\ny",
+    "\nx",
+    "＝1",
+    '"a","b"',
+    "a;b",
+    "",
+    " x ",
+    "∞",
+    "ü\u2028",
+]
+
+
+def everything(log):
+    return {kind: list(log.entries(kind, superseded=True)) for kind in TABLES}
+
+
+@pytest.fixture
+def full(log, tmp_path):
+    """A log with rows of every kind, and every kind of value in them."""
+    (tmp_path / "run.MAT").write_bytes(b"raw" * 99)
+    raw = files.keep(log.files, tmp_path / "run.MAT")
+    old = reading("26 triX", "0.1", remark=REMARKS[0], baked=True, source_row=3)
+    log.add(
+        [
+            raw,
+            Batch(uid="b", batch="26", file=raw.uid),
+            Print(
+                uid="p",
+                specimen="26 triX",
+                iteration=26,
+                shape="tri",
+                axes="X",
+                film_mm=0.0,
+                batch_uid="b",
+                design_id="d",
+                design="trix",
+            ),
+            old,
+            *(reading("triX .3333mm 7", "1.23456789k / OL", "0", remark=remark, baked=False) for remark in REMARKS),
+            reading("26 triX", "100", supersedes=old.uid),
+            BenchRun(
+                uid="run", specimen="26 triX", written="26 triX", file=raw.uid, facts='{"n": 1}', source="=run.mat"
+            ),
+            prediction("d", "trix", {"capacitance_f": {"lower": 1e-11, "upper": None}}),
+        ]
+    )
+    return log
+
+
+def test_the_whole_log_comes_back(full, tmp_path):
+    rows = exporting.export(full, tmp_path / "out")
+    assert rows == sum(map(len, everything(full).values())) == len(REMARKS) + 7
+    with Log(tmp_path / "new.db", create=True) as new:
+        done = importing.take(new, tmp_path / "out", {})
+        assert (done.rows, done.new) == (rows, rows)
+        assert everything(new) == everything(full)
+        assert new.specimens() == full.specimens()
+        assert list(verify.faults(new)) == []
+        kept = next(new.entries(RawFile))
+        assert files.place(new.files, kept).read_bytes() == b"raw" * 99
+        assert files.place(new.files, kept).suffix == ".mat"
+        assert importing.take(new, tmp_path / "out", {}).new == 0
+
+
+@pytest.mark.parametrize("form", exchange.FORMATS)
+def test_readings_alone_come_back(full, tmp_path, form):
+    exporting.export(full, tmp_path / f"r.{form}")
+    with Log(tmp_path / "new.db", create=True) as new:
+        importing.take(new, tmp_path / f"r.{form}", {})
+        assert new.readings(superseded=True) == full.readings(superseded=True)
+
+
+def test_parquet_holds_types_that_others_read(full, tmp_path):
+    import pyarrow.parquet
+
+    exporting.export(full, tmp_path / "r.parquet")
+    table = pyarrow.parquet.read_table(tmp_path / "r.parquet")
+    assert table.column("y_ohm").to_pylist()[1] == [1234.56789, math.inf]
+    assert table.column("baked").to_pylist()[:2] == [True, False]
+    assert table.column("film_mm").to_pylist()[:2] == [0.0, 0.3333]
+    assert table.column("remark").to_pylist()[1 : len(REMARKS) + 1] == REMARKS
+
+
+def test_no_cell_is_a_formula(full, tmp_path):
+    exporting.export(full, tmp_path / "out")
+    for file in (tmp_path / "out").glob("*.csv"):
+        with file.open(encoding="utf-8", newline="") as text:
+            cells = [cell for row in csv.reader(text) for cell in row]
+        assert len(cells) > 4
+        assert not [cell for cell in cells if cell.startswith(("=", "+", "-", "@", "\t", "\r", "\n", "＝"))]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=20), max_size=5))
+def test_any_text_comes_back_from_csv(words):
+    rows = [
+        Reading(uid=f"u{k}", specimen=word, written=word, remark=word, doubts=(word, "="))
+        for k, word in enumerate(words)
+    ]
+    text = "".join(exchange.csv_pieces(Reading, rows))
+    assert list(exchange.from_sheet(Reading, parsed(text.encode(), "x"))) == rows
+
+
+@given(
+    st.lists(st.floats(allow_nan=False), max_size=4).map(tuple),
+    st.none() | st.booleans(),
+    st.none() | st.integers(-5, 2**62),
+)
+def test_any_numbers_come_back(ohm, baked, number):
+    for annotation, value in ((tuple[float, ...], ohm), (bool | None, baked), (int | None, number)):
+        held = codec.CODECS[annotation]
+        assert held.from_text(held.text(value)) == value
+        assert held.from_sql(int(value) if isinstance(value, bool) else held.sql(value)) == value
+
+
+@pytest.mark.parametrize(
+    ("column", "cell"),
+    [
+        ("y_ohm", "[1, nan]"),
+        ("y_ohm", "[1"),
+        ("y_ohm", "1"),
+        ("y_ohm", '["1"]'),
+        ("y_ohm", "[true]"),
+        ("baked", "True"),
+        ("film_mm", "nan"),
+        ("film_mm", "inf"),
+        ("iteration", "1.5"),
+        ("doubts", "[1]"),
+        ("doubts", "[" * 9000),
+        ("source_row", "x"),
+    ],
+)
+def test_a_cell_that_the_log_did_not_write_is_refused(full, tmp_path, column, cell):
+    exporting.export(full, tmp_path / "r.csv")
+    with (tmp_path / "r.csv").open(encoding="utf-8", newline="") as text:
+        rows = list(csv.DictReader(text))
+    rows[2][column] = cell
+    with (tmp_path / "bad.csv").open("w", encoding="utf-8", newline="") as text:
+        table = csv.DictWriter(text, rows[0])
+        table.writeheader()
+        table.writerows(rows)
+    with Log(tmp_path / "new.db", create=True) as new:
+        with pytest.raises(BadInput, match=f"bad.csv, row 4, column {column}: .* is not what the log writes there"):
+            importing.take(new, tmp_path / "bad.csv", {})
+        assert new.readings() == ()
+
+
+def test_an_export_that_was_tuned_is_refused(full, tmp_path):
+    exporting.export(full, tmp_path / "r.csv")
+    text = (tmp_path / "r.csv").read_text("utf-8")
+    (tmp_path / "tuned.csv").write_text(text.replace("0.1", "0.2"), "utf-8")
+    with pytest.raises(BadInput, match="is in the log and says something else there"):
+        importing.take(full, tmp_path / "tuned.csv", {})
+
+
+def test_raw_files_of_an_export_are_checked(full, tmp_path):
+    exporting.export(full, tmp_path / "out")
+    (file,) = (tmp_path / "out" / "files").iterdir()
+    with Log(tmp_path / "new.db", create=True) as new:
+        for content in (b"other", None):
+            file.unlink()
+            if content:
+                file.write_bytes(content)
+            with pytest.raises((BadInput, Unwritable), match=r"is not the file of that SHA-256|No such file"):
+                importing.take(new, tmp_path / "out", {})
+        table = tmp_path / "out" / "raw-files.csv"
+        table.write_text(table.read_text("utf-8").replace(file.name, "../../../etc/passwd"), "utf-8")
+        with pytest.raises(BadInput, match="is no SHA-256 of a raw file"):
+            importing.take(new, tmp_path / "out", {})
+        assert all(not rows for rows in everything(new).values())
+
+
+def test_folders_that_are_no_export(full, tmp_path):
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(BadInput, match=r"has no raw-files.csv; expected the folder of an exported log"):
+        importing.take(full, tmp_path / "empty", {})
+    exporting.export(full, tmp_path / "out")
+    (tmp_path / "out" / "readings.csv").replace(tmp_path / "out" / "batches.csv")
+    with pytest.raises(BadInput, match="columns of another table; expected those of batches"):
+        importing.take(full, tmp_path / "out", {})
+    for place in ("out", "r.xlsx"):
+        with pytest.raises(BadInput, match=r"expected a .csv or .parquet file, or a folder that is not there"):
+            exporting.export(full, tmp_path / place)
+    assert not [p for p in tmp_path.iterdir() if p.name.endswith(".part")]
+
+
+def test_without_pyarrow_parquet_is_refused_and_csv_is_not(full, tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
+    with pytest.raises(MissingValue, match=r"pip install 'sensorgen\[parquet\]', or export CSV"):
+        exporting.export(full, tmp_path / "r.parquet")
+    assert exporting.export(full, tmp_path / "r.csv") == len(REMARKS) + 2
+
+
+def test_every_kind_has_every_column():
+    for kind in (Reading, BenchRun, Prediction, Batch, Print, RawFile):
+        assert exchange.kind_of(exchange.columns(kind)) is kind
+        assert {"number"} == {f.name for f in dataclasses.fields(kind)} - set(exchange.columns(kind))

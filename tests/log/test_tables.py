@@ -1,0 +1,147 @@
+"""Tables that people keep: any names of columns, any separator; and what is no table."""
+
+import pickle
+import zipfile
+
+import pytest
+
+from sensorgen.errors import SensorgenError
+from sensorgen.log import Log, importing, tables
+
+HEAD = "specimen,y,z,remark\n"
+
+
+@pytest.fixture
+def take(log, tmp_path):
+    """Import some bytes or text as a table."""
+
+    def call(content, name="t.csv", **columns):
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return importing.take(log, path, columns)
+
+    return call
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "specimen,y,z,remark\n23 triX,0.65k,40,small holes\n",
+        "Design;Resistance in Y;Resistance in Z;Remarks\r\n23 triX;0,65k;40;small holes\r\n",
+        "\ufeffNAME\tRY\tRZ\tComment\n23 triX\t650\t40\tsmall holes\n\n\n",
+        'remark,z,y,sample\n"small holes"," 40 ",650,23 triX',
+    ],
+)
+def test_every_way_to_write_the_same_table(take, log, text):
+    assert take(text).new == 1
+    (row,) = log.readings()
+    assert (row.specimen, row.y_ohm, row.z_ohm, row.remark) == ("23 triX", (650.0,), (40.0,), "small holes")
+    assert (row.source, row.source_row) == ("t.csv", 1)
+
+
+def test_columns_can_be_named(take, log):
+    done = take("what,R1,R2,who\n23 triX,650,40,me\n", specimen="what", y="r1", z="R2")
+    assert done.lines() == ["1 of 1 rows logged", "columns left out: who"]
+    assert log.readings()[0].z_ohm == (40.0,)
+
+
+def test_columns_of_state_and_time(take, log):
+    cells = ["yes", "no", "", "baked", "Unbaked", "TRUE"]
+    take("specimen,y,baked,date\n" + "".join(f"23 triX,{k},{cell},May {k}\n" for k, cell in enumerate(cells, 1)))
+    assert [r.baked for r in log.readings()] == [True, False, None, True, False, True]
+    assert log.readings()[4].measured_at == "May 5"
+
+
+def test_a_table_that_has_grown_adds_what_is_new(take, log):
+    assert take(HEAD + "23 triX,650,40,\n23 triX,650,40,\n").new == 2  # twice the same is two readings
+    done = take(HEAD + "23 triX,650,40,\n23 triY,1k,5,\n23 triX,650,40,\n", name="other.csv")
+    assert (done.rows, done.new) == (3, 1)
+    assert [r.specimen for r in log.readings()] == ["23 triX", "23 triX", "23 triY"]
+
+
+def test_blank_cells_are_missing_and_doubtful(take, log):
+    take(HEAD + "23 triX,650,,\n23 triY,,,\n23 sqXY,0,OL,\n")
+    assert [(r.y_ohm, r.z_ohm, r.doubts) for r in log.readings()] == [
+        ((650.0,), (), ("z blank: not measured, or an overload",)),
+        ((), (), ("no measurement",)),
+        ((0.0,), (float("inf"),), ("y: 0 ohm: a short circuit, or a reading below the meter's resolution",)),
+    ]
+
+
+WRONG = {
+    "empty": (b"", "t.csv is empty; expected a header"),
+    "blank": (b"\n\n", "row 1 is empty"),
+    "header alone": (HEAD, "no rows below the header"),
+    "no specimen": ("y,z\n1,2\n", "row 1: no column specimen among 'y, z'; name it, as --column specimen=NAME"),
+    "no value": ("specimen,x\n23 triX,2\n", "row 1: no column y or z"),
+    "column twice": ("specimen,y,y\n23 triX,2,3\n", "row 1: column 'y' stands twice"),
+    "short row": (HEAD + "23 triX,1,2,\n23 triX,1\n", "row 3: 2 cells; the header has 4"),
+    "long row": (HEAD + "23 triX,0,65k,40,x\n", "row 2: 5 cells"),
+    "open quote": (HEAD + '23 triX,"1,2\n', "row 2: not CSV"),
+    "bad value": (HEAD + "23 triX,1,2,\n23 triX,1,about 2,\n", "row 3: resistance in Z: 'about 2' is no resistance"),
+    "bad name": (HEAD + "23 triX,1,2,\n\n23 trj,1,2,\n", "row 4: '23 trj' is no specimen's name"),
+    "bad state": ("specimen,y,baked\n23 triX,1,half\n", "row 2: column baked: 'half'; expected yes, no or nothing"),
+    "zip": (b"PK\x03\x04" + b"\0" * 99, "is a zip archive or a spreadsheet; expected a table as CSV"),
+    "pickle": (pickle.dumps({"specimen": 1}), "is a pickle"),
+    "gzip": (b"\x1f\x8b\x08\0", "is gzip"),
+    "utf-16": (HEAD.encode("utf-16"), "is UTF-16"),
+    "latin-1": (HEAD.encode() + "23 triX,1,2,gr\xf6\xdfe\n".encode("latin-1"), "row 2: byte 0xf6 is not UTF-8"),
+    "zero byte": (HEAD + "23 triX,1,2,\0\n", "row 2: a zero byte"),
+    "huge cell": (HEAD + "23 triX,1,2," + "x" * 200_000 + "\n", "row 2: not CSV (field larger than field limit"),
+    "long remark": (HEAD + "23 triX,1,2," + "x" * 20_000 + "\n", "row 2: a remark of 20000 letters"),
+    "long name": (HEAD + "23 triX" + "x" * 9_000 + ",1,2,\n", "row 2:"),
+}
+
+
+@pytest.mark.parametrize(("content", "message"), WRONG.values(), ids=WRONG)
+def test_a_bad_table_is_refused_as_a_whole_by_file_and_row(take, log, content, message):
+    with pytest.raises(SensorgenError) as told:
+        take(content)
+    assert message in str(told.value)
+    assert "t.csv" in str(told.value)
+    assert len(str(told.value)) < 600
+    assert log.readings() == log.specimens() == ()
+
+
+def test_columns_that_are_not_there(take):
+    with pytest.raises(SensorgenError, match=r"unknown column of .*t.csv 'Ry'. Known: RY .ohm., specimen"):
+        take("specimen,RY (ohm)\n23 triX,1\n", y="Ry")
+    with pytest.raises(SensorgenError, match="unknown column of --column 'yy'; did you mean 'y'"):
+        take("specimen,RY\n23 triX,1\n", yy="RY")
+
+
+def test_a_huge_table_is_refused_unread(log, tmp_path, monkeypatch):
+    with (tmp_path / "big.csv").open("wb") as file:
+        file.truncate(tables.MOST_BYTES + 1)
+    with pytest.raises(SensorgenError, match="64000001 bytes; expected at most 64000000: split it"):
+        importing.take(log, tmp_path / "big.csv", {})
+
+
+@pytest.mark.parametrize("place", ["none.csv", "/dev/zero", "/dev/tty", "none.json", "none.parquet", "none", "a\0b"])
+def test_what_is_no_file(log, tmp_path, place):
+    with pytest.raises(SensorgenError, match=r"cannot read|no file|no Parquet file"):
+        importing.take(log, tmp_path / place, {})
+
+
+def test_a_zip_or_pickle_given_as_anything_is_not_executed(log, tmp_path):
+    class Evil:
+        def __reduce__(self):
+            return (open, (str(tmp_path / "pwned"), "w"))
+
+    with zipfile.ZipFile(tmp_path / "t.zip", "w") as archive:
+        archive.writestr("t.csv", HEAD)
+    for suffix in ("csv", "json", "parquet"):
+        for content in (pickle.dumps(Evil()), (tmp_path / "t.zip").read_bytes()):
+            (tmp_path / f"t.{suffix}").write_bytes(content)
+            with pytest.raises(SensorgenError):
+                importing.take(log, tmp_path / f"t.{suffix}", {})
+    assert not (tmp_path / "pwned").exists()
+    assert log.readings() == ()
+
+
+def test_a_table_as_log_and_a_log_as_table(log, path, tmp_path):
+    with pytest.raises(SensorgenError, match="is a database; expected a table as CSV"):
+        importing.take(log, path, {})
+    (tmp_path / "t.csv").write_text(HEAD + "x" * 200)
+    with pytest.raises(SensorgenError, match="is no SQLite file; expected a log"):
+        Log(tmp_path / "t.csv")

@@ -1,0 +1,123 @@
+"""Recording and rig's log on one time, with offsets that are known."""
+
+import made
+import numpy as np
+import pytest
+
+from sensorgen.errors import BadInput
+from sensorgen.recording import Clock, Recording, Source, joined, rig
+from sensorgen.recording.clock import rebuilt
+from sensorgen.recording.samples import blank, sifted
+
+MADE = made.presses(12)
+END = MADE[-1][1] + 4
+
+
+def recording(run, skew=0.0, stamped=True):
+    clock = rebuilt(len(run.time_s), run.time_s, made.stamps(run.time_s, skew=skew)).clock if stamped else Clock()
+    z = run.impedance_ohm.copy()
+    return Recording(run.time_s, made.TONES_HZ, z, blank(len(z)) | sifted(z), clock, Source("run.mat", "MATLAB 5"))
+
+
+@pytest.fixture(scope="module")
+def run():
+    return made.run(MADE, creep=0.01)
+
+
+@pytest.mark.parametrize("offset_s", [0.0, 3.217, -47.12, 3600.5])
+def test_the_offset_is_found_within_its_error(tmp_path, run, offset_s):
+    log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(MADE, offset_s)))
+    found = joined(recording(run), log)
+    assert found.offset_error_s < 0.01
+    assert found.offset_s == pytest.approx(offset_s + 0.03, abs=3 * found.offset_error_s)
+    assert found.skew == 0
+    assert f"{found.offset_s:.6g}" in found.words()
+    truth, _ = made.force_at(run.time_s, MADE)
+    told = np.isfinite(found.force_n)
+    assert told.mean() > 0.99
+    assert np.std(found.force_n[told] - truth[told]) < 0.1
+    held = found.force_n > 0.3
+    np.testing.assert_allclose(found.set_position_mm[held], run.position_mm[held], atol=1e-3)
+
+
+def test_errors_of_the_offset_are_what_they_say(tmp_path):
+    pulls = []
+    for seed in range(8):
+        one = made.run(MADE, seed=seed)
+        log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(MADE, 1.0, seed=seed + 50)))
+        found = joined(recording(one), log)
+        pulls.append((found.offset_s - 1.03) / found.offset_error_s)
+    assert 0.15 < np.sqrt(np.mean(np.square(pulls))) < 1.8
+
+
+def test_a_skew_of_the_rigs_clock_is_found(tmp_path):
+    many = made.presses(40)
+    run = made.run(many, rate_hz=70)
+    log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(many, 2.0, skew=3e-4)))
+    found = joined(recording(run, stamped=False), log)
+    assert found.skew == pytest.approx(3e-4, abs=3 * found.skew_error)
+    assert found.skew_error < 5e-5
+
+
+def test_errors_and_silence_of_the_rig_are_marked_and_counted(tmp_path, run):
+    rows = [c.copy() for c in made.rig_rows(MADE)]
+    keep = np.ones(len(rows[0]), bool)
+    keep[600:700] = False  # 5 s
+    columns = [c[keep] for c in rows]
+    log = rig(made.write_rig(tmp_path / "rig.csv", columns, {200: "timeout", 201: "timeout", 300: "0"}))
+    assert log.counts() == {"rows": int(keep.sum()), "errors": 2}
+    found = joined(recording(run), log)
+    marked = found.recording.marks["rig error"]
+    assert marked.sum() == pytest.approx(140 * (5 + 0.1), abs=30)
+    assert np.isnan(found.force_n[np.isclose(run.time_s, 32, atol=1e-3)]).all()
+    assert not found.recording.valid()[marked].any()
+
+
+def test_a_sensor_that_does_not_answer_leaves_the_clocks_as_they_are(tmp_path, run):
+    rng = np.random.default_rng(0)
+    z = 41 * np.exp(1e-3 * (rng.standard_normal((len(run.time_s), 7)) + 0j))
+    dead = made.Run(run.time_s, run.force_n, run.position_mm, z, z, z, run.presses)
+    log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(MADE)))
+    found = joined(recording(dead), log)
+    assert (found.offset_s, found.skew) == (0, 0)
+    assert np.isnan(found.offset_error_s)
+    assert "believed" in found.words()
+    with pytest.raises(BadInput, match="too little to find the offset"):
+        joined(recording(dead, stamped=False), log)
+    far = rig(made.write_rig(tmp_path / "far.csv", made.rig_rows(MADE, 9000.0)))
+    with pytest.raises(BadInput, match="do not overlap within 1 s"):
+        joined(recording(run), far, within_s=1.0)
+
+
+def test_a_rigs_log_in_other_words(tmp_path):
+    file = tmp_path / "rig.csv"
+    file.write_text(
+        "when;soll;x;ist;err\n2023-05-04T12:00:00+02:00;1,5;10;1,4;\n2023-05-04T10:00:01.5Z;2;20;;E7\n"
+        "2023-05-04T10:00:01Z;2;20;1;\n2023-05-04T10:00:0"
+    )
+    names = {"when": "time_s", "soll": "set_force_n", "x": "set_position_mm", "ist": "force_n", "err": "error"}
+    found = rig(file, names)
+    assert np.diff(found.time_s).tolist() == [1.5, -0.5]
+    assert found.set_force_n.tolist() == [1.5, 2, 2]
+    assert found.error.tolist() == [False, True, True]
+    assert any("not after" in note for note in found.notes)
+    assert "not whole" in found.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time_s,set_force_n\n1,2\n", "set_position_mm is not there once"),
+        ("time_s,set_force_n,set_position_mm\n1,x,3\n", "row 2, column set_force_n: 'x' is not a number"),
+        ("time_s,set_force_n,set_position_mm\n2023-05-04T12:00:00,1,3\n", "is not a number"),
+        ("time_s,set_force_n,set_position_mm\n1,2,3,4\n", "row 2: 4 cells, but the header has 3"),
+        ("time_s,set_force_n,set_position_mm\n", "no rows"),
+        ("time_s,set_force_n,set_position_mm\n1,inf,3\n", "not a number"),
+        ("x" * 70_000, "row 1: longer than"),
+    ],
+)
+def test_bad_logs_name_row_and_column(tmp_path, text, said):
+    (tmp_path / "rig.csv").write_text(text)
+    with pytest.raises(BadInput, match=said) as error:
+        rig(tmp_path / "rig.csv")
+    assert "rig.csv" in str(error.value)
