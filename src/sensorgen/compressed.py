@@ -1,18 +1,20 @@
 """How a design's cell gives way under stress, as plain data: what ``sensorgen compress`` answers."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from sensorgen import cached
 from sensorgen.design import Design
 from sensorgen.errors import OutOfRange
-from sensorgen.models import press2d, springs
+from sensorgen.models import press2d, press3d, springs
 from sensorgen.models.press2d import Elastic, Fineness, Held
+from sensorgen.models.press3d import Pieces
 
 __all__ = ["MODELS", "Held", "answer", "stresses_kpa"]
 
 Data = dict[str, Any]
-MODELS = ("press2d", "springs")
+MODELS = ("press2d", "press3d", "springs")
 
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _OF_OUTLINES = "of the capacitance of the deformed outlines as computed; the outlines' own error is not in them"
@@ -39,7 +41,7 @@ def answer(
     held : Held
         Base, period, top and contact.
     model : str
-        One of ``MODELS``, or "" for the finite elements where they can speak of the scene, else springs.
+        One of ``MODELS``, or "" for the first that can speak of the scene.
     check_mesh : bool
         Solve on a finer mesh too, and compare.
     keep : bool
@@ -56,22 +58,24 @@ def answer(
     """
     solids = _solids(design)
     asked = [_PA_PER_KPA * kpa for kpa in stress_kpa]
-    if (model or _cheapest(design)) == "springs":
+    name = model or next(m for m, refuses in _UNFIT.items() if not refuses(design))
+    if name == "springs":
         return _springs(design, solids, asked)
-    cell = press2d.cell(design.in_use, _period_mm(design))
     permittivity = _permittivity(design)
+    press, cell = _PRESSED[name](design)
 
     def work() -> Data:
-        found = press2d.press(cell, solids, asked, permittivity, held, step=step)
+        found: press2d.Pressed = press(solids, asked, permittivity, held, step=step)
         if check_mesh:
-            finer = press2d.press(cell, solids, asked, permittivity, held, Fineness().finer(), step=step)
-            found = press2d.compared(found, finer)
-        return _plain(found, held)
+            finer = (Pieces() if name == "press3d" else Fineness()).finer()
+            found = press2d.compared(found, press(solids, asked, permittivity, held, finer, step=step))
+        return _plain(found, name, held)
 
     if not keep:
         return work()
     question = {
-        "compress": repr(cell),
+        "compress": cell,
+        "model": name,
         "solids": {name: [s.youngs_modulus_pa, s.poisson_ratio] for name, s in solids.items()},
         "permittivity": permittivity,
         "stress_pa": asked,
@@ -82,8 +86,22 @@ def answer(
     return found
 
 
-def _cheapest(design: Design) -> str:
-    return MODELS[press2d.unfit(design.in_use) is not None]
+def _in_2d(design: Design) -> tuple[Callable[..., press2d.Pressed], str]:
+    cell = press2d.cell(design.in_use, _period_mm(design))
+    return partial(press2d.press, cell), repr(cell)
+
+
+def _in_3d(design: Design) -> tuple[Callable[..., press2d.Pressed], str]:
+    cell = press3d.cell(design.in_use)
+    return partial(press3d.press, cell), cell.written()
+
+
+_PRESSED = {"press2d": _in_2d, "press3d": _in_3d}
+_UNFIT: dict[str, Callable[[Design], str | None]] = {
+    "press2d": lambda design: press2d.unfit(design.in_use),
+    "press3d": lambda design: press3d.unfit(design.in_use),
+    "springs": lambda _: None,
+}
 
 
 def _period_mm(design: Design) -> float | None:
@@ -106,10 +124,10 @@ def _permittivity(design: Design) -> dict[str, float]:
     return {name: design.material(name).value("relative_permittivity", used[name]).value for name in sorted(names)}
 
 
-def _plain(found: press2d.Pressed, held: Held) -> Data:
+def _plain(found: press2d.Pressed, model: str, held: Held) -> Data:
     bounds = found.capacitance_f_per_m2
     return {
-        "model": "press2d",
+        "model": model,
         "held": dict(vars(held)),
         "stress_kpa": [p / _PA_PER_KPA for p in found.stress_pa.tolist()],
         "displacement_um": [d * _UM_PER_M for d in found.displacement_m.tolist()],

@@ -11,7 +11,7 @@ from sensorgen.errors import BadInput, OutOfRange
 
 pytest.importorskip("netgen")
 from sensorgen.models import press2d
-from sensorgen.models._press import load
+from sensorgen.models._press import load, pressed
 from sensorgen.models.press2d import Fineness, Held
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "contact.json").read_text())
@@ -106,7 +106,9 @@ def test_a_curve_for_the_sensor():
 def test_too_much_is_told_with_the_last_load(monkeypatch):
     """Nothing above 15 kPa is allowed to converge: what was reached is told, and nothing is made up beyond it."""
     stepped = load.Problem.stepped
-    monkeypatch.setattr(load.Problem, "stepped", lambda self, s, p: stepped(self, s, p) if p < 1.5e4 else None)
+    monkeypatch.setattr(
+        load.Problem, "stepped", lambda self, s, p, before: stepped(self, s, p, before) if p < 1.5e4 else None
+    )
     found = press2d.press(tri(), solids(), [0.0, 1e4, 2e4], fineness=Fineness(0.005, 0.2, 0.3))
     assert found.converged_pa == 1e4
     assert found.faults == ("converged up to 10 of 20 kPa",)
@@ -119,9 +121,9 @@ def test_coarser_triangles_take_over_where_finer_ones_fail(monkeypatch):
     """Made to fail at first: the answer is that of coarser triangles, and says what they cost."""
     stepped = load.Problem.stepped
 
-    def fine_fail(self, state, pressure):
+    def fine_fail(self, state, pressure, before):
         fine = self.elements.mesh.lengths_m().min() < 1e-6
-        return None if fine and pressure > 1.5e4 else stepped(self, state, pressure)
+        return None if fine and pressure > 1.5e4 else stepped(self, state, pressure, before)
 
     monkeypatch.setattr(load.Problem, "stepped", fine_fail)
     found = press2d.press(tri(), solids(), [0.0, 1e4, 2e4])
@@ -149,8 +151,8 @@ def test_what_is_no_prism_or_no_solid_is_refused():
 def test_work_and_energy_are_weighed():
     """A linear spring stores half of stress times way; if it stores more or less, that is told as a share."""
     stress = moved = np.array([0.0, 1.0, 2.0])
-    assert press2d._imbalance(stress, moved, np.array([0.0, 0.5, 2.0])) == pytest.approx([0, 0, 0], abs=1e-12)
-    assert press2d._imbalance(stress, moved, np.array([0.0, 0.5, 2.5]))[2] == pytest.approx(-0.2)
+    assert pressed._imbalance(stress, moved, np.array([0.0, 0.5, 2.0])) == pytest.approx([0, 0, 0], abs=1e-12)
+    assert pressed._imbalance(stress, moved, np.array([0.0, 0.5, 2.5]))[2] == pytest.approx(-0.2)
 
 
 def test_a_peak_stays_though_the_same_bodies_lie_on_both_sides():

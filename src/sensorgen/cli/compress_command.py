@@ -33,8 +33,8 @@ OWN: list[click.Parameter] = [
     _choice("--top", "top", ["even", "rigid"], "Even pressure, or a stiff plate."),
     _choice("--contact", "contact", ["frictionless", "stick"], "What faces do that touch."),
     click.Option(
-        ["--model"], type=OneOf(["press2d", "springs"]), default=None,
-        help="Finite elements, or springs of columns; the first that can speak of the scene if not given.",
+        ["--model"], type=OneOf(["press2d", "press3d", "springs"]), default=None,
+        help="Finite elements of a cross-section or of boxes, or springs of columns; the first that fits if not given.",
     ),
     click.Option(["--check-mesh"], is_flag=True, help="Solve on a finer mesh too, and compare."),
     click.Option(["--no-cache"], is_flag=True, help="Solve anew, and keep nothing."),
@@ -101,7 +101,7 @@ def _bar(stresses: tuple[float, ...]) -> Iterator[Callable[[float], None]]:
 
 command = DesignGroup(
     _work, OWN, name="compress",
-    help="Press a cell: displacement and capacitance over stress, by plane-strain finite elements with contact. Exit "
-    "code 1 where a check says that the answer is not to be trusted.",
+    help="Press a cell: displacement and capacitance over stress, by finite elements with contact; of a cross-section "
+    "in plane strain, of boxes in 3D. Exit code 1 where a check says that the answer is not to be trusted.",
     short_help="Displacement and capacitance under stress.",
 )  # fmt: skip

@@ -35,8 +35,13 @@ def _slopes(s: Real) -> Real:
 class Faces:
     """Sides of a mesh that may touch: those that look up, and those that look down, (k, 3) nodes each."""
 
+    mesh: Mesh
     lower: Whole
     upper: Whole
+
+    def project(self, places_m: Real, penalty_pa: float, kept: "Pairs | None" = None) -> "Pairs":
+        """Find the partner of every point at given places of the nodes (n, 2); those of ``kept`` stay as they are."""
+        return project(self.mesh, self, places_m, penalty_pa, kept)
 
 
 def faces_of(mesh: Mesh) -> Faces:
@@ -44,7 +49,7 @@ def faces_of(mesh: Mesh) -> Faces:
     a, b = (mesh.points_m[mesh.rim[:, k]] for k in range(2))
     outside = at_border(mesh)
     across = (a[:, 0] - b[:, 0]) / mesh.lengths_m()  # the solid lies left of a side: one that runs back looks up
-    return Faces(mesh.rim[(across > _UPRIGHT) & ~outside], mesh.rim[(across < -_UPRIGHT) & ~outside])
+    return Faces(mesh, mesh.rim[(across > _UPRIGHT) & ~outside], mesh.rim[(across < -_UPRIGHT) & ~outside])
 
 
 @dataclass(frozen=True)
@@ -117,9 +122,9 @@ def _some(pairs: Pairs, which: NDArray[np.bool_], sticks: NDArray[np.bool_]) -> 
     return Pairs(pairs.gap[which], pairs.slip[which], *rest)
 
 
-def carrying(pairs: Pairs, loose: NDArray[np.bool_]) -> Pairs:
+def carrying(pairs: Pairs, loose: NDArray[np.bool_], dimension: int) -> Pairs:
     """The pairs between a loose piece above and one below that is held; ``loose`` says it of each node."""
-    share = np.asarray(pairs.gap[:, 1::2] @ loose.astype(float))
+    share = np.asarray(pairs.gap[:, dimension - 1 :: dimension] @ loose.astype(float))
     return _some(pairs, share > _HALF, pairs.sticks)
 
 

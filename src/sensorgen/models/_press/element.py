@@ -58,33 +58,61 @@ def law(youngs_modulus_pa: Real, poisson_ratio: Real) -> Law:
 
 @dataclass(frozen=True)
 class Inner:
-    """What the triangles keep for themselves: bubble (m, 2) [m] and pressure (m, 3) [Pa]."""
+    """What elements keep for themselves: bubble (m, 2 or 3) [m] and pressure (m, 3 or 4) [Pa]."""
 
     bubble: Real
     pressure: Real
 
     def moved(self, step: Real, share: float) -> "Inner":
-        """After a share of a step (m, 5)."""
-        return Inner(self.bubble + share * step[:, :2], self.pressure + share * step[:, 2:])
+        """After a share of a step (m, 5 or 7)."""
+        own = self.bubble.shape[1]
+        return Inner(self.bubble + share * step[:, :own], self.pressure + share * step[:, own:])
+
+    def ahead(self, before: "Inner", share: float) -> "Inner":
+        """As much further as it has come since ``before``, times a share."""
+        bubble, pressure = (
+            getattr(self, key) + share * (getattr(self, key) - getattr(before, key)) for key in ("bubble", "pressure")
+        )
+        return Inner(bubble, pressure)
 
 
 @dataclass(frozen=True)
 class Tangent:
-    """Condensed stiffness (m, 12, 12) and force (m, 12); the inner step is ``offset - slope @ du``."""
+    """Condensed stiffness (m, k, k) and force (m, k); the inner step is ``offset - slope @ du``.
+
+    ``pressure_step`` is how far the pressures are from their own equilibrium.
+    """
 
     stiffness: Real
     force: Real
     offset: Real
     slope: Real
+    pressure_step: Real
     mu_pa: Real
 
     def imbalance(self) -> float:
         """How far the inner unknowns are from their own equilibrium: the largest step of a pressure over mu [-]."""
-        return float(np.abs(self.offset[:, 2:] / self.mu_pa[:, None]).max())
+        return float(np.abs(self.pressure_step / self.mu_pa[:, None]).max())
 
     def inner_step(self, du: Real) -> Real:
-        """Step of bubble and pressure that belongs to a step of the nodes (m, 12)."""
+        """Step of bubble and pressure that belongs to a step of the nodes (m, k)."""
         return np.asarray(self.offset - np.einsum("mij,mj->mi", self.slope, du))
+
+
+def condensed(residual: Real, matrix: Real, outer: int, pressures: int, mu_pa: Real) -> Tangent:
+    """Without what elements keep for themselves: all beyond the first ``outer`` unknowns, pressures last."""
+    o = outer
+    inside = np.concatenate([matrix[:, o:, :o], residual[:, o:, None]], axis=2)
+    solved = np.linalg.solve(matrix[:, o:, o:], inside)
+    taken = np.matmul(matrix[:, :o, o:], solved)
+    return Tangent(
+        matrix[:, :o, :o] - taken[..., :-1],
+        residual[:, :o] - taken[..., -1],
+        -solved[..., -1],
+        solved[..., :-1],
+        -solved[:, -pressures:, -1],
+        mu_pa,
+    )
 
 
 @dataclass(frozen=True)
@@ -93,6 +121,11 @@ class Elements:
 
     mesh: Mesh
     law: Law
+
+    @property
+    def points_m(self) -> Real:
+        """Places of the nodes [m]."""
+        return self.mesh.points_m
 
     @cached_property
     def _geometry(self) -> tuple[Real, Real]:
@@ -142,18 +175,7 @@ class Elements:
 
     def tangent(self, u: Real, inner: Inner) -> Tangent:
         """Residual and its derivative at a state whose J is above 0."""
-        residual, matrix = self.full(u, inner)
-        k, o = matrix, _OUTER
-        inside = np.concatenate([k[:, o:, :o], residual[:, o:, None]], axis=2)
-        solved = np.linalg.solve(k[:, o:, o:], inside)
-        condensed = np.matmul(k[:, :o, o:], solved)
-        return Tangent(
-            k[:, :o, :o] - condensed[..., :-1],
-            residual[:, :o] - condensed[..., -1],
-            -solved[..., -1],
-            solved[..., :-1],
-            self.law.mu_pa,
-        )
+        return condensed(*self.full(u, inner), _OUTER, 3, self.law.mu_pa)
 
     def full(self, u: Real, inner: Inner) -> tuple[Real, Real]:
         """Residual (m, 17) and its derivative before the inner unknowns are condensed."""

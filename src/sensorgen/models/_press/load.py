@@ -1,8 +1,9 @@
 """Newton's method, and load steps that are cut when it fails."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,12 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from sensorgen.models._press import contact
-from sensorgen.models._press.contact import Faces, Pairs
-from sensorgen.models._press.element import Elements, Inner, Tangent
+from sensorgen.models._press.contact import Pairs
+from sensorgen.models._press.element import Inner, Tangent
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
+Solver = Callable[[csr_matrix, Real], Real | None]
 
 _ENOUGH = 1e-6  # residual over load
 _NEARLY = 1e-3  # the same before the contact partners are looked for anew
@@ -27,6 +29,51 @@ _MOST_CUTS = 8  # failed load steps in all before a cell is given up
 _FLAT = 1e-3  # gaps that differ by less than this share of their side close at once [-]
 _DEEPEST = 0.1  # how far a foot may sink in to begin with, over the length of a side [-]
 _ROUNDING = 1e-9
+_SYMMETRIC: dict[str, Any] = {
+    "permc_spec": "MMD_AT_PLUS_A",
+    "diag_pivot_thresh": 1e-3,
+    "options": {"SymmetricMode": True},
+}
+
+
+class Solid(Protocol):
+    """Elements of a mesh, in two or three dimensions."""
+
+    @property
+    def points_m(self) -> Real:
+        """Places of the nodes (n, d) [m]."""
+
+    @property
+    def freedoms(self) -> Whole:
+        """Numbers of the displacements that each element shares with its neighbours (m, k); x, y (, z) of each node."""
+
+    def start(self) -> Inner:
+        """Unloaded."""
+
+    def volume_ratio(self, u: Real, inner: Inner) -> Real:
+        """J at each quadrature point."""
+
+    def energy_j_per_m(self, u: Real, inner: Inner) -> float:
+        """Energy stored, per depth in two dimensions."""
+
+    def tangent(self, u: Real, inner: Inner) -> Tangent:
+        """Residual and its derivative."""
+
+
+class Touching(Protocol):
+    """Faces that may touch."""
+
+    def project(self, places_m: Real, penalty_pa: float, kept: Pairs | None = None) -> Pairs:
+        """Contact partners at given places of the nodes; those of ``kept`` stay."""
+
+
+def by_lu(stiffness: csr_matrix, right: Real) -> Real | None:
+    """The step that a force makes, or None where a piece has nothing that holds it."""
+    try:
+        found: Real = splu(stiffness.tocsc(), **_SYMMETRIC).solve(right)
+    except RuntimeError:  # exactly singular
+        return None
+    return found
 
 
 @dataclass(frozen=True)
@@ -48,12 +95,12 @@ class Problem:
 
     Attributes
     ----------
-    elements : Elements
-        Its triangles.
-    faces : Faces
+    elements : Solid
+        Its triangles or bricks.
+    faces : Touching
         What may touch.
     free : sparse
-        Displacements from the free ones.
+        Displacements from the free ones: rows with a one, or empty.
     load : (2n,) array
         Forces of a unit pressure [m].
     penalty_pa : float
@@ -62,15 +109,23 @@ class Problem:
         What has touched sticks.
     tied : (k, 2) array
         Nodes that move as one.
+    solver : callable
+        Of the linear systems.
     """
 
-    elements: Elements
-    faces: Faces
+    elements: Solid
+    faces: Touching
     free: csr_matrix
     load: Real
     penalty_pa: float
     stick: bool = False
     tied: Whole = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    solver: Solver = by_lu
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3; the last coordinate is the height."""
+        return int(self.elements.points_m.shape[1])
 
     def start(self) -> State:
         """Nothing presses."""
@@ -83,58 +138,69 @@ class Problem:
         It sinks in as far as the penalty needs to carry a pressure, because a contact that only just touches has no
         stiffness to begin with.
         """
-        pairs = contact.carrying(state.pairs, self.loose)
+        pairs = contact.carrying(state.pairs, self.loose, self.dimension)
         if not pairs.point.size:
             return state
         gap = self.gaps(pairs, state.u_m)
         first = gap < gap.min() + _FLAT * pairs.length_m
         sunk = pressure_pa * np.abs(self.load).sum() / pairs.stiffness_pa[first].sum()
         u = state.u_m.copy()
-        u[1::2] -= self.loose * (gap.min() + min(sunk, _DEEPEST * pairs.length_m[first].min()))
+        fall = gap.min() + min(sunk, _DEEPEST * pairs.length_m[first].min())
+        u[self.dimension - 1 :: self.dimension] -= self.loose * fall
         return replace(state, u_m=u, pairs=self.project(u))
 
     def fall_m(self, state: State) -> float:
         """How far the top comes down before anything carries it [m]."""
-        pairs = contact.carrying(state.pairs, self.loose)
+        pairs = contact.carrying(state.pairs, self.loose, self.dimension)
         return float(self.gaps(pairs, state.u_m).min()) if pairs.point.size else 0.0
 
     @cached_property
     def loose(self) -> NDArray[np.bool_]:
         """Nodes of pieces that nothing holds up."""
-        triangles, tied = self.elements.mesh.triangles, self.tied
-        starts = np.concatenate([np.repeat(triangles[:, 0], 5), tied[:, 0]])
-        ends = np.concatenate([triangles[:, 1:].ravel(), tied[:, 1]])
-        nodes = len(self.elements.mesh.points_m)
+        d, nodes = self.dimension, len(self.elements.points_m)
+        joined = self.elements.freedoms[:, ::d] // d
+        starts = np.concatenate([np.repeat(joined[:, 0], joined.shape[1] - 1), self.tied[:, 0]])
+        ends = np.concatenate([joined[:, 1:].ravel(), self.tied[:, 1]])
         _, piece = connected_components(coo_matrix((np.ones(len(starts)), (starts, ends)), (nodes, nodes)))
-        moves = np.diff(self.free.indptr)[1::2] > 0
-        return ~np.isin(piece, piece[~moves])
+        used = np.zeros(nodes, bool)
+        used[joined] = True
+        moves = np.diff(self.free.indptr)[d - 1 :: d] > 0
+        return used & ~np.isin(piece, piece[used & ~moves])
 
     def places(self, u: Real) -> Real:
         """Where the nodes are [m]."""
-        return self.elements.mesh.points_m + u.reshape(-1, 2)
+        return self.elements.points_m + u.reshape(-1, self.dimension)
 
     def project(self, u: Real, stuck: Pairs | None = None) -> Pairs:
         """Contact partners at given displacements."""
-        return contact.project(self.elements.mesh, self.faces, self.places(u), self.penalty_pa, stuck)
+        return self.faces.project(self.places(u), self.penalty_pa, stuck)
 
     def gaps(self, pairs: Pairs, u: Real) -> Real:
         """Gap of each pair [m]."""
         return np.asarray(pairs.gap @ self.places(u).ravel())
 
     @cached_property
-    def _places_of_entries(self) -> tuple[Whole, Whole]:
-        freedoms = self.elements.freedoms
-        return np.repeat(freedoms, 12, axis=1).ravel(), np.tile(freedoms, (1, 12)).ravel()
+    def _pattern(self) -> tuple[csr_matrix, Whole, Whole]:
+        """The elements' stiffness on the free displacements, empty; which entries of theirs it has, and where."""
+        number = np.full(self.free.shape[0], -1)
+        number[np.diff(self.free.indptr) > 0] = self.free.indices
+        here = number[self.elements.freedoms]
+        size, n = here.shape[1], self.free.shape[1]
+        rows, columns = np.repeat(here, size, axis=1).ravel(), np.tile(here, (1, size)).ravel()
+        kept = np.flatnonzero((rows >= 0) & (columns >= 0))
+        entries, place = np.unique(rows[kept] * n + columns[kept], return_inverse=True)
+        starts = np.searchsorted(entries, n * np.arange(n + 1))
+        return csr_matrix((np.zeros(len(entries)), entries % n, starts), (n, n)), kept, place
 
     def _touching(self, pairs: Pairs, u: Real) -> tuple[Real, csr_matrix]:
-        """Forces and stiffness of the contact."""
+        """Forces of the contact, and its stiffness on the free displacements."""
         gap = self.gaps(pairs, u)
-        k = pairs.stiffness_pa * (gap < 0)
-        force, stiffness = pairs.gap.T @ (k * gap), pairs.gap.T @ diags(k) @ pairs.gap
+        k, across = pairs.stiffness_pa * (gap < 0), pairs.gap @ self.free
+        force, stiffness = pairs.gap.T @ (k * gap), across.T @ diags(k) @ across
         if self.stick:
-            k = pairs.stiffness_pa * pairs.sticks
+            k, across = pairs.stiffness_pa * pairs.sticks, pairs.slip @ self.free
             force = force + pairs.slip.T @ (k * (pairs.slip @ self.places(u).ravel()))
-            stiffness = stiffness + pairs.slip.T @ diags(k) @ pairs.slip
+            stiffness = stiffness + across.T @ diags(k) @ across
         return force, stiffness
 
     def contact_energy(self, state: State) -> float:
@@ -146,13 +212,14 @@ class Problem:
 
     def residual(self, u: Real, inner: Inner, pairs: Pairs, pressure_pa: float) -> tuple[Real, csr_matrix, Tangent]:
         """Forces out of balance on the free displacements, their derivative, and the triangles' condensed part."""
-        local = self.elements.tangent(u, inner)
+        local, free = self.elements.tangent(u, inner), self.free
         force, stiffness = self._touching(pairs, u)
-        np.add.at(force, self.elements.freedoms.ravel(), local.force.ravel())
-        whole = (
-            coo_matrix((local.stiffness.ravel(), self._places_of_entries), shape=stiffness.shape).tocsr() + stiffness
-        )
-        return self.free.T @ (force - pressure_pa * self.load), self.free.T @ whole @ self.free, local
+        force += np.bincount(self.elements.freedoms.ravel(), local.force.ravel(), len(force))
+        empty, kept, place = self._pattern
+        data = np.bincount(place, local.stiffness.ravel()[kept], empty.nnz)
+        whole = csr_matrix((data, empty.indices, empty.indptr), empty.shape)
+        stiffness = whole + stiffness if stiffness.nnz else whole  # a sum forgets zeros, and the pattern with them
+        return free.T @ (force - pressure_pa * self.load), stiffness, local
 
     def newton(self, state: State, pressure_pa: float, pairs: Pairs, enough: float) -> State | None:
         """Equilibrium at a pressure with frozen contact partners, or None where it does not converge.
@@ -167,7 +234,7 @@ class Problem:
                 return None
             if np.abs(residual).max() < enough * scale and local.imbalance() < enough:
                 return replace(state, pressure_pa=pressure_pa, u_m=u, inner=inner, pairs=pairs)
-            step = _solved(stiffness, -residual)
+            step = self.solver(stiffness, -residual)
             if step is None:
                 return None
             du = self.free @ step
@@ -187,9 +254,25 @@ class Problem:
                 return share
         return None
 
-    def stepped(self, state: State, pressure_pa: float) -> State | None:
+    def ahead(self, state: State, before: State, pressure_pa: float) -> State:
+        """Where the last step leads if it is gone on with, as a start for Newton's method; or where it stands.
+
+        With contact it stands: what touches changes from step to step.
+        """
+        gone = state.pressure_pa - before.pressure_pa
+        if not (before.pressure_pa and gone) or (self.gaps(state.pairs, state.u_m) < 0).any():
+            return state
+        share = (pressure_pa - state.pressure_pa) / gone
+        u = state.u_m + share * (state.u_m - before.u_m)
+        inner = state.inner.ahead(before.inner, share)
+        inside_out = self.elements.volume_ratio(u, inner).min() <= _LEAST_J
+        return state if inside_out else replace(state, u_m=u, inner=inner)
+
+    def stepped(self, state: State, pressure_pa: float, before: State | None = None) -> State | None:
         """Press on to a pressure: solve, look for the partners anew, and solve again."""
-        first = self.newton(state, pressure_pa, state.pairs, _NEARLY)
+        first = self.newton(self.ahead(state, before or state, pressure_pa), pressure_pa, state.pairs, _NEARLY)
+        if first is None:
+            first = self.newton(state, pressure_pa, state.pairs, _NEARLY) if before else None
         if first is None:
             return None
         stuck = self._stuck(first) if self.stick else None
@@ -204,27 +287,19 @@ class Problem:
         return contact.stuck(state.pairs, self.gaps(state.pairs, state.u_m) < 0)
 
 
-def _solved(stiffness: csr_matrix, right: Real) -> Real | None:
-    """The step that a force makes, or None where a piece has nothing that holds it."""
-    try:
-        found: Real = splu(stiffness.tocsc()).solve(right)
-    except RuntimeError:  # exactly singular
-        return None
-    return found
-
-
 def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) -> Iterator[State]:
     """Equilibria at rising pressures, in steps of at most ``longest_pa``; ends early where even small steps fail."""
     state = problem.start()
     yield state
-    state = problem.rested(state, min(pressures_pa[1], longest_pa))
+    state = before = problem.rested(state, min(pressures_pa[1], longest_pa))
     step = longest_pa
     for target in pressures_pa[1:]:
         while state.pressure_pa < target:
             left = target - state.pressure_pa
-            reached = problem.stepped(state, target if left < step * (1 + _ROUNDING) else state.pressure_pa + step)
+            aim = target if left < step * (1 + _ROUNDING) else state.pressure_pa + step
+            reached = problem.stepped(state, aim, before)
             if reached is not None:
-                state, step = reached, min(2 * step, longest_pa)
+                before, state, step = state, reached, min(2 * step, longest_pa)
                 continue
             state, step = replace(state, cuts=state.cuts + 1), min(step, left) / 2
             if state.cuts > _MOST_CUTS:

@@ -44,54 +44,49 @@ CHOICES = {
 }
 
 
-def free_of(mesh: Mesh, held: Held, *, mirrored: bool, tied: Whole) -> csr_matrix:
-    """Displacements (x, y of each node) from the free ones, as a sparse matrix of ones.
+def free_of(points_m: Real, held: Held, tied: Whole, used: NDArray[np.bool_] | None = None) -> csr_matrix:
+    """Displacements (x, y of each node, or x, y, z) from the free ones, as a sparse matrix of ones.
 
     Parameters
     ----------
-    mesh : Mesh
-        Of the cell.
+    points_m : (n, d) array
+        Places of the nodes, the height last; all sides of the cell are mirrors [m].
     held : Held
         Choices of the boundary.
-    mirrored : bool
-        Both sides are mirrors; else the right side repeats the left one.
     tied : (k, 2) array
         Pairs of nodes that move as one, where solids touch in a point.
+    used : (n,) array, optional
+        Nodes that elements share; others do not move. All where not given.
     """
-    x, y = mesh.points_m.T
-    near = _SAME * (x.max() - x.min())
-    left, right = (np.flatnonzero(abs(x - end) < near) for end in (x.min(), x.max()))
-    floor, roof = (np.flatnonzero(abs(y - end) < near) for end in (y.min(), y.max()))
-    leader = np.arange(2 * len(x) + 1)  # the last number stands for the widening of the period
-    wide = 2 * len(x)
+    nodes, d = points_m.shape
+    near = _SAME * np.ptp(points_m[:, 0])
+    ends = [
+        [np.flatnonzero(abs(points_m[:, a] - end(points_m[:, a])) < near) for end in (np.min, np.max)] for a in range(d)
+    ]
+    wide = d * nodes + np.arange(d - 1)  # these numbers stand for how the cell widens
+    leader = np.arange(d * nodes + d - 1)
     fixed = np.zeros(len(leader), bool)
     for one, other in tied:
-        leader[2 * other], leader[2 * other + 1] = 2 * one, 2 * one + 1
-    widened = np.zeros(2 * len(x), bool)
-    if mirrored:
-        fixed[2 * left] = True
-        leader[2 * right] = wide
-    else:
-        partner = left[np.argmin(abs(y[right][:, None] - y[left]), axis=1)]
-        leader[2 * right], leader[2 * right + 1] = 2 * partner, 2 * partner + 1
-        widened[2 * right] = True
-        fixed[2 * left[y[left].argmin()]] |= held.base == "sliding"
-    fixed[2 * floor + 1] = True
-    fixed[2 * floor] |= held.base == "bonded"
+        leader[d * other : d * other + d] = d * one + np.arange(d)
+    for axis, (start, stop) in enumerate(ends[:-1]):
+        fixed[d * start + axis] = True
+        leader[d * stop + axis] = wide[axis]
+    floor, roof = ends[-1]
+    fixed[d * floor + d - 1] = True
+    for axis in range(d - 1):
+        fixed[d * floor + axis] |= held.base == "bonded"
     fixed[wide] = held.period == "fixed" or held.base == "bonded"
+    if used is not None:
+        fixed[: d * nodes] |= ~np.repeat(used, d)
     if held.top == "rigid":
-        leader[2 * roof + 1] = 2 * roof[0] + 1
+        leader[d * roof + d - 1] = d * roof[0] + d - 1
     while (leader[leader] != leader).any():
         leader = leader[leader]
     held_too = np.zeros(len(leader), bool)
     held_too[leader[fixed]] = True
-    number = np.where(held_too[leader], -1, leader)[:-1]
+    number = np.where(held_too[leader], -1, leader)[: d * nodes]
     kept, column = np.unique(number[number >= 0], return_inverse=True)
-    rows, columns = np.flatnonzero(number >= 0), column
-    if widened.any() and wide not in leader[:-1] and not fixed[wide]:
-        rows, columns = np.append(rows, np.flatnonzero(widened)), np.append(columns, np.full(widened.sum(), len(kept)))
-        kept = np.append(kept, wide)
-    return csr_matrix((np.ones(len(rows)), (rows, columns)), (2 * len(x), len(kept)))
+    return csr_matrix((np.ones(len(column)), (np.flatnonzero(number >= 0), column)), (d * nodes, len(kept)))
 
 
 def top_load(mesh: Mesh) -> Real:
