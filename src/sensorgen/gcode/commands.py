@@ -57,7 +57,8 @@ class _Simulation:
         self.prints = np.flatnonzero(motion.extruded_mm > 0)
         self.travels = np.flatnonzero(motion.length_mm() > 0)
         self.changes = {change.number: change for change in motion.changes}
-        self.tool = NO_TOOL
+        start = machine.tool_at_start()
+        self.tool = NO_TOOL if start is None else start
         self.last: Change | None = None
         self.heat = {tool: Heat() for tool in machine.tool_numbers}
         self.homed: set[str] = set()

@@ -7,7 +7,6 @@ other lines are parsed in full and kept as events between the moves. Checks and 
 import math
 import re
 from array import array
-from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -78,11 +77,6 @@ class Track:
         else:
             self.rows.append(row)
             self.values.append(value)
-
-    def at(self, row: int, before: float = math.nan) -> float:
-        """What holds for one move; ``before`` is what held at the start of the file."""
-        place = bisect_right(self.rows, row)
-        return self.values[place - 1] if place else before
 
     def column(self, count: int, before: float = math.nan) -> Floats:
         """What holds for each of ``count`` moves."""
