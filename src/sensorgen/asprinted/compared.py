@@ -8,10 +8,11 @@ import numpy as np
 
 from sensorgen import planner
 from sensorgen.asprinted import estimate
-from sensorgen.asprinted.beads import CONVENTIONS, Beads, beads, layers
+from sensorgen.asprinted.beads import CONVENTIONS, Beads, beads
+from sensorgen.asprinted.beads import layers as printed_layers
 from sensorgen.asprinted.rectilinear import plate
 from sensorgen.asprinted.strips import Strips, drawn, scene_of
-from sensorgen.asprinted.window import cut, window
+from sensorgen.asprinted.window import cut, evened, window
 from sensorgen.checks.slices import Slices
 from sensorgen.design import Design
 from sensorgen.errors import BadInput, OutOfRange
@@ -63,14 +64,17 @@ def sliced(design: Design, paths: Paths, source: str, centre_mm: tuple[float, fl
             f"no line of {design.name} in this G-code: expected tools {tools} in layers of "
             f"{design.layers.layer_mm:g} mm at its place on the bed; was it sliced from this design?"
         )
-    return Printed(source, {name: layers(design, lines, name) for name in CONVENTIONS}, lines)
+    return Printed(source, {name: printed_layers(design, lines, name) for name in CONVENTIONS}, lines)
 
 
 def cell(design: Design, printed: Sequence[Strips]) -> tuple[Scene, float]:
     """One period of a print as a scene, bottom electrode down, and how many of its plan the sensor has [-]."""
     scene = design.printed
     plan = window(drawn(scene, Slices(scene, design.layers)), scene)
-    found = scene_of(cut(printed, plan), replace(scene, size_mm=(*plan.sides_mm(), scene.size_mm[2])))
+    layers = cut(printed, plan)
+    if all(side < whole for side, whole in zip(plan.sides_mm(), scene.size_mm[:2], strict=True)):
+        layers = evened(layers, plan)
+    found = scene_of(layers, replace(scene, size_mm=(*plan.sides_mm(), scene.size_mm[2])))
     if design.orientation == "upside-down":
         found = found.turned_over()
     kept = replace(found, bodies=tuple(b for b in found.bodies if not b.is_support()))
