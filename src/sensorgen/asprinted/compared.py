@@ -17,6 +17,7 @@ from sensorgen.checks.slices import Slices
 from sensorgen.design import Design
 from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.gcode.paths import Paths
+from sensorgen.geometry import meshes, validity
 from sensorgen.interval import Interval
 from sensorgen.models import traxels
 from sensorgen.models._traxel_lines import Lines
@@ -92,6 +93,12 @@ def gap_mm(scene: Scene) -> float:
         return float("inf")
     apart = np.maximum(tops[:, None, :, 0] - bottoms[None, :, :, 1], bottoms[None, :, :, 0] - tops[:, None, :, 1])
     return float(np.round(np.sqrt((apart.clip(0) ** 2).sum(2)).min(), 9))
+
+
+def drawn_gap_mm(design: Design) -> float:
+    """Smallest distance of the electrodes as drawn, exact [mm]."""
+    scene = design.in_use
+    return round(validity.electrode_gap_mm(scene, {b.name: meshes.mesh(b) for b in scene.bodies}), 9)
 
 
 def capacitance_f(design: Design, printed: Printed, width: float = ACCURACY) -> dict[str, Interval | str]:
