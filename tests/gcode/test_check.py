@@ -198,6 +198,10 @@ M84"""
     assert found(lines.splitlines(), other) == set()
     assert "reach" in errors([*lines.splitlines(), "G1 X-1"], other)
     assert "heat-left" in errors(lines.splitlines()[:-2], other)
+    without_t = [line for line in lines.splitlines() if line != "T0"]
+    assert found(without_t, other) == set()  # its first tool is in hand
+    assert check(without_t, other).report.tools[0].tool == 0
+    assert {"tool", "cold"} & errors(["M83", "G1 X1 E1"], other) == {"cold"}
 
 
 def test_a_printer_without_a_control_section_has_the_bed_for_its_reach():

@@ -204,7 +204,7 @@ def test_several_commands_on_a_line():
 
 def test_a_printer_with_plain_words_gets_its_file_unchanged():
     xl = load_printer("prusa-xl5")
-    text = "G28\nM83\nT2\nM104 S210 T2\nM106 S255\nM107\nG10\nM82\nM83\nG1 X1 E1\nM104 S0\n"
+    text = "T2\nG28\nM83\nM104 S210 T2\nM106 S255\nM107\nG10\nM82\nM83\nG1 X1 E1\nM104 S0\n"
     assert made(text, xl) == text
 
 

@@ -90,6 +90,14 @@ def test_two_sensors_stand_where_they_were_placed(slicer, tmp_path):
 
 
 @both
+def test_another_printer_keeps_its_words(slicer, tmp_path):
+    variant = small("23/trix-d0.1.yaml", printer="prusa-xl5", tools={"etpu": 0, "x60": 1})
+    made = sliced([alone(variant)], slicer, tmp_path)
+    assert check(made.ready, variant.machine).errors() == []
+    assert made.ready.read_bytes() == made.raw.read_bytes()
+
+
+@both
 def test_retraction_by_the_firmware(slicer, tmp_path):
     variant = small("23/trix-d0.1.yaml")
     control = variant.machine.control.model_copy(update={"firmware_retraction": True})

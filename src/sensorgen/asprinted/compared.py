@@ -8,14 +8,16 @@ import numpy as np
 
 from sensorgen import planner
 from sensorgen.asprinted import estimate
-from sensorgen.asprinted.beads import CONVENTIONS, Beads, beads, layers
+from sensorgen.asprinted.beads import CONVENTIONS, Beads, beads
+from sensorgen.asprinted.beads import layers as printed_layers
 from sensorgen.asprinted.rectilinear import plate
 from sensorgen.asprinted.strips import Strips, drawn, scene_of
-from sensorgen.asprinted.window import cut, window
+from sensorgen.asprinted.window import cut, evened, window
 from sensorgen.checks.slices import Slices
 from sensorgen.design import Design
 from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.gcode.paths import Paths
+from sensorgen.geometry import meshes, validity
 from sensorgen.interval import Interval
 from sensorgen.models import traxels
 from sensorgen.models._traxel_lines import Lines
@@ -63,14 +65,17 @@ def sliced(design: Design, paths: Paths, source: str, centre_mm: tuple[float, fl
             f"no line of {design.name} in this G-code: expected tools {tools} in layers of "
             f"{design.layers.layer_mm:g} mm at its place on the bed; was it sliced from this design?"
         )
-    return Printed(source, {name: layers(design, lines, name) for name in CONVENTIONS}, lines)
+    return Printed(source, {name: printed_layers(design, lines, name) for name in CONVENTIONS}, lines)
 
 
 def cell(design: Design, printed: Sequence[Strips]) -> tuple[Scene, float]:
     """One period of a print as a scene, bottom electrode down, and how many of its plan the sensor has [-]."""
     scene = design.printed
     plan = window(drawn(scene, Slices(scene, design.layers)), scene)
-    found = scene_of(cut(printed, plan), replace(scene, size_mm=(*plan.sides_mm(), scene.size_mm[2])))
+    layers = cut(printed, plan)
+    if all(side < whole for side, whole in zip(plan.sides_mm(), scene.size_mm[:2], strict=True)):
+        layers = evened(layers, plan)
+    found = scene_of(layers, replace(scene, size_mm=(*plan.sides_mm(), scene.size_mm[2])))
     if design.orientation == "upside-down":
         found = found.turned_over()
     kept = replace(found, bodies=tuple(b for b in found.bodies if not b.is_support()))
@@ -88,6 +93,12 @@ def gap_mm(scene: Scene) -> float:
         return float("inf")
     apart = np.maximum(tops[:, None, :, 0] - bottoms[None, :, :, 1], bottoms[None, :, :, 0] - tops[:, None, :, 1])
     return float(np.round(np.sqrt((apart.clip(0) ** 2).sum(2)).min(), 9))
+
+
+def drawn_gap_mm(design: Design) -> float:
+    """Smallest distance of the electrodes as drawn, exact [mm]."""
+    scene = design.in_use
+    return round(validity.electrode_gap_mm(scene, {b.name: meshes.mesh(b) for b in scene.bodies}), 9)
 
 
 def capacitance_f(design: Design, printed: Printed, width: float = ACCURACY) -> dict[str, Interval | str]:

@@ -8,7 +8,6 @@ from sensorgen.asprinted.compared import ACCURACY, CONTACTS_OHM_M2, Printed, cel
 from sensorgen.asprinted.tally import findings, tally
 from sensorgen.design import Design
 from sensorgen.errors import SensorgenError
-from sensorgen.geometry import meshes, validity
 from sensorgen.interval import Interval
 
 
@@ -36,18 +35,13 @@ def report(design: Design, printed: Printed, accuracy: float = ACCURACY) -> dict
         "design_id": design.id(),
         "source": printed.source,
         "estimate": printed.lines is None,
-        "electrode_gap_mm": {"drawn": _drawn_gap_mm(design), "printed": _gaps_mm(design, printed)},
+        "electrode_gap_mm": {"drawn": compared.drawn_gap_mm(design), "printed": _gaps_mm(design, printed)},
         "capacitance_f": {"drawn": _drawn_f(design, accuracy), **_printed_f(design, printed, accuracy)},
         "electrode_resistance_ohm": _resistance(design, printed),
         "contact_ohm_m2": list(CONTACTS_OHM_M2),
         "layers": [row.as_dict() for row in rows],
         "findings": [f.as_dict() for f in design.waived(findings(rows, design.printed))],
     }
-
-
-def _drawn_gap_mm(design: Design) -> float:
-    scene = design.in_use
-    return round(validity.electrode_gap_mm(scene, {b.name: meshes.mesh(b) for b in scene.bodies}), 9)
 
 
 def _gaps_mm(design: Design, printed: Printed) -> list[float]:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from sensorgen.asprinted.intervals import within
+from sensorgen.asprinted.intervals import Intervals, within
 from sensorgen.asprinted.strips import Strips
 from sensorgen.cells import Band, Slice, mirrored
 from sensorgen.scene import SLIVER_MM, Point, Scene
@@ -100,6 +100,26 @@ def cut(layers: Sequence[Strips], to: Window) -> list[Strips]:
     found = [_cut(layer, *to.of(layer.across)) for layer in layers]
     places = {axis: _snapped(found, axis, side) for axis, side in zip("xy", to.sides_mm(), strict=True)}
     return [replace(layer, runs=_moved(layer, places[layer.across])) for layer in found]
+
+
+def evened(layers: Sequence[Strips], to: Window) -> list[Strips]:
+    """Layers of a window with each run as far to one side as its mirror image is to the other [mm].
+
+    For crossed strips, whose lopsided cell would take sixteen times the bricks. Widths stay; a strip that is printed a
+    little aside moves to its place, which changes the field in second order.
+    """
+    sides = dict(zip("xy", to.sides_mm(), strict=True))
+    return [
+        replace(layer, runs={name: _evened(runs, sides[layer.across]) for name, runs in layer.runs.items()})
+        for layer in layers
+    ]
+
+
+def _evened(runs: Intervals, side: float) -> Intervals:
+    mirrored_runs = [(side - b, side - a) for a, b in reversed(runs)]
+    return tuple(
+        (round((a + c) / 2, 6), round((b + d) / 2, 6)) for (a, b), (c, d) in zip(runs, mirrored_runs, strict=True)
+    )
 
 
 def _cut(layer: Strips, low: float, high: float) -> Strips:

@@ -1,9 +1,42 @@
 """A design as drawn and as printed, as lines for the terminal."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import click
 
 from sensorgen.cli.show import si
+from sensorgen.cli.words import OneOf
+
+if TYPE_CHECKING:
+    from sensorgen.design import Design
+
+
+def compensate_option() -> click.Option:
+    """``--compensate``, for commands that make files."""
+    return click.Option(
+        ["--compensate"], type=OneOf(("print", "bake")),
+        help="Change the design so that what is asked for comes out: whole layers, widths of a line, the electrode "
+        "gap; with bake also larger by the 20 % that the bake takes off.",
+    )  # fmt: skip
+
+
+def compensated(
+    design: "Design", word: str | None, walls: str, *, silent: bool
+) -> tuple["Design", list[dict[str, Any]]]:
+    """The design to print, and what was changed, which is also told."""
+    if word is None:
+        return design, []
+    from sensorgen.asprinted.compensation import compensated as changed
+
+    found, changes = changed(design, walls, bake=word == "bake")
+    if not silent:
+        click.echo(f"{design.name} compensated for the print, by the estimate for {walls} walls: {found.name}")
+        for c in changes or ():
+            click.echo(f"  {c.what:30} {c.before:g} -> {c.after:g}: {c.why}")
+        if not changes:
+            click.echo("  nothing to change")
+    return found, [c.as_dict() for c in changes]
 
 
 def lines(found: Mapping[str, Any]) -> Iterator[str]:

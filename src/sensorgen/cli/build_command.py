@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import card_text, show
+from sensorgen.cli import asprinted_text, card_text, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
@@ -16,15 +16,19 @@ OWN: list[click.Parameter] = [
     click.Option(["--no-cad"], is_flag=True, help="Leave out the STEP file, and with it the CAD kernel's seconds."),
     click.Option(["--force"], is_flag=True, help="Write the files in spite of findings of severity error."),
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
+    asprinted_text.compensate_option(),
     click.Option(["--json", "as_json"], is_flag=True, help="Print the result as JSON."),
 ]
 
 
-def _work(design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool, as_json: bool) -> int:
+def _work(
+    design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool, compensate: str | None, as_json: bool
+) -> int:
     from sensorgen import store
     from sensorgen.build import STEPS, build
     from sensorgen.errors import Unprintable
 
+    design, changes = asprinted_text.compensated(design, compensate, "arachne", silent=as_json)
     try:
         with show.progress(STEPS) as step:
             built = build(design, Path(out), cad=not no_cad, force=force, strict=strict, step=step)
@@ -43,6 +47,7 @@ def _work(design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool
                 "folder": str(built.folder),
                 "files": files,
                 "findings": found,
+                "compensated": changes,
                 "prediction": built.prediction,
             }
         )

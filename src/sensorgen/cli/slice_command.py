@@ -28,6 +28,7 @@ OWN: list[click.Parameter] = [
     click.Option(["--out"], default="out", show_default=True, metavar="DIR", help="Folder for the designs' folders."),
     click.Option(["--force"], is_flag=True, help="Slice in spite of findings of severity error."),
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
+    asprinted_text.compensate_option(),
     click.Option(["--json", "as_json"], is_flag=True, help="Print the result as JSON."),
 ]  # fmt: skip
 
@@ -41,6 +42,7 @@ def _work(
     out: str,
     force: bool,
     strict: bool,
+    compensate: str | None,
     as_json: bool,
 ) -> int:
     from sensorgen import printfile
@@ -49,6 +51,8 @@ def _work(
 
     if not 0 < time_limit_s < float("inf"):
         raise OutOfRange(f"--time-limit {time_limit_s:g}; expected seconds above 0")
+    walls = "arachne" if slicer == "prusa" else "cura-gaps"
+    design, changes = asprinted_text.compensated(design, compensate, walls, silent=as_json)
     try:
         with show.progress(("checks", *STEPS)) as step:
             made = printfile.slice_design(
@@ -65,7 +69,7 @@ def _work(
         _tell_findings(design, error.findings, as_json=as_json)
         raise
     if as_json:
-        show.as_json(made.as_dict())
+        show.as_json(made.as_dict() | {"compensated": changes})
         return made.code
     click.echo(f"{design.name}: {show.summary(made.review)} (sensorgen check tells them)")
     for line in (*gcode_text.findings(made.checked), *gcode_text.report(made.checked.report)):

@@ -7,7 +7,6 @@ other lines are parsed in full and kept as events between the moves. Checks and 
 import math
 import re
 from array import array
-from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -78,11 +77,6 @@ class Track:
         else:
             self.rows.append(row)
             self.values.append(value)
-
-    def at(self, row: int, before: float = math.nan) -> float:
-        """What holds for one move; ``before`` is what held at the start of the file."""
-        place = bisect_right(self.rows, row)
-        return self.values[place - 1] if place else before
 
     def column(self, count: int, before: float = math.nan) -> Floats:
         """What holds for each of ``count`` moves."""
@@ -173,8 +167,8 @@ class Motion:
         return way
 
 
-def follow(lines: Iterable[str], prime_macro: str = "", *, absolute_e: bool = True) -> Motion:
-    """Follow a file.
+def follow(lines: Iterable[str], prime_macro: str = "") -> Motion:
+    """Follow a file; places and filament count as absolute until it says otherwise, as firmwares start.
 
     Parameters
     ----------
@@ -182,8 +176,6 @@ def follow(lines: Iterable[str], prime_macro: str = "", *, absolute_e: bool = Tr
         The G-code.
     prime_macro : str
         Macro that changes tools, as ``tprime{tool}.g``; "" if the printer has none.
-    absolute_e : bool
-        Whether E counts as absolute before the file says; RepRapFirmware and Marlin start so.
 
     Examples
     --------
@@ -192,7 +184,6 @@ def follow(lines: Iterable[str], prime_macro: str = "", *, absolute_e: bool = Tr
     ([0.0, 0.0, 0.0, 0.5], [5.0, 0.0, 0.0, 4.0], ('', 'perimeter'))
     """
     follower = _Follower(prime_macro)
-    follower.is_absolute_e = absolute_e
     count = follower.run(lines)
     return follower.motion(count)
 

@@ -126,7 +126,8 @@ class _Writer:
         self.machine, self.control = machine, machine.control
         self.tool: int | None = None  # the printer's number
         self.held: list[str] = []  # taking the first tool, until the axes are homed
-        self.homed = self.ended = False
+        self.homed = machine.tool_at_start() is not None  # such a printer may take tools at any time
+        self.ended = False
         self.hot: list[int] = []
         self.offset_mm = 0.0
         self.changes: dict[str, Callable[[Command], Sequence[str] | None]] = {

@@ -1,0 +1,185 @@
+"""Parameters changed so that what is printed is what was asked for."""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from sensorgen.asprinted.compared import cell, drawn_gap_mm, estimated, gap_mm
+from sensorgen.checks.widths import GAP_CLOSES
+from sensorgen.design import Design, fields, make, name_of
+from sensorgen.errors import SensorgenError
+from sensorgen.scene import SLIVER_MM
+
+BAKE = 0.2  # what the bake takes off in the plane (thesis 6.2)
+_STEP_MM = 0.05  # by which a period grows
+_ENOUGH = 6.0  # periods to estimate a gap with
+_MOST = 5.0  # times the period
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing that was changed, or that comes out changed.
+
+    Attributes
+    ----------
+    what : str
+        Parameter, or what it does.
+    before, after : float
+        Values, in the unit that its name ends in.
+    why : str
+        In a few words.
+    """
+
+    what: str
+    before: float
+    after: float
+    why: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, for JSON."""
+        return asdict(self)
+
+
+def compensated(design: Design, walls: str = "arachne", *, bake: bool = False) -> tuple[Design, list[Change]]:
+    """The design to print so that the one that was asked for comes out, and what differs.
+
+    Heights go to whole layers, strips narrower than a line to a line, gaps that would close to one that does not; and
+    the electrode gap, as estimated for some walls, to what was asked: by a thinner film where cogs lose their tips and
+    the film is thick enough, else by a longer period, whose tips are wider.
+
+    Parameters
+    ----------
+    design : Design
+        As it should come out.
+    walls : str
+        As of :func:`sensorgen.asprinted.estimate.estimate`.
+    bake : bool
+        Also print larger by what the bake takes off, where the design does not say by how much.
+
+    Raises
+    ------
+    NoStrips, UnknownName
+        As :func:`sensorgen.asprinted.estimate.estimate`.
+    """
+    changes: list[Change] = []
+    now = design
+    if bake and not design.shrinkage:
+        now = _with(now, shrinkage=BAKE)
+        changes.append(Change("shrinkage", 0.0, BAKE, "the bake takes it off in the plane"))
+    for name, value, why in _steps(now):
+        changes.append(Change(name, getattr(now.params, name), value, why))
+        now = _with(now, **{name: value})
+    asked, before = drawn_gap_mm(now), _printed_gap_mm(now, walls)
+    now, moved = _gap_kept(now, asked, before, walls)
+    after = _printed_gap_mm(now, walls)
+    changes += moved
+    if moved or abs(after - asked) > SLIVER_MM:
+        kept = abs(after - asked) < SLIVER_MM
+        changes.append(
+            Change(
+                "electrode gap as printed [mm]", before, after, f"{asked:g} mm asked" + ("" if kept else ": NOT KEPT")
+            )
+        )
+    return now, changes
+
+
+def _with(design: Design, **changed: float) -> Design:
+    """The design with other parameters or shrinkage."""
+    data = design.model_dump(mode="json", exclude_unset=True)
+    for name, value in changed.items():
+        if name == "shrinkage":
+            data["shrinkage"] = value
+        else:
+            data["parameters"] = data.get("parameters", {}) | {name: round(value, 9)}
+    own = design.name != name_of(design)
+    data["name"] = design.name.removesuffix("-compensated")[:88] + "-compensated" if own else ""
+    return make({k: v for k, v in data.items() if k != "name" or v})
+
+
+def _steps(design: Design) -> Iterator[tuple[str, float, str]]:
+    """Heights off the layer grid and widths below what prints, with what they should be."""
+    layer, larger = design.layers.layer_mm, 1.0 / (1.0 - design.shrinkage)
+    line, closes = design.machine.line_mm(), GAP_CLOSES * design.machine.nozzle_mm
+    for name, value in asdict(design.params).items():
+        if not isinstance(value, float) or not value:
+            continue
+        whole = max(round(value / layer), 1) * layer
+        if _is_height(design, name):
+            if abs(whole - value) > SLIVER_MM:
+                yield name, round(whole, 9), f"whole layers of {layer:g} mm"
+        elif name.endswith("_width_mm"):
+            least, why = (line, "one line") if _fills(design, name) else (closes, "a gap that stays open")
+            if value * larger < least - SLIVER_MM:
+                yield name, round(least / larger, 9), why
+
+
+def _is_height(design: Design, name: str) -> bool:
+    """Whether a parameter moves faces up or down: a level is gone; a cut at the sensor's end only makes new ones."""
+    changed = _nudged(design, name)
+    return changed is not None and not _levels(design) <= _levels(changed)
+
+
+def _fills(design: Design, name: str) -> bool:
+    """Whether there is more material where a parameter is larger."""
+    changed = _nudged(design, name)
+    return changed is not None and _share(changed) > _share(design)
+
+
+def _nudged(design: Design, name: str) -> Design | None:
+    try:
+        return _with(design, **{name: getattr(design.params, name) * 1.01})
+    except SensorgenError:
+        return None
+
+
+def _levels(design: Design) -> set[float]:
+    return {
+        round(z, 6) for b in design.drawn.bodies for p in b.prisms for z in _heights(p.axis, p.outline, p.span("z"))
+    }
+
+
+def _heights(axis: str, outline: tuple[tuple[float, float], ...], span: tuple[float, float]) -> set[float]:
+    return set(span) if axis == "z" else {z for _, z in outline}
+
+
+def _share(design: Design) -> float:
+    size = design.drawn.size_mm
+    return sum(b.volume_mm3() for b in design.in_use.bodies) / (size[0] * size[1] * size[2])
+
+
+def _printed_gap_mm(design: Design, walls: str) -> float:
+    """Electrode gap as estimated, of a few periods [mm]."""
+    enough = _ENOUGH * float(getattr(design.params, "period_mm", 1.0))
+    sides = {name: min(getattr(design.params, name), max(enough, 1.0)) for name in ("length_mm", "width_mm")}
+    few = _with(design, **sides)
+    return gap_mm(cell(few, estimated(few, walls).layers["mid-plane"])[0])
+
+
+def _gap_kept(design: Design, asked: float, printed: float, walls: str) -> tuple[Design, list[Change]]:
+    """The design whose printed gap is the asked one, by the film or by the period; itself where neither does it."""
+    known = fields(design.shape)
+    lost = printed - asked
+    if lost <= SLIVER_MM or lost == float("inf"):
+        return design, []
+    film = getattr(design.params, "dielectric_mm", 0.0)
+    if film - lost > design.layers.layer_mm - SLIVER_MM:
+        thinner = _with(design, dielectric_mm=film - lost)
+        if abs(_printed_gap_mm(thinner, walls) - asked) < SLIVER_MM:
+            why = f"the cogs' lowest {lost:g} mm are not printed"
+            return thinner, [Change("dielectric_mm", film, round(film - lost, 9), why)]
+    return _longer(design, asked, walls) if "period_mm" in known else (design, [])
+
+
+def _longer(design: Design, asked: float, walls: str) -> tuple[Design, list[Change]]:
+    """The design with the shortest period whose tips are wide enough to print."""
+    period = design.params.period_mm  # type: ignore[attr-defined]
+    for k in range(1, int(period * (_MOST - 1) / _STEP_MM) + 1):
+        try:
+            longer = _with(design, period_mm=period + k * _STEP_MM)
+            if abs(_printed_gap_mm(longer, walls) - asked) < SLIVER_MM:
+                return longer, [
+                    Change("period_mm", period, round(period + k * _STEP_MM, 9), "tips wide enough to print")
+                ]
+        except SensorgenError:
+            break
+    return design, []
