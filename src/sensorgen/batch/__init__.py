@@ -45,7 +45,7 @@ class Arranged:
     @cached_property
     def designs(self) -> dict[str, Design]:
         """The designs, once each, by their hash."""
-        return {piece.design.id(): piece.design for piece in self.pieces}
+        return {piece.design_id: piece.design for piece in self.pieces}
 
     @cached_property
     def tools(self) -> dict[int, str]:
@@ -202,7 +202,7 @@ def _record(
         "checklist": record.checklist(plan, loaded),
         "bake": [step.model_dump() for step in plan.bake],
         "specimens": record.specimens(found.pieces, found.plate, predicted),
-        "designs": record.designs(found.designs.values()),
+        "designs": record.designs(found.designs),
         "slicers": dict(sliced),
         "versions": versions(),
         "files": store.hashes(stage),
