@@ -63,6 +63,7 @@ def test_the_page_needs_nothing_else_and_holds_text_as_text():
         [sheet.Label.of(Piece(named(design, 26, 1), design, design.id()), "a", 1)], '<script>alert("x")</script>'
     )
     assert "<script" not in page
+    assert "<i>" not in sheet.page([sheet.Label("<i>26", "<i>b", "<i>c", "<i>d", 1)], "a")
     assert "&lt;b&gt;&amp;" in page
     assert not re.findall(r"(?:src|href)\s*=", page)
     assert set(re.findall(r"https?://[^\"' ]+", page)) <= {"http://www.w3.org/2000/svg"}
