@@ -1,11 +1,11 @@
 """What the commands of a file ask of the machine, one after the other: tools, heat, homing, modes, fans, macros."""
 
-from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from math import isnan
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sensorgen.gcode.found import Found
 from sensorgen.gcode.motion import NO_TOOL, Change, Event, Motion, macro_name
@@ -53,9 +53,9 @@ class _Simulation:
 
     def __init__(self, motion: Motion, machine: Printer) -> None:
         self.motion, self.machine, self.control = motion, machine, machine.control
-        self.pushes = np.flatnonzero(motion.filament_mm != 0).tolist()
-        self.prints = np.flatnonzero(motion.extruded_mm > 0).tolist()
-        self.travels = np.flatnonzero(motion.length_mm() > 0).tolist()
+        self.pushes = np.flatnonzero(motion.filament_mm != 0)
+        self.prints = np.flatnonzero(motion.extruded_mm > 0)
+        self.travels = np.flatnonzero(motion.length_mm() > 0)
         self.changes = {change.number: change for change in motion.changes}
         self.tool = NO_TOOL
         self.last: Change | None = None
@@ -89,9 +89,9 @@ class _Simulation:
         if (number := self._first(self.travels, first, row)) is not None:
             yield from self._moving(number)
 
-    def _first(self, rows: list[int], start: int, end: int) -> int | None:
+    def _first(self, rows: NDArray[np.int64], start: int, end: int) -> int | None:
         """Line of the first of some moves in a stretch."""
-        place = bisect_left(rows, start)
+        place = int(np.searchsorted(rows, start))
         return int(self.motion.rows[rows[place], 9]) if place < len(rows) and rows[place] < end else None
 
     def _pushing(self, number: int) -> Iterator[Found]:
@@ -156,14 +156,13 @@ class _Simulation:
     def _take(self, change: Change) -> Iterator[Found]:
         yield from self._known(change.number, change.tool, "is taken") if change.tool != NO_TOOL else ()
         last, self.last, self.tool = self.last, change, change.tool
-        if last and (last.tool, last.macro) == (change.tool, not change.macro) and last.number != change.number:
-            start = bisect_left(self.prints, last.row)
-            if start >= len(self.prints) or self.prints[start] >= change.row:
-                yield _error(
-                    "tool-change", change.number,
-                    f"tool {change.tool} is taken twice, by T and by its macro: the macro takes it itself",
-                    "leave one of them out",
-                )  # fmt: skip
+        twice = last and (last.tool, last.macro) == (change.tool, not change.macro) and last.number != change.number
+        if last and twice and self._first(self.prints, last.row, change.row) is None:
+            yield _error(
+                "tool-change", change.number,
+                f"tool {change.tool} is taken twice, by T and by its macro: the macro takes it itself",
+                "leave one of them out",
+            )  # fmt: skip
 
     def _known(self, number: int, tool: float, what: str) -> Iterator[Found]:
         if tool not in self.heat:
@@ -275,7 +274,7 @@ class _Simulation:
             yield _error(
                 "relative", last, "the file ends in relative coordinates (G91)", "write G90 after the last G91"
             )
-        if not self.prints:
+        if not len(self.prints):
             yield Found("read", "warning", last, "the file prints nothing", "check that it is the right file")
         if "G90" not in self.seen:
             yield Found(

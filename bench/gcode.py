@@ -1,0 +1,127 @@
+"""G-code: time and memory of checking a file as it grows, and our own share of slicing; writes bench/results/gcode.*.
+
+Times are the processor's, so that other programs count for nothing; each file is checked in a process of its own,
+whose peak memory is that of the check. The slicers' times are those of their own processes and all they start.
+"""
+
+import json
+import platform
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from sensorgen import design
+from sensorgen.gcode.check import check
+from sensorgen.review import review
+from sensorgen.slicing import alone, sliced
+
+HERE = Path(__file__).parent
+RESULTS = HERE / "results"
+SIZES = (10_000, 100_000, 300_000, 1_000_000, 2_000_000)
+RUNS = 3
+TARGET_S, TARGET_MB, TARGET_SHARE = 10.0, 500.0, 0.15
+DESIGNS = ("23/trix-d0.1.yaml", "23/sqxy-d0.2.yaml")
+
+HEAD = "G90\nM83\nM140 S75\nG10 P3 S210 R180\nG10 P4 S230 R180\nG28\nG32\nM116\nM106 P3 S255\n"
+TAIL = "G10 P3 S0 R0\nG10 P4 S0 R0\nG28\nM0 H1\n"
+CHECK = """
+import json, resource, sys, time
+from pathlib import Path
+from sensorgen.gcode.check import check
+from sensorgen.printer import load_printer
+machine = load_printer("diabase-h5")
+start = time.process_time()
+result = check(Path(sys.argv[1]), machine)
+print(json.dumps({"lines": result.report.lines, "seconds": time.process_time() - start, "errors": len(result.errors()),
+    "mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024}))
+"""
+
+
+def write(path, lines):
+    """A print of two tools: layers of short lines, with a slicer's comments on every twelfth."""
+    count, layer = 0, 0
+    with path.open("w") as file:
+        file.write(HEAD)
+        while count < lines:
+            layer += 1
+            z = min(0.1 + 0.001 * layer, 190.0)
+            file.write(f"T{3 + layer % 2}\n;LAYER_CHANGE\n;HEIGHT:0.1\nG1 Z{z:.3f} F3000\nG1 E-4.7 F2400\n")
+            file.write("G1 X-50 Y-40 F7200\nG1 E4.7 F2400\n;TYPE:Solid infill\n")
+            for k in range(2000):
+                file.write(
+                    f"G1 X{-50 + k % 100:.3f} Y{-40 + 0.04 * k:.3f} E.0{1000 + k}\n" if k % 12 else ";WIDTH:0.44\n"
+                )
+            count += 2009
+        file.write(TAIL)
+
+
+def measured(path):
+    runs = []
+    for _ in range(RUNS):
+        done = subprocess.run([sys.executable, "-c", CHECK, path], capture_output=True, text=True, check=True)
+        runs.append(json.loads(done.stdout))
+    assert not any(run["errors"] for run in runs)
+    return {key: statistics.median(run[key] for run in runs) for key in ("lines", "seconds", "mb")}
+
+
+def share(name, slicer):
+    """Processor time of the slicer's process, and of ours around it."""
+    variant = design.load(HERE.parent / "designs" / name)
+    rows = []
+    for _ in range(RUNS):
+        with tempfile.TemporaryDirectory() as folder:
+            review(variant)
+            before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.process_time()
+            made = sliced([alone(variant)], slicer, Path(folder))
+            own, after = time.process_time() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+            theirs = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            start = time.process_time()
+            lines = check(made.ready, variant.machine).report.lines
+            rows.append((theirs, own, time.process_time() - start))
+    theirs, own, checking = (statistics.median(column) for column in zip(*rows, strict=True))
+    return {
+        "design": Path(name).stem, "slicer": slicer, "version": made.version, "lines": lines, "slicer_s": theirs,
+        "own_s": own, "check_s": checking, "share": (own + checking) / theirs,
+    }  # fmt: skip
+
+
+def table(growth, shares):
+    yield "# G-code\n"
+    yield f"Processor times on {platform.machine()}, Python {platform.python_version()}; medians of {RUNS}.\n"
+    yield "| lines | check [s] | us per line | peak memory [MB] |"
+    yield "|---|---|---|---|"
+    for row in growth:
+        per_line = row["seconds"] / row["lines"] * 1e6
+        yield f"| {row['lines']} | {row['seconds']:.2f} | {per_line:.2f} | {row['mb']:.0f} |"
+    yield f"\nTarget: 1 000 000 lines in {TARGET_S:g} s and {TARGET_MB:g} MB.\n"
+    yield "| design | slicer | lines | slicer [s] | files and rewriting [s] | check [s] | our share |"
+    yield "|---|---|---|---|---|---|---|"
+    for row in shares:
+        yield (
+            f"| {row['design']} | {row['slicer']} {row['version']} | {row['lines']} | {row['slicer_s']:.2f} "
+            f"| {row['own_s']:.3f} | {row['check_s']:.3f} | {row['share']:.0%} |"
+        )
+    yield f"\nTarget: {TARGET_SHARE:.0%} of the slicer's own time."
+
+
+def main():
+    growth = []
+    with tempfile.TemporaryDirectory() as folder:
+        for size in SIZES:
+            path = Path(folder) / "a.gcode"
+            write(path, size)
+            growth.append(measured(path))
+    shares = [share(name, slicer) for name in DESIGNS for slicer in ("prusa", "cura")]
+    text = "\n".join(table(growth, shares))
+    RESULTS.mkdir(exist_ok=True)
+    (RESULTS / "gcode.md").write_text(f"{text}\n", "utf-8")
+    (RESULTS / "gcode.json").write_text(json.dumps({"growth": growth, "shares": shares}, indent=1) + "\n", "utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
