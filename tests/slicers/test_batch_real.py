@@ -178,6 +178,14 @@ def test_a_batch_that_fails_leaves_the_earlier_one_as_it_was(tmp_path, monkeypat
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["plan"]
 
 
+def test_a_slicer_that_hangs_is_ended(tmp_path, monkeypatch):
+    stand_in(tmp_path, monkeypatch, "echo 'still thinking'; sleep 60")
+    (tmp_path / "plan.yaml").write_text(SMALL, "utf-8")
+    with pytest.raises(SlicerFailed, match=r"more than 0.3 s .*still thinking"):
+        make(tmp_path / "plan.yaml", tmp_path / "out", time_limit_s=0.3)
+    assert list((tmp_path / "out").rglob("*")) == []
+
+
 def test_a_slicer_that_is_missing_leaves_nothing_and_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(SlicerFailed, match="not installed"):

@@ -17,6 +17,7 @@ from sensorgen.errors import BadInput, Unprintable
 from sensorgen.findings import Finding
 from sensorgen.predict import prediction
 from sensorgen.review import Review, Step, review
+from sensorgen.slicer.run import TIMEOUT_S
 
 STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "record", "done")
 
@@ -115,6 +116,7 @@ def make(
     out: Path,
     *,
     gcode: bool = True,
+    time_limit_s: float = TIMEOUT_S,
     force: bool = False,
     strict: bool = False,
     step: Step = lambda _: None,
@@ -129,6 +131,8 @@ def make(
         Folder that holds the batches' folders.
     gcode : bool
         Also slice; the slicers take most of the time.
+    time_limit_s : float
+        How long each slicer may take [s].
     force : bool
         Write the files in spite of findings of severity error.
     strict : bool
@@ -159,7 +163,9 @@ def make(
         for name, content in [*printing.threemfs(found.plan.name, on_plate), *_files(found)]:
             store.write(stage, {name: content})
         slicers = found.plan.slicers if gcode else ()
-        sliced: dict[str, Any] = {s: printing.gcode(found.plan.name, on_plate, s, stage, step) for s in slicers}
+        sliced: dict[str, Any] = {
+            s: printing.gcode(found.plan.name, on_plate, s, stage, time_limit_s, step) for s in slicers
+        }
         step("record")
         made = record.sealed(_record(found, predicted, sliced, stage))
         store.write(stage, {record.RECORD: json_bytes(made)})

@@ -35,7 +35,9 @@ def threemfs(name: str, found: Sequence[Placed]) -> Iterator[tuple[str, bytes]]:
         yield f"{name}.{family}.3mf", slicing.plate_3mf(found, family, name)
 
 
-def gcode(name: str, found: Sequence[Placed], slicer: str, folder: Path, step: Step) -> dict[str, Any]:
+def gcode(
+    name: str, found: Sequence[Placed], slicer: str, folder: Path, time_limit_s: float, step: Step
+) -> dict[str, Any]:
     """Slice a plate into ``folder``, and say by what.
 
     Parameters
@@ -48,6 +50,8 @@ def gcode(name: str, found: Sequence[Placed], slicer: str, folder: Path, step: S
         ``prusa`` or ``cura``.
     folder : Path
         Of the batch; the slicer's own G-code and its settings go to a folder of its name in there.
+    time_limit_s : float
+        How long the slicer may take [s].
     step : callable
         Told again and again while the slicer works.
 
@@ -57,7 +61,7 @@ def gcode(name: str, found: Sequence[Placed], slicer: str, folder: Path, step: S
         Version of the slicer, the names of its files, what the check of the printer's file found, and what it takes.
     """
     inside, own, ready = folder / f".{slicer}", folder / slicer, folder / f"{name}.{slicer}.gcode"
-    made = slicing.sliced(found, slicer, inside, step=lambda _: step("slicing"))
+    made = slicing.sliced(found, slicer, inside, time_limit_s=time_limit_s, step=lambda _: step("slicing"))
     own.mkdir()
     made.raw.replace(own / "raw.gcode")
     made.ready.replace(ready)
