@@ -11,9 +11,12 @@ EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
 SVG = "{http://www.w3.org/2000/svg}"
 
 
+def text_of(found):
+    return picture.svg(found.plan.name, found.pieces[0].design.machine, found.room, found.plate, found.pieces)
+
+
 def drawn(found):
-    text = picture.svg(found.plan.name, found.pieces[0].design.machine, found.room, found.plate, found.pieces)
-    return ET.fromstring(text)
+    return ET.fromstring(text_of(found))
 
 
 def numbers(element, *keys):
@@ -50,6 +53,11 @@ def test_names_fit_their_specimens():
         assert 0.62 * float(text.get("font-size")) * len(text.text) <= 100
     listed = [t.text for t in root.iter(f"{SVG}text") if not t.get("text-anchor")]
     assert sum(line.split(":")[0].isdigit() for line in listed) == 20
+
+
+def test_the_page_shows_the_plate_of_the_example():
+    shown = EXAMPLE.parents[1] / "pictures" / "film-study-plate.svg"
+    assert shown.read_text("utf-8") == text_of(arranged(EXAMPLE)), "run `make docs`"
 
 
 def test_small_specimens_have_their_number_alone(tmp_path):
