@@ -17,7 +17,7 @@ from sensorgen.cli import COMMANDS, cli
 from sensorgen.cli.designs import option_of
 
 DESIGNS = Path(__file__).parents[2] / "designs"
-ON_DESIGNS = ("build", "check", "draw", "predict")
+ON_DESIGNS = ("build", "check", "draw", "predict", "slice")
 
 
 def options_of_help(text):

@@ -173,8 +173,8 @@ class Motion:
         return way
 
 
-def follow(lines: Iterable[str], prime_macro: str = "", *, absolute_e: bool = True) -> Motion:
-    """Follow a file.
+def follow(lines: Iterable[str], prime_macro: str = "") -> Motion:
+    """Follow a file; places and filament count as absolute until it says otherwise, as firmwares start.
 
     Parameters
     ----------
@@ -182,8 +182,6 @@ def follow(lines: Iterable[str], prime_macro: str = "", *, absolute_e: bool = Tr
         The G-code.
     prime_macro : str
         Macro that changes tools, as ``tprime{tool}.g``; "" if the printer has none.
-    absolute_e : bool
-        Whether E counts as absolute before the file says; RepRapFirmware and Marlin start so.
 
     Examples
     --------
@@ -192,7 +190,6 @@ def follow(lines: Iterable[str], prime_macro: str = "", *, absolute_e: bool = Tr
     ([0.0, 0.0, 0.0, 0.5], [5.0, 0.0, 0.0, 4.0], ('', 'perimeter'))
     """
     follower = _Follower(prime_macro)
-    follower.is_absolute_e = absolute_e
     count = follower.run(lines)
     return follower.motion(count)
 
