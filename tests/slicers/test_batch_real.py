@@ -115,6 +115,15 @@ def test_copies_of_a_design_are_printed_alike(small):
     assert one == pytest.approx(other, rel=1e-3)
 
 
+def test_all_but_the_gcode_is_the_same_without_slicing(small, tmp_path):
+    path = tmp_path / "plan.yaml"
+    path.write_text(SMALL, "utf-8")
+    files = make(path, tmp_path / "out", gcode=False).record["files"]
+    assert {name: small.record["files"][name] for name in files} == files
+    more = {"plan.prusa.gcode", "plan.cura.gcode", "prusa/raw.gcode", "prusa/profile.ini", "cura/raw.gcode"}
+    assert set(small.record["files"]) - set(files) == more | {"cura/settings.json"}
+
+
 def test_twenty_sensors_in_one_file(twenty):
     inside = printed_by(twenty, "prusa")[1]
     assert len(inside) == 20

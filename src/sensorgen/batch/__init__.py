@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from sensorgen import store
+from sensorgen import store, threemf
 from sensorgen.batch import picture, printing, record, sheet, tab
 from sensorgen.batch.layout import Plate, Room, Size, column, packed, room
 from sensorgen.batch.pieces import Piece, pieces, shuffled, tools
@@ -160,9 +160,11 @@ def make(
         step("3MF")
         store.write(stage, {"plan.yaml": path.read_bytes()})
         on_plate = printing.placed(found.plan, found.pieces, found.plate)
-        for name, content in [*printing.threemfs(found.plan.name, on_plate), *_files(found)]:
-            store.write(stage, {name: content})
         slicers = found.plan.slicers if gcode else ()
+        sliced_from = {"prusa"} & set(slicers)  # slicing leaves the 3MF that it took; CuraEngine takes none
+        families = [family for family in threemf.FAMILIES if family not in sliced_from]
+        for name, content in (*printing.threemfs(found.plan.name, on_plate, families), *_files(found)):
+            store.write(stage, {name: content})
         sliced: dict[str, Any] = {
             s: printing.gcode(found.plan.name, on_plate, s, stage, time_limit_s, step) for s in slicers
         }
