@@ -39,6 +39,9 @@ def main() -> None:
             out = Path(folder) / f"{name}.svg"
             sensorgen("draw", *words, "--output", str(out))
             (DOCS / "pictures" / out.name).write_bytes(out.read_bytes())
+        sensorgen("batch", str(DOCS / "examples" / "film-study.yaml"), "--no-gcode", "--out", folder)
+        plate = Path(folder) / "film-study" / "plate.svg"
+        (DOCS / "pictures" / "film-study-plate.svg").write_bytes(plate.read_bytes())
 
 
 if __name__ == "__main__":

@@ -79,6 +79,7 @@ def sliced(
     slicer: Literal["prusa", "cura"] | str,
     folder: Path,
     *,
+    title: str = "",
     program: str = "",
     time_limit_s: float = TIMEOUT_S,
     step: Step = lambda _: None,
@@ -93,6 +94,8 @@ def sliced(
         ``prusa``: PrusaSlicer takes one 3MF. ``cura``: CuraEngine takes one STL per body.
     folder : Path
         Where to write; made if missing. The slicer's input files stay there too.
+    title : str
+        Name of the print in its 3MF; the pieces' names when not given.
     program : str
         Path of the slicer; "" for the one on PATH.
     time_limit_s : float
@@ -121,7 +124,7 @@ def sliced(
     step("files")
     runner = Runner(program, time_limit_s, lambda: step("slicing"))
     try:
-        work = _prepared(pieces, bodies, slicer, folder, raw, runner)
+        work = _prepared(pieces, bodies, slicer, folder, raw, runner, title)
         before = time.perf_counter()
         work()
         seconds = time.perf_counter() - before
@@ -257,15 +260,21 @@ def _corner_mm(design: Design) -> tuple[float, float]:
 
 
 def _prepared(
-    pieces: Sequence[Placed], bodies: list[threemf.Part], slicer: str, folder: Path, raw: Path, runner: Runner
+    pieces: Sequence[Placed],
+    bodies: list[threemf.Part],
+    slicer: str,
+    folder: Path,
+    raw: Path,
+    runner: Runner,
+    title: str,
 ) -> Callable[[], None]:
     """Write what the slicer reads; the answer runs it."""
     design, all_loads = pieces[0].design, plate_loads(pieces)
     folder.mkdir(parents=True, exist_ok=True)
     if slicer == "prusa":
         plate, profile = folder / "plate.3mf", folder / "profile.ini"
-        title = " ".join(piece.name for piece in pieces)[:80]
-        plate.write_bytes(threemf.plate("prusa", title, bodies, _corner_mm(design)))
+        named = title or " ".join(piece.name for piece in pieces)[:80]
+        plate.write_bytes(threemf.plate("prusa", named, bodies, _corner_mm(design)))
         profile.write_text(prusa.profile(design.machine, design.layers, all_loads), "utf-8")
         return lambda: prusa.slice_3mf(plate, profile, raw, runner)
     settings = curaengine.engine_settings(design.machine, design.layers, all_loads)

@@ -11,9 +11,12 @@ EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
 SVG = "{http://www.w3.org/2000/svg}"
 
 
+def text_of(found):
+    return picture.svg(found.plan.name, found.pieces[0].design.machine, found.room, found.plate, found.pieces)
+
+
 def drawn(found):
-    text = picture.svg(found.plan.name, found.pieces[0].design.machine, found.room, found.plate, found.pieces)
-    return ET.fromstring(text)
+    return ET.fromstring(text_of(found))
 
 
 def numbers(element, *keys):
@@ -52,6 +55,11 @@ def test_names_fit_their_specimens():
     assert sum(line.split(":")[0].isdigit() for line in listed) == 20
 
 
+def test_the_page_shows_the_plate_of_the_example():
+    shown = EXAMPLE.parents[1] / "pictures" / "film-study-plate.svg"
+    assert shown.read_text("utf-8") == text_of(arranged(EXAMPLE)), "run `make docs`"
+
+
 def test_small_specimens_have_their_number_alone(tmp_path):
     plan = tmp_path / "plan.yaml"
     plan.write_text("iteration: 1\ndesigns: [{shape: tri, replicates: 30, parameters: {length_mm: 6, width_mm: 6}}]\n")
@@ -59,12 +67,12 @@ def test_small_specimens_have_their_number_alone(tmp_path):
     assert texts == [str(k) for k in range(1, 31)]
 
 
-def test_more_designs_than_colours_still_have_one_each():
+def test_more_designs_than_colours_share_them():
     class Known:
         def __init__(self, key):
             self.design, self.name = self, f"{key:03}"
+            self.design_id = self.name
 
-        def id(self):
-            return self.name
-
-    assert len(picture.colours([Known(k) for k in range(20)])) == 20
+    found = picture.colours([Known(k) for k in range(20)])
+    assert list(found) == [f"{k:03}" for k in range(20)]
+    assert len({found[key] for key in list(found)[:8]}) == 8

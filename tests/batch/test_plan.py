@@ -6,10 +6,14 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from sensorgen import design
+from sensorgen.batch import arranged
 from sensorgen.batch.pieces import pieces, shuffled, tools
-from sensorgen.batch.plan import Plan, load
+from sensorgen.batch.plan import Item, Plan, load
 from sensorgen.errors import BadInput, OutOfRange, SensorgenError, UnknownName
 
 ROOT = Path(__file__).parents[2]
@@ -174,8 +178,6 @@ def test_the_order_does_not_hang_on_pythons_own_hashes():
 
 
 def test_a_huge_specimen_fits_nowhere(plan):
-    from sensorgen.batch import arranged
-
     with pytest.raises(OutOfRange, match="fits on no plate"):
         arranged(plan(HEAD + "  - {shape: tri, parameters: {length_mm: 400}}\n"))
 
@@ -185,3 +187,30 @@ def test_the_page_shows_the_example_and_every_key_of_a_plan():
     shown = page.partition("```yaml\n")[2].partition("```")[0]
     assert EXAMPLE.read_text("utf-8").partition("\n")[2] == shown
     assert not [key for key in Plan.model_fields if f"`{key}`" not in page]
+
+
+SCALARS = st.one_of(
+    st.none(), st.booleans(), st.integers(-3, 10**19), st.floats(), st.text(max_size=8),
+    st.sampled_from(["tri", "rect", "reference", "prusa", "cura", "column", "packed", "etpu", "x60", "../x.yaml"]),
+)  # fmt: skip
+KEYS = st.one_of(
+    st.sampled_from([*Plan.model_fields, *Item.model_fields, "spacing_mm", "lot", "hours"]), st.text(max_size=5)
+)
+TREES = st.recursive(
+    SCALARS,
+    lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(KEYS, inner, max_size=4)),
+    max_leaves=8,
+)
+FITTING = {"iteration": 26, "designs": [{"shape": "tri", "replicates": 2}]}
+
+
+@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.dictionaries(KEYS, TREES, max_size=3), st.booleans())
+def test_any_mapping_is_a_plan_or_refused_in_words(tmp_path, data, whole):
+    path = tmp_path / "plan.yaml"
+    path.write_text(yaml.safe_dump(FITTING | data if whole else data, allow_unicode=True), "utf-8")
+    try:
+        found = arranged(path)
+    except SensorgenError:
+        return
+    assert len({piece.name for piece in found.pieces}) == len(found.pieces)

@@ -59,8 +59,11 @@ def test_every_code_reads_as_its_label_says():
 
 def test_the_page_needs_nothing_else_and_holds_text_as_text():
     design = make({"shape": "tri"}).model_copy(update={"name": "<b>&"})
-    page = sheet.page([sheet.Label.of(Piece(named(design, 26, 1), design), "a", 1)], '<script>alert("x")</script>')
+    page = sheet.page(
+        [sheet.Label.of(Piece(named(design, 26, 1), design, design.id()), "a", 1)], '<script>alert("x")</script>'
+    )
     assert "<script" not in page
+    assert "<i>" not in sheet.page([sheet.Label("<i>26", "<i>b", "<i>c", "<i>d", 1)], "a")
     assert "&lt;b&gt;&amp;" in page
     assert not re.findall(r"(?:src|href)\s*=", page)
     assert set(re.findall(r"https?://[^\"' ]+", page)) <= {"http://www.w3.org/2000/svg"}

@@ -55,6 +55,8 @@ def test_json(run, plan):
         (["batch", "verify", "nowhere"], "expected the folder of a batch"),
         (["batch", "plan.yaml", "--fast"], "unknown option '--fast'"),
         (["batch", "empty.yaml"], "holds nothing"),
+        (["batch", "plan.yaml", "--time-limit", "0"], "expected seconds above 0"),
+        (["batch", "plan.yaml", "--time-limit", "nan"], "expected seconds above 0"),
     ],
 )
 def test_wrong_words(run, plan, words, said):

@@ -115,6 +115,15 @@ def test_copies_of_a_design_are_printed_alike(small):
     assert one == pytest.approx(other, rel=1e-3)
 
 
+def test_all_but_the_gcode_is_the_same_without_slicing(small, tmp_path):
+    path = tmp_path / "plan.yaml"
+    path.write_text(SMALL, "utf-8")
+    files = make(path, tmp_path / "out", gcode=False).record["files"]
+    assert {name: small.record["files"][name] for name in files} == files
+    more = {"plan.prusa.gcode", "plan.cura.gcode", "prusa/raw.gcode", "prusa/profile.ini", "cura/raw.gcode"}
+    assert set(small.record["files"]) - set(files) == more | {"cura/settings.json"}
+
+
 def test_twenty_sensors_in_one_file(twenty):
     inside = printed_by(twenty, "prusa")[1]
     assert len(inside) == 20
@@ -176,6 +185,14 @@ def test_a_batch_that_fails_leaves_the_earlier_one_as_it_was(tmp_path, monkeypat
     assert not differences(folder)
     assert json.loads((folder / RECORD).read_text("utf-8"))["seed"] == 3
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["plan"]
+
+
+def test_a_slicer_that_hangs_is_ended(tmp_path, monkeypatch):
+    stand_in(tmp_path, monkeypatch, "echo 'still thinking'; sleep 60")
+    (tmp_path / "plan.yaml").write_text(SMALL, "utf-8")
+    with pytest.raises(SlicerFailed, match=r"more than 0.3 s .*still thinking"):
+        make(tmp_path / "plan.yaml", tmp_path / "out", time_limit_s=0.3)
+    assert list((tmp_path / "out").rglob("*")) == []
 
 
 def test_a_slicer_that_is_missing_leaves_nothing_and_says_what_to_install(tmp_path, monkeypatch):

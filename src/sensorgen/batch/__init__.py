@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from sensorgen import store
+from sensorgen import store, threemf
 from sensorgen.batch import picture, printing, record, sheet, tab
 from sensorgen.batch.layout import Plate, Room, Size, column, packed, room
 from sensorgen.batch.pieces import Piece, pieces, shuffled, tools
@@ -17,6 +17,7 @@ from sensorgen.errors import BadInput, Unprintable
 from sensorgen.findings import Finding
 from sensorgen.predict import prediction
 from sensorgen.review import Review, Step, review
+from sensorgen.slicer.run import TIMEOUT_S
 
 STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "record", "done")
 
@@ -45,7 +46,7 @@ class Arranged:
     @cached_property
     def designs(self) -> dict[str, Design]:
         """The designs, once each, by their hash."""
-        return {piece.design.id(): piece.design for piece in self.pieces}
+        return {piece.design_id: piece.design for piece in self.pieces}
 
     @cached_property
     def tools(self) -> dict[int, str]:
@@ -115,6 +116,7 @@ def make(
     out: Path,
     *,
     gcode: bool = True,
+    time_limit_s: float = TIMEOUT_S,
     force: bool = False,
     strict: bool = False,
     step: Step = lambda _: None,
@@ -129,6 +131,8 @@ def make(
         Folder that holds the batches' folders.
     gcode : bool
         Also slice; the slicers take most of the time.
+    time_limit_s : float
+        How long each slicer may take [s].
     force : bool
         Write the files in spite of findings of severity error.
     strict : bool
@@ -156,10 +160,14 @@ def make(
         step("3MF")
         store.write(stage, {"plan.yaml": path.read_bytes()})
         on_plate = printing.placed(found.plan, found.pieces, found.plate)
-        for name, content in [*printing.threemfs(found.plan.name, on_plate), *_files(found)]:
-            store.write(stage, {name: content})
         slicers = found.plan.slicers if gcode else ()
-        sliced: dict[str, Any] = {s: printing.gcode(found.plan.name, on_plate, s, stage, step) for s in slicers}
+        sliced_from = {"prusa"} & set(slicers)  # slicing leaves the 3MF that it took; CuraEngine takes none
+        families = [family for family in threemf.FAMILIES if family not in sliced_from]
+        for name, content in (*printing.threemfs(found.plan.name, on_plate, families), *_files(found)):
+            store.write(stage, {name: content})
+        sliced: dict[str, Any] = {
+            s: printing.gcode(found.plan.name, on_plate, s, stage, time_limit_s, step) for s in slicers
+        }
         step("record")
         made = record.sealed(_record(found, predicted, sliced, stage))
         store.write(stage, {record.RECORD: json_bytes(made)})
@@ -202,7 +210,7 @@ def _record(
         "checklist": record.checklist(plan, loaded),
         "bake": [step.model_dump() for step in plan.bake],
         "specimens": record.specimens(found.pieces, found.plate, predicted),
-        "designs": record.designs(found.designs.values()),
+        "designs": record.designs(found.designs),
         "slicers": dict(sliced),
         "versions": versions(),
         "files": store.hashes(stage),

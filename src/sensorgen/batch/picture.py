@@ -54,7 +54,7 @@ def svg(title: str, printer: Printer, room: Room, plate: Plate, pieces: Sequence
 
 def colours(pieces: Sequence[Piece]) -> Mapping[str, str]:
     """Colour of each design, by its hash, in the order of their names."""
-    designs = {piece.design.id(): piece.design.name for piece in pieces}
+    designs = {piece.design_id: piece.design.name for piece in pieces}
     known = sorted(designs, key=lambda key: (designs[key], key))
     return {key: COLOURS[k % len(COLOURS)] for k, key in enumerate(known)}
 
@@ -83,7 +83,7 @@ def _specimens(plate: Plate, pieces: Sequence[Piece], bed: Rect) -> list[str]:
         if len(text) * _LETTER * size > 0.95 * length:
             text = f"{order}"
         found.append(
-            f'<rect {_box(place, bed)} fill="{fills[piece.design.id()]}" stroke="#333" stroke-width=".25"/>'
+            f'<rect {_box(place, bed)} fill="{fills[piece.design_id]}" stroke="#333" stroke-width=".25"/>'
             f'<path d="M{x:.6g} {y:.6g}v{width:.6g}" stroke="#000" stroke-width="1"/>'
             + _text(x + length / 2, y + width / 2 + 0.36 * size, size, text, middle=True)
         )

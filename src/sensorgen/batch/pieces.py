@@ -21,10 +21,13 @@ class Piece:
         Its name.
     design : Design
         What it is; copies share one.
+    design_id : str
+        The design's hash, worked out once for all copies.
     """
 
     specimen: Specimen
     design: Design
+    design_id: str
 
     @property
     def name(self) -> str:
@@ -55,8 +58,8 @@ def pieces(plan: Plan, folder: Path) -> tuple[Piece, ...]:
             design = plan.made(item, folder)
         except SensorgenError as error:
             raise error.within(f"designs.{number}") from None
-        copies = range(item.first, item.first + item.replicates)
-        found += [Piece(named(design, plan.iteration, copy), design) for copy in copies]
+        copies, key = range(item.first, item.first + item.replicates), design.id()
+        found += [Piece(named(design, plan.iteration, copy), design, key) for copy in copies]
     _refuse_twins(found)
     _refuse_strangers([piece.design for piece in found])
     return tuple(found)

@@ -6,7 +6,7 @@ from pathlib import Path
 from shutil import rmtree
 from typing import Any
 
-from sensorgen import slicing, store, threemf
+from sensorgen import slicing, store
 from sensorgen.batch import tab
 from sensorgen.batch.layout import Plate
 from sensorgen.batch.pieces import Piece, tools
@@ -29,14 +29,16 @@ def placed(plan: Plan, pieces: Sequence[Piece], plate: Plate) -> list[Placed]:
     ]  # fmt: skip
 
 
-def threemfs(name: str, found: Sequence[Placed]) -> Iterator[tuple[str, bytes]]:
-    """Name and content of the 3MF of a plate called ``name``, for each family of slicers."""
-    for family in threemf.FAMILIES:
+def threemfs(name: str, found: Sequence[Placed], families: Sequence[str]) -> Iterator[tuple[str, bytes]]:
+    """Name and content of the 3MF of a plate called ``name``, for some families of slicers."""
+    for family in families:
         yield f"{name}.{family}.3mf", slicing.plate_3mf(found, family, name)
 
 
-def gcode(name: str, found: Sequence[Placed], slicer: str, folder: Path, step: Step) -> dict[str, Any]:
-    """Slice a plate into ``folder``, and say by what.
+def gcode(
+    name: str, found: Sequence[Placed], slicer: str, folder: Path, time_limit_s: float, step: Step
+) -> dict[str, Any]:
+    """Slice a plate into ``folder``, and say by what; the 3MF on record is the one that PrusaSlicer took.
 
     Parameters
     ----------
@@ -48,6 +50,8 @@ def gcode(name: str, found: Sequence[Placed], slicer: str, folder: Path, step: S
         ``prusa`` or ``cura``.
     folder : Path
         Of the batch; the slicer's own G-code and its settings go to a folder of its name in there.
+    time_limit_s : float
+        How long the slicer may take [s].
     step : callable
         Told again and again while the slicer works.
 
@@ -57,11 +61,12 @@ def gcode(name: str, found: Sequence[Placed], slicer: str, folder: Path, step: S
         Version of the slicer, the names of its files, what the check of the printer's file found, and what it takes.
     """
     inside, own, ready = folder / f".{slicer}", folder / slicer, folder / f"{name}.{slicer}.gcode"
-    made = slicing.sliced(found, slicer, inside, step=lambda _: step("slicing"))
+    made = slicing.sliced(found, slicer, inside, title=name, time_limit_s=time_limit_s, step=lambda _: step("slicing"))
     own.mkdir()
     made.raw.replace(own / "raw.gcode")
     made.ready.replace(ready)
     if slicer == "prusa":
+        (inside / "plate.3mf").replace(folder / f"{name}.prusa.3mf")
         settings = "profile.ini"
         (inside / settings).replace(own / settings)
     else:

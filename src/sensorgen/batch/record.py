@@ -1,7 +1,7 @@
 """The record of a batch, ``batch.json``: what is where on the plate, made of what, and what it should measure."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -35,12 +35,11 @@ def specimens(pieces: Sequence[Piece], plate: Plate, predictions: Mapping[str, M
     found = {}
     for order, (number, place) in enumerate(plate.items(), 1):
         piece = pieces[number]
-        key = piece.design.id()
-        predicted = predictions[key]
+        predicted = predictions[piece.design_id]
         found[piece.name] = {
             "order": order,
             "design": piece.design.name,
-            "design_id": key,
+            "design_id": piece.design_id,
             "iteration": piece.specimen.iteration,
             "copy": piece.specimen.replicate,
             "centre_mm": [round(c, 6) for c in place.centre_mm],
@@ -104,14 +103,9 @@ def _lot(spool: Mapping[str, Any]) -> str:
     return f"lot {spool['lot']}" if spool["lot"] else "lot not named: write it down"
 
 
-def unnamed_lots(loaded: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Materials on the plate whose lot the plan does not name."""
-    return [s["material"] for s in loaded.values() if not s["lot"]]
-
-
-def designs(found: Iterable[Design]) -> dict[str, dict[str, Any]]:
+def designs(found: Mapping[str, Design]) -> dict[str, dict[str, Any]]:
     """Every design under its hash, with all that decides it."""
-    return {d.id(): {"name": d.name, "resolved": d.resolved()} for d in found}
+    return {key: {"name": design.name, "resolved": design.resolved()} for key, design in found.items()}
 
 
 def sealed(content: Mapping[str, Any]) -> dict[str, Any]:

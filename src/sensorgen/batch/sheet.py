@@ -43,7 +43,7 @@ class Label:
     @classmethod
     def of(cls, piece: Piece, batch: str, place: int) -> "Label":
         """The label of a specimen."""
-        return cls(piece.name, batch, piece.design.name, piece.design.id(), place)
+        return cls(piece.name, batch, piece.design.name, piece.design_id, place)
 
     @property
     def code(self) -> str:

@@ -7,7 +7,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from sensorgen.cli import show
-from sensorgen.errors import BadInput
+from sensorgen.errors import BadInput, OutOfRange
 
 if TYPE_CHECKING:
     from sensorgen.batch import Batch
@@ -44,6 +44,14 @@ def _plan_command(name: str) -> click.Command:
                 ["--out"], default="out", show_default=True, metavar="DIR", help="Folder for batches' folders."
             ),
             click.Option(["--no-gcode"], is_flag=True, help="Leave out slicing, which takes most of the time."),
+            click.Option(
+                ["--time-limit", "time_limit_s"],
+                type=float,
+                default=1800.0,
+                show_default=True,
+                metavar="SECONDS",
+                help="End a slicer after this time.",
+            ),
             click.Option(["--force"], is_flag=True, help="Write the files in spite of findings of severity error."),
             click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
             click.Option(["--json", "as_json"], is_flag=True, help="Print the record as JSON."),
@@ -53,13 +61,18 @@ def _plan_command(name: str) -> click.Command:
     )
 
 
-def _make(plan: str, *, out: str, no_gcode: bool, force: bool, strict: bool, as_json: bool) -> int:
+def _make(plan: str, *, out: str, no_gcode: bool, time_limit_s: float, force: bool, strict: bool, as_json: bool) -> int:
     from sensorgen.batch import STEPS, make
     from sensorgen.errors import Unprintable
 
+    if not 0 < time_limit_s < float("inf"):
+        raise OutOfRange(f"--time-limit {time_limit_s:g}; expected seconds above 0")
     try:
         with show.progress(STEPS) as step:
-            made = make(Path(plan), Path(out), gcode=not no_gcode, force=force, strict=strict, step=step)
+            made = make(
+                Path(plan), Path(out), gcode=not no_gcode, time_limit_s=time_limit_s, force=force, strict=strict,
+                step=step,
+            )  # fmt: skip
     except Unprintable as error:
         if as_json:
             show.as_json({"folder": None, "findings": [f.as_dict() for f in error.findings]})
