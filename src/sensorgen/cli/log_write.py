@@ -1,7 +1,8 @@
 """``sensorgen log multimeter|import|bench|predict``: what goes into the log."""
 
+import difflib
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -90,10 +91,20 @@ def _say_logged(new: Sequence["Entry"], log: "Log", *, as_json: bool, known: str
         show.as_json([log_text.plain(entry) for entry in new])
         return
     for entry in new:
-        click.echo("logged " + "\n".join(log_text.of(entry)))
+        click.echo("logged " + "\n".join([*log_text.of(entry), *_near(entry, log)]))
     if not new:
         click.echo(known)
     click.echo(f"in {log.path}")
+
+
+def _near(entry: "Entry", log: "Log") -> Iterator[str]:
+    """A hint where a specimen is on no print bed of its iteration, and another with nearly its name is."""
+    from sensorgen.log import Print, Reading
+
+    if isinstance(entry, Reading) and not entry.batch:
+        names = [printed.specimen for printed in log.entries(Print, iteration=entry.iteration)]
+        for near in difflib.get_close_matches(entry.specimen, names, n=1, cutoff=0.8):
+            yield f"no print bed of the log has {entry.specimen!r}; near is {near!r}, --corrects {entry.number} if meant"
 
 
 def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, thesis: bool, as_json: bool) -> None:
