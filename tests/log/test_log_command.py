@@ -152,7 +152,7 @@ def test_a_print_bed_ties_its_specimens(run, path, tmp_path):
     assert "5 of 5 rows logged" in run("import", "batch.json").out  # both specimens share one prediction
     assert "0 of 5 rows logged" in run("import", "batch.json").out
     assert "near" not in run("multimeter", "26 triX .1mm 2", "--y", "650").out
-    near = "no print bed of the log has '26 triX .1mm 2 fine'; near is '26 triX .1mm 2'"
+    near = "no print bed here has '26 triX .1mm 2 fine'; near is '26 triX .1mm 2'"
     assert near in run("multimeter", "26 triX .1mm 2 fine", "--y", "650").out
     assert "near" not in run("multimeter", "27 triX .1mm 2", "--y", "650").out
     shown = run("show", "26 triX .1mm 2").out

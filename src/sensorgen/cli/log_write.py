@@ -104,7 +104,7 @@ def _near(entry: "Entry", log: "Log") -> Iterator[str]:
     if isinstance(entry, Reading) and not entry.batch:
         names = [printed.specimen for printed in log.entries(Print, iteration=entry.iteration)]
         for near in difflib.get_close_matches(entry.specimen, names, n=1, cutoff=0.8):
-            yield f"no print bed of the log has {entry.specimen!r}; near is {near!r}, --corrects {entry.number} if meant"
+            yield f"no print bed here has {entry.specimen!r}; near is {near!r}: --corrects {entry.number}, if meant"
 
 
 def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, thesis: bool, as_json: bool) -> None:
