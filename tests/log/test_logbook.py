@@ -234,6 +234,29 @@ def test_a_reader_makes_no_log(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_whoever_makes_the_log_first_keeps_it(path, monkeypatch):
+    def slow(made=database._empty):
+        monkeypatch.setattr(database, "_empty", made)
+        with Log(path, create=True) as first:
+            first.add([reading("23 triX", "650")])
+        return made()
+
+    monkeypatch.setattr(database, "_empty", slow)
+    with Log(path, create=True) as second:
+        assert len(second.readings()) == 1
+    assert [p.name for p in path.parent.iterdir()] == ["log.db"]
+
+
+def test_a_log_is_made_where_there_are_no_links(path, monkeypatch):
+    def refuse(*_):
+        raise OSError(1, "Operation not permitted")
+
+    monkeypatch.setattr("os.link", refuse)
+    with Log(path, create=True) as log:
+        assert len(log.add([reading("23 triX", "650")])) == 1
+    assert [p.name for p in path.parent.iterdir()] == ["log.db"]
+
+
 WRITER = """
 import sys
 from pathlib import Path
