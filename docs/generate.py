@@ -12,6 +12,7 @@ PAGES = (
     [], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
     ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"], ["predict"],
     ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["invert"], ["sheet"], ["stack"],
+    ["log"], *(["log", w] for w in ("multimeter", "import", "bench", "predict", "list", "show", "export", "verify")),
     ["list"], ["schema"], ["completion"],
 )  # fmt: skip
 

@@ -32,7 +32,7 @@ def run_files(tmp_path_factory):
 
 def test_files_are_kept_whole_and_what_was_counted_beside_them(log, run_files):
     mat, rig = run_files
-    (run,) = take(log, "26 triX .1mm", mat, rig, "first of the day")
+    (run,) = take(log, "26 triX .1mm", mat, rig, remark="first of the day")
     assert log.recordings(iteration=26) == (run,)
     assert (run.file, run.rig_file) == tuple(sha256(path.read_bytes()).hexdigest() for path in run_files)
     for kept, path in zip(log.entries(RawFile), run_files, strict=True):
@@ -119,9 +119,14 @@ def test_the_command_and_the_way_out_and_in_again(run, path, run_files, tmp_path
     assert "rig's clock + 3.2" in said.out
     assert "has this very recording" in run("bench", "26 triX .1mm", *run_files).out
     assert "1 recordings" in run("list").out
+    assert "no such row" in run("bench", "26 triX .1mm 2", *run_files, "--corrects", "9").line
+    run("bench", "26 triX .1mm 2", *run_files, "--corrects", "1")  # it was another specimen
+    with Log(path) as log:
+        assert [(r.number, r.specimen) for r in log.recordings()] == [(2, "26 triX .1mm 2")]
+        assert len(log.recordings(superseded=True)) == 2
     assert json.loads(run("show", "26 triX .1mm", "--json").out)[0]["remark"] == "x"
     assert run("export", "out").code == 0
-    assert "3 of 3 rows logged" in run("import", "out", "--log", "new.db").out
+    assert "4 of 4 rows logged" in run("import", "out", "--log", "new.db").out
     with Log(path) as one, Log(tmp_path / "new.db") as other:
         assert one.recordings() == other.recordings()
         assert list(verify.faults(other)) == []

@@ -46,7 +46,7 @@ WRONG = {
     "blank": (["23 triX", "--y", " "], "nothing to log"),
     "value": (["23 triX", "--y", "abc"], "resistance in Y: 'abc' is no resistance; expected a resistance such as 650"),
     "name": (["23 trj", "--y", "1"], "'23 trj' is no specimen's name"),
-    "correction": (["23 triX", "--y", "1", "--corrects", "7"], "--corrects 7: no such reading"),
+    "correction": (["23 triX", "--y", "1", "--corrects", "7"], "--corrects 7: no such row"),
     "axis": (["23 triX", "--visa", "x", "--axis", "q"], "unknown --axis 'q'"),
 }
 
@@ -111,7 +111,7 @@ def test_hostile_words_do_not_reach_the_terminal(run):
 
 def test_lists(run, path):
     run("import", "--thesis")
-    assert "the latest 40 readings are shown, --all shows all" in run("list").out
+    assert "; the latest 40 are shown, --all shows all" in run("list").out
     assert len(run("list", "--all").out.splitlines()) == 69 + 2
     assert len(run("list", "--last", "3").out.splitlines()) == 3 + 2
     listed = run("list", "--iteration", "25").out.splitlines()
@@ -149,9 +149,12 @@ BATCH = {
 
 def test_a_print_bed_ties_its_specimens(run, path, tmp_path):
     (tmp_path / "batch.json").write_text(json.dumps(BATCH))
-    assert "5 of 6 rows logged" in run("import", "batch.json").out  # both specimens share one prediction
-    assert "0 of 6 rows logged" in run("import", "batch.json").out
-    run("multimeter", "26 triX .1mm 2", "--y", "650")
+    assert "5 of 5 rows logged" in run("import", "batch.json").out  # both specimens share one prediction
+    assert "0 of 5 rows logged" in run("import", "batch.json").out
+    assert "near" not in run("multimeter", "26 triX .1mm 2", "--y", "650").out
+    near = "no print bed here has '26 triX .1mm 2 fine'; near is '26 triX .1mm 2'"
+    assert near in run("multimeter", "26 triX .1mm 2 fine", "--y", "650").out
+    assert "near" not in run("multimeter", "27 triX .1mm 2", "--y", "650").out
     shown = run("show", "26 triX .1mm 2").out
     assert "batch      26" in shown
     assert "design     trix-d0.1 (aaaaaaaaaaaaaaaa)" in shown
