@@ -23,6 +23,7 @@ COMMANDS = (
     "invert",
     "sheet",
     "stack",
+    "bench",
     "list",
     "schema",
     "completion",
