@@ -263,6 +263,7 @@ def _dress(figure: Any, run: Run) -> None:
     for scene, (symbol, _) in zip(("scene", "scene2"), PARTS.values(), strict=True):
         figure.update_layout({scene: {
             "xaxis_title": "position [mm]", "yaxis_title": "force [N]", "zaxis_title": f"Δ{symbol} [Ω]",
+            "camera": {"eye": {"x": 1.6, "y": 1.6, "z": 1.0}, "center": {"x": 0, "y": 0, "z": -0.2}},
         }})  # fmt: skip
     figure.update_layout(
         title={"text": escape(run.name)}, height=1150, template="plotly_white", legend={"orientation": "h", "y": 1.03},
