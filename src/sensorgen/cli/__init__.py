@@ -27,6 +27,7 @@ COMMANDS = (
     "sheet",
     "stack",
     "log",
+    "bench",
     "list",
     "schema",
     "completion",
