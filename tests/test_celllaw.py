@@ -1,6 +1,7 @@
 """Cells that are solved on demand: what is asked, what is kept, and what is said where it does not work."""
 
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -49,14 +50,31 @@ def test_a_prototype_is_known_and_nothing_is_solved(monkeypatch):
     assert (high - 1) / (law.compression.ratio[-1] - 1) == pytest.approx(1.006)
 
 
-def test_a_cell_that_needs_three_dimensions_says_so():
-    drawn = make({"shape": "rect"})
-    with pytest.raises(BadInput, match="solved in 3D"):
-        law_of(drawn, GAPS, "solved")
-    law = law_of(drawn, GAPS, solve=True)
-    assert (law.compression.name, law.bounded) == ("unconfined", False)
-    assert "was not solved; compression needs one cross-section" in law.doubts[0]
+def test_a_cell_of_boxes_is_solved_in_three_dimensions(monkeypatch):
+    """An unknown one on one brick per box, held against two; a prototype's is stored."""
+    from sensorgen.models import press3d
+
+    class Two(press3d.Pieces):
+        def coarser(self):
+            return press3d.Pieces(1)
+
+    monkeypatch.setattr(press3d, "Pieces", lambda *given: Two(*given) if given else Two(2))
+    monkeypatch.setattr(press3d, "press", partial(press3d.press, fineness=press3d.Pieces()))
+    drawn = make({"shape": "rect", "parameters": {"dielectric_mm": 0.1, "lower_height_mm": 0.30001}})
     assert "ask for the law 'solved'" in law_of(drawn, GAPS).doubts[0]
+    law = law_of(drawn, GAPS, solve=True)
+    stored = law_of(make({"shape": "rect", "parameters": {"dielectric_mm": 0.1}}), GAPS)
+    assert (law.compression.name, law.doubts, stored.doubts, stored.bounded) == ("solved", (), (), True)
+    rise = [c.compression.thinning(np.asarray(6e4))[0] for c in (law, stored)]
+    assert rise[0] == pytest.approx(rise[1], rel=0.08)
+    assert 0.006 < law.compression.within < 0.2
+    assert len(law.held) == len(stored.held) > 0
+
+
+def test_a_cell_that_no_model_can_press_says_so():
+    drawn = make({"shape": "tri", "parameters": {"along": "y", "period_mm": 2.5}})
+    law = law_of(drawn, GAPS, "")
+    assert "ask for the law 'solved'" in law.doubts[0]
 
 
 def test_without_the_solver_a_plate_stands_in_and_that_is_said(monkeypatch):

@@ -4,11 +4,12 @@ A plate has two laws, free to give way sideways and bonded, which bracket it. A 
 all where it is a prototype's; any other one is solved when asked for, and kept.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from hashlib import sha256
 from json import dumps
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sensorgen import cached
 from sensorgen.design import Design
@@ -18,11 +19,14 @@ from sensorgen.models.compression import Compression, Curve
 from sensorgen.planner import Answer, Taken, is_plate, permittivities
 from sensorgen.units import M_PER_MM
 
+if TYPE_CHECKING:
+    from sensorgen.models.press2d import Fineness, Pressed
+    from sensorgen.models.press3d import Pieces
+
 LAWS = ("unconfined", "bonded", "solved")
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)))  # 6 N on a tip of 10 x 10 mm are 60 kPa
-_STORED = 0.006  # of the rise: mesh levels, penalties and a second discretisation agree to it
+_LEAST = 0.006  # of the rise: what mesh levels, penalties and a second discretisation agree to at best
 _COARSER = 1.5  # mesh that a solution is compared with, by its edges
-_HELD = {"stick": -0.039, "stiff tip": 0.017, "free sideways": -0.011}  # of the rise, d = 0.1: docs/sensitivity.md
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,7 @@ def law_of(design: Design, answer: Answer, name: str = "", *, solve: bool = Fals
         raise OutOfRange(f"the law 'bonded' speaks of a solid plate; {design.shape} has gaps: expected 'unconfined'")
     known = compression.solved(design.shape, vars(design.params), {n: t.value for n, t in moduli.items()})
     if known and name != "unconfined":
-        return _cell(known, moduli, _STORED)
+        return _cell(known, moduli)
     if name == "solved":
         return solved(design)
     if solve and not name:
@@ -114,10 +118,10 @@ def _as_plate(design: Design, moduli: Mapping[str, Taken], why: str) -> Law:
     return Law(compression.unconfined(film.value), (film,), (f"{doubt}; {why}",), bounded=False)
 
 
-def _cell(found: Curve, moduli: Mapping[str, Taken], within: float, doubts: tuple[str, ...] = ()) -> Law:
+def _cell(found: Curve, moduli: Mapping[str, Taken], doubts: tuple[str, ...] = ()) -> Law:
     """A solved cell: its rise known to a share, and what other ways to hold it would make of it."""
-    others = tuple(found.rising(1 + sign * within) for sign in (-1, 1))
-    held = tuple(found.rising(1 + change) for change in _HELD.values())
+    others = tuple(found.rising(1 + sign * found.within) for sign in (-1, 1))
+    held = tuple(found.rising(1 + change) for change in found.held)
     return Law(found, tuple(moduli.values()), doubts, others, held)
 
 
@@ -146,30 +150,51 @@ def solved(design: Design, **held: str) -> Law:
     if found["stress_pa"][-1] < STRESS_PA[-1]:
         doubts = (f"the solution of the cell ended at {found['stress_pa'][-1] / 1e3:.3g} kPa",)
     curve = compression.curve("solved", found["source"], found["stress_pa"], found["ratio"])
-    return _cell(curve, {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, found["within"], doubts)
+    curve = replace(curve, within=found["within"], held=compression.held_of(found["of"]))
+    return _cell(curve, {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, doubts)
 
 
 def _pressed(
     design: Design, solids: Mapping[str, tuple[float, float]], eps: Mapping[str, float], given: Mapping[str, str]
 ) -> dict[str, Any]:
     """The curve of a cell on two meshes, as plain data; as far as it converged."""
-    from sensorgen.models import press2d
-    from sensorgen.models._press.mesh import Fineness
-    from sensorgen.models._press.support import Held
+    from sensorgen.models import press2d, press3d
 
-    cell = press2d.cell(design.in_use, getattr(design.params, "period_mm", None))
     elastic = {name: press2d.Elastic(*pair) for name, pair in solids.items()}
-    held, fine, stress = Held(**given), Fineness(), list(STRESS_PA)
-    found = press2d.press(cell, elastic, stress, eps, held)
+    held, stress = press2d.Held(**given), list(STRESS_PA)
+    flat = press2d.unfit(design.in_use) is None or press3d.unfit(design.in_use) is not None
+    press, coarse = _flat(design) if flat else _boxes(design)
+    found = press(elastic, stress, eps, held)
     if 0 < found.converged_pa < stress[-1]:
         stress = [p for p in stress if p <= found.converged_pa]
-        found = press2d.press(cell, elastic, stress, eps, held)
+        found = press(elastic, stress, eps, held)
     curve = press2d.curve_of(found)
-    coarse = replace(fine, corner_mm=_COARSER * fine.corner_mm, coarse_mm=_COARSER * fine.coarse_mm)
-    other = press2d.curve_of(press2d.press(cell, elastic, stress, eps, held, coarse))
+    other = press2d.curve_of(press(elastic, stress, eps, held, coarse))
     rises = zip(curve.ratio[1:], other.ratio[1:], strict=False)
     within = max(abs((b - 1) / (a - 1) - 1) for a, b in rises)
-    return {"source": curve.source, "stress_pa": curve.stress_pa, "ratio": curve.ratio, "within": max(within, _STORED)}
+    return {
+        "source": curve.source,
+        "stress_pa": curve.stress_pa,
+        "ratio": curve.ratio,
+        "within": max(within, _LEAST),
+        "of": "tri" if flat else "rect",
+    }
+
+
+def _flat(design: Design) -> tuple[Callable[..., "Pressed"], "Fineness"]:
+    """How to press a cross-section, and a coarser mesh."""
+    from sensorgen.models import press2d
+
+    cell, fine = press2d.cell(design.in_use, getattr(design.params, "period_mm", None)), press2d.Fineness()
+    coarse = replace(fine, corner_mm=_COARSER * fine.corner_mm, coarse_mm=_COARSER * fine.coarse_mm)
+    return partial(press2d.press, cell), coarse
+
+
+def _boxes(design: Design) -> tuple[Callable[..., "Pressed"], "Pieces"]:
+    """How to press a scene of boxes, and a coarser mesh."""
+    from sensorgen.models import press3d
+
+    return partial(press3d.press, press3d.cell(design.in_use)), press3d.Pieces().coarser()
 
 
 def _film(design: Design) -> str:

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from functools import partial
 
 import pytest
 
@@ -74,12 +75,24 @@ def test_a_known_answer_is_taken(run, monkeypatch):
         run(*PLATE, "--no-cache")
 
 
-def test_three_dimensions_are_springs_and_say_so(run):
-    found = json.loads(run("compress", "rect", "--stress", "100", "--json").out)
-    assert found["model"] == "springs"
-    assert found["lower_f_per_m2"] == [None, None]
-    assert "at most this" in found["doubts"][0]
-    assert "solved in 3D" in found["doubts"][-1]
+def test_boxes_are_pressed_in_three_dimensions(run, monkeypatch):
+    """On one brick per box: within 8 % of the solution, and below the bound of springs."""
+    from sensorgen.models import press3d
+
+    monkeypatch.setattr(press3d, "press", partial(press3d.press, fineness=press3d.Pieces(1)))
+    found = json.loads(run("compress", "rect", "--dielectric", "0.1", "--stress", "100", "--json").out)
+    assert (found["model"], found["converged_kpa"], found["faults"]) == ("press3d", 100.0, [])
+    assert found["displacement_um"][1] == pytest.approx(6.56, rel=0.08)
+    assert found["lower_f_per_m2"][0] * 4e-6 < 0.812343e-12 < found["upper_f_per_m2"][0] * 4e-6
+    springs = json.loads(run("compress", "rect", "--stress", "100", "--model", "springs", "--json").out)
+    assert springs["lower_f_per_m2"] == [None, None]
+    assert "at most this" in springs["doubts"][0]
+    assert springs["displacement_um"][1] > found["displacement_um"][1]
+
+
+def test_a_shape_that_a_model_cannot_speak_of_is_refused(run):
+    assert "needs a scene of boxes" in run("compress", "tri", "--model", "press3d").line
+    assert "must be solved in 3D" in run("compress", "rect", "--model", "press2d").line
 
 
 @pytest.mark.parametrize(
@@ -92,7 +105,7 @@ def test_three_dimensions_are_springs_and_say_so(run):
         (["--stress", "5mm"], "is not a stress"),
         (["--base", "glued"], "bonded"),
         (["--contact", "slippy"], "frictionless"),
-        (["--model", "press3d"], "press2d"),
+        (["--model", "press4d"], "press2d"),
         (["--set", "nu_x60=0.6"], "0.5"),
         (["--set", "youngs_modulus_x60=0"], "youngs_modulus"),
         (["--set", "youngs_modulus_x6=1e6"], "x6"),

@@ -72,6 +72,10 @@ class Curve:
         What it is, and who says so.
     stress_pa, ratio, slope_per_pa : tuple of float
         Stress from 0 on [Pa]; C'(stress)/C'(0) [-], from 1 on, and its derivative [1/Pa].
+    within : float
+        Share by which its rise may be off [-].
+    held : tuple of float
+        Shares by which the rise differs for the same cell held or touched otherwise [-].
 
     Examples
     --------
@@ -85,6 +89,8 @@ class Curve:
     stress_pa: tuple[float, ...]
     ratio: tuple[float, ...]
     slope_per_pa: tuple[float, ...]
+    within: float = 0.0
+    held: tuple[float, ...] = ()
 
     def thinning(self, stress_pa: Real) -> tuple[Real, Real]:
         """Thinning [-] and its derivative [1/Pa]; raises OutOfRange for a pull and far beyond the last point."""
@@ -224,9 +230,15 @@ def solved(shape: str, parameters: Mapping[str, Any], youngs_modulus_pa: Mapping
         same = all(abs(parameters.get(k, np.inf) / v - 1) < _SAME for k, v in cell["parameters"].items())
         if cell["shape"] == shape and same and min(factors) > 0 and max(factors) / min(factors) - 1 < _SAME:
             stress = [kpa * _PA_PER_KPA * factors[0] for kpa in cell["stress_kpa"]]
-            ratio = [1 + rise / cell["unloaded_pf_per_m"] for rise in cell["rise_pf_per_m"]]
-            return curve("solved", str(_cells()["source"]), stress, ratio)
+            ratio = [1 + percent / 100 for percent in cell["rise_percent"]]
+            found = curve("solved", cell["source"], stress, ratio)
+            return replace(found, within=cell["within"], held=tuple(cell["held"].values()))
     return None
+
+
+def held_of(shape: str) -> tuple[float, ...]:
+    """Shares by which the rise of a shape's first solved cell differs when it is held or touched otherwise [-]."""
+    return next(tuple(cell["held"].values()) for cell in _cells()["cells"] if cell["shape"] == shape)
 
 
 @cache

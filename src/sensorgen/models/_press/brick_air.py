@@ -11,6 +11,7 @@ Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 _ROUNDING = 1e-9
+_ALONG = 300.0  # weight of a displacement's derivative along itself: air between two faces is squeezed evenly [-]
 
 
 def extended(mesh: BrickMesh, solid: BrickMesh, moved: Real) -> Real:
@@ -41,7 +42,7 @@ def _harmonic(mesh: BrickMesh, air: Whole, given: Real, axis: int) -> Real:
     if not free.any():
         return found
     found[np.isnan(found)] = 0.0
-    local = _laplace(mesh.edges_m()[mesh.region == 0])
+    local = _laplace(mesh.edges_m()[mesh.region == 0], np.where(np.arange(3) == axis, _ALONG, 1.0))
     rows, columns = np.repeat(air, 27, axis=1).ravel(), np.tile(air, (1, 27)).ravel()
     matrix = coo_matrix((local.ravel(), (rows, columns)), (len(found),) * 2).tocsr()
     inner = matrix[free][:, free].tocsc()
@@ -50,12 +51,12 @@ def _harmonic(mesh: BrickMesh, air: Whole, given: Real, axis: int) -> Real:
     return found
 
 
-def _laplace(edges: Real) -> Real:
-    """Integrals of grad . grad of the 27 functions of boxes (m, 27, 27)."""
+def _laplace(edges: Real, weight_of: Real) -> Real:
+    """Integrals of grad . grad of the 27 functions of boxes (m, 27, 27), each direction by its weight."""
     at, weight = np.polynomial.legendre.leggauss(3)
     value, slope = values(at), slopes(at)
     stiffness, mass = (v.T @ (weight[:, None] * v) for v in (slope, value))
-    scale = edges.prod(axis=1)[:, None] / (2 * edges**2)
+    scale = weight_of * edges.prod(axis=1)[:, None] / (2 * edges**2)
     parts = [_product([stiffness if a == axis else mass for a in range(3)]) for axis in range(3)]
     return np.asarray(np.einsum("ma,aij->mij", scale, np.array(parts)))
 

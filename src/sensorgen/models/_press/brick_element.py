@@ -42,7 +42,17 @@ def gradients(at: Real) -> Real:
     return np.stack([f.reshape(len(at) ** 3, 27) for f in found], axis=-1)
 
 
-_GRADIENTS = gradients(_POINTS)
+_CORNERS = np.array([0, 2, 6, 8, 18, 20, 24, 26])
+
+
+def _shifting(gradient: Real) -> Real:
+    """The same with the node in the middle counted from the mean of the corners, so that it goes along with them."""
+    found = gradient.copy()
+    found[:, _CORNERS] += gradient[:, [_INNER]] / 8
+    return found
+
+
+_GRADIENTS = _shifting(gradients(_POINTS))
 _WEIGHT = np.einsum("a,b,c->abc", _WEIGHTS, _WEIGHTS, _WEIGHTS).ravel()
 _PRESSURES = np.column_stack([np.ones(27), np.array(list(product(_POINTS, repeat=3)))])
 _TURNS = [((i + 1) % 3, (i + 2) % 3) for i in range(3)]
@@ -130,13 +140,19 @@ class BrickElements:
 
     def all_nodes(self, u: Real, inner: Inner) -> Real:
         """Displacements of all nodes (n, 3), those within the bricks among them [m]."""
-        found = u.reshape(-1, 3).copy()
-        found[self.mesh.nodes[:, _INNER]] = inner.bubble
+        found, nodes = u.reshape(-1, 3).copy(), self.mesh.nodes
+        found[nodes[:, _INNER]] = inner.bubble + found[nodes[:, _CORNERS]].mean(axis=1)
+        return np.asarray(found)
+
+    def _local(self, u: Real, inner: Inner) -> Real:
+        """Factors of the 27 functions of each brick (m, 27, 3) [m]."""
+        found = u.reshape(-1, 3)[self.mesh.nodes]
+        found[:, _INNER] = inner.bubble
         return np.asarray(found)
 
     def deformation(self, u: Real, inner: Inner) -> Real:
         """F at each quadrature point (m, 27, 3, 3)."""
-        moved = np.einsum("qnj,mni->mqij", _GRADIENTS, self.all_nodes(u, inner)[self.mesh.nodes], optimize=True)
+        moved = np.einsum("qnj,mni->mqij", _GRADIENTS, self._local(u, inner), optimize=True)
         return np.asarray(moved * self._scale[:, None, None, :] + np.eye(3))
 
     def volume_ratio(self, u: Real, inner: Inner) -> Real:

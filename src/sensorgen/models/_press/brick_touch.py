@@ -66,38 +66,44 @@ class BrickFaces:
 
     @cached_property
     def _sides(self) -> tuple[Whole, Whole, Real]:
-        """Nodes of each pair of faces (k, 18), the far ones first; along which axis; and their area [m2]."""
+        """Nodes of each pair of faces (k, 18), the far ones first; along which axis; and their edges (k, 2) [m]."""
         mesh = self.mesh
         number = np.full(mesh.bricks.fill.shape, -1)
         number[tuple(mesh.boxes.T)] = np.arange(len(mesh.boxes))
-        edges, nodes, axes, areas = mesh.edges_m(), [], [], []
+        edges, nodes, axes, sides = mesh.edges_m(), [], [], []
         for axis, below, above in facing(mesh.bricks.fill):
             one, other = (number[tuple(boxes.T)] for boxes in (below, above))
             nodes.append(np.concatenate([mesh.nodes[other][:, _FACE[axis, 0]], mesh.nodes[one][:, _FACE[axis, 1]]], 1))
             axes.append(np.full(len(one), axis))
-            areas.append(np.delete(edges[one], axis, axis=1).prod(axis=1))
-        return np.concatenate(nodes), np.concatenate(axes), np.concatenate(areas)
+            sides.append(np.delete(edges[one], axis, axis=1))
+        return np.concatenate(nodes), np.concatenate(axes), np.concatenate(sides)
 
     @cached_property
     def _pairs(self) -> Pairs:
         """Of unit penalty; the gap runs along an axis."""
-        nodes, axes, area = self._sides
+        nodes, axes, edges = self._sides
         count, shape = 9 * len(nodes), (9 * len(nodes), 3 * len(self.mesh.points_m))
         weight = np.tile(np.concatenate([_SHAPE, -_SHAPE], axis=1), (len(nodes), 1))
         columns = np.repeat(3 * nodes + axes[:, None], 9, axis=0)
         gap = csr_matrix((weight.ravel(), (np.repeat(np.arange(count), 18), columns.ravel())), shape)
-        side = np.repeat(np.sqrt(area), 9)
-        stiffness = side * np.tile(_WEIGHT, len(nodes))
+        side = np.repeat(edges.min(axis=1), 9)
+        stiffness = np.repeat(edges.prod(axis=1), 9) / side * np.tile(_WEIGHT, len(nodes))
         return Pairs(gap, csr_matrix(shape), stiffness, side, np.arange(count), np.zeros(count, bool))
 
     def opened(self, moved: Real, share: float) -> Real:
-        """Displacements of all nodes (n, 3), gaps that are thinner than a share of their width held open so far [m]."""
+        """Displacements of all nodes (n, 3), gaps that are thinner than a share of their width held open so far [m].
+
+        There the lower face's nodes slide along it to those that they face, or the air beside would fold.
+        """
         found = moved.copy()
         nodes, axes, _ = self._sides
         for far, near, axis in zip(nodes[:, :9], nodes[:, 9:], axes.tolist(), strict=True):
             width = self.mesh.points_m[far, axis] - self.mesh.points_m[near, axis]
             gap = width + found[far, axis] - found[near, axis]
-            found[far, axis] += np.maximum(share * width - gap, 0.0)
+            shut = gap < share * width
+            found[far[shut], axis] += (share * width - gap)[shut]
+            for across in {0, 1, 2} - {axis}:
+                found[near[shut], across] = found[far[shut], across]
         return found
 
     def slid_m(self, u_m: Real, which: NDArray[np.bool_]) -> Real:
@@ -154,7 +160,10 @@ class _Cholesky:
             if not (np.isfinite(power) and power > 0):
                 return None
             pushed = stiffness @ direction
-            share = power / (direction @ pushed)
+            bearing = direction @ pushed
+            if not bearing > 0:
+                return None
+            share = power / bearing
             found, residual = found + share * direction, residual - share * pushed
             if np.abs(residual).max() < _ENOUGH * np.abs(right).max():
                 return np.asarray(found)

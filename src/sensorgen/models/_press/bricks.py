@@ -36,9 +36,9 @@ class Bricks:
     fill: Whole
     regions: tuple[Region, ...]
 
-    def size_m(self) -> Real:
-        """Its edges [m]."""
-        return np.array([p[-1] - p[0] for p in self.planes_m])
+    def spans_m(self) -> Real:
+        """Where it begins and ends along each axis (3, 2) [m]."""
+        return np.array([[p[0], p[-1]] for p in self.planes_m])
 
     def written(self) -> str:
         """Everything that it is, as text."""
@@ -98,10 +98,9 @@ def _cell(planes: Real, fill: Whole) -> tuple[Real, Whole]:
 
 def _cut(planes: Real, pieces: int, shrink: float) -> tuple[Real, Whole]:
     """Planes with more between them, and from which interval each piece is; both ends are as coarse as the middle."""
-    found, last = [planes[:1]], len(planes) - 2
+    found, last, steps = [planes[:1]], len(planes) - 2, np.arange(pieces)
     for k, (a, b) in enumerate(pairwise(planes.tolist())):
-        steps = np.arange(pieces)
-        apart = np.minimum(steps if k else pieces, pieces - 1 - steps if k < last else pieces)
-        size = (1 / shrink) ** np.minimum(apart, pieces)
+        apart = np.minimum(steps + pieces * (k == 0), steps[::-1] + pieces * (k == last))
+        size = (1 / shrink) ** np.minimum(apart, pieces - 1)
         found.append(a + (b - a) * np.cumsum(size) / size.sum())
     return np.concatenate(found), np.repeat(np.arange(last + 1), pieces)

@@ -44,7 +44,9 @@ CHOICES = {
 }
 
 
-def free_of(points_m: Real, held: Held, tied: Whole, used: NDArray[np.bool_] | None = None) -> csr_matrix:
+def free_of(
+    points_m: Real, held: Held, tied: Whole, spans_m: Real | None = None, used: NDArray[np.bool_] | None = None
+) -> csr_matrix:
     """Displacements (x, y of each node, or x, y, z) from the free ones, as a sparse matrix of ones.
 
     Parameters
@@ -55,14 +57,15 @@ def free_of(points_m: Real, held: Held, tied: Whole, used: NDArray[np.bool_] | N
         Choices of the boundary.
     tied : (k, 2) array
         Pairs of nodes that move as one, where solids touch in a point.
+    spans_m : (d, 2) array, optional
+        Where the cell begins and ends; as far as its nodes reach where not given [m].
     used : (n,) array, optional
         Nodes that elements share; others do not move. All where not given.
     """
     nodes, d = points_m.shape
-    near = _SAME * np.ptp(points_m[:, 0])
-    ends = [
-        [np.flatnonzero(abs(points_m[:, a] - end(points_m[:, a])) < near) for end in (np.min, np.max)] for a in range(d)
-    ]
+    spans = np.column_stack([points_m.min(axis=0), points_m.max(axis=0)]) if spans_m is None else spans_m
+    near = _SAME * np.ptp(spans[0])
+    ends = [[np.flatnonzero(abs(x - end) < near) for end in span] for x, span in zip(points_m.T, spans, strict=True)]
     wide = d * nodes + np.arange(d - 1)  # these numbers stand for how the cell widens
     leader = np.arange(d * nodes + d - 1)
     fixed = np.zeros(len(leader), bool)

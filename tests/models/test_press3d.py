@@ -1,0 +1,312 @@
+"""Boxes under pressure: closed forms, the plane-strain model, another field solver, and what must not change."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from sensorgen.design import make
+from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.models import fem3d, press2d, press3d, springs
+from sensorgen.models._press import brick_air, brick_element, brick_field, brick_touch, element, load, pressed
+from sensorgen.models._press.brick_field import Orders
+from sensorgen.models._press.bricks import Bricks
+from sensorgen.models._press.cell import Region
+from sensorgen.models.press3d import Elastic, Held, Pieces
+from sensorgen.scene import Body, Scene, box
+
+EPS = {"x60": 4.68, "air": 1.00059}
+REGIONS = (Region("air", ""), Region("x60", ""), Region("etpu", "bottom"), Region("etpu", "top"))
+COARSE = Pieces(2, 0.5)
+
+
+def solids(nu=0.4999, x60=6e6, etpu=22e6):
+    return {"x60": Elastic(x60, nu), "etpu": Elastic(etpu, nu)}
+
+
+def rect(film=0.1, **more):
+    return make({"shape": "rect", "parameters": {"dielectric_mm": film, **more}}).in_use
+
+
+def boxes(planes_mm, fill):
+    x, y, z = (np.array(p, float) * 1e-3 for p in planes_mm)
+    return Bricks((x, y, z), np.array(fill), REGIONS)
+
+
+@pytest.fixture(scope="module")
+def pressed_rect():
+    """At 0, 50 and 100 kPa on a coarse mesh."""
+    return press3d.press(press3d.cell(rect()), solids(), [0.0, 5e4, 1e5], EPS, fineness=COARSE)
+
+
+@pytest.mark.parametrize(
+    ("nu", "period"), [(0.3, "fixed"), (0.4999, "fixed"), (0.3, "free"), (0.4999, "free"), (0.5, "free")]
+)
+def test_a_block_follows_the_closed_form(nu, period):
+    """Homogeneous neo-Hookean block: stretch a across in both directions, b along the load; at a third of E."""
+    block = boxes(((0, 0.3, 1), (0, 0.6, 1), (0, 0.2, 1)), np.ones((2, 2, 2), int))
+    mu, lam = 6e6 / (2 * (1 + nu)), np.inf if nu == 0.5 else 6e6 * nu / ((1 + nu) * (1 - 2 * nu))
+    found = press3d.press(block, solids(nu), [0.0, 1e6, 2e6], None, Held("sliding", period), Pieces(1))
+
+    def across(b):  # nothing pulls sideways: mu a - mu / a + lam (J - 1) J / a = 0
+        if period == "fixed":
+            return 1.0
+        if nu == 0.5:
+            return b**-0.5
+        return brentq(lambda a: mu * a - mu / a + lam * (a * a * b - 1) * a * b, 0.5, 9)
+
+    def stress(b):
+        a = across(b)
+        p = -(mu * a - mu / a) / (a * b) if nu == 0.5 else lam * (a * a * b - 1)
+        return mu * b - mu / b + p * a * a
+
+    exact = [1 - brentq(lambda b, s=s: stress(b) + s, 0.3, 1) for s in (1e6, 2e6)]
+    assert found.faults == ()
+    assert found.displacement_m[1:] == pytest.approx(np.array(exact) * 1e-3, rel=1e-6, abs=0)
+
+
+def noisy(seed, nu):
+    mesh = brick_element.mesh_of(
+        boxes(((0, 1, 1.7), (0, 0.6), (0, 0.5, 2)), np.ones((2, 1, 2), int)), np.ones((2, 1, 2), bool)
+    )
+    m = len(mesh.nodes)
+    e, rng = (
+        brick_element.BrickElements(mesh, element.law(np.full(m, 6.0), np.full(m, nu))),
+        np.random.default_rng(seed),
+    )
+    u = rng.normal(size=3 * len(mesh.points_m)) * 2e-5
+    inner = element.Inner(rng.normal(size=(m, 3)) * 1e-5, rng.normal(size=(m, 4)))
+    return e, u, inner, rng.normal(size=len(u)) * 1e-3, rng.normal(size=(m, 7)) * ([1e-3] * 3 + [1] * 4)
+
+
+def test_the_tangent_is_the_derivative_of_the_residual_and_that_of_the_energy():
+    e, u, inner, du, di = noisy(1, 0.49)
+    h, along = 1e-6, np.concatenate([du[e.freedoms], di], axis=1)
+    (up, _), (down, _) = (e.full(u + s * du, inner.moved(di, s)) for s in (h, -h))
+    residual, matrix = e.full(u, inner)
+    expected = np.einsum("mij,mj->mi", matrix, along)
+    assert (up - down) / (2 * h) == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
+    assert matrix == pytest.approx(matrix.transpose(0, 2, 1), abs=1e-9 * np.abs(matrix).max())
+    one, other = (e.energy_j_per_m(u + s * du, inner.moved(di, s)) for s in (h, -h))
+    assert (one - other) / (2 * h) == pytest.approx((residual * along).sum(), rel=1e-6, abs=0)
+
+
+@pytest.mark.parametrize(("thick", "stiffer"), [(0.6, 92.6), (0.2, 830.4)])
+def test_a_bonded_strip_does_not_lock(thick, stiffer):
+    """Upper half of a strip 10 mm wide bonded to stiff plates, sides free, incompressible: solved in 2D elsewhere."""
+    x = np.append(5 * (1 - (1 - np.linspace(0, 1, 25)) ** 1.5), 5.5)
+    fill = np.ones((25, 1, 3), int)
+    fill[-1] = 0
+    block = boxes((x, (0, 0.1), np.linspace(0, thick / 2, 4)), fill)
+    stress = 1e-4 * stiffer * 6e6
+    found = press3d.press(block, solids(0.5), [0.0, stress], None, Held(top="rigid"), Pieces(1))
+    strain = found.displacement_m[-1] / (thick / 2 * 1e-3)
+    assert stress / strain / 6e6 == pytest.approx(stiffer, rel=0.02)
+
+
+def test_a_plate_between_mirrors_is_confined_and_a_free_one_widens():
+    plate = press3d.cell(make({"shape": "reference"}).in_use)
+    found = press3d.press(plate, solids(), [0.0, 1e5], EPS, fineness=Pieces(1))
+    confined = {k: s.youngs_modulus_pa * (1 - 0.4999) / (1.4999 * 2e-4) for k, s in solids().items()}
+    assert found.displacement_m[-1] == pytest.approx(1e5 * 0.6e-3 * sum(1 / m for m in confined.values()), rel=1e-4)
+    assert found.capacitance_f_per_m2[0].middle() == pytest.approx(0.27625066e-12 / 4e-6, rel=1e-6, abs=0)
+    rise = found.capacitance_f_per_m2[1].middle() / found.capacitance_f_per_m2[0].middle() - 1
+    assert rise == pytest.approx(1e5 / confined["x60"], rel=1e-3)
+    loose = press3d.press(plate, solids(), [0.0, 1e3], EPS, Held("sliding", "free"), Pieces(1))
+    rise = loose.capacitance_f_per_m2[1].middle() / loose.capacitance_f_per_m2[0].middle() - 1
+    biaxial = {k: s.youngs_modulus_pa / (1 - 0.4999) for k, s in solids().items()}  # all layers widen alike
+    wide = 1e3 * 0.4999 * sum(1.2e-3 / 2 / 0.5001 for _ in range(2)) / sum(0.6e-3 * m for m in biaxial.values())
+    thinner = 1e3 * (1 - 2 * 0.4999) * 1.4999 / (0.5001 * 6e6) + 2 * 0.4999 / 0.5001 * wide
+    assert rise == pytest.approx(thinner, rel=5e-3)
+
+
+def test_rect_is_softer_than_solid_stiffer_than_springs_and_work_is_stored(pressed_rect):
+    moved = pressed_rect.displacement_m
+    assert pressed_rect.faults == ()
+    assert pressed_rect.doubts == ()
+    assert moved[2] * 1e6 == pytest.approx(6.56, rel=0.03)  # extrapolated from finer meshes; 6.6 published
+    bound = springs.displacement_m(rect(), {"x60": 6e6, "etpu": 22e6}, [1e5])[0]
+    assert 100 * 0.007634e-6 < moved[2] < bound
+    assert moved[2] / moved[1] == pytest.approx(2, rel=0.02)
+    assert abs(pressed_rect.imbalance[-1]) < 1e-3
+    rises = [[getattr(c, k) for c in pressed_rect.capacitance_f_per_m2] for k in ("lower", "upper")]
+    assert [r[2] / r[0] - 1 for r in rises] == pytest.approx([0.0101, 0.0101], rel=0.08)  # 1.0 % published
+
+
+def test_bounds_hold_the_reference_and_close_in():
+    widths = []
+    for fineness, orders in ((Pieces(2, 0.4), Orders(2, 1)), (Pieces(2, 0.4), Orders()), (Pieces(3, 0.3), Orders())):
+        bricks = press3d.cell(rect()).cut(fineness.pieces, fineness.shrink)
+        found = unmoved(bricks, orders).times(4e-6)
+        assert found.lower < 0.812343e-12 < found.upper  # by two other solvers, to 2.6e-5
+        widths.append(found.width())
+    assert all(after < 0.6 * before for before, after in pairwise(widths))
+
+
+def unmoved(bricks, orders):
+    mesh = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
+    return brick_field.capacitance(mesh, np.zeros(3 * len(mesh.points_m)), EPS, orders)
+
+
+def test_a_thinner_film_by_displacement_is_one_by_drawing():
+    """Everything above the film lowered by 20 um, the film thinned alike: another solver on the drawn cell agrees."""
+    bricks = press3d.cell(rect(0.1)).cut(2, 0.3)
+    mesh = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
+    u = np.zeros((len(mesh.points_m), 3))
+    u[:, 2] = -20e-6 * np.clip((mesh.points_m[:, 2] - 0.3e-3) / 0.1e-3, 0, 1)
+    moved = brick_field.capacitance(mesh, u.ravel(), EPS, Orders())
+    drawn = fem3d.capacitance(rect(0.08), EPS, 1e-2).times(1 / 1e-3)
+    assert max(moved.lower, drawn.lower) < min(moved.upper, drawn.upper)
+    assert moved.middle() == pytest.approx(drawn.middle(), rel=4e-3)
+
+
+def test_where_a_plates_inner_places_go_does_not_matter():
+    """The same plate mapped to itself in any way: its capacitance stays between the bounds, which close in."""
+    planes = (np.linspace(0, 1, 4), np.linspace(0, 1, 4), (0, 0.1, 0.3, 0.5, 0.7, 0.8))
+    fill = np.ones((3, 3, 5), int)
+    fill[..., 0], fill[..., -1] = 2, 3
+    mesh = brick_element.mesh_of(boxes(planes, fill), np.ones((3, 3, 5), bool))
+    x, y, z = mesh.points_m.T * 1e3
+    bump = np.sin(np.pi * x) * np.sin(np.pi * y) * np.sin(np.pi * np.clip((z - 0.1) / 0.6, 0, 1))
+    u = 1e-3 * np.column_stack([0.08 * bump, -0.05 * bump, 0.07 * bump])
+    exact = 8.8541878128e-12 * 4.68 / 0.6e-3
+    widths = []
+    for orders in (Orders(2, 1), Orders(4, 3)):
+        found = brick_field.capacitance(mesh, u.ravel(), EPS, orders)
+        assert found.lower < exact < found.upper
+        widths.append(found.width())
+    assert widths[1] < 0.02 * widths[0]
+    with pytest.raises(brick_field.Folded):
+        brick_field.capacitance(mesh, 12 * u.ravel(), EPS, Orders(2, 1))
+
+
+def stairs(*widths, lift=0.0, film=0.1):
+    """A top on bars along y: half widths of the layers of 0.1 mm from below, around x = 0.5 and 2.5."""
+    floor, deep = 0.3 + film + lift, 8.0
+    bars = [
+        box(c - w, c + w, 0, deep, floor + 0.1 * k, floor + 0.1 * (k + 1))
+        for c in (0.5, 2.5)
+        for k, w in enumerate(widths)
+    ]
+    roof = floor + 0.1 * len(widths)
+    bodies = (
+        Body("bottom_electrode", "etpu", (box(0, 4, 0, deep, 0, 0.3),), "bottom"),
+        Body("film", "x60", (box(0, 4, 0, deep, 0.3, 0.3 + film),)),
+        Body("feet", "x60", tuple(bars)),
+        Body("top_electrode", "etpu", (box(0, 4, 0, deep, roof, roof + 0.3),), "top"),
+    )
+    return Scene(bodies, (4.0, deep, roof + 0.3))
+
+
+@pytest.mark.parametrize("lift", [0.0, 0.02])
+def test_stairs_as_boxes_are_stairs_as_a_cross_section(lift):
+    """Bars along y are pressed alike by both models, bonded or falling onto the film and slipping on it."""
+    scene, stress = stairs(0.2, 0.3, lift=lift), [0.0, 1e4, 2e4]
+    eps = EPS if lift == 0 else None
+    flat = press2d.press(press2d.cell(scene, 2.0), solids(), stress, eps)
+    solid = press3d.press(press3d.cell(scene), solids(), stress, eps, fineness=Pieces(2, 0.4))
+    assert flat.faults == solid.faults == ()
+    assert solid.fall_m == pytest.approx(lift * 1e-3, rel=1e-9)
+    own = [f.displacement_m[1:] - f.fall_m for f in (flat, solid)]
+    assert own[1] == pytest.approx(own[0], rel=0.02)
+    assert ("faces of gaps touch, without friction" in solid.doubts) == (lift > 0)
+    if eps:
+        grown = [[c.middle() for c in f.capacitance_f_per_m2] for f in (flat, solid)]
+        assert grown[1] == pytest.approx(grown[0], rel=2e-3)
+        assert grown[1][2] / grown[1][0] - 1 == pytest.approx(grown[0][2] / grown[0][0] - 1, rel=0.04)
+
+
+def test_upright_walls_hold_each_other_apart():
+    """A soft block bulges into the narrow slot beside it and then leans on the stiff wall beyond."""
+    soft = {"x60": Elastic(6e6, 0.49), "etpu": Elastic(1e9, 0.3)}
+    fill = np.array([[[2, 1, 3]], [[2, 0, 3]], [[2, 2, 3]]])
+    cell = boxes(((0, 0.4, 0.402, 0.5), (0, 0.2), (0, 0.1, 0.5, 0.6)), fill)
+    found = press3d.press(cell, soft, [0.0, 2e5, 4e5, 6e5, 8e5], None, fineness=Pieces(2, 0.6))
+    assert found.faults == ()
+    assert "faces of gaps touch" in found.doubts[-1]
+    slopes = np.diff(found.displacement_m)
+    assert slopes[-1] < 0.75 * slopes[0]
+    assert 0 < found.penetration[-1] < 0.02
+
+
+def test_moduli_scale_and_incompressible_is_the_limit():
+    cell = press3d.cell(rect())
+    one = press3d.press(cell, solids(), [0.0, 2e4], fineness=Pieces(1))
+    five = press3d.press(cell, solids(x60=30e6, etpu=110e6), [0.0, 1e5], fineness=Pieces(1))
+    assert five.displacement_m == pytest.approx(one.displacement_m, rel=1e-5, abs=1e-15)
+    moved = [
+        press3d.press(cell, solids(nu), [0.0, 2e4], fineness=Pieces(1)).displacement_m[-1]
+        for nu in (0.4999, 0.49999, 0.5)
+    ]
+    assert moved[0] > moved[1] > moved[2] > 0.995 * moved[0]
+
+
+def test_both_directions_of_the_strips_are_one():
+    moved = [
+        press3d.press(press3d.cell(rect(along=way)), solids(), [0.0, 5e4], fineness=Pieces(1)).displacement_m[-1]
+        for way in ("xy", "yx")
+    ]
+    assert moved[0] == pytest.approx(moved[1], rel=1e-6)
+
+
+def test_what_does_not_converge_ends_with_the_last_load(monkeypatch):
+    stepped = load.Problem.stepped
+    monkeypatch.setattr(
+        load.Problem, "stepped", lambda self, s, p, before: stepped(self, s, p, before) if p < 1.5e4 else None
+    )
+    found = press3d.press(press3d.cell(rect()), solids(), [0.0, 1e4, 2e4], fineness=Pieces(1))
+    assert (found.converged_pa, found.faults) == (1e4, ("converged up to 10 of 20 kPa",))
+    with pytest.raises(OutOfRange, match="not to be trusted"):
+        press3d.curve_of(found)
+
+
+def test_what_is_wrong_is_refused():
+    with pytest.raises(BadInput, match="needs a scene of boxes"):
+        press3d.cell(make({"shape": "tri"}).in_use)
+    assert "needs a scene of boxes" in press3d.unfit(make({"shape": "tri"}).in_use)
+    over = Scene((Body("a", "x60", (box(0, 1, 0, 1, 0, 1),)), Body("b", "etpu", (box(0, 1, 0, 1, 0.5, 2),))), (1, 1, 2))
+    with pytest.raises(BadInput, match="b overlaps"):
+        press3d.cell(over)
+    with pytest.raises(BadInput, match="bonded or sliding"):
+        press3d.press(press3d.cell(rect()), solids(), [0.0, 1.0], held=Held(base="glued"))
+    touching = boxes(((0, 1), (0, 1), (0, 1, 2, 3)), [[[2, 3, 1]]])
+    with pytest.raises(BadInput, match="no dielectric lies between"):
+        unmoved(touching, Orders())
+    shorted = boxes(((0, 1, 2), (0, 1), (0, 1, 2, 3)), [[[2, 1, 3]], [[2, 3, 3]]])
+    with pytest.raises(OutOfRange, match="electrodes touch"):
+        unmoved(shorted, Orders())
+    open_ended = boxes(((0, 1, 2), (0, 1), (0, 1, 2, 3)), [[[2, 1, 3]], [[2, 1, 1]]])
+    with pytest.raises(BadInput, match="does not cover"):
+        unmoved(open_ended, Orders())
+
+
+def test_many_boxes_are_cut_into_fewer_pieces_and_that_is_said(monkeypatch):
+    monkeypatch.setattr(press3d, "_MOST", 50)
+    found = press3d.press(press3d.cell(rect()), solids(), [0.0, 1e4])
+    assert "cut into 1 pieces along each axis, not 3" in found.doubts[0]
+
+
+def test_conjugate_gradients_make_new_factors_where_the_old_ones_do_not_serve():
+    pytest.importorskip("ngsolve")
+    from scipy.sparse import diags
+
+    rng, solver = np.random.default_rng(3), brick_touch.cholesky()
+    for scale in (1.0, 1.01, 1e4):
+        d = 2 + rng.random(200) * scale
+        matrix = diags([-np.ones(199), d, -np.ones(199)], [-1, 0, 1]).tocsr()
+        right = rng.normal(size=200)
+        assert matrix @ solver(matrix, right) == pytest.approx(right, abs=1e-6)
+    assert solver(diags([[0.0] * 200], [0]).tocsr(), right) is None
+
+
+def test_air_goes_along_without_folding():
+    """Walls that lean by the same slope take the air between them along exactly."""
+    bricks = boxes(((0, 0.3, 0.6, 1.0), (0, 1), (0, 0.2, 0.6)), [[[2, 1]], [[2, 0]], [[2, 1]]]).cut(2, 0.5)
+    whole, solid = (brick_element.mesh_of(bricks, w) for w in (np.ones(bricks.fill.shape, bool), bricks.fill > 0))
+    straight = np.column_stack([0 * solid.points_m[:, 0], 0 * solid.points_m[:, 1], -0.1 * solid.points_m[:, 2]])
+    found = brick_air.extended(whole, solid, straight).reshape(-1, 3)
+    bottom = whole.points_m[:, 2] <= 0.6e-3
+    assert found[bottom, :2] == pytest.approx(np.zeros((bottom.sum(), 2)), abs=1e-15)
+    assert found[:, 2].max() <= 1e-15
+    assert pressed.penalty_pa(22e6) == 220e6
