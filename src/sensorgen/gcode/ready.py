@@ -21,7 +21,7 @@ import numpy as np
 
 from sensorgen.errors import BadInput
 from sensorgen.gcode import words
-from sensorgen.gcode.motion import NO_TOOL, Motion
+from sensorgen.gcode.moves import NO_TOOL, Motion
 from sensorgen.gcode.timing import seconds
 from sensorgen.gcode.words import Command
 from sensorgen.printer import Printer
