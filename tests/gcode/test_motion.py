@@ -48,6 +48,12 @@ def test_filament_relative_and_absolute(lines):
     assert motion.end_mm[:, 0].tolist() == [1, 2, 3, 4]
 
 
+def test_relative_filament_moves_the_absolute_place_on():
+    """As in RepRapFirmware, whose virtual position of the extruder follows both."""
+    motion = follow(["M82", "G1 X1 E2", "M83", "G1 X2 E3", "G1  x3 E1", "M82", "G1 X4 E7", "G1 X5 e7.5"])
+    assert motion.filament_mm.tolist() == [2, 3, 1, 1, 0.5]
+
+
 def test_each_tool_owes_its_own_retraction():
     motion = follow([R, "T1", "G1 E-2", "T2", "G1 X1 E1", "T1", "G1 E2.5"])
     assert motion.extruded_mm.tolist() == [0, 1, 0.5]
