@@ -153,6 +153,7 @@ def test_line_by_line_for_cura():
     assert not any(line.startswith(("M82", "M104", "M109")) for line in new)
     assert new[-2:] == ["M0 H1", ";End of Gcode"]
     assert new[new.index("T4") + 2] == "G10 P3 S0 R0"  # the slicer switched it off there
+    assert new.count("G10 P3 S0 R0") == new.count("G10 P4 S0 R0") == 1
 
 
 def test_the_first_tool_waits_until_the_axes_are_homed():
