@@ -24,6 +24,8 @@ def test_starts_are_where_the_last_move_ended():
     motion = follow([R, "G1 X1", "G92 X5", "G1 X6", "G28 Y", "G1 Y2"])
     assert motion.start_mm[:, 0].tolist() == [0, 5, 6]
     assert motion.length_mm().tolist() == [1, 1, 2]
+    assert follow([R, "G1 Z1", "G92 Y9 Z5", "G1 Z6", "G1 Y10"]).length_mm().tolist() == [1, 1, 1]
+    assert follow([R, "G1 X1 Y1 Z1", "G92", "G1 X3"]).length_mm()[1] == 3
 
 
 def test_inches():

@@ -203,6 +203,19 @@ def test_retraction_by_the_firmware_and_places_of_work_stay():
     assert "G10\nG11\nG10 ; retract\n" in made(text)
 
 
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [
+        ("M568 P3 S230", ["G10 P4 S230 R180"]),
+        ("M568 P3 S230 R200 A2", ["G10 P4 S230 R200", "M568 P4 A2"]),
+        ("M568 P3 A1", ["M568 P4 A1"]),
+    ],
+)
+def test_temperatures_by_m568(said, expected):
+    new = made(f"G28\nM83\nT2\n{said}\nG1 X1 E1\n").splitlines()
+    assert new[4 : 4 + len(expected)] == expected
+
+
 def test_several_commands_on_a_line():
     new = made("G28\nM83\nT2\nM106 S1 M104 S210 ; both\nG1 X1 E1\n").splitlines()
     assert new[4:6] == ["M106 P3 S1 ; both", "G10 P3 S210 R180"]
