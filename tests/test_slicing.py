@@ -4,6 +4,8 @@ import os
 import stat
 import sys
 import zipfile
+from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from sensorgen import slicing, threemf
 from sensorgen.design import make
 from sensorgen.errors import BadInput, SlicerFailed, UnknownName, Unwritable
 from sensorgen.gcode.check import check
+from sensorgen.geometry.mesh import Mesh
 from sensorgen.printfile import slice_design
 from sensorgen.slicer import stl
 from sensorgen.slicing import Placed, alone, sliced
@@ -77,6 +80,10 @@ def test_bodies_stand_where_they_were_placed():
     low, high = box_mm(slicing.plate_parts([Placed(SMALL, (-30.0, 5.0), "a")]))
     assert (low + high)[:2] / 2 == pytest.approx([-30.0, 5.0])
     assert low[2] == 0.0
+    bodies = slicing.plate_parts([alone(SMALL)])
+    raised = [replace(b, mesh=Mesh(b.mesh.vertices_mm + 7.0, b.mesh.triangles)) for b in bodies]
+    low, high = box_mm(threemf.placed(raised, (1.0, 2.0)))
+    assert (low[2], *((low + high)[:2] / 2)) == pytest.approx((0.0, 1.0, 2.0))
 
 
 @pytest.mark.parametrize(
@@ -170,6 +177,8 @@ def test_a_design_gets_its_file_and_what_was_found(slicer, tmp_path):
     again = slice_design(SMALL, tmp_path / "out", "prusa", force=True)
     folder = tmp_path / "out" / SMALL.name
     assert sorted(p.name for p in folder.iterdir()) == [f"{SMALL.name}.prusa.gcode", f"{SMALL.name}.prusa.gcode.json"]
-    assert made.sha256 == again.sha256
+    content = made.gcode.read_bytes()
+    assert made.sha256 == again.sha256 == sha256(content).hexdigest()
+    assert content.endswith(b"M0 H1\n")
     assert made.code == 0
     assert made.checked.report.tools[0].material == "etpu"

@@ -10,7 +10,7 @@ import numpy as np
 from sensorgen import materials
 from sensorgen.errors import MissingValue, UnknownName
 from sensorgen.gcode.extruded import NOT_MODEL
-from sensorgen.gcode.motion import NO_TOOL, Motion
+from sensorgen.gcode.moves import NO_TOOL, Motion
 from sensorgen.gcode.timing import seconds
 from sensorgen.printer import Printer
 
