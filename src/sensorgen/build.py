@@ -131,7 +131,7 @@ def draw(design: Design, held: Review, printed: Scene | None = None, source: str
     names = {body.material for body in scene.bodies}
     notes = [
         f"{design.machine.name}, {design.layers.name}, printed {design.orientation}",
-        *([source] if source else []),
+        *([f"green outlines: {source}"] if source else []),
     ]
     known = {name: (materials.load(name).title, materials.load(name).colour) for name in sorted(names)}
     return drawing.svg(
