@@ -16,6 +16,7 @@ from sensorgen.errors import Unprintable
 from sensorgen.geometry.cad import CadProcess
 from sensorgen.predict import prediction
 from sensorgen.review import Review, Step, report, review
+from sensorgen.scene import Scene
 from sensorgen.slicer import cura, prusa
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
@@ -124,13 +125,18 @@ def _await(job: "Future[None]", step: Step) -> None:
             continue
 
 
-def draw(design: Design, held: Review) -> str:
-    """The drawing of the cross-section, as SVG."""
+def draw(design: Design, held: Review, printed: Scene | None = None, source: str = "") -> str:
+    """The drawing of the cross-section, as SVG, with what is printed outlined over it if that is given."""
     scene = design.printed
     names = {body.material for body in scene.bodies}
-    notes = [f"{design.machine.name}, {design.layers.name}, printed {design.orientation}"]
+    notes = [
+        f"{design.machine.name}, {design.layers.name}, printed {design.orientation}",
+        *([f"green outlines: {source}"] if source else []),
+    ]
     known = {name: (materials.load(name).title, materials.load(name).colour) for name in sorted(names)}
-    return drawing.svg(scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known, notes)
+    return drawing.svg(
+        scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known, notes, printed
+    )
 
 
 def profiles(design: Design) -> dict[str, str]:

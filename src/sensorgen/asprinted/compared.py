@@ -12,10 +12,12 @@ from sensorgen.asprinted.beads import CONVENTIONS, Beads, beads
 from sensorgen.asprinted.beads import layers as printed_layers
 from sensorgen.asprinted.rectilinear import plate
 from sensorgen.asprinted.strips import Strips, drawn, scene_of
+from sensorgen.asprinted.tally import Row, findings, tally
 from sensorgen.asprinted.window import cut, evened, window
 from sensorgen.checks.slices import Slices
 from sensorgen.design import Design
 from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.findings import Finding
 from sensorgen.gcode.paths import Paths
 from sensorgen.geometry import meshes, validity
 from sensorgen.interval import Interval
@@ -48,6 +50,22 @@ class Printed:
     source: str
     layers: Mapping[str, Sequence[Strips]]
     lines: Beads | None
+
+    def scene(self, design: Design) -> Scene:
+        """The whole print as a scene, as it lies on the bed, by the first convention."""
+        return scene_of(self.first(), design.printed)
+
+    def first(self) -> Sequence[Strips]:
+        """The layers by the first convention."""
+        return next(iter(self.layers.values()))
+
+    def rows(self, design: Design) -> list[Row]:
+        """Printed and exact volume per body and layer."""
+        return tally(design, self.first(), self.lines)
+
+    def findings(self, design: Design) -> list[Finding]:
+        """What rule 7 says of them."""
+        return design.waived(findings(self.rows(design), design.printed))
 
 
 def estimated(design: Design, walls: str = "arachne") -> Printed:

@@ -1,5 +1,6 @@
 """Parameters changed so that what is printed is what was asked for."""
 
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -13,6 +14,7 @@ from sensorgen.scene import SLIVER_MM
 BAKE = 0.2  # what the bake takes off in the plane (thesis 6.2)
 _STEP_MM = 0.05  # by which a period grows
 _ENOUGH = 6.0  # periods to estimate a gap with
+_MARGIN = 1.04  # by which a tip is wider than what just prints: at the limit itself a slicer may round it away
 _MOST = 5.0  # times the period
 
 
@@ -143,8 +145,11 @@ def _heights(axis: str, outline: tuple[tuple[float, float], ...], span: tuple[fl
 
 
 def _share(design: Design) -> float:
-    size = design.drawn.size_mm
-    return sum(b.volume_mm3() for b in design.in_use.bodies) / (size[0] * size[1] * size[2])
+    """Share of whole periods that is filled [-]."""
+    period = float(getattr(design.params, "period_mm", 1.0))
+    whole = _with(design, length_mm=_ENOUGH * period, width_mm=_ENOUGH * period)
+    x, y, z = whole.drawn.size_mm
+    return sum(b.volume_mm3() for b in whole.in_use.bodies) / (x * y * z)
 
 
 def _printed_gap_mm(design: Design, walls: str) -> float:
@@ -171,15 +176,19 @@ def _gap_kept(design: Design, asked: float, printed: float, walls: str) -> tuple
 
 
 def _longer(design: Design, asked: float, walls: str) -> tuple[Design, list[Change]]:
-    """The design with the shortest period whose tips are wide enough to print."""
+    """The design with the shortest period whose tips are wide enough to print, and would be with less."""
     period = design.params.period_mm  # type: ignore[attr-defined]
-    for k in range(1, int(period * (_MOST - 1) / _STEP_MM) + 1):
+
+    def keeps(steps: int) -> bool:
         try:
-            longer = _with(design, period_mm=period + k * _STEP_MM)
-            if abs(_printed_gap_mm(longer, walls) - asked) < SLIVER_MM:
-                return longer, [
-                    Change("period_mm", period, round(period + k * _STEP_MM, 9), "tips wide enough to print")
-                ]
+            with_less = _with(design, period_mm=(period + steps * _STEP_MM) / _MARGIN)
+            return abs(_printed_gap_mm(with_less, walls) - asked) < SLIVER_MM
         except SensorgenError:
-            break
-    return design, []
+            return False  # so long that the shape refuses it
+
+    most = int(period * (_MOST - 1) / _STEP_MM)
+    if not keeps(most):
+        return design, []
+    steps = bisect_left(range(most), True, key=keeps)  # the longer the period, the wider the tips
+    longer = round(period + steps * _STEP_MM, 9)
+    return _with(design, period_mm=longer), [Change("period_mm", period, longer, "tips wide enough to print")]

@@ -5,7 +5,6 @@ from typing import Any
 from sensorgen import planner
 from sensorgen.asprinted import compared
 from sensorgen.asprinted.compared import ACCURACY, CONTACTS_OHM_M2, Printed, cell, gap_mm
-from sensorgen.asprinted.tally import findings, tally
 from sensorgen.design import Design
 from sensorgen.errors import SensorgenError
 from sensorgen.interval import Interval
@@ -28,8 +27,6 @@ def report(design: Design, printed: Printed, accuracy: float = ACCURACY) -> dict
     dict
         Lengths in mm, all else in SI units; a capacitance that no model can speak of has its reason in its place.
     """
-    first = next(iter(printed.layers.values()))
-    rows = tally(design, first, printed.lines)
     return {
         "design": design.name,
         "design_id": design.id(),
@@ -39,8 +36,8 @@ def report(design: Design, printed: Printed, accuracy: float = ACCURACY) -> dict
         "capacitance_f": {"drawn": _drawn_f(design, accuracy), **_printed_f(design, printed, accuracy)},
         "electrode_resistance_ohm": _resistance(design, printed),
         "contact_ohm_m2": list(CONTACTS_OHM_M2),
-        "layers": [row.as_dict() for row in rows],
-        "findings": [f.as_dict() for f in design.waived(findings(rows, design.printed))],
+        "layers": [row.as_dict() for row in printed.rows(design)],
+        "findings": [f.as_dict() for f in printed.findings(design)],
     }
 
 

@@ -1,14 +1,19 @@
 """A design as drawn and as printed, as lines for the terminal."""
 
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from sensorgen.cli import show
 from sensorgen.cli.show import si
 from sensorgen.cli.words import OneOf
+from sensorgen.errors import BadInput
 
 if TYPE_CHECKING:
+    from sensorgen.asprinted.compared import Printed
     from sensorgen.design import Design
 
 
@@ -19,6 +24,47 @@ def compensate_option() -> click.Option:
         help="Change the design so that what is asked for comes out: whole layers, widths of a line, the electrode "
         "gap; with bake also larger by the 20 % that the bake takes off.",
     )  # fmt: skip
+
+
+def printed_options() -> list[click.Parameter]:
+    """``--as-printed`` with whose print is meant, for commands that hold a print against the drawing."""
+    return [
+        click.Option(
+            ["--as-printed"], is_flag=True,
+            help="Hold what is printed against what is drawn.",
+        ),
+        click.Option(
+            ["--slicer"], type=OneOf(("prusa", "cura")),
+            help="With --as-printed: slice for real; estimated from each layer's mid-plane if not given.",
+        ),
+        click.Option(
+            ["--walls"], type=OneOf(("arachne", "classic", "cura", "cura-gaps")),
+            help="With --as-printed and no slicer: whose walls are estimated.  [default: arachne]",
+        ),
+    ]  # fmt: skip
+
+
+def refuse_strays(*, as_printed: bool, slicer: str | None, walls: str | None) -> None:
+    """Refuse words on a print that nobody asked about, or two ways at once."""
+    if not as_printed and (slicer or walls):
+        raise BadInput("--slicer and --walls say how it is printed; expected --as-printed with them")
+    if slicer and walls:
+        raise BadInput("--slicer and --walls at once; expected one: the slicer's profile says what walls it makes")
+
+
+def printed(design: "Design", slicer: str | None, walls: str | None) -> "Printed":
+    """What is printed of a design: sliced for real, or estimated."""
+    from sensorgen.asprinted import compared
+
+    if not slicer:
+        return compared.estimated(design, walls or "arachne")
+    from sensorgen import slicing
+    from sensorgen.gcode import paths
+
+    with tempfile.TemporaryDirectory() as folder, show.progress(slicing.STEPS) as step:
+        made = slicing.sliced([slicing.alone(design)], slicer, Path(folder), step=step)
+        lines = paths.read(made.raw, design.machine, "slicer")
+    return compared.sliced(design, lines, f"{slicer} {made.version}")
 
 
 def compensated(

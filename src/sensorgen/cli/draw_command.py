@@ -1,11 +1,12 @@
 """``sensorgen draw``: the dimensioned cross-section."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import show
+from sensorgen.cli import asprinted_text, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
@@ -14,17 +15,23 @@ if TYPE_CHECKING:
 OWN: list[click.Parameter] = [
     click.Option(
         ["--output", "-o"], metavar="FILE", help="SVG file to write; NAME.svg here if not given, - for the terminal."
-    )
+    ),
+    *asprinted_text.printed_options(),
 ]
 
 
-def _work(design: "Design", *, output: str | None) -> int:
+def _work(design: "Design", *, output: str | None, as_printed: bool, slicer: str | None, walls: str | None) -> int:
     from sensorgen import store
     from sensorgen.build import draw
     from sensorgen.review import STEPS, review
 
+    asprinted_text.refuse_strays(as_printed=as_printed, slicer=slicer, walls=walls)
+    made = asprinted_text.printed(design, slicer, walls) if as_printed else None
     with show.progress(STEPS) as step:
-        text = draw(design, review(design, step))
+        held = review(design, step)
+    if made:
+        held = replace(held, findings=[*made.findings(design), *held.findings])
+    text = draw(design, held, made.scene(design), made.source) if made else draw(design, held)
     if output == "-":
         click.echo(text, nl=False)
         return 0

@@ -1,7 +1,6 @@
 """``sensorgen predict``: what the bench should measure."""
 
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from math import inf
 from pathlib import Path
@@ -16,7 +15,6 @@ from sensorgen.cli.words import Length, OneOf, Ratio, Share, Values, proper
 from sensorgen.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.asprinted.compared import Printed
     from sensorgen.design import Design
     from sensorgen.sensing import Sensed
 
@@ -53,18 +51,7 @@ OWN: list[click.Parameter] = [
         ["--accuracy"], type=Ratio(), default=None,
         help="Wanted of |Z|, as 1e-3: bounds the capacitance as nearly, solves an unknown cell, says what misses it.",
     ),
-    click.Option(
-        ["--as-printed"], is_flag=True,
-        help="Drawn against printed: electrode gap, capacitance, electrode resistance, volume per body and layer.",
-    ),
-    click.Option(
-        ["--slicer"], type=OneOf(("prusa", "cura")),
-        help="With --as-printed: slice for real; estimated from each layer's mid-plane if not given.",
-    ),
-    click.Option(
-        ["--walls"], type=OneOf(("arachne", "classic", "cura", "cura-gaps")),
-        help="With --as-printed and no slicer: whose walls are estimated.  [default: arachne]",
-    ),
+    *asprinted_text.printed_options(),
     click.Option(["--json", "as_json"], is_flag=True, help="Print as JSON."),
     click.Option(["--csv", "as_csv"], is_flag=True, help="Print R and X as CSV, a row per force and position."),
     click.Option(["--plot"], metavar="DIR", help="Draw R, X, sensitivities and inverse maps there, as PNG and HTML."),
@@ -85,7 +72,8 @@ def _work(
     noise: float,
     **how: Any,
 ) -> int:
-    if how["as_printed"] or how["slicer"] or how["walls"]:
+    asprinted_text.refuse_strays(as_printed=how["as_printed"], slicer=how["slicer"], walls=how["walls"])
+    if how["as_printed"]:
         _refuse_strangers(how, (frequency_hz, force_n, position_mm, tip_mm, compression))
         return _as_printed(design, accuracy, how)
     from sensorgen.predict import FORCES_N, TONES_HZ, positions_mm, prediction
@@ -111,33 +99,15 @@ def _as_printed(design: "Design", accuracy: float | None, how: dict[str, Any]) -
     from sensorgen.asprinted import compared
     from sensorgen.asprinted.report import report
 
-    if how["slicer"]:
-        with tempfile.TemporaryDirectory() as folder:
-            printed = _sliced(design, how["slicer"], Path(folder))
-    else:
-        printed = compared.estimated(design, how["walls"] or "arachne")
+    printed = asprinted_text.printed(design, how["slicer"], how["walls"])
     found = report(design, printed, accuracy or compared.ACCURACY)
     text = (f"{line}\n" for line in asprinted_text.lines(found))
     _deliver(iter([show.json_text(found)]) if how["as_json"] else text, how["output"])
     return FOUND_ERRORS if any(f["severity"] == "error" and not f["waiver"] for f in found["findings"]) else 0
 
 
-def _sliced(design: "Design", slicer: str, folder: Path) -> "Printed":
-    from sensorgen import slicing
-    from sensorgen.asprinted import compared
-    from sensorgen.gcode import paths
-
-    with show.progress(slicing.STEPS) as step:
-        made = slicing.sliced([slicing.alone(design)], slicer, folder, step=step)
-    return compared.sliced(design, paths.read(made.raw, design.machine, "slicer"), f"{slicer} {made.version}")
-
-
 def _refuse_strangers(how: dict[str, Any], pressed: Sequence[object]) -> None:
     """What is printed is told of the sensor at rest."""
-    if not how["as_printed"]:
-        raise BadInput("--slicer and --walls say how it is printed; expected --as-printed with them")
-    if how["slicer"] and how["walls"]:
-        raise BadInput("--slicer and --walls at once; expected one: the slicer's profile says what walls it makes")
     if any(given is not None for given in pressed) or how["as_csv"] or how["plot"]:
         raise BadInput("--as-printed speaks of the sensor at rest; expected no tones, presses, --csv or --plot with it")
 

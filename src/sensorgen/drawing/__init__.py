@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from sensorgen.drawing import dimensions, layers, markers, measures, overview, panels, titleblock
 from sensorgen.drawing.panels import Colours, Panel
 from sensorgen.drawing.paper import ARROWS, STYLE, box, element, escaped, line
+from sensorgen.drawing.printed import over
 from sensorgen.drawing.view import views
 from sensorgen.findings import Finding
 from sensorgen.scene import Point, Scene
@@ -37,6 +38,7 @@ def svg(
     findings: Sequence[Finding],
     materials: Colours,
     notes: Sequence[str] = (),
+    printed: Scene | None = None,
 ) -> str:
     """Draw a scene as it is printed.
 
@@ -54,6 +56,8 @@ def svg(
         Display title and colour (``#rrggbb``) of each material by its name.
     notes : sequence of str
         Further lines for the title block.
+    printed : Scene, optional
+        What is printed of it, in boxes, to be outlined over the sections.
 
     Returns
     -------
@@ -69,6 +73,7 @@ def svg(
     gap = _gap(details)
     parts = [
         *_detail_parts(scene, details, lanes, grid, materials),
+        *(part for panel in details if printed for part in over(panel, printed)),
         *_notes(details, gap, shown, grid),
         *(p for d, w, n in zip(details, wholes, NAMES, strict=False) for p in overview.draw(d, w, n, scene, materials)),
         *markers.on_overview(shown, details, wholes),

@@ -22,6 +22,7 @@ text{font-family:sans-serif;font-size:2.5px;fill:#1f2328}
 .under{stroke:#fff;stroke-width:.4;stroke-opacity:.4;fill:none}
 .grid{stroke:#2878d0;stroke-width:.14;fill:none}.dense{stroke-width:.08}
 .mid{stroke:#2878d0;stroke-width:.12;stroke-dasharray:1.2 1;fill:none}
+.halo-line{stroke:#fff;stroke-width:.75;fill:none}.printed{stroke:#00806c;stroke-width:.4;fill:none}
 .thin{stroke:#1f2328;stroke-width:.13;fill:none}.frame{stroke:#1f2328;stroke-width:.35;fill:none}
 .dim,.tick{stroke:#1f2328;stroke-width:.16;fill:none}
 .dim{marker-start:url(#sg-start);marker-end:url(#sg-end)}.tick{marker-start:url(#sg-tick);marker-end:url(#sg-tick)}
