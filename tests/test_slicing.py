@@ -4,6 +4,7 @@ import os
 import stat
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from sensorgen import slicing, threemf
 from sensorgen.design import make
 from sensorgen.errors import BadInput, SlicerFailed, UnknownName, Unwritable
 from sensorgen.gcode.check import check
+from sensorgen.geometry.mesh import Mesh
 from sensorgen.printfile import slice_design
 from sensorgen.slicer import stl
 from sensorgen.slicing import Placed, alone, sliced
@@ -77,6 +79,10 @@ def test_bodies_stand_where_they_were_placed():
     low, high = box_mm(slicing.plate_parts([Placed(SMALL, (-30.0, 5.0), "a")]))
     assert (low + high)[:2] / 2 == pytest.approx([-30.0, 5.0])
     assert low[2] == 0.0
+    bodies = slicing.plate_parts([alone(SMALL)])
+    raised = [replace(b, mesh=Mesh(b.mesh.vertices_mm + 7.0, b.mesh.triangles)) for b in bodies]
+    low, high = box_mm(threemf.placed(raised, (1.0, 2.0)))
+    assert (low[2], *((low + high)[:2] / 2)) == pytest.approx((0.0, 1.0, 2.0))
 
 
 @pytest.mark.parametrize(

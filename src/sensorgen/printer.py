@@ -98,6 +98,10 @@ class Printer(Strict):
         """Place of a tool in a slicer's list, which counts from 0 [-]."""
         return self.tool_numbers.index(tool)
 
+    def tool_at_start(self) -> int | None:
+        """Tool in hand before a file takes one: RepRapFirmware has none, others have their first [-]."""
+        return None if self.gcode_flavour == "reprapfirmware" else self.tool_numbers[0]
+
     def reach_mm(self) -> Reach:
         """How far the axes go [mm]."""
         if self.control.reach_mm is not None:

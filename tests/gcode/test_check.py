@@ -171,6 +171,12 @@ def test_a_file_cut_short_is_refused():
         assert "heat-left" in errors(lines[:end])
 
 
+def test_a_tool_that_still_waits_warm_is_left_on():
+    lines = [line.replace("G10 P4 S0 R0", "G10 P4 S0") for line in OWN.splitlines() if line != "M0 H1"]
+    (fault,) = check(lines, DIABASE).errors()
+    assert (fault.rule, "tools 4 are" in fault.message) == ("heat-left", True)
+
+
 def test_heaters_left_to_the_stop_macro_are_told():
     assert ("heat-left", "info") in found(MAKER.splitlines())
     assert not any(rule == "heat-left" for rule, _ in found(OWN.splitlines()))
@@ -180,6 +186,12 @@ def test_many_of_a_kind_are_one_finding():
     lines = [*changed(OWN, "T4", "T4"), *["G1 X300 F600\n"] * 500]
     (fault,) = [f for f in check(lines, DIABASE).findings if f.rule == "reach"]
     assert fault.count == 500
+
+
+def test_the_first_line_of_a_kind_is_named():
+    lines = [*OWN.splitlines(), "M104 S210", "G28", "M104 S210"]
+    (fault,) = check(lines, DIABASE).errors()
+    assert (fault.line, fault.count) == (len(OWN.splitlines()) + 1, 2)
 
 
 def test_another_printer_has_other_rules():
@@ -198,6 +210,10 @@ M84"""
     assert found(lines.splitlines(), other) == set()
     assert "reach" in errors([*lines.splitlines(), "G1 X-1"], other)
     assert "heat-left" in errors(lines.splitlines()[:-2], other)
+    without_t = [line for line in lines.splitlines() if line != "T0"]
+    assert found(without_t, other) == set()  # its first tool is in hand
+    assert check(without_t, other).report.tools[0].tool == 0
+    assert {"tool", "cold"} & errors(["M83", "G1 X1 E1"], other) == {"cold"}
 
 
 def test_a_printer_without_a_control_section_has_the_bed_for_its_reach():

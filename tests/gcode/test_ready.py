@@ -191,6 +191,11 @@ def test_standby_is_never_above_active():
     assert "G10 P3 S170 R60" in made("G28\nM83\nT2\nG10 P2 S170 R60\nG1 X1 E1\n")
 
 
+def test_switching_off_without_a_tool_means_all():
+    new = made("G28\nM83\nT2\nG10 P2 S210\nG10 P3 S230\nM104 S0 ; off\n").splitlines()
+    assert new[-2:] == ["G10 P3 S0 R0 ; off", "G10 P4 S0 R0"]
+
+
 def test_retraction_by_the_firmware_and_places_of_work_stay():
     text = "G28\nM83\nG10 L2 P1 X3\nT2\nG1 X1 E1 F60\nG10\nG11\nG10 ; retract\n"
     assert "G10 L2 P1 X3\n" in made(text)
@@ -204,7 +209,7 @@ def test_several_commands_on_a_line():
 
 def test_a_printer_with_plain_words_gets_its_file_unchanged():
     xl = load_printer("prusa-xl5")
-    text = "G28\nM83\nT2\nM104 S210 T2\nM106 S255\nM107\nG10\nM82\nM83\nG1 X1 E1\nM104 S0\n"
+    text = "T2\nG28\nM83\nM104 S210 T2\nM106 S255\nM107\nG10\nM82\nM83\nG1 X1 E1\nM104 S0\n"
     assert made(text, xl) == text
 
 

@@ -54,6 +54,7 @@ def test_each_variant_passes_the_printers_check(name, orientation, quality, slic
     result = check(made.ready, variant.machine)
     assert result.errors(strict=True) == []
     assert {tool.tool for tool in result.report.tools} == {3, 4}
+    assert all(tool.purge_mm > 5 for tool in result.report.tools)  # the tower primes both
     assert made.version.split(".")[0].isdecimal()
     printed = extruded.read(lines_of(made.ready), variant.machine.filament_mm)
     assert set(printed.model_mm3()) == {3, 4}
@@ -87,6 +88,16 @@ def test_two_sensors_stand_where_they_were_placed(slicer, tmp_path):
         low, high = ends.min(axis=0)[:2], ends.max(axis=0)[:2]
         assert (low + high) / 2 == pytest.approx(middle, abs=0.05)
         assert ((high - low > 5.4) & (high - low <= 6.0)).all()  # lines stay inside the outline
+
+
+@both
+def test_another_printer_keeps_its_words(slicer, tmp_path):
+    variant = small("23/trix-d0.1.yaml", printer="prusa-xl5", tools={"etpu": 0, "x60": 1})
+    made = sliced([alone(variant)], slicer, tmp_path)
+    assert check(made.ready, variant.machine).errors() == []
+    assert made.ready.read_bytes() == made.raw.read_bytes()
+    ends = paths.read(made.ready, variant.machine).model().end_mm[:, :2]
+    assert (ends.min(axis=0) + ends.max(axis=0)) / 2 == pytest.approx(variant.machine.bed_centre_mm(), abs=0.05)
 
 
 @both

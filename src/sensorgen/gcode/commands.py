@@ -1,33 +1,18 @@
 """What the commands of a file ask of the machine, one after the other: tools, heat, homing, modes, fans, macros."""
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from math import isnan
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.gcode.found import Found
-from sensorgen.gcode.motion import NO_TOOL, Change, Event, Motion, macro_name
+from sensorgen.gcode.found import Found, error
+from sensorgen.gcode.heat import Heaters, known_tool, tool_there
+from sensorgen.gcode.motion import macro_name
+from sensorgen.gcode.moves import NO_TOOL, Change, Event, Motion
 from sensorgen.gcode.remarks import PRUSA
-from sensorgen.gcode.words import Command
 from sensorgen.printer import Printer
 
 AXES = "XYZ"
-
-
-@dataclass
-class Heat:
-    """What a tool is told: temperatures while it prints and while it waits [C], and whether it is on."""
-
-    active_c: float = 0.0
-    standby_c: float = 0.0
-    on: bool = True
-
-    @property
-    def hot(self) -> bool:
-        """Whether its heater is on."""
-        return self.on and max(self.active_c, self.standby_c) > 0
 
 
 def check(motion: Motion, machine: Printer) -> Iterator[Found]:
@@ -57,9 +42,10 @@ class _Simulation:
         self.prints = np.flatnonzero(motion.extruded_mm > 0)
         self.travels = np.flatnonzero(motion.length_mm() > 0)
         self.changes = {change.number: change for change in motion.changes}
-        self.tool = NO_TOOL
+        start = machine.tool_at_start()
+        self.tool = NO_TOOL if start is None else start
         self.last: Change | None = None
-        self.heat = {tool: Heat() for tool in machine.tool_numbers}
+        self.heaters = Heaters(machine)
         self.homed: set[str] = set()
         self.levelled = not self.control.levels
         self.relative = False
@@ -96,40 +82,31 @@ class _Simulation:
 
     def _pushing(self, number: int) -> Iterator[Found]:
         if self.tool == NO_TOOL:
-            yield _error("tool", number, "filament is moved before a tool is taken", "take a tool first (T)")
+            yield error("tool", number, "filament is moved before a tool is taken", "take a tool first (T)")
         elif self.tool in self.control.spindles:
-            yield _error("tool", number, f"tool {self.tool} is a spindle and cannot extrude", "use another tool")
-        elif self.tool in self.heat:
-            yield from self._cold(number, self.heat[self.tool])
+            yield error("tool", number, f"tool {self.tool} is a spindle and cannot extrude", "use another tool")
+        else:
+            yield from self.heaters.cold(self.tool, number)
         if self.absolute_e and self.control.relative_e:
-            yield _error(
+            yield error(
                 "absolute-e", number, "filament is moved with absolute E", "write M83 at the start, and relative E"
             )
 
-    def _cold(self, number: int, heat: Heat) -> Iterator[Found]:
-        given_c = heat.active_c if heat.on else 0.0
-        if given_c < self.control.coldest_c:
-            yield _error(
-                "cold", number,
-                f"tool {self.tool} moves filament at {given_c:g} C; below {self.control.coldest_c:g} C it is cold",
-                f"heat it before (G10 P{self.tool} S..)",
-            )  # fmt: skip
-
     def _printing(self, number: int) -> Iterator[Found]:
         if self.homed != set(AXES):
-            yield _error(
+            yield error(
                 "home",
                 number,
                 "the file prints before all axes are homed",
                 f"home first ({' or '.join(self.control.homes)})",
             )
         if not self.levelled:
-            yield _error(
+            yield error(
                 "level", number, "the file prints before the bed is levelled",
                 f"level first ({' or '.join(self.control.levels)})",
             )  # fmt: skip
         if self.relative:
-            yield _error("relative", number, "the file prints in relative coordinates (G91)", "write G90 before it")
+            yield error("relative", number, "the file prints in relative coordinates (G91)", "write G90 before it")
 
     def _moving(self, number: int) -> Iterator[Found]:
         if self.homed != set(AXES):
@@ -154,78 +131,33 @@ class _Simulation:
             yield from self.does[code](event)
 
     def _take(self, change: Change) -> Iterator[Found]:
-        yield from self._known(change.number, change.tool, "is taken") if change.tool != NO_TOOL else ()
+        yield from tool_there(self.machine, change.number, change.tool, "is taken") if change.tool != NO_TOOL else ()
         last, self.last, self.tool = self.last, change, change.tool
         twice = last and (last.tool, last.macro) == (change.tool, not change.macro) and last.number != change.number
         if last and twice and self._first(self.prints, last.row, change.row) is None:
-            yield _error(
+            yield error(
                 "tool-change", change.number,
                 f"tool {change.tool} is taken twice, by T and by its macro: the macro takes it itself",
                 "leave one of them out",
             )  # fmt: skip
 
-    def _known(self, number: int, tool: float, what: str) -> Iterator[Found]:
-        if tool not in self.heat:
-            known = ", ".join(map(str, self.machine.tool_numbers))
-            yield _error(
-                "tool", number, f"tool {tool:g} {what}; {self.machine.name} has {known}",
-                "give the printer's own number; slicers count from 0",
-            )  # fmt: skip
-
     def _tool_settings(self, event: Event) -> Iterator[Found]:
         if event.command.has("SR") and not event.command.has("L"):
-            yield from self._set(event, "P", event.command.number("S"), event.command.number("R"))
+            yield from self.heaters.told(event, "P", self.tool)
         elif event.command.has("P") and not event.command.has("L"):
-            yield from self._known(event.number, _whole(event.command, "P"), "is set")
+            yield from known_tool(self.machine, event, "P", "is set")
 
     def _temperature(self, event: Event) -> Iterator[Found]:
-        yield from self._set(event, "T", event.command.number("S"), event.command.number("R"))
-
-    def _set(self, event: Event, letter: str, active_c: float | None, standby_c: float | None) -> Iterator[Found]:
-        """Tell a tool its temperatures; the tool in hand where the command names none."""
-        tool: float = self.tool
-        if event.command.has(letter):
-            tool = _whole(event.command, letter)
-            yield from self._known(event.number, tool, "gets a temperature")
-        elif self.control.names_tools:
-            yield _error(
-                "temperature", event.number, f"{event.command.code} sets a temperature and names no tool",
-                f"name it: G10 P{max(self.tool, 1)} S.. R..",
-            )  # fmt: skip
-        most_c = self.machine.max_nozzle_c
-        for value_c in (active_c, standby_c):
-            if value_c is not None and not value_c <= most_c:
-                yield _error(
-                    "temperature",
-                    event.number,
-                    f"a tool is set to {value_c:g} C; the limit is {most_c:g} C",
-                    "print cooler",
-                )
-        if tool in self.heat:
-            self._tell(self.heat[int(tool)], active_c, standby_c)
-
-    @staticmethod
-    def _tell(heat: Heat, active_c: float | None, standby_c: float | None) -> None:
-        heat.on = True
-        heat.active_c = heat.active_c if active_c is None or isnan(active_c) else active_c
-        heat.standby_c = heat.standby_c if standby_c is None or isnan(standby_c) else standby_c
+        yield from self.heaters.told(event, "T", self.tool)
 
     def _state(self, event: Event) -> Iterator[Found]:
-        if event.command.has("SR"):
-            yield from self._set(event, "P", event.command.number("S"), event.command.number("R"))
-        elif event.command.has("P"):
-            yield from self._known(event.number, _whole(event.command, "P"), "gets a state")
-        tool = _whole(event.command, "P") if event.command.has("P") else self.tool
-        if tool in self.heat and event.command.has("A"):
-            self.heat[int(tool)].on = event.command.number("A") != 0
+        yield from self.heaters.state(event, self.tool)
 
     def _waits(self, event: Event) -> Iterator[Found]:
-        if event.command.has("P"):
-            yield from self._known(event.number, _whole(event.command, "P"), "is waited for")
+        yield from known_tool(self.machine, event, "P", "is waited for")
 
     def _bed(self, event: Event) -> Iterator[Found]:
-        values_c = event.command.number("S"), event.command.number("R")
-        yield from _too_hot(event.number, "the bed", values_c, self.machine.max_bed_c)
+        yield from self.heaters.bed(event)
 
     def _fan(self, event: Event) -> Iterator[Found]:
         fan = self.control.layer_fan
@@ -240,7 +172,7 @@ class _Simulation:
         name = macro_name(event.command)
         if event.number not in self.changes and name not in self.control.macros:
             known = ", ".join(filter(None, (self.control.prime_macro, *self.control.macros))) or "none"
-            yield _error(
+            yield error(
                 "macro", event.number, f"nobody knows the macro {name[:60]!r}; {self.machine.name} has {known}",
                 "leave it out, or add it to the printer's file (control: macros)",
             )  # fmt: skip
@@ -248,7 +180,7 @@ class _Simulation:
     def _absolute(self, event: Event) -> Iterator[Found]:
         self.absolute_e = True
         if self.control.relative_e:
-            yield _error("absolute-e", event.number, "M82 makes E absolute", "leave it out, and write relative E")
+            yield error("absolute-e", event.number, "M82 makes E absolute", "leave it out, and write relative E")
 
     def _relative_e(self, _: Event) -> Iterator[Found]:
         self.absolute_e = False
@@ -271,9 +203,7 @@ class _Simulation:
         """Judge the file as a whole."""
         last = max(1, self.motion.lines)
         if self.relative:
-            yield _error(
-                "relative", last, "the file ends in relative coordinates (G91)", "write G90 after the last G91"
-            )
+            yield error("relative", last, "the file ends in relative coordinates (G91)", "write G90 after the last G91")
         if not len(self.prints):
             yield Found("read", "warning", last, "the file prints nothing", "check that it is the right file")
         if "G90" not in self.seen:
@@ -290,13 +220,13 @@ class _Simulation:
         settings = [e.command for e in self.motion.events if e.command.code == "G10" and e.command.has("S")]
         untouched = settings and not any(command.has("R") for command in settings)
         if self.control.names_tools and self.motion.maker == PRUSA and untouched and "fan" in self.warned:
-            yield _error(
+            yield error(
                 "raw", 1, "this is PrusaSlicer's own file: it counts tools from 0, and the printer from 1",
                 "let sensorgen slice write it",
             )  # fmt: skip
 
     def _left_on(self, last: int) -> Iterator[Found]:
-        hot = [tool for tool, heat in self.heat.items() if heat.hot]
+        hot = self.heaters.hot()
         if not hot:
             return
         names = ", ".join(map(str, hot))
@@ -306,26 +236,8 @@ class _Simulation:
                 "switch them off in the file (G10 P.. S0 R0) if that macro does not",
             )  # fmt: skip
         else:
-            yield _error(
+            yield error(
                 "heat-left", last, f"tools {names} are still heated at the end of the file",
                 "switch them off (G10 P.. S0 R0), or end as the printer's other files do"
                 f" ({' or '.join(self.control.ends) or 'see its manual'}); the file may be cut short",
             )  # fmt: skip
-
-
-def _too_hot(number: int, what: str, values_c: Iterable[float | None], most_c: float) -> Iterator[Found]:
-    for value_c in values_c:
-        if value_c is not None and not value_c <= most_c:
-            yield _error(
-                "temperature", number, f"{what} is set to {value_c:g} C; the limit is {most_c:g} C", "print cooler"
-            )
-
-
-def _whole(command: Command, letter: str) -> float:
-    """Tool number of a word; nan, which no tool has, where it is none."""
-    value = command.number(letter)
-    return float("nan") if value is None else value
-
-
-def _error(rule: str, number: int, message: str, advice: str) -> Found:
-    return Found(rule, "error", number, message, advice)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sensorgen.gcode.motion import NO_TOOL, Motion, follow
+from sensorgen.gcode.motion import follow
+from sensorgen.gcode.moves import NO_TOOL, Motion
 
 # What the slicers' ";TYPE:" comments call lines that are not part of a body, in lower case.
 NOT_MODEL = frozenset(

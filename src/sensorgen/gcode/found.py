@@ -39,11 +39,16 @@ class Found:
         return asdict(self)
 
 
+def error(rule: str, line: int, message: str, advice: str) -> Found:
+    """A finding that refuses the file."""
+    return Found(rule, "error", line, message, advice)
+
+
 def merged(found: Iterable[Found]) -> list[Found]:
-    """Findings of the same words as one, the severe first and then by line."""
+    """Findings of the same words as one, which has the first line; the severe first, and then by line."""
     kept: dict[tuple[str, str, str], Found] = {}
     for f in found:
         key = (f.rule, f.severity, f.message)
         old = kept.get(key)
-        kept[key] = f if old is None else replace(old, line=min(old.line, f.line), count=old.count + f.count)
+        kept[key] = f if old is None else replace(old, count=old.count + f.count)
     return sorted(kept.values(), key=lambda f: (SEVERITIES.index(f.severity), f.line, f.rule))

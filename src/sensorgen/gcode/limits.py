@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.gcode.found import Found
-from sensorgen.gcode.motion import Motion
+from sensorgen.gcode.moves import Motion
 from sensorgen.printer import Printer
 
 Floats = NDArray[np.float64]
@@ -107,12 +107,7 @@ def _speed(motion: Motion, machine: Printer) -> Iterator[Found]:
         fast = rate * length
         over = fast > limit * (1 + 1e-6)
         for rows, severity, what, then in (
-            (
-                over & extrudes,
-                "error",
-                "a line is printed",
-                "not at the speed that it was sliced for",
-            ),
+            (over & extrudes, "error", "a line is printed", "it was sliced for another speed"),
             (over & ~extrudes, "warning", "a move without printing goes", "the firmware slows it down"),
         ):
             most = float(fast[rows].max()) * MM_MIN if rows.any() else 0.0

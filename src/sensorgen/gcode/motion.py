@@ -7,23 +7,17 @@ other lines are parsed in full and kept as events between the moves. Checks and 
 import math
 import re
 from array import array
-from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.gcode import arcs, remarks, words
+from sensorgen.gcode.moves import COLUMNS, NO_TOOL, Change, Event, Fault, Floats, Motion, Track
 from sensorgen.gcode.words import Command
 
-Floats = NDArray[np.float64]
-
 DEFAULT_FEED_MM_MIN = 3000.0  # RepRapFirmware's, until a line says another
-NO_TOOL = -1
 INCH_MM = 25.4
-COLUMNS = 10
 MOST_FAULTS = 10_000  # enough to know that a file is none
 MOST_MM = 1e9  # beyond this a number is a slip, and differences of it are noise
 
@@ -34,143 +28,6 @@ _PLAIN = re.compile(
 
 
 _TOOL = re.compile("-?[0-9]{1,6}")
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """A command that is no move: the moves before it, its line, and what it says."""
-
-    row: int
-    number: int
-    command: Command
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """What could not be read or followed, and where."""
-
-    number: int
-    what: str
-    severe: bool = True
-
-
-@dataclass(frozen=True, slots=True)
-class Change:
-    """A tool is taken, by ``T`` or by a macro: the moves before it, its line, the tool, and how."""
-
-    row: int
-    number: int
-    tool: int
-    macro: bool
-
-
-@dataclass
-class Track:
-    """Something that holds from one place in the file to the next: its values, and the moves before each."""
-
-    rows: list[int] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
-
-    def put(self, row: int, value: float) -> None:
-        """Let a value hold from the next move on."""
-        if self.rows and self.rows[-1] == row:
-            self.values[-1] = value
-        else:
-            self.rows.append(row)
-            self.values.append(value)
-
-    def at(self, row: int, before: float = math.nan) -> float:
-        """What holds for one move; ``before`` is what held at the start of the file."""
-        place = bisect_right(self.rows, row)
-        return self.values[place - 1] if place else before
-
-    def column(self, count: int, before: float = math.nan) -> Floats:
-        """What holds for each of ``count`` moves."""
-        edges = np.array([0, *self.rows, count], dtype=np.int64)
-        spans: NDArray[np.int64] = edges[1:] - edges[:-1]
-        return np.repeat(np.array([before, *self.values]), spans)
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """A file as moves in columns, and everything else as events between them.
-
-    Attributes
-    ----------
-    rows : (n, 10) float64 array
-        Start and end [mm], filament that is extruded and filament that is moved [mm], feed [mm/min], and
-        the line. Arcs stand as chords. Filament that only makes good for a retraction is moved, not extruded.
-    events : sequence of Event
-        All other commands.
-    changes : sequence of Change
-        Tools in the order in which they are taken, also the same again; ``NO_TOOL`` where one is put down.
-    tools : Track
-        The tool in hand, ``NO_TOOL`` before the first.
-    kinds : tuple of str
-        Kinds of line that comments name, in lower case; the first is "".
-    kind, width_mm, height_mm, layer : Track
-        Index into ``kinds``, and what comments say of the lines: width and height [mm], and layer from 1.
-    relative : Track
-        1 where X, Y and Z are relative, 0 where they are absolute.
-    absolute_e : Track
-        1 where E is absolute, 0 where it is relative.
-    faults : sequence of Fault
-        What could not be read or followed.
-    lines : int
-        How many lines the file has.
-    maker : str
-        Slicer that names itself at the top, where that tells something; else "".
-    """
-
-    rows: Floats
-    events: Sequence[Event]
-    changes: Sequence[Change]
-    tools: Track
-    kinds: tuple[str, ...]
-    kind: Track
-    width_mm: Track
-    height_mm: Track
-    layer: Track
-    relative: Track
-    absolute_e: Track
-    faults: Sequence[Fault]
-    lines: int
-    maker: str
-
-    @property
-    def start_mm(self) -> Floats:
-        """Where each move starts, (n, 3) [mm]."""
-        return self.rows[:, 0:3]
-
-    @property
-    def end_mm(self) -> Floats:
-        """Where each move ends, (n, 3) [mm]."""
-        return self.rows[:, 3:6]
-
-    @property
-    def extruded_mm(self) -> Floats:
-        """Filament that each move extrudes, without what makes good for a retraction [mm]."""
-        return self.rows[:, 6]
-
-    @property
-    def filament_mm(self) -> Floats:
-        """Filament that each move pushes, or draws back if negative [mm]."""
-        return self.rows[:, 7]
-
-    @property
-    def feed_mm_min(self) -> Floats:
-        """Feed that the file asks for [mm/min]."""
-        return self.rows[:, 8]
-
-    @property
-    def number(self) -> NDArray[np.int64]:
-        """Line of each move, from 1 [-]."""
-        return self.rows[:, 9].astype(np.int64)
-
-    def length_mm(self) -> Floats:
-        """Way of the nozzle in each move [mm]."""
-        way: Floats = np.sqrt(((self.end_mm - self.start_mm) ** 2).sum(axis=1))
-        return way
 
 
 def follow(lines: Iterable[str], prime_macro: str = "") -> Motion:

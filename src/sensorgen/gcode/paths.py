@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from sensorgen.gcode.extruded import NOT_MODEL
 from sensorgen.gcode.files import lines_of
-from sensorgen.gcode.motion import NO_TOOL, Motion, follow
+from sensorgen.gcode.motion import follow
+from sensorgen.gcode.moves import NO_TOOL, Motion
 from sensorgen.printer import Printer
 
 Floats = NDArray[np.float64]

@@ -21,7 +21,7 @@ import numpy as np
 
 from sensorgen.errors import BadInput
 from sensorgen.gcode import words
-from sensorgen.gcode.motion import NO_TOOL, Motion
+from sensorgen.gcode.moves import NO_TOOL, Motion
 from sensorgen.gcode.timing import seconds
 from sensorgen.gcode.words import Command
 from sensorgen.printer import Printer
@@ -126,7 +126,8 @@ class _Writer:
         self.machine, self.control = machine, machine.control
         self.tool: int | None = None  # the printer's number
         self.held: list[str] = []  # taking the first tool, until the axes are homed
-        self.homed = self.ended = False
+        self.homed = machine.tool_at_start() is not None  # such a printer may take tools at any time
+        self.ended = False
         self.hot: list[int] = []
         self.offset_mm = 0.0
         self.changes: dict[str, Callable[[Command], Sequence[str] | None]] = {

@@ -10,7 +10,7 @@ import numpy as np
 from sensorgen import materials
 from sensorgen.errors import MissingValue, UnknownName
 from sensorgen.gcode.extruded import NOT_MODEL
-from sensorgen.gcode.motion import NO_TOOL, Motion
+from sensorgen.gcode.moves import NO_TOOL, Motion
 from sensorgen.gcode.timing import seconds
 from sensorgen.printer import Printer
 
@@ -102,7 +102,8 @@ def _dwells(motion: Motion) -> float:
 
 def _tools(motion: Motion, machine: Printer, loaded: dict[int, str]) -> tuple[OfTool, ...]:
     count = len(motion.rows)
-    tools = motion.tools.column(count, NO_TOOL).astype(np.int64)
+    start = machine.tool_at_start()
+    tools = motion.tools.column(count, NO_TOOL if start is None else start).astype(np.int64)
     kinds = motion.kind.column(count, 0).astype(np.int64)
     waste = np.array([kind in NOT_MODEL for kind in motion.kinds])[kinds] | (motion.length_mm() == 0)
     extruded = motion.extruded_mm

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.gcode.motion import Motion
+from sensorgen.gcode.moves import Motion
 from sensorgen.printer import MaxSpeed
 
 Floats = NDArray[np.float64]
