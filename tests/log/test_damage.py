@@ -142,3 +142,37 @@ def test_a_prediction_that_was_tuned_is_found(log, path):
     connection.execute(sql)
     connection.close()
     assert list(verify.faults(log)) == ["prediction 1 is not what was made then"]
+
+
+def test_a_row_that_refers_to_nothing_is_found(sound):
+    connection = sqlite3.connect(sound, isolation_level=None)
+    connection.execute("INSERT INTO print VALUES (1, 'u', '', '23 triX', 'nobody', '', '')")
+    connection.close()
+    with Log(sound) as log:
+        assert list(verify.faults(log)) == ["'print': a row refers to one that is not there"]
+
+
+def test_what_sqlite_finds_is_told(log, monkeypatch):
+    said = {"integrity_check": ("ok", "row 3 missing\nfrom index x"), "foreign_key_check": ()}
+    monkeypatch.setattr(Log, "pragma", lambda _, name: said[name])
+    assert list(verify.faults(log)) == ["database: row 3 missing from index x"]
+
+
+def test_a_raw_file_is_on_the_disk_before_it_has_its_name(log, tmp_path, monkeypatch):
+    (tmp_path / "a.csv").write_text("a")
+    steps = []
+
+    def fsync(handle, sync=os.fsync):
+        steps.append("folder" if Path(f"/proc/self/fd/{handle}").resolve().is_dir() else "file")
+        sync(handle)
+
+    def rename(self, target, replace=Path.replace):
+        steps.append("name")
+        return replace(self, target)
+
+    if not Path("/proc/self/fd").exists():
+        pytest.skip("no /proc to ask what a handle is")
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(Path, "replace", rename)
+    files.keep(log.files, tmp_path / "a.csv")
+    assert steps == ["file", "name", "folder", "folder"]

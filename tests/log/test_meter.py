@@ -102,3 +102,38 @@ def test_a_meter_that_fails_is_let_go(monkeypatch):
         found.resistance(wires=2)
     with meter.Meter(HP) as found:
         assert found.resistance(wires=2)
+
+
+class Spoken:
+    """A VISA of one instrument, which writes down every order in turn."""
+
+    def __init__(self):
+        self.orders, self.read_termination = [], None
+
+        class Port:
+            def write(port, order):
+                self.orders.append(order)
+
+            def query(port, order):
+                self.orders.append(order)
+                return {"*IDN?": "HEWLETT-PACKARD,34401A,0,1", "SYST:ERR?": "+0"}.get(order, "+1.0E+03")
+
+            def close(port):
+                self.orders.append("closed")
+
+        class Manager(Port):
+            def open_resource(manager, address):
+                return Port()
+
+        self.ResourceManager = Manager
+        self.errors = type("errors", (), {"Error": OSError})
+        self.resources = type("resources", (), {"MessageBasedResource": Port})
+
+
+@pytest.mark.parametrize(("address", "first"), [(HP, []), ("ASRL/dev/ttyUSB0::INSTR", ["SYST:REM"])])
+def test_orders_come_in_the_order_that_the_manuals_ask_for(monkeypatch, address, first):
+    spoken = Spoken()
+    monkeypatch.setattr(meter, "_pyvisa", lambda: spoken)
+    with meter.Meter(address) as found:
+        found.resistance(wires=2)
+    assert spoken.orders == [*first, "*IDN?", "*CLS", "MEAS:RES?", "SYST:ERR?", "closed", "closed"]
