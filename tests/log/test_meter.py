@@ -1,6 +1,7 @@
 """Multimeters through VISA, simulated: what they say is logged in their own words, or told why not."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -104,36 +105,32 @@ def test_a_meter_that_fails_is_let_go(monkeypatch):
         assert found.resistance(wires=2)
 
 
-class Spoken:
+def spoken(orders):
     """A VISA of one instrument, which writes down every order in turn."""
 
-    def __init__(self):
-        self.orders, self.read_termination = [], None
+    class Port:
+        def write(self, order):
+            orders.append(order)
 
-        class Port:
-            def write(port, order):
-                self.orders.append(order)
+        def query(self, order):
+            orders.append(order)
+            return {"*IDN?": "HEWLETT-PACKARD,34401A,0,1", "SYST:ERR?": "+0"}.get(order, "+1.0E+03")
 
-            def query(port, order):
-                self.orders.append(order)
-                return {"*IDN?": "HEWLETT-PACKARD,34401A,0,1", "SYST:ERR?": "+0"}.get(order, "+1.0E+03")
+        def close(self):
+            orders.append("closed")
 
-            def close(port):
-                self.orders.append("closed")
+    class Manager(Port):
+        def open_resource(self, address):
+            return Port()
 
-        class Manager(Port):
-            def open_resource(manager, address):
-                return Port()
-
-        self.ResourceManager = Manager
-        self.errors = type("errors", (), {"Error": OSError})
-        self.resources = type("resources", (), {"MessageBasedResource": Port})
+    errors, resources = SimpleNamespace(Error=OSError), SimpleNamespace(MessageBasedResource=Port)
+    return SimpleNamespace(ResourceManager=Manager, errors=errors, resources=resources)
 
 
 @pytest.mark.parametrize(("address", "first"), [(HP, []), ("ASRL/dev/ttyUSB0::INSTR", ["SYST:REM"])])
 def test_orders_come_in_the_order_that_the_manuals_ask_for(monkeypatch, address, first):
-    spoken = Spoken()
-    monkeypatch.setattr(meter, "_pyvisa", lambda: spoken)
+    orders = []
+    monkeypatch.setattr(meter, "_pyvisa", lambda: spoken(orders))
     with meter.Meter(address) as found:
         found.resistance(wires=2)
-    assert spoken.orders == [*first, "*IDN?", "*CLS", "MEAS:RES?", "SYST:ERR?", "closed", "closed"]
+    assert orders == [*first, "*IDN?", "*CLS", "MEAS:RES?", "SYST:ERR?", "closed", "closed"]
