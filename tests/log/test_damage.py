@@ -115,12 +115,17 @@ def test_a_log_in_a_place_that_cannot_be(tmp_path):
 
 def test_raw_files_are_checked(log, tmp_path):
     (tmp_path / "a.csv").write_text("a")
+    left = log.files / "ca" / f".x.ab.{os.getpid()}.part"  # of an earlier process of our number
+    left.parent.mkdir(parents=True)
+    left.touch()
     (tmp_path / "b").write_text("b")
     kept = [files.keep(log.files, tmp_path / name) for name in ("a.csv", "b")]
     log.add(kept)
     assert list(verify.faults(log)) == []
     first, second = (files.place(log.files, file) for file in kept)
     assert first.name == f"{kept[0].uid}.csv"
+    assert left.parent == first.parent
+    assert not left.exists()
     first.chmod(0o644)
     first.write_text("A")
     second.unlink()
