@@ -10,11 +10,13 @@ import mpmath
 import numpy as np
 import pytest
 from line_cases import PLATE as LINE_PLATE
+from line_cases import exact as exact_line
 
 from sensorgen import materials, planner
 from sensorgen.design import make
 from sensorgen.errors import MissingValue, OutOfRange
 from sensorgen.interval import Interval
+from sensorgen.losses import Lost
 from sensorgen.models import line
 from sensorgen.planner import Unpredictable, capacitance
 from sensorgen.predict import (
@@ -391,9 +393,36 @@ def test_csv_of_many_rows_needs_no_more_memory(plate):
     assert peaks[1] < 1.1 * peaks[0] < 10e6
 
 
-def test_a_loss_that_is_set_and_left_out_is_said():
-    lossy = make({"shape": "reference", "material_values": {"x60": {"loss_tangent": 0.02}}})
-    said = [a for a in prediction(lossy)["assumptions"] if "loss" in a]
-    assert said == [
-        "no dielectric loss and no leak: loss_tangent of x60 as set is left out here, sensorgen cell takes it"
-    ]
+LOSSY = {"shape": "reference", "material_values": {"x60": {"loss_tangent": 0.02, "resistivity_ohm_m": 1e9}}}
+AREA_M2, FILM_M = 1e-3, 6e-4
+
+
+def test_losses_reach_the_line():
+    """Of a plate: y = (tan delta + j) omega C + A / (rho d), by transfer matrices in 60 digits."""
+    found = prediction(make(LOSSY))
+    for row in found["impedance_ohm"]:
+        z = exact_line(
+            60, **LINE_PLATE | {
+                "f_Hz": row["frequency_hz"], "tan_delta": 0.02, "G_S_per_m": 0.01 / (1e9 * FILM_M), "F_N": 0,
+            }
+        )  # fmt: skip
+        assert row["re"] == pytest.approx(float(z.real), rel=1e-6)
+        assert row["im"] == pytest.approx(float(z.imag), rel=1e-6)
+    assert (
+        "of dielectric loss and leak, loss_tangent of x60 and resistivity_ohm_m of x60 as set" in found["assumptions"]
+    )
+    sensor = sensor_of(make(LOSSY)).sensor
+    assert sensor.tan_delta == pytest.approx(0.02, rel=1e-6)
+    assert sensor.leak_s_per_m == pytest.approx(0.01 / (1e9 * FILM_M), rel=1e-6, abs=0)
+
+
+def test_without_losses_nothing_is_asked():
+    assert sensor_of(make({"shape": "reference"})).lost == Lost()
+
+
+def test_a_strong_leak_is_doubted():
+    strong = make({"shape": "reference", "material_values": {"x60": {"resistivity_ohm_m": 1e7}}})
+    (said,) = [a for a in prediction(strong)["assumptions"] if "depends on the frequency" in a]
+    assert said.startswith("x60 leaks 0.35 of what it stores at 1.1 kHz")
+    weak = make({"shape": "reference", "material_values": {"x60": {"resistivity_ohm_m": 1e8}}})
+    assert not any("depends on the frequency" in a for a in prediction(weak)["assumptions"])

@@ -1,14 +1,20 @@
-"""What dielectrics lose: the complex permittivities of a design at a frequency."""
+"""What dielectrics lose: the complex permittivities of a design at a frequency, and what the line makes of them."""
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from math import pi
 
 from sensorgen.design import Design
 from sensorgen.errors import BadInput
 from sensorgen.materials import SET
-from sensorgen.planner import Taken, permittivities
+from sensorgen.planner import Taken, capacitance, permittivities
 from sensorgen.units import EPS0_F_PER_M
 
 LOSSES = ("loss_tangent", "resistivity_ohm_m")
+LOWEST_HZ = 1.1e3  # of the bench's tones: a leak is strongest there
+
+_ACCURACY = 1e-5
+_WEAK = 0.1  # of what is stored: up to here a leak is a conductance within 1 %
 
 
 def set_losses(design: Design) -> list[Taken]:
@@ -47,8 +53,13 @@ def permittivity(design: Design, frequency_hz: float | None = None) -> tuple[dic
         A dielectric without a permittivity.
     """
     taken = permittivities(design)
+    found = _with(taken, set_losses(design), frequency_hz)
+    return found, [*taken, *set_losses(design)]
+
+
+def _with(taken: Sequence[Taken], lost: Sequence[Taken], frequency_hz: float | None) -> dict[str, complex]:
     found: dict[str, complex] = {t.material: t.value for t in taken}
-    for loss in set_losses(design):
+    for loss in lost:
         if loss.quantity == "loss_tangent":
             found[loss.material] -= 1j * found[loss.material].real * loss.value
         elif frequency_hz is None:
@@ -57,5 +68,71 @@ def permittivity(design: Design, frequency_hz: float | None = None) -> tuple[dic
                 "expected one: --frequency 1.1kHz"
             )
         else:
-            found[loss.material] -= 1j / (2 * pi * frequency_hz * EPS0_F_PER_M * loss.value)
-    return found, [*taken, *set_losses(design)]
+            found[loss.material] -= 1j * _conduction(loss.value, frequency_hz)
+    return found
+
+
+def _conduction(resistivity_ohm_m: float, frequency_hz: float) -> float:
+    """What a leak adds to the permittivity, minus its imaginary part [-]."""
+    return 1 / (2 * pi * frequency_hz * EPS0_F_PER_M * resistivity_ohm_m)
+
+
+@dataclass(frozen=True)
+class Lost:
+    """What the dielectrics of a whole sensor lose.
+
+    Attributes
+    ----------
+    tan_delta : float
+        Of the whole, the same at every frequency [-].
+    leak_s : float
+        Conductance between the electrodes, the same at every frequency [S].
+    taken : tuple of Taken
+        What both rest on; empty where nothing is lost.
+    doubts : tuple of str
+        Why they are to be taken with care.
+    """
+
+    tan_delta: float = 0.0
+    leak_s: float = 0.0
+    taken: tuple[Taken, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+
+def lost(design: Design) -> Lost:
+    r"""What the dielectrics of a design lose, as far as the design sets it.
+
+    A weak leak is a conductance :math:`G = \omega C''`: to first order in :math:`1 / (\omega \varepsilon \varrho)` it
+    does not depend on the frequency, whatever lies in series with what leaks. It is taken at the lowest tone.
+
+    Raises
+    ------
+    Unpredictable
+        No model knows the losses of this scene.
+    """
+    taken, sets = permittivities(design), set_losses(design)
+    parts = {quantity: [t for t in sets if t.quantity == quantity] for quantity in LOSSES}
+    tangents, leaks = (_tangent(design, taken, parts[quantity]) for quantity in LOSSES)
+    return Lost(tangents[0], 2 * pi * LOWEST_HZ * leaks[1], tuple(sets), tuple(_strong(taken, parts[LOSSES[1]])))
+
+
+def _tangent(design: Design, taken: Sequence[Taken], some: Sequence[Taken]) -> tuple[float, float]:
+    """C''/C' [-] and C'' [F] of the sensor with some of its losses."""
+    if not some:
+        return 0.0, 0.0
+    found = capacitance(design.in_use, _with(taken, some, LOWEST_HZ), _ACCURACY)
+    if found.loss_f is None:
+        return 0.0, 0.0
+    loss = (found.loss_f.lower + found.loss_f.upper) / 2
+    return loss / found.capacitance_f.middle(), loss
+
+
+def _strong(taken: Sequence[Taken], leaks: Sequence[Taken]) -> Iterator[str]:
+    eps = {t.material: t.value for t in taken}
+    for leak in leaks:
+        share = _conduction(leak.value, LOWEST_HZ) / eps[leak.material]
+        if share > _WEAK:
+            yield (
+                f"{leak.material} leaks {share:.2g} of what it stores at {LOWEST_HZ / 1e3:g} kHz: beyond {_WEAK:g} its "
+                "leak depends on the frequency, and is taken as of that tone"
+            )

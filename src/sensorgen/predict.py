@@ -16,7 +16,7 @@ from sensorgen.card import FORCE_N, card
 from sensorgen.design import Design
 from sensorgen.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.interval import Interval
-from sensorgen.losses import set_losses
+from sensorgen.losses import Lost, lost
 from sensorgen.models import line
 from sensorgen.planner import Unloaded, Unpredictable, unloaded
 from sensorgen.sensing import TIP_M, Sensed, sensor_of
@@ -60,7 +60,7 @@ def prediction(
     A scene that no model can speak of, as a short, or a material without a value has a reason in place of numbers.
     """
     try:
-        found = unloaded(design, accuracy)
+        found, gone = unloaded(design, accuracy), lost(design)
     except (Unpredictable, MissingValue) as error:
         return {"capacitance_f": None, "reason": str(error)}
     area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
@@ -72,24 +72,27 @@ def prediction(
         "capacitance_f": _bounds(found.answer.capacitance_f),
         "capacitance_per_area_f_per_m2": _bounds(found.answer.capacitance_f.times(1 / area)),
         "electrode_resistance_ohm": resistance,
-        **_line(sum(resistance.values()), found.answer.capacitance_f, frequency_hz),
+        **_line(sum(resistance.values()), found.answer.capacitance_f, gone, frequency_hz),
         **(_pressed(design, found, frequency_hz, (law, tip_m, profile), accuracy, noise) if judged else {}),
-        "values": [vars(t) for t in found.taken],
+        "values": [vars(t) for t in (*found.taken, *gone.taken)],
         "assumptions": [
             "ideal electrodes and no fringe at the sensor's edge for the capacitance",
             "electrode resistance of the plates alone: cogs can only lower it",
-            _lossless(design),
+            _lossless(gone),
+            *gone.doubts,
             "resistivity under the tip as elsewhere: no source says how it moves with pressure",
             "unloaded, as drawn",
         ],
     }
 
 
-def _lossless(design: Design) -> str:
-    said = [f"{t.quantity} of {t.material}" for t in set_losses(design)]
-    if said:
-        return f"no dielectric loss and no leak: {' and '.join(said)} as set is left out here, sensorgen cell takes it"
-    return "no dielectric loss and no leak: the sources give none"
+def _lossless(gone: Lost) -> str:
+    said = " and ".join(f"{t.quantity} of {t.material}" for t in gone.taken)
+    return (
+        f"of dielectric loss and leak, {said} as set"
+        if said
+        else "no dielectric loss and no leak: the sources give none"
+    )
 
 
 def _pressed(
@@ -149,11 +152,11 @@ def _resistance_ohm(design: Design, found: Unloaded) -> dict[str, float]:
     return {end: rho * squares_per_m for end, rho in zip(("top", "bottom"), found.resistivity_ohm_m, strict=True)}
 
 
-def _line(resistance_ohm: float, capacitance_f: Interval, frequency_hz: Sequence[float]) -> dict[str, Any]:
+def _line(resistance_ohm: float, capacitance_f: Interval, gone: Lost, frequency_hz: Sequence[float]) -> dict[str, Any]:
     """Corner frequency and impedance at the tones, for both bounds of the capacitance."""
     ends = (capacitance_f.lower, capacitance_f.middle(), capacitance_f.upper)
     corner = [line.corner_frequency_hz(resistance_ohm, c) for c in ends]
-    admittance = [[2j * math.pi * f * c for c in ends] for f in frequency_hz]
+    admittance = [[2 * math.pi * f * c * (1j + gone.tan_delta) + gone.leak_s for c in ends] for f in frequency_hz]
     rows = line.cascade([resistance_ohm], [admittance], [1.0])  # per the sensor's own length
     return {
         "corner_frequency_hz": {"lower": corner[2], "middle": corner[1], "upper": corner[0]},

@@ -5,6 +5,7 @@ from math import inf
 
 from sensorgen.celllaw import Law, law_of
 from sensorgen.design import Design
+from sensorgen.losses import Lost, lost
 from sensorgen.planner import Taken, Unloaded, unloaded
 from sensorgen.sensor import UNIFORM, Sensor
 from sensorgen.units import M_PER_MM
@@ -24,21 +25,24 @@ class Sensed:
         Capacitance with its bounds, and resistivities.
     law : Law
         How it gives way, and how surely.
+    lost : Lost
+        What its dielectrics lose, as far as the design sets it.
     """
 
     sensor: Sensor
     unloaded: Unloaded
     law: Law
+    lost: Lost
 
     @property
     def taken(self) -> tuple[Taken, ...]:
         """Material values."""
-        return (*self.unloaded.taken, *self.law.taken)
+        return (*self.unloaded.taken, *self.lost.taken, *self.law.taken)
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """Why its answers are to be taken with care."""
-        return self.law.doubts
+        return (*self.law.doubts, *self.lost.doubts)
 
 
 def sensor_of(
@@ -70,6 +74,7 @@ def sensor_of(
         As :func:`sensorgen.celllaw.law_of`.
     """
     found, p = known or unloaded(design, accuracy), design.params
+    gone = lost(design)
     how = law_of(design, found.answer, law, solve=accuracy < inf)
     sensor = Sensor(
         length_m=p.length_mm * M_PER_MM,
@@ -80,5 +85,7 @@ def sensor_of(
         compression=how.compression,
         tip_m=tip_m,
         profile=profile,
+        tan_delta=gone.tan_delta,
+        leak_s_per_m=gone.leak_s / (p.length_mm * M_PER_MM),
     )
-    return Sensed(sensor, found, how)
+    return Sensed(sensor, found, how, gone)
