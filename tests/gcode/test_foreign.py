@@ -106,6 +106,12 @@ def test_a_marlin_file_is_refused_for_what_it_is():
     assert motion.length_mm()[arc].sum() == pytest.approx(15 * math.pi, rel=1e-3)
 
 
+def test_a_file_of_something_else_is_told_in_few_lines():
+    found = check([f"this is line {n} of a letter" for n in range(500)], DIABASE).findings
+    assert len(found) < 30
+    assert any(f.message.startswith("further lines cannot be read") and f.count > 400 for f in found)
+
+
 def test_words_of_a_thumbnail_are_no_commands():
     assert len(follow(THUMBNAIL.splitlines()).events) == 0
 

@@ -227,6 +227,14 @@ def test_a_printer_with_plain_words_gets_its_file_unchanged():
     assert made(text, xl) == text
 
 
+def test_tools_are_renumbered_also_where_temperatures_need_no_tool():
+    plain = with_control(names_tools=False)
+    text = "G28\nM83\nT2\nG10 P2 S210\nM104 S205 T2\nM104 S200\nM568 P2 S210 A2\nM116 P2\nG1 X1 E1\n"
+    assert made(text, plain).splitlines() == [
+        "G28", "M83", "T3", "G10 P3 S210", "M104 S205 T3", "M104 S200", "M568 P3 S210 A2", "M116 P3", "G1 X1 E1",
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

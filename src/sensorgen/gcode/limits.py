@@ -17,6 +17,7 @@ Mask = NDArray[np.bool_]
 HAIR_MM = 1e-6  # what rounding may make of a limit
 STEP_MM = 1e-3  # heights closer than this are one height
 MM_MIN = 60.0
+MOST_TOLD = 20  # lines that cannot be read; more of them say no more
 
 
 def check(motion: Motion, machine: Printer) -> Iterator[Found]:
@@ -139,11 +140,14 @@ def _purge(motion: Motion, machine: Printer) -> Iterator[Found]:
 
 def _read(motion: Motion, _: Printer) -> Iterator[Found]:
     """Every line can be read."""
-    for fault in motion.faults:
-        yield Found(
-            "read", "error" if fault.severe else "warning", fault.number, fault.what,
-            "correct the line" if fault.severe else "keep to plain ASCII",
-        )  # fmt: skip
+    for severe, advice in ((True, "correct the line"), (False, "keep to plain ASCII and plain commands")):
+        faults = [fault for fault in motion.faults if fault.severe == severe]
+        severity = "error" if severe else "warning"
+        for fault in faults[:MOST_TOLD]:
+            yield Found("read", severity, fault.number, fault.what, advice)
+        if rest := faults[MOST_TOLD:]:
+            message = "further lines cannot be read: is this G-code?"
+            yield Found("read", severity, rest[0].number, message, advice, len(rest))
 
 
 def _across(motion: Motion) -> Floats:

@@ -186,17 +186,16 @@ class _Writer:
     def _tool_settings(self, command: Command) -> Sequence[str] | None:
         if not command.has("SR"):
             return None  # retraction by the firmware, or offsets of a place of work
+        if not self.control.names_tools:
+            return self._of_tool(command)
         index = command.number("P")
         tool = self.tool if index is None else _own(self.machine, index)
-        active, standby = command.number("S"), command.number("R")
-        if tool is None or not self.control.names_tools:
-            return None
-        return [self._settings(tool, active, standby)]
+        return None if tool is None else [self._settings(tool, command.number("S"), command.number("R"))]
 
     def _temperature(self, command: Command) -> Sequence[str] | None:
         active = command.number("S")
         if not self.control.names_tools or active is None:
-            return None
+            return self._of_tool(command, "T")
         index = command.number("T")
         if index is None and active <= 0:
             return [text.strip() for text in self.cold()]
@@ -220,11 +219,11 @@ class _Writer:
 
     def _state(self, command: Command) -> Sequence[str] | None:
         """``M568``: temperatures as those of G10, and the state by itself."""
-        settings = self._tool_settings(command)
+        settings = self._tool_settings(command) if self.control.names_tools else None
         state = Command("M568", tuple(word for word in command.words if word[0] not in "SR"))
         if not settings:
             return self._of_tool(command)
-        return [*settings, *(self._of_tool(state) or ())] if command.has("A") else settings
+        return [*settings, *(self._of_tool(state) or _text(state))] if command.has("A") else settings
 
     def _fan(self, command: Command) -> Sequence[str] | None:
         if self.control.layer_fan is None or command.has("P"):
@@ -237,12 +236,13 @@ class _Writer:
     def _absolute(self, _: Command) -> Sequence[str] | None:
         return [] if self.control.relative_e else None
 
-    def _of_tool(self, command: Command) -> Sequence[str] | None:
-        index = command.number("P")
-        if index is None:
+    def _of_tool(self, command: Command, letter: str = "P") -> Sequence[str] | None:
+        """A command that names a tool, with the printer's number of it."""
+        index = command.number(letter)
+        if index is None or _own(self.machine, index) == index:
             return None
         own = str(_own(self.machine, index))
-        return _text(Command(command.code, tuple((n, own if n == "P" else t) for n, t in command.words)))
+        return _text(Command(command.code, tuple((n, own if n == letter else t) for n, t in command.words)))
 
 
 def _stays(_: Command) -> None:
