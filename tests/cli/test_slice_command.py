@@ -2,7 +2,10 @@
 
 import json
 import os
+import signal
 import sys
+import time
+from pathlib import Path
 
 import pytest
 
@@ -75,6 +78,22 @@ def test_what_goes_wrong_is_one_line(run, slicer, tmp_path, words, code, said):
     result = run("slice", *SMALL, *words)
     assert result.code == 2
     assert said in result.line
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_asked_to_end_it_ends_the_slicer_too(start, slicer, tmp_path, number, code):
+    note = tmp_path / "pid"
+    slicer(f"import os; open({str(note)!r}, 'w').write(str(os.getpid())); time.sleep(60)")
+    process = start("slice", *SMALL)
+    while not (note.exists() and note.read_text()):
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.02)
+    process.send_signal(number)
+    out, err = process.communicate(timeout=30)
+    assert (process.returncode, out) == (code, "")
+    assert "no file is half-written" in err
+    assert not Path(f"/proc/{note.read_text()}").exists()
     assert not (tmp_path / "out").exists()
 
 

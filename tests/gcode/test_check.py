@@ -52,11 +52,13 @@ PLANTED = [
     ("bed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y-86 E.2 F1200"),
     ("bed", OWN, "G1 Z.2 F3000", "G1 Z205 F3000"),
     ("below", OWN, "G1 Z.2 F3000", "G1 Z.05 F3000"),
+    ("below", OWN, "G1 Z.2 F3000", "G28\nG32\nG1 Z.05 F3000"),
     ("below", MAKER, "G1 Z0.400 F3000", "G1 Z0.100 F3000"),
     ("cold", OWN, "G10 P4 S230 R180", ""),
     ("cold", OWN, "G10 P4 S230 R180", "G10 P4 R180"),
     ("cold", OWN, "M568 P4 A2", "G10 P4 S120"),
-    ("cold", OWN, "M568 P4 A2", "M568 P4 A0"),
+    ("cold", OWN, "M116 P4", "M568 P4 A0"),
+    ("cold", OWN, "M116 P4", "M568 P4 A0\nG10 P4 S230"),
     ("cold", OWN, "M568 P4 A2", "M104 T4 S0"),
     ("cold", MAKER, "G10 P4 R184 S228", "G10 P5 R184 S228"),
     ("cold", LAB, "G10 P1 R175 S200", "G10 P2 R175 S200"),
@@ -99,6 +101,7 @@ PLANTED = [
     ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Ynan E.2 F1200"),
     ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X-nan Y5 E.2 F1200"),
     ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y5 E.2 F1200 \N{DEGREE SIGN}"),
+    ("read", OWN, "M116", "M117 Gr\N{LATIN SMALL LETTER U WITH DIAERESIS}n"),
     ("read", OWN, "G1 X15 Y5 E.2 F1200", "X15 Y5 E.2"),
     ("read", OWN, "G1 X15 Y5 E.2 F1200", "G2 X15 Y5 E.2"),
     ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X\N{ARABIC-INDIC DIGIT FIVE} E.2"),
@@ -133,6 +136,10 @@ def test_a_finding_names_the_line():
         (OWN, "G10 P4 S230 R180", "M109 T4 S230 R180"),
         (OWN, "G10 P4 S230 R180", "G10 P4 R180\nG10 P4 S230"),
         (OWN, "M568 P4 A2", "G91\nG1 Z5\nG1 Z-5\nG90"),
+        (OWN, "M568 P4 A2", "M568 P4 A0"),
+        (OWN, "M116 P4", "M568 P4 A0\nM104 T4 S230"),
+        (OWN, "G1 Z.2 F3000", "G92 Z0\nG1 Z.05 F3000"),
+        (OWN, "G1 Z.2 F3000", "G92\nG1 Z.05 F3000"),
         (OWN, "M106 P3 S255", "M106 S255"),
         (OWN, "M568 P4 A2", 'M291 P"Go on; it\'s fine?" S3'),
         (OWN, "M116", "M25"),
@@ -163,6 +170,7 @@ def test_a_slicers_own_file_is_refused():
     raw = [re.sub(r" R[0-9]+|(?<=M106) P3", "", line) for line in OWN.splitlines()]
     assert "raw" in errors(raw)
     assert "raw" not in errors([line for line in raw if not line.startswith("; generated")])
+    assert "raw" not in errors([re.sub(r" R[0-9]+", "", line) for line in OWN.splitlines()])  # its fan has a number
 
 
 def test_a_file_cut_short_is_refused():
@@ -180,6 +188,10 @@ def test_a_tool_that_still_waits_warm_is_left_on():
 def test_heaters_left_to_the_stop_macro_are_told():
     assert ("heat-left", "info") in found(MAKER.splitlines())
     assert not any(rule == "heat-left" for rule, _ in found(OWN.splitlines()))
+
+
+def test_heights_count_anew_only_where_z_is_named():
+    assert "below" in errors(changed(OWN, "G1 Z.2 F3000", "G92 E0\nG1 Z.05 F3000"))
 
 
 def test_many_of_a_kind_are_one_finding():

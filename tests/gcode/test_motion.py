@@ -24,6 +24,8 @@ def test_starts_are_where_the_last_move_ended():
     motion = follow([R, "G1 X1", "G92 X5", "G1 X6", "G28 Y", "G1 Y2"])
     assert motion.start_mm[:, 0].tolist() == [0, 5, 6]
     assert motion.length_mm().tolist() == [1, 1, 2]
+    assert follow([R, "G1 Z1", "G92 Y9 Z5", "G1 Z6", "G1 Y10"]).length_mm().tolist() == [1, 1, 1]
+    assert follow([R, "G1 X1 Y1 Z1", "G92", "G1 X3"]).length_mm()[1] == 3
 
 
 def test_inches():
@@ -46,6 +48,12 @@ def test_filament_relative_and_absolute(lines):
     assert motion.filament_mm.tolist() == [2, -3, 3, 0.5]
     assert motion.extruded_mm.tolist() == [2, 0, 0, 0.5]
     assert motion.end_mm[:, 0].tolist() == [1, 2, 3, 4]
+
+
+def test_relative_filament_moves_the_absolute_place_on():
+    """As in RepRapFirmware, whose virtual position of the extruder follows both."""
+    motion = follow(["M82", "G1 X1 E2", "M83", "G1 X2 E3", "G1  x3 E1", "M82", "G1 X4 E7", "G1 X5 e7.5"])
+    assert motion.filament_mm.tolist() == [2, 3, 1, 1, 0.5]
 
 
 def test_each_tool_owes_its_own_retraction():

@@ -51,6 +51,7 @@ def test_the_printers_own_numbers_stay():
 def test_layers_by_height_where_no_comment_counts():
     lines = ["M83", "T3", "G1 Z.1", "G1 X1 E1", "G1 Z.2", "G1 X2 E1", "G1 Z.1", "G1 X1 E1"]
     assert paths.read(lines, DIABASE).layer.tolist() == [1, 2, 1]
+    assert paths.read([*lines[:4], "G1 X2 Z.2 E1"], DIABASE).layer.tolist() == [1, 2]
 
 
 def test_a_file_with_carriage_returns(tmp_path):

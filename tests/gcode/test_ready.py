@@ -153,6 +153,7 @@ def test_line_by_line_for_cura():
     assert not any(line.startswith(("M82", "M104", "M109")) for line in new)
     assert new[-2:] == ["M0 H1", ";End of Gcode"]
     assert new[new.index("T4") + 2] == "G10 P3 S0 R0"  # the slicer switched it off there
+    assert new.count("G10 P3 S0 R0") == new.count("G10 P4 S0 R0") == 1
 
 
 def test_the_first_tool_waits_until_the_axes_are_homed():
@@ -200,6 +201,19 @@ def test_retraction_by_the_firmware_and_places_of_work_stay():
     text = "G28\nM83\nG10 L2 P1 X3\nT2\nG1 X1 E1 F60\nG10\nG11\nG10 ; retract\n"
     assert "G10 L2 P1 X3\n" in made(text)
     assert "G10\nG11\nG10 ; retract\n" in made(text)
+
+
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [
+        ("M568 P3 S230", ["G10 P4 S230 R180"]),
+        ("M568 P3 S230 R200 A2", ["G10 P4 S230 R200", "M568 P4 A2"]),
+        ("M568 P3 A1", ["M568 P4 A1"]),
+    ],
+)
+def test_temperatures_by_m568(said, expected):
+    new = made(f"G28\nM83\nT2\n{said}\nG1 X1 E1\n").splitlines()
+    assert new[4 : 4 + len(expected)] == expected
 
 
 def test_several_commands_on_a_line():

@@ -133,6 +133,7 @@ class _Simulation:
     def _take(self, change: Change) -> Iterator[Found]:
         yield from tool_there(self.machine, change.number, change.tool, "is taken") if change.tool != NO_TOOL else ()
         last, self.last, self.tool = self.last, change, change.tool
+        self.heaters.take(change.tool)
         twice = last and (last.tool, last.macro) == (change.tool, not change.macro) and last.number != change.number
         if last and twice and self._first(self.prints, last.row, change.row) is None:
             yield error(

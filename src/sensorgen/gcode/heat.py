@@ -8,6 +8,8 @@ from sensorgen.gcode.found import Found, error
 from sensorgen.gcode.moves import Event
 from sensorgen.printer import Printer
 
+SWITCHES_ON = frozenset({"M104", "M109"})  # G10 and M568 S say how hot, and leave on or off what is
+
 
 @dataclass
 class Heat:
@@ -24,7 +26,6 @@ class Heat:
 
     def tell(self, active_c: float | None, standby_c: float | None) -> None:
         """Take new temperatures; what is missing, or no number, stays as it was."""
-        self.on = True
         self.active_c = self.active_c if active_c is None or isnan(active_c) else active_c
         self.standby_c = self.standby_c if standby_c is None or isnan(standby_c) else standby_c
 
@@ -36,6 +37,11 @@ class Heaters:
         """Start cold."""
         self.machine = machine
         self.tools = {tool: Heat() for tool in machine.tool_numbers}
+
+    def take(self, tool: int) -> None:
+        """A tool is taken: its heater goes on, also where it was switched off before."""
+        if tool in self.tools:
+            self.tools[tool].on = True
 
     def hot(self) -> list[int]:
         """Tools that are heated."""
@@ -67,6 +73,7 @@ class Heaters:
         yield from _too_hot(event.number, "a tool", (active_c, standby_c), self.machine.max_nozzle_c)
         if tool in self.tools:
             self.tools[int(tool)].tell(active_c, standby_c)
+            self.tools[int(tool)].on |= command.code in SWITCHES_ON
 
     def state(self, event: Event, in_hand: int) -> Iterator[Found]:
         """A tool is switched off, to standby or on, and perhaps told its temperatures (M568)."""

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from sensorgen.gcode.found import Found
 from sensorgen.gcode.moves import Motion
+from sensorgen.gcode.words import Command
 from sensorgen.printer import Printer
 
 Floats = NDArray[np.float64]
@@ -16,8 +17,6 @@ Mask = NDArray[np.bool_]
 HAIR_MM = 1e-6  # what rounding may make of a limit
 STEP_MM = 1e-3  # heights closer than this are one height
 MM_MIN = 60.0
-
-_PLACES_ANEW = frozenset({"G28", "G32", "G92"})
 
 
 def check(motion: Motion, machine: Printer) -> Iterator[Found]:
@@ -78,7 +77,7 @@ def _below(motion: Motion, _: Printer) -> Iterator[Found]:
     prints, across = _prints(motion), _across(motion) > 0
     lowest = np.minimum(motion.start_mm[:, 2], motion.end_mm[:, 2])
     printed = np.where(prints, lowest, -np.inf)
-    edges = [0, *sorted({e.row for e in motion.events if _moves_z(e.command.code, e.command.has)}), len(lowest)]
+    edges = [0, *sorted({e.row for e in motion.events if _names_z(e.command)}), len(lowest)]
     wrong = np.zeros(len(lowest), dtype=bool)
     for start, end in pairwise(edges):
         top = np.maximum.accumulate(printed[start:end])
@@ -89,8 +88,9 @@ def _below(motion: Motion, _: Printer) -> Iterator[Found]:
     )  # fmt: skip
 
 
-def _moves_z(code: str, has: Callable[[str], bool]) -> bool:
-    return code in _PLACES_ANEW and (code != "G92" or has("Z") or not has("XYE"))
+def _names_z(command: Command) -> bool:
+    """Whether heights count anew."""
+    return command.code == "G92" and (command.has("Z") or not command.has("XYE"))
 
 
 def _speed(motion: Motion, machine: Printer) -> Iterator[Found]:

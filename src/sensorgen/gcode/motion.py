@@ -84,7 +84,7 @@ class _Follower:
         """Follow all lines; state is local while plain moves last, which is what makes it fast."""
         plain, put = _PLAIN.match, self.rows.extend
         x, y, z, e, owed, feed = self.x, self.y, self.z, self.e, self.owed, self.feed
-        usual = self._usual()
+        usual, absolute = self._usual(), self.is_absolute_e
         number = 0
         for number, line in enumerate(lines, 1):
             if usual and (found := plain(line)):
@@ -94,12 +94,16 @@ class _Follower:
                 y = float(to_y) if to_y else y
                 z = float(to_z) if to_z else z
                 feed = float(last_f or first_f) if last_f or first_f else feed
-                moved = float(to_e) if to_e else 0.0
-                extruded = moved - owed if to_e else 0.0
-                if extruded > 0:
-                    owed = 0.0
-                elif to_e:
-                    owed, extruded = -extruded, 0.0
+                moved = extruded = 0.0
+                if to_e:
+                    given = float(to_e)
+                    moved = given - e if absolute else given
+                    e = given if absolute else e + given
+                    extruded = moved - owed
+                    if extruded > 0:
+                        owed = 0.0
+                    else:
+                        owed, extruded = -extruded, 0.0
                 put((from_x, from_y, from_z, x, y, z, extruded, moved, feed, number))
             elif line[:1] == ";" and line.isascii():
                 self._note(line[1:])
@@ -107,11 +111,11 @@ class _Follower:
                 self.x, self.y, self.z, self.e, self.owed, self.feed = x, y, z, e, owed, feed
                 self._other(line, number)
                 x, y, z, e, owed, feed = self.x, self.y, self.z, self.e, self.owed, self.feed
-                usual = self._usual()
+                usual, absolute = self._usual(), self.is_absolute_e
         return number
 
     def _usual(self) -> bool:
-        return not self.is_relative and not self.is_absolute_e and self.scale == 1.0
+        return not self.is_relative and self.scale == 1.0
 
     def motion(self, count: int) -> Motion:
         rows = np.frombuffer(self.rows).reshape(-1, COLUMNS) if self.rows else np.zeros((0, COLUMNS))
@@ -214,11 +218,9 @@ class _Follower:
         given = self._number(command, "E", number)
         if given is None:
             return 0.0
-        if not self.is_absolute_e:
-            return given * self.scale
-        step = given * self.scale - self.e
-        self.e = given * self.scale
-        return step
+        moved = given * self.scale - (self.e if self.is_absolute_e else 0.0)
+        self.e += moved
+        return moved
 
     def _put(self, end: tuple[float, float, float], moved: float, number: int) -> None:
         extruded = max(0.0, moved - self.owed)

@@ -132,7 +132,7 @@ class _Writer:
         self.offset_mm = 0.0
         self.changes: dict[str, Callable[[Command], Sequence[str] | None]] = {
             "G10": self._tool_settings, "M104": self._temperature, "M109": self._temperature, "M106": self._fan,
-            "M107": self._fan_off, "M82": self._absolute, "M116": self._of_tool, "M568": self._of_tool,
+            "M107": self._fan_off, "M82": self._absolute, "M116": self._of_tool, "M568": self._state,
         }  # fmt: skip
 
     def line(self, line: str) -> Iterator[str]:
@@ -217,6 +217,14 @@ class _Writer:
         if any(value is not None and not isfinite(value) for _, value in given):
             raise BadInput(f"the slicer's file sets tool {tool} to a temperature that is no number")
         return " ".join([f"G10 P{tool}", *(f"{letter}{value:g}" for letter, value in given if value is not None)])
+
+    def _state(self, command: Command) -> Sequence[str] | None:
+        """``M568``: temperatures as those of G10, and the state by itself."""
+        settings = self._tool_settings(command)
+        state = Command("M568", tuple(word for word in command.words if word[0] not in "SR"))
+        if not settings:
+            return self._of_tool(command)
+        return [*settings, *(self._of_tool(state) or ())] if command.has("A") else settings
 
     def _fan(self, command: Command) -> Sequence[str] | None:
         if self.control.layer_fan is None or command.has("P"):
