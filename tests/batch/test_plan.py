@@ -62,7 +62,9 @@ def test_a_plan_overrides_quality_and_printer_of_its_designs(plan):
 def test_a_plan_assigns_tools(plan, tmp_path):
     (tmp_path / "own.yaml").write_text("shape: rect\ntools: {x60: 2, bvoh: 1}\n")
     path = plan("tools: {x60: 5, etpu: 4}\n" + HEAD + "  - {shape: tri}\n  - {design: own.yaml}\n")
-    assert tools([p.design for p in read(path)]) == {4: "etpu", 5: "x60"}
+    found = read(path)
+    assert tools([p.design for p in found]) == {4: "etpu", 5: "x60"}
+    assert found[1].design.tools == {"x60": 5, "bvoh": 1, "etpu": 4}
 
 
 def test_parameters_and_materials_go_before_those_of_the_file(plan, tmp_path):
