@@ -27,9 +27,9 @@ def test_a_bonded_plate_is_94_times_stiffer():
     assert sensed("reference", "bonded").sensor.compression.modulus_pa == pytest.approx(94 * 6e6, rel=2e-3)
 
 
-@pytest.mark.parametrize("film", [0.1, 0.2])
-def test_solved_cells_answer_for_themselves(film):
-    found = sensed("tri", parameters={"dielectric_mm": film})
+@pytest.mark.parametrize(("shape", "film"), [("tri", 0.1), ("tri", 0.2), ("rect", 0.1), ("rect", 0.2)])
+def test_solved_cells_answer_for_themselves(shape, film):
+    found = sensed(shape, parameters={"dielectric_mm": film})
     assert found.sensor.compression.name == "solved"
     assert found.doubts == ()
 
@@ -38,7 +38,12 @@ FIRM = {"film": "x60@thesis-4.1", "dielectric": "x60@thesis-4.1"}  # another mod
 
 
 @pytest.mark.parametrize(
-    ("shape", "rest"), [("rect", {}), ("tri", {"parameters": {"period_mm": 2.5}}), ("tri", {"materials": FIRM})]
+    ("shape", "rest"),
+    [
+        ("rect", {"parameters": {"air_width_mm": 0.4}}),
+        ("tri", {"parameters": {"period_mm": 2.5}}),
+        ("tri", {"materials": FIRM}),
+    ],
 )
 def test_other_cells_are_taken_for_free_plates_and_that_is_said(shape, rest):
     found = sensed(shape, **rest)

@@ -11,7 +11,7 @@ from sensorgen.errors import BadInput, OutOfRange
 
 pytest.importorskip("netgen")
 from sensorgen.models import press2d
-from sensorgen.models._press import load, pressed
+from sensorgen.models._press import deformed, load, pressed
 from sensorgen.models.press2d import Fineness, Held
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "contact.json").read_text())
@@ -131,6 +131,38 @@ def test_coarser_triangles_take_over_where_finer_ones_fail(monkeypatch):
     assert found.doubts[-1].startswith("triangles of 1.4 um at the apex")
     assert "up to 10 kPa" in found.doubts[-1]
     assert found.displacement_m[-1] * 1e6 == pytest.approx(REFERENCE["tri_d0.1"]["uy_um"][2], rel=0.03)
+
+
+def test_outlines_that_are_closed_in_the_wrong_place_do_not_pass(monkeypatch):
+    """Gaps up to a third of a side taken for shut: solids gain area, and the answer has no capacitance and a fault."""
+    monkeypatch.setattr(deformed, "CLOSED", (1.5,))
+    monkeypatch.setattr(deformed, "_BETWEEN", 1.5)
+    found = press2d.press(tri(), solids(), [0.0, 1e4], EPS, fineness=Fineness(1.4e-3, 0.1, 0.2))
+    assert found.capacitance_f_per_m2[1] is None
+    assert "could not be meshed" in found.faults[-1]
+
+
+def test_areas_are_weighed_when_gaps_are_closed():
+    cell = tri()
+    mesh = press2d.mesh_of(cell, Fineness(1.4e-3, 0.1, 0.2))
+    still = np.zeros(2 * len(mesh.points_m))
+    assert deformed.misfit(cell, mesh, still) < 1e-8
+    taller = np.column_stack([0 * mesh.points_m[:, 0], 0.01 * mesh.points_m[:, 1]]).ravel()
+    assert deformed.misfit(cell, mesh, taller) == pytest.approx(1 - 1 / 1.01, rel=1e-6)
+
+
+@pytest.mark.parametrize(("film", "period"), [(0.02, 2.0), (0.1, 1.0), (0.1, 4.0)])
+def test_thin_films_and_other_periods_are_pressed_at_once(film, period):
+    found = press2d.press(
+        press2d.cell(make({"shape": "tri", "parameters": {"dielectric_mm": film, "period_mm": period}}).in_use, period),
+        solids(),
+        [0.0, 1e4, 2e4],
+        EPS,
+        fineness=Fineness(7e-4, 0.1, 0.2),
+    )
+    assert (found.faults, found.doubts) == ((), ())
+    assert (np.diff(found.displacement_m) > 0).all()
+    assert max(c.width() for c in found.capacitance_f_per_m2) < 3e-3
 
 
 @pytest.mark.parametrize("stresses", [[1.0, 2.0], [0.0], [0.0, 2.0, 1.0]])

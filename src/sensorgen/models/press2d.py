@@ -42,6 +42,7 @@ __all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "curve_
 
 _STEP = 1 / 600  # longest load step over the least Young's modulus: 10 kPa for 6 MPa [-]
 _FIELD_GROWTH = 0.5  # of the triangles of the capacitance's mesh, per distance [-]
+_MISFIT = 1e-3  # of a solid's area: gaps that were closed in the wrong place change more [-]
 _NARROW = 2e-3  # a bracket of the capacitance wider than this is a poor mesh [-]
 _COARSER = (4, 8, 16)  # times the size of the triangles at an apex, where the finer ones do not converge [-]
 
@@ -162,6 +163,7 @@ def _field(cell: Cell, run: _Run, u_m: Real, permittivity: Mapping[str, float]) 
     for closed in deformed.CLOSED:
         outline = deformed.deformed(cell, run.mesh, run.faces, run.problem.tied, u_m, closed)
         try:
+            _refuse_misfit(deformed.misfit(outline, run.mesh, u_m))
             found = field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH)
         except Unmeshed:
             best = best if best[0] else (None, outline)
@@ -171,6 +173,11 @@ def _field(cell: Cell, run: _Run, u_m: Real, permittivity: Mapping[str, float]) 
         if found.width() < _NARROW:
             break
     return best
+
+
+def _refuse_misfit(share: float) -> None:
+    if share > _MISFIT:
+        raise Unmeshed(f"closing the gaps changed a solid's area by {share:.1%}")
 
 
 def unfit(scene: Scene) -> str | None:

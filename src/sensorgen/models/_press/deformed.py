@@ -18,6 +18,7 @@ Run = tuple[int, int]
 Sides = dict[Run, tuple[int, int]]
 
 CLOSED = (5e-3, 1e-2, 2.5e-3, 2e-2, 4e-2)  # gaps less than this share of their side are none: to be tried in turn [-]
+_ROUND = [0, 3, 1, 4, 2, 5]  # the nodes of a triangle, in turn
 _BETWEEN = 0.3  # and less than this share where both ends of the side touch [-]
 
 
@@ -36,6 +37,25 @@ def deformed(cell: Cell, mesh: Mesh, faces: Faces, tied: Whole, u_m: Real, close
         if sides[0] != sides[1] and p != q:
             edges[(p, q) if p < q else (q, p)] = sides if p < q else sides[::-1]
     return replace(cell, edges=edges, right_mm=max(q[0] for _, q in edges))
+
+
+def misfit(cell: Cell, mesh: Mesh, u_m: Real) -> float:
+    """Largest change of a solid's area by what was closed, over that area [-]; ``cell`` has the closed outlines."""
+    places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
+    kept = np.bincount(mesh.region, _areas(places[mesh.triangles[:, _ROUND]]), len(cell.regions) + 1)
+    found = np.zeros(len(kept))
+    for (a, b), sides in cell.edges.items():
+        half = (a[0] * b[1] - a[1] * b[0]) / 2
+        found[sides[0]] += half
+        found[sides[1]] -= half
+    solid = kept > 0
+    return float(np.abs(found[solid] / kept[solid] - 1).max())
+
+
+def _areas(corners: Real) -> Real:
+    """Of polygons (m, n, 2)."""
+    ahead = np.roll(corners, -1, axis=1)
+    return np.asarray((corners[..., 0] * ahead[..., 1] - corners[..., 1] * ahead[..., 0]).sum(axis=1) / 2)
 
 
 def _air(cell: Cell) -> int:
