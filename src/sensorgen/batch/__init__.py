@@ -19,6 +19,7 @@ from sensorgen.predict import prediction
 from sensorgen.review import Review, Step, review
 from sensorgen.slicer.run import TIMEOUT_S
 
+ACCURACY = 1e-3  # of the expected capacitance: what a print is held against should not be the largest doubt
 STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "record", "done")
 
 
@@ -154,7 +155,7 @@ def make(
     held = {key: review(design) for key, design in found.designs.items()}
     _refuse_unprintable(found, held, force=force, strict=strict)
     step("predictions")
-    predicted = {key: prediction(design, judged=False) for key, design in found.designs.items()}
+    predicted = {key: prediction(design, accuracy=ACCURACY, judged=False) for key, design in found.designs.items()}
     folder = out / found.plan.name
     with store.staging(folder) as stage:
         step("3MF")
