@@ -40,12 +40,12 @@ def test_every_specimen_is_traced_to_its_design_and_has_what_it_should_measure(s
     assert [s["order"] for s in found.values()] == [1, 2, 3]
     tri = found["26 triX .2mm 2 fine"]
     assert (tri["design_id"], tri["copy"], tri["iteration"]) == (TRI.id(), 2, 26)
-    predicted = prediction(TRI)
+    predicted = prediction(TRI, accuracy=1e-3)
     for name in ("capacitance_f", "electrode_resistance_ohm", "impedance_ohm"):
         assert tri["expected"][name] == json.loads(json.dumps(predicted[name]))
     # The plate's C by hand: eps0 4.68 A/d = 8.854e-12 x 4.68 x 2e-4 / 6e-4, in the middle of the bounds.
     plate = found["26 SX60 1 fine"]["expected"]["capacitance_f"]["middle"]
-    assert plate == pytest.approx(8.8541878128e-12 * 4.68 * 20e-3 * 10e-3 / 0.6e-3, rel=1e-9)
+    assert plate == pytest.approx(8.8541878128e-12 * 4.68 * 20e-3 * 10e-3 / 0.6e-3, rel=1e-8)
     assert record["designs"][TRI.id()]["resolved"] == json.loads(json.dumps(TRI.resolved()))
     assert all(parse(name).name == name for name in found)
 
