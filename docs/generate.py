@@ -11,8 +11,9 @@ PICTURES = {"trix-d0.2": ["tri"], "sqxy-d0.2": ["rect"], "trix-upside-down": ["t
 PAGES = (
     [], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
     ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"], ["predict"],
-    ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["invert"], ["sheet"], ["stack"],
-    ["log"], *(["log", w] for w in ("multimeter", "import", "bench", "predict", "list", "show", "export", "verify")),
+    ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["invert"], ["sheet"], ["stack"], ["bench"],
+    ["bench", "plan"], ["bench", "plan", "tri"], ["log"],
+    *(["log", w] for w in ("multimeter", "import", "bench", "predict", "list", "show", "export", "verify")),
     ["list"], ["schema"], ["completion"],
 )  # fmt: skip
 

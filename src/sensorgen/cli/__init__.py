@@ -26,6 +26,7 @@ COMMANDS = (
     "invert",
     "sheet",
     "stack",
+    "bench",
     "log",
     "list",
     "schema",

@@ -2,11 +2,12 @@ r"""Recording and rig on one time: the offset of their clocks, with its error.
 
 Both have their own clock. What tells their distance is that the sensor answers to the force: the recording is fitted by
 
-.. math:: y(t) = \sum_{i=0}^{3} c_i t^i + \sum_{i=1}^{2} b_i \ln(1 + t / \tau_i) + \sum_{i=1}^{3} \sum_{j=0}^{2} c_{ij} F^i x^j
+.. math::
+   y(t) = \sum_{i=0}^{3} c_i t^i + \sum_{i=1}^{2} b_i \ln(1 + t / \tau_i) + \sum_{i=1}^{3} \sum_{j=0}^{2} c_{ij} F^i x^j
 
-with F and x taken the offset earlier, y the strongest direction in which ln Z moves, and time constants of a tenth and a
-hundredth of the run for what creeps. A correlation over all distances finds the place, Gauss-Newton the
-rest; the standard error is that of the fit, with as many samples as are independent of each other.
+with F and x taken the offset earlier, y the strongest direction in which ln Z moves, and time constants of a tenth and
+a hundredth of the run for what creeps. A correlation over all distances finds the place, Gauss-Newton the rest; the
+standard error is that of the fit, with as many samples as are independent of each other.
 """
 
 from dataclasses import dataclass, replace
@@ -156,10 +157,9 @@ def _troubled(rig: RigLog, at: Real) -> np.ndarray[tuple[int], np.dtype[np.bool_
 
 def _estimated(recording: Recording, time: Real, rig: RigLog, within_s: float) -> _Offset:
     valid = np.flatnonzero(recording.valid())
-    stride = max(1, len(valid) // _MOST_FITTED)
-    signal = strongest(recording.impedance_ohm[valid])
-    coarse = _correlated(time[valid], signal, rig, within_s)
-    return _refined(time[valid][::stride], signal[::stride], rig, coarse)
+    used = valid[:: max(1, len(valid) // _MOST_FITTED)]
+    signal = strongest(recording.impedance_ohm[used])
+    return _refined(time[used], signal, rig, _correlated(time[used], signal, rig, within_s))
 
 
 def _force(rig: RigLog) -> tuple[Real, Real, Real]:
