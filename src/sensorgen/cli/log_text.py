@@ -39,13 +39,13 @@ def _prefixed(value: float) -> str:
 
 def readings(found: Sequence["Reading"]) -> Iterator[str]:
     """A line for each reading, "?" where something is to be doubted."""
-    yield f"{'no.':>6}  {'specimen':21} {'Y [ohm]':>11} {'Z [ohm]':>16}   remark"
+    yield f"{'no.':>6}  {'specimen':21} {'Y [ohm]':>11} {'Z [ohm]':>15}   remark"
     for r in found:
         state = {None: "", True: "baked; ", False: "" if "bake" in r.remark else "not baked; "}[r.baked]
         remark = visible(state + r.remark)
         said = remark if len(remark) <= _REMARK else remark[: _REMARK - 1] + "…"
         doubt = "?" if r.doubts else " "
-        line = f"{r.number:6}  {visible(r.specimen):21} {short(r.y_ohm):>11} {short(r.z_ohm):>16} {doubt} {said}"
+        line = f"{r.number:6}  {visible(r.specimen):21} {short(r.y_ohm):>11} {short(r.z_ohm):>15} {doubt} {said}"
         yield line.rstrip("; ")
 
 
