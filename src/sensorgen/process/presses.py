@@ -1,6 +1,5 @@
 """Presses out of a run: where they are, and the readings before and under each."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -227,9 +226,3 @@ def _error(time_s: Real, values: Real) -> Real:
     power = np.maximum((left**2).sum(axis=0), 1e-300)
     rho = np.clip((left[1:] * left[:-1]).sum(axis=0) / power + 1 / len(left), 0.0, 1 - 1 / len(left))
     return np.asarray(np.sqrt(variance / len(left) * (1 + rho) / (1 - rho)))
-
-
-def words(made: Pairs) -> Iterator[str]:
-    """What came of it, as a person reads it."""
-    yield f"{len(made.time_s)} presses, {made.force_n.min():.3g} to {made.force_n.max():.3g} N"
-    yield from (f"left out: {text}" for text in made.left_out)
