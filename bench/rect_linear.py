@@ -1,10 +1,10 @@
 """The rect cell pressed in three dimensions, small strains: mixed finite elements in NGSolve, capacitance by mapping.
 
-A second program beside press3d. Solid parts are nearly incompressible (displacement of order 3, pressure of order 1 in each
-tetrahedron: it has to jump where materials meet, or the free cell rises by 20 % too much); air gives way without stress, so
-that the displacement goes on through it smoothly. The deformed capacitance is that of the undeformed mesh with the
-permittivity J F^-1 F^-T, which is exact for the displacement that was found. No contact, no large strain: the gaps of
-this cell stay open far beyond the stresses that a finger makes.
+A second program beside press3d. Solid parts are nearly incompressible: displacement of order 3, pressure of order 1 in
+each tetrahedron, which has to jump where materials meet, or the free cell rises by 20 % too much. Air gives way without
+stress, so that the displacement goes on through it smoothly. The deformed capacitance is that of the undeformed mesh
+with the permittivity J F^-1 F^-T, which is exact for the displacement that was found. No contact, no large strain: the
+gaps of this cell stay open far beyond the stresses that a finger makes.
 """
 
 from typing import Any
