@@ -1,9 +1,10 @@
 """The rect cell pressed in three dimensions, small strains: mixed finite elements in NGSolve, capacitance by mapping.
 
-Solid parts are nearly incompressible (displacement of order 2, pressure of order 1); air gives way without stress, so
-that the displacement goes on through it smoothly. The deformed capacitance is that of the undeformed mesh with the
-permittivity J F^-1 F^-T, which is exact for the displacement that was found. No contact, no large strain: the gaps of
-this cell stay open far beyond the stresses that a finger makes.
+A second program beside press3d. Solid parts are nearly incompressible: displacement of order 3, pressure of order 1 in
+each tetrahedron, which has to jump where materials meet, or the free cell rises by 20 % too much. Air gives way without
+stress, so that the displacement goes on through it smoothly. The deformed capacitance is that of the undeformed mesh
+with the permittivity J F^-1 F^-T, which is exact for the displacement that was found. No contact, no large strain: the
+gaps of this cell stay open far beyond the stresses that a finger makes.
 """
 
 from typing import Any
@@ -88,10 +89,10 @@ def _displaced(mesh: Any, materials: list[str], solids: dict[str, tuple[float, f
 
     bonded = "" if free else "|base"
     space = ng.VectorH1(
-        mesh, order=2, dirichletx=f"left|right{bonded}", dirichlety=f"front|back{bonded}", dirichletz="base"
+        mesh, order=3, dirichletx=f"left|right{bonded}", dirichlety=f"front|back{bonded}", dirichletz="base"
     )
     hard = "|".join(sorted({m for m in materials if not m.startswith("air")}))
-    spaces = space * ng.H1(mesh, order=1, definedon=hard) * ng.NumberSpace(mesh) * ng.NumberSpace(mesh)
+    spaces = space * ng.L2(mesh, order=1, definedon=hard) * ng.NumberSpace(mesh) * ng.NumberSpace(mesh)
     (u, p, a, b), (v, q, c, d) = spaces.TnT()
     e = {m: AIR_PA if m.startswith("air") else solids[m.partition("/")[0]][0] for m in materials}
     nu = {m: 0.0 if m.startswith("air") else solids[m.partition("/")[0]][1] for m in materials}
@@ -118,7 +119,7 @@ def _displaced(mesh: Any, materials: list[str], solids: dict[str, tuple[float, f
     found.vec.data = form.mat.Inverse(spaces.FreeDofs(), inverse="umfpack") * load.vec
     wide, deep = (float(found.components[k].vec[0]) if free else 0.0 for k in (2, 3))
     sides = ng.CoefficientFunction((wide * (ng.x - _least(mesh, 0)), deep * (ng.y - _least(mesh, 1)), 0))
-    whole = ng.GridFunction(ng.VectorH1(mesh, order=2))
+    whole = ng.GridFunction(ng.VectorH1(mesh, order=3))
     whole.Set(found.components[0] + sides)
     return whole, (wide, deep)
 

@@ -230,6 +230,15 @@ def test_upright_walls_hold_each_other_apart():
     assert 0 < found.penetration[-1] < 0.02
 
 
+def test_gaps_are_runs_of_air_between_solids_along_each_axis():
+    fill = np.array([[[1, 0, 1, 1]], [[1, 0, 0, 1]], [[0, 0, 0, 1]]])
+    found = {axis: (below.tolist(), above.tolist()) for axis, below, above in brick_touch.facing(fill)}
+    assert found[2] == ([[0, 0, 0], [1, 0, 0]], [[0, 0, 2], [1, 0, 3]])
+    assert found[0] == found[1] == ([], [])
+    slot = np.array([[[1]], [[0]], [[2]]])
+    assert [len(below) for _, below, _ in brick_touch.facing(slot)] == [1, 0, 0]
+
+
 def test_moduli_scale_and_incompressible_is_the_limit():
     cell = press3d.cell(rect())
     one = press3d.press(cell, solids(), [0.0, 2e4], fineness=Pieces(1))
@@ -300,13 +309,16 @@ def test_conjugate_gradients_make_new_factors_where_the_old_ones_do_not_serve():
     assert solver(diags([[0.0] * 200], [0]).tocsr(), right) is None
 
 
-def test_air_goes_along_without_folding():
-    """Walls that lean by the same slope take the air between them along exactly."""
-    bricks = boxes(((0, 0.3, 0.6, 1.0), (0, 1), (0, 0.2, 0.6)), [[[2, 1]], [[2, 0]], [[2, 1]]]).cut(2, 0.5)
+def test_air_goes_along_evenly_with_what_is_stretched_evenly():
+    """Walls, mirrors and a top that move by a linear map take all air along by the same, also where it ends a cell."""
+    fill = [[[2, 1, 3]], [[2, 0, 3]], [[2, 1, 3]], [[2, 0, 3]]]
+    bricks = boxes(((0, 0.3, 0.6, 1.0, 1.2), (0, 1), (0, 0.2, 0.6, 0.8)), fill).cut(2, 0.5)
     whole, solid = (brick_element.mesh_of(bricks, w) for w in (np.ones(bricks.fill.shape, bool), bricks.fill > 0))
-    straight = np.column_stack([0 * solid.points_m[:, 0], 0 * solid.points_m[:, 1], -0.1 * solid.points_m[:, 2]])
-    found = brick_air.extended(whole, solid, straight).reshape(-1, 3)
-    bottom = whole.points_m[:, 2] <= 0.6e-3
-    assert found[bottom, :2] == pytest.approx(np.zeros((bottom.sum(), 2)), abs=1e-15)
-    assert found[:, 2].max() <= 1e-15
+    stretched = np.array([0.03, 0.02, -0.1])
+    found = brick_air.extended(whole, solid, solid.points_m * stretched).reshape(-1, 3)
+    assert found == pytest.approx(whole.points_m * stretched, abs=1e-12)
+
+
+def test_a_stiffer_cell_has_a_stiffer_contact():
     assert pressed.penalty_pa(22e6) == 220e6
+    assert pressed.penalty_pa(1e6) == 60e6
