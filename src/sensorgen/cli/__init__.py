@@ -23,6 +23,7 @@ COMMANDS = (
     "invert",
     "sheet",
     "stack",
+    "thesis",
     "list",
     "schema",
     "completion",
