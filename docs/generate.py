@@ -1,4 +1,4 @@
-"""Write what can be derived: docs/reference.md from the --help texts, and the pictures from the designs."""
+"""Write what can be derived: docs/reference.md from the --help texts, docs/thesis.md, and pictures from the designs."""
 
 import subprocess
 import sys
@@ -11,7 +11,7 @@ PICTURES = {"trix-d0.2": ["tri"], "sqxy-d0.2": ["rect"], "trix-upside-down": ["t
 PAGES = (
     [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"], ["predict"],
     ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["invert"], ["sheet"], ["stack"],
-    ["list"], ["schema"], ["completion"],
+    ["thesis"], ["list"], ["schema"], ["completion"],
 )  # fmt: skip
 
 
@@ -30,7 +30,8 @@ def reference() -> str:
 
 
 def main() -> None:
-    """Write reference and pictures."""
+    """Write reference, the thesis's page and pictures."""
+    sensorgen("thesis", "--format", "md", "--output", str(DOCS))
     (DOCS / "reference.md").write_text(reference(), "utf-8")
     (DOCS / "pictures").mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:

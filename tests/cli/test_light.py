@@ -20,6 +20,7 @@ LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))
         (["predict", "tri", "--force", "0:6:1"], CAD),
         (["cell", "tri", "--help"], HEAVY),
         (["chart", "--help"], HEAVY),
+        (["thesis", "--help"], HEAVY),
         (["cell", "reference"], CAD),
         (["draw", "tri", "-o", "-"], CAD),
         (["build", "tri", "--no-cad"], CAD),

@@ -83,7 +83,12 @@ def _row(row: Row) -> str:
         verdict(row),
         item.erratum,
     )
-    return f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |"
+    return f"| {' | '.join(map(_cell, cells))} |"
+
+
+def _cell(text: str) -> str:
+    """Without what Markdown would take for a new cell, or for HTML."""
+    return text.replace("|", "&#124;").replace("<", "&lt;")
 
 
 def verdict(row: Row) -> str:

@@ -18,5 +18,8 @@ function show() {
 form.addEventListener("input", show);
 form.addEventListener("reset", () => setTimeout(show));
 form.addEventListener("submit", (event) => event.preventDefault());
+for (const [key, value] of new URLSearchParams(location.search)) {
+  if (form.elements[key]) form.elements[key].value = value;
+}
 form.hidden = false;
 show();

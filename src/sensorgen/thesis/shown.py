@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike
 
 from sensorgen.thesis.verdicts import Part
 
-_FEW = 3  # parts, or values in a part, that are all shown
+_FEW = 3  # parts, or complex values in a part, that are all shown
+_FEW_REAL = 8
 _NONE = "no number"
 _NOISE = 1e-9  # below this share of what is large, a number is what rounding left
 
@@ -53,8 +54,8 @@ def _number(part: Part, values: ArrayLike) -> str:
 def number(values: ArrayLike, unit: str = "", scale: float = 0.0, digits: int = 5) -> str:
     """One number or several with their unit.
 
-    >>> number(2997.116648 - 23192.109j, "ohm"), number([1.0, 2.0, 3.0, 4.0], "V"), number(float("nan"))
-    ('2.9971 − 23.192j kohm', '1 … 4 V (4 values)', 'no number')
+    >>> number(2997.116648 - 23192.109j, "ohm"), number([1.0, 2e-3], "V"), number(float("nan"))
+    ('2.9971 − 23.192j kohm', '1, 0.002 V', 'no number')
     """
     flat = np.atleast_1d(np.asarray(values)).ravel()
     if np.isnan(flat).all():
@@ -63,7 +64,7 @@ def number(values: ArrayLike, unit: str = "", scale: float = 0.0, digits: int = 
     power = _power(large, unit)
     texts = [_one(value / 10.0**power, _NOISE * max(large, scale) / 10.0**power, digits) for value in flat.tolist()]
     end = f" {_PREFIXES[power]}{unit}" if unit else ""
-    if len(texts) <= _FEW:
+    if len(texts) <= (_FEW if np.iscomplexobj(flat) else _FEW_REAL):
         return f"{', '.join(texts)}{end}"
     return f"{texts[0]} {ELLIPSIS} {texts[-1]}{end} ({len(texts)} values)"
 

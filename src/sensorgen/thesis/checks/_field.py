@@ -6,6 +6,7 @@ line then says what flows into it. So the thesis's differential equations are he
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -44,7 +45,7 @@ class Smooth:
         """Interpolate between the ends."""
         places = chebyshev.chebpts1(_DEGREE + 1)
         values = field((places + 1) / 2 * LENGTH_M)
-        self._terms: Complex = np.linalg.solve(chebyshev.chebvander(places, _DEGREE), values)
+        self._terms: NDArray[Any] = np.linalg.solve(chebyshev.chebvander(places, _DEGREE), values)
 
     def at(self, x_m: ArrayLike, order: int = 0) -> Complex:
         """Its value, or a derivative of it, per metre to the power of the order."""

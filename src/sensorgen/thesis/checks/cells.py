@@ -181,9 +181,11 @@ _T_M, _D_M = _TRI.hang_height_mm * M_PER_MM, _TRI.dielectric_mm * M_PER_MM
 
 
 def continuity() -> list[Part]:
-    """3.9: the field in X60 from that in air."""
-    d, _, _ = _fields()
-    return [Part("E in X60", "V/m", d / (EPS0_F_PER_M * EPS_R), (d / EPS0_F_PER_M) / EPS_R)]
+    """3.9: the field in air from that in X60, and from the voltage that the X60 leaves to the air."""
+    d, y1, y2 = _fields()
+    solid = d / (EPS0_F_PER_M * EPS_R)
+    left = (_VOLT - solid * (_T_M - y1 + y2 + _D_M)) / (y1 - y2)
+    return [Part("E in air", "V/m", left, EPS_R * solid)]
 
 
 def voltage() -> list[Part]:

@@ -6,7 +6,7 @@ Left sides come from :mod:`._field`, which knows impedances only; right sides ar
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.models import line
+from sensorgen.models import line, line_closed
 from sensorgen.thesis.checks._field import (
     AREA_M2,
     CAPACITANCE_F_PER_M,
@@ -30,6 +30,7 @@ from sensorgen.units import EPS0_F_PER_M
 
 _X = PLACES_M
 _PERIOD_S = 1 / FREQUENCY_HZ
+_NO_CURRENT_OHM = 1e18
 _SLICE_F = CAPACITANCE_F_PER_M * STEP_M
 _SLICE_OHM = 1 / (1j * OMEGA * _SLICE_F)  # impedance of a slice between the tracks
 
@@ -160,20 +161,27 @@ def slice_impedance() -> list[Part]:
 
 
 def contacts() -> list[Part]:
-    """B.1, B.2: what is connected."""
+    """B.1, B.2: what is connected, and the current that goes in, by the slope of the potential."""
     return [
         Part("U1(0)", "V", LINE.top_v(0.0), INPUT_V),
         Part("U2(0)", "V", LINE.bottom_v(0.0), 0.0, scale=INPUT_V),
-        Part("I1(0)", "A", LINE.current_a.at(0.0), LINE.input_a),
+        Part("I1(0)", "A", -AREA_M2 / RHO_OHM_M * LINE.top_v(0.0, order=1), LINE.input_a),
     ]
 
 
 def far_end() -> list[Part]:
-    """B.3: no current leaves at the end."""
-    return [Part("I1(L)", "A", LINE.current_a.at(LENGTH_M), 0.0, scale=abs(LINE.input_a))]
+    """B.3: an open end, and one with so large a resistor that no current leaves; in both the potential ends flat."""
+    shut = line.impedance(L_m=LENGTH_M, far_end=_NO_CURRENT_OHM, **TRACKS)
+    flat = abs(LINE.input_a) * RHO_OHM_M / AREA_M2
+    return [
+        Part("Z", "ohm", LINE.impedance_ohm, shut),
+        Part("dU1/dx at L", "V/m", LINE.top_v(LENGTH_M, order=1), 0.0, scale=flat),
+    ]
 
 
 def return_current() -> list[Part]:
-    """B.4, at places where there is a current: the bottom track's, from the slope of its potential."""
-    back = -AREA_M2 / RHO_OHM_M * LINE.bottom_v(_X, order=1)
-    return [Part("I1", "A", LINE.current_a.at(_X), -back)]
+    """B.4: as both tracks carry one current, only the sum of their resistances shows; here of unequal ones."""
+    apart = {"rho_top_ohm_m": 0.5 * RHO_OHM_M, "rho_bottom_ohm_m": 1.5 * RHO_OHM_M}
+    ours = line.impedance(L_m=LENGTH_M, **TRACKS | apart)
+    printed = line_closed.uniform(L_m=LENGTH_M, **TRACKS)
+    return [Part("Re Z", "ohm", np.real(ours), np.real(printed)), Part("Im Z", "ohm", np.imag(ours), np.imag(printed))]

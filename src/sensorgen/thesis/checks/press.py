@@ -12,7 +12,7 @@ from sensorgen.thesis.verdicts import Part
 from sensorgen.units import M_PER_MM
 
 _KPA = 100.0
-_MM_PER_UM = 1e-3
+_M_PER_UM = 1e-6
 _SHOWN = 3  # digits that a mesh leaves as they are
 _DEPTH_M, _PERIOD_M = 20e-3, 2e-3  # of the cell of 6.1.2
 _CORNERS_N, _CORNERS_M = np.array([0.0, 6.0]), np.array([0.01, 0.09])
@@ -31,26 +31,29 @@ def _pressed(
     return found
 
 
-def _moved_mm(found: compressed.Data) -> float:
-    return float(found["displacement_um"][-1]) * _MM_PER_UM
+def _moved_m(found: compressed.Data) -> float:
+    return float(found["displacement_um"][-1]) * _M_PER_UM
 
 
 def triangles(displacement_mm: float, film_mm: float) -> list[Part]:
     """6.5: the triangular cell, base and period held."""
     found = _pressed("tri", parameters={"dielectric_mm": film_mm})
-    return [Part("displacement of the top at 100 kPa", "mm", _moved_mm(found), displacement_mm, shown=_SHOWN)]
+    return [Part("displacement of the top at 100 kPa", "m", _moved_m(found), displacement_mm * M_PER_MM, shown=_SHOWN)]
 
 
 def triangles_free(displacement_mm: float, film_mm: float) -> list[Part]:
     """6.8: the same on a base that slides, its period free to widen."""
     found = _pressed("tri", parameters={"dielectric_mm": film_mm}, base="sliding", period="free")
-    return [Part("displacement of the top at 100 kPa", "mm", _moved_mm(found), displacement_mm, shown=_SHOWN)]
+    return [Part("displacement of the top at 100 kPa", "m", _moved_m(found), displacement_mm * M_PER_MM, shown=_SHOWN)]
 
 
 def plates(two_mm: float, three_mm: float) -> list[Part]:
     """6.11: the plain plate, held at its sides so that only its bulk gives way."""
-    ours = _moved_mm(_pressed("reference", parameters={}))
-    return [Part("2D", "mm", ours, two_mm, shown=_SHOWN), Part("3D", "mm", ours, three_mm, shown=_SHOWN)]
+    ours = _moved_m(_pressed("reference", parameters={}))
+    return [
+        Part("2D", "m", ours, two_mm * M_PER_MM, shown=_SHOWN),
+        Part("3D", "m", ours, three_mm * M_PER_MM, shown=_SHOWN),
+    ]
 
 
 def gain(rise_f: float, film_mm: float) -> list[Part]:

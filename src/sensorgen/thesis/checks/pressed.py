@@ -92,7 +92,7 @@ def piezoresistive() -> list[Part]:
     stiff = {"E_Pa": 1e30, "L_p_m": LENGTH_M, "F_N": _FORCE_N}
     ours = line.impedance(f_Hz=_TONES_HZ, **_TRACKS, **stiff, S_n_top_per_N=_S_PER_N, S_n_bottom_per_N=_S_PER_N)
     more = RHO_OHM_M * (1 + _S_PER_N * _FORCE_N)
-    printed = line.impedance(f_Hz=_TONES_HZ, **_TRACKS | {"rho_top_ohm_m": more, "rho_bottom_ohm_m": more})
+    printed = line_closed.uniform(f_Hz=_TONES_HZ, **_TRACKS | {"rho_top_ohm_m": more, "rho_bottom_ohm_m": more})
     return _both("Z", ours, printed)
 
 

@@ -10,19 +10,17 @@ from sensorgen.shapes import reference
 from sensorgen.thesis.verdicts import Part
 from sensorgen.units import M_PER_MM
 
-_UNITS = {"pa": "Pa", "m3": "kg/m3", "c": "°C", "percent": "%", "mm": "mm", "s": "mm/s"}
+_UNITS = {"_pa": "Pa", "_kg_m3": "kg/m3", "_c": "°C", "_percent": "%"}  # by the ending of a quantity
 _PRINTER = "diabase-h5"
 _SIEMENS = "S/m"
 
 Printed = dict[str, float]
 
 
-def _unit(quantity: str) -> str:
-    return _UNITS.get(quantity.rpartition("_")[2], "")
-
-
-def _words(material: str, quantity: str) -> str:
-    return f"{material}: {quantity.replace('_', ' ')}"
+def _named(material: str, quantity: str) -> tuple[str, str]:
+    """What a quantity of a material is called, and its unit."""
+    ending = next((end for end in _UNITS if quantity.endswith(end)), "")
+    return f"{material}: {quantity.removesuffix(ending).replace('_', ' ')}", _UNITS.get(ending, "")
 
 
 def _of_source(material: str, quantity: str, source: str) -> float:
@@ -35,7 +33,7 @@ def _of_source(material: str, quantity: str, source: str) -> float:
 def of_source(source: str, **said: Printed) -> list[Part]:
     """Values by material and quantity, against what is kept of that source."""
     return [
-        Part(_words(material, quantity), _unit(quantity), _of_source(material, quantity, source), value)
+        Part(*_named(material, quantity), _of_source(material, quantity, source), value)
         for material, values in said.items()
         for quantity, value in values.items()
     ]
