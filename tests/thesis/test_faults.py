@@ -7,7 +7,7 @@ from sensorgen import compressed
 from sensorgen.interval import Interval
 from sensorgen.models import columns, compression, line, line_abcd, line_closed, line_fit, line_ladder, thesis_cells
 from sensorgen.sensor import Sensor
-from sensorgen.thesis.checks import _field, cells, inverse
+from sensorgen.thesis.checks import _field, inverse, strips, triangles
 from sensorgen.thesis.items import CHAPTERS, chapter
 from sensorgen.thesis.reproduced import row
 from sensorgen.thesis.verdicts import UNEXPLAINED
@@ -88,7 +88,7 @@ PLANTED = {
         "3.40 3.41 3.42 3.43 3.44 3.45 3.46 3.47 3.48 4.1 6.1 B.9",
     ),
     "flanks of another slope": (
-        cells, "_height_at", times(1.01), "3.10 3.11 3.20",
+        triangles, "_height_mm", times(1.01), "3.10 3.11 3.20",
     ),
     "capacitance under the dielectric": (
         thesis_cells, "under_dielectric_f_per_m", times(1.00001), "3.19 3.23 3.24 3.35",
@@ -97,7 +97,7 @@ PLANTED = {
         thesis_cells, "under_cog_f_per_m", lambda sound: lambda p, eps_r, printed=True: sound(p, eps_r, True),
         "3.32 3.33 3.34 3.35",
     ),
-    "triangles": (thesis_cells, "triangles_f_per_m2", times(1.00001), "2.10"),
+    "triangles": (thesis_cells, "triangles_f_per_m2", times(1.00001), "2.10 3.35"),
     "strips": (thesis_cells, "strips_f_per_m2", times(1.00001), "3.36 3.49"),
     "bulging added whole": (
         thesis_cells, "bulging_f_per_m2", lambda sound: lambda p, e, dh=0.0, printed=True: sound(p, e, dh, True),
@@ -107,7 +107,8 @@ PLANTED = {
         thesis_cells, "bulging_f_per_m2", lambda sound: lambda p, e, dh=0.0, printed=True: sound(p, e, 0.0, True),
         "3.51 3.52 3.53",
     ),
-    "another field solver": (cells, "_exact", times(1.01), "3.35 3.49"),
+    "another field solver": (triangles, "exact_f_per_m2", times(1.01), "3.35"),
+    "another solver of boxes": (strips, "exact_f_per_m2", times(1.01), "3.49"),
     "B.48 as printed in the closed form": (
         line_closed, "impedance", lambda sound: lambda **given: sound("B.48", **given), "B.51",
     ),

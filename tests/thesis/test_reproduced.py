@@ -90,15 +90,15 @@ def test_a_confined_plate_gives_way_by_its_bulk(rows):
 
 def test_a_missing_solver_leaves_uncovered_and_any_other_refusal_is_unexplained(monkeypatch):
     from sensorgen.errors import MissingValue, OutOfRange
-    from sensorgen.thesis.checks import cells
+    from sensorgen.thesis.checks import triangles
 
-    item = Item(number="3.35", says="x", check="cells.triangles", because="y", off={"x": 1.0}, within=0.1)
+    item = Item(number="3.35", says="x", check="triangles.whole", because="y", off={"x": 1.0}, within=0.1)
     for error, expected in ((MissingValue("no solver"), NOT_COVERED), (OutOfRange("strain"), UNEXPLAINED)):
 
         def refuse(_, error=error):
             raise error
 
-        monkeypatch.setattr(cells, "_exact", refuse)
+        monkeypatch.setattr(triangles, "exact_f_per_m2", refuse)
         found = row("3", "equation", item).verdict
         assert found.word == expected
         assert str(error) in found.text()
