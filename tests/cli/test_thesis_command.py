@@ -45,7 +45,7 @@ def test_what_nobody_can_explain_is_told_and_ends_with_1(run, few, monkeypatch):
 
 
 def test_wrong_words(run, few, tmp_path):
-    assert "did you mean 'md'" in run("thesis", "--format", "mb").line
+    assert "did you mean 'html'" in run("thesis", "--format", "htm").line
     (tmp_path / "file").write_text("x")
     said = run("thesis", "-o", "file/below")
     assert said.code == 2

@@ -105,3 +105,9 @@ def test_of_many_parts_those_that_differ_are_shown():
     assert shown.thesis(many, 1e-6) == ["bad: 2 m; corrected 1 m"]
     assert shown.ours(many, 1e-6) == ["bad: 1 m", "9 more values that agree"]
     assert len(shown.ours(many[:9], 1e-6)) == 4
+
+
+def test_what_rounding_leaves_is_nothing_beside_ours():
+    assert shown.thesis([part(3e-13, ours=1.9)], 1e-6) == ["x: 0 m"]
+    assert shown.ours([part(0.0, ours=2e-16j, scale=1.0)], 1e-6) == ["x: 0 m"]
+    assert shown.thesis([part(3e-8, ours=1.9)], 1e-6) == ["x: 30 nm"]

@@ -48,7 +48,8 @@ def _printed(part: Part) -> str:
 
 
 def _number(part: Part, values: ArrayLike) -> str:
-    return number(values, part.unit, part.scale, part.shown)
+    """In the light of ours: what is nothing beside it is what rounding left."""
+    return number(values, part.unit, max(part.scale, float(np.max(abs(np.asarray(part.ours))))), part.shown)
 
 
 def number(values: ArrayLike, unit: str = "", scale: float = 0.0, digits: int = 5) -> str:
@@ -61,7 +62,7 @@ def number(values: ArrayLike, unit: str = "", scale: float = 0.0, digits: int = 
     if np.isnan(flat).all():
         return _NONE
     large = max((abs(v) for v in flat.tolist() if not np.isnan(v)), default=0.0)
-    power = _power(large, unit)
+    power = _power(large if large > _NOISE * scale else 0.0, unit)
     texts = [_one(value / 10.0**power, _NOISE * max(large, scale) / 10.0**power, digits) for value in flat.tolist()]
     end = f" {_PREFIXES[power]}{unit}" if unit else ""
     if len(texts) <= (_FEW if np.iscomplexobj(flat) else _FEW_REAL):
