@@ -1,4 +1,4 @@
-"""Write what can be derived: docs/reference.md from the --help texts, and the pictures from the designs."""
+"""Write what can be derived: docs/reference.md from the --help texts, docs/thesis.md, and pictures from the designs."""
 
 import subprocess
 import sys
@@ -14,7 +14,7 @@ PAGES = (
     ["predict"], ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["invert"], ["sheet"], ["stack"],
     ["bench"], ["bench", "plan"], ["bench", "plan", "tri"],
     ["log"], *(["log", w] for w in ("multimeter", "import", "bench", "predict", "list", "show", "export", "verify")),
-    ["list"], ["schema"], ["completion"],
+    ["thesis"], ["list"], ["schema"], ["completion"],
 )  # fmt: skip
 
 
@@ -33,7 +33,8 @@ def reference() -> str:
 
 
 def main() -> None:
-    """Write reference and pictures."""
+    """Write reference, the thesis's page and pictures."""
+    sensorgen("thesis", "--format", "md", "--output", str(DOCS))
     (DOCS / "reference.md").write_text(reference(), "utf-8")
     (DOCS / "pictures").mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:

@@ -25,6 +25,7 @@ LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))
         (["chart", "--help"], HEAVY),
         (["gcode", "check", "--help"], HEAVY),
         (["slice", "tri", "--help"], HEAVY),
+        (["thesis", "--help"], HEAVY),
         (["cell", "reference"], CAD),
         (["draw", "tri", "-o", "-"], CAD),
         (["build", "tri", "--no-cad"], CAD),

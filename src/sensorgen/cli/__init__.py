@@ -28,6 +28,7 @@ COMMANDS = (
     "stack",
     "log",
     "bench",
+    "thesis",
     "list",
     "schema",
     "completion",

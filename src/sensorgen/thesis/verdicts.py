@@ -1,0 +1,159 @@
+"""What came of holding a number of the thesis against ours."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import floor, log10
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+AGREES = "agrees"
+MISPRINT = "misprint confirmed"
+DIFFERS = "differs"
+NOT_COVERED = "not covered"
+LOST = "cannot be reproduced"
+UNEXPLAINED = "unexplained"  # an error of ours until somebody knows better
+WORDS = (AGREES, MISPRINT, DIFFERS, NOT_COVERED, LOST, UNEXPLAINED)
+
+MOST_DIGITS = 9  # what is left is rounding, which machines do differently
+EXACT = 1e-6
+
+Numbers = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One quantity of an item.
+
+    Attributes
+    ----------
+    name, unit : str
+        What it is, and the unit of all three.
+    printed : number or array, optional
+        The thesis's value, or its equation evaluated as printed; None where nothing was printed.
+    ours : number or array
+        From a model of this package.
+    corrected : number or array, optional
+        The equation, or the value, with its misprint put right.
+    scale : float
+        What counts as large, where the quantity itself is 0.
+    shown : int
+        Digits to show: fewer where a solver's own last ones differ from machine to machine.
+    """
+
+    name: str
+    unit: str
+    ours: ArrayLike
+    printed: ArrayLike | None = None
+    corrected: ArrayLike | None = None
+    scale: float = 0.0
+    shown: int = 5
+
+    def off(self) -> float:
+        """How far the thesis is from ours, as a share of ours; by its sign more or less, where both are real [-]."""
+        if self.printed is None:
+            return 0.0
+        printed, ours = np.broadcast_arrays(np.asarray(self.printed), np.asarray(self.ours))
+        if printed.size == 1 and np.isrealobj(printed) and np.isrealobj(ours) and ours.item():
+            return float((printed.item() - ours.item()) / max(abs(ours.item()), self.scale))
+        return self._distance(printed)
+
+    def mended(self) -> float:
+        """How far the corrected value is from ours, as a share of it [-]."""
+        return np.inf if self.corrected is None else self._distance(np.asarray(self.corrected))
+
+    def _distance(self, other: Numbers) -> float:
+        """By the largest of all numbers, so that a 0 among them is none of its own."""
+        ours = np.asarray(self.ours)
+        size = max(float(np.max(abs(ours))), self.scale)
+        far = float(np.max(abs(other - ours)))
+        return far / size if size else (0.0 if far == 0 else np.inf)
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What is known of an item beforehand.
+
+    Attributes
+    ----------
+    tolerance : float
+        Up to which relative distance the thesis and we agree [-].
+    erratum, because : str
+        What is misprinted; why a difference is no misprint. Or "".
+    off : mapping of str to float
+        By part, how far the thesis then is from ours [-].
+    within : float
+        How near that has to be [-].
+    """
+
+    tolerance: float = EXACT
+    erratum: str = ""
+    because: str = ""
+    off: Mapping[str, float] = field(default_factory=dict)
+    within: float = 0.0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One of ``WORDS``, and what it rests on."""
+
+    word: str
+    why: str = ""
+
+    def text(self) -> str:
+        """Both in one line."""
+        return f"{self.word}{self.why and ' '}{self.why}"
+
+
+def judged(expected: Expected, parts: Sequence[Part]) -> Verdict:
+    """The verdict over all parts of an item: the worst of them decides.
+
+    Parameters
+    ----------
+    expected : Expected
+        A misprint or a difference that is announced has to be found, and one that is found has to be announced.
+    parts : sequence of Part
+        What was computed.
+    """
+    wrong = [part for part in parts if not abs(part.off()) <= expected.tolerance]
+    announced = any(part.corrected is not None for part in parts)
+    if not wrong and (announced or expected.off):
+        return Verdict(UNEXPLAINED, "(what is announced as wrong agrees with ours)")
+    if not wrong:
+        return Verdict(AGREES, f"to {digits(max(abs(part.off()) for part in parts))}")
+    if all(part.mended() <= expected.tolerance for part in wrong) and expected.erratum:
+        return Verdict(MISPRINT, f"(corrected: to {digits(max(part.mended() for part in wrong))})")
+    if expected.because and all(_as_announced(expected, part) for part in wrong):
+        worst = max(wrong, key=lambda part: abs(part.off()))
+        return Verdict(DIFFERS, f"(the thesis has {share(worst.off())}), because {expected.because}")
+    named = ", ".join(f"{part.name} {share(part.off())}" for part in wrong)
+    return Verdict(UNEXPLAINED, f"(off: {named})")
+
+
+def _as_announced(expected: Expected, part: Part) -> bool:
+    announced = expected.off.get(part.name)
+    return announced is not None and abs(part.off() - announced) <= expected.within
+
+
+def digits(off: float) -> str:
+    """How many leading digits two numbers have in common, in words.
+
+    >>> digits(0.04), digits(2e-7), digits(1e-14)
+    ('1 digit', '6 digits', '9 digits or more')
+    """
+    count = MOST_DIGITS if off <= 10.0**-MOST_DIGITS else max(floor(-log10(off)), 0)
+    return f"{count} digit{'' if count == 1 else 's'}{' or more' if count == MOST_DIGITS else ''}"
+
+
+def share(off: float) -> str:
+    """A relative difference as a person would say it, the thesis's from ours.
+
+    >>> share(-0.252), share(1.2), share(8.5), share(float("nan"))
+    ('25.2 % less', '120 % more', '9.5 times as much', 'no number')
+    """
+    if off != off:
+        return "no number"
+    return (
+        f"{off + 1:.3g} times as much" if off > 2 - EXACT else f"{abs(100 * off):.3g} % {'less' if off < 0 else 'more'}"
+    )

@@ -1,0 +1,100 @@
+"""The HTML page: whole, safe, without network, and its filters at work in a browser."""
+
+import re
+import subprocess
+from collections import Counter
+from html.parser import HTMLParser
+
+import pytest
+
+from sensorgen import thesis
+from sensorgen.thesis.items import Item
+from sensorgen.thesis.reproduced import Row
+from sensorgen.thesis.verdicts import AGREES, Part, Verdict
+
+VOID = {"meta", "input"}
+
+
+class Page(HTMLParser):
+    """Start tags with what they carry, and whether all are closed."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.open = [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def of(self, tag):
+        return [attrs for name, attrs in self.tags if name == tag]
+
+
+@pytest.fixture(scope="module")
+def text(rows):
+    return thesis.html(rows)
+
+
+@pytest.fixture(scope="module")
+def page(text):
+    return Page(text)
+
+
+def test_the_page_is_whole(page, rows):
+    assert not page.open
+    items = [tr for tr in page.of("tr") if "data-verdict" in tr]
+    assert len(items) == len(rows)
+    assert len({tr["id"] for tr in items}) == len(rows)
+    assert len([td for td in page.of("td") if "data-head" in td]) == 5 * len(rows)
+    assert Counter(tr["data-verdict"] for tr in items) == Counter(r.verdict.word for r in rows)
+
+
+def test_the_page_asks_nobody(text, page):
+    assert not re.search(r"https?://|@import|url\(|fetch\(|XMLHttpRequest", text)
+    assert not any("src" in attrs or "href" in attrs for _, attrs in page.tags)
+    assert len(text) < 250_000
+
+
+def test_the_page_can_be_read_aloud(page):
+    assert page.of("html") == [{"lang": "en"}]
+    assert all("scope" in th or th.get("role") == "rowheader" for th in page.of("th"))
+    assert all(option["value"] is not None for option in page.of("option"))
+    assert {"aria-live": "polite", "name": "count"}.items() <= page.of("output")[0].items()
+
+
+def test_words_stay_text():
+    bad = "<script>alert(1)</script> | & `code`"
+    item = Item(number="9.9", says=bad, check="line.current", erratum=bad)
+    made = [Row("2", "equation", item, (Part(bad, bad, 1.0, 1.0),), Verdict(AGREES, bad))]
+    found = thesis.html(made)
+    assert "<script>alert" not in found
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; | &amp; <code>code</code>" in found
+    line = next(line for line in thesis.markdown(made).splitlines() if line.startswith("| Eq. 9.9"))
+    assert line.count("|") == 7
+    assert "<script>" not in line
+
+
+@pytest.mark.parametrize(
+    ("asked", "fits"),
+    [
+        ("", lambda r: True),
+        ("?verdict=differs", lambda r: r.verdict.word == "differs"),
+        ("?chapter=B&kind=figure", lambda r: r.chapter == "B" and r.kind == "figure"),
+        ("?text=sideways&verdict=differs&nonsense=1", lambda r: r.name() in ("Eq. 3.35", "Eq. 3.49")),
+    ],
+)
+def test_filters_in_a_browser(asked, fits, text, rows, program, tmp_path):
+    file = tmp_path / "thesis.html"
+    file.write_text(text, "utf-8")
+    command = [
+        program("chromium", "chromium", "chromium-browser", "google-chrome"), "--headless", "--no-sandbox",
+        "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", file.as_uri() + asked,
+    ]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    shown = {tr["id"] for tr in Page(done.stdout).of("tr") if "data-verdict" in tr and "hidden" not in tr}
+    assert shown == {f"{r.kind}-{r.item.number}" for r in rows if fits(r)}
