@@ -12,20 +12,23 @@ import subprocess
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from line_cases import exact, off
 
 from sensorgen import chart, planner
-from sensorgen.chart import STANDARD, Point
+from sensorgen.chart import cells, lines
+from sensorgen.chart.cells import STANDARD
+from sensorgen.chart.measured import Point, with_front
 from sensorgen.interval import Interval
 from sensorgen.plots import chart as pictures
 
 
 def point(seconds, error, model="m", bounded=True, scene="s"):
-    return Point(scene, model, None, 1.0, 1.1, bounded, error, seconds)
+    return Point(scene, model, error, seconds, "", bounded, None, 1.0, 1.1)
 
 
 @given(st.lists(st.tuples(st.integers(1, 6), st.integers(1, 6)), min_size=1, max_size=12))
 def test_the_front_is_what_nothing_beats(pairs):
-    found = chart._with_front([point(float(s), float(e)) for s, e in pairs])
+    found = with_front([point(float(s), float(e)) for s, e in pairs])
     assert sorted((p.seconds, p.error) for p in found) == sorted(pairs)
     for p in found:
         better = [q for q in pairs if q[0] <= p.seconds and q[1] <= p.error and q != (p.seconds, p.error)]
@@ -39,14 +42,14 @@ def test_the_front_is_what_nothing_beats(pairs):
 
 def test_errors_are_of_the_bound_that_is_further_off():
     exact = STANDARD["plate, 0.6 mm"].capacitance_f_per_m2
-    assert chart._point(
+    assert cells._point(
         "plate, 0.6 mm", "m", None, Interval(0.9 * exact, 1.05 * exact), True, 1.0
     ).error == pytest.approx(0.1)
-    assert chart._point(
+    assert cells._point(
         "plate, 0.6 mm", "m", None, Interval(0.9 * exact, 1.2 * exact), True, 1.0
     ).error == pytest.approx(0.2)
     rect = STANDARD["rect, 0.1 mm"].capacitance_f_per_m2
-    assert chart._point("rect, 0.1 mm", "m", None, Interval(rect, rect), True, 1.0).error == 2.7e-5
+    assert cells._point("rect, 0.1 mm", "m", None, Interval(rect, rect), True, 1.0).error == 2.7e-5
 
 
 def test_rungs_go_on_until_it_costs_too_much(monkeypatch):
@@ -56,19 +59,19 @@ def test_rungs_go_on_until_it_costs_too_much(monkeypatch):
         asked.append(wanted)
         return Interval(1 - wanted / 4, 1 + wanted / 4)
 
-    monkeypatch.setattr(chart, "_timed", lambda work: (work(), 10.0 ** len(asked) / 1e4))
+    monkeypatch.setattr(cells, "timed", lambda work: (work(), 10.0 ** len(asked) / 1e4))
     model = type("Model", (), {"WIDTH": 1e-3})
-    rungs = list(chart._rungs(work, (), model, 1.0))
+    rungs = list(cells._rungs(work, (), model, 1.0))
     assert asked == pytest.approx([0.1, 1e-2, 1e-3, 1e-4])  # the last took 1 s: ten times that is over the budget
     assert [wanted for wanted, _, _ in rungs] == asked
 
 
 def test_rungs_end_where_nothing_is_gained(monkeypatch):
-    monkeypatch.setattr(chart, "_timed", lambda work: (work(), 1e-6))
+    monkeypatch.setattr(cells, "timed", lambda work: (work(), 1e-6))
     model = type("Model", (), {"WIDTH": 1e-3})
-    assert len(list(chart._rungs(lambda wanted: Interval(0.9, 1.1), (), model, 1.0))) == 1
-    assert len(list(chart._rungs(lambda wanted: Interval(1.0, 1.0), (), model, 1.0))) == 1
-    assert [w for w, _, _ in chart._rungs(lambda: Interval(0.9, 1.1), (), object(), 1.0)] == [None]
+    assert len(list(cells._rungs(lambda wanted: Interval(0.9, 1.1), (), model, 1.0))) == 1
+    assert len(list(cells._rungs(lambda wanted: Interval(1.0, 1.0), (), model, 1.0))) == 1
+    assert [w for w, _, _ in cells._rungs(lambda: Interval(0.9, 1.1), (), object(), 1.0)] == [None]
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +79,7 @@ def measured():
     pytest.importorskip("ngsolve", reason="the extra fem is not installed")
     said = []
     with pytest.MonkeyPatch.context() as patch:  # by accuracy, not by time: a busy machine measures the same points
-        patch.setattr(chart, "_LEAST_WIDTH", 1e-6)
+        patch.setattr(cells, "_LEAST_WIDTH", 1e-6)
         found = chart.points(["tri, 0.2 mm", "plate, 0.6 mm"], 1e9, said.append)
     assert said == ["tri, 0.2 mm", "plate, 0.6 mm"]
     return found
@@ -103,6 +106,45 @@ def test_what_is_known_of_errors(measured):
     assert off["thesis-3.35"] == pytest.approx(0.2417, abs=2e-4)
     assert off["thesis-3.34-printed"] > 1
     assert min(p.error for p in measured if p.model == "fem2d" and p.scene.startswith("tri")) < 1e-5
+
+
+@pytest.mark.parametrize("name", lines.STANDARD)
+def test_lines_are_known_to_the_last_digit(name):
+    """The same line by transfer matrices in 60 digits."""
+    for tone, known in lines.STANDARD[name].items():
+        whole, real = off(known, exact(60, **lines.PLATE, f_Hz=tone))
+        assert max(whole, real) < 2e-16
+
+
+@pytest.fixture(scope="module")
+def of_lines():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lines, "_LADDERS", (1, 10, 100))
+        return chart.points(list(lines.STANDARD), 1e9, lambda _: None)
+
+
+def test_what_is_known_of_lines(of_lines):
+    """Ladders are of second order; matrices lose Re Z at low tones; the misprint of B.48 is no small one."""
+    low, wide = ({p.model: p.error for p in of_lines if p.scene == name} for name in lines.STANDARD)
+    assert max(low["line"], wide["line"]) < 1e-15
+    assert wide["line_abcd"] > 1e6 * wide["line"]
+    assert low["line_closed, B.48 as printed"] > 0.5
+    ladder = [p.error for p in of_lines if p.model == "line_ladder" and p.scene == "line, seven tones"]
+    assert len(ladder) == 3
+    assert ladder[0] / ladder[1] == pytest.approx(100, rel=0.01)
+    assert ladder[1] / ladder[2] == pytest.approx(100, rel=0.01)
+    assert all(p.seconds > 0 and not p.bounded and "Re Z by" in p.said for p in of_lines)
+
+
+def test_a_budget_ends_the_ladders(monkeypatch):
+    monkeypatch.setattr(lines, "timed", lambda work: (work(), 1.0))
+    found = [p for p in lines.points("line, seven tones", 5.0) if p.model == "line_ladder"]
+    assert len(found) == 1
+
+
+def test_no_two_models_look_alike():
+    looks = {(k % len(pictures._COLOURS), pictures._marker(pictures._MARKERS, k)) for k in range(30)}
+    assert len(looks) == 30
 
 
 def test_the_picture(measured):

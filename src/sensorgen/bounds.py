@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from math import inf
 from typing import TYPE_CHECKING, Any
 
-from sensorgen import planner
+from sensorgen import losses, planner
 from sensorgen.design import Design
 from sensorgen.errors import SensorgenError
 from sensorgen.models import thesis_cells
@@ -32,11 +32,14 @@ class Asked:
         The only model to ask, or "".
     keep : bool
         Take answers that are known from before, and keep new ones.
+    frequency_hz : float or None
+        Of the field, where dielectrics leak [Hz].
     """
 
     width: float = inf
     model: str = ""
     keep: bool = True
+    frequency_hz: float | None = None
 
 
 def answer(design: Design, asked: Asked) -> dict[str, Any]:
@@ -56,7 +59,7 @@ def answer(design: Design, asked: Asked) -> dict[str, Any]:
     MissingValue
         A dielectric without a permittivity.
     """
-    return _plain(design, _solved(design.in_use, _permittivity(design), asked))
+    return _plain(design, _solved(design.in_use, _permittivity(design, asked), asked), asked)
 
 
 def formula(design: Design, name: str) -> dict[str, Any]:
@@ -79,6 +82,8 @@ def formula(design: Design, name: str) -> dict[str, Any]:
     shape, work = thesis_cells.NAMED[name]
     if design.shape != shape:
         raise Unpredictable(f"{name} speaks of {shape}, not of {design.shape}")
+    if losses.set_losses(design):
+        raise Unpredictable(f"{name} knows no losses; leave out --model, or the loss")
     taken = [t for t in planner.permittivities(design) if t.material == design.slot("film")[0].name]
     start = time.perf_counter()
     value = work(design.params, taken[0].value)
@@ -112,7 +117,7 @@ def answers(designs: Sequence[Design], asked: Asked, jobs: int, done: Callable[[
     SensorgenError
         A process ended before its answer, as when the memory is full.
     """
-    inputs = [(design.in_use, _permittivity(design), asked) for design in designs]
+    inputs = [(design.in_use, _permittivity(design, asked), asked) for design in designs]
     missing = [
         k for k, (scene, eps, _) in enumerate(inputs)
         if not (asked.keep and planner.is_known(scene, eps, asked.width, asked.model))
@@ -128,14 +133,14 @@ def answers(designs: Sequence[Design], asked: Asked, jobs: int, done: Callable[[
             planner.remember(scene, eps, asked.model, result)
         found[missing[k]] = result
         done()
-    return [_plain(design, found[k]) for k, design in enumerate(designs)]
+    return [_plain(design, found[k], asked) for k, design in enumerate(designs)]
 
 
-def _solved(scene: Scene, permittivity: dict[str, float], asked: Asked) -> Answer:
+def _solved(scene: Scene, permittivity: dict[str, complex], asked: Asked) -> Answer:
     return planner.capacitance(scene, permittivity, asked.width, asked.model, asked.keep)
 
 
-def _said(scene: Scene, permittivity: dict[str, float], asked: Asked) -> Answer | str:
+def _said(scene: Scene, permittivity: dict[str, complex], asked: Asked) -> Answer | str:
     """The answer, or why there is none."""
     try:
         return _solved(scene, permittivity, asked)
@@ -184,11 +189,11 @@ def _quietly() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _permittivity(design: Design) -> dict[str, float]:
-    return {t.material: t.value for t in planner.permittivities(design)}
+def _permittivity(design: Design, asked: Asked) -> dict[str, complex]:
+    return losses.permittivity(design, asked.frequency_hz)[0]
 
 
-def _plain(design: Design, found: Answer | str) -> dict[str, Any]:
+def _plain(design: Design, found: Answer | str, asked: Asked) -> dict[str, Any]:
     """What is printed of an answer."""
     data: dict[str, Any] = {"design": design.name, "model": None, "lower_f_per_m2": None, "upper_f_per_m2": None}
     if isinstance(found, str):
@@ -199,7 +204,8 @@ def _plain(design: Design, found: Answer | str) -> dict[str, Any]:
         "model": found.model,
         "lower_f_per_m2": per_area.lower,
         "upper_f_per_m2": per_area.upper,
-        "relative_width": per_area.width(),
+        **_lost(found, area, asked),
+        "relative_width": found.width(),
         "accuracy": found.wanted if found.wanted < inf else None,
         "reached": found.reached(),
         "seconds": found.seconds(),
@@ -207,5 +213,19 @@ def _plain(design: Design, found: Answer | str) -> dict[str, Any]:
         "area_m2": area,
         "refused": list(found.refused),
         "plan": [asdict(c) for c in found.plan],
-        "values": [vars(t) for t in planner.permittivities(design)],
+        "values": [vars(t) for t in losses.permittivity(design, asked.frequency_hz)[1]],
+    }
+
+
+def _lost(found: Answer, area_m2: float, asked: Asked) -> dict[str, Any]:
+    """Where dielectrics lose: minus the imaginary part per area, and the tangent of the whole."""
+    if found.loss_f is None:
+        return {}
+    real, loss = found.capacitance_f, found.loss_f
+    ends = (real.lower, real.upper)
+    return {
+        "loss_lower_f_per_m2": loss.lower / area_m2,
+        "loss_upper_f_per_m2": loss.upper / area_m2,
+        "tan_delta": [loss.lower / ends[loss.lower > 0], loss.upper / ends[loss.upper < 0]] if real.lower > 0 else None,
+        "frequency_hz": asked.frequency_hz,
     }

@@ -1,4 +1,4 @@
-"""A number known to lie between two others."""
+"""A number known to lie between two others, or near one."""
 
 from dataclasses import dataclass
 
@@ -21,3 +21,23 @@ class Interval:
     def times(self, factor: float) -> "Interval":
         """Both bounds scaled by a positive factor."""
         return Interval(self.lower * factor, self.upper * factor)
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A complex quantity known to lie within ``radius`` of ``centre``, both in its own unit."""
+
+    centre: complex
+    radius: float
+
+    def width(self) -> float:
+        """Relative width: the diameter, as a share of the centre's modulus [-]."""
+        return 2 * self.radius / abs(self.centre)
+
+    def times(self, factor: float) -> "Disc":
+        """The disc scaled by a positive factor."""
+        return Disc(self.centre * factor, self.radius * factor)
+
+    def holds(self, value: complex) -> bool:
+        """Whether a value lies in it."""
+        return abs(value - self.centre) <= self.radius

@@ -12,7 +12,7 @@ from hashlib import sha256
 from importlib import import_module, resources
 from importlib.util import find_spec
 from json import dumps
-from math import inf
+from math import hypot, inf
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -20,12 +20,13 @@ from typing import Any
 from sensorgen import cached, materials, models, registry, yamlfile
 from sensorgen.design import Design
 from sensorgen.errors import OutOfRange, SensorgenError, UnknownName
-from sensorgen.interval import Interval
+from sensorgen.interval import Disc, Interval
 from sensorgen.scene import Scene
 from sensorgen.sections import overlap
 
 SOLVER = "ngsolve"  # the optional package that dear models need
 _EXACT = 1e-9  # relative width of a capacitance's bounds below which the scene is a plate
+_LOSSLESS, _LOSSY = "capacitance", "lossy"  # functions of a model
 _CHEAP = 1  # up to this cost, a model is asked before it is weighed
 
 
@@ -75,7 +76,7 @@ class Answer:
     model : str
         Name of the model.
     capacitance_f : Interval
-        Of the whole sensor [F].
+        Of the whole sensor [F]; its real part where dielectrics lose.
     refused : tuple of str
         Why other models cannot speak of the scene.
     wanted : float
@@ -84,6 +85,8 @@ class Answer:
         All models, in the order in which they were weighed.
     known : bool
         Whether the answer was known from before.
+    loss_f : Interval or None
+        Minus the imaginary part, where dielectrics lose [F].
     """
 
     model: str
@@ -92,10 +95,18 @@ class Answer:
     wanted: float = inf
     plan: tuple[Candidate, ...] = ()
     known: bool = False
+    loss_f: Interval | None = None
 
     def reached(self) -> bool:
         """Whether the interval is as narrow as wanted."""
-        return self.capacitance_f.width() <= self.wanted
+        return self.width() <= self.wanted
+
+    def width(self) -> float:
+        """How far the bounds are apart, relative to their middle; of a complex value, to its modulus [-]."""
+        if self.loss_f is None:
+            return self.capacitance_f.width()
+        real, loss = self.capacitance_f, self.loss_f
+        return (real.upper - real.lower) / hypot(real.upper + real.lower, loss.upper + loss.lower) * 2
 
     def seconds(self) -> float:
         """Time that all models took together, imports left out [s]."""
@@ -132,7 +143,7 @@ class Unloaded:
 
 
 def capacitance(
-    scene: Scene, permittivity: Mapping[str, float], width: float = inf, model: str = "", keep: bool = True
+    scene: Scene, permittivity: Mapping[str, complex], width: float = inf, model: str = "", keep: bool = True
 ) -> Answer:
     """Ask models, the cheapest that will do, for the capacitance of a scene.
 
@@ -140,8 +151,8 @@ def capacitance(
     ----------
     scene : Scene
         As drawn.
-    permittivity : mapping of str to float
-        Relative permittivity of each dielectric, and of "air" [-].
+    permittivity : mapping of str to float or complex
+        Relative permittivity of each dielectric, and of "air" [-]; complex where one loses.
     width : float
         How wide the interval may be, relative to its middle; the narrowest one where none is that narrow [-].
     model : str
@@ -178,25 +189,28 @@ def capacitance(
     return answer
 
 
-def remember(scene: Scene, permittivity: Mapping[str, float], model: str, answer: Answer) -> None:
+def remember(scene: Scene, permittivity: Mapping[str, complex], model: str, answer: Answer) -> None:
     """Keep an answer to :func:`capacitance` for the next time."""
     cached.keep(_question(scene, permittivity, answer.wanted, model), _plain(answer))
 
 
-def is_known(scene: Scene, permittivity: Mapping[str, float], width: float, model: str = "") -> bool:
+def is_known(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str = "") -> bool:
     """Whether the answer to :func:`capacitance` is known from before."""
     return cached.known(_question(scene, permittivity, width, model)) is not None
 
 
-def weighed(scene: Scene, width: float = inf, model: str = "") -> tuple[Candidate, ...]:
+def weighed(scene: Scene, width: float = inf, model: str = "", lossy: bool = False) -> tuple[Candidate, ...]:
     """The plan before anything is asked: all models of capacitance in the order in which they would be.
 
     Parameters
     ----------
     scene, width, model : Scene, float, str
         As of :func:`capacitance`.
+    lossy : bool
+        Whether a dielectric loses.
     """
-    return tuple(replace(c, passed_over=c.passed_over or _unfit(c, scene)) for c in _ordered(width, model))
+    kind = _LOSSY if lossy else _LOSSLESS
+    return tuple(replace(c, passed_over=c.passed_over or _unfit(c, scene, kind)) for c in _ordered(width, model))
 
 
 def _ordered(width: float, model: str) -> list[Candidate]:
@@ -214,8 +228,9 @@ def capacitance_models() -> dict[str, ModuleType]:
     return {name: registry.load(models, name) for name in registry.defining(models, "capacitance")}
 
 
-def _unfit(candidate: Candidate, scene: Scene) -> str:
-    return capacitance_models()[candidate.model].unfit(scene) or ""
+def _unfit(candidate: Candidate, scene: Scene, kind: str) -> str:
+    model = capacitance_models()[candidate.model]
+    return (model.unfit(scene) or "") if hasattr(model, kind) else "it knows no losses"
 
 
 def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float]:
@@ -240,33 +255,55 @@ def _expectations() -> dict[str, list[tuple[float, float]]]:
     return {name: [(width, seconds) for width, seconds in entry["points"]] for name, entry in data.items()}
 
 
-def _asked(scene: Scene, permittivity: Mapping[str, float], width: float, model: str) -> Answer:
+def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str) -> Answer:
     overlaps = overlap(scene)
     if overlaps:
         raise Unpredictable(f"{overlaps}; expected each place to belong to one body")
     plan: list[Candidate] = []
     refused: list[str] = []
-    bounds: dict[str, Interval] = {}
+    bounds: dict[str, Interval | Disc] = {}
+    kind = _kind(permittivity)
     for candidate in _ordered(width, model):
         reason = candidate.passed_over or _idle(candidate, bounds, width)
         if not reason:
-            reason = _unfit(candidate, scene)
+            reason = _unfit(candidate, scene, kind)
             refused += [f"{candidate.model}: {reason}"] if reason else []
         if reason:
             plan.append(replace(candidate, passed_over=reason))
             continue
-        found, seconds = _timed(candidate.model, scene, permittivity, width)
+        found, seconds = _timed(candidate.model, kind, scene, permittivity, width)
         bounds[candidate.model] = found
         _refuse_contradiction(bounds)
         plan.append(replace(candidate, width=found.width(), seconds=seconds))
     if not bounds:
         raise Unpredictable("; ".join(refused))
     best = min(bounds, key=lambda name: bounds[name].width())
-    return Answer(best, bounds[best], tuple(refused), width, tuple(plan))
+    real, loss = _parts(bounds[best])
+    return Answer(best, real, tuple(refused), width, tuple(plan), loss_f=loss)
 
 
-def _refuse_contradiction(bounds: Mapping[str, Interval]) -> None:
-    """All intervals hold the truth: any two of them overlap."""
+def _kind(permittivity: Mapping[str, complex]) -> str:
+    """Which of a model's functions speaks of these permittivities."""
+    return _LOSSY if any(isinstance(value, complex) for value in permittivity.values()) else _LOSSLESS
+
+
+def _parts(found: Interval | Disc) -> tuple[Interval, Interval | None]:
+    """Bounds of a capacitance, and those of what it loses."""
+    if isinstance(found, Interval):
+        return found, None
+    real, loss = found.centre.real, -found.centre.imag
+    return Interval(real - found.radius, real + found.radius), Interval(loss - found.radius, loss + found.radius)
+
+
+def _refuse_contradiction(bounds: Mapping[str, Interval | Disc]) -> None:
+    """All of them hold the truth: any two overlap."""
+    for part in zip(*(_parts(found) for found in bounds.values()), strict=True):
+        named = {name: found for name, found in zip(bounds, part, strict=True) if found}
+        if named:
+            _refuse_apart(named)
+
+
+def _refuse_apart(bounds: Mapping[str, Interval]) -> None:
     lower = max(bounds, key=lambda name: bounds[name].lower)
     upper = min(bounds, key=lambda name: bounds[name].upper)
     if bounds[lower].lower > bounds[upper].upper * (1 + _EXACT):
@@ -276,7 +313,7 @@ def _refuse_contradiction(bounds: Mapping[str, Interval]) -> None:
         )
 
 
-def _idle(candidate: Candidate, bounds: Mapping[str, Interval], width: float) -> str:
+def _idle(candidate: Candidate, bounds: Mapping[str, Interval | Disc], width: float) -> str:
     """Why a model that might speak need not."""
     best = min((found.width() for found in bounds.values()), default=inf)
     if bounds and best <= width:
@@ -284,14 +321,16 @@ def _idle(candidate: Candidate, bounds: Mapping[str, Interval], width: float) ->
     return f"not expected to come nearer than {candidate.reach():.2g}" if candidate.reach() >= best else ""
 
 
-def _timed(name: str, scene: Scene, permittivity: Mapping[str, float], width: float) -> tuple[Interval, float]:
-    """A model's bounds, and how long they took once everything is loaded [s]."""
+def _timed(
+    name: str, kind: str, scene: Scene, permittivity: Mapping[str, complex], width: float
+) -> tuple[Interval | Disc, float]:
+    """A model's bounds, or its disc, and how long they took once everything is loaded [s]."""
     model = capacitance_models()[name]
     given = (model.WIDTH if width == inf else width,) if hasattr(model, "WIDTH") else ()
     if hasattr(model, "NEEDS"):
         load_solver()
     start = time.perf_counter()
-    found: Interval = model.capacitance(scene, permittivity, *given)
+    found: Interval | Disc = getattr(model, kind)(scene, permittivity, *given)
     return found, time.perf_counter() - start
 
 
@@ -306,7 +345,7 @@ def load_solver() -> None:
         ) from None
 
 
-def _question(scene: Scene, permittivity: Mapping[str, float], width: float, model: str) -> dict[str, Any]:
+def _question(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str) -> dict[str, Any]:
     """Everything that decides an answer: the scene's content, materials, what is wanted, and the solver's version."""
     look = [
         (body.name, body.material, body.terminal, [(p.axis, p.outline, p.start_mm, p.end_mm) for p in body.prisms])
@@ -315,7 +354,7 @@ def _question(scene: Scene, permittivity: Mapping[str, float], width: float, mod
     return {
         "what": "capacitance",
         "scene": sha256(dumps([look, scene.size_mm]).encode()).hexdigest(),
-        "permittivity": dict(permittivity),
+        "permittivity": {name: [v.real, v.imag] if isinstance(v, complex) else v for name, v in permittivity.items()},
         "width": width if width < inf else None,
         "model": model,
         SOLVER: _solver_version(),
@@ -340,6 +379,7 @@ def _of_plain(data: dict[str, Any]) -> Answer:
     return Answer(
         data["model"], Interval(**data["capacitance_f"]), tuple(data["refused"]),
         inf if data["wanted"] is None else data["wanted"], tuple(Candidate(**c) for c in data["plan"]),
+        loss_f=Interval(**data["loss_f"]) if data["loss_f"] else None,
     )  # fmt: skip
 
 

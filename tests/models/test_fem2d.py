@@ -187,37 +187,6 @@ def _neat(p):
     return replace(p, outline=tuple((round(u, 12), round(v, 12)) for u, v in p.outline))
 
 
-@pytest.mark.parametrize(("first", "second"), [(4.68, 1.0), (1e4, 1.0), (1.0, 1e4), (3.0 - 0.5j, 2.0 - 1.5j)])
-def test_lossy_layers_in_series_and_side_by_side(first, second):
-    """1/C = sum of t/eps, or C = sum of w eps."""
-    eps = {"a": first, "b": second, "air": 1.0}
-    series = plates(Body("a", "a", (box(0, 2, 0, 1, 0.2, 0.6),)), Body("b", "b", (box(0, 2, 0, 1, 0.6, 1.2),)))
-    beside = plates(Body("a", "a", (box(0, 0.7, 0, 1, 0.2, 1.2),)), Body("b", "b", (box(0.7, 2, 0, 1, 0.2, 1.2),)))
-    for scene, exact in ((series, 2 / (0.4 / first + 0.6 / second)), (beside, 0.7 * first + 1.3 * second)):
-        value, off = fem2d.estimate(scene, eps, 1e-8)
-        exact_f = exact * EPS0_F_PER_M * MM
-        assert abs(value - exact_f) < 1e-8 * abs(exact_f)
-        assert off < 1e-8 * abs(exact_f)
-
-
-def test_a_loss_alike_everywhere_turns_the_whole():
-    """Every permittivity times 1 - 0.02j: so is C."""
-    lossless = fem2d.capacitance(tri_cell(0.1), EPS, 1e-6)
-    value, off = fem2d.estimate(tri_cell(0.1), {m: e * (1 - 0.02j) for m, e in EPS.items()}, 1e-5)
-    assert value == pytest.approx(lossless.middle() * (1 - 0.02j), rel=1e-5, abs=0)
-    assert off < 1e-5 * abs(value)
-
-
-def test_a_small_loss_is_the_slope_of_the_lossless():
-    """Im C = -tan delta eps dC/deps to first order, by differences of certified values."""
-    delta, step = 1e-3, 1e-2
-    value, _ = fem2d.estimate(tri_cell(0.1), {"x60": 4.68 * (1 - 1j * delta), "air": 1.00059}, 1e-6)
-    up, down = (
-        fem2d.capacitance(tri_cell(0.1), {"x60": 4.68 * (1 + s), "air": 1.00059}, 1e-6).middle() for s in (step, -step)
-    )
-    assert value.imag == close(-delta * (up - down) / (2 * step), 1e-4)
-
-
 def test_mirrored_swapped_scaled_and_deeper():
     scene = tri_cell(0.1)
     one = fem2d.capacitance(scene, EPS, 1e-6)

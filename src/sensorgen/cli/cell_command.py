@@ -11,8 +11,9 @@ import click
 
 from sensorgen.cli import FOUND_ERRORS, settings, show
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import Ratio
+from sensorgen.cli.words import Ratio, Values, one
 from sensorgen.errors import BadInput
+from sensorgen.units import FREQUENCY_HZ
 
 if TYPE_CHECKING:
     from sensorgen.bounds import Asked
@@ -21,7 +22,22 @@ if TYPE_CHECKING:
 Data = dict[str, Any]
 
 ACCURACY = 1e-3
-COLUMNS = ("lower_f_per_m2", "upper_f_per_m2", "relative_width", "model", "seconds", "reached", "reason")
+QUANTITIES = {
+    "relative_permittivity": "relative permittivity",
+    "loss_tangent": "loss tangent",
+    "resistivity_ohm_m": "resistivity [ohm m]",
+}
+COLUMNS = (
+    "lower_f_per_m2",
+    "upper_f_per_m2",
+    "loss_lower_f_per_m2",
+    "loss_upper_f_per_m2",
+    "relative_width",
+    "model",
+    "seconds",
+    "reached",
+    "reason",
+)
 
 OWN: list[click.Parameter] = [
     click.Option(
@@ -29,6 +45,10 @@ OWN: list[click.Parameter] = [
         help="How far the bounds may be apart, as a share of their middle.",
     ),
     click.Option(["--model"], metavar="NAME", default="", help="Ask this model only, as columns, or thesis-3.35."),
+    click.Option(
+        ["--frequency"], type=Values(FREQUENCY_HZ, zero=False), default=None,
+        help="Of the field, where a dielectric leaks: --set resistivity_x60=1e8; a loss_x60=0.02 needs none.",
+    ),
     click.Option(["--explain"], is_flag=True, help="Print the plan, and what came of it."),
     click.Option(["--no-cache"], is_flag=True, help="Solve anew, and keep nothing."),
     click.Option(
@@ -46,12 +66,13 @@ OWN: list[click.Parameter] = [
 
 
 def _work(
-    design: "Design", *, accuracy: float, model: str, no_cache: bool, sweep: str | None, jobs: int | None, **how: Any
-) -> int:
+    design: "Design", *, accuracy: float, model: str, no_cache: bool, frequency: tuple[float, ...] | None,
+    sweep: str | None, jobs: int | None, **how: Any,
+) -> int:  # fmt: skip
     from sensorgen.bounds import Asked
 
     _refuse_pairs(sweep, how)
-    asked = Asked(accuracy, model, not no_cache)
+    asked = Asked(accuracy, model, not no_cache, one("--frequency", frequency) if frequency else None)
     if sweep is None:
         return _one(design, asked, how)
     key, points = settings.sweep(sweep, design)
@@ -135,18 +156,31 @@ def _lines(data: Data, *, explain: bool) -> Iterator[str]:
         yield ""
     yield f"{data['design']}: {show.si(low * data['area_m2'], 'F')} to {show.si(high * data['area_m2'], 'F')}"
     yield f"{'per area':12}{low:.10g} to {high:.10g} F/m2"
+    if "loss_lower_f_per_m2" in data:
+        yield from _loss(data)
     yield f"{'apart by':12}{data['relative_width']:.2g} of their middle, {data['accuracy']:g} wanted"
     when = ", known from before" if data["known"] else ""
     yield f"{'model':12}{data['model']}, {data['seconds']:.2g} s{when}"
-    values = ", ".join(f"{v['material']} {v['value']:g} ({v['source']})" for v in data["values"])
-    yield f"{'with':12}relative permittivity of {values}"
+    for quantity in dict.fromkeys(v["quantity"] for v in data["values"]):
+        here = [v for v in data["values"] if v["quantity"] == quantity]
+        values = ", ".join(f"{v['material']} {v['value']:g} ({v['source']})" for v in here)
+        yield f"{'with':12}{QUANTITIES[quantity]} of {values}"
+
+
+def _loss(data: Data) -> Iterator[str]:
+    low, high = data["loss_lower_f_per_m2"], data["loss_upper_f_per_m2"]
+    at = f" at {show.si(data['frequency_hz'], 'Hz')}" if data["frequency_hz"] else ""
+    yield f"{'loss':12}{low:.10g} to {high:.10g} F/m2, minus the imaginary part{at}"
+    if data["tan_delta"]:
+        yield f"{'tan delta':12}{data['tan_delta'][0]:.6g} to {data['tan_delta'][1]:.6g}"
 
 
 def _print_plan(design: "Design", asked: "Asked") -> None:
-    from sensorgen import planner
+    from sensorgen import losses, planner
 
     click.echo(f"plan for an accuracy of {asked.width:g}")
-    for c in planner.weighed(design.in_use, asked.width, asked.model):
+    lossy = bool(losses.set_losses(design))
+    for c in planner.weighed(design.in_use, asked.width, asked.model, lossy):
         click.echo(f"  {c.model:10}{_expectation(vars(c)):28}{c.passed_over}".rstrip())
     click.echo("  the first that does is taken; cheap ones are asked first in any case")
 

@@ -11,7 +11,7 @@ from sensorgen.cli.words import Ratio
 from sensorgen.errors import UnknownName, Unwritable
 
 if TYPE_CHECKING:
-    from sensorgen.chart import Point
+    from sensorgen.chart.measured import Point
 
 FILES = ("chart.csv", "chart.png", "chart.html")
 
@@ -24,19 +24,20 @@ FILES = ("chart.csv", "chart.png", "chart.html")
 @click.option("--output", "-o", default="out/chart", show_default=True, metavar="DIR", help="Folder of the files.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was measured as JSON, too.")
 def command(scene: tuple[str, ...], budget: float, output: str, as_json: bool) -> None:
-    """Measure every model of capacitance on every standard scene.
+    """Measure every model of capacitance, and of the line, on every standard scene.
 
     Writes processor time against error, with the Pareto front marked: chart.png, chart.html to ask with the mouse,
-    and chart.csv. The scenes are cells whose capacitance is known from elsewhere.
+    and chart.csv. The scenes are cells and lines whose capacitance or impedance is known
+    from elsewhere.
     """
     from sensorgen import chart
     from sensorgen.plots.libraries import needed
 
     needed("matplotlib", "plotly")
     for name in scene:
-        if name not in chart.STANDARD:
-            raise UnknownName("standard scene", name, chart.STANDARD)
-    names = scene or tuple(chart.STANDARD)
+        if name not in chart.SCENES:
+            raise UnknownName("standard scene", name, chart.SCENES)
+    names = scene or chart.SCENES
     with show.progress(names) as step:
         points = chart.points(names, budget, step)
     _write(Path(output), points)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 Data = dict[str, Any]
 
-SYMBOLS = {"eps": "relative_permittivity", "nu": "poisson_ratio", "rho": "resistivity_ohm_m"}
+SYMBOLS = {"eps": "relative_permittivity", "loss": "loss_tangent", "nu": "poisson_ratio", "rho": "resistivity_ohm_m"}
 
 
 def pairs(words: tuple[str, ...], option: str) -> list[tuple[str, str]]:

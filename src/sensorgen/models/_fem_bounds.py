@@ -18,8 +18,6 @@ from sensorgen.errors import OutOfRange, SensorgenError
 from sensorgen.interval import Interval
 from sensorgen.scene import Scene
 
-Number = float | complex
-
 
 class CrossedBounds(SensorgenError):
     """A lower bound above its upper one: a fault of the solver, and no result."""
@@ -57,22 +55,22 @@ class Energies:
 
     Attributes
     ----------
-    lower, upper : complex or float
+    lower, upper : float
         By Thomson's and by Dirichlet's principle.
-    part : complex or float
+    part : float
         Of ``upper``: the energy weighted with how often each region occurs beyond the least.
     unknowns : int
         That the larger of the two systems couples.
     """
 
-    lower: Number
-    upper: Number
-    part: Number
+    lower: float
+    upper: float
+    part: float
     unknowns: int
 
 
 def energies(
-    mesh: Mesh, permittivity: Sequence[Number], weights: Sequence[float], order: int, flux_order: int
+    mesh: Mesh, permittivity: Sequence[float], weights: Sequence[float], order: int, flux_order: int
 ) -> Energies:
     """Solve both problems on triangles with polynomials of one order.
 
@@ -80,7 +78,7 @@ def energies(
     ----------
     mesh : Mesh
         Of a cell.
-    permittivity : list of float or complex
+    permittivity : list of float
         Relative, of each region [-].
     weights : list of float
         Of each region in ``part`` [-].
@@ -92,15 +90,71 @@ def energies(
     Unsolved
         The flux does not balance its energy.
     """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # elements are small: threads would only wait for each other
-    import ngsolve as ng
+    solved = Solved.of(mesh, permittivity, order, flux_order)
+    slope = solved.slope()
+    upper, part = solved.integrals(solved.eps * slope * slope, weights)
+    return Energies(solved.lower(), upper, part, solved.unknowns)
 
-    lossy = any(np.imag(e) != 0 for e in permittivity)
-    space = _ngsolve(mesh)
-    eps = ng.CoefficientFunction([complex(e) if lossy else float(np.real(e)) for e in permittivity])
-    upper, part = _potential(space, eps, weights, order, lossy)
-    lower, unknowns = _flux(space, eps, flux_order, lossy)
-    return Energies(lower, upper, part, unknowns)
+
+@dataclass(frozen=True)
+class Solved:
+    """Both fields on one mesh, in NGSolve's own form.
+
+    Attributes
+    ----------
+    space : ngsolve.Mesh
+        That they live on.
+    eps : ngsolve.CoefficientFunction
+        Relative permittivity [-].
+    potential, flux : ngsolve.GridFunction
+        The best of their orders; the flux runs down the potential.
+    into_top, flux_energy : float or complex
+        What flows into the electrode at 1 V, and the flux's energy, over eps0.
+    order, unknowns : int
+        Of the potential; that the larger of the two systems couples.
+    """
+
+    space: Any
+    eps: Any
+    potential: Any
+    flux: Any
+    into_top: Any
+    flux_energy: Any
+    order: int
+    unknowns: int
+
+    @classmethod
+    def of(cls, mesh: Mesh, permittivity: Sequence[complex], order: int, flux_order: int) -> "Solved":
+        """Solve for both; complex where a permittivity is."""
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # elements are small: threads would only wait for each other
+        import ngsolve as ng
+
+        lossy = any(isinstance(e, complex) for e in permittivity)
+        space = _ngsolve(mesh)
+        eps = ng.CoefficientFunction([complex(e) if lossy else float(np.real(e)) for e in permittivity])
+        potential = _potential(space, eps, order, lossy)
+        flux, into_top, energy, unknowns = _flux(space, eps, flux_order, lossy)
+        return cls(space, eps, potential, flux, into_top, energy, order, unknowns)
+
+    def lower(self) -> Any:
+        """Thomson's functional of the flux."""
+        return 2 * self.into_top - self.flux_energy
+
+    def slope(self) -> Any:
+        """Gradient of the potential."""
+        import ngsolve as ng
+
+        return ng.grad(self.potential)
+
+    def integrals(self, density: Any, weights: Sequence[float]) -> tuple[Any, Any]:
+        """Integral of a product of two fields, and with the weight of each region."""
+        import ngsolve as ng
+
+        order = 2 * self.order + _MORE
+        whole = ng.Integrate(density, self.space, order=order)
+        if not any(weights):
+            return whole, 0.0
+        return whole, ng.Integrate(ng.CoefficientFunction(list(weights)) * density, self.space, order=order)
 
 
 def third_electrode(scene: Scene) -> str | None:
@@ -131,14 +185,14 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
     CrossedBounds
         The lower bound lies above the upper one by more than rounding.
     """
-    below, above = float(np.real(found.lower)), float(np.real(found.upper))
+    below, above = found.lower, found.upper
     if not 0 < below <= above * (1 + ROUNDING):
         raise CrossedBounds(
             f"lower bound {below:.12g} above upper bound {above:.12g}: the solver failed on this scene; report it, "
             "and use --model columns meanwhile"
         )
     least, most = min(shares), max(shares)
-    part, off = np.sqrt(float(np.real(found.part))), np.sqrt((most - least) * max(above - below, 0.0))
+    part, off = np.sqrt(found.part), np.sqrt((most - least) * max(above - below, 0.0))
     lower = least * below + max(part - off, 0.0) ** 2
     upper = least * above + (part + off) ** 2
     return Interval(float(min(lower, upper) * (1 - ROUNDING)), float(upper * (1 + ROUNDING)))
@@ -168,8 +222,8 @@ def _ngsolve(mesh: Mesh) -> Any:
     return ng.Mesh(made)
 
 
-def _potential(space: Any, eps: Any, weights: Sequence[float], order: int, lossy: bool) -> tuple[Number, Number]:
-    """Least energy of a potential, and its weighted part."""
+def _potential(space: Any, eps: Any, order: int, lossy: bool) -> Any:
+    """The potential of least energy, or where it is stationary."""
     import ngsolve as ng
 
     fes = ng.H1(space, order=order, dirichlet="top|bottom", complex=lossy)
@@ -178,15 +232,13 @@ def _potential(space: Any, eps: Any, weights: Sequence[float], order: int, lossy
     found = ng.GridFunction(fes)
     found.Set(ng.CF(1), definedon=space.Boundaries("top"))
     _solve(form, found)
-    density = eps * ng.grad(found) * ng.grad(found)
-    whole = ng.Integrate(density, space, order=2 * order + _MORE)
-    if not any(weights):
-        return whole, 0.0
-    return whole, ng.Integrate(ng.CoefficientFunction(list(weights)) * density, space, order=2 * order + _MORE)
+    return found
 
 
-def _flux(space: Any, eps: Any, order: int, lossy: bool) -> tuple[Number, int]:
-    """Most that Thomson's functional reaches, by fluxes that facets' potentials keep continuous.
+def _flux(space: Any, eps: Any, order: int, lossy: bool) -> tuple[Any, Any, Any, int]:
+    """The flux at which Thomson's functional is most, what flows into the top, its energy, and the shared unknowns.
+
+    Facets' potentials keep it continuous.
 
     The sign makes what is left after the elements' own unknowns positive definite.
     """
@@ -213,7 +265,7 @@ def _flux(space: Any, eps: Any, order: int, lossy: bool) -> tuple[Number, int]:
             f"flux {into_top:.9g} and its energy {energy:.9g} differ (order {order}): the solver failed on this scene; "
             "use --model columns"
         )
-    return 2 * into_top - energy, facet.ndof
+    return field, into_top, energy, facet.ndof
 
 
 _MORE = 2  # orders of quadrature beyond twice the polynomials'

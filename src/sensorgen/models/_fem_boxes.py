@@ -64,19 +64,19 @@ class Element:
         found: Ints = flat * 3 + self.numbers[:, 3]
         return found
 
-    def condensed(self, scale: NDArray[np.float64 | np.complex128]) -> NDArray[np.float64 | np.complex128]:
-        """Energy of the shared unknowns when those inside have found their best values, of boxes of three scales."""
+    def condensed(self, scale: Array) -> Array:
+        """Energy of the shared unknowns when those inside have found their best values, of a box of three scales."""
         shared, coupling, inner = (
             sum(s * g for s, g in zip(scale, of, strict=True)) for of in (self.outer, self.coupling, self.inner)
         )
-        found: NDArray[np.float64 | np.complex128] = shared - coupling.T @ (coupling / inner[:, None])
+        found: Array = shared - coupling.T @ (coupling / inner[:, None])
         return found
 
 
 @cache
 def potential(order: int) -> Element:
     """Continuous polynomials of an order: what they minimise lies above."""
-    stiffness, mass = _modes(order)
+    stiffness, mass, _ = _modes(order)
     pair = (stiffness, mass)
     places = np.indices((order + 1,) * 3).reshape(3, -1).T
     ends = places < 2
@@ -99,19 +99,26 @@ def _product(factors: list[Array]) -> Array:
     return np.kron(np.kron(first, second), third)
 
 
-def _modes(order: int) -> tuple[Array, Array]:
-    """Stiffness and mass of two straight hats and of modes that vanish at both ends, which diagonalise both."""
+def _modes(order: int) -> tuple[Array, Array, Array]:
+    """Stiffness and mass of two straight hats and of modes that vanish at both ends and diagonalise both; the modes."""
     at, weight = np.polynomial.legendre.leggauss(order + 1)
-    legendre = np.polynomial.legendre.legvander(at, order)
+    value = _values(order, at)
     degree = np.arange(2, order + 1)
-    norm = np.sqrt(4 * degree - 2)
-    bubbles = (legendre[:, degree] - legendre[:, degree - 2]) / norm
-    value = np.column_stack([(1 - at) / 2, (1 + at) / 2, bubbles])
-    slope = np.column_stack([-0.5 + 0 * at, 0.5 + 0 * at, legendre[:, degree - 1] * (2 * degree - 1) / norm])
+    legendre = np.polynomial.legendre.legvander(at, order)
+    rising = legendre[:, degree - 1] * (2 * degree - 1) / np.sqrt(4 * degree - 2)
+    slope = np.column_stack([-0.5 + 0 * at, 0.5 + 0 * at, rising])
     stiffness, mass = (v.T @ (weight[:, None] * v) for v in (slope, value))
     turn = np.eye(order + 1)
     turn[2:, 2:] = np.linalg.eigh(mass[2:, 2:]).eigenvectors  # the bubbles' stiffness is 1
-    return turn.T @ stiffness @ turn, turn.T @ mass @ turn
+    return turn.T @ stiffness @ turn, turn.T @ mass @ turn, turn
+
+
+def _values(order: int, at: Array) -> Array:
+    """Two straight hats, and bubbles of degree 2 and more, at some places."""
+    legendre = np.polynomial.legendre.legvander(at, order)
+    degree = np.arange(2, order + 1)
+    bubbles = (legendre[:, degree] - legendre[:, degree - 2]) / np.sqrt(4 * degree - 2)
+    return np.column_stack([(1 - at) / 2, (1 + at) / 2, bubbles])
 
 
 @cache
@@ -133,6 +140,38 @@ def flux(order: int) -> Element:
         numbers[rows, axis], numbers[rows[:, None], across], numbers[rows, 3] = side * n, pair.T, axis
     one = np.tile(2.0 * np.outer(turn[0], turn[0]).ravel(), 6)
     return Element(_three(outer), _three(coupling), _three(squares[inside]), one, numbers, n)
+
+
+@cache
+def traces(order: int, flux_order: int) -> Array:
+    """What fluxes feel of potentials: moments of :func:`potential` with the functions on the faces of :func:`flux`.
+
+    Parameters
+    ----------
+    order, flux_order : int
+        Of both elements.
+
+    Returns
+    -------
+    (f, b) array
+        Of a potential's shared unknowns, its moments on six faces. With the moments of a flux, which G gives of its own
+        unknowns, their product is the integral of the potential's gradient along the flux.
+    """
+    at, weight = np.polynomial.legendre.leggauss(order + flux_order + 2)
+    modes = _values(order, at) @ _modes(order)[2]
+    _, _, _, turn = _worked_out(flux_order)
+    n = flux_order + 1
+    legendre = np.polynomial.legendre.legvander(at, flux_order) * np.sqrt(np.arange(n) + 0.5)
+    along = (legendre @ turn).T @ (weight[:, None] * modes)
+    places = np.indices((order + 1,) * 3).reshape(3, -1).T
+    places = places[(places < 2).any(1)]
+    found = np.zeros((6 * n * n, len(places)))
+    for axis, side in np.ndindex(3, 2):
+        here = np.flatnonzero(places[:, axis] == side)
+        first, second = (along[:, places[here, a]] for a in range(3) if a != axis)
+        face = (2 * axis + side) * n * n
+        found[face : face + n * n, here] = (first[:, None] * second[None]).reshape(n * n, -1)
+    return found
 
 
 def _worked_out(order: int) -> tuple[Array, Array, Array, Array]:

@@ -4,7 +4,7 @@ A block of boxes is halved until one box is left. Going back, two halves are add
 eliminated at once, by dense algebra. What remains at the end is one number: the energy at 1 V.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -160,14 +160,14 @@ def _taken(inner: Matrix, coupling: Matrix) -> Matrix:
     return taken
 
 
-def energies_of(elements: Elements, values: dict[int, Any], weights: Sequence[float]) -> Any:
-    """Energy of all boxes at given unknowns, each counted by its weight."""
-    total: Any = 0.0
-    for box, weight in enumerate(weights):
-        if weight:
-            here = np.where(elements.held[box] == 1, elements.one, 0.0).astype(object)
-            free = np.isnan(elements.held[box])
-            here[free] = [values[k] for k in elements.keys[box][free].tolist()]
-            field_here = here.astype(complex if any(isinstance(v, complex) for v in here) else float)
-            total += weight * (field_here @ elements.energy(box) @ field_here)
-    return total
+def unknowns_of(elements: Elements, values: dict[int, Any]) -> Matrix:
+    """The unknowns of each box, (n, b), from all by their key."""
+    found = np.where(elements.held == 1, elements.one, 0.0).astype(np.result_type(*values.values()))
+    free = np.isnan(elements.held)
+    found[free] = [values[k] for k in elements.keys[free].tolist()]
+    return found
+
+
+def energies_of(elements: Elements, unknowns: Matrix) -> NDArray[Any]:
+    """Energy of each box at given unknowns, (n,)."""
+    return np.array([here @ elements.energy(box) @ here for box, here in enumerate(unknowns)])

@@ -7,14 +7,16 @@ distance of the bounds falls exponentially. See docs/cells.md.
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
+from typing import TypeVar
 
 import numpy as np
 
 from sensorgen.cells import cell
-from sensorgen.interval import Interval
+from sensorgen.interval import Disc, Interval
 from sensorgen.models import _fem_bounds as fem
 from sensorgen.models._fem_corners import exponents
 from sensorgen.models._fem_grading import graded
+from sensorgen.models._fem_lossy import Fields, Turned, disc, turned
 from sensorgen.models._fem_triangles import TERMINALS, Triangles, triangles
 from sensorgen.scene import Scene
 from sensorgen.sections import Section, sections
@@ -30,6 +32,7 @@ _ORDERS = (4, 20)  # of polynomials: the lowest and the highest
 _CORNER_SHARE = 0.01  # of the wanted width: what may stay unresolved at a corner
 _SMALLEST_SHARE = 1e-12
 _GAIN = 1.2  # by which an order lowers the width, in e-folds, as measured
+_STEP = 2  # of orders, where the field is complex
 _STALLED = 0.7  # a step that leaves more of the width than this gains nothing
 
 
@@ -114,7 +117,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     section, coarse = _triangles(scene)
     values = {material: permittivity[material] for material, _ in coarse.regions}
     mesh = graded(coarse, exponents(coarse, values), max(_CORNER_SHARE * width, _SMALLEST_SHARE))
-    last, order = np.inf, int(np.clip(round(2.3 - 1.25 * np.log10(width)), *_ORDERS))
+    last, order = np.inf, _first(width)
     while order <= _ORDERS[1]:
         try:
             interval, unknowns = _solved(mesh, values, order)
@@ -132,51 +135,72 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
         order, last = order + _more(here.width(), width), here.width()
 
 
+def _first(width: float) -> int:
+    """The order to begin with, as measured."""
+    return int(np.clip(round(2.3 - 1.25 * np.log10(width)), *_ORDERS))
+
+
 def _more(now: float, width: float) -> int:
     """How many orders to add for a width, when the last had another; 4 at most."""
     return int(np.clip(np.ceil(np.log(now / width) / _GAIN), 1, 4))
 
 
-def estimate(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDTH) -> tuple[complex, float]:
-    r"""Complex capacitance where materials lose or leak, and how far it may be off.
-
-    :math:`\varepsilon = \varepsilon' (1 - j\tan\delta) - j\sigma / (\omega\varepsilon_0)`. Neither principle bounds a
-    complex value; both fields are stationary there, and half of their distance is the estimated error.
+def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDTH) -> Disc:
+    r"""Complex capacitance where materials lose or leak, between the terminals.
 
     Parameters
     ----------
     scene : Scene
         As drawn, for which :func:`unfit` is None.
     permittivity : mapping of str to complex
-        Relative permittivity of each material between the electrodes, and of "air"; real part above 0 [-].
+        Relative permittivity of each material between the electrodes, and of "air"; real part above 0,
+        :math:`\varepsilon' (1 - j\tan\delta) - j / (\omega\varepsilon_0\varrho)` [-].
     width : float
-        Distance of both values that is wanted, relative to their middle [-].
+        How wide the disc may be, relative to its centre's modulus; wider where doubles or orders end [-].
 
     Returns
     -------
-    (complex, float)
-        Capacitance of the whole sensor, and its estimated error [F].
+    Disc
+        Capacitance of the whole sensor [F]; see :mod:`sensorgen.models._fem_lossy`.
 
     Raises
     ------
-    OutOfRange, KeyError, ValueError
+    OutOfRange, KeyError, ValueError, Unsolved
         As :func:`capacitance`.
     """
     fem.check(permittivity, width)
     section, coarse = _triangles(scene)
-    moduli = {material: abs(permittivity[material]) for material, _ in coarse.regions}
+    values = {material: complex(permittivity[material]) for material, _ in coarse.regions}
+    turn = turned(values.values())
+    moduli = {material: abs(value) for material, value in values.items()}
     mesh = graded(coarse, exponents(coarse, moduli), max(_CORNER_SHARE * width, _SMALLEST_SHARE))
-    best, error = 0j, np.inf
-    for order in range(_ORDERS[0], _ORDERS[1] + 1, 2):
-        found = _energies(mesh, permittivity, order)
-        least = min(share for _, share in mesh.regions)
-        middle, off = least * (found.lower + found.upper) / 2 + found.part, abs(found.upper - found.lower) / 2 * least
-        if off < error:
-            best, error = complex(middle), float(off)
-        if 2 * error <= width * abs(best):
+    best = _disc(mesh, values, turn, _first(width))
+    for order in range(_first(width) + _STEP, _ORDERS[1] + 1, _STEP):
+        if best.width() <= width:
             break
-    scale = EPS0_F_PER_M * M_PER_MM * section.depth_mm
-    return best * scale, error * scale
+        try:
+            found = _disc(mesh, values, turn, order)
+        except fem.Unsolved:
+            break  # doubles end here: what was solved before stands
+        gain = found.width() / best.width()
+        best = min(best, found, key=Disc.width)
+        if gain > _STALLED:
+            break
+    return best.times(EPS0_F_PER_M * M_PER_MM * section.depth_mm)
+
+
+def _disc(mesh: Triangles, permittivity: Mapping[str, complex], turn: Turned, order: int) -> Disc:
+    import ngsolve as ng
+
+    names, eps, weights = _by_region(mesh, permittivity)
+    solved = fem.Solved.of(_for_ngsolve(mesh, names), eps, order, order - 1)
+    rho = ng.CoefficientFunction([turn.weight[e] for e in eps])
+    slope, missed = solved.slope(), solved.eps * solved.slope() + solved.flux
+    energy, part = solved.integrals(solved.eps * slope * slope, weights)
+    _, size = solved.integrals((rho * slope * ng.Conj(slope)).real, weights)
+    apart, _ = solved.integrals((missed * ng.Conj(missed)).real / rho, ())
+    found = Fields(solved.lower(), energy, part, size, apart, solved.unknowns)
+    return disc(found, turn, [share for _, share in mesh.regions])
 
 
 def _triangles(scene: Scene) -> tuple[Section, Triangles]:
@@ -192,16 +216,27 @@ def _solved(mesh: Triangles, permittivity: Mapping[str, float], order: int) -> t
     return fem.whole(found, [share for _, share in mesh.regions]), found.unknowns
 
 
-def _energies(mesh: Triangles, permittivity: Mapping[str, complex], order: int) -> fem.Energies:
+def _energies(mesh: Triangles, permittivity: Mapping[str, float], order: int) -> fem.Energies:
+    names, eps, weights = _by_region(mesh, permittivity)
+    return fem.energies(_for_ngsolve(mesh, names), eps, weights, order, order - 1)
+
+
+_Region = tuple[str, float]
+_Number = TypeVar("_Number", float, complex)
+
+
+def _by_region(mesh: Triangles, values: Mapping[str, _Number]) -> tuple[list[_Region], list[_Number], list[float]]:
+    """All regions, and of each its permittivity, and how often it occurs beyond the least."""
     names = sorted(set(mesh.regions))
     least = min(share for _, share in names)
+    return names, [values[m] for m, _ in names], [s - least for _, s in names]
+
+
+def _for_ngsolve(mesh: Triangles, names: list[_Region]) -> fem.Mesh:
     edges = {name: [e for e, end in mesh.terminals.items() if end == name] for name in TERMINALS}
-    ngsolve_mesh = fem.Mesh(
+    return fem.Mesh(
         mesh.points,
         np.array(mesh.triangles, dtype=np.int32),
         np.array([names.index(r) for r in mesh.regions], dtype=np.int32),
         {name: np.array(found, dtype=np.int32) for name, found in edges.items()},
-    )
-    return fem.energies(
-        ngsolve_mesh, [permittivity[m] for m, _ in names], [s - least for _, s in names], order, order - 1
     )

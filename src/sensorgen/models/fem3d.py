@@ -5,16 +5,18 @@ boxes all matrices are known in closed form, and elimination from the inside out
 docs/cells.md.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sensorgen.interval import Interval
+from sensorgen.interval import Disc, Interval
 from sensorgen.models import _fem_bounds as fem
-from sensorgen.models._fem_boxes import Element, flux, potential
+from sensorgen.models._fem_boxes import Element, flux, potential, traces
 from sensorgen.models._fem_bricks import Grid, grid, layered
-from sensorgen.models._fem_dissection import Elements, energies_of, least
+from sensorgen.models._fem_dissection import Elements, energies_of, least, unknowns_of
+from sensorgen.models._fem_lossy import Fields, Turned, disc, turned
 from sensorgen.scene import Scene
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
@@ -110,8 +112,89 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
             return
 
 
-def _least(fine: Grid, values: list[float], kind: Element) -> tuple[float, float, int]:
+def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDTH) -> Disc:
+    """Complex capacitance where materials lose or leak, between the terminals.
+
+    Parameters
+    ----------
+    scene : Scene
+        As drawn, for which :func:`unfit` is None.
+    permittivity : mapping of str to complex
+        As of :func:`sensorgen.models.fem2d.lossy` [-].
+    width : float
+        How wide the disc may be, relative to its centre's modulus; it is wider where the finest mesh is reached [-].
+
+    Returns
+    -------
+    Disc
+        Capacitance of the whole sensor [F]; see :mod:`sensorgen.models._fem_lossy`.
+
+    Raises
+    ------
+    OutOfRange, KeyError, ValueError
+        As :func:`capacitance`.
+    """
+    fem.check(permittivity, width)
+    coarse = grid(scene)
+    values = [0j, 0j, *(complex(permittivity[name]) for name in coarse.names[2:])]
+    turn = turned(values[2:])
+    found = []
+    for layers, order, flux_order in _RUNGS:
+        fine = layered(coarse, [abs(v) for v in values], layers)
+        found.append(disc(_fields(fine, values, turn, order, flux_order), turn, fine.shares.ravel().tolist()))
+        if found[-1].width() <= width:
+            break
+    return min(found, key=Disc.width).times(EPS0_F_PER_M * M_PER_MM)
+
+
+def _least(fine: Grid, values: Sequence[float], kind: Element) -> tuple[float, float, int]:
     """Energy at 1 V over eps0, its part in columns that occur more often than others, and the unknowns."""
+    boxes = _boxes(fine, values, kind)
+    solved = least(boxes.elements, keep=bool(boxes.more.any()))
+    part = (
+        boxes.more @ energies_of(boxes.elements, unknowns_of(boxes.elements, solved.values())) if solved.steps else 0.0
+    )
+    return float(solved.energy), float(part), boxes.unknowns()
+
+
+def _fields(fine: Grid, values: Sequence[complex], turn: Turned, order: int, flux_order: int) -> Fields:
+    r"""Potential and flux, and how far they are apart, :math:`\int |\varepsilon \nabla u - D|^2 / \rho`."""
+    upper, lower = (_boxes(fine, values, kind) for kind in (potential(order), flux(flux_order)))
+    solved = [least(boxes.elements, keep=True) for boxes in (upper, lower)]
+    u, level = (unknowns_of(b.elements, s.values()) for b, s in zip((upper, lower), solved, strict=True))
+    seen = traces(order, flux_order)
+    squares, apart = np.empty(len(u)), np.empty(len(u))
+    for box, (here, there) in enumerate(zip(u, level, strict=True)):
+        into, out = upper.shape(box) @ here, lower.shape(box) @ there
+        squares[box] = (here.conj() @ into).real
+        apart[box] = squares[box] - 2 * ((seen @ here) @ out.conj()).real + (there.conj() @ out).real
+    rho = np.array([turn.weight[eps] for eps in upper.eps.tolist()])
+    energies = energies_of(upper.elements, u)
+    return Fields(
+        solved[1].energy, energies.sum(), upper.more @ energies, float(upper.more @ (rho * squares)),
+        max(float((abs(upper.eps) ** 2 / rho) @ apart), 0.0), max(upper.unknowns(), lower.unknowns()),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Boxes:
+    """All boxes between the electrodes as elements of one kind.
+
+    ``eps`` (n,), relative permittivity; ``more`` (n,), how often each occurs beyond the least; ``shape`` gives the
+    matrix of a box for a permittivity of 1.
+    """
+
+    elements: Elements
+    eps: NDArray[np.float64 | np.complex128]
+    more: NDArray[np.float64]
+    shape: Callable[[int], NDArray[np.float64]]
+
+    def unknowns(self) -> int:
+        """How many the boxes share."""
+        return len(np.unique(self.elements.keys[np.isnan(self.elements.held)]))
+
+
+def _boxes(fine: Grid, values: Sequence[complex], kind: Element) -> _Boxes:
     boxes = np.argwhere(fine.fill > 1)
     count = np.array(fine.fill.shape)
     keys = kind.keys(boxes, count)
@@ -120,9 +203,11 @@ def _least(fine: Grid, values: list[float], kind: Element) -> tuple[float, float
         held[np.isin(keys, kind.keys(np.argwhere(fine.fill == code), count))] = value
     eps = np.array(values)[fine.fill[tuple(boxes.T)]]
     edges = np.column_stack([np.diff(p)[boxes[:, axis]] for axis, p in enumerate(fine.planes_mm)])
-    scales = eps[:, None] * edges.prod(1)[:, None] / (2 * edges**2)
-    elements = Elements(boxes, keys, held, kind.one, lambda box: kind.condensed(scales[box]))
+    scales = edges.prod(1)[:, None] / (2 * edges**2)
+
+    def shape(box: int) -> NDArray[np.float64]:
+        return kind.condensed(scales[box])
+
+    elements = Elements(boxes, keys, held, kind.one, lambda box: eps[box] * shape(box))
     more = fine.shares[boxes[:, 0], boxes[:, 1]] - fine.shares.min()
-    solved = least(elements, keep=bool(more.any()))
-    part = energies_of(elements, solved.values(), more.tolist()) if more.any() else 0.0
-    return float(solved.energy), part, len(np.unique(keys[np.isnan(held)]))
+    return _Boxes(elements, eps, more, shape)

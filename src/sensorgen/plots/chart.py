@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from sensorgen.chart import Point
+from sensorgen.chart.measured import Point
 from sensorgen.plots.panels import png as written
 
 if TYPE_CHECKING:
@@ -32,8 +32,8 @@ def png(points: Sequence[Point]) -> bytes:
     bounded = {p.model for p in points if p.bounded}
     keys = [
         Line2D(
-            [], [], linestyle="", marker=_MARKERS[k % 9], color=_COLOURS[k % 9], mfc=None if m in bounded else "none",
-            label=m,
+            [], [], linestyle="", marker=_marker(_MARKERS, k), color=_COLOURS[k % 9],
+            mfc=None if m in bounded else "none", label=m,
         )
         for k, m in enumerate(models)
     ]  # fmt: skip
@@ -49,7 +49,7 @@ def _panel(panel: "Axes", scene: str, points: Sequence[Point], models: Sequence[
         here = [p for p in points if p.model == model]
         if here:
             panel.plot(
-                [p.seconds for p in here], [p.error for p in here], _MARKERS[k % 9], color=_COLOURS[k % 9], ms=6,
+                [p.seconds for p in here], [p.error for p in here], _marker(_MARKERS, k), color=_COLOURS[k % 9], ms=6,
                 mfc=None if here[0].bounded else "none", ls="-" if len(here) > 1 else "", lw=0.8,
             )  # fmt: skip
     front = list(_steps([p for p in points if p.front]))
@@ -57,6 +57,11 @@ def _panel(panel: "Axes", scene: str, points: Sequence[Point], models: Sequence[
     panel.set(xscale="log", yscale="log", title=scene, xlabel=_TIME, ylabel=_ERROR)
     panel.tick_params(labelbottom=True, labelleft=True)
     panel.grid(alpha=0.25)
+
+
+def _marker(markers: Sequence[str], k: int) -> str:
+    """A mark that no other model of the same colour has."""
+    return markers[(k + k // len(_COLOURS)) % len(markers)]
 
 
 def _steps(front: Sequence[Point]) -> Iterator[tuple[float, float]]:
@@ -91,23 +96,20 @@ def html(points: Sequence[Point]) -> str:
     figure.update_xaxes(type="log", title_text=_TIME, exponentformat="power", dtick=1)
     figure.update_yaxes(type="log", title_text=_ERROR, exponentformat="power", dtick=2)
     figure.update_layout(
-        title={"text": "Speed against accuracy of every model of a cell's capacitance"},
+        title={"text": "Speed against accuracy of every model"},
         height=120 + 400 * rows, template="plotly_white", legend={"groupclick": "togglegroup"},
     )  # fmt: skip
     return str(figure.to_html(include_plotlyjs=True, div_id="chart", config={"displaylogo": False, "responsive": True}))
 
 
 def _marks(points: Sequence[Point], k: int, first: bool) -> dict[str, Any]:
-    said = [
-        f"{p.lower_f_per_m2:.9g} to {p.upper_f_per_m2:.9g} F/m²" if p.bounded else f"{p.lower_f_per_m2:.9g} F/m²"
-        for p in points
-    ]
     hollow = "" if points[0].bounded else "-open"
     symbols = ("circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x", "star", "hexagon")
     return {
-        "x": [p.seconds for p in points], "y": [p.error for p in points], "customdata": said, "name": points[0].model,
+        "x": [p.seconds for p in points], "y": [p.error for p in points], "customdata": [p.said for p in points],
+        "name": points[0].model,
         "mode": "lines+markers" if len(points) > 1 else "markers", "legendgroup": points[0].model, "showlegend": first,
-        "marker": {"color": _COLOURS[k % 9], "symbol": symbols[k % 9] + hollow, "size": 9},
+        "marker": {"color": _COLOURS[k % 9], "symbol": _marker(symbols, k) + hollow, "size": 9},
         "line": {"width": 1, "color": _COLOURS[k % 9]},
         "hovertemplate": f"{points[0].model}<br>error %{{y:.3g}} in %{{x:.3g}} s<br>%{{customdata}}<extra></extra>",
     }  # fmt: skip

@@ -1,24 +1,19 @@
-"""Speed against accuracy: every model of a cell's capacitance on every standard scene, timed and held against truth.
-
-Times are the processor's, imports left out, so that a busy machine shows nearly what an idle one does.
-"""
+"""Models of a cell's capacitance on scenes whose capacitance is known."""
 
 import math
-import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 from sensorgen import design as designs
 from sensorgen import planner
+from sensorgen.chart.measured import Point, timed
 from sensorgen.design import Design
 from sensorgen.interval import Interval
 from sensorgen.models import thesis_cells
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
 _LEAST_WIDTH = 1e-9  # that is asked of a model
-_QUICK_S = 0.3  # runs shorter than this are repeated, and the median counts
-_REPEATS = 5
 _DEARER = 10.0  # by how much the next accuracy may cost more than the last
 
 
@@ -56,59 +51,19 @@ STANDARD = {
 }
 
 
-@dataclass(frozen=True)
-class Point:
-    """What one model gave on one scene.
-
-    Attributes
-    ----------
-    scene, model : str
-        Names.
-    wanted : float or None
-        Width of the bounds that was asked for [-]; None where the model cannot be asked.
-    lower_f_per_m2, upper_f_per_m2 : float
-        Its bounds; equal for a formula that gives none [F/m2].
-    bounded : bool
-        Whether the truth must lie between them.
-    error : float
-        Relative distance from what is known, of the bound that is further off; no less than the reference's own [-].
-    seconds : float
-        Time of the processor [s].
-    front : bool
-        Whether nothing is quicker and at least as near.
-    """
-
-    scene: str
-    model: str
-    wanted: float | None
-    lower_f_per_m2: float
-    upper_f_per_m2: float
-    bounded: bool
-    error: float
-    seconds: float
-    front: bool = False
-
-
-def points(scenes: Sequence[str], budget_s: float, started: Callable[[str], None]) -> list[Point]:
-    """Measure every model on the scenes that are named.
+def points(name: str, budget_s: float) -> list[Point]:
+    """Measure every model that can speak of a scene.
 
     Parameters
     ----------
-    scenes : sequence of str
+    name : str
         Of ``STANDARD``.
     budget_s : float
         A model is not asked for more where that would take longer, ten times the last one taken as a guess [s].
-    started : callable
-        Called with each scene's name before it is measured.
     """
     planner.load_solver()
-    found = []
-    for name in scenes:
-        started(name)
-        design = designs.make(STANDARD[name].data)
-        here = [*_formulas(name, design), *_bounds(name, design, budget_s)]
-        found += _with_front(here)
-    return found
+    design = designs.make(STANDARD[name].data)
+    return [*_formulas(name, design), *_bounds(name, design, budget_s)]
 
 
 def _bounds(name: str, design: Design, budget_s: float) -> Iterator[Point]:
@@ -127,12 +82,12 @@ def _rungs(
 ) -> Iterator[tuple[float | None, Interval, float]]:
     """Width that was asked for, bounds and seconds; each time for a decade less than was reached."""
     if not hasattr(module, "WIDTH"):
-        yield (None, *_timed(lambda: work(*given)))
+        yield (None, *timed(lambda: work(*given)))
         return
     wanted, last = 0.1, math.inf
     while wanted >= _LEAST_WIDTH * (1 - 1e-6):
         asked = wanted
-        interval, seconds = _timed(lambda asked=asked: work(*given, asked))  # type: ignore[misc]
+        interval, seconds = timed(lambda asked=asked: work(*given, asked))  # type: ignore[misc]
         width = interval.width()
         if width >= last:
             return
@@ -142,22 +97,12 @@ def _rungs(
         wanted, last = 10.0 ** math.ceil(math.log10(width) - 1), width
 
 
-def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    """What some work gives, and the processor's time for it: the median of several runs of quick work [s]."""
-    taken: list[float] = []
-    while len(taken) < _REPEATS and sum(taken) < _QUICK_S:
-        start = time.process_time()
-        found = work()
-        taken.append(time.process_time() - start)
-    return found, sorted(taken)[len(taken) // 2]
-
-
 def _formulas(name: str, design: Design) -> Iterator[Point]:
     """The thesis's formulas for this shape."""
     eps = next(t.value for t in planner.permittivities(design) if t.material == "x60")
     for model, (shape, formula) in thesis_cells.NAMED.items():
         if shape == design.shape:
-            value, seconds = _timed(lambda formula=formula: formula(design.params, eps))  # type: ignore[misc]
+            value, seconds = timed(lambda formula=formula: formula(design.params, eps))  # type: ignore[misc]
             yield _point(name, model, None, Interval(value, value), False, seconds)
 
 
@@ -165,13 +110,5 @@ def _point(scene: str, model: str, wanted: float | None, found: Interval, bounde
     standard = STANDARD[scene]
     off = [abs(bound / standard.capacitance_f_per_m2 - 1) for bound in (found.lower, found.upper)]
     error = max(*off, standard.known_to)
-    return Point(scene, model, wanted, found.lower, found.upper, bounded, error, seconds)
-
-
-def _with_front(found: Sequence[Point]) -> list[Point]:
-    """Points by time, those marked than which none is quicker and at least as near."""
-    ordered, best = [], math.inf
-    for point in sorted(found, key=lambda p: (p.seconds, p.error)):
-        ordered.append(replace(point, front=point.error < best))
-        best = min(best, point.error)
-    return ordered
+    said = f"{found.lower:.9g} to {found.upper:.9g} F/m²" if bounded else f"{found.lower:.9g} F/m²"
+    return Point(scene, model, error, seconds, said, bounded, wanted, found.lower, found.upper)

@@ -1,0 +1,31 @@
+"""Speed against accuracy: every model on every standard scene, timed and held against the truth.
+
+Times are the processor's, imports left out, so that a busy machine shows nearly what an idle one does.
+"""
+
+from collections.abc import Callable, Sequence
+
+from sensorgen.chart import cells, lines
+from sensorgen.chart.measured import Point, with_front
+
+SCENES = (*cells.STANDARD, *lines.STANDARD)
+
+
+def points(scenes: Sequence[str], budget_s: float, started: Callable[[str], None]) -> list[Point]:
+    """Measure every model on the scenes that are named.
+
+    Parameters
+    ----------
+    scenes : sequence of str
+        Of ``SCENES``.
+    budget_s : float
+        A model is not asked for more where that would take longer [s].
+    started : callable
+        Called with each scene's name before it is measured.
+    """
+    found = []
+    for name in scenes:
+        started(name)
+        here = cells.points(name, budget_s) if name in cells.STANDARD else lines.points(name, budget_s)
+        found += with_front(here)
+    return found

@@ -1,0 +1,86 @@
+"""``sensorgen cell`` where a dielectric loses or leaks: plates in closed form, in words, in tables, and refused."""
+
+import csv
+import io
+import json
+import math
+
+import pytest
+
+from sensorgen.units import EPS0_F_PER_M
+
+pytest.importorskip("ngsolve", reason="the extra fem is not installed")
+
+PLATE_F_PER_M2 = EPS0_F_PER_M * 4.68 / 0.6e-3
+
+
+def answer(said):
+    assert said.code == 0, said.err
+    return json.loads(said.out)
+
+
+def middle(found):
+    return (found["loss_lower_f_per_m2"] + found["loss_upper_f_per_m2"]) / 2
+
+
+def test_a_plate_loses_what_its_dielectric_does(run):
+    found = answer(run("cell", "reference", "--set", "loss_x60=0.02", "--json", "--accuracy", "1e-6"))
+    assert found["lower_f_per_m2"] <= PLATE_F_PER_M2 <= found["upper_f_per_m2"]
+    assert middle(found) == pytest.approx(0.02 * PLATE_F_PER_M2, rel=1e-6, abs=0)
+    assert found["tan_delta"] == pytest.approx([0.02, 0.02], rel=1e-4)
+    assert {v["quantity"]: v["value"] for v in found["values"] if v["material"] == "x60"} == {
+        "relative_permittivity": 4.68,
+        "loss_tangent": 0.02,
+    }
+
+
+def test_a_plate_leaks_by_its_frequency(run):
+    """G = sigma A / d beside C: minus Im C = G / omega."""
+    words = ("cell", "reference", "--set", "resistivity_x60=1e6", "--json", "--accuracy", "1e-6", "--frequency")
+    for typed, hertz in (("1.1kHz", 1100.0), ("50", 50.0)):
+        found = answer(run(*words, typed))
+        assert middle(found) == pytest.approx(1 / (1e6 * 0.6e-3) / (2 * math.pi * hertz), rel=1e-6, abs=0)
+        assert found["frequency_hz"] == hertz
+
+
+def test_lossless_designs_say_nothing_of_losses(run):
+    assert "loss_lower_f_per_m2" not in answer(run("cell", "reference", "--json", "--frequency", "1kHz"))
+
+
+def test_it_is_kept_and_known(run):
+    words = ("cell", "tri", "--set", "loss_x60=0.05", "--accuracy", "1e-5", "--json")
+    first, second = answer(run(*words)), answer(run(*words))
+    assert (first["known"], second["known"]) == (False, True)
+    assert second["tan_delta"] == first["tan_delta"]
+    assert not answer(run(*words[:3], "loss_x60=0.06", *words[4:]))["known"]
+
+
+def test_in_words_and_planned(run):
+    said = run("cell", "tri", "--set", "loss_x60=0.05", "--explain").out
+    assert "minus the imaginary part" in said
+    assert "loss tangent of x60 0.05 (set by the user)" in said
+    assert "columns" in said
+    assert "it knows no losses" in said
+
+
+def test_a_sweep_has_the_losses_too(run):
+    said = run("cell", "tri", "--sweep", "loss_x60=0.01,0.02", "--jobs", 1, "--csv", "--accuracy", "1e-5")
+    low, high = csv.DictReader(io.StringIO(said.out))
+    assert float(high["loss_lower_f_per_m2"]) / float(low["loss_lower_f_per_m2"]) == pytest.approx(2, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--set", "resistivity_x60=1e6"), "--frequency 1.1kHz"),
+        (("--set", "loss_x60=-0.1"), "expected a number above 0"),
+        (("--set", "loss_x60=0.1", "--model", "columns"), "it knows no losses"),
+        (("--set", "loss_x60=0.1", "--model", "thesis-3.35"), "knows no losses"),
+        (("--set", "loss_x60=0.1", "--frequency", "1kHz,2kHz"), "expected one"),
+        (("--set", "loss_x60=0.1", "--frequency", "0"), "above 0"),
+    ],
+)
+def test_what_means_nothing_is_refused(run, words, said):
+    found = run("cell", "tri", *words)
+    assert found.code == 2
+    assert said in found.err
