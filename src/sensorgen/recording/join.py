@@ -2,9 +2,10 @@ r"""Recording and rig on one time: the offset of their clocks, with its error.
 
 Both have their own clock. What tells their distance is that the sensor answers to the force: the recording is fitted by
 
-.. math:: y(t) = c_0 + c_1 t + c_2 t^2 + c_3 F + c_4 F^2 + c_5 F x + c_6 F^2 x, \quad F, x \text{ at } t - \tau,
+.. math:: y(t) = \sum_{i=0}^{3} c_i t^i + \sum_{i=1}^{2} b_i \ln(1 + t / \tau_i) + \sum_{i=1}^{3} \sum_{j=0}^{2} c_{ij} F^i x^j
 
-with y the strongest direction in which ln Z moves. A correlation over all distances finds the place, Gauss-Newton the
+with F and x taken the offset earlier, y the strongest direction in which ln Z moves, and time constants of a tenth and a
+hundredth of the run for what creeps. A correlation over all distances finds the place, Gauss-Newton the
 rest; the standard error is that of the fit, with as many samples as are independent of each other.
 """
 
@@ -14,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sensorgen.errors import BadInput
+from sensorgen.recording.movement import strongest
 from sensorgen.recording.rig import RigLog
 from sensorgen.recording.samples import Real, Recording
 
@@ -24,6 +26,7 @@ _LEAST_SHARE = 0.05  # of the recording's variance that the force must explain b
 _SURE = 3.0
 _MOST_SKEW = 1e-3
 _STEPS = 20
+_CREEP = (10.0, 100.0)  # times that the time constants fit into the run
 _GAP = 5.0  # typical distances of the rig's rows: beyond it the rig is silent
 
 
@@ -154,26 +157,9 @@ def _troubled(rig: RigLog, at: Real) -> np.ndarray[tuple[int], np.dtype[np.bool_
 def _estimated(recording: Recording, time: Real, rig: RigLog, within_s: float) -> _Offset:
     valid = np.flatnonzero(recording.valid())
     stride = max(1, len(valid) // _MOST_FITTED)
-    signal = _signal(recording, valid)
+    signal = strongest(recording.impedance_ohm[valid])
     coarse = _correlated(time[valid], signal, rig, within_s)
     return _refined(time[valid][::stride], signal[::stride], rig, coarse)
-
-
-def _signal(recording: Recording, valid: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Real:
-    """The direction in which ln Z moves most, in units of its noise, without its straight trend."""
-    z = recording.impedance_ohm[valid]
-    channels = np.hstack([np.log(np.abs(z)), np.unwrap(np.angle(z), axis=0)])
-    noise = np.median(np.abs(np.diff(channels, axis=0)), axis=0)
-    spread = np.ptp(channels, axis=0)
-    told = spread > 0
-    if not told.any():
-        raise BadInput("the readings are all the same: nothing in them tells the time")
-    channels = channels[:, told] / np.where(noise > 1e-9 * spread, noise, spread)[told]
-    t = np.linspace(-1, 1, len(valid))
-    basis = np.column_stack([np.ones_like(t), t])
-    channels = channels - basis @ np.linalg.lstsq(basis, channels, rcond=None)[0]
-    _, _, directions = np.linalg.svd(channels.T @ channels)
-    return np.asarray(channels @ directions[0])
 
 
 def _force(rig: RigLog) -> tuple[Real, Real, Real]:
@@ -225,17 +211,18 @@ def _refined(time: Real, signal: Real, rig: RigLog, offset: float) -> _Offset:
 
     def basis(at: Real) -> Real:
         f, x = np.interp(at, rows, force), (np.interp(at, rows, position) - position.mean()) / length
-        return np.column_stack([f, f**2, f * x, f**2 * x])
+        return np.column_stack([f**i * x**j for i in (1, 2, 3) for j in (0, 1, 2)])
 
-    drift, skew = np.column_stack([np.ones_like(u), u, u**2]), 0.0
+    creep = [np.log1p((1 + u) * ratio / 2) for ratio in _CREEP]
+    drift, skew = np.column_stack([np.ones_like(u), u, u**2, u**3, *creep]), 0.0
     covariance, fitted, left = np.full((2, 2), np.nan), signal * 0, signal
     for _ in range(_STEPS):
         at = time - offset - skew * (time - middle)
         shapes = basis(at)
         model = np.hstack([drift, shapes])
         weights = np.linalg.lstsq(model, signal, rcond=None)[0]
-        fitted, left = shapes @ weights[3:], signal - model @ weights
-        slope = -((basis(at + h) - basis(at - h)) / (2 * h)) @ weights[3:]
+        fitted, left = shapes @ weights[drift.shape[1] :], signal - model @ weights
+        slope = -((basis(at + h) - basis(at - h)) / (2 * h)) @ weights[drift.shape[1] :]
         whole = np.hstack([model, slope[:, None], (slope * u * half)[:, None]])
         step = np.linalg.lstsq(whole, left, rcond=None)[0][-2:]
         covariance = _covariance(whole, left)

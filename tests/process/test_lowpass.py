@@ -1,0 +1,129 @@
+"""The low-pass against the closed form of Butterworth's response, and why it is in sections."""
+
+import made
+import numpy as np
+import pytest
+from scipy import signal
+
+from sensorgen.errors import OutOfRange
+from sensorgen.process import lowpass
+from sensorgen.process.lowpass import CUTOFF_HZ, THESIS_RATE_HZ, Live
+from sensorgen.recording import Clock, Recording, Source
+from sensorgen.recording.samples import blank
+
+RATE = 140.0
+
+
+def gain_db(run, frequency, rate=RATE):
+    t = np.arange(round(60 / frequency * rate)) / rate
+    wave = np.exp(2j * np.pi * frequency * t)[:, None]
+    middle = slice(len(t) // 3, 2 * len(t) // 3)
+    return 20 * np.log10(np.abs(run(wave)[middle, 0]).mean())
+
+
+@pytest.mark.parametrize("rate", [RATE, THESIS_RATE_HZ])
+@pytest.mark.parametrize("over", [0.2, 0.5, 1.0, 2.0, 4.0])
+def test_gain_is_that_of_the_closed_form_once_and_twice(rate, over):
+    expected = lowpass.response_db(over * CUTOFF_HZ, CUTOFF_HZ, rate)
+    assert gain_db(Live(rate), over * CUTOFF_HZ, rate) == pytest.approx(expected, abs=2e-3, rel=1e-4)
+    assert gain_db(lambda w: lowpass.offline(w, rate), over * CUTOFF_HZ, rate) == pytest.approx(
+        2 * expected, abs=2e-3, rel=1e-4
+    )
+
+
+def test_cut_off_is_3_db_once_and_6_db_forward_and_backward():
+    assert lowpass.response_db(CUTOFF_HZ, CUTOFF_HZ, RATE) == pytest.approx(-3.0103, abs=1e-4)
+    assert gain_db(lambda w: lowpass.offline(w, RATE), CUTOFF_HZ) == pytest.approx(-6.0206, abs=2e-3)
+
+
+def test_the_thesis_rate_on_real_samples_would_cut_elsewhere():
+    sos = lowpass.sections(THESIS_RATE_HZ)
+    where = CUTOFF_HZ * RATE / THESIS_RATE_HZ
+    _, h = signal.sosfreqz(sos, [where], fs=RATE)
+    assert 20 * np.log10(abs(h[0])) == pytest.approx(-3.01, abs=0.01)  # 0.573 Hz
+
+
+@pytest.mark.parametrize(("cutoff", "digits"), [(0.2727, 1e-12), (0.027, 1e-10), (0.00027, 1e-6)])
+def test_sections_are_stable_where_polynomials_are_not(cutoff, digits):
+    sos = lowpass.sections(THESIS_RATE_HZ, cutoff)
+    _, h = signal.sosfreqz(sos, [cutoff], fs=THESIS_RATE_HZ)
+    assert 20 * np.log10(abs(h[0])) == pytest.approx(-3.0103, abs=1e-3)
+    poles = np.concatenate([np.roots(row[3:]) for row in sos])
+    assert (np.abs(poles) < 1).all()
+    direct = Live(THESIS_RATE_HZ, cutoff)(np.ones((20_000, 1)))
+    assert np.abs(direct - 1).max() < max(digits, 1e-6)
+
+
+def test_polynomials_lose_digits_and_then_stability():
+    def lost(cutoff):
+        b, a = signal.butter(4, cutoff, fs=THESIS_RATE_HZ)
+        step = signal.lfilter(b, a, np.ones(400_000))
+        return abs(step[-1] - 1)
+
+    assert 1e-13 < lost(0.2727) < 1e-9
+    assert not lost(0.00027) < 1  # where the sections are still right
+
+
+def test_live_begins_settled_and_a_filter_begun_at_zero_does_not():
+    z = np.full((3000, 2), 41.0 - 12.0j)
+    assert np.abs(Live(RATE)(z) - z).max() < 1e-9
+    from_zero = signal.sosfilt(lowpass.sections(RATE), z[:, 0].real)
+    assert np.flatnonzero(np.abs(from_zero / 41 - 1) > 0.001)[-1] / RATE > 5  # seconds until it has settled
+
+
+def test_one_pass_delays_by_a_second_and_a_half_and_two_do_not():
+    t = np.arange(0, 60, 1 / RATE)
+    ramp = t[:, None] * 1.0
+    live = Live(RATE)(ramp)
+    assert (ramp - live)[-1, 0] == pytest.approx(1.5, abs=0.06)
+    both = lowpass.offline(ramp, RATE)
+    assert np.abs(both - ramp).max() < 1e-3
+    assert np.abs(both - ramp)[2000:-2000].max() < 1e-6
+
+
+def test_a_stream_in_pieces_is_the_stream_at_once():
+    rng = np.random.default_rng(0)
+    z = rng.standard_normal((1000, 3)) + 1j * rng.standard_normal((1000, 3))
+    z[300:320, 1] = np.nan
+    z[0, 2] = np.nan
+    whole, live = Live(RATE)(z), Live(RATE)
+    pieces = np.vstack([live(z[a:b]) for a, b in [(0, 1), (1, 310), (310, 311), (311, 1000)]])
+    np.testing.assert_allclose(pieces[320:, :2], whole[320:, :2], atol=1e-12)
+    assert np.isnan(whole[300:320, 1]).all()
+    assert np.isfinite(whole[320:]).all()
+
+
+def test_a_recording_with_gaps_is_bridged_when_short_and_blank_when_long():
+    time = np.arange(0, 60, 1 / RATE)
+    keep = ~((time > 20) & (time < 20.5)) & ~((time > 40) & (time < 45))
+    time = time[keep]
+    z = (50 + 10 * np.sin(2 * np.pi * 0.02 * time) + 5j)[:, None]
+    made_of = Recording(time, np.array([1e3]), z, blank(len(time)), Clock(), Source("", "", rate_hz=RATE))
+    grid, found = lowpass.filtered(made_of)
+    np.testing.assert_allclose(np.diff(grid), 1 / RATE, rtol=1e-9)
+    gap = (grid > 40.01) & (grid < 44.99)
+    assert np.isnan(found[gap]).all()
+    assert np.isfinite(found[~gap & (np.abs(grid - 42.5) > 2.6)]).all()
+    inner = (grid > 10) & (grid < 35)
+    truth = 50 + 10 * np.sin(2 * np.pi * 0.02 * grid)
+    assert np.abs(found[inner, 0].real - truth[inner]).max() < 0.05
+
+
+def test_noise_falls_as_the_bandwidth_says():
+    rng = np.random.default_rng(1)
+    noise = rng.standard_normal((200_000, 1))
+    left = lowpass.offline(noise, RATE).std()
+    _, h = signal.sosfreqz(lowpass.sections(RATE), 200_000, fs=RATE)
+    assert left == pytest.approx(np.sqrt(np.mean(np.abs(h) ** 4)), rel=0.05)
+
+
+def test_a_cut_off_beyond_half_the_rate_is_refused():
+    for cutoff in (0.0, 70.0, -1.0, np.nan):
+        with pytest.raises(OutOfRange, match="between 0 and half"):
+            Live(RATE, cutoff)
+    run = made.run(made.presses(1))
+    few = Recording(
+        run.time_s[:1], made.TONES_HZ, run.impedance_ohm[:1], blank(1), Clock(), Source("", "", rate_hz=RATE)
+    )
+    with pytest.raises(OutOfRange, match="1 valid samples"):
+        lowpass.filtered(few)

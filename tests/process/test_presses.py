@@ -1,0 +1,141 @@
+"""Presses, pairs, drift, hysteresis and surfaces of runs whose truth is known."""
+
+import made
+import numpy as np
+import pytest
+
+from sensorgen.errors import BadInput
+from sensorgen.process import drift, presses
+from sensorgen.process.hysteresis import hysteresis
+from sensorgen.process.surfaces import normalised, surface
+
+MADE = made.presses(12)
+RUN = made.run(MADE, rate_hz=70, creep=0.004)
+ALL = np.ones(len(RUN.time_s), bool)
+
+
+def test_presses_are_found_by_force_and_by_the_readings_alone():
+    noisy = RUN.force_n + 0.03 * np.random.default_rng(0).standard_normal(len(RUN.force_n))
+    by_force = presses.pressed(RUN.time_s, noisy)
+    by_readings = presses.found(RUN.time_s, RUN.impedance_ohm)
+    truth = [(start, end) for start, end, f, _ in MADE if f > 0.3]
+    assert len(by_force) == len(truth)
+    np.testing.assert_allclose(by_force, truth, atol=0.21)
+    felt = [(s, e) for s, e, f, _ in MADE if f > 2.5]  # a light press leaves a reading within its noise
+    for start, end in felt:
+        assert any(abs(p.start_s - start) < 0.4 and abs(p.end_s - end) < 0.4 for p in by_readings)
+    assert len(by_readings) <= len(MADE)
+
+
+def test_a_press_ends_where_the_force_is_not_known_and_short_ones_are_none():
+    t = np.arange(0, 10, 0.1)
+    force = np.where((t > 2) & (t < 6), 3.0, 0.0)
+    force[45:50] = np.nan
+    force[80] = 5.0
+    assert [(round(p.start_s, 6), round(p.end_s, 6)) for p in presses.pressed(t, force)] == [(2.1, 4.4), (5.0, 5.9)]
+    assert presses.pressed(t, force * 0) == []
+    dithering = np.where((t > 2) & (t < 6), 0.15 + 0.1 * (np.arange(100) % 2), 0.0)  # about the threshold
+    assert len(presses.pressed(t, dithering)) == 1
+
+
+def test_pairs_are_the_means_and_their_errors_are_what_they_say():
+    pulls, errors = [], []
+    for seed in range(6):
+        run = made.run(MADE, rate_hz=70, seed=seed)
+        found = presses.pairs(run.time_s, run.impedance_ohm, ALL, presses.pressed(run.time_s, run.force_n),
+                              run.force_n, run.position_mm)  # fmt: skip
+        at = [np.searchsorted(run.time_s, s + 2) for s in found.time_s]
+        truth = run.clean_ohm[at] - run.clean_ohm[0]
+        off = found.difference_ohm - truth
+        pulls.append(np.stack([off.real / found.error_ohm.real, off.imag / found.error_ohm.imag]))
+        errors.append(found.error_ohm)
+        np.testing.assert_allclose(found.force_n, [m[2] for m in MADE], rtol=1e-9)
+        np.testing.assert_allclose(found.position_mm, [m[3] for m in MADE], rtol=1e-9)
+        np.testing.assert_array_equal(found.difference_ohm, found.pressed_ohm - found.before_ohm)
+    # an even mean over a second at 70 samples/s, before and under: sqrt(2 / 70) of the noise
+    expected = 1e-3 * np.abs(RUN.clean_ohm[0]) * np.sqrt(2 / 70)
+    np.testing.assert_allclose(np.mean(errors, axis=(0, 1)).real, expected, rtol=0.15)
+    np.testing.assert_allclose(np.mean(errors, axis=(0, 1)).imag, expected, rtol=0.15)
+    assert np.sqrt(np.mean(np.square(pulls))) == pytest.approx(1, abs=0.12)
+
+
+def test_readings_that_do_not_count_are_not_counted():
+    spans = presses.pressed(RUN.time_s, RUN.force_n)
+    z, valid = RUN.impedance_ohm.copy(), ALL.copy()
+    inside = (RUN.time_s > spans[0].end_s - 1.3) & (RUN.time_s < spans[0].end_s - 0.8)
+    z[inside], valid[inside] = np.nan, False
+    lost = (RUN.time_s > spans[1].start_s) & (RUN.time_s < spans[1].end_s)
+    valid[lost] = False
+    found = presses.pairs(RUN.time_s, z, valid, spans, RUN.force_n, RUN.position_mm)
+    assert np.isfinite(found.difference_ohm).all()
+    assert found.samples[0].tolist() == pytest.approx([70, 35], abs=2)
+    assert found.left_out[0].startswith("press 2 at")
+    assert len(found.time_s) == len(MADE) - 1
+    with pytest.raises(BadInput, match="none with 8 readings"):
+        presses.pairs(RUN.time_s, z, ALL & False, spans, RUN.force_n, RUN.position_mm)
+
+
+def test_means_of_readings_that_hang_together_have_larger_errors():
+    rng = np.random.default_rng(3)
+    t = np.arange(200) / 100
+    white = rng.standard_normal((200, 400))
+    smooth = np.zeros_like(white)
+    for k in range(1, 200):
+        smooth[k] = 0.6 * smooth[k - 1] + white[k]
+    for values in (white, smooth):
+        said = np.sqrt((presses._error(t, values) ** 2).mean())
+        assert said == pytest.approx(values.mean(axis=0).std(), rel=0.15)
+
+
+def test_drift_is_fitted_to_the_rest_and_taken_out():
+    run = made.run(made.presses(15, most_n=3.0), rate_hz=70, creep=0.02, slope_per_s=2e-5)
+    valid = np.ones(len(run.time_s), bool)
+    found = drift.fitted(run.time_s, run.impedance_ohm, valid, run.force_n)
+    np.testing.assert_allclose(found.at(run.time_s), run.drift - run.drift[0], atol=3e-4)
+    assert np.abs(run.drift[-1] - run.drift[0]).max() > 0.04
+    left = found.removed(run.time_s, run.impedance_ohm) / run.clean_ohm - 1
+    assert np.abs(left.mean(axis=0)).max() < 2e-4
+    np.testing.assert_allclose(found.scatter.real, 1e-3, rtol=0.1)
+    np.testing.assert_allclose(found.scatter.imag, 1e-3, rtol=0.1)
+    np.testing.assert_allclose(found.rest_ohm(), run.clean_ohm[0], rtol=5e-4)
+    with pytest.raises(BadInput, match="0 readings at rest"):
+        drift.fitted(run.time_s, run.impedance_ohm, valid, run.force_n + 1)
+
+
+def test_hysteresis_of_two_known_ways():
+    force = np.concatenate([np.linspace(0, 4, 200), np.linspace(4, 0, 200)])
+    up, down = force**2, force**2 + force * (4 - force) * 0.5
+    values = np.column_stack([np.where(np.arange(400) < 200, up, down), 3 * force])
+    found = hysteresis(force, values)
+    assert found.share == pytest.approx([2.0 / 16, 0], abs=2e-3)  # 0.5 F (4 - F) has its top of 2 at 2 N
+    assert found.at_n[0] == pytest.approx(2, abs=0.1)
+    assert found.lost == pytest.approx([0.5 * 64 / 6 / (64 / 3), 0], abs=5e-3)
+    with pytest.raises(BadInput, match="goes up and down again"):
+        hysteresis(force[:200], values[:200])
+
+
+def test_a_surface_is_straight_between_its_presses_and_blank_beyond():
+    rng = np.random.default_rng(0)
+    force, at = rng.uniform(0, 6, 60), rng.uniform(10, 90, 60)
+    values = np.column_stack([2 + 3 * force - 0.1 * at, -force])
+    found = surface(force, at, values, points=20)
+    expected = 2 + 3 * found.force_n[:, None] - 0.1 * found.position_mm
+    inside = np.isfinite(found.values[..., 0])
+    assert 0.6 < inside.mean() < 1
+    np.testing.assert_allclose(found.values[inside, 0], expected[inside], atol=1e-9)
+    assert found.values.shape == (20, 20, 2)
+    with pytest.raises(BadInput, match="on one line"):
+        surface(force, 2 * force, values)
+    with pytest.raises(BadInput, match="three or more"):
+        surface(force[:2], at[:2], values[:2])
+
+
+def test_all_sets_on_one_scale():
+    sets = [np.array([[1.0, 5], [3, 5]]), np.array([[-2.0, 0], [2, 4], [0, 2]])]
+    own = normalised(sets)
+    assert own[0][:, 0].tolist() == [0, 1]
+    assert np.isnan(own[0][:, 1]).all()
+    assert own[1].tolist() == [[0, 0], [1, 1], [0.5, 0.5]]
+    one = normalised(sets, together=True)
+    assert one[0][:, 0].tolist() == pytest.approx([0.6, 1.0])
+    assert one[1][:, 0].tolist() == pytest.approx([0, 0.8, 0.4])

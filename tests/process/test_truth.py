@@ -1,0 +1,90 @@
+"""A whole run with a known truth, through files, clocks, drift and presses, back to force and position."""
+
+import made
+import numpy as np
+import pytest
+import scipy.io as sio
+
+from sensorgen.card.fisher import bounds, slopes
+from sensorgen.invert import Estimator
+from sensorgen.process import drift, presses
+from sensorgen.process.presses import GUARD_S, WINDOW_S
+from sensorgen.recording import joined, read, rig
+
+NOISE, RATE = 1e-3, 140.0
+MADE = made.presses(60, dwell_s=3.0, rest_s=3.0, seed=11)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """What the two files say, joined."""
+    folder = tmp_path_factory.mktemp("run")
+    truth = made.run(MADE, RATE, NOISE, creep=0.02, slope_per_s=2e-5, seed=5)
+    z = truth.impedance_ohm.copy()
+    z[4000:4014] = 0  # a skipped block
+    sio.savemat(folder / "run.mat", made.tree([z], [truth.time_s], made.stamps(truth.time_s, skew=6e-5)))
+    rows = made.rig_rows(MADE, offset_s=7.25, skew=-1.5e-4)
+    log = rig(made.write_rig(folder / "rig.csv", rows, errors={1000: "timeout"}))
+    return joined(read(folder / "run.mat"), log)
+
+
+@pytest.fixture(scope="module")
+def pairs(run):
+    one = run.recording
+    found = drift.fitted(one.time_s, one.impedance_ohm, one.valid(), run.force_n)
+    clean = found.removed(one.time_s, one.impedance_ohm)
+    spans = presses.pressed(one.time_s, run.force_n)
+    # relative to the rest: what the model of the sensor has there
+    clean *= made.sensor().impedance(made.TONES_HZ, 0.0, 0.05) / found.rest_ohm()
+    return presses.pairs(one.time_s, clean, one.valid(), spans, run.force_n, run.set_position_mm)
+
+
+def test_clocks_and_marks(run):
+    counts = run.recording.counts()
+    assert (counts["zero"], counts["transient"]) == (14, 23)
+    middle = run.recording.time_s[-1] / 2
+    assert run.offset_s == pytest.approx(7.25 + 0.03 + 6e-5 * middle, abs=3 * run.offset_error_s)
+    assert run.skew == pytest.approx(2.1e-4, abs=3 * run.skew_error)
+    assert 3 <= counts["rig error"] <= 400
+
+
+def test_force_and_position_come_back_as_well_as_they_can(pairs):
+    assert len(pairs.time_s) == len(MADE)
+    force, at_mm = np.array([m[2] for m in MADE]), np.array([m[3] for m in MADE])
+    np.testing.assert_allclose(pairs.position_mm, at_mm, atol=1e-3)  # as the rig was told
+    noise = NOISE / np.sqrt(WINDOW_S * RATE)
+    limits = bounds(slopes(made.sensor(), made.TONES_HZ, force, at_mm * 1e-3), noise)
+    found = Estimator(made.sensor(), made.TONES_HZ, noise).batch(pairs.pressed_ohm)
+    pull_force = (found.force_n - force) / limits.force_n
+    pull_at = (found.position_m - at_mm * 1e-3) / limits.position_m
+    assert 0.7 < np.sqrt(np.mean(pull_force**2)) < 1.5
+    assert 0.7 < np.sqrt(np.mean(pull_at**2)) < 1.5
+    assert np.abs(pull_force).max() < 4.5
+    assert np.median(limits.position_m) < 2e-3  # or the test would say nothing
+    assert GUARD_S < 1
+
+
+def test_without_taking_the_drift_out_they_do_not(run):
+    one = run.recording
+    spans = presses.pressed(one.time_s, run.force_n)
+    raw = presses.pairs(one.time_s, one.impedance_ohm, one.valid(), spans, run.force_n, run.set_position_mm)
+    noise = NOISE / np.sqrt(WINDOW_S * RATE)
+    force, at_m = np.array([m[2] for m in MADE]), np.array([m[3] for m in MADE]) * 1e-3
+    limits = bounds(slopes(made.sensor(), made.TONES_HZ, force, at_m), noise)
+    found = Estimator(made.sensor(), made.TONES_HZ, noise).batch(raw.pressed_ohm)
+    assert np.sqrt(np.mean(((found.force_n - force) / limits.force_n) ** 2)) > 5
+
+
+def test_quotients_of_pairs_are_free_of_most_of_the_drift_without_a_fit(run):
+    """Between before and under a press drift has moved little, though more than the noise."""
+    one = run.recording
+    spans = presses.pressed(one.time_s, run.force_n)
+    raw = presses.pairs(one.time_s, one.impedance_ohm, one.valid(), spans, run.force_n, run.set_position_mm)
+    z = made.sensor().impedance(made.TONES_HZ, 0.0, 0.05) * raw.pressed_ohm / raw.before_ohm
+    noise = NOISE * np.sqrt(2 / (WINDOW_S * RATE))
+    force, at_m = np.array([m[2] for m in MADE]), np.array([m[3] for m in MADE]) * 1e-3
+    limits = bounds(slopes(made.sensor(), made.TONES_HZ, force, at_m), noise)
+    found = Estimator(made.sensor(), made.TONES_HZ, noise).batch(z)
+    without = Estimator(made.sensor(), made.TONES_HZ, noise).batch(raw.pressed_ohm)
+    rms, drifting = (np.sqrt(np.mean(((e.force_n - force) / limits.force_n) ** 2)) for e in (found, without))
+    assert rms < drifting / 5

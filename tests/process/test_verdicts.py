@@ -1,0 +1,134 @@
+"""Verdicts against the line model, yields against SciPy, and what Table D.1 says of itself."""
+
+from math import inf, isnan, nan
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from sensorgen.errors import OutOfRange
+from sensorgen.models import line
+from sensorgen.process.verdicts import WORDS, Evidence, electrode_ohm, expected_from, leak_s, verdict
+from sensorgen.process.yields import groups, independence, share
+
+
+@pytest.mark.parametrize("leak", [1e-12, 1e-6, 1e-3, 0.1, 10.0])
+def test_the_leak_is_that_of_the_line_model(leak):
+    rho, length, thickness, width = 0.07, 0.1, 0.4e-3, 0.02
+    z = line.impedance(
+        f_Hz=1e-9, F_N=0.0, E_Pa=1e6, x_p_left_edge_m=0.0, L_p_m=0.01, L_m=length, W_m=width, H_top_m=thickness,
+        H_bottom_m=thickness, rho_top_ohm_m=rho, rho_bottom_ohm_m=rho, d_m=1e-4, eps_r=4.0, tan_delta=0.0,
+        G_S_per_m=leak / length, S_n_top_per_N=0.0, S_n_bottom_per_N=0.0, far_end="open",
+    )  # fmt: skip
+    ry = electrode_ohm(rho, length, thickness, width)
+    assert leak_s(float(z.real), ry) == pytest.approx(leak, rel=1e-6)
+
+
+def test_leaks_at_their_limits():
+    assert (leak_s(inf, 600.0), leak_s(0.0, 600.0), leak_s(1e12, 600.0)) == (0, inf, pytest.approx(1e-12))
+    assert leak_s(500.0, 0.0) == pytest.approx(1 / 500)
+    small = [leak_s(z, 600.0) for z in np.geomspace(1e-3, 1e13, 300)]
+    assert (np.diff(small) < 0).all()
+    with pytest.raises(OutOfRange):
+        leak_s(-1.0, 600.0)
+
+
+@pytest.mark.parametrize(
+    ("ry", "rz", "word", "electrode", "film"),
+    [
+        ((600.0,), (inf,), "intact", "sound", "intact"),
+        ((600.0,), (1e8,), "intact", "sound", "intact"),
+        ((600.0,), (0.999e8,), "leak", "sound", "leak"),
+        ((600.0,), (1200.0,), "short", "sound", "short"),
+        ((600.0,), (1201.0,), "leak", "sound", "leak"),
+        ((600.0,), (0.0,), "short", "sound", "short"),
+        ((1800.0,), (inf,), "intact", "sound", "intact"),
+        ((1801.0,), (inf,), "dry joint", "dry joint", "intact"),
+        ((600.0, 1300.0), (inf,), "dry joint", "dry joint", "intact"),
+        ((59_999.0,), (inf,), "dry joint", "dry joint", "intact"),
+        ((60_000.0,), (inf,), "open electrode", "open electrode", "intact"),
+        ((inf,), (40.0,), "open electrode", "open electrode", "short"),
+        ((2000.0,), (5.0,), "short", "dry joint", "short"),
+        ((), (40.0,), "leak", "unknown", "leak"),
+        ((600.0,), (), "unknown", "sound", "unknown"),
+        ((), (), "unknown", "unknown", "unknown"),
+        ((0.8,), (inf,), "unknown", "unknown", "intact"),
+    ],
+)
+def test_every_verdict_at_its_limits(ry, rz, word, electrode, film):
+    found = verdict(Evidence("x", ry, rz, 600.0))
+    assert (found.word, found.electrode, found.film) == (word, electrode, film)
+    assert word in WORDS
+    assert len(found.reasons) == 2
+
+
+def test_a_verdict_carries_its_numbers():
+    found = verdict(Evidence("x", (700.0, 650.0), (260.0, 300.0), 600.0))
+    assert (found.ry_ohm, found.rz_ohm, found.ratio, found.same_order) == (650, 260, 0.4, True)
+    assert "260 ohm is within the 1300 ohm" in found.reasons[1]
+    assert found.over_expected == pytest.approx(650 / 600)
+    blank = verdict(Evidence("y", (650.0,)))
+    assert blank.same_order is None
+    assert isnan(blank.ratio)
+    assert verdict(Evidence("z", (650.0,), (6500.0,))).same_order is True
+    assert verdict(Evidence("z", (650.0,), (6501.0,))).same_order is False
+    with pytest.raises(OutOfRange, match="from 0 on"):
+        verdict(Evidence("z", (-1.0,)))
+    with pytest.raises(OutOfRange):
+        verdict(Evidence("z", (nan,)))
+
+
+@pytest.mark.parametrize(("count", "total"), [(0, 1), (0, 59), (3, 10), (59, 59), (20, 1000)])
+def test_intervals_are_those_of_scipy(count, total):
+    found = share(count, total)
+    exact = stats.binomtest(count, total).proportion_ci(0.95, "exact")
+    assert (found.low, found.high) == (pytest.approx(exact.low, abs=1e-12), pytest.approx(exact.high, abs=1e-12))
+
+
+def test_intervals_hold_at_least_their_confidence_where_wilsons_do_not():
+    def coverage(intervals, p):
+        inside = [low <= p <= high for low, high in intervals]
+        return stats.binom.pmf(np.arange(len(intervals)), len(intervals) - 1, p)[inside].sum()
+
+    for total in (5, 12, 59):
+        ours = [(share(k, total).low, share(k, total).high) for k in range(total + 1)]
+        wilson = [stats.binomtest(k, total).proportion_ci(0.95, "wilson") for k in range(total + 1)]
+        at = np.linspace(0.005, 0.995, 199)
+        assert min(coverage(ours, p) for p in at) >= 0.95
+        assert min(coverage(wilson, p) for p in at) < 0.94
+
+
+@pytest.mark.parametrize("table", [[(8, 2), (1, 5)], [(28, 5), (12, 14)], [(0, 3), (4, 0)], [(10, 10), (10, 10)]])
+def test_two_groups_are_fishers_test(table):
+    assert independence(table) == pytest.approx(stats.fisher_exact(np.array(table)).pvalue, rel=1e-9)
+
+
+def test_three_groups_against_every_table_with_the_same_sums():
+    table = [(7, 1), (3, 4), (2, 6)]
+    sizes, did = [8, 7, 8], 12
+    law = stats.random_table(sizes, [did, sum(sizes) - did])
+    every = [
+        np.array([[a, 8 - a], [b, 7 - b], [did - a - b, 8 - did + a + b]])
+        for a in range(9) for b in range(8) if 0 <= did - a - b <= 8
+    ]  # fmt: skip
+    chances = np.array([law.pmf(t) for t in every])
+    assert chances.sum() == pytest.approx(1)
+    assert independence(table) == pytest.approx(chances[chances <= law.pmf(np.array(table)) * 1.000001].sum(), rel=1e-9)
+    with pytest.raises(OutOfRange, match="smaller groups"):
+        independence([(500, 500)] * 4)
+
+
+def test_groups_count_what_is_known_only():
+    made = [
+        Evidence("a", (600.0,), (inf,), 600.0, "tri", 0.1),
+        Evidence("b", (600.0,), (30.0,), 600.0, "tri", 0.1),
+        Evidence("c", (600.0,), (), 600.0, "tri", 0.1),
+        Evidence("d", (600.0,), (9e6,), 600.0, "rect", None),
+    ]
+    found = groups([(of, verdict(of)) for of in made], lambda of: (of.shape, of.film_mm))
+    assert [g.key for g in found] == [("rect", None), ("tri", 0.1)]
+    tri = found[1]
+    assert (tri.intact.count, tri.intact.total, tri.shorted.count, tri.shorted.total) == (1, 2, 1, 2)
+    assert tri.words == {"intact": 1, "short": 1, "unknown": 1}
+    assert found[0].shorted.count == 0
+    assert expected_from(made) == 600
