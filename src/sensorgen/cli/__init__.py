@@ -24,6 +24,7 @@ COMMANDS = (
     "sheet",
     "stack",
     "log",
+    "report",
     "list",
     "schema",
     "completion",

@@ -1,0 +1,1 @@
+"""Material values out of what was measured, as a new source."""
