@@ -10,7 +10,8 @@ DESIGNS = DOCS.parent / "designs"
 PICTURES = {"trix-d0.2": ["tri"], "sqxy-d0.2": ["rect"], "trix-upside-down": ["tri", "--orientation", "upside-down"]}
 PAGES = (
     [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"], ["predict"],
-    ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["invert"], ["sheet"], ["stack"],
+    ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["invert"], ["sheet"], ["stack"], ["bench"],
+    ["bench", "plan"], ["bench", "plan", "tri"],
     ["list"], ["schema"], ["completion"],
 )  # fmt: skip
 

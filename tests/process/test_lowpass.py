@@ -25,9 +25,9 @@ def gain_db(run, frequency, rate=RATE):
 @pytest.mark.parametrize("over", [0.2, 0.5, 1.0, 2.0, 4.0])
 def test_gain_is_that_of_the_closed_form_once_and_twice(rate, over):
     expected = lowpass.response_db(over * CUTOFF_HZ, CUTOFF_HZ, rate)
-    assert gain_db(Live(rate), over * CUTOFF_HZ, rate) == pytest.approx(expected, abs=2e-3, rel=1e-4)
+    assert gain_db(Live(rate), over * CUTOFF_HZ, rate) == pytest.approx(expected, abs=2e-3, rel=4e-4)
     assert gain_db(lambda w: lowpass.offline(w, rate), over * CUTOFF_HZ, rate) == pytest.approx(
-        2 * expected, abs=2e-3, rel=1e-4
+        2 * expected, abs=2e-3, rel=4e-4
     )
 
 
@@ -127,3 +127,18 @@ def test_a_cut_off_beyond_half_the_rate_is_refused():
     )
     with pytest.raises(OutOfRange, match="1 valid samples"):
         lowpass.filtered(few)
+
+
+def test_the_noise_of_the_last_reading_does_not_become_a_step():
+    rng = np.random.default_rng(4)
+    ends = []
+    for _ in range(60):
+        left = lowpass.offline(rng.standard_normal((4000, 1)), RATE)
+        ends += [left[0, 0], left[-1, 0]]
+    inner = lowpass.offline(rng.standard_normal((60_000, 1)), RATE)[5000:-5000].std()
+    assert np.std(ends) < 3 * inner
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 20])
+def test_few_samples_pass(count):
+    assert lowpass.offline(np.full((count, 2), 3.0 + 1j), RATE) == pytest.approx(np.full((count, 2), 3.0 + 1j))

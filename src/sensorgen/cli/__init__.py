@@ -25,6 +25,7 @@ COMMANDS = (
     "stack",
     "log",
     "report",
+    "bench",
     "list",
     "schema",
     "completion",

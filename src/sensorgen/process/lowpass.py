@@ -19,6 +19,7 @@ CUTOFF_HZ = 0.2727
 THESIS_RATE_HZ = 66.6666
 ORDER = 4
 _SETTLED = 3.0  # over the cut-off: until then a filter that was started wrong has forgotten it
+_END = 0.5  # over the cut-off: how much of an end says how it goes on
 _LONGEST_GAP = 0.5  # over the cut-off: what is missing for longer is not made up
 _EVEN = 1e-3  # of a step: how evenly samples must lie to be taken as they are
 
@@ -113,8 +114,9 @@ def offline(values: NDArray[Any], rate_hz: float, cutoff_hz: float = CUTOFF_HZ) 
 
     Notes
     -----
-    At both ends the values are continued by their point reflection for as long as the filter remembers, so that a drift
-    goes on straight.
+    At both ends the values are continued for as long as the filter remembers: reflected at the end of a straight line
+    through the last half period of the cut-off, so that a drift goes on and the noise of the last reading does
+    not become a step.
 
     Raises
     ------
@@ -127,12 +129,21 @@ def offline(values: NDArray[Any], rate_hz: float, cutoff_hz: float = CUTOFF_HZ) 
     if len(values) < 2:
         return np.array(values)
     pad = min(len(values) - 1, ceil(_SETTLED * rate_hz / cutoff_hz))
-    if np.iscomplexobj(values):
-        parts = (sosfiltfilt(made, part, axis=0, padlen=pad) for part in (values.real, values.imag))
-        found = np.empty(values.shape, np.complex128)
-        found.real, found.imag = parts
-        return found
-    return np.asarray(sosfiltfilt(made, values, axis=0, padlen=pad))
+    fit = min(len(values), ceil(_END * rate_hz / cutoff_hz))
+    begin = 2 * _first(values[:fit]) - values[pad:0:-1]
+    end = 2 * _first(values[: -fit - 1 : -1]) - values[-2 : -pad - 2 : -1]
+    longer = np.concatenate([begin, values, end])
+    parts = [longer.real, longer.imag] if np.iscomplexobj(values) else [longer]
+    found = [np.asarray(sosfiltfilt(made, part, axis=0, padlen=0))[pad : pad + len(values)] for part in parts]
+    return found[0] if len(found) == 1 else found[0] + 1j * found[1]
+
+
+def _first(values: NDArray[Any]) -> NDArray[Any]:
+    """Where a straight line through some values begins."""
+    t = np.arange(len(values)) - (len(values) - 1) / 2
+    spread = float(t @ t)
+    slope = t @ values / spread if spread else np.zeros(values.shape[1])
+    return np.asarray(values.mean(axis=0) + slope * t[0])
 
 
 def filtered(recording: Recording, cutoff_hz: float = CUTOFF_HZ) -> tuple[Real, Complex]:

@@ -18,7 +18,7 @@ from sensorgen.errors import BadInput, OutOfRange
 
 Complex = NDArray[np.complex128]
 _HARMONICS = range(2, 12)
-_BATCH = 1 << 24  # samples that are transformed at once
+_BATCH = 1 << 20  # samples that are transformed at once
 
 
 class Demodulated(NamedTuple):

@@ -2,11 +2,12 @@ r"""Recording and rig on one time: the offset of their clocks, with its error.
 
 Both have their own clock. What tells their distance is that the sensor answers to the force: the recording is fitted by
 
-.. math:: y(t) = \sum_{i=0}^{3} c_i t^i + \sum_{i=1}^{2} b_i \ln(1 + t / \tau_i) + \sum_{i=1}^{3} \sum_{j=0}^{2} c_{ij} F^i x^j
+.. math::
+   y(t) = \sum_{i=0}^{3} c_i t^i + \sum_{i=1}^{2} b_i \ln(1 + t / \tau_i) + \sum_{i=1}^{3} \sum_{j=0}^{2} c_{ij} F^i x^j
 
-with F and x taken the offset earlier, y the strongest direction in which ln Z moves, and time constants of a tenth and a
-hundredth of the run for what creeps. A correlation over all distances finds the place, Gauss-Newton the
-rest; the standard error is that of the fit, with as many samples as are independent of each other.
+with F and x taken the offset earlier, y the strongest direction in which ln Z moves, and time constants of a tenth and
+a hundredth of the run for what creeps. A correlation over all distances finds the place, Gauss-Newton the rest; the
+standard error is that of the fit, with as many samples as are independent of each other.
 """
 
 from dataclasses import dataclass, replace

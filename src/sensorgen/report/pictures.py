@@ -43,7 +43,7 @@ def _plain(name: str) -> str:
 def _figure(chart: Chart, choice: str, content: Content) -> "Figure":
     from matplotlib.figure import Figure
 
-    rows = [_ROW_IN * len(axis.names) or _PANEL_IN for axis in chart.y] if not chart.solid else [5.0]
+    rows = [_ROW_IN * len(axis.names) or _PANEL_IN for axis in chart.y] if not chart.solid else [4.0]
     figure = Figure(figsize=(_WIDE_IN, _FRAME_IN + sum(rows)), layout="constrained")
     figure.suptitle(": ".join(filter(None, (chart.title, choice))), fontsize="large")
     if isinstance(content[0], Body):
@@ -89,7 +89,7 @@ def _trace(panel: "Axes", trace: Trace, places: dict[str, int], left: Any) -> No
         panel.barh(y, x, left=left[y], color=trace.colour, label=label)
         left[y] += x
     elif trace.kind == "ranges":
-        panel.hlines(y, trace.low, trace.high, color=GREY, alpha=0.5, lw=6, label=label)  # type: ignore[arg-type]
+        panel.hlines(y, trace.low, trace.high, color=GREY, alpha=0.5, lw=6, label=label)
         panel.plot(x, y, "|", color="0.3", ms=7)
     elif trace.kind == "line":
         panel.plot(x, y, _STYLES[trace.dash], color=trace.colour, lw=1, label=label)
@@ -104,15 +104,15 @@ def _bodies(figure: "Figure", chart: Chart, content: Content) -> None:
 
     panel: Any = figure.add_subplot(projection="3d")
     bodies = [body for body in content if isinstance(body, Body)]
-    corners = np.vstack([body.vertices_mm for body in bodies])
+    faces = np.concatenate([body.vertices_mm[body.triangles] for body in bodies])
+    colours = [body.colour for body in bodies for _ in body.triangles]
+    panel.add_collection3d(Poly3DCollection(faces, facecolors=colours, shade=True, rasterized=True))
     for body in bodies:
-        faces = Poly3DCollection(
-            body.vertices_mm[body.triangles], facecolors=body.colour, shade=True, label=body.name, rasterized=True
-        )
-        panel.add_collection3d(faces)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    panel.set_box_aspect((high - low) * chart.stretch, zoom=1.25)
+        panel.plot([], [], [], "s", color=body.colour, label=body.name)
+    low, high = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
+    for axis, least, most in zip("xyz", low, high, strict=True):
+        getattr(panel, f"set_{axis}lim")(least, most, view_margin=0)
+    panel.set_box_aspect((high - low) * chart.stretch, zoom=1.5)
     panel.set(xlabel=chart.x.title, ylabel=chart.y[0].title, zlabel=chart.y[1].title)
     panel.view_init(elev=30, azim=-65)
     panel.legend(loc="upper left", frameon=False)

@@ -1,0 +1,69 @@
+"""Pictures of a run: what they are drawn from, that they are drawn, and the same bytes every time."""
+
+import made
+import numpy as np
+import pytest
+
+from sensorgen.plots import bench
+from sensorgen.process import lowpass, presses
+from sensorgen.process.schedule import Plan
+from sensorgen.recording import Clock, Recording, Source
+from sensorgen.recording.samples import blank
+
+
+@pytest.fixture(scope="module")
+def run():
+    tones = made.TONES_HZ[::3]
+    truth = made.run(made.presses(12), rate_hz=35, tones_hz=tones)
+    every = np.ones(len(truth.time_s), bool)
+    recording = Recording(
+        truth.time_s, tones, truth.impedance_ohm, blank(len(every)), Clock(), Source("", "", rate_hz=35)
+    )
+    pairs = presses.pairs(truth.time_s, truth.impedance_ohm, every, presses.pressed(truth.time_s, truth.force_n),
+                          truth.force_n, truth.position_mm)  # fmt: skip
+    return bench.Run("<b>23 $triX$</b>", tones, truth.time_s, truth.impedance_ohm, *lowpass.filtered(recording), pairs)
+
+
+def test_decimated_curves_keep_their_spikes_and_ends():
+    rng = np.random.default_rng(0)
+    t, y = np.arange(100_000) / 140, rng.standard_normal(100_000)
+    y[54_321], y[70_000:70_010] = 50, np.nan
+    x, shown = bench.decimated(t, y)
+    assert len(x) < 4100
+    assert (np.diff(x) > 0).all()
+    assert (shown.max(), x[np.argmax(shown)]) == (50, t[54_321])
+    assert shown.min() == np.nanmin(y)
+    assert x[-1] == t[-1]
+    same = bench.decimated(t[:50], y[:50])
+    np.testing.assert_array_equal(same[1], y[:50])
+
+
+def test_pictures_are_drawn_and_the_same_every_time(run):
+    for draw in (bench.over_time, lambda r: bench.surfaces(r, "resistance"), lambda r: bench.surfaces(r, "reactance")):
+        first = draw(run)
+        assert first.startswith(b"\x89PNG")
+        assert len(first) > 20_000
+    assert bench.surfaces(run, "reactance") == first
+    sets = {"$a$ $\\frac$": run.pairs, "b": run.pairs}
+    assert bench.normalised_differences(sets, run.tones_hz).startswith(b"\x89PNG")
+    plan = Plan(1, 20, (0.0, 6.0), (5.0, 95.0), 4.0, 6.0)
+    assert bench.schedule(plan.steps(), plan.seconds()).startswith(b"\x89PNG")
+
+
+def test_a_surface_goes_through_its_presses(run):
+    through = bench.difference_surface(run.pairs, "reactance")
+    assert through.values.shape[2] == 3
+    assert np.nanmax(through.values[..., 0]) == pytest.approx(run.pairs.difference_ohm[:, 0].imag.max(), rel=0.1)
+
+
+def test_the_page_has_every_tone_and_asks_no_network(run):
+    text = bench.html(run)
+    assert text.count("plotly.js v") == 1
+    assert "\\u003cb\\u003e23" not in text
+    assert "\\u0026lt;b\\u0026gt;23 $triX$" in text or "&lt;b&gt;23 $triX$" in text
+    for name in ("1.1 kHz", "99.7 kHz"):
+        assert f'"label":"{name}"' in text
+    assert text.count('"type":"surface"') >= 6
+    head = text[: text.index("<script")] + text[text.rindex("</script>") :]
+    assert "http" not in head
+    assert "src=" not in head
