@@ -9,9 +9,12 @@ DOCS = Path(__file__).parent
 DESIGNS = DOCS.parent / "designs"
 PICTURES = {"trix-d0.2": ["tri"], "sqxy-d0.2": ["rect"], "trix-upside-down": ["tri", "--orientation", "upside-down"]}
 PAGES = (
-    [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"], ["predict"],
+    [], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
+    ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"], ["predict"],
     ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["invert"], ["sheet"], ["stack"], ["bench"],
     ["bench", "plan"], ["bench", "plan", "tri"],
+    ["log"], *(["log", w] for w in ("multimeter", "import", "bench", "predict", "list", "show", "export", "verify")),
+    ["report"], ["fit"],
     ["list"], ["schema"], ["completion"],
 )  # fmt: skip
 

@@ -17,6 +17,7 @@ with suppress(ValueError):  # not in the main thread
 def _cache(monkeypatch, tmp_path_factory):
     """No test finds what another one, or the user, has kept."""
     monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path_factory.mktemp("cache")))
+    monkeypatch.setenv("SENSORGEN_LOG", str(tmp_path_factory.mktemp("log") / "log.db"))
 
 
 @pytest.fixture(autouse=True, scope="module")

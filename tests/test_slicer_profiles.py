@@ -12,8 +12,9 @@ import pytest
 
 from sensorgen import materials
 from sensorgen.errors import BadInput, MissingValue, OutOfRange, SlicerFailed, UnknownName
+from sensorgen.gcode import extruded
 from sensorgen.printer import Printer, load_printer, load_quality, printer_names, quality_names
-from sensorgen.slicer import cura, curaengine, gcode, prusa
+from sensorgen.slicer import cura, curaengine, prusa
 from sensorgen.slicer.loads import Load, recipes
 from sensorgen.slicer.run import run
 from sensorgen.slicer.tower import MARGIN_MM, tower
@@ -268,7 +269,7 @@ def test_tower_stands_on_the_bed_and_holds_what_is_primed(printer, quality, tool
 # --- reading G-code ---------------------------------------------------------------------------------------
 
 
-def mm(found: gcode.Extruded) -> dict[tuple[int, str], float]:
+def mm(found: extruded.Extruded) -> dict[tuple[int, str], float]:
     """Lengths instead of volumes: the filament of these tests has a section of 1 mm2."""
     return {key: round(volume, 9) for key, volume in found.volume_mm3.items()}
 
@@ -289,23 +290,23 @@ def test_reading_relative_with_retraction_over_a_tool_change():
         "G1 E3",
         "G1 X3 E.5",
     ]
-    found = gcode.read(lines, SECTION_OF_ONE)
+    found = extruded.read(lines, SECTION_OF_ONE)
     assert found.tools == (1, 0, 1)
     assert mm(found) == {(1, "perimeter"): 2.5, (0, "perimeter"): 5.0}
 
 
 def test_reading_absolute_with_resets():
     lines = ["M82", "T0", "G92 E0", "G1 X1 E2", "G1 E1.5", "G1 X9 E2.5", "G92 E0.0", "G1 X3 E1", "G1 X4"]
-    assert mm(gcode.read(lines, SECTION_OF_ONE)) == {(0, ""): 3.5}
+    assert mm(extruded.read(lines, SECTION_OF_ONE)) == {(0, ""): 3.5}
 
 
 def test_reading_counts_what_goes_beyond_a_retraction():
-    assert mm(gcode.read(["M83", "G1 E-1", "G1 E1.25"], SECTION_OF_ONE)) == {(0, ""): 0.25}
+    assert mm(extruded.read(["M83", "G1 E-1", "G1 E1.25"], SECTION_OF_ONE)) == {(0, ""): 0.25}
 
 
 def test_reading_is_not_fooled_by_comments_and_parameters():
     lines = ["; T4", "M83 ; E9", "M104 T3 S210", "G10 P3 S210", "(T2)", "T-1", "T3", "T3", "m106 s255", "g1 x1 e1 ; E5"]
-    found = gcode.read(lines, SECTION_OF_ONE)
+    found = extruded.read(lines, SECTION_OF_ONE)
     assert found.tools == (3,)
     assert mm(found) == {(3, ""): 1.0}
 
@@ -322,7 +323,7 @@ def test_model_is_told_from_tower_and_skirt():
         ";TYPE:Skirt/Brim",
         "G1 E8",
     ]
-    found = gcode.read(lines, SECTION_OF_ONE)
+    found = extruded.read(lines, SECTION_OF_ONE)
     assert found.model_mm3() == {0: pytest.approx(2.0)}
     assert found.total_mm3() == {0: pytest.approx(15.0)}
 

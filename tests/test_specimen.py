@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from sensorgen import design
 from sensorgen.errors import BadInput
-from sensorgen.specimen import MAX_LETTERS, Specimen, design_of, parse
+from sensorgen.specimen import MAX_LETTERS, Specimen, design_of, named, parse
 
 HERE = Path(__file__).parent
 DESIGNS = HERE.parent / "designs"
@@ -170,3 +170,22 @@ def test_the_plain_plate_and_the_double_one():
     assert design_of(parse("26 SX60")).params.dielectric_mm == 0.6
     assert design_of(parse("26 SX60 .4mm")).params.dielectric_mm == 0.4
     assert design_of(parse("26 double 2")).shape == "double"
+
+
+@pytest.mark.parametrize("quality", ["fine", "extrafine"])
+@pytest.mark.parametrize(
+    "data",
+    [
+        {"shape": "tri", "parameters": {"dielectric_mm": 0.125, "along": "y"}},
+        {"shape": "tri", "parameters": {"dielectric_mm": 0.0}},
+        {"shape": "rect", "parameters": {"dielectric_mm": 2.0, "along": "yx"}},
+        {"shape": "reference"},
+        {"shape": "reference", "parameters": {"dielectric_mm": 1.25}},
+        {"shape": "double"},
+    ],
+)
+def test_the_name_of_a_design_leads_back_to_it(data, quality):
+    made = design.make(data | {"quality": quality})
+    specimen = parse(named(made, 26, 7).name)
+    assert (specimen.iteration, specimen.replicate) == (26, 7)
+    assert design_of(specimen).id() == made.id()

@@ -10,14 +10,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from sensorgen import __version__, drawing, materials, printer, store, threemf
-from sensorgen.design import Design, Infill
+from sensorgen import __version__, drawing, materials, printer, slicing, store, threemf
+from sensorgen.design import Design
 from sensorgen.errors import Unprintable
 from sensorgen.geometry.cad import CadProcess
 from sensorgen.predict import prediction
 from sensorgen.review import Review, Step, report, review
 from sensorgen.slicer import cura, prusa
-from sensorgen.slicer.loads import Load
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
 LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")
@@ -91,7 +90,7 @@ def build(
             store.write(stage, {name: content})
         if job:
             _await(job, step)
-        store.write(stage, {store.MANIFEST: _json(_manifest(design, stage))})
+        store.write(stage, {store.MANIFEST: json_bytes(_manifest(design, stage))})
         store.publish(stage, folder)
         step("done")
     return Built(folder, held, predicted)
@@ -101,15 +100,18 @@ def _files(design: Design, held: Review, predicted: dict[str, Any], step: Step) 
     name = design.name
     step("3MF")
     for family in threemf.FAMILIES:
-        yield f"{name}.{family}.3mf", threemf.content(family, name, _parts(design, held), _centre_mm(design, family))
+        yield (
+            f"{name}.{family}.3mf",
+            threemf.content(family, name, slicing.parts(design, held.meshes), _centre_mm(design, family)),
+        )
     step("profiles")
     for path, text in profiles(design).items():
         yield path, text.encode()
     step("drawing")
     yield f"{name}.svg", draw(design, held).encode()
-    yield "check.json", _json(report(design, held))
-    yield "prediction.json", _json(predicted)
-    yield "design.json", _json(design.model_dump(mode="json"))
+    yield "check.json", json_bytes(report(design, held))
+    yield "prediction.json", json_bytes(predicted)
+    yield "design.json", json_bytes(design.model_dump(mode="json"))
 
 
 def _await(job: "Future[None]", step: Step) -> None:
@@ -133,7 +135,7 @@ def draw(design: Design, held: Review) -> str:
 
 def profiles(design: Design) -> dict[str, str]:
     """Slicer profiles, by file name: PrusaSlicer and Cura, for every quality that ships and the design's own."""
-    loads = _loads(design)
+    loads = slicing.loads(design)
     texts: dict[str, str] = {}
     # The design's own quality comes last: Cura's machine definition, one for all, then starts with it.
     others = (printer.load_quality(name) for name in QUALITIES if name != design.layers.name)
@@ -143,32 +145,6 @@ def profiles(design: Design) -> dict[str, str]:
         )
         texts |= {f"profiles/cura/{path}": text for path, text in cura.profiles(design.machine, quality, loads).items()}
     return texts
-
-
-def _loads(design: Design) -> dict[int, Load]:
-    """What each used tool prints, by the printer's own tool number."""
-    return {design.tool(name): _load(design, name) for name in design.used()}
-
-
-def _load(design: Design, name: str) -> Load:
-    infill = design.infill.get(name, Infill())
-    return Load(design.material(name), design.used()[name], infill.percent, infill.pattern)
-
-
-def _parts(design: Design, held: Review) -> list[threemf.Part]:
-    return [_part(design, body.name, body.material, held) for body in design.printed.bodies]
-
-
-def _part(design: Design, name: str, material: str, held: Review) -> threemf.Part:
-    tool = design.tool(material)
-    return threemf.Part(
-        name=name,
-        material=materials.load(material).title,
-        colour=materials.load(material).colour,
-        extruder=design.machine.slicer_index(tool),
-        mesh=held.meshes[name],
-        settings=prusa.volume_settings(design.machine, design.layers, tool, _load(design, material)),
-    )
 
 
 def _centre_mm(design: Design, family: str) -> tuple[float, float]:
@@ -202,7 +178,7 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _json(data: Mapping[str, Any]) -> bytes:
+def json_bytes(data: Mapping[str, Any]) -> bytes:
     """Indented JSON that ends in a newline; infinity, which JSON lacks, becomes a word."""
     return (json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
 

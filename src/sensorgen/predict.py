@@ -34,7 +34,7 @@ Complex = NDArray[np.complex128]
 
 def prediction(
     design: Design, frequency_hz: Sequence[float] = TONES_HZ, law: str = "", tip_m: float = TIP_M,
-    *, profile: str = UNIFORM, accuracy: float = inf, noise: float = NOISE,
+    *, profile: str = UNIFORM, accuracy: float = inf, noise: float = NOISE, judged: bool = True,
 ) -> dict[str, Any]:  # fmt: skip
     """Everything that is predicted of a design, as plain data for ``prediction.json`` (SI units).
 
@@ -51,6 +51,8 @@ def prediction(
         Wanted of abs(Z), relative [-]; the capacitance is bounded as nearly, and an unknown cell solved.
     noise : float
         Standard deviation of Re Z and of Im Z, each, as a share of abs(Z), for the card [-].
+    judged : bool
+        Whether card and error budget, which take most of the time, are in it.
 
     Notes
     -----
@@ -70,7 +72,7 @@ def prediction(
         "capacitance_per_area_f_per_m2": _bounds(found.answer.capacitance_f.times(1 / area)),
         "electrode_resistance_ohm": resistance,
         **_line(sum(resistance.values()), found.answer.capacitance_f, frequency_hz),
-        **_pressed(design, found, frequency_hz, (law, tip_m, profile), accuracy, noise),
+        **(_pressed(design, found, frequency_hz, (law, tip_m, profile), accuracy, noise) if judged else {}),
         "values": [vars(t) for t in found.taken],
         "assumptions": [
             "ideal electrodes and no fringe at the sensor's edge for the capacitance",

@@ -12,6 +12,7 @@ from sensorgen import yamlfile
 from sensorgen.errors import BadInput, UnknownName
 from sensorgen.records import Strict, checked
 
+Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 # Titles stand on one line of a slicer's profile.
 Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]*$", examples=["one line without control characters"])]
@@ -23,6 +24,35 @@ class MaxSpeed(Strict):
     xy: Positive
     z: Positive
     extruder: Positive
+
+
+class Reach(Strict):
+    """How far the axes go, in the printer's own coordinates [mm]."""
+
+    x: Annotated[tuple[Finite, Finite], Field(strict=False)]
+    y: Annotated[tuple[Finite, Finite], Field(strict=False)]
+    z: Annotated[tuple[Finite, Finite], Field(strict=False)]
+
+
+class Control(Strict):
+    """What the printer's firmware and macros make of G-code, where printers differ."""
+
+    reach_mm: Reach | None = None  # the bed and the height, where nobody says
+    spindles: Annotated[tuple[int, ...], Field(strict=False)] = ()  # tools that cut and do not print
+    layer_fan: int | None = None  # number of the fan on the part; None where it needs none
+    relative_e: bool = False  # absolute E is refused
+    names_tools: bool = False  # temperatures without a tool are refused, and set by G10 P S R
+    prime_macro: Line = ""  # changes tools, as tprime{tool}.g
+    macros: Annotated[tuple[Line, ...], Field(strict=False)] = ()  # others that stand on the printer
+    homes: Annotated[tuple[Line, ...], Field(strict=False)] = ("G28",)
+    levels: Annotated[tuple[Line, ...], Field(strict=False)] = ()
+    ends: Annotated[tuple[Line, ...], Field(strict=False)] = ()  # commands whose macro switches the heaters off
+    coldest_c: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 150.0
+    longest_purge_mm: Positive = 100.0
+    standby_c: Positive | None = None  # of a tool that waits; None: as hot as when it prints
+    preheat_s: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    tool_offsets_mm: dict[int, Finite] = Field(default={}, strict=False)  # baby steps per tool, M290
+    firmware_retraction: bool = False  # G10 and G11 instead of moves of E
 
 
 class Printer(Strict):
@@ -46,6 +76,7 @@ class Printer(Strict):
     max_speed_mm_s: MaxSpeed
     start_gcode: str
     end_gcode: str
+    control: Control = Control()
 
     @model_validator(mode="after")
     def _tools_exist(self) -> Self:
@@ -54,6 +85,9 @@ class Printer(Strict):
         for material, tool in self.default_tools.items():
             if tool not in self.tool_numbers:
                 raise ValueError(f"default tool {tool} for {material} is not among {list(self.tool_numbers)}")
+        for tool in (*self.control.spindles, *self.control.tool_offsets_mm):
+            if tool not in self.tool_numbers:
+                raise ValueError(f"tool {tool} under control is not among {list(self.tool_numbers)}")
         return self
 
     def line_mm(self) -> float:
@@ -63,6 +97,13 @@ class Printer(Strict):
     def slicer_index(self, tool: int) -> int:
         """Place of a tool in a slicer's list, which counts from 0 [-]."""
         return self.tool_numbers.index(tool)
+
+    def reach_mm(self) -> Reach:
+        """How far the axes go [mm]."""
+        if self.control.reach_mm is not None:
+            return self.control.reach_mm
+        (x, y), (wide, deep) = self.bed_centre_mm(), self.bed_mm
+        return Reach(x=(x - wide / 2, x + wide / 2), y=(y - deep / 2, y + deep / 2), z=(0.0, self.height_mm))
 
     def bed_centre_mm(self) -> tuple[float, float]:
         """Where the middle of the bed is in the printer's own coordinates [mm]."""

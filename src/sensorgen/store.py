@@ -35,12 +35,15 @@ def staging(folder: Path) -> Iterator[Path]:
             stage.mkdir()
             yield stage
         except OSError as error:
-            raise Unwritable(
-                f"cannot write to {str(folder)!r}: {error.strerror or error}; name another place with --out"
-            ) from None
+            raise unwritable(folder, error) from None
     finally:
         with _undisturbed():
             shutil.rmtree(stage, ignore_errors=True)
+
+
+def unwritable(path: Path, error: OSError) -> Unwritable:
+    """What to raise where a place cannot be written to."""
+    return Unwritable(f"cannot write to {str(path)!r}: {error.strerror or error}; name another place with --out")
 
 
 def _refuse_file(folder: Path) -> None:
@@ -74,7 +77,7 @@ def alive(pid: int) -> bool:
         return True
 
 
-def publish(stage: Path, folder: Path) -> None:
+def publish(stage: Path, folder: Path, manifest: str = MANIFEST) -> None:
     """Move all staged files into place, the manifest last; files that only an earlier manifest lists go.
 
     Everything that can fail for lack of space or rights has happened by then: what is left is renaming.
@@ -90,12 +93,12 @@ def publish(stage: Path, folder: Path) -> None:
                 f"cannot write {str(target)!r}: a folder is in its place, or the folder around it is read-only"
             )
     with _alone(folder), _undisturbed():
-        stale = set(listed(folder)) - set(staged)
-        for name in sorted(set(staged) - {MANIFEST}):
+        stale = set(listed(folder, manifest)) - set(staged)
+        for name in sorted(set(staged) - {manifest}):
             staged[name].replace(targets[name])
         for name in stale:
             (folder / name).unlink(missing_ok=True)
-        staged[MANIFEST].replace(targets[MANIFEST])
+        staged[manifest].replace(targets[manifest])
 
 
 def write(folder: Path, files: Mapping[str, bytes]) -> None:
@@ -160,10 +163,10 @@ def _key(file: Path, folder: Path) -> str:
     return file.relative_to(folder).as_posix()
 
 
-def listed(folder: Path) -> list[str]:
+def listed(folder: Path, manifest: str = MANIFEST) -> list[str]:
     """Files in the manifest of an earlier build; none where it is missing or damaged, and none outside the folder."""
     try:
-        names = list(json.loads((folder / MANIFEST).read_text("utf-8"))["files"])
+        names = list(json.loads((folder / manifest).read_text("utf-8"))["files"])
         return [n for n in names if _inside(folder, folder / n)]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return []

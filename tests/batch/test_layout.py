@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sensorgen.batch.layout import Rect, column, packed, room
+from sensorgen.batch.layout import Rect, Room, column, packed, room
 from sensorgen.errors import OutOfRange
 from sensorgen.printer import load_printer, load_quality
 from sensorgen.slicer.tower import tower
@@ -52,6 +52,28 @@ def test_every_specimen_has_a_place_of_its_own(sizes, name, tools, spacing, brim
             assert tools == 1 or distance(place, stands) >= 2 + spacing + 2 * brim - 1e-5
         for a, b in combinations(plate.values(), 2):
             assert distance(a, b) >= spacing + 2 * brim - 1e-5
+
+
+@pytest.mark.parametrize("gap", [0.0, 2.0, 3.0])
+def test_a_full_plate_stays_clear_of_what_stands_in_its_middle(gap):
+    kept = Rect(25.0, 15.0, 35.0, 25.0)
+    here = Room(Rect(0.0, 0.0, 60.0, 40.0), (kept,), gap)
+    for side in (4.0, 5.0, 6.5):
+        first = packed([(side, side)] * 200, here)[0].values()
+        assert min(distance(place, kept) for place in first) >= gap - 1e-9
+        assert {(p.x0 > kept.x1, p.x1 < kept.x0, p.y0 > kept.y1, p.y1 < kept.y0) for p in first} >= {
+            (True, False, False, False), (False, True, False, False), (False, False, True, False),
+        }  # fmt: skip
+        # At least half of what area and gaps allow.
+        assert len(first) >= 0.5 * ((60 + gap) * (40 + gap) - (10 + gap) ** 2) / (side + gap) ** 2
+
+
+@pytest.mark.parametrize("printer", PRINTERS)
+def test_the_towers_brim_is_kept_clear(printer):
+    machine = load_printer(printer)
+    (kept,) = room(machine, FINE, 2, 5.0, 0.0).kept
+    at = tower(machine, FINE, 2)
+    assert kept == Rect(at.x_mm - 2, at.y_mm - 2, at.x_mm + at.side_mm + 2, at.y_mm + at.side_mm + 2)
 
 
 @settings(deadline=None, max_examples=30)

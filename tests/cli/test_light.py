@@ -14,6 +14,7 @@ LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))
         (["--version"], HEAVY),
         (["build", "--help"], HEAVY),
         (["build", "tri", "--help"], HEAVY),
+        (["batch", "--help"], HEAVY),
         (["completion", "zsh"], HEAVY),
         (["check", "tri"], CAD),
         (["predict", "tri"], CAD),

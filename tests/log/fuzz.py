@@ -43,7 +43,7 @@ ODD = (
     b"\x00" * 64,
 )
 BATCH = {
-    "name": "26",
+    "batch": "26",
     "specimens": {
         "26 triX .1mm": {"design": "trix-d0.1", "design_id": "0" * 16, "expected": {"capacitance_f": {"lower": 1e-11}}},
         "26 triX .1mm 2": {"design": "trix-d0.1", "design_id": "0" * 16, "expected": {}},

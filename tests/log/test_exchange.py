@@ -38,6 +38,8 @@ REMARKS = [
     "''=1",
     "\tx",
     "x\r\ny",
+    "\r",
+    "x\ry",
     "\nx",
     "＝1",
     '"a","b"',
@@ -62,6 +64,7 @@ def full(log, tmp_path):
     log.add(
         [
             raw,
+            reading("26 triX", "1", remark="before the print bed was known"),
             Batch(uid="b", batch="26", file=raw.uid),
             Print(
                 uid="p",
@@ -88,7 +91,7 @@ def full(log, tmp_path):
 
 def test_the_whole_log_comes_back(full, tmp_path):
     rows = exporting.export(full, tmp_path / "out")
-    assert rows == sum(map(len, everything(full).values())) == len(REMARKS) + 7
+    assert rows == sum(map(len, everything(full).values())) == len(REMARKS) + 8
     with Log(tmp_path / "new.db", create=True) as new:
         done = importing.take(new, tmp_path / "out", {})
         assert (done.rows, done.new) == (rows, rows)
@@ -114,10 +117,10 @@ def test_parquet_holds_types_that_others_read(full, tmp_path):
 
     exporting.export(full, tmp_path / "r.parquet")
     table = pyarrow.parquet.read_table(tmp_path / "r.parquet")
-    assert table.column("y_ohm").to_pylist()[1] == [1234.56789, math.inf]
-    assert table.column("baked").to_pylist()[:2] == [True, False]
-    assert table.column("film_mm").to_pylist()[:2] == [0.0, 0.3333]
-    assert table.column("remark").to_pylist()[1 : len(REMARKS) + 1] == REMARKS
+    assert table.column("y_ohm").to_pylist()[2] == [1234.56789, math.inf]
+    assert table.column("baked").to_pylist()[1:3] == [True, False]
+    assert table.column("film_mm").to_pylist()[1:3] == [0.0, 0.3333]
+    assert table.column("remark").to_pylist()[2 : len(REMARKS) + 2] == REMARKS
 
 
 def test_no_cell_is_a_formula(full, tmp_path):
@@ -227,7 +230,7 @@ def test_without_pyarrow_parquet_is_refused_and_csv_is_not(full, tmp_path, monke
     monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
     with pytest.raises(MissingValue, match=r"pip install 'sensorgen\[parquet\]', or export CSV"):
         exporting.export(full, tmp_path / "r.parquet")
-    assert exporting.export(full, tmp_path / "r.csv") == len(REMARKS) + 2
+    assert exporting.export(full, tmp_path / "r.csv") == len(REMARKS) + 3
 
 
 def test_every_kind_has_every_column():

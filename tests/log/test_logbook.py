@@ -1,6 +1,7 @@
 """The log only grows, ties every row to what it is about, and takes older files along."""
 
 import dataclasses
+import os
 import sqlite3
 import subprocess
 import sys
@@ -8,8 +9,21 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.errors import BadInput, Unwritable
-from sensorgen.log import TABLES, Batch, BenchRun, Log, Prediction, Print, RawFile, Reading, database, schema, verify
+from sensorgen.errors import BadInput, UnknownName, Unwritable
+from sensorgen.log import (
+    TABLES,
+    Batch,
+    BenchRun,
+    Log,
+    Prediction,
+    Print,
+    RawFile,
+    Reading,
+    database,
+    leftovers,
+    schema,
+    verify,
+)
 from sensorgen.log.words import reading
 
 HERE = Path(__file__).parent
@@ -65,7 +79,13 @@ def test_every_reading_is_tied_to_specimen_iteration_design_and_batch(log):
         row = found[uid]
         assert (row.specimen, row.batch, row.design_id, row.design) == ("26 triX", "26", "d", "trix")
     assert log.recordings()[0].batch == "26"
-    assert [len(log.readings(iteration=k)) for k in (25, 26, 27)] == [0, 3, 1]
+    again = [
+        Batch(uid="b2", batch="26 again", file=SHA),
+        Print(uid="p2", specimen="26 triX", batch_uid="b2", design_id="e", design="t"),
+    ]
+    log.add([*again, reading("26 triX", "700", uid="last")])
+    assert next(log.entries(Reading, uid="last")).batch == "26 again"
+    assert [len(log.readings(iteration=k)) for k in (25, 26, 27)] == [0, 4, 1]
     assert [s.specimen for s in log.specimens()] == ["26 triX", "26 triX .1mm", "27 triX"]
     assert [s.specimen for s in log.specimens(iteration=27)] == ["27 triX"]
     assert log.readings(last=2) == log.readings()[-2:]
@@ -232,6 +252,51 @@ def test_a_reader_makes_no_log(tmp_path):
     with pytest.raises(BadInput, match=r"no log at .*: log something first"):
         Log(tmp_path / "none.db")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_whoever_makes_the_log_first_keeps_it(path, monkeypatch):
+    def slow(made=database._empty):
+        monkeypatch.setattr(database, "_empty", made)
+        with Log(path, create=True) as first:
+            first.add([reading("23 triX", "650")])
+        return made()
+
+    monkeypatch.setattr(database, "_empty", slow)
+    with Log(path, create=True) as second:
+        assert len(second.readings()) == 1
+    assert [p.name for p in path.parent.iterdir()] == ["log.db"]
+
+
+def test_a_log_is_made_where_there_are_no_links(path, monkeypatch):
+    def refuse(*_):
+        raise OSError(1, "Operation not permitted")
+
+    monkeypatch.setattr("os.link", refuse)
+    with Log(path, create=True) as log:
+        assert len(log.add([reading("23 triX", "650")])) == 1
+    assert [p.name for p in path.parent.iterdir()] == ["log.db"]
+
+
+def test_parts_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path):
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    mine = leftovers.part_of(tmp_path / "log.db")
+    assert mine != leftovers.part_of(tmp_path / "log.db")
+    stay = [mine.name, f".log.db.ab.{os.getppid()}.part", "log.db.1.part", ".log.db.part", f".x.{dead.pid}.part.txt"]
+    go = [f".log.db.ab.{dead.pid}.part", f".log.db.ab.{os.getpid()}.part"]
+    for name in (*stay, *go):
+        (tmp_path / name).touch()
+    Log(tmp_path / "log.db", create=True).__exit__(None, None, None)
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([*stay, "log.db"])
+
+
+def test_rows_by_columns_that_there_are(log):
+    log.add([reading("23 triX", "650"), reading("23 triY", "650")])
+    assert [r.specimen for r in log.readings(shape="tri", axes="Y", baked=None)] == ["23 triY"]
+    with pytest.raises(UnknownName, match="unknown column of a Reading 'iteratoin'; did you mean 'iteration'"):
+        log.readings(iteratoin=23)
+    with pytest.raises(UnknownName):
+        log.readings(**{"uid = '' OR 1 --": ""})
 
 
 WRITER = """

@@ -109,6 +109,7 @@ def test_several_readings_are_several():
     assert found.ohm == (500.0, 1000.0, 1300.0)
     assert found.doubts == ("3 readings: repeats, or several points of contact",)
     assert read("5k / 0").ohm == (5000.0, 0.0)
+    assert read("5k / 6k").doubts == ("2 readings: repeats, or several points of contact",)
 
 
 @pytest.mark.parametrize("words", ["", "  ", "\t"])

@@ -15,8 +15,9 @@ import pytest
 
 from sensorgen import materials
 from sensorgen.errors import SlicerFailed
+from sensorgen.gcode import extruded
 from sensorgen.printer import Printer, load_printer, load_quality, printer_names, quality_names
-from sensorgen.slicer import cura, curaengine, gcode, prusa
+from sensorgen.slicer import cura, curaengine, prusa
 from sensorgen.slicer.loads import Load
 from sensorgen.slicer.tower import tower
 
@@ -98,12 +99,12 @@ def usual(printer: Printer, **dielectric: object) -> dict[int, Load]:
     }
 
 
-def read(path: Path, printer: Printer) -> gcode.Extruded:
+def read(path: Path, printer: Printer) -> extruded.Extruded:
     with path.open() as lines:
-        return gcode.read(lines, printer.filament_mm)
+        return extruded.read(lines, printer.filament_mm)
 
 
-def fullness(found: gcode.Extruded, heights_mm: dict[int, float]) -> dict[int, float]:
+def fullness(found: extruded.Extruded, heights_mm: dict[int, float]) -> dict[int, float]:
     """Printed over drawn volume of each tool's bodies [-]."""
     return {tool: volume / (SIZE_MM[0] * SIZE_MM[1] * heights_mm[tool]) for tool, volume in found.model_mm3().items()}
 

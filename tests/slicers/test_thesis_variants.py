@@ -7,8 +7,9 @@ import pytest
 
 from sensorgen import design
 from sensorgen.build import build
+from sensorgen.gcode import extruded
 from sensorgen.geometry import meshes
-from sensorgen.slicer import curaengine, gcode, prusa
+from sensorgen.slicer import curaengine, prusa
 from sensorgen.slicer.loads import Load
 
 DESIGNS = Path(__file__).parents[2] / "designs"
@@ -28,14 +29,14 @@ def solid_mm3(variant):
     return found
 
 
-def judge(record_property, slicer, name, variant, extruded):
-    solid, printed = solid_mm3(variant), extruded.model_mm3()
+def judge(record_property, slicer, name, variant, found):
+    solid, printed = solid_mm3(variant), found.model_mm3()
     ratios = {tool: printed[tool] / solid[tool] for tool in solid}
     row = "  ".join(
         f"T{tool} {printed[tool]:7.1f} of {solid[tool]:7.1f} mm3 ({ratios[tool]:.3f})" for tool in sorted(solid)
     )
     record_property("volumes", f"{slicer:6} {name:20} {row}")
-    assert set(extruded.tools) == TOOLS
+    assert set(found.tools) == TOOLS
     assert set(printed) == TOOLS
     assert all(SOUND[0] < ratio < SOUND[1] for ratio in ratios.values()), ratios
 
@@ -51,7 +52,11 @@ def test_prusaslicer_prints_every_body_on_its_tool(name, tmp_path, prusa_slicer,
     out = tmp_path / "print.gcode"
     prusa.slice_3mf(folder / f"{variant.name}.prusa.3mf", folder / "profiles/prusa/diabase-h5-fine.ini", out)
     judge(
-        record_property, "Prusa", name, variant, gcode.read(out.read_text().splitlines(), variant.machine.filament_mm)
+        record_property,
+        "Prusa",
+        name,
+        variant,
+        extruded.read(out.read_text().splitlines(), variant.machine.filament_mm),
     )
 
 
@@ -66,7 +71,9 @@ def test_curaengine_prints_every_body_on_its_tool(name, tmp_path, cura_engine, r
     ]
     out = tmp_path / "print.gcode"
     curaengine.slice_bodies(bodies, settings, out)
-    judge(record_property, "Cura", name, variant, gcode.read(out.read_text().splitlines(), variant.machine.filament_mm))
+    judge(
+        record_property, "Cura", name, variant, extruded.read(out.read_text().splitlines(), variant.machine.filament_mm)
+    )
 
 
 def stl(folder, variant, body):

@@ -92,6 +92,9 @@ class Plan(Strict):
     designs: Annotated[tuple[Item, ...], Field(min_length=1, strict=False)]
     printer: str = Field(default="", description="Printer of all designs; each design's own when not given.")
     quality: str = Field(default="", description="Quality of all designs; each design's own when not given.")
+    tools: dict[str, Annotated[int, Field(ge=0, le=99)]] = Field(
+        default={}, description="Material to tool, in the printer's own numbers; goes before each design's."
+    )
     layout: Layout = Layout()
     slicers: Annotated[tuple[Literal["prusa", "cura"], ...], Field(min_length=1, max_length=2, strict=False)] = (
         "prusa",
@@ -113,9 +116,11 @@ class Plan(Strict):
         SensorgenError
             It is unknown, or wrong.
         """
-        over = {key: value for key in ("printer", "quality") if (value := getattr(self, key))}
         data = item.data(folder)
-        if any(data.get(key, None) != value for key, value in over.items()):
+        over = {key: value for key in ("printer", "quality") if (value := getattr(self, key))}
+        if self.tools:
+            over["tools"] = _over(data.get("tools", {}), self.tools)
+        if any(data.get(key) != value for key, value in over.items()):
             data = {key: value for key, value in (data | over).items() if key != "name"}
         return design_files.make(data)
 

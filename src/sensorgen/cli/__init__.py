@@ -14,7 +14,10 @@ from sensorgen.errors import SensorgenError, Unprintable
 
 COMMANDS = (
     "build",
+    "batch",
     "check",
+    "slice",
+    "gcode",
     "draw",
     "predict",
     "cell",

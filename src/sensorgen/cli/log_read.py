@@ -28,17 +28,18 @@ def _list(iteration: int | None, last: int, file: str | None, *, everything: boo
             show.as_json({k: [log_text.plain(e) for e in v] for k, v in (("readings", found), ("recordings", runs))})
             return
         click.echo("\n".join((*log_text.readings(found), *log_text.runs(runs))))
-        click.echo(_total(log, len(found)))
+        click.echo(
+            _total(log) + ("" if everything or len(found) < last else f"; the latest {last} are shown, --all shows all")
+        )
 
 
-def _total(log: "Log", shown: int) -> str:
+def _total(log: "Log") -> str:
     from sensorgen.log import BenchRun, Prediction, Reading
 
     names = {Reading: "readings", BenchRun: "recordings", Prediction: "predictions"}
     counts = {name: log.count(kind) for kind, name in names.items()}
     said = ", ".join(f"{count} {name}" for name, count in counts.items())
-    more = f"; the latest {shown} readings are shown, --all shows all" if shown == LAST < counts["readings"] else ""
-    return f"{said} in {log.path}{more}"
+    return f"{said} in {log.path}"
 
 
 def _show(what: str, file: str | None, *, as_json: bool) -> None:

@@ -1,8 +1,9 @@
 """The log as a person at a terminal, or a program, wants to read it."""
 
 import dataclasses
+import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.cli.show import si
@@ -69,8 +70,23 @@ def _said(words: str, ohm: Sequence[float]) -> str:
 def run(b: "BenchRun") -> Iterator[str]:
     """Everything about one recording."""
     yield f"recording {b.number}: {visible(b.specimen)}"
-    facts = {name: getattr(b, name) for name in ("file", "rig_file", "remark", "batch", "logged_at", "facts")}
+    facts = {name: getattr(b, name) for name in ("file", "rig_file", "remark", "design", "batch", "logged_at")}
     yield from (f"  {name:11}{visible(fact)}" for name, fact in facts.items() if fact)
+    yield from (f"  {visible(line)}" for line in _counted(json.loads(b.facts)))
+
+
+def _counted(facts: Mapping[str, Any]) -> Iterator[str]:
+    """What was counted in a recording when it came in."""
+    for lockin in facts.get("lockins", ()):
+        counts = dict(lockin["counts"])
+        samples, valid = counts.pop("samples"), counts.pop("valid")
+        marks = ", ".join(f"{count} {mark}" for mark, count in counts.items() if count)
+        tones = ", ".join(si(tone, "Hz") for tone in lockin["tones_hz"])
+        yield f"lock-in {lockin['lockin']}  {samples} samples, {valid} of them sound; {marks or 'no marks'}"
+        yield f"{'':11}{tones}; {lockin['seconds']:.5g} s by {lockin['program'] or lockin['format']}"
+    if "rig" in facts:
+        rig = facts["rig"]
+        yield f"{'rig':11}{rig['rows']} rows, {rig['errors']} with errors; {rig['clocks']}"
 
 
 def plain(entry: "Entry") -> dict[str, Any]:

@@ -26,6 +26,11 @@ def remark() -> click.Option:
     return click.Option(["--remark"], metavar="TEXT", default="", help="Anything worth knowing, in your own words.")
 
 
+def corrects() -> click.Option:
+    """A row that is to be corrected."""
+    return click.Option(["--corrects"], metavar="NUMBER", type=int, help="Number of the row that this one corrects.")
+
+
 def made(work: Callable[..., Any], name: str, about: str, *params: click.Parameter) -> click.Command:
     """A command that does some work, its help being what the work's docstring says."""
     return click.Command(name, params=list(params), callback=work, help=work.__doc__, short_help=about)

@@ -1,7 +1,8 @@
 """``sensorgen log multimeter|import|bench|predict``: what goes into the log."""
 
+import difflib
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ import click
 from sensorgen.cli import show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.log_words import as_json as json_option
-from sensorgen.cli.log_words import made, opened, remark, where
+from sensorgen.cli.log_words import corrects, made, opened, remark, where
 from sensorgen.cli.settings import pairs
 from sensorgen.cli.words import OneOf
 from sensorgen.errors import BadInput
@@ -28,7 +29,7 @@ def _multimeter(
     Several readings have / between them, as in --z '2.3k / 3.8k'. A small m is taken for mega, and asked for on a
     terminal.
     """
-    from sensorgen.log import words
+    from sensorgen.log import Reading, words
 
     meter = {key: how.pop(key) for key in ("visa", "axis", "wires")}
     if meter["visa"] and (y_words or z_words):
@@ -39,18 +40,18 @@ def _multimeter(
         how["source"] = meter["visa"]
     if not (y_words.strip() or z_words.strip() or how["remark"]):
         raise BadInput("nothing to log; expected --y, --z, --visa or --remark")
-    mega = _asked_mega(y_words, z_words)
+    mega = _asked_mega(y=y_words, z=z_words)
     with opened(file, create=True) as log:
-        supersedes = _uid(log, corrects) if corrects is not None else ""
+        supersedes = _uid(log, Reading, corrects)
         new = log.add([words.reading(specimen, y_words, z_words, mega=mega, supersedes=supersedes, **how)])
         _say_logged(new, log, as_json=as_json)
 
 
-def _asked_mega(*typed: str) -> bool:
+def _asked_mega(**typed: str) -> bool:
     """Whether a person says that a small m means mega; nobody is asked where there is no m, or no person."""
-    from sensorgen.log.values import read
+    from sensorgen.log.words import resistance
 
-    found = [word for words in typed for word in read(words).mega]
+    found = [word for axis, words in typed.items() for word in resistance(axis, words).mega]
     if not found or not sys.stdin.isatty():
         return False
     if not click.confirm(f"{', '.join(found)}: is m mega (a million)?", default=True, err=True):
@@ -73,24 +74,38 @@ def _measured(visa: str, axis: str | None, wires: str) -> tuple[str, str, str]:
         return found["y"], found["z"], meter.name
 
 
-def _uid(log: "Log", number: int) -> str:
-    from sensorgen.log import Reading
-
-    old = next(log.entries(Reading, superseded=True, number=number), None)
+def _uid(log: "Log", kind: "type[Entry]", number: int | None) -> str:
+    """The name for life of a row that is to be corrected, "" if none is."""
+    if number is None:
+        return ""
+    old = next(log.entries(kind, superseded=True, number=number), None)
     if old is None:
-        raise BadInput(f"--corrects {number}: no such reading; sensorgen log list shows their numbers")
+        raise BadInput(f"--corrects {number}: no such row; sensorgen log list shows their numbers")
     return old.uid
 
 
-def _say_logged(new: Iterable["Entry"], log: "Log", *, as_json: bool) -> None:
+def _say_logged(new: Sequence["Entry"], log: "Log", *, as_json: bool, known: str = "") -> None:
+    """Say what was logged, or that it was ``known``, and where."""
     from sensorgen.cli import log_text
 
     if as_json:
         show.as_json([log_text.plain(entry) for entry in new])
         return
     for entry in new:
-        click.echo("logged " + "\n".join(log_text.of(entry)))
+        click.echo("logged " + "\n".join([*log_text.of(entry), *_near(entry, log)]))
+    if not new:
+        click.echo(known)
     click.echo(f"in {log.path}")
+
+
+def _near(entry: "Entry", log: "Log") -> Iterator[str]:
+    """A hint where a specimen is on no print bed of its iteration, and another with nearly its name is."""
+    from sensorgen.log import Print, Reading
+
+    if isinstance(entry, Reading) and not entry.batch:
+        names = [printed.specimen for printed in log.entries(Print, iteration=entry.iteration)]
+        for near in difflib.get_close_matches(entry.specimen, names, n=1, cutoff=0.8):
+            yield f"no print bed here has {entry.specimen!r}; near is {near!r}: --corrects {entry.number}, if meant"
 
 
 def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, thesis: bool, as_json: bool) -> None:
@@ -114,16 +129,26 @@ def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, the
         click.echo(f"in {log.path}")
 
 
-def _bench(specimen: str, lcr_file: str, rig_file: str | None, remark: str, file: str | None, *, as_json: bool) -> None:
+def _bench(
+    specimen: str,
+    lcr_file: str,
+    rig_file: str | None,
+    remark: str,
+    file: str | None,
+    corrects: int | None,
+    *,
+    as_json: bool,
+) -> None:
     """Log a recording of one specimen, its files kept whole.
 
     LCR_FILE is the impedance analyser's, RIG_FILE the rig's with force and position.
     """
-    from sensorgen.log import bench
+    from sensorgen.log import BenchRun, bench
 
     with opened(file, create=True) as log:
-        new = bench.take(log, specimen, Path(lcr_file), Path(rig_file) if rig_file else None, remark)
-        _say_logged(new, log, as_json=as_json)
+        more = {"remark": remark, "supersedes": _uid(log, BenchRun, corrects)}
+        new = bench.take(log, specimen, Path(lcr_file), Path(rig_file) if rig_file else None, **more)
+        _say_logged(new, log, as_json=as_json, known=f"{specimen}: the log has this very recording")
 
 
 def _predict(design: "Design", *, file: str | None, as_json: bool) -> int:
@@ -132,10 +157,7 @@ def _predict(design: "Design", *, file: str | None, as_json: bool) -> int:
 
     with opened(file, create=True) as log:
         new = log.add([prediction(design.id(), design.name, predicted(design))])
-        if new or as_json:
-            _say_logged(new, log, as_json=as_json)
-        else:
-            click.echo(f"{design.name}: the log has this very prediction\nin {log.path}")
+        _say_logged(new, log, as_json=as_json, known=f"{design.name}: the log has this very prediction")
     return 0
 
 
@@ -147,7 +169,7 @@ multimeter = made(
     click.Option(["--baked/--unbaked"], default=None, help="Whether the specimen was baked before."),
     remark(),
     click.Option(["--measured-at"], metavar="WHEN", default="", help="When it was measured, in your own words."),
-    click.Option(["--corrects"], metavar="NUMBER", type=int, help="Reading that this one corrects."),
+    corrects(),
     click.Option(["--visa"], metavar="ADDRESS", help="Read the meter there, as GPIB0::22::INSTR: first Y, then Z."),
     click.Option(["--axis"], type=OneOf(("y", "z")), help="Let the meter read this one only."),
     click.Option(["--wires"], type=OneOf(("2", "4")), default="2", show_default=True, help="Leads of the meter."),
@@ -171,6 +193,7 @@ bench = made(
     click.Argument(["lcr_file"]),
     click.Argument(["rig_file"], required=False),
     remark(),
+    corrects(),
     where(),
     json_option(),
 )  # fmt: skip

@@ -31,11 +31,16 @@ def rows(path: Path, file: RawFile) -> Iterator[Entry]:
         Not the record of a batch; with the file's name, and the specimen's.
     """
     record = _record(path)
-    batch = str(record.get("name") or path.parent.name or path.stem)
+    batch = str(record.get("batch") or path.absolute().parent.name)
     yield file
     yield Batch(uid=file.uid, batch=batch, file=file.uid)
-    for written, piece in _mapping(record.get("specimens"), f"{path}: specimens").items():
-        yield from _of_piece(file.uid, written, _mapping(piece, f"{path}: specimen {written}"), str(path))
+    pieces = _mapping(record.get("specimens"), f"{path}: specimens").items()
+    found = (
+        row
+        for written, piece in pieces
+        for row in _of_piece(file.uid, written, _mapping(piece, f"{path}: specimen {written}"), str(path))
+    )
+    yield from dict.fromkeys(found)  # copies of one design share a prediction
 
 
 def _of_piece(batch: str, written: str, piece: Mapping[str, Any], where: str) -> Iterator[Entry]:

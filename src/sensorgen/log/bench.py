@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from sensorgen.recording import Joined, Recording
 
 
-def take(log: Log, specimen: str, recording: Path, rig: Path | None = None, remark: str = "") -> list[Entry]:
+def take(
+    log: Log, specimen: str, recording: Path, rig: Path | None = None, *, remark: str = "", supersedes: str = ""
+) -> list[Entry]:
     """Log a recording of one specimen.
 
     Parameters
@@ -29,6 +31,8 @@ def take(log: Log, specimen: str, recording: Path, rig: Path | None = None, rema
         The impedance analyser's file, and the rig's, if there is one.
     remark : str
         In anybody's words.
+    supersedes : str
+        ``uid`` of the recording that this one corrects, "" if it corrects none.
 
     Returns
     -------
@@ -50,8 +54,8 @@ def take(log: Log, specimen: str, recording: Path, rig: Path | None = None, rema
     run = BenchRun(
         uid=sha256(" ".join([str(columns["specimen"]), *(file.uid for file in kept)]).encode()).hexdigest()[:32],
         **columns,  # type: ignore[arg-type]
-        written=specimen, design_id=design_id, design=design, remark=remark, source=recording.name,
-        file=kept[0].uid, rig_file=kept[1].uid if rig else "",
+        written=specimen, design_id=design_id, design=design, source=recording.name, remark=remark,
+        supersedes=supersedes, file=kept[0].uid, rig_file=kept[1].uid if rig else "",
         facts=json.dumps(facts, sort_keys=True, allow_nan=False),
     )  # fmt: skip
     return [row for row in log.add([*kept, run]) if isinstance(row, BenchRun)]

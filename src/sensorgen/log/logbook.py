@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
-from sensorgen.errors import BadInput
+from sensorgen.errors import BadInput, UnknownName
 from sensorgen.log import database
 from sensorgen.log.codec import CODECS
 from sensorgen.log.entries import (
@@ -156,6 +156,8 @@ class Log:
 
         Raises
         ------
+        UnknownName
+            There is no such column.
         BadInput
             The log is damaged; what was given until then is sound.
         """
@@ -247,6 +249,9 @@ def _check_same(known: Entry, entry: Entry) -> None:
 
 def _selection(kind: type[Entry], equal: dict[str, Any], last: int | None, superseded: bool) -> tuple[str, list[Any]]:
     """The SQL for some rows; all names in it are our own."""
+    for name in equal:
+        if name not in columns(kind):
+            raise UnknownName(f"column of a {kind.__name__}", name, columns(kind))
     table = TABLES[kind]
     names = ", ".join(f"{_home(kind, name)}.{name}" for name in columns(kind))
     joined = f"JOIN specimen ON specimen.specimen = {table}.specimen" if issubclass(kind, Specimen) else ""

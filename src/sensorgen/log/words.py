@@ -76,7 +76,7 @@ def reading(
     if any("\0" in text for text in (remark, written, y_words, z_words)):
         raise BadInput("a zero byte in a name, a value or a remark; expected text")
     columns, name = named(written)
-    said = {axis: _resistance(axis, words) for axis, words in (("y", y_words), ("z", z_words))}
+    said = {axis: resistance(axis, words) for axis, words in (("y", y_words), ("z", z_words))}
     unbaked = bool(_UNBAKED.search(remark))
     doubts = [doubt for doubt in name.assumed if doubt != NO_FILM or (name.iteration or 0) < FIRST_WITH_FILMS]
     for axis, found in said.items():
@@ -98,7 +98,14 @@ def reading(
     )
 
 
-def _resistance(axis: str, words: str) -> Resistances:
+def resistance(axis: str, words: str) -> Resistances:
+    """What words say of one resistance, ``y`` or ``z``.
+
+    Raises
+    ------
+    BadInput
+        Not a resistance; the message names the axis.
+    """
     try:
         return read(words)
     except BadInput as error:

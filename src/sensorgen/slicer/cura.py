@@ -147,6 +147,7 @@ def _machine(printer: Printer, quality: Quality, used: Mapping[int, Recipe]) -> 
         "max_xy": speeds.xy,
         "max_z": speeds.z,
         "max_e": speeds.extruder,
+        "firmware_retraction": printer.control.firmware_retraction,
     }
     return _fill("machine.def.json", {key: json.dumps(value) for key, value in names.items()})
 

@@ -17,7 +17,7 @@ from sensorgen.errors import SlicerFailed
 from sensorgen.printer import Printer, Quality, folder
 from sensorgen.slicer import cura
 from sensorgen.slicer.loads import Load, recipes
-from sensorgen.slicer.run import find, run
+from sensorgen.slicer.run import USUAL, Runner, find, run
 
 RESOURCES = (Path("/usr/share/cura/resources"), Path("/usr/local/share/cura/resources"))
 
@@ -68,7 +68,9 @@ def engine_settings(printer: Printer, quality: Quality, loads: Mapping[int, Load
     )
 
 
-def slice_bodies(stls: Sequence[tuple[Path, int]], settings: EngineSettings, gcode: Path) -> None:
+def slice_bodies(
+    stls: Sequence[tuple[Path, int]], settings: EngineSettings, gcode: Path, runner: Runner = USUAL
+) -> None:
     """Slice one STL per body with CuraEngine.
 
     Parameters
@@ -80,6 +82,8 @@ def slice_bodies(stls: Sequence[tuple[Path, int]], settings: EngineSettings, gco
         From :func:`engine_settings`.
     gcode : Path
         What to write.
+    runner : Runner
+        Which program, and for how long [s].
 
     Raises
     ------
@@ -87,7 +91,7 @@ def slice_bodies(stls: Sequence[tuple[Path, int]], settings: EngineSettings, gco
         CuraEngine or its definitions are not installed, a mesh is missing, or its tool has no load; or
         the engine refuses.
     """
-    program = find("CuraEngine", "cura-engine cura")
+    program = find("CuraEngine", "cura-engine cura", runner.program)
     for path, index in stls:
         if not path.is_file():
             raise SlicerFailed(f"nothing to slice: there is no file {path}")
@@ -99,7 +103,8 @@ def slice_bodies(stls: Sequence[tuple[Path, int]], settings: EngineSettings, gco
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_text(text, "utf-8")
         command = [program, "slice", *_arguments(stls, settings, Path(here)), "-o", str(gcode)]
-        run(command, gcode, {"CURA_ENGINE_SEARCH_PATH": os.pathsep.join(map(str, _search(Path(here))))})
+        search = os.pathsep.join(map(str, _search(Path(here))))
+        run(command, gcode, {"CURA_ENGINE_SEARCH_PATH": search}, runner)
 
 
 def resources() -> Path:

@@ -8,7 +8,7 @@ from string import Template
 from sensorgen.errors import SlicerFailed
 from sensorgen.printer import Printer, Quality, folder
 from sensorgen.slicer.loads import Load, Recipe, by_hand, number, recipe, recipes
-from sensorgen.slicer.run import find, run
+from sensorgen.slicer.run import USUAL, Runner, find, run
 from sensorgen.slicer.tower import PRIME_MM3, Tower, tower
 
 FLAVOURS = {"reprapfirmware": "reprapfirmware", "marlin": "marlin2"}
@@ -75,7 +75,7 @@ def volume_settings(printer: Printer, quality: Quality, tool: int, load: Load) -
     }  # fmt: skip
 
 
-def slice_3mf(threemf: Path, profile: Path, gcode: Path) -> None:
+def slice_3mf(threemf: Path, profile: Path, gcode: Path, runner: Runner = USUAL) -> None:
     """Slice a 3MF with PrusaSlicer, where it stands on the bed.
 
     Parameters
@@ -86,20 +86,22 @@ def slice_3mf(threemf: Path, profile: Path, gcode: Path) -> None:
         An ``.ini`` written from :func:`profile`.
     gcode : Path
         What to write.
+    runner : Runner
+        Which program, and for how long [s].
 
     Raises
     ------
     SlicerFailed
         PrusaSlicer is not installed, refuses, or cannot read one of the files.
     """
-    program = find("prusa-slicer", "prusa-slicer")
+    program = find("prusa-slicer", "prusa-slicer", runner.program)
     for path in (threemf, profile):
         if not path.is_file():  # PrusaSlicer would take a missing profile for an empty one
             raise SlicerFailed(f"nothing to slice: there is no file {path}")
     # By default PrusaSlicer puts another value for one that it does not know, and goes on.
     strict = ["--config-compatibility", "disable"]
     command = [program, "--export-gcode", "--dont-arrange", *strict, "--load", str(profile)]
-    run([*command, "--output", str(gcode), str(threemf)], gcode)
+    run([*command, "--output", str(gcode), str(threemf)], gcode, runner=runner)
 
 
 def _of_printer(printer: Printer) -> dict[str, str]:
@@ -117,6 +119,7 @@ def _of_printer(printer: Printer) -> dict[str, str]:
         "max_z": number(speeds.z),
         "max_e": number(speeds.extruder),
         "travel_speed_z": number(speeds.z),
+        "firmware_retraction": str(int(printer.control.firmware_retraction)),
     }
 
 

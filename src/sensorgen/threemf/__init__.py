@@ -9,11 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sensorgen.errors import UnknownName
+from sensorgen.errors import BadInput, UnknownName
 from sensorgen.threemf import archive, cura, orca, prusa
 from sensorgen.threemf.part import Part, check
+from sensorgen.threemf.plate import box_mm, placed
 
-__all__ = ["FAMILIES", "Part", "content"]
+__all__ = ["FAMILIES", "Part", "content", "placed", "plate"]
 
 _WRITERS = {"prusa": prusa.files, "cura": cura.files, "orca": orca.files}
 
@@ -61,7 +62,33 @@ def content(family: str, title: str, parts: Sequence[Part], centre_mm: tuple[flo
         raise UnknownName("family of slicers", family, FAMILIES)
     check(title, parts, centre_mm)
     ordered = sorted(parts, key=lambda part: part.name)
-    low = np.min([part.mesh.vertices_mm.min(axis=0) for part in parts], axis=0)
-    high = np.max([part.mesh.vertices_mm.max(axis=0) for part in parts], axis=0)
+    low, high = box_mm(parts)
     shift_mm = np.array([*centre_mm, 0.0]) - [*(low + high)[:2] / 2, low[2]]
     return archive.pack(_WRITERS[family](title, ordered, shift_mm))
+
+
+def plate(family: str, title: str, parts: Sequence[Part], corner_mm: tuple[float, float]) -> bytes:
+    """The 3MF of a plate with several sensors, each body where it stands.
+
+    Parameters
+    ----------
+    family : str
+        One of ``FAMILIES``.
+    title : str
+        Name of the print.
+    parts : sequence of Part
+        All bodies, made by :func:`placed` in the coordinates of the bed.
+    corner_mm : (float, float)
+        The front left corner of the bed in those coordinates [mm]: Cura counts from there.
+
+    Raises
+    ------
+    UnknownName, BadInput, OutOfRange
+        See :func:`content`.
+    """
+    if not parts:
+        raise BadInput("no bodies to write: a plate needs at least one sensor")
+    low, high = box_mm(parts)
+    middle_x, middle_y = (low + high)[:2] / 2
+    x0, y0 = corner_mm if family == "cura" else (0.0, 0.0)
+    return content(family, title, parts, (float(middle_x - x0), float(middle_y - y0)))

@@ -1,0 +1,141 @@
+"""The log: how long its commands take as it grows, what a recording costs, and what kills and tampering come to.
+
+Seconds are the processor's, of the command's own process where one runs. Writes ``results/log.md``. The recordings
+are of seven tones in MATLAB's format.
+"""
+
+import dataclasses
+import json
+import os
+import platform
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import scipy.io
+
+from sensorgen.log import Log
+from sensorgen.log.words import reading
+
+HERE = Path(__file__).parent
+TESTS = HERE.parent / "tests" / "log"
+READINGS, SAMPLES, KILLS, FILES = 100_000, 1_000_000, 200, 10_000
+TONES_HZ = [1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3]
+RUNS = 5
+COMMAND = """
+import resource, sys
+from sensorgen.cli import main
+try:
+    main()
+finally:
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stderr)
+"""
+
+
+def spent(*words):
+    """Processor time [s], output and peak memory [GB] of a command."""
+    before = os.times()
+    done = subprocess.run([sys.executable, "-c", COMMAND, *map(str, words)], capture_output=True, text=True, check=True)
+    after = os.times()
+    peak = int(done.stderr.split()[-1]) * 1024 / 1e9
+    return (
+        after.children_user + after.children_system - before.children_user - before.children_system,
+        done.stdout,
+        peak,
+    )
+
+
+def median(*words):
+    return sorted(spent(*words)[0] for _ in range(RUNS))[RUNS // 2]
+
+
+def of_readings(folder):
+    path = folder / "big.db"
+    names = [f"{k} triX .{film}mm {copy}" for k in range(1, 51) for film in (1, 2) for copy in range(2, 12)]
+    rows = [reading(name, "0.65k", "40 / 2.3k", remark="small holes") for name in names]
+    start = time.process_time()
+    with Log(path, create=True) as log:
+        log.add(
+            dataclasses.replace(row, uid=f"{k}-{j}") for k in range(READINGS // len(rows)) for j, row in enumerate(rows)
+        )
+    yield f"`Log.add` of {READINGS} readings at once", f"{time.process_time() - start:.1f} s", ""
+    yield f"`log list` of {READINGS} readings", f"{median('log', 'list', '--log', path):.2f} s", "0.5 s"
+    yield "`log list --iteration 25`", f"{median('log', 'list', '--iteration', 25, '--log', path):.2f} s", "0.5 s"
+    yield "`log list --all`, all lines of it", f"{spent('log', 'list', '--all', '--log', path)[0]:.1f} s", ""
+    yield "`log verify`", f"{spent('log', 'verify', '--log', path)[0]:.1f} s", ""
+    yield "`log export` to CSV", f"{spent('log', 'export', folder / 'r.csv', '--log', path)[0]:.1f} s", ""
+    start = time.process_time()
+    with Log(path) as log:
+        log.readings()
+    yield "`Log.readings()`, all of them", f"{time.process_time() - start:.1f} s", ""
+
+
+def of_a_recording(folder):
+    rng = np.random.default_rng(0)
+    t = np.arange(SAMPLES) / 140
+    z = (1e4 - 1e5j) / np.sqrt(TONES_HZ) * (1 + 1e-3 * rng.standard_normal((SAMPLES, 7)))
+    settings = np.empty((1, 1), object)
+    settings[0, 0] = {"bandwidth": 10.0, "dem_freqs": np.array(TONES_HZ), "version": "V1.0.3"}
+    content = {
+        "impedance_data": {"lockin1": z},
+        "impedance_time": t[None],
+        "timestamps": 1.66e9 + t[:, None],
+        "settings": settings,
+    }
+    scipy.io.savemat(folder / "run.mat", content)
+    seconds, said, peak = spent("log", "bench", "23 triX", folder / "run.mat", "--log", folder / "run.db")
+    assert f"{SAMPLES} samples" in said, said
+    size = (folder / "run.mat").stat().st_size / 1e6
+    yield f"`log bench` of {SAMPLES} samples x 7 tones, {size:.0f} MB", f"{seconds:.1f} s, {peak:.2f} GB", "5 s, 1 GB"
+
+
+def of_chance(folder, program, count, target):
+    place = folder / program
+    place.mkdir()
+    start = time.monotonic()
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(
+        [sys.executable, TESTS / program, place, str(count), "1"], capture_output=True, text=True, check=True
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seen = json.loads(done.stdout)
+    faults = seen.pop("faults")
+    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    said = ", ".join(f"{value} {name}" for name, value in seen.items())
+    yield (
+        f"{said}; {used:.0f} s of the processor, {time.monotonic() - start:.0f} s by the clock",
+        f"{len(faults)} faults {faults or ''}",
+        target,
+    )
+
+
+def main():
+    print(platform.processor() or platform.machine(), "Python", platform.python_version())
+    lines = [
+        "# The log, measured",
+        "",
+        "Written by `python bench/log.py`.",
+        "",
+        "| what | measured | target |",
+        "|---|---|---|",
+    ]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for work in (
+            of_readings(folder),
+            of_a_recording(folder),
+            of_chance(folder, "kills.py", KILLS, "200 kills, 0 faults"),
+            of_chance(folder, "fuzz.py", FILES, "10 000 files, 0 faults"),
+        ):
+            for what, got, target in work:
+                lines.append(f"| {what} | {got} | {target} |")
+                print(lines[-1], flush=True)
+    (HERE / "results" / "log.md").write_text("\n".join(lines) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    main()

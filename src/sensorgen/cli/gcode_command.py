@@ -1,0 +1,74 @@
+"""``sensorgen gcode``: files for the printer, whoever has sliced them."""
+
+import click
+
+from sensorgen.cli.words import completed
+
+
+def _printers() -> list[str]:
+    from sensorgen.printer import printer_names
+
+    return printer_names()
+
+
+@click.group("gcode", short_help="Check G-code before the printer does.")
+def command() -> None:
+    """Check G-code, whoever has sliced it."""
+
+
+@command.command("check", short_help="Simulate the printer: what would go wrong, and what it takes.")
+@click.argument("file", metavar="FILE")
+@click.option(
+    "--printer",
+    default="diabase-h5",
+    show_default=True,
+    metavar="NAME",
+    shell_complete=completed(_printers),
+    help="A printer that is listed, or a YAML file.",
+)
+@click.option(
+    "--material",
+    "materials",
+    multiple=True,
+    metavar="TOOL=NAME",
+    help="What a tool prints, for its mass; the printer's usual material if not given.",
+)
+@click.option("--strict", is_flag=True, help="Treat warnings as errors.")
+@click.option("--json", "as_json", is_flag=True, help="Print findings and report as JSON.")
+def check(file: str, printer: str, materials: tuple[str, ...], strict: bool, as_json: bool) -> int:
+    """Simulate the printer with a file: position, tool, temperatures, fans, limits.
+
+    Says what would go wrong, with lines, and what the print takes: time, filament and mass of each tool, tool
+    changes, purging. Ends with 1 if there are errors, with 2 if the file cannot be read.
+    """
+    from pathlib import Path
+
+    from sensorgen.cli import gcode_text, show
+    from sensorgen.gcode.check import check as checked
+    from sensorgen.printer import load_printer
+
+    machine = load_printer(printer)
+    found = checked(Path(file), machine, _loaded(materials, machine.tool_numbers))
+    if as_json:
+        show.as_json({"file": file, "printer": machine.name, **found.as_dict()})
+    else:
+        for line in (*gcode_text.findings(found), *gcode_text.report(found.report)):
+            click.echo(line)
+        click.echo(f"{file}: {gcode_text.summary(found)}")
+    return 1 if found.errors(strict) else 0
+
+
+def _loaded(words: tuple[str, ...], tools: tuple[int, ...]) -> dict[int, str]:
+    """Material of each tool that was named."""
+    from sensorgen import materials
+    from sensorgen.cli.settings import pairs
+    from sensorgen.errors import BadInput
+
+    found = {}
+    for tool, name in pairs(words, "--material"):
+        if not tool.isdecimal() or int(tool) not in tools:
+            raise BadInput(
+                f"--material {tool}={name}: {tool!r} is no tool; the printer has {', '.join(map(str, tools))}"
+            )
+        found[int(tool)] = materials.load(name).name
+    return found

@@ -1,0 +1,65 @@
+"""A file of G-code held against a printer: what it would do wrong, and what it takes."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sensorgen.findings import SEVERITIES
+from sensorgen.gcode import commands, limits
+from sensorgen.gcode.files import lines_of
+from sensorgen.gcode.found import Found, merged
+from sensorgen.gcode.motion import follow
+from sensorgen.gcode.report import Report, report
+from sensorgen.printer import Printer
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What was found, the severe first, and what the file takes."""
+
+    findings: list[Found]
+    report: Report
+
+    def errors(self, strict: bool = False) -> list[Found]:
+        """Findings that refuse the file; with ``strict`` also the warnings."""
+        bad = SEVERITIES[: 2 if strict else 1]
+        return [f for f in self.findings if f.severity in bad]
+
+    def counts(self) -> dict[str, int]:
+        """How many findings there are of each severity [-]."""
+        return {severity: sum(f.severity == severity for f in self.findings) for severity in SEVERITIES}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, for JSON."""
+        return {"findings": [f.as_dict() for f in self.findings], **self.report.as_dict()}
+
+
+def check(source: Path | Iterable[str], machine: Printer, loaded: Mapping[int, str] | None = None) -> Checked:
+    """Check a file, whoever has sliced it.
+
+    Parameters
+    ----------
+    source : Path or iterable of str
+        The file, or its lines.
+    machine : Printer
+        Who is to print it.
+    loaded : mapping of int to str, optional
+        Material of each tool, for masses.
+
+    Raises
+    ------
+    BadInput
+        The file cannot be read, or is no G-code.
+
+    Examples
+    --------
+    >>> from sensorgen.printer import load_printer
+    >>> found = check(["G90", "M83", "M140 S60", "G10 P9 S210"], load_printer("diabase-h5")).findings
+    >>> found[0].rule, found[0].line, found[0].message
+    ('tool', 4, 'tool 9 gets a temperature; diabase-h5 has 1, 2, 3, 4, 5')
+    """
+    lines = lines_of(source) if isinstance(source, Path) else source
+    motion = follow(lines, machine.control.prime_macro)
+    found = [*limits.check(motion, machine), *commands.check(motion, machine)]
+    return Checked(merged(found), report(motion, machine, dict(loaded or {})))

@@ -1,0 +1,49 @@
+"""What a check of G-code has found, as plain data: the form of :class:`sensorgen.findings.Finding`, with lines."""
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from sensorgen.findings import SEVERITIES
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """One finding of one rule.
+
+    Attributes
+    ----------
+    rule : str
+        Name of the rule, as in ``speed``.
+    severity : str
+        "error", "warning" or "info".
+    line : int
+        First line of the file where it shows, from 1 [-].
+    message : str
+        What is the matter, in one sentence.
+    advice : str
+        What to change.
+    count : int
+        In how many lines it shows [-].
+    """
+
+    rule: str
+    severity: str
+    line: int
+    message: str
+    advice: str
+    count: int = 1
+
+    def as_dict(self) -> dict[str, Any]:
+        """The finding, for JSON."""
+        return asdict(self)
+
+
+def merged(found: Iterable[Found]) -> list[Found]:
+    """Findings of the same words as one, the severe first and then by line."""
+    kept: dict[tuple[str, str, str], Found] = {}
+    for f in found:
+        key = (f.rule, f.severity, f.message)
+        old = kept.get(key)
+        kept[key] = f if old is None else replace(old, line=min(old.line, f.line), count=old.count + f.count)
+    return sorted(kept.values(), key=lambda f: (SEVERITIES.index(f.severity), f.line, f.rule))

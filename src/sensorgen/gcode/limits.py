@@ -1,0 +1,167 @@
+"""What the moves of a file ask of the axes: each rule looks at all moves at once."""
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.gcode.found import Found
+from sensorgen.gcode.motion import Motion
+from sensorgen.printer import Printer
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+HAIR_MM = 1e-6  # what rounding may make of a limit
+STEP_MM = 1e-3  # heights closer than this are one height
+MM_MIN = 60.0
+
+_PLACES_ANEW = frozenset({"G28", "G32", "G92"})
+
+
+def check(motion: Motion, machine: Printer) -> Iterator[Found]:
+    """Findings of all rules on moves.
+
+    Parameters
+    ----------
+    motion : Motion
+        The file.
+    machine : Printer
+        Who is to print it.
+    """
+    for rule in RULES:
+        yield from rule(motion, machine)
+
+
+def _found(motion: Motion, wrong: Mask, rule: str, severity: str, message: str, advice: str) -> Iterator[Found]:
+    """A finding if any move is wrong."""
+    if wrong.any():
+        numbers = np.unique(motion.rows[wrong, 9])
+        yield Found(rule, severity, int(numbers[0]), message, advice, len(numbers))
+
+
+def _reach(motion: Motion, machine: Printer) -> Iterator[Found]:
+    """No axis leaves its limits."""
+    reach = machine.reach_mm()
+    for name, column, (low, high) in zip("XYZ", motion.end_mm.T, (reach.x, reach.y, reach.z), strict=True):
+        for wrong, worst in ((column < low - HAIR_MM, np.min), (column > high + HAIR_MM, np.max)):
+            value = float(worst(column[wrong])) if wrong.any() else 0.0
+            yield from _found(
+                motion, wrong, "reach", "error",
+                f"a move goes to {name} {value:g}; the axis reaches {low:g} to {high:g} mm",
+                "place the print inside, and check the origin of the bed",
+            )  # fmt: skip
+
+
+def _bed(motion: Motion, machine: Printer) -> Iterator[Found]:
+    """Nothing is printed beside the bed or above the print volume."""
+    prints = _prints(motion)
+    middle = np.array(machine.bed_centre_mm())
+    beside = np.abs(motion.end_mm[:, :2] - middle) - np.array(machine.bed_mm) / 2
+    wrong = prints & (beside > HAIR_MM).any(axis=1)
+    far = float(beside[wrong].max()) if wrong.any() else 0.0
+    wide, deep = machine.bed_mm
+    yield from _found(
+        motion, wrong, "bed", "error", f"lines are printed up to {far:.3g} mm beside the bed of {wide:g} x {deep:g} mm",
+        "place the print on the bed",
+    )  # fmt: skip
+    high = prints & (motion.end_mm[:, 2] > machine.height_mm + HAIR_MM)
+    yield from _found(
+        motion, high, "bed", "error", f"lines are printed above {machine.height_mm:g} mm",
+        "print a lower piece",
+    )  # fmt: skip
+
+
+def _below(motion: Motion, _: Printer) -> Iterator[Found]:
+    """No move across goes lower than what is already printed: the nozzle would plough through it."""
+    prints, across = _prints(motion), _across(motion) > 0
+    lowest = np.minimum(motion.start_mm[:, 2], motion.end_mm[:, 2])
+    printed = np.where(prints, lowest, -np.inf)
+    edges = [0, *sorted({e.row for e in motion.events if _moves_z(e.command.code, e.command.has)}), len(lowest)]
+    wrong = np.zeros(len(lowest), dtype=bool)
+    for start, end in pairwise(edges):
+        top = np.maximum.accumulate(printed[start:end])
+        wrong[start:end] = across[start:end] & (motion.end_mm[start:end, 2] < top - STEP_MM)
+    yield from _found(
+        motion, wrong, "below", "error", "a move goes across lower than a layer that is already printed",
+        "raise the nozzle first; pieces printed one after the other are not for this printer",
+    )  # fmt: skip
+
+
+def _moves_z(code: str, has: Callable[[str], bool]) -> bool:
+    return code in _PLACES_ANEW and (code != "G92" or has("Z") or not has("XYE"))
+
+
+def _speed(motion: Motion, machine: Printer) -> Iterator[Found]:
+    """No axis is asked for more than its limit."""
+    feed = motion.feed_mm_min / MM_MIN
+    along = np.abs(motion.end_mm - motion.start_mm)
+    across, filament = np.hypot(along[:, 0], along[:, 1]), np.abs(motion.filament_mm)
+    way = np.hypot(across, along[:, 2])
+    rate = feed / np.where(way > 0, way, np.maximum(filament, 1e-12))
+    limits = machine.max_speed_mm_s
+    extrudes = motion.extruded_mm > 0
+    axes = (("X and Y", across, limits.xy), ("Z", along[:, 2], limits.z), ("E", filament, limits.extruder))
+    for name, length, limit in axes:
+        fast = rate * length
+        over = fast > limit * (1 + 1e-6)
+        for rows, severity, what, then in (
+            (
+                over & extrudes,
+                "error",
+                "a line is printed",
+                "not at the speed that it was sliced for",
+            ),
+            (over & ~extrudes, "warning", "a move without printing goes", "the firmware slows it down"),
+        ):
+            most = float(fast[rows].max()) * MM_MIN if rows.any() else 0.0
+            yield from _found(
+                motion, rows, "speed", severity,
+                f"{what} with {name} at {most:.0f} mm/min; the limit is {limit * MM_MIN:.0f}: {then}",
+                "lower the feed (F)",
+            )  # fmt: skip
+
+
+def _feed(motion: Motion, _: Printer) -> Iterator[Found]:
+    """A feed is above 0."""
+    yield from _found(
+        motion, motion.feed_mm_min <= 0, "speed", "error", "a move has a feed of 0 or less", "give a feed (F)"
+    )
+
+
+def _purge(motion: Motion, machine: Printer) -> Iterator[Found]:
+    """Filament that is pushed on the spot stays within what was seen to work."""
+    most = machine.control.longest_purge_mm
+    pushed = np.where(_across(motion) > 0, 0.0, np.abs(motion.filament_mm))
+    wrong = pushed > most + HAIR_MM
+    value = float(pushed.max()) if wrong.any() else 0.0
+    yield from _found(
+        motion, wrong, "purge", "error", f"{value:g} mm of filament are moved on the spot; the limit is {most:g} mm",
+        "purge in shorter pieces; left-over absolute E looks like this too",
+    )  # fmt: skip
+
+
+def _read(motion: Motion, _: Printer) -> Iterator[Found]:
+    """Every line can be read."""
+    for fault in motion.faults:
+        yield Found(
+            "read", "error" if fault.severe else "warning", fault.number, fault.what,
+            "correct the line" if fault.severe else "keep to plain ASCII",
+        )  # fmt: skip
+
+
+def _across(motion: Motion) -> Floats:
+    step = motion.end_mm[:, :2] - motion.start_mm[:, :2]
+    way: Floats = np.hypot(step[:, 0], step[:, 1])
+    return way
+
+
+def _prints(motion: Motion) -> Mask:
+    rows: Mask = (motion.extruded_mm > 0) & (_across(motion) > 0)
+    return rows
+
+
+RULES: tuple[Callable[[Motion, Printer], Iterator[Found]], ...] = (
+    _reach, _bed, _below, _speed, _feed, _purge, _read,
+)  # fmt: skip

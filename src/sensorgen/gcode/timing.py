@@ -1,0 +1,33 @@
+"""How long moves take, as far as a file says: feeds and the axes' limits, without acceleration."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.gcode.motion import Motion
+from sensorgen.printer import MaxSpeed
+
+Floats = NDArray[np.float64]
+
+
+def seconds(motion: Motion, fastest: MaxSpeed) -> Floats:
+    """Duration of each move, (n,) [s].
+
+    The feed is that of the nozzle, or of the filament where the nozzle rests; an axis that could not follow
+    slows the whole move, as the firmware does. Accelerations are the printer's own and unknown here, so a
+    print takes longer than the sum.
+
+    Parameters
+    ----------
+    motion : Motion
+        The moves.
+    fastest : MaxSpeed
+        The axes' limits [mm/s].
+    """
+    along = np.abs(motion.end_mm - motion.start_mm)
+    filament = np.abs(motion.filament_mm)
+    across = np.hypot(along[:, 0], along[:, 1])
+    way = np.hypot(across, along[:, 2])
+    asked = np.where(way > 0, way, filament) / np.maximum(motion.feed_mm_min / 60, 1e-3)
+    limits = (across / fastest.xy, along[:, 2] / fastest.z, filament / fastest.extruder)
+    longest: Floats = np.maximum.reduce([asked, *limits])
+    return longest

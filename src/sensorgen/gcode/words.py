@@ -1,0 +1,155 @@
+"""One line of G-code to its commands, after RepRapFirmware's own reading.
+
+A line may carry a number (``N12``), a checksum (``*57``), remarks in brackets or after a semicolon, strings in
+double quotes, and more than one command. Nothing here knows what a command means.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from functools import reduce
+
+NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
+
+_TOKEN = re.compile(
+    r"""\s*(?:
+        ;(?P<remark>.*)
+      | \((?P<bracket>[^)]*)\)?
+      | \*(?P<checksum>[0-9]+)
+      | (?P<letter>[A-Za-z])[ \t]*(?P<value>
+            "(?:[^"]|"")*"? | \{[^}]*\}? | [-+]?(?:nan|inf)[a-z]* | [-+0-9.:]* )
+      | (?P<junk>[^\s])
+    )""",
+    re.VERBOSE | re.IGNORECASE | re.DOTALL,
+)
+_MOST_FAULTS = 5  # of one line: a line of noise needs no more
+_META = re.compile(r"\s*(?:if|elif|else|while|break|continue|var|global|set|echo|abort|skip)\b", re.IGNORECASE)
+_FREE_TEXT = re.compile(r"\s*(?:N[0-9]+\s*)?(M(?:23|28|30|32|36|38|117))(?![0-9])\s*(.*)", re.IGNORECASE | re.DOTALL)
+_NUMBER = re.compile(NUMBER)
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A command and its words: ``G10`` with ``(("P", "3"), ("S", "210"))``.
+
+    Attributes
+    ----------
+    code : str
+        Letter and number, in capitals and without leading zeros.
+    words : tuple of (str, str)
+        Letter of each word, in capitals, and its text as it stands; a string without its quotes.
+    """
+
+    code: str
+    words: tuple[tuple[str, str], ...] = ()
+
+    def text(self, letter: str) -> str | None:
+        """Text of a word, or None where the command has no such word."""
+        return next((text for name, text in self.words if name == letter), None)
+
+    def number(self, letter: str) -> float | None:
+        """Number of a word, the first of a list as ``210:205``; nan where it is none, None without the word."""
+        text = self.text(letter)
+        if text is None:
+            return None
+        first = text.partition(":")[0]
+        return float(first) if _NUMBER.fullmatch(first) else math.nan
+
+    def has(self, letters: str) -> bool:
+        """Whether it has a word with any of these letters."""
+        return any(name in letters for name, _ in self.words)
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """What a line says: its commands, its remarks, and what could not be read."""
+
+    commands: tuple[Command, ...]
+    remark: str = ""
+    faults: tuple[str, ...] = ()
+
+
+def parse(text: str) -> Line:
+    """Read one line.
+
+    Parameters
+    ----------
+    text : str
+        The line, with or without its end.
+
+    Returns
+    -------
+    Line
+        Its commands in order; ``faults`` has what is no G-code, in words.
+
+    Examples
+    --------
+    >>> line = parse('N3 g01 X-1.5 (left) E.2 ; wall')
+    >>> line.commands, line.remark
+    ((Command(code='G1', words=(('X', '-1.5'), ('E', '.2'))),), ' wall')
+    >>> parse('M291 P"say ""hi""; go" S3').commands[0].text("P")
+    'say "hi"; go'
+    """
+    if free := _FREE_TEXT.match(text):
+        code, rest = free.groups()
+        return Line((Command(code.upper(), (("", rest.partition(";")[0].strip()),)),))
+    if is_meta(text):
+        return Line((), "", (f"a line of the firmware's own language, which is not followed: {text.strip()[:60]!r}",))
+    return _read(text)
+
+
+def is_meta(text: str) -> bool:
+    """Whether a line is of the firmware's own language, as ``if`` and ``while``."""
+    return _META.match(text) is not None
+
+
+def _read(text: str) -> Line:
+    commands: list[tuple[str, list[tuple[str, str]]]] = []
+    faults: list[str] = []
+    remark = ""
+    for token in _TOKEN.finditer(text.strip()):
+        kind = token.lastgroup
+        if kind == "value":
+            faults += _take(commands, token["letter"].upper(), token["value"])
+        elif kind == "remark":
+            remark = token["remark"].rstrip("\r\n")
+        elif kind == "bracket":
+            remark = remark or token["bracket"]
+        elif kind == "checksum":
+            faults += _checksum(text, token.start("checksum") - 1, int(token["checksum"]))
+        else:
+            faults.append(f"{token['junk']!r} means nothing here")
+    made = tuple(Command(code, tuple(words)) for code, words in commands)
+    return Line(made, remark, tuple(faults[:_MOST_FAULTS]))
+
+
+def _take(commands: list[tuple[str, list[tuple[str, str]]]], letter: str, value: str) -> list[str]:
+    """Add a word to the last command, or start the next one."""
+    if letter == "N" and not commands:
+        return []
+    if letter in "GM" or (letter == "T" and not commands):
+        code = _code(letter, value)
+        if code is None:
+            return [f"{letter}{value!s} is no command"]
+        commands.append((code, []))
+        return []
+    if not commands:
+        return [f"{letter}{value} stands before any command"]
+    quoted = value.startswith('"')
+    text = value[1:].removesuffix('"').replace('""', '"') if quoted else value
+    commands[-1][1].append((letter, text))
+    if value.count('"') % 2:
+        return [f"the string after {letter} does not end"]
+    return []
+
+
+def _code(letter: str, value: str) -> str | None:
+    if not _NUMBER.fullmatch(value):
+        return None
+    number = float(value)
+    return f"{letter}{int(number)}" if number == int(number) else f"{letter}{value}"
+
+
+def _checksum(text: str, end: int, given: int) -> list[str]:
+    found = reduce(lambda a, b: a ^ b, text[:end].encode("utf-8", "surrogateescape"), 0)
+    return [] if found == given else [f"checksum {given} is wrong: the line makes {found}"]

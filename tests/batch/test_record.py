@@ -1,0 +1,162 @@
+"""The record of a batch: whole, traceable, and what differs from it is found."""
+
+import hashlib
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from sensorgen import design
+from sensorgen.batch import make
+from sensorgen.batch.record import RECORD, Differences, differences
+from sensorgen.errors import BadInput, Unprintable, Unwritable
+from sensorgen.predict import prediction
+from sensorgen.specimen import parse
+
+TRI = design.make({"shape": "tri", "parameters": {"length_mm": 20.0, "width_mm": 10.0}})
+
+
+@pytest.fixture
+def copy(small, tmp_path):
+    """The small batch in a folder that a test may spoil."""
+    return Path(shutil.copytree(small.folder, tmp_path / "copy"))
+
+
+def test_every_file_has_its_hash(small, contents):
+    record = json.loads((small.folder / RECORD).read_text("utf-8"))
+    assert record == small.record
+    files = {k: hashlib.sha256(v).hexdigest() for k, v in contents(small.folder).items() if k != RECORD}
+    assert record["files"] == files
+    assert {"plan.yaml", "plate.svg", "labels.html"} | {f"small.{f}.3mf" for f in ("prusa", "cura", "orca")} <= set(
+        files
+    )
+
+
+def test_every_specimen_is_traced_to_its_design_and_has_what_it_should_measure(small):
+    record = small.record
+    found = record["specimens"]
+    assert sorted(found) == ["26 SX60 1 fine", "26 triX .2mm 1 fine", "26 triX .2mm 2 fine"]
+    assert [s["order"] for s in found.values()] == [1, 2, 3]
+    tri = found["26 triX .2mm 2 fine"]
+    assert (tri["design_id"], tri["copy"], tri["iteration"]) == (TRI.id(), 2, 26)
+    predicted = prediction(TRI)
+    for name in ("capacitance_f", "electrode_resistance_ohm", "impedance_ohm"):
+        assert tri["expected"][name] == json.loads(json.dumps(predicted[name]))
+    # The plate's C by hand: eps0 4.68 A/d = 8.854e-12 x 4.68 x 2e-4 / 6e-4, in the middle of the bounds.
+    plate = found["26 SX60 1 fine"]["expected"]["capacitance_f"]["middle"]
+    assert plate == pytest.approx(8.8541878128e-12 * 4.68 * 20e-3 * 10e-3 / 0.6e-3, rel=1e-9)
+    assert record["designs"][TRI.id()]["resolved"] == json.loads(json.dumps(TRI.resolved()))
+    assert all(parse(name).name == name for name in found)
+
+
+def test_the_design_files_beside_it_make_the_same_designs(small):
+    for key in small.record["designs"]:
+        data = json.loads((small.folder / "designs" / f"{key}.json").read_text("utf-8"))
+        assert design.make(data).id() == key
+
+
+def test_tools_lots_and_the_checklist(small):
+    tools = small.record["tools"]
+    assert {tool: (t["material"], t["lot"], t["cam_dial"]) for tool, t in tools.items()} == {
+        "3": ("etpu", "PI-2026-014", 3.0), "4": ("x60", None, 5.0),
+    }  # fmt: skip
+    lines = small.record["checklist"]
+    text = "\n".join(lines)
+    for said in (
+        "Dry etpu (lot PI-2026-014): 65 C for 5 h", "Load T4 with x60 (lot not named", "Cam dial of T3: 3",
+        "Cam dial of T4: 5", "Clean the nozzles of T3, T4", "level", "Bake at 150 C for 24 h",
+    ):  # fmt: skip
+        assert said in text
+    order = [
+        next(k for k, line in enumerate(lines) if word in line)
+        for word in ("Dry", "Load", "level", "not baked", "Bake")
+    ]
+    assert order == sorted(order)
+
+
+def test_made_again_it_is_the_same_to_the_byte(small, tmp_path, contents):
+    plan = tmp_path / "small.yaml"
+    plan.write_bytes((small.folder / "plan.yaml").read_bytes())
+    assert contents(make(plan, tmp_path / "out", gcode=False).folder) == contents(small.folder)
+
+
+def test_verify_finds_nothing_where_nothing_changed(copy):
+    assert not differences(copy)
+
+
+def test_verify_finds_what_is_missing_changed_and_extra(copy):
+    (copy / "plate.svg").unlink()
+    with (copy / "small.prusa.3mf").open("r+b") as file:
+        file.seek(100)
+        file.write(b"x")
+    (copy / "notes.txt").write_text("mine")
+    assert differences(copy) == Differences(("plate.svg",), ("small.prusa.3mf",), ("notes.txt",))
+
+
+def test_verify_finds_a_record_that_was_rewritten(copy):
+    path = copy / RECORD
+    text = path.read_text("utf-8")
+    path.write_text(text.replace("PI-2026-014", "PI-2026-015"), "utf-8")
+    assert differences(copy) == Differences(record=True)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "expected the folder of a batch"),
+        (b"", "not the record of a batch"),
+        (b"{", "not the record"),
+        (b"[]", "'files' is None"),
+        (b'{"files": 3}', "'files' is 3; expected names to hashes"),
+        (b'{"files": {"a": 3}}', "expected names to hashes"),
+        (b"\xff\xfe\x00", "not the record of a batch"),
+        (b"[" * 100_000, "not the record of a batch"),
+    ],
+)
+def test_verify_of_what_is_no_batch(tmp_path, content, said):
+    if content is not None:
+        (tmp_path / RECORD).write_bytes(content)
+    with pytest.raises(BadInput) as error:
+        differences(tmp_path)
+    assert said in str(error.value)
+
+
+def test_files_of_an_earlier_batch_that_are_no_longer_made_go_and_others_stay(plan, tmp_path):
+    path = plan()
+    folder = make(path, tmp_path / "out", gcode=False).folder
+    (folder / "mine.txt").write_text("mine")
+    path.write_text(path.read_text("utf-8") + "labels: {sheet: false}\n", "utf-8")
+    make(path, tmp_path / "out", gcode=False)
+    assert not (folder / "labels.html").exists()
+    assert differences(folder) == Differences(extra=("mine.txt",))
+
+
+def test_a_design_that_cannot_be_printed_stops_the_batch(plan, tmp_path):
+    path = plan("iteration: 26\ndesigns: [{shape: tri}, {shape: tri, parameters: {dielectric_mm: 0.0}}]\n")
+    with pytest.raises(Unprintable, match=r"^trix-d0: .*electrodes touch") as error:
+        make(path, tmp_path / "out", gcode=False)
+    assert error.value.findings
+    assert not (tmp_path / "out").exists()
+    found = make(path, tmp_path / "out", gcode=False, force=True)
+    expected = found.record["specimens"]["26 triX 1 fine"]["expected"]
+    assert expected["capacitance_f"] is None
+    assert expected["reason"]
+
+
+def test_a_plan_too_large_says_how_many_plates(plan, tmp_path):
+    path = plan("iteration: 26\ndesigns: [{shape: tri, replicates: 70}]\n")
+    with pytest.raises(BadInput, match=r"70 specimens need 3 plates, 33 of them on the first"):
+        make(path, tmp_path / "out", gcode=False)
+
+
+def test_a_place_that_cannot_be_written_to(plan, tmp_path):
+    (tmp_path / "out").write_text("a file")
+    with pytest.raises(Unwritable, match="is a file; expected a folder"):
+        make(plan(), tmp_path / "out", gcode=False)
+
+
+def test_tabs_are_bodies_of_their_own_and_take_room(plan, tmp_path):
+    with_tabs = make(plan("labels: {tab: true}\n" + plan().read_text("utf-8")), tmp_path / "out", gcode=False)
+    sizes = {tuple(s["size_mm"]) for s in with_tabs.record["specimens"].values()}
+    assert all(length > 30 for length, _ in sizes)

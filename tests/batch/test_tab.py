@@ -1,0 +1,115 @@
+"""Tabs with names: letters apart, wide enough to print, beside the sensor and not in it."""
+
+import numpy as np
+import pytest
+
+from sensorgen import design
+from sensorgen.batch import tab
+from sensorgen.errors import BadInput
+from sensorgen.geometry import meshes
+from sensorgen.specimen import Specimen, parse
+
+SENSOR = design.make({"shape": "tri"})
+NAME = "26 triX .2mm 12 x fine"
+
+
+def raised(sensor, name):
+    """The raised squares of a tab as a picture of dots, the top row first."""
+    (body,) = tab.bodies(sensor, name)
+    dot = tab.dot_mm(sensor)
+    length, _ = tab.size_mm(sensor, name)
+    x0 = sensor.printed.size_mm[0]
+    letters = body.prisms[1:]
+    top = max(p.span("y")[1] for p in letters)
+    rows = round((top - min(p.span("y")[0] for p in letters)) / dot)
+    picture = np.zeros((rows, round(length / dot)), bool)
+    for p in letters:
+        (a, b), (_, high) = p.span("x"), p.span("y")
+        picture[round((top - high) / dot), round((a - x0) / dot) : round((b - x0) / dot)] = True
+    return picture
+
+
+def test_what_is_written_can_be_read():
+    shown = ["".join(" #"[int(dot)] for dot in row).rstrip() for row in raised(SENSOR, "26 triX 7")]
+    assert shown == [
+        " ### ###",
+        "   # #",
+        " ### ###",
+        " #   # #",
+        " ### ###",
+        "",
+        " ### #### ### #   #",
+        "  #  #  #  #  ## ##",
+        "  #  ####  #   ###",
+        "  #  # #   #  ## ##",
+        "  #  # ## ### #   #",
+        "",
+        " ###",
+        "   #",
+        "   #",
+        "   #",
+        "   #",
+    ]
+
+
+@pytest.mark.parametrize(("nozzle", "line"), [(0.4, 0.44), (0.25, 0.275), (0.6, 0.66)])
+def test_strokes_are_wider_than_a_line(nozzle, line):
+    sensor = design.make({"shape": "tri", "nozzle_mm": nozzle, "parameters": {"width_mm": 20}})
+    letters = tab.bodies(sensor, NAME)[0].prisms[1:]
+    for p in letters:
+        assert min(p.span("x")[1] - p.span("x")[0], p.span("y")[1] - p.span("y")[0]) >= 1.05 * line
+
+
+@pytest.mark.parametrize("orientation", ["as-drawn", "upside-down"])
+@pytest.mark.parametrize("shape", ["tri", "rect", "reference"])
+def test_the_tab_touches_the_far_end_and_lies_on_the_bed(shape, orientation):
+    sensor = design.make({"shape": shape, "orientation": orientation, "shrinkage": 0.2})
+    (body,) = tab.bodies(sensor, NAME)
+    length, width = tab.size_mm(sensor, NAME)
+    x0, deep, _ = sensor.printed.size_mm
+    spans = {axis: [p.span(axis) for p in body.prisms] for axis in "xyz"}
+    assert min(a for a, _ in spans["x"]) == x0
+    assert max(b for _, b in spans["x"]) == pytest.approx(x0 + length)
+    assert (min(a for a, _ in spans["y"]), max(b for _, b in spans["y"])) == (0.0, deep)
+    assert min(a for a, _ in spans["z"]) == 0.0
+    assert width == deep
+    assert body.material == "x60"
+
+
+def test_the_mesh_is_closed_and_of_the_volume_of_its_boxes():
+    (body,) = tab.bodies(SENSOR, NAME)
+    mesh = meshes.mesh(body)
+    assert mesh.volume_mm3() == pytest.approx(body.volume_mm3(), rel=1e-9)
+    edges = np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    assert set(np.unique(edges, axis=0, return_counts=True)[1]) == {2}
+
+
+def test_every_name_of_the_grammar_can_be_written():
+    sensor = design.make({"shape": "tri", "parameters": {"width_mm": 40}})
+    for shape in ("tri", "rect", "reference", "double"):
+        for slicing in ("", "fine", "x fine", "xtrafine"):
+            axes = {"tri": "Y", "rect": "XY"}.get(shape, "")
+            name = Specimen(1234567890 % 9999, shape, axes, 0.123457, 9876, slicing, "m").name
+            assert tab.bodies(sensor, parse(name).name)
+
+
+def test_letters_that_look_alike_never_change_a_name():
+    glyphs = tab._FONT
+    alike = {(a, b) for a in glyphs for b in glyphs if a < b and glyphs[a] == glyphs[b]}
+    assert alike <= {("0", "O"), ("5", "S")}  # digits stand in numbers alone, O and S in words
+
+
+@pytest.mark.parametrize("letter", tab._FONT)
+def test_no_dot_of_a_letter_hangs_on_its_corners_alone(letter):
+    dots = np.pad(np.array([[dot == "#" for dot in row] for row in tab._FONT[letter].split()]), 1)
+    beside = np.roll(dots, 1, 0) | np.roll(dots, -1, 0) | np.roll(dots, 1, 1) | np.roll(dots, -1, 1)
+    assert dots.any()
+    assert (beside | ~dots).all()
+
+
+def test_narrow_sensors_are_told():
+    thin = design.make({"shape": "tri", "parameters": {"width_mm": 2}})
+    with pytest.raises(BadInput, match="2 mm wide, too little"):
+        tab.bodies(thin, NAME)
+    with pytest.raises(BadInput, match="no letter '!'"):
+        tab.bodies(SENSOR, "26 triX!")

@@ -1,0 +1,206 @@
+"""Good files pass, and one changed line of each kind is found: with its rule, its severity and its line."""
+
+import re
+
+import pytest
+
+from sensorgen.gcode.check import check
+from sensorgen.printer import Control, load_printer
+
+from .good import LAB, MAKER, OWN, changed  # isort: skip
+
+DIABASE = load_printer("diabase-h5")
+WITH_SPINDLES = DIABASE.model_copy(update={"control": DIABASE.control.model_copy(update={"spindles": (1, 2)})})
+
+
+def found(lines, machine=DIABASE):
+    return {(f.rule, f.severity) for f in check(lines, machine).findings}
+
+
+def errors(lines, machine=DIABASE):
+    return {f.rule for f in check(lines, machine).findings if f.severity == "error"}
+
+
+@pytest.mark.parametrize(
+    ("text", "warned"),
+    [(MAKER, {"start", "fan", "speed"}), (LAB, {"start", "speed"}), (OWN, set())],
+    ids=["maker", "lab", "own"],
+)
+def test_good_files_pass_with_their_warnings(text, warned):
+    result = check(text.splitlines(), DIABASE)
+    assert result.errors() == []
+    assert {f.rule for f in result.findings if f.severity == "warning"} == warned
+
+
+def test_warnings_name_what_is_missing():
+    said = [f.message for f in check(MAKER.splitlines(), DIABASE).findings]
+    assert any("no command for the bed" in text for text in said)
+    assert any("M106 names no fan" in text for text in said)
+    assert any("no G90" in f.message for f in check(LAB.splitlines(), DIABASE).findings)
+
+
+# Text of the good file, the line to change, what to make of it, the rule that must refuse it.
+PLANTED = [
+    ("reach", OWN, "G1 X5 Y5 F7200", "G1 X209 Y5 F7200"),
+    ("reach", OWN, "G1 X5 Y5 F7200", "G1 X-208.1 Y5 F7200"),
+    ("reach", OWN, "G1 X5 Y5 F7200", "G1 X5 Y90.1 F7200"),
+    ("reach", OWN, "G1 X5 Y5 F7200", "G1 X5 Y-91 F7200"),
+    ("reach", OWN, "G1 Z.2 F3000", "G1 Z211 F3000"),
+    ("reach", OWN, "G1 Z.1 F3000", "G1 Z-.1 F3000"),
+    ("reach", LAB, "G3 X18.100 Y-3.900 I0.000 J0.500 E0.0575 F1800", "G3 X18.1 Y-4.9 I0 J95.2 E0.5 F1800"),
+    ("bed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X196 Y5 E.2 F1200"),
+    ("bed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y-86 E.2 F1200"),
+    ("bed", OWN, "G1 Z.2 F3000", "G1 Z205 F3000"),
+    ("below", OWN, "G1 Z.2 F3000", "G1 Z.05 F3000"),
+    ("below", MAKER, "G1 Z0.400 F3000", "G1 Z0.100 F3000"),
+    ("cold", OWN, "G10 P4 S230 R180", ""),
+    ("cold", OWN, "G10 P4 S230 R180", "G10 P4 R180"),
+    ("cold", OWN, "M568 P4 A2", "G10 P4 S120"),
+    ("cold", OWN, "M568 P4 A2", "M568 P4 A0"),
+    ("cold", OWN, "M568 P4 A2", "M104 T4 S0"),
+    ("cold", MAKER, "G10 P4 R184 S228", "G10 P5 R184 S228"),
+    ("cold", LAB, "G10 P1 R175 S200", "G10 P2 R175 S200"),
+    ("tool", OWN, "T4", "T6"),
+    ("tool", OWN, "T4", "T0"),
+    ("tool", OWN, "T3", ""),
+    ("tool", OWN, "G10 P4 S230 R180", "G10 P0 S230 R180"),
+    ("tool", OWN, "M568 P4 A2", "M568 P7 A2"),
+    ("tool", OWN, "M568 P4 A2", "M109 T0 S230"),
+    ("tool", OWN, "M116 P4", "M116 P9"),
+    ("tool", MAKER, 'M98 P"tprime4.g" ; tool change', 'M98 P"tprime6.g" ; tool change'),
+    ("tool-change", MAKER, 'M98 P"tprime4.g" ; tool change', 'T4\nM98 P"tprime4.g"'),
+    ("tool-change", OWN, "T4", 'M98 P"tprime4.g"\nG1 X3 F600\nT4'),
+    ("absolute-e", OWN, "M83", "M82"),
+    ("absolute-e", OWN, "M83", ""),
+    ("absolute-e", OWN, "M501", "M82"),
+    ("temperature", OWN, "G10 P4 S230 R180", "G10 P4 S251 R180"),
+    ("temperature", OWN, "G10 P4 S230 R180", "G10 P4 S230 R260"),
+    ("temperature", OWN, "M568 P4 A2", "M104 T4 S300"),
+    ("temperature", OWN, "M568 P4 A2", "M104 S230"),
+    ("temperature", OWN, "M568 P4 A2", "M109 S230"),
+    ("temperature", OWN, "M190 S75 ; set bed temperature", "M190 S121"),
+    ("temperature", LAB, "M140 S60", "M140 S121"),
+    ("home", OWN, "G32", ""),
+    ("home", LAB, "G28\nG32", "G28 X Y\nG29"),
+    ("level", LAB, "G32", ""),
+    ("level", OWN, "G32", "G28"),
+    ("speed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y5 E.2 F12001"),
+    ("speed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y5 Z9 E.2 F9000"),
+    ("speed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X5.1 Y5 E.2 F6000"),
+    ("speed", MAKER, "G1 E6.00 F3000", "G1 E6.00 F6001"),
+    ("speed", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y5 E.2 F0"),
+    ("heat-left", OWN, "G10 P4 S0 R0", "M84\nM30"),
+    ("heat-left", MAKER, "M0 H1", "M84"),
+    ("purge", LAB, "G1 E15.000 F1800", "G1 E15.1 F1800"),
+    ("purge", OWN, "G1 E-4.7 F2400", "G1 E-25 F2400"),
+    ("macro", MAKER, "G32", 'G32\nM98 P"mine.g"'),
+    ("relative", MAKER, "G90", "G91"),
+    ("relative", MAKER, "G1 X180 Y85 Z200 F12000 ; End", "G91"),
+    ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Ynan E.2 F1200"),
+    ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X-nan Y5 E.2 F1200"),
+    ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y5 E.2 F1200 \N{DEGREE SIGN}"),
+    ("read", OWN, "G1 X15 Y5 E.2 F1200", "X15 Y5 E.2"),
+    ("read", OWN, "G1 X15 Y5 E.2 F1200", "G2 X15 Y5 E.2"),
+    ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X\N{ARABIC-INDIC DIGIT FIVE} E.2"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("rule", "text", "old", "new"), PLANTED, ids=lambda x: x[:24].strip() if x else "gone")
+def test_a_planted_fault_is_refused(rule, text, old, new):
+    lines = changed(text, old, new)
+    if (rule, new) == ("heat-left", "M84\nM30"):
+        lines = [line for line in lines if line != "M0 H1\n"]
+    result = check(lines, DIABASE)
+    faults = [f for f in result.errors() if f.rule == rule]
+    assert faults, [f.rule for f in result.findings]
+    assert all(f.message and f.advice and 1 <= f.line <= len(lines) for f in faults)
+
+
+def test_a_finding_names_the_line():
+    lines = changed(OWN, "G1 X15 Y5 E.2 F1200", "G1 X196 Y5 E.2 F1200")
+    (fault,) = check(lines, DIABASE).errors()
+    assert lines[fault.line - 1] == "G1 X196 Y5 E.2 F1200\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "old", "new"),
+    [
+        (MAKER, 'M98 P"tprime4.g" ; tool change', "T4"),
+        (LAB, "T1", 'M98 P"tprime1.g"'),
+        (LAB, "T1", 'M98 P"0:/macros/tprime1.g"'),
+        (OWN, "G10 P4 S230 R180", "G10 P4 S230"),
+        (OWN, "G10 P4 S230 R180", "M104 T4 S230"),
+        (OWN, "G10 P4 S230 R180", "M109 T4 S230 R180"),
+        (OWN, "G10 P4 S230 R180", "G10 P4 R180\nG10 P4 S230"),
+        (OWN, "M568 P4 A2", "G91\nG1 Z5\nG1 Z-5\nG90"),
+        (OWN, "M106 P3 S255", "M106 S255"),
+        (OWN, "M568 P4 A2", 'M291 P"Go on; it\'s fine?" S3'),
+        (OWN, "M116", "M25"),
+        (OWN, "G1 X5 Y5 F7200", "G10\nG1 X5 Y5 F7200\nG11"),
+        (OWN, "G1 X5 Y5 F7200", "G1 X208 Y-90 F7200"),
+        (OWN, "G1 X5 Y5 F7200", "G1 X5 Y5 F20000"),
+        (OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y5 E.2 F12000"),
+        (OWN, "G28", "G1 Z210\nG28"),
+        (OWN, "M83", "M83\nG92 E0"),
+        (OWN, "M84" if "M84" in OWN else "M501", "M84"),
+        (OWN, "T4", "T4\nT4"),
+        (OWN, "T4", "T-1\nT4"),
+        (OWN, ";TYPE:Custom", "; printed at 210 \N{DEGREE SIGN}C"),
+    ],
+)
+def test_what_must_be_accepted_is(text, old, new):
+    assert errors(changed(text, old, new)) == set()
+
+
+def test_tools_may_be_spindles():
+    assert errors(LAB.splitlines()) == set()
+    assert errors(LAB.splitlines(), WITH_SPINDLES) == {"tool"}
+    assert errors(OWN.splitlines(), WITH_SPINDLES) == set()
+    assert errors(changed(OWN, "T4", "T1\nT4"), WITH_SPINDLES) == set()
+
+
+def test_a_slicers_own_file_is_refused():
+    raw = [re.sub(r" R[0-9]+|(?<=M106) P3", "", line) for line in OWN.splitlines()]
+    assert "raw" in errors(raw)
+    assert "raw" not in errors([line for line in raw if not line.startswith("; generated")])
+
+
+def test_a_file_cut_short_is_refused():
+    lines = OWN.splitlines()
+    for end in range(16, len(lines) - 4):
+        assert "heat-left" in errors(lines[:end])
+
+
+def test_heaters_left_to_the_stop_macro_are_told():
+    assert ("heat-left", "info") in found(MAKER.splitlines())
+    assert not any(rule == "heat-left" for rule, _ in found(OWN.splitlines()))
+
+
+def test_many_of_a_kind_are_one_finding():
+    lines = [*changed(OWN, "T4", "T4"), *["G1 X300 F600\n"] * 500]
+    (fault,) = [f for f in check(lines, DIABASE).findings if f.rule == "reach"]
+    assert fault.count == 500
+
+
+def test_another_printer_has_other_rules():
+    other = load_printer("prusa-xl5")
+    lines = """G90
+M83
+M140 S60
+G28
+T0
+M109 S215
+G1 X100 Y100 Z.2 F6000
+G1 X120 E1 F1200
+M106 S255
+M104 S0
+M84"""
+    assert found(lines.splitlines(), other) == set()
+    assert "reach" in errors([*lines.splitlines(), "G1 X-1"], other)
+    assert "heat-left" in errors(lines.splitlines()[:-2], other)
+
+
+def test_a_printer_without_a_control_section_has_the_bed_for_its_reach():
+    plain = DIABASE.model_copy(update={"control": Control()})
+    assert plain.reach_mm().x == (-195.0, 195.0)
+    assert plain.reach_mm().z == (0.0, 200.0)

@@ -1,0 +1,68 @@
+"""What a file takes, by hand."""
+
+import math
+
+import pytest
+
+from sensorgen import materials
+from sensorgen.gcode.check import check
+from sensorgen.gcode.motion import follow
+from sensorgen.gcode.timing import seconds
+from sensorgen.printer import load_printer
+
+from .good import OWN  # isort: skip
+
+DIABASE = load_printer("diabase-h5")
+
+
+def test_filament_mass_and_purge_of_each_tool():
+    result = check(OWN.splitlines(), DIABASE).report
+    three, four = result.tools
+    assert (three.tool, three.material, three.filament_mm, three.purge_mm) == (3, "etpu", pytest.approx(0.2), 0.0)
+    assert (four.tool, four.material, four.filament_mm, four.purge_mm) == (
+        4,
+        "x60",
+        pytest.approx(0.5),
+        pytest.approx(0.3),
+    )
+    assert four.volume_mm3 == pytest.approx(0.5 * math.pi * 1.75**2 / 4)
+    density = materials.load("x60").value("density_kg_m3").value
+    assert four.mass_g == pytest.approx(four.volume_mm3 * 1e-9 * density * 1e3)
+    assert (result.tool_changes, result.layers) == (1, 2)
+    assert result.box_mm == ((10.0 - 10.0, 5.0, 0.1), (15.0, 20.0, 0.2))
+
+
+def test_a_material_may_be_named_and_none_means_no_mass():
+    lines = ["M83", "T5", "G1 X1 E1"]
+    assert check(lines, DIABASE).report.tools[0].mass_g is None  # bvoh or pla
+    named = check(lines, DIABASE, {5: "x60"}).report.tools[0]
+    assert (named.material, named.mass_g) == ("x60", pytest.approx(math.pi * 1.75**2 / 4 * 1e-3))
+    assert check(lines, DIABASE, {5: "nothing"}).report.tools[0].mass_g is None
+
+
+@pytest.mark.parametrize(
+    ("lines", "expected"),
+    [
+        (["G1 X10 F600"], 1.0),
+        (["G1 X30 Y40 F3000"], 1.0),
+        (["G1 X200 F99999"], 1.0),  # the axis is slower
+        (["G1 Z50 F12000"], 1.0),
+        (["G1 E10 F600"], 1.0),
+        (["G1 E100 F99999"], 1.0),
+        (["G1 X1 E100 F99999"], 1.0),
+        (["G4 S1"], 1.0),
+        (["G4 P1000"], 1.0),
+        (["G1 X10 F600", "G1 X0", "G1 X10 F1200"], 2.5),
+    ],
+)
+def test_time_by_hand(lines, expected):
+    assert check(["G90", "M83", *lines], DIABASE).report.time_s == pytest.approx(expected)
+
+
+def test_a_feed_of_none_takes_long_but_not_for_ever():
+    assert math.isfinite(seconds(follow(["M83", "G1 X1 F0"]), DIABASE.max_speed_mm_s).sum())
+
+
+def test_spot_extrusion_is_purge():
+    tool = check(["M83", "T3", "G1 E5", "G1 E-2", "G1 E2", "G1 X1 E.5"], DIABASE).report.tools[0]
+    assert (tool.filament_mm, tool.purge_mm) == (5.5, 5.0)

@@ -1,0 +1,74 @@
+"""One line of G-code, in all the forms in which files have it."""
+
+import pytest
+
+from sensorgen.gcode.words import Command, Line, parse
+
+
+def commands(text: str) -> list[tuple[str, dict[str, str]]]:
+    line = parse(text)
+    assert line.faults == ()
+    return [(c.code, dict(c.words)) for c in line.commands]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("G1 X1.5 Y-.5 E+2. F1800\n", [("G1", {"X": "1.5", "Y": "-.5", "E": "+2.", "F": "1800"})]),
+        ("g01x1y2", [("G1", {"X": "1", "Y": "2"})]),
+        ("G1 X 1.5\tY 2 ; to the left\r\n", [("G1", {"X": "1.5", "Y": "2"})]),
+        ("(G28) G1 (X9) X1", [("G1", {"X": "1"})]),
+        ("T3", [("T3", {})]),
+        ("T-1 P0", [("T-1", {"P": "0"})]),
+        ("M104 T3 S210:205", [("M104", {"T": "3", "S": "210:205"})]),
+        ("G10 S210 P2 ; set temperature", [("G10", {"S": "210", "P": "2"})]),
+        ('M98 P"tprime3.g" ; tool change', [("M98", {"P": "tprime3.g"})]),
+        ('M291 P"Is it; in?" R"Bed (hot)" S3', [("M291", {"P": "Is it; in?", "R": "Bed (hot)", "S": "3"})]),
+        ("G91 G1 Z5", [("G91", {}), ("G1", {"Z": "5"})]),
+        ("G54.1 P3", [("G54.1", {"P": "3"})]),
+        ("M117 Layer 3 of 9; G28", [("M117", {"": "Layer 3 of 9"})]),
+        ("N3 T0*57", [("T0", {})]),
+        ("; G28", []),
+        ("   \n", []),
+        ("G1 X{move.axes[0].max}", [("G1", {"X": "{move.axes[0].max}"})]),
+    ],
+)  # fmt: skip
+def test_what_a_line_says(text, expected):
+    assert commands(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("X5 Y3", "stands before any command"),
+        ("G", "is no command"),
+        ("Gnan", "is no command"),
+        ("G1 X5 §", "means nothing"),
+        ('M98 P"tprime3.g', "does not end"),
+        ("N3 T1*57", "checksum 57 is wrong"),
+        ("if sensors.analog[0].lastReading > 50", "own language"),
+    ],
+)
+def test_what_cannot_be_read_is_said(text, fault):
+    assert any(fault in said for said in parse(text).faults)
+
+
+def test_numbers_of_words():
+    command = parse("G10 P3 S210:205 Rnan X{x}").commands[0]
+    assert (command.number("P"), command.number("S"), command.number("Z")) == (3.0, 210.0, None)
+    assert command.number("R") != command.number("R")
+    assert command.number("X") != command.number("X")
+    assert command.has("ZX")
+    assert not command.has("ZY")
+
+
+def test_remarks_are_kept():
+    assert parse("G1 X1 ;TYPE:Skirt").remark == "TYPE:Skirt"
+    assert parse("(hello)") == Line((), "hello")
+    assert parse("T1").commands == (Command("T1"),)
+
+
+def test_long_lines_take_no_long_time():
+    assert parse("G1 X1" + " " * 200_000 + "\n").faults == ()
+    assert len(parse("G1" + " X1" * 50_000).commands[0].words) == 50_000
+    assert parse('M98 P"' + '""' * 100_000).faults

@@ -1,0 +1,134 @@
+"""Recordings of the bench: counted, joined with the rig, and kept whole under their SHA-256."""
+
+import json
+from hashlib import sha256
+
+import made
+import numpy as np
+import pytest
+import scipy.io
+
+from sensorgen.errors import SensorgenError
+from sensorgen.log import Log, RawFile, files, verify
+from sensorgen.log.bench import take
+
+MADE = made.presses(8)
+OFFSET_S = 3.217
+
+
+@pytest.fixture(scope="module")
+def run_files(tmp_path_factory):
+    """A run of seven tones with 14 samples skipped, and the rig's log whose clock is late and has two errors."""
+    folder = tmp_path_factory.mktemp("run")
+    run = made.run(MADE)
+    z = run.impedance_ohm.copy()
+    z[1400:1414] = 0
+    content = made.tree([z], [run.time_s], made.stamps(run.time_s))
+    scipy.io.savemat(folder / "run.mat", content)
+    return folder / "run.mat", made.write_rig(
+        folder / "rig.csv", made.rig_rows(MADE, OFFSET_S), {3: "stalled", 90: "stalled"}
+    )
+
+
+def test_files_are_kept_whole_and_what_was_counted_beside_them(log, run_files):
+    mat, rig = run_files
+    (run,) = take(log, "26 triX .1mm", mat, rig, remark="first of the day")
+    assert log.recordings(iteration=26) == (run,)
+    assert (run.file, run.rig_file) == tuple(sha256(path.read_bytes()).hexdigest() for path in run_files)
+    for kept, path in zip(log.entries(RawFile), run_files, strict=True):
+        place = files.place(log.files, kept)
+        assert place.read_bytes() == path.read_bytes()
+        assert (kept.name, kept.size, place.suffix) == (path.name, path.stat().st_size, path.suffix)
+        assert place.stat().st_mode & 0o777 == 0o444
+    assert (run.design, run.remark, run.source) == ("trix-d0.1", "first of the day", "run.mat")
+    assert list(verify.faults(log)) == []
+
+
+def test_counts_and_clocks_are_those_of_the_run(log, run_files):
+    (run,) = take(log, "26 triX .1mm", *run_files)
+    facts = json.loads(run.facts)
+    (lockin,) = facts["lockins"]
+    assert lockin["tones_hz"] == pytest.approx(made.TONES_HZ.tolist())
+    assert lockin["counts"]["zero"] == 14
+    assert lockin["counts"]["samples"] == len(made.run(MADE).time_s)
+    assert 0 < lockin["counts"]["transient"] < 40
+    assert lockin["rate_hz"] == pytest.approx(140, rel=1e-3)
+    assert facts["rig"]["errors"] == 2
+    assert facts["rig"]["offset_s"] == pytest.approx(OFFSET_S + 0.03, abs=4 * facts["rig"]["offset_error_s"])
+    assert "s" in facts["rig"]["clocks"]
+
+
+def test_without_a_rig_and_twice(log, run_files):
+    (run,) = take(log, "26 triX .1mm", run_files[0])
+    assert (run.rig_file, "rig" in json.loads(run.facts)) == ("", False)
+    assert take(log, "26-trix-d0.1", run_files[0]) == []
+    assert len(take(log, "26 triX .1mm 2", run_files[0])) == 1
+    assert (len(log.recordings()), log.count(RawFile)) == (2, 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("run.mat", b"", "run.mat"),
+        ("run.mat", b"MATLAB 5.0 MAT-file" + b" " * 105 + b"\0\1IM" + b"\xff" * 99, "run.mat"),
+        ("run.csv", b"a,b\n1,2\n", "run.csv"),
+        ("run.csv", b"re_ohm_1kHz,im_ohm_1kHz\n1,x\n", "run.csv, row 2"),
+        ("run.pkl", b"\x80\x04cos\nsystem\n(S'touch pwned'\ntR.", "run.pkl"),
+        ("run.zip", b"PK\x03\x04" + b"\0" * 99, "run.zip"),
+    ],
+)  # fmt: skip
+def test_a_bad_recording_is_told_and_nothing_is_kept(log, tmp_path, run_files, name, content, message):
+    (tmp_path / name).write_bytes(content)
+    for pair in ((tmp_path / name, None), (tmp_path / name, run_files[1])):
+        with pytest.raises(SensorgenError) as told:
+            take(log, "26 triX", *pair)
+        assert message in str(told.value)
+    with pytest.raises(SensorgenError):
+        take(log, "26 triX", run_files[0], tmp_path / name)
+    for path in (tmp_path / "none.mat", tmp_path):
+        with pytest.raises(SensorgenError, match=r"cannot read|no file"):
+            take(log, "26 triX", path)
+    assert log.recordings() == log.specimens() == ()
+    assert not [path for path in log.files.rglob("*") if path.is_file()]
+    assert not (tmp_path / "pwned").exists()
+
+
+def test_a_recording_that_grows_while_it_is_read_is_refused(log, tmp_path, monkeypatch):
+    from sensorgen.log import bench
+
+    path = tmp_path / "run.csv"
+    rows = "".join(f"{k},-{k},{k}\n" for k in range(1, 99))
+    path.write_text(f"re_ohm_1kHz,im_ohm_1kHz,time_s\n{rows}")
+
+    def growing(*paths, facts=bench._facts):
+        found = facts(*paths)
+        with path.open("a") as file:
+            file.write("99,-99,99\n")
+        return found
+
+    monkeypatch.setattr(bench, "_facts", growing)
+    with pytest.raises(SensorgenError, match="changes while it is read: log it when it is complete"):
+        take(log, "26 triX", path)
+    assert log.recordings() == ()
+
+
+def test_the_command_and_the_way_out_and_in_again(run, path, run_files, tmp_path):
+    said = run("bench", "26 triX .1mm", *run_files, "--remark", "x")
+    assert (said.code, said.err) == (0, "")
+    assert "recording 1: 26 triX .1mm" in said.out
+    assert "rig's clock + 3.2" in said.out
+    assert "has this very recording" in run("bench", "26 triX .1mm", *run_files).out
+    assert "1 recordings" in run("list").out
+    assert "no such row" in run("bench", "26 triX .1mm 2", *run_files, "--corrects", "9").line
+    run("bench", "26 triX .1mm 2", *run_files, "--corrects", "1")  # it was another specimen
+    with Log(path) as log:
+        assert [(r.number, r.specimen) for r in log.recordings()] == [(2, "26 triX .1mm 2")]
+        assert len(log.recordings(superseded=True)) == 2
+    assert json.loads(run("show", "26 triX .1mm", "--json").out)[0]["remark"] == "x"
+    assert run("export", "out").code == 0
+    assert "4 of 4 rows logged" in run("import", "out", "--log", "new.db").out
+    with Log(path) as one, Log(tmp_path / "new.db") as other:
+        assert one.recordings() == other.recordings()
+        assert list(verify.faults(other)) == []
+        kept = next(other.entries(RawFile))
+        assert np.isfinite(scipy.io.loadmat(files.place(other.files, kept))["impedance_time"]).all()

@@ -1,0 +1,216 @@
+"""Plates of a batch in the hands of the real slicers: everything is printed where the record says, and nothing else."""
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sensorgen import design
+from sensorgen.batch import make, tab
+from sensorgen.batch.record import RECORD, differences
+from sensorgen.errors import SlicerFailed
+from sensorgen.gcode import paths
+from sensorgen.printer import load_printer
+from sensorgen.slicer.tower import tower
+
+EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
+MACHINE = load_printer("diabase-h5")
+SMALL = """\
+iteration: 26
+seed: 3
+designs:
+  - {shape: tri, parameters: {length_mm: 12, width_mm: 10}, replicates: 2}
+  - {shape: reference, parameters: {length_mm: 12, width_mm: 10}}
+slicers: [prusa, cura]
+layout: {kind: column}
+labels: {tab: true}
+"""
+LINE_MM = 0.44
+
+
+def made(folder, text, name="plan"):
+    path = folder / f"{name}.yaml"
+    path.write_text(text, "utf-8")
+    return make(path, folder / "out")
+
+
+def needed(*programs):
+    """Skip where a slicer is not installed, but never on CI."""
+    missing = [p for p in programs if shutil.which(p) is None]
+    if missing and not os.environ.get("CI"):
+        pytest.skip(f"{missing[0]} is not installed")
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    needed("prusa-slicer", "CuraEngine")
+    return made(tmp_path_factory.mktemp("small"), SMALL)
+
+
+@pytest.fixture(scope="module")
+def twenty(tmp_path_factory):
+    """The example: twenty sensors of 100 x 10 mm on one plate."""
+    needed("prusa-slicer")
+    return make(EXAMPLE, tmp_path_factory.mktemp("twenty"))
+
+
+def printed_by(batch, slicer):
+    """Lines of the bodies, and for each specimen which of them lie within its place on the record."""
+    lines = paths.read(batch.folder / batch.record["slicers"][slicer]["gcode"], MACHINE).model()
+    middle = (lines.start_mm + lines.end_mm)[:, :2] / 2
+    inside = {
+        name: (np.abs(middle - s["centre_mm"]) <= np.array(s["size_mm"]) / 2 + 0.05).all(axis=1)
+        for name, s in batch.record["specimens"].items()
+    }
+    return lines, inside
+
+
+def volumes(lines, rows):
+    volume = lines.volume_mm3(MACHINE.filament_mm)
+    return {tool: float(volume[rows & (lines.tool == tool)].sum()) for tool in (3, 4)}
+
+
+def solid(name, tab_mm3):
+    shape = "tri" if "tri" in name else "reference"
+    sensor = design.make({"shape": shape, "parameters": {"length_mm": 12.0, "width_mm": 10.0}})
+    found = {3: 0.0, 4: tab_mm3}
+    for body in sensor.printed.bodies:
+        found[sensor.tool(body.material)] += body.volume_mm3()
+    return found
+
+
+@pytest.mark.parametrize("slicer", ["prusa", "cura"])
+def test_every_line_lies_within_one_specimen(small, slicer):
+    lines, inside = printed_by(small, slicer)
+    assert len(lines) > 1000
+    assert (np.sum(list(inside.values()), axis=0) == 1).all()
+
+
+@pytest.mark.parametrize("slicer", ["prusa", "cura"])
+def test_every_specimen_is_printed_whole_with_both_tools_and_its_tab(small, slicer):
+    lines, inside = printed_by(small, slicer)
+    for name, rows in inside.items():
+        length_mm = small.record["specimens"][name]["size_mm"][0]
+        sensor = design.make({"shape": "tri", "parameters": {"length_mm": 12.0, "width_mm": 10.0}})
+        (label,) = tab.bodies(sensor, name)
+        assert length_mm == pytest.approx(12 + tab.size_mm(sensor, name)[0])
+        printed, exact = volumes(lines, rows), solid(name, label.volume_mm3())
+        for tool, volume in exact.items():
+            assert printed[tool] == pytest.approx(volume, rel=0.12), (name, tool)
+        # Raised letters: X60 above the tab's plate and beyond the sensor's end.
+        centre = small.record["specimens"][name]["centre_mm"][0]
+        end = centre - length_mm / 2 + 12
+        above = rows & (lines.start_mm[:, 0] > end + LINE_MM) & (lines.end_mm[:, 2] > tab.PLATE_MM + 0.05)
+        assert (lines.tool[above] == 4).all()
+        letters = sum(p.volume_mm3() for p in label.prisms[1:])
+        assert volumes(lines, above)[4] == pytest.approx(letters, rel=0.35), name
+
+
+def test_copies_of_a_design_are_printed_alike(small):
+    lines, inside = printed_by(small, "prusa")
+    one, other = (volumes(lines, inside[f"26 triX .2mm {k} fine"])[3] for k in (1, 2))
+    assert one == pytest.approx(other, rel=1e-3)
+
+
+def test_twenty_sensors_in_one_file(twenty):
+    inside = printed_by(twenty, "prusa")[1]
+    assert len(inside) == 20
+    assert (np.sum(list(inside.values()), axis=0) == 1).all()
+    assert all(rows.sum() > 500 for rows in inside.values())
+    assert not differences(twenty.folder)
+
+
+def test_skirt_and_tower_stay_on_the_bed_and_off_the_specimens(twenty):
+    everything = paths.read(twenty.folder / "film-study.prusa.gcode", MACHINE)
+    ways = everything.chosen(everything.length_mm() > 0)
+    half = np.array(MACHINE.bed_mm) / 2
+    assert (np.abs(ways.end_mm[:, :2]) <= half).all()
+    names = np.array(ways.kinds)[ways.kind]
+    tower_rows = np.char.startswith(names.astype(str), "wipe tower")
+    assert tower_rows.any()
+    (kept,) = twenty.record["tower"]
+    at = ways.end_mm[tower_rows][:, :2]
+    assert (at >= [kept["x0"] - 1, kept["y0"] - 1]).all()
+    assert (at <= [kept["x1"] + 1, kept["y1"] + 1]).all()
+    place = tower(MACHINE, design.make({"shape": "tri"}).layers, 2)
+    assert (kept["x0"], kept["y1"]) == (place.x_mm - 2, place.y_mm + place.side_mm + 2)
+
+
+def test_the_record_names_slicer_profile_and_gcode(small):
+    slicers = json.loads((small.folder / RECORD).read_text("utf-8"))["slicers"]
+    assert set(slicers) == {"prusa", "cura"}
+    for used in slicers.values():
+        assert used["version"][0].isdigit()
+        assert {used["gcode"], used["raw"], used["profile"]} <= set(small.record["files"])
+    assert not differences(small.folder)
+    assert not [p for p in small.folder.rglob("*") if p.suffix in (".stl", ".part")]
+
+
+def stand_in(folder, monkeypatch, script):
+    """A program that goes by the slicer's name."""
+    path = folder / "bin" / "prusa-slicer"
+    path.parent.mkdir()
+    path.write_text(f"#!/bin/sh\n{script}\n")
+    path.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{path.parent}:/usr/bin:/bin")
+
+
+def test_a_slicer_that_fails_leaves_nothing_and_says_why(tmp_path, monkeypatch):
+    stand_in(tmp_path, monkeypatch, "echo 'error: no more tools'; exit 3")
+    with pytest.raises(SlicerFailed, match=r"exit code 3: .*no more tools"):
+        made(tmp_path, SMALL.replace("[prusa, cura]", "[prusa]"))
+    assert list((tmp_path / "out").rglob("*")) == []
+
+
+def test_a_batch_that_fails_leaves_the_earlier_one_as_it_was(tmp_path, monkeypatch):
+    path = tmp_path / "plan.yaml"
+    path.write_text(SMALL, "utf-8")
+    folder = make(path, tmp_path / "out", gcode=False).folder
+    stand_in(tmp_path, monkeypatch, "exit 1")
+    path.write_text(SMALL.replace("seed: 3", "seed: 4"), "utf-8")
+    with pytest.raises(SlicerFailed):
+        make(path, tmp_path / "out")
+    assert not differences(folder)
+    assert json.loads((folder / RECORD).read_text("utf-8"))["seed"] == 3
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["plan"]
+
+
+def test_a_slicer_that_is_missing_leaves_nothing_and_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(SlicerFailed, match="not installed"):
+        made(tmp_path, SMALL)
+    assert list((tmp_path / "out").rglob("*")) == []
+
+
+def test_faults_of_the_gcode_are_on_record_and_in_the_exit_code(tmp_path, monkeypatch):
+    """A stand-in for the slicer prints beside the bed."""
+    lines = ["; generated by PrusaSlicer 2.5.0 on some day", "M83", "T2", "G1 Z0.1 F3000", "G1 X900 Y0 E1 F1200"]
+    script = 'while [ "$1" != --output ]; do shift; done\n' + "".join(f"echo '{line}' >> \"$2\"\n" for line in lines)
+    stand_in(tmp_path, monkeypatch, script)
+    batch = made(tmp_path, SMALL.replace("[prusa, cura]", "[prusa]"))
+    found = batch.record["slicers"]["prusa"]["findings"]
+    assert any(f["severity"] == "error" and "900" in f["message"] for f in found)
+    assert batch.gcode_errors() == sum(f["severity"] == "error" for f in found)
+    assert not differences(batch.folder)
+
+
+def test_the_check_of_the_real_files_finds_no_error_and_sums_them_up(small, twenty):
+    for batch, slicer in ((small, "prusa"), (small, "cura"), (twenty, "prusa")):
+        used = batch.record["slicers"][slicer]
+        assert [f for f in used["findings"] if f["severity"] == "error"] == []
+        assert [(t["tool"], t["material"]) for t in used["tools"]] == [(3, "etpu"), (4, "x60")]
+    # Twenty sensors of 100 x 10 mm: what is printed of each material besides purging, near the bodies' volume.
+    exact = {3: 0.0, 4: 0.0}
+    for name in twenty.record["specimens"]:
+        shape, film = ("reference", 0.6) if "SX60" in name else ("tri", float(name.split()[2][:2]))
+        along = {"along": name.split()[1][-1].lower()} if shape == "tri" else {}
+        sensor = design.make({"shape": shape, "parameters": {"dielectric_mm": film, **along}})
+        for body in sensor.printed.bodies:
+            exact[sensor.tool(body.material)] += body.volume_mm3()
+    area_mm2 = np.pi / 4 * MACHINE.filament_mm**2
+    for t in twenty.record["slicers"]["prusa"]["tools"]:
+        printed = (t["filament_mm"] - t["purge_mm"]) * area_mm2
+        assert printed == pytest.approx(exact[t["tool"]], rel=0.06)

@@ -1,0 +1,106 @@
+"""Every variant of the thesis, both ways up and in both qualities, through both real slicers to the printer's words.
+
+Small sensors of few cells: what their G-code says does not depend on how often the pattern repeats.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sensorgen import design, yamlfile
+from sensorgen.gcode import extruded, paths
+from sensorgen.gcode.check import check
+from sensorgen.gcode.files import lines_of
+from sensorgen.gcode.motion import follow
+from sensorgen.slicing import Placed, alone, sliced
+
+DESIGNS = Path(__file__).parents[2] / "designs"
+VARIANTS = sorted(p.relative_to(DESIGNS).as_posix() for p in DESIGNS.rglob("*.yaml") if not p.stem.endswith("-d0"))
+SIZE = {"length_mm": 6.0, "width_mm": 6.0}  # two or three cells
+PROGRAMS = {"prusa": "prusa_slicer", "cura": "cura_engine"}
+
+
+def small(name, **more):
+    data = yamlfile.read(DESIGNS / name)
+    data["parameters"] = {**data.get("parameters", {}), **SIZE}
+    return design.make({**data, "name": Path(name).stem, **more})
+
+
+@pytest.fixture
+def slicer(request):
+    request.getfixturevalue(PROGRAMS[request.param])
+    return request.param
+
+
+both = pytest.mark.parametrize("slicer", sorted(PROGRAMS), indirect=True)
+
+
+def solid_mm3(variant):
+    found = {}
+    for body in variant.printed.bodies:
+        tool = variant.tool(body.material)
+        found[tool] = found.get(tool, 0.0) + body.volume_mm3()
+    return found
+
+
+@both
+@pytest.mark.parametrize("quality", ["fine", "extrafine"])
+@pytest.mark.parametrize("orientation", ["as-drawn", "upside-down"])
+@pytest.mark.parametrize("name", VARIANTS)
+def test_each_variant_passes_the_printers_check(name, orientation, quality, slicer, tmp_path):
+    variant = small(name, orientation=orientation, quality=quality)
+    made = sliced([alone(variant)], slicer, tmp_path)
+    result = check(made.ready, variant.machine)
+    assert result.errors(strict=True) == []
+    assert {tool.tool for tool in result.report.tools} == {3, 4}
+    assert made.version.split(".")[0].isdecimal()
+    printed = extruded.read(lines_of(made.ready), variant.machine.filament_mm)
+    assert set(printed.model_mm3()) == {3, 4}
+    layers = paths.read(made.ready, variant.machine).model()
+    heights = np.unique(np.round(layers.end_mm[:, 2], 4))
+    assert set(heights) <= {round(z, 4) for z in variant.layers.boundaries_mm(variant.printed.size_mm[2] + 0.1)}
+
+
+@both
+def test_what_the_rewriting_leaves_alone(slicer, tmp_path):
+    variant = small("23/trix-d0.1.yaml")
+    made = sliced([alone(variant)], slicer, tmp_path)
+    before, after = follow(lines_of(made.raw)), follow(lines_of(made.ready))
+    assert np.array_equal(before.rows[:, :9], after.rows[:, :9])
+    assert np.array_equal(
+        paths.paths_of(before, variant.machine, "slicer").tool, paths.paths_of(after, variant.machine).tool
+    )
+    comments = [[line for line in lines_of(path) if line.startswith(";")] for path in (made.raw, made.ready)]
+    assert comments[0] == comments[1]
+
+
+@both
+def test_two_sensors_stand_where_they_were_placed(slicer, tmp_path):
+    one, two = small("23/trix-d0.1.yaml"), small("23/sqxy-d0.2.yaml")
+    made = sliced([Placed(one, (-40.0, 10.0), "left"), Placed(two, (30.0, -20.0), "right")], slicer, tmp_path)
+    assert check(made.ready, one.machine).errors(strict=True) == []
+    lines = paths.read(made.ready, one.machine).model()
+    assert len(lines)
+    for where, middle in ((lines.end_mm[:, 0] < 0, (-40, 10)), (lines.end_mm[:, 0] > 0, (30, -20))):
+        ends = lines.end_mm[where]
+        low, high = ends.min(axis=0)[:2], ends.max(axis=0)[:2]
+        assert (low + high) / 2 == pytest.approx(middle, abs=0.05)
+        assert high - low == pytest.approx(np.full(2, 6.0 - 0.44), abs=0.1)
+
+
+@both
+def test_retraction_by_the_firmware(slicer, tmp_path):
+    variant = small("23/trix-d0.1.yaml")
+    control = variant.machine.control.model_copy(update={"firmware_retraction": True})
+    variant.__dict__["machine"] = variant.machine.model_copy(update={"control": control})
+    made = sliced([alone(variant)], slicer, tmp_path)
+    motion = follow(lines_of(made.ready))
+    assert not (motion.filament_mm < 0).any()
+    plain = [
+        event.command.code
+        for event in motion.events
+        if event.command.code in ("G10", "G11") and not event.command.words
+    ]
+    assert plain.count("G10") >= plain.count("G11") > 3
+    assert check(made.ready, variant.machine).errors(strict=True) == []
