@@ -28,6 +28,7 @@ COMMANDS = (
     "stack",
     "log",
     "report",
+    "fit",
     "bench",
     "list",
     "schema",

@@ -51,6 +51,8 @@ class Predicted:
         Why there is no capacitance.
     values : tuple of mapping
         Material values that it rests on, with their sources.
+    card : mapping
+        Its identifiability card, or the reason why there is none.
     """
 
     design: str
@@ -63,6 +65,7 @@ class Predicted:
     version: str
     reason: str
     values: tuple[Mapping[str, Any], ...]
+    card: Mapping[str, Any]
 
     @property
     def provenance(self) -> str:
@@ -89,6 +92,7 @@ def predicted(design: Design, stored: Sequence[Prediction] = ()) -> Predicted:
         _interval(data.get("capacitance_f")), tuple(_tone(t) for t in data.get("impedance_ohm", ())),
         "electrodes touch" in data.get("reason", ""), first.logged_at if first else "",
         first.version if first else __version__, data.get("reason", ""), tuple(data.get("values", ())),
+        data.get("identifiability") or {"reason": data.get("reason", "")},
     )  # fmt: skip
 
 

@@ -31,7 +31,7 @@ class Run:
     force_n : (n,) array
         At the recording's samples [N]; nan everywhere without a rig's log.
     rest_ohm, rest_error_ohm : (m,) array
-        Impedance with nothing on the sensor, and its standard error: of R in the real part, of X in the imaginary [ohm].
+        Impedance at rest, and its standard error: of R in the real, of X in the imaginary part [ohm].
     pairs : Pairs or None
         Before and under each press; None where there are none.
     notes : tuple of str
@@ -124,5 +124,7 @@ def _pairs(one: Recording, force: Real, position: Real, notes: list[str]) -> pre
 def _mean(z: Complex) -> tuple[Complex, Complex]:
     """Mean of rows, and the standard error of its parts."""
     z = z[np.isfinite(z).all(axis=1)]
-    scatter = (z.real.std(axis=0, ddof=1) + 1j * z.imag.std(axis=0, ddof=1)) if len(z) > 1 else np.full(z.shape[1], np.nan)
+    scatter = (
+        (z.real.std(axis=0, ddof=1) + 1j * z.imag.std(axis=0, ddof=1)) if len(z) > 1 else np.full(z.shape[1], np.nan)
+    )
     return z.mean(axis=0), np.asarray(scatter / np.sqrt(max(len(z), 1)))

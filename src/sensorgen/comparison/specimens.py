@@ -56,6 +56,8 @@ class Comparison:
         One for each reading, in the order of the log.
     designs : mapping of str to Design
         Every design that is known, by name.
+    names : mapping of str to str
+        The design's name by the specimen's.
     predictions : mapping of str to Predicted
         By the design's name.
     left_out : tuple of (str, str)
@@ -64,6 +66,7 @@ class Comparison:
 
     rows: tuple[Compared, ...]
     designs: Mapping[str, Design]
+    names: Mapping[str, str]
     predictions: Mapping[str, Predicted]
     left_out: tuple[tuple[str, str], ...]
 
@@ -91,7 +94,7 @@ def of_iteration(log: Log, iteration: int) -> Comparison:
     for reading, of in zip(readings, evidence, strict=True):
         known = replace(of, expected_ohm=usual[of.shape])
         rows.append(Compared(reading, found.get(names.get(reading.specimen, "")), known, verdict(known)))
-    return Comparison(tuple(rows), designs, found, tuple(left_out + list(_unused(rows))))
+    return Comparison(tuple(rows), designs, names, found, tuple(left_out + list(_unused(rows))))
 
 
 def _corrected(log: Log, iteration: int) -> Iterator[Reading]:

@@ -4,10 +4,12 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from sensorgen.comparison import Comparison, of_iteration
+from sensorgen.comparison.runs import Run, runs
 from sensorgen.comparison.specimens import known_iterations
 from sensorgen.log import Log
-from sensorgen.report import figures, specimens, yields
+from sensorgen.report import figures, identified, recordings, specimens, yields
 from sensorgen.report.charts import Chart
+from sensorgen.report.explained import Explanation, explanations, sentences, table_of
 from sensorgen.report.provenance import origins
 from sensorgen.report.tables import Column, Table, table
 from sensorgen.report.variants import Variant, variants
@@ -85,36 +87,63 @@ def report(log: Log, iteration: int) -> Report:
         Of the design.
     """
     found = of_iteration(log, iteration)
+    left_out = list(found.left_out)
+    recorded = list(runs(log, iteration, left_out))
+    explained = explanations(found, recorded)
     sections = (
-        _residuals(found),
+        _residuals(found, recorded),
+        _explained(explained),
         _verdicts(found),
+        _recordings(recorded),
         _variants(found),
-        _left_out(found),
+        _left_out(left_out),
         Section("provenance", "Provenance", tables=(origins(log, found),)),
     )
     return Report(
-        iteration, datetime.now(UTC).isoformat(timespec="seconds"), tuple(_findings(log, iteration, found)),
+        iteration, datetime.now(UTC).isoformat(timespec="seconds"),
+        tuple(_findings(log, iteration, found, recorded, explained)),
         tuple(s for s in sections if s.words or s.tables or s.charts or s.variants),
     )  # fmt: skip
 
 
-def _findings(log: Log, iteration: int, found: Comparison) -> list[str]:
-    if not found.rows:
+def _findings(
+    log: Log, iteration: int, found: Comparison, recorded: list[Run], explained: list[Explanation]
+) -> list[str]:
+    if not found.rows and not recorded:
         known = ", ".join(map(str, known_iterations(log))) or "none"
         return [
             f"The log has no readings of iteration {iteration}. Iterations that it knows: {known}.",
             "Log some with: sensorgen log multimeter SPECIMEN --y 0.65k --z OL",
         ]
-    return [*specimens.findings(found), *yields.findings(found)]
+    of_readings = [*specimens.findings(found), *yields.findings(found)] if found.rows else []
+    return [*of_readings, *sentences(explained), *recordings.findings(recorded, found)]
 
 
-def _residuals(found: Comparison) -> Section:
-    if not found.rows:
+def _residuals(found: Comparison, recorded: list[Run]) -> Section:
+    if not found.rows and not recorded:
         return Section("residuals", "Residuals")
+    tables = [specimens.table_of(found)] if found.rows else []
+    tables += [recordings.tones(recorded, found)] if recorded else []
+    drawn = [*figures.residuals(found), *recordings.residuals(recorded, found)]
     return Section(
-        "residuals", "Predicted against measured: residuals first", specimens.words(found),
-        (specimens.table_of(found),), figures.residuals(found),
+        "residuals", "Predicted against measured: residuals first", specimens.words(found), tuple(tables), tuple(drawn)
+    )
+
+
+def _explained(explained: list[Explanation]) -> Section:
+    if not explained:
+        return Section("explained", "Explained")
+    words = (
+        "Each parameter is moved alone, for all specimens at once, until the squared residuals are least. R_Z is "
+        "compared up to the meter's highest range, which is also what a film without a leak is predicted to read.",
     )  # fmt: skip
+    return Section("explained-by", "Which parameter explains the residuals", words, (table_of(explained),))
+
+
+def _recordings(recorded: list[Run]) -> Section:
+    if not recorded:
+        return Section("recorded", "Recordings")
+    return Section("recorded", "Recordings", (), (recordings.facts(recorded),), recordings.figures(recorded))
 
 
 def _verdicts(found: Comparison) -> Section:
@@ -131,11 +160,11 @@ def _verdicts(found: Comparison) -> Section:
 
 def _variants(found: Comparison) -> Section:
     made = variants(found)
-    return Section("variants", "The variants", (), (), figures.bodies(found), made)
+    card = identified.table_of(found)
+    return Section("variants", "The variants", (), (card,) if card else (), figures.bodies(found), made)
 
 
-def _left_out(found: Comparison) -> Section:
-    rows = found.left_out
+def _left_out(rows: list[tuple[str, str]]) -> Section:
     words = () if rows else ("Nothing was left out.",)
     made = (table("left_out", "What was left out, or taken with care, and why", (Column("what"), Column("why")), rows),)
     return Section("left-out", "What was left out, and why", words, made if rows else ())

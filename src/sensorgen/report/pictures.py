@@ -84,7 +84,7 @@ def _dress(panel: "Axes", x: Axis, y: Axis) -> None:
 def _trace(panel: "Axes", trace: Trace, places: dict[str, int], left: Any) -> None:
     x = np.asarray(trace.x, float)
     y: Any = [places[str(name)] for name in trace.y] if places else np.asarray(trace.y, float)
-    label = trace.name or None
+    label = trace.name or "_nolegend_"
     if trace.kind == "bars":
         panel.barh(y, x, left=left[y], color=trace.colour, label=label)
         left[y] += x
