@@ -12,7 +12,7 @@ from sensorgen.comparison.runs import Run, runs
 from sensorgen.design import Design, make
 from sensorgen.errors import BadInput, SensorgenError
 from sensorgen.fit import resistance, tones
-from sensorgen.fit.results import Error, Fit, Fitted, Untold
+from sensorgen.fit.results import LEAK, Error, Fit, Fitted, Untold
 from sensorgen.log import Log
 
 HELD_BACK = 0.25  # of the specimens
@@ -114,7 +114,8 @@ def _fitted(
             if key not in best or value.high / value.low < best[key].high / best[key].low:
                 best[key] = value
     known = {quantity for _, quantity in best}
-    untold = [u for u in found if isinstance(u, Untold) and u.parameter.partition(" ")[0] not in known]
+    open_ = [u for u in found if isinstance(u, Untold)]
+    untold = [u for u in open_ if not any(quantity.startswith(u.parameter.split()[0]) for quantity in known)]
     return list(best.values()), [_ACROSS, *untold]
 
 
@@ -122,7 +123,7 @@ def with_values(design: Design, values: Sequence[Fitted]) -> Design:
     """A design with fitted values in place of those of its sources."""
     own: dict[str, dict[str, float]] = {}
     for value in values:
-        if value.quantity != resistance.LEAK:
+        if value.quantity != LEAK:
             own.setdefault(value.material, {})[value.quantity] = value.value
     data = design.model_dump(exclude_defaults=True, mode="json")
     return make(data | {"material_values": data.get("material_values", {}) | own})

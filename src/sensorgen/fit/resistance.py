@@ -15,11 +15,11 @@ from sensorgen.comparison import Compared
 from sensorgen.comparison.expected import ENDS, electrode_ohm
 from sensorgen.comparison.leaky import electrode_and_leak
 from sensorgen.design import Design
-from sensorgen.fit.results import LEVEL, Fitted, Untold
+from sensorgen.fit.results import LEAK, LEVEL, Fitted, Untold
 from sensorgen.recording.samples import Real
 from sensorgen.units import M_PER_MM
 
-RESISTIVITY, LEAK = "resistivity_ohm_m", "leak_s_per_m2"
+RESISTIVITY = "resistivity_ohm_m"
 LEAST = 3  # readings that a scatter can be told from
 _DRAWS = 2000
 _PROPERTY = 10.0  # leaks that scatter by more than this factor about their median are no property of a material

@@ -9,7 +9,7 @@ import numpy as np
 from sensorgen.comparison.moved import PERMITTIVITY, Movable, at_rest, moved, pressed
 from sensorgen.comparison.runs import Run
 from sensorgen.errors import SensorgenError
-from sensorgen.fit.results import Fitted, Untold
+from sensorgen.fit.results import LEAK, Fitted, Untold
 from sensorgen.recording.samples import Complex, Real
 from sensorgen.units import M_PER_MM
 
@@ -98,7 +98,7 @@ def values(fits: Sequence[OfRun]) -> list[Fitted | Untold]:
         none = "no recording of the bench: resistances at direct current do not depend on it"
         return [Untold(PERMITTIVITY, none), Untold("youngs_modulus_pa", none)]
     film = fits[0].of.film
-    return [*_resistivity(fits), _permittivity(fits, film), _modulus(fits, film)]
+    return [*_resistivity(fits), _permittivity(fits, film), _modulus(fits, film), _leak(fits, film)]
 
 
 def _together(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
@@ -159,6 +159,18 @@ def _modulus(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
     law = fits[0].of.sensed.sensor.compression.name
     note = f"presses of {len(found)} recordings, by the law of compression {law}; all moduli move together"
     return Fitted(film, quantity, *_interval(at, error), note)
+
+
+def _leak(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
+    """Per area, where it stands out of its error in every recording."""
+    areas = [fit.of.sensed.sensor.length_m * fit.of.sensed.sensor.width_m for fit in fits]
+    found = [(fit.leak_s[0] / a, fit.leak_s[1] / a) for fit, a in zip(fits, areas, strict=True)]
+    if any(at < _SURE * error for at, error in found):
+        most = max(at + _SURE * error for at, error in found)
+        return Untold("leak", f"in {len(found)} recordings no more than {most:.2g} S/m2, and none of it certain")
+    at, error = _together(found)
+    return Fitted(film, LEAK, at, max(at - _SURE * error, 0.0), at + _SURE * error,
+                  f"Z of {len(found)} recordings at their lowest tones; no prediction reads it")  # fmt: skip
 
 
 def _modulus_of(fit: OfRun, film: str) -> float:

@@ -77,7 +77,8 @@ def _section(section: Section) -> Iterator[str]:
 
 
 def _chart(chart: Chart) -> Iterator[str]:
-    yield f'<figure id="{chart.key}"><h3 id="{chart.key}-title">{escape(chart.title)}</h3>'
+    key = chart.key
+    yield f'<figure id="figure-{key}"><h3 id="{key}-title">{escape(chart.title)}</h3>'
     if chart.chooser:
         options = "".join(f"<option>{escape(name)}</option>" for name in chart.choices)
         choose = f'{escape(chart.chooser)} <select data-for="{chart.key}">{options}</select>'
@@ -91,7 +92,7 @@ def _chart(chart: Chart) -> Iterator[str]:
 
 def _table(table: Table) -> Iterator[str]:
     yield f'<div class="scroll" tabindex="0" role="region" aria-labelledby="{table.key}-caption">'
-    yield f'<table id="{table.key}"><caption id="{table.key}-caption">{escape(table.caption)}</caption><thead><tr>'
+    yield f'<table id="table-{table.key}"><caption id="{table.key}-caption">{escape(table.caption)}</caption><thead><tr>'
     yield from (_head(column) for column in table.columns)
     yield "</tr></thead><tbody>"
     named = next((k for k, c in enumerate(table.columns) if c.name in ("specimen", "what", "name")), 0)

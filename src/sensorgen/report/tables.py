@@ -75,7 +75,7 @@ def exact(cell: Cell) -> str:
     """
     if cell is None:
         return ""
-    return cell if isinstance(cell, str) else repr(cell)
+    return cell if isinstance(cell, str) else repr(cell if isinstance(cell, int) else float(cell))
 
 
 def plain(cell: Cell) -> Cell:
