@@ -1,8 +1,9 @@
-"""Fits against a truth that is known, what the thesis's table can tell and what not, and the source that comes of it."""
+"""Fits against a known truth, what the thesis's table can tell and what not, and the source that comes of it."""
 
 import math
 import statistics
 
+import bench_files
 import pytest
 import yaml
 
@@ -14,7 +15,7 @@ from sensorgen.errors import BadInput, OutOfRange, SensorgenError, UnknownName
 from sensorgen.fit import Fit, Fitted, Untold, fit, text
 from sensorgen.fit.fitting import held_back
 from sensorgen.fit.resistance import Allowed, leak, resistivity
-from sensorgen.log import Log, words
+from sensorgen.log import Log, bench, words
 from sensorgen.materials import own
 from sensorgen.predict import prediction
 from sensorgen.specimen import design_of, parse
@@ -168,6 +169,33 @@ def test_words_in_a_source_are_text():
     data = yaml.safe_load(text(made))
     assert data["materials"]["etpu"]["resistivity_ohm_m"]["note"] == bad
     assert set(data) == {"about", "materials"}
+
+
+def test_recordings_give_back_what_they_were_made_with(tmp_path):
+    """Factors to the prediction: resistivity 0.5, capacitance 1.3, modulus 0.5; a leak of 2 nS on 10 cm2."""
+    names = [f"30 triX .1mm {k}" for k in (1, 2)]
+    design = design_of(parse(names[0]))
+    sensor = bench_files.truth(design, **bench_files.TRUTH)
+    with Log(tmp_path / "log.db", create=True) as log:
+        for k, name in enumerate(names):
+            bench.take(log, name, *bench_files.write(tmp_path, f"run{k}", sensor, count=5, seed=k + 1))
+        made = fit(log, 30)
+    assert value(made, "resistivity_ohm_m").value == pytest.approx(0.5 * (0.07 + 0.2) / 2, rel=3e-3)
+    assert value(made, "youngs_modulus_pa").value == pytest.approx(0.5 * 6e6, rel=5e-3)
+    assert value(made, "leak_s_per_m2").value == pytest.approx(2e-9 / 1e-3, rel=0.1)
+    eps = value(made, "relative_permittivity")
+    known = materials.load("x60").value("relative_permittivity").value
+
+    def capacitance(permittivity):
+        data = {"shape": "tri", "parameters": {"dielectric_mm": 0.1}}
+        own_value = {"x60": {"relative_permittivity": permittivity}}
+        return math.sqrt(math.prod(prediction(make(data | {"material_values": own_value}))["capacitance_f"][end]
+                                   for end in ("lower", "upper")))  # fmt: skip
+
+    assert capacitance(eps.value) / capacitance(known) == pytest.approx(1.3, rel=1e-2)
+    assert eps.high / eps.low > 1.5  # the bounds of the cell's model are in it
+    for v in made.values:
+        assert v.low < v.value < v.high
 
 
 def test_nothing_to_fit_to(tmp_path):

@@ -73,7 +73,7 @@ class Movable:
 
     def _curve(self, at: Callable[[float], Interval]) -> tuple[Real, Real]:
         known = self.sensed.unloaded.answer.capacitance_f.middle()
-        return np.log(FACTORS), np.log([at(factor).middle() / known for factor in FACTORS])
+        return np.log(FACTORS), np.log([at(k).middle() / known if k != 1 else 1.0 for k in FACTORS])
 
 
 def moved(sensor: Sensor, resistivity: float = 1.0, capacitance: float = 1.0, leak_s: float = 0.0) -> Sensor:

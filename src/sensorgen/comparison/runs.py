@@ -11,9 +11,10 @@ from sensorgen.log import BenchRun, Log, RawFile
 from sensorgen.log.files import place
 from sensorgen.process import drift, lowpass, presses
 from sensorgen.recording import joined, read_all, rig
-from sensorgen.recording.samples import Complex, Real, Recording
+from sensorgen.recording.samples import Bools, Complex, Real, Recording
 
 _LEAST = 16  # valid samples that a mean at rest needs
+_BLOCKS = 50_000  # that a drift is fitted to
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +112,7 @@ def _pairs(one: Recording, force: Real, position: Real, notes: list[str]) -> pre
         return None
     try:
         spans = presses.pressed(one.time_s, force)
-        fit = drift.fitted(one.time_s, one.impedance_ohm, one.valid(), force)
+        fit = drift.fitted(*_in_blocks(one.time_s, one.impedance_ohm, one.valid(), force))
         clean = fit.removed(one.time_s, one.impedance_ohm)
         made = presses.pairs(one.time_s, clean, one.valid(), spans, force, position)
     except SensorgenError as error:
@@ -119,6 +120,16 @@ def _pairs(one: Recording, force: Real, position: Real, notes: list[str]) -> pre
         return None
     notes.extend(f"left out: {text}" for text in made.left_out)
     return made
+
+
+def _in_blocks(time_s: Real, impedance_ohm: Complex, valid: Bools, force_n: Real) -> tuple[Real, Complex, Bools, Real]:
+    """Means over blocks of neighbours, so that a long recording has ``_BLOCKS`` of them: drift is slower by far."""
+    size = len(time_s) // _BLOCKS
+    if size < 2:
+        return time_s, impedance_ohm, valid, force_n
+    end = len(time_s) // size * size
+    blocks = [values[:end].reshape(-1, size, *values.shape[1:]) for values in (time_s, impedance_ohm, valid, force_n)]
+    return blocks[0].mean(axis=1), blocks[1].mean(axis=1), blocks[2].all(axis=1), np.abs(blocks[3]).max(axis=1)
 
 
 def _mean(z: Complex) -> tuple[Complex, Complex]:

@@ -7,7 +7,7 @@ that takes away of it.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from math import exp, inf, isfinite, log, nan, sqrt
+from math import exp, inf, log, nan, sqrt
 
 import numpy as np
 
@@ -27,8 +27,9 @@ PARAMETERS = {
     "d": "film thickness", "leak": "leak of the whole film",
 }  # fmt: skip
 _FACTOR, _LEAK_S = (1e-2, 1e2), (1e-12, 1e3)
-_GRID = 61
+_GRID = 31
 _STEP = 1e-3
+_OPEN = log(1e6)  # a factor beyond is told as this one: nothing is known
 _FLAT = 1e-9  # share below which a parameter does nothing
 
 Model = Callable[[str, float], Complex]
@@ -171,8 +172,8 @@ def _explained(kind: Kind, parameter: str) -> Explanation:
         return Explanation(kind.name, parameter, start, nan, _slope(kind, parameter, log(start)) if start else 0.0, 0.0)
     slope = _slope(kind, parameter, at)
     count = len(kind.measured)
-    error = sqrt(least / max(count - 1, 1) / count) / slope if slope else nan
-    return Explanation(kind.name, parameter, exp(at), exp(error) if isfinite(error) else nan, slope, share)
+    error = sqrt(least / max(count - 1, 1) / count) / slope if slope else inf
+    return Explanation(kind.name, parameter, exp(at), float(np.exp(min(error, _OPEN))), slope, share)
 
 
 def _slope(kind: Kind, parameter: str, at: float) -> float:

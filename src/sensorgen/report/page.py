@@ -92,7 +92,8 @@ def _chart(chart: Chart) -> Iterator[str]:
 
 def _table(table: Table) -> Iterator[str]:
     yield f'<div class="scroll" tabindex="0" role="region" aria-labelledby="{table.key}-caption">'
-    yield f'<table id="table-{table.key}"><caption id="{table.key}-caption">{escape(table.caption)}</caption><thead><tr>'
+    yield f'<table id="table-{table.key}"><caption id="{table.key}-caption">{escape(table.caption)}</caption>'
+    yield "<thead><tr>"
     yield from (_head(column) for column in table.columns)
     yield "</tr></thead><tbody>"
     named = next((k for k, c in enumerate(table.columns) if c.name in ("specimen", "what", "name")), 0)
