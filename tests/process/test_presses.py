@@ -124,6 +124,9 @@ def test_a_surface_is_straight_between_its_presses_and_blank_beyond():
     assert 0.6 < inside.mean() < 1
     np.testing.assert_allclose(found.values[inside, 0], expected[inside], atol=1e-9)
     assert found.values.shape == (20, 20, 2)
+    bent = np.column_stack([force**2, force * at])
+    other_unit = surface(force * 1e3, at, bent, points=20)  # triangles must not hang on it
+    np.testing.assert_allclose(other_unit.values, surface(force, at, bent, points=20).values, rtol=1e-6)
     with pytest.raises(BadInput, match="on one line"):
         surface(force, 2 * force, values)
     with pytest.raises(BadInput, match="three or more"):
@@ -139,3 +142,12 @@ def test_all_sets_on_one_scale():
     one = normalised(sets, together=True)
     assert one[0][:, 0].tolist() == pytest.approx([0.6, 1.0])
     assert one[1][:, 0].tolist() == pytest.approx([0, 0.8, 0.4])
+
+
+def test_the_rest_begins_when_the_film_has_come_back():
+    t = np.arange(0, 12, 0.1)
+    force = np.where((t > 3.05) & (t < 5.05), 2.0, 0.0)
+    force[100] = np.nan  # nobody knows: as if it pressed
+    away = drift._disturbed(t, force, 1.5)
+    assert t[away][:-16].tolist() == pytest.approx(np.arange(3.0, 6.45, 0.1).tolist())
+    assert t[away][-16:].tolist() == pytest.approx(np.arange(9.9, 11.45, 0.1).tolist())

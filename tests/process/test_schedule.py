@@ -26,6 +26,7 @@ def test_forces_and_positions_are_even_within_limits_and_independent():
     assert stats.kstest((at - 5) / 90, "uniform").pvalue > 0.01
     assert abs(stats.spearmanr(force, at).statistic) < 0.15
     assert abs(stats.spearmanr(force, np.arange(400)).statistic) < 0.15  # drift is no force
+    assert abs(stats.spearmanr(at, np.arange(400)).statistic) < 0.15
     assert 0 <= force.min() < 0.1
     assert 5.9 < force.max() <= 6
     assert 5 <= at.min() < at.max() <= 95

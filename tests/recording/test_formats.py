@@ -105,6 +105,7 @@ def test_several_lockins_of_any_length_and_any_tones(tmp_path, lengths):
         np.testing.assert_array_equal(one.impedance_ohm, z)
         assert one.tones_hz.tolist() == tone.tolist()
         assert one.epoch_s == found[0].epoch_s
+        np.testing.assert_array_equal(one.time_s, SHORT.time_s[: len(z)])
     with pytest.raises(BadInput, match="2 lock-ins; expected one"):
         read(file)
 
@@ -119,9 +120,10 @@ def test_skipped_blocks_and_nan_are_missing_and_counted(tmp_path):
     z = SHORT.impedance_ohm[BEFORE].copy()
     z[100:114] = 0
     z[200, 3] = np.nan
+    z[201, 3] = 1e300 + 1e308j
     found = read(save(tmp_path / "gaps.mat", made.tree([z], [SHORT.time_s[BEFORE]])))
     counts = found.counts()
-    assert (counts["zero"], counts["missing"], counts["valid"]) == (14, 1, 300 - 23 - 15)
+    assert (counts["zero"], counts["missing"], counts["valid"]) == (14, 2, 300 - 23 - 16)
     assert np.isnan(found.impedance_ohm[100:114]).all()
     assert np.isnan(found.impedance_ohm[200]).tolist() == [False] * 3 + [True] + [False] * 3
     assert np.isnan(found.epoch_s)
@@ -298,3 +300,14 @@ def test_hdf5_that_leads_elsewhere_is_refused(tmp_path):
             group[f"lockin{k}"] = group
     with pytest.raises(BadInput, match="without end"):
         read(tmp_path / "loop.h5")
+    with h5py.File(tmp_path / "wide.h5", "w") as file:
+        inner = file.create_group("g0")
+        inner["x"] = 1.0
+        for level in range(1, 10):
+            outer = file.create_group(f"g{level}")
+            for k in range(9):
+                outer[f"lockin{k}"] = inner
+            inner = outer
+        file["impedance_data"] = inner
+    with pytest.raises(BadInput, match="without end"):
+        read(tmp_path / "wide.h5")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from sensorgen.errors import BadInput
-from sensorgen.recording import Clock, Recording, Source, joined, rig
+from sensorgen.recording import Clock, Recording, Source, join, joined, rig
 from sensorgen.recording.clock import rebuilt
 from sensorgen.recording.samples import blank, sifted
 
@@ -71,6 +71,8 @@ def test_errors_and_silence_of_the_rig_are_marked_and_counted(tmp_path, run):
     assert marked.sum() == pytest.approx(140 * (5 + 0.1), abs=30)
     assert np.isnan(found.force_n[np.isclose(run.time_s, 32, atol=1e-3)]).all()
     assert not found.recording.valid()[marked].any()
+    assert marked[np.searchsorted(run.time_s, 10.02)]  # beside rows 200 and 201
+    assert not marked[np.searchsorted(run.time_s, [9.9, 10.15, 15.0])].any()
 
 
 def test_a_sensor_that_does_not_answer_leaves_the_clocks_as_they_are(tmp_path, run):
@@ -121,3 +123,18 @@ def test_bad_logs_name_row_and_column(tmp_path, text, said):
     with pytest.raises(BadInput, match=said) as error:
         rig(tmp_path / "rig.csv")
     assert "rig.csv" in str(error.value)
+
+
+def test_errors_of_weights_hold_for_noise_that_hangs_together():
+    rng = np.random.default_rng(5)
+    t = np.linspace(-1, 1, 1500)
+    model = np.column_stack([np.ones_like(t), np.sin(5 * t), t**2])
+    found, said = [], []
+    for _ in range(300):
+        white, noise = rng.standard_normal(1500), np.zeros(1500)
+        for k in range(1, 1500):
+            noise[k] = 0.7 * noise[k - 1] + white[k]
+        weights = np.linalg.lstsq(model, noise, rcond=None)[0]
+        found.append(weights[-2:])
+        said.append(np.sqrt(np.diag(join._covariance(model, noise - model @ weights))))
+    np.testing.assert_allclose(np.mean(said, axis=0), np.std(found, axis=0), rtol=0.15)

@@ -19,6 +19,7 @@ SETTLE_S = 1.0
 _TAUS = 9
 _FASTEST = 300.0  # of the run: a time constant that short is a step
 _LEAST = 30
+_MOST_SEARCHED = 20_000  # readings that the time constant is looked for in; the rest is fitted to all
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +84,8 @@ def fitted(time_s: Real, impedance_ohm: Complex, valid: Bools, force_n: Real, se
     t, z = time_s[rest] - start, impedance_ohm[rest]
     values = np.log(np.abs(z)) + 1j * np.unwrap(np.angle(z), axis=0)
     scale = np.maximum(np.abs(np.diff(values, axis=0)).mean(axis=0), 1e-300)  # tones count by their noise
-    tau = _best_tau(t, values / scale)
+    some = slice(None, None, max(1, len(t) // _MOST_SEARCHED))
+    tau = _best_tau(t[some], (values / scale)[some])
     weights = np.linalg.lstsq(_basis(t, tau), values, rcond=None)[0]
     left = values - _basis(t, tau) @ weights
     scatter = np.sqrt((left.real**2).mean(axis=0)) + 1j * np.sqrt((left.imag**2).mean(axis=0))

@@ -1,6 +1,5 @@
 """Presses out of a run: where they are, and the readings before and under each."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -180,16 +179,14 @@ def pairs(
     """
     rows, left_out, last_end = [], [], -np.inf
     for k, press in enumerate(presses, 1):
-        before = valid & _within(
-            time_s, press.start_s - guard_s - window_s, press.start_s - guard_s, last_end + guard_s
-        )
-        under = valid & _within(
-            time_s, press.end_s - guard_s - window_s, press.end_s - guard_s, press.start_s + guard_s
-        )
+        until, end = press.start_s - guard_s, press.end_s - guard_s
+        before = _counting(time_s, valid, max(until - window_s, last_end + guard_s), until)
+        under = _counting(time_s, valid, max(end - window_s, press.start_s + guard_s), end)
         last_end = press.end_s
-        counts = int(np.count_nonzero(before)), int(np.count_nonzero(under))
-        if min(counts) < _LEAST:
-            left_out.append(f"press {k} at {press.start_s:.6g} s: {counts[0]} readings before and {counts[1]} under it")
+        if min(len(before), len(under)) < _LEAST:
+            left_out.append(
+                f"press {k} at {press.start_s:.6g} s: {len(before)} readings before and {len(under)} under it"
+            )
             continue
         means = _mean(time_s[before], impedance_ohm[before]), _mean(time_s[under], impedance_ohm[under])
         rows.append((press.start_s, float(np.nanmean(force_n[under])), float(np.nanmean(position_mm[under])), *means))
@@ -209,8 +206,10 @@ def _column(means: tuple[_Mean, ...]) -> Complex:
     return np.array([mean.value for mean in means])
 
 
-def _within(time_s: Real, start_s: float, end_s: float, not_before_s: float) -> Bools:
-    return np.asarray((time_s >= max(start_s, not_before_s)) & (time_s <= end_s))
+def _counting(time_s: Real, valid: Bools, start_s: float, end_s: float) -> NDArray[np.intp]:
+    """Readings between two times that count."""
+    first, after = np.searchsorted(time_s, start_s), np.searchsorted(time_s, end_s, side="right")
+    return first + np.flatnonzero(valid[first:after])
 
 
 def _mean(time_s: Real, z: Complex) -> _Mean:
@@ -227,9 +226,3 @@ def _error(time_s: Real, values: Real) -> Real:
     power = np.maximum((left**2).sum(axis=0), 1e-300)
     rho = np.clip((left[1:] * left[:-1]).sum(axis=0) / power + 1 / len(left), 0.0, 1 - 1 / len(left))
     return np.asarray(np.sqrt(variance / len(left) * (1 + rho) / (1 - rho)))
-
-
-def words(made: Pairs) -> Iterator[str]:
-    """What came of it, as a person reads it."""
-    yield f"{len(made.time_s)} presses, {made.force_n.min():.3g} to {made.force_n.max():.3g} N"
-    yield from (f"left out: {text}" for text in made.left_out)

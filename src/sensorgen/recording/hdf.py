@@ -15,7 +15,7 @@ from sensorgen.errors import BadInput, MissingValue
 from sensorgen.recording.matfive import MOST_BYTES
 
 _DEEPEST = 12
-_MOST_ITEMS = 10_000
+_MOST_ITEMS = 2_000
 _CLASS = "MATLAB_class"
 _BROKEN = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, OverflowError, MemoryError)
 

@@ -157,10 +157,9 @@ def _troubled(rig: RigLog, at: Real) -> np.ndarray[tuple[int], np.dtype[np.bool_
 
 def _estimated(recording: Recording, time: Real, rig: RigLog, within_s: float) -> _Offset:
     valid = np.flatnonzero(recording.valid())
-    stride = max(1, len(valid) // _MOST_FITTED)
-    signal = strongest(recording.impedance_ohm[valid])
-    coarse = _correlated(time[valid], signal, rig, within_s)
-    return _refined(time[valid][::stride], signal[::stride], rig, coarse)
+    used = valid[:: max(1, len(valid) // _MOST_FITTED)]
+    signal = strongest(recording.impedance_ohm[used])
+    return _refined(time[used], signal, rig, _correlated(time[used], signal, rig, within_s))
 
 
 def _force(rig: RigLog) -> tuple[Real, Real, Real]:

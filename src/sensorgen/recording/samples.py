@@ -12,7 +12,7 @@ Bools = NDArray[np.bool_]
 
 MARKS = {
     "zero": "a tone is exactly 0 + 0j: the instrument skipped a block",
-    "missing": "a tone is not a finite number",
+    "missing": "a tone is no finite number, or beyond any impedance (1e30 ohm)",
     "transient": "the demodulator was still starting up",
     "clipped": "the instrument's input was beyond its range",
     "invalid": "the file itself says that the sample does not count",
@@ -23,6 +23,8 @@ MARKS = {
     "rig error": "the rig reported an error, or nothing",
 }
 """What may be said of a sample, and what it means."""
+
+_LARGEST_OHM = 1e30  # beyond it arithmetic fails before physics does
 
 HARMLESS = frozenset({"gap", "reversed stamp", "repeated stamp", "no stamp"})
 """Marks that do not take a sample out: the rebuilt clock has put them right."""
@@ -36,7 +38,8 @@ def blank(count: int) -> dict[str, Bools]:
 def sifted(impedance_ohm: Complex) -> dict[str, Bools]:
     """Marks of what is no reading: exact zeros and what is not finite; both become nan in place [ohm]."""
     zero = impedance_ohm == 0
-    missing = ~np.isfinite(impedance_ohm)
+    with np.errstate(over="ignore"):
+        missing = ~(np.abs(impedance_ohm) < _LARGEST_OHM)
     impedance_ohm[zero | missing] = complex("nan+nanj")
     return {"zero": zero.any(axis=1), "missing": missing.any(axis=1)}
 
