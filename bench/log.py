@@ -93,7 +93,7 @@ def of_a_recording(folder):
     yield f"`log bench` of {SAMPLES} samples x 7 tones, {size:.0f} MB", f"{seconds:.1f} s, {peak:.2f} GB", "5 s, 1 GB"
 
 
-def of_chance(folder, program, count, target):
+def of_chance(folder, about, program, count, target):
     place = folder / program
     place.mkdir()
     start = time.monotonic()
@@ -105,10 +105,10 @@ def of_chance(folder, program, count, target):
     seen = json.loads(done.stdout)
     faults = seen.pop("faults")
     used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    said = ", ".join(f"{value} {name}" for name, value in seen.items())
+    said = about + ": " + ", ".join(f"{value} {name}" for name, value in seen.items())
     yield (
         f"{said}; {used:.0f} s of the processor, {time.monotonic() - start:.0f} s by the clock",
-        f"{len(faults)} faults {faults or ''}",
+        f"{len(faults)} faults {faults or ''}".strip(),
         target,
     )
 
@@ -128,8 +128,8 @@ def main():
         for work in (
             of_readings(folder),
             of_a_recording(folder),
-            of_chance(folder, "kills.py", KILLS, "200 kills, 0 faults"),
-            of_chance(folder, "fuzz.py", FILES, "10 000 files, 0 faults"),
+            of_chance(folder, "`kill -9` at random moments", "kills.py", KILLS, "200 kills, 0 faults"),
+            of_chance(folder, "Files tampered with", "fuzz.py", FILES, "10 000 files, 0 faults"),
         ):
             for what, got, target in work:
                 lines.append(f"| {what} | {got} | {target} |")

@@ -46,9 +46,8 @@ def main() -> None:
         print(f"computed in {middle - start:.1f} s, written in {end - middle:.1f} s of processor time")
         print(f"{time.perf_counter() - wall:.1f} s by the clock")
         print(f"page: {len(page.encode()) / 1e6:.1f} MB")
-        print(
-            f"largest memory, making of the data included: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6:.2f} GB"
-        )
+        most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+        print(f"largest memory, making of the data included: {most:.2f} GB")
 
 
 if __name__ == "__main__":

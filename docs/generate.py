@@ -12,8 +12,8 @@ PAGES = (
     [], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
     ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"], ["predict"],
     ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["invert"], ["sheet"], ["stack"], ["bench"],
-    ["bench", "plan"], ["bench", "plan", "tri"],
-    ["log"], *(["log", w] for w in ("multimeter", "import", "bench", "predict", "list", "show", "export", "verify")),
+    ["bench", "plan"], ["bench", "plan", "tri"], ["log"],
+    *(["log", w] for w in ("multimeter", "import", "bench", "predict", "list", "show", "export", "verify")),
     ["report"], ["fit"],
     ["list"], ["schema"], ["completion"],
 )  # fmt: skip

@@ -20,6 +20,8 @@ LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))
         (["predict", "tri"], CAD),
         (["predict", "tri", "--force", "0:6:1"], CAD),
         (["cell", "tri", "--help"], HEAVY),
+        (["log", "--help"], HEAVY),
+        (["log", "multimeter", "--help"], HEAVY),
         (["chart", "--help"], HEAVY),
         (["cell", "reference"], CAD),
         (["draw", "tri", "-o", "-"], CAD),

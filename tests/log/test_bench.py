@@ -11,6 +11,7 @@ import scipy.io
 from sensorgen.errors import SensorgenError
 from sensorgen.log import Log, RawFile, files, verify
 from sensorgen.log.bench import take
+from sensorgen.recording import read
 
 MADE = made.presses(8)
 OFFSET_S = 3.217
@@ -56,6 +57,29 @@ def test_counts_and_clocks_are_those_of_the_run(log, run_files):
     assert facts["rig"]["errors"] == 2
     assert facts["rig"]["offset_s"] == pytest.approx(OFFSET_S + 0.03, abs=4 * facts["rig"]["offset_error_s"])
     assert "s" in facts["rig"]["clocks"]
+
+
+def test_columns_of_csv_by_other_names_are_kept_to_read_it_again(run, path, run_files, tmp_path):
+    lived = made.run(MADE, tones_hz=made.TONES_HZ[:1])
+    rows = zip(lived.time_s, lived.impedance_ohm[:, 0], strict=True)
+    lines = "".join(f"{t},{z.real},{z.imag}\n" for t, z in rows)
+    (tmp_path / "run.csv").write_text(f"t,R,X\n{lines}")
+    (tmp_path / "rig.csv").write_text(run_files[1].read_text().replace("time_s", "when", 1))
+    words = ["bench", "26 triX", "run.csv", "rig.csv"]
+    for option in ("time_s=t", "re_ohm_1.1kHz=R", "im_ohm_1.1kHz=X"):
+        assert run(*words).code == 2
+        words += ["--column", option]
+    assert "rig.csv" in run(*words).line
+    assert run(*words, "--rig-column", "time_s=when").code == 0
+    with Log(path) as log:
+        (row,) = log.recordings()
+        raw = log.raw(row.file)
+        with pytest.raises(SensorgenError, match="no raw file 'x' in the log"):
+            log.raw("x")
+    facts = json.loads(row.facts)
+    again = read(raw, facts["columns"])
+    assert again.impedance_ohm[:, 0] == pytest.approx(lived.impedance_ohm[:, 0])
+    assert facts["rig_columns"] == {"when": "time_s"}
 
 
 def test_without_a_rig_and_twice(log, run_files):

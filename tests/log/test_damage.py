@@ -115,12 +115,17 @@ def test_a_log_in_a_place_that_cannot_be(tmp_path):
 
 def test_raw_files_are_checked(log, tmp_path):
     (tmp_path / "a.csv").write_text("a")
+    left = log.files / "ca" / f".x.ab.{os.getpid()}.part"  # of an earlier process of our number
+    left.parent.mkdir(parents=True)
+    left.touch()
     (tmp_path / "b").write_text("b")
     kept = [files.keep(log.files, tmp_path / name) for name in ("a.csv", "b")]
     log.add(kept)
     assert list(verify.faults(log)) == []
     first, second = (files.place(log.files, file) for file in kept)
     assert first.name == f"{kept[0].uid}.csv"
+    assert left.parent == first.parent
+    assert not left.exists()
     first.chmod(0o644)
     first.write_text("A")
     second.unlink()
@@ -142,3 +147,37 @@ def test_a_prediction_that_was_tuned_is_found(log, path):
     connection.execute(sql)
     connection.close()
     assert list(verify.faults(log)) == ["prediction 1 is not what was made then"]
+
+
+def test_a_row_that_refers_to_nothing_is_found(sound):
+    connection = sqlite3.connect(sound, isolation_level=None)
+    connection.execute("INSERT INTO print VALUES (1, 'u', '', '23 triX', 'nobody', '', '')")
+    connection.close()
+    with Log(sound) as log:
+        assert list(verify.faults(log)) == ["'print': a row refers to one that is not there"]
+
+
+def test_what_sqlite_finds_is_told(log, monkeypatch):
+    said = {"integrity_check": ("ok", "row 3 missing\nfrom index x"), "foreign_key_check": ()}
+    monkeypatch.setattr(Log, "pragma", lambda _, name: said[name])
+    assert list(verify.faults(log)) == ["database: row 3 missing from index x"]
+
+
+def test_a_raw_file_is_on_the_disk_before_it_has_its_name(log, tmp_path, monkeypatch):
+    (tmp_path / "a.csv").write_text("a")
+    steps = []
+
+    def fsync(handle, sync=os.fsync):
+        steps.append("folder" if Path(f"/proc/self/fd/{handle}").resolve().is_dir() else "file")
+        sync(handle)
+
+    def rename(self, target, replace=Path.replace):
+        steps.append("name")
+        return replace(self, target)
+
+    if not Path("/proc/self/fd").exists():
+        pytest.skip("no /proc to ask what a handle is")
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(Path, "replace", rename)
+    files.keep(log.files, tmp_path / "a.csv")
+    assert steps == ["file", "name", "folder", "folder"]

@@ -30,7 +30,7 @@ def seen(program, folder, count):
 def test_killed_at_random_moments(tmp_path):
     found = seen("kills.py", tmp_path, KILLS)
     assert found["faults"] == []
-    assert found["promised"] > KILLS
+    assert found["promised"] > KILLS / 2
     assert [p.name for p in tmp_path.glob(".*.part")] == []
 
 

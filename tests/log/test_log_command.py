@@ -94,8 +94,8 @@ def test_corrections(run):
     assert "reading 2" in run("multimeter", "23 triX", "--y", "0.65k", "--corrects", "1").out
     assert "row 1 was corrected before, by row 2" in run("multimeter", "23 triX", "--y", "1", "--corrects", "1").line
     listed = run("list").out
-    assert "650 ohm" in listed
-    assert "mohm" not in listed
+    assert "   650  " in listed
+    assert "0.65" not in listed
     assert "reading 1:" in run("show", "1").out
     assert [f"reading {k}:" in run("show", "23-trix-d0").out for k in (1, 2)] == [True, True]
 
@@ -104,8 +104,9 @@ def test_hostile_words_do_not_reach_the_terminal(run):
     run("multimeter", "23 triX", "--y", "1", "--remark", "\x1b[2J\x07<b>\u202eevil\n=1", "--measured-at", "\x9b2J")
     for words in (["list"], ["show", "1"], ["show", "23 triX"]):
         out = run(*words).out
-        assert "\\x1b[2J\\x07<b>\\u202eevil\\n=1" in out
+        assert "\\x1b[2J\\x07<b>" in out
         assert out.replace("\n", "").isprintable()
+    assert "<b>\\u202eevil\\n=1" in out
     assert json.loads(run("list", "--json").out)["readings"][0]["remark"] == "\x1b[2J\x07<b>\u202eevil\n=1"
 
 
@@ -114,6 +115,7 @@ def test_lists(run, path):
     assert "; the latest 40 are shown, --all shows all" in run("list").out
     assert len(run("list", "--all").out.splitlines()) == 69 + 2
     assert len(run("list", "--last", "3").out.splitlines()) == 3 + 2
+    assert max(map(len, run("list", "--all").out.splitlines()[:-1])) <= 80
     listed = run("list", "--iteration", "25").out.splitlines()
     assert [line.split()[1:3] for line in listed[1:-1]] == [["25", name] for name in ("triX", "triY", "sqXY", "sqYX")]
     assert listed[-1] == f"69 readings, 0 recordings, 0 predictions in {path}"

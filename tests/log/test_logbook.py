@@ -150,6 +150,23 @@ def test_what_is_no_text_is_refused(log, remark):
         reading("23 triX", "650", remark="a\0b")
 
 
+@pytest.mark.parametrize(
+    ("remark", "said", "baked"),
+    [
+        ("not baked", None, False), ("Unbaked, small holes", None, False), ("before the bake", None, False),
+        ("baked twice", None, None), ("", True, True), ("", False, False), ("half-baked", None, None),
+    ],
+)  # fmt: skip
+def test_the_bake_is_what_is_said_or_remarked(remark, said, baked):
+    row = reading("23 triX .1mm", "650", remark=remark, baked=said)
+    assert (row.baked, row.doubts) == (baked, ())
+
+
+def test_a_remark_that_contradicts_is_doubtful():
+    row = reading("23 triX .1mm", "650", remark="not baked", baked=True)
+    assert (row.baked, row.doubts) == (True, ("said to be baked, and the remark says that it is not",))
+
+
 HOSTILE = [
     "'; DROP TABLE reading;--",
     '"<script>alert(1)</script>',

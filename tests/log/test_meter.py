@@ -1,6 +1,7 @@
 """Multimeters through VISA, simulated: what they say is logged in their own words, or told why not."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -102,3 +103,34 @@ def test_a_meter_that_fails_is_let_go(monkeypatch):
         found.resistance(wires=2)
     with meter.Meter(HP) as found:
         assert found.resistance(wires=2)
+
+
+def spoken(orders):
+    """A VISA of one instrument, which writes down every order in turn."""
+
+    class Port:
+        def write(self, order):
+            orders.append(order)
+
+        def query(self, order):
+            orders.append(order)
+            return {"*IDN?": "HEWLETT-PACKARD,34401A,0,1", "SYST:ERR?": "+0"}.get(order, "+1.0E+03")
+
+        def close(self):
+            orders.append("closed")
+
+    class Manager(Port):
+        def open_resource(self, address):
+            return Port()
+
+    errors, resources = SimpleNamespace(Error=OSError), SimpleNamespace(MessageBasedResource=Port)
+    return SimpleNamespace(ResourceManager=Manager, errors=errors, resources=resources)
+
+
+@pytest.mark.parametrize(("address", "first"), [(HP, []), ("ASRL/dev/ttyUSB0::INSTR", ["SYST:REM"])])
+def test_orders_come_in_the_order_that_the_manuals_ask_for(monkeypatch, address, first):
+    orders = []
+    monkeypatch.setattr(meter, "_pyvisa", lambda: spoken(orders))
+    with meter.Meter(address) as found:
+        found.resistance(wires=2)
+    assert orders == [*first, "*IDN?", "*CLS", "MEAS:RES?", "SYST:ERR?", "closed", "closed"]

@@ -87,6 +87,7 @@ WRONG = {
     "utf-16": (HEAD.encode("utf-16"), "is UTF-16"),
     "latin-1": (HEAD.encode() + "23 triX,1,2,gr\xf6\xdfe\n".encode("latin-1"), "row 2: byte 0xf6 is not UTF-8"),
     "zero byte": (HEAD + "23 triX,1,2,\0\n", "row 2: a zero byte"),
+    "zero byte elsewhere": ("specimen,y,who\n23 triX,1,\0\n", "row 2: a zero byte"),
     "huge cell": (HEAD + "23 triX,1,2," + "x" * 200_000 + "\n", "row 2: not CSV (field larger than field limit"),
     "long remark": (HEAD + "23 triX,1,2," + "x" * 20_000 + "\n", "row 2: a remark of 20000 letters"),
     "long name": (HEAD + "23 triX" + "x" * 9_000 + ",1,2,\n", "row 2:"),

@@ -11,7 +11,7 @@ from sensorgen.cli.show import si
 if TYPE_CHECKING:
     from sensorgen.log import BenchRun, Entry, Reading
 
-_REMARK = 28  # letters of a remark in a list
+_REMARK = 20  # letters of a remark in a list
 
 
 def visible(text: str) -> str:
@@ -24,22 +24,35 @@ def ohms(values: Sequence[float]) -> str:
     return ", ".join("OL" if math.isinf(value) else si(value, "ohm") for value in values) or "-"
 
 
+def short(values: Sequence[float]) -> str:
+    """Readings for a list, as people write them [ohm]; below 1 ohm without a prefix, for m would be taken for mega.
+
+    >>> short((0.8, 650.0, 2300.0, 1.1e6, math.inf)), short(())
+    ('0.8 / 650 / 2.3k / 1.1M / OL', '-')
+    """
+    return " / ".join(f"{value:g}" if abs(value) < 1 else _prefixed(value) for value in values) or "-"
+
+
+def _prefixed(value: float) -> str:
+    return "OL" if math.isinf(value) else si(value, "").replace(" ", "")
+
+
 def readings(found: Sequence["Reading"]) -> Iterator[str]:
-    """A line for each reading."""
-    yield f"{'no.':>6}  {'specimen':24} {'Y':>20} {'Z':>20}  {'':2}remark"
+    """A line for each reading, "?" where something is to be doubted."""
+    yield f"{'no.':>6}  {'specimen':21} {'Y [ohm]':>11} {'Z [ohm]':>15}   remark"
     for r in found:
-        doubtful = "? " if r.doubts else "  "
         state = {None: "", True: "baked; ", False: "" if "bake" in r.remark else "not baked; "}[r.baked]
         remark = visible(state + r.remark)
-        short = remark if len(remark) <= _REMARK else remark[: _REMARK - 1] + "…"
-        line = f"{r.number:6}  {visible(r.specimen):24} {ohms(r.y_ohm):>20} {ohms(r.z_ohm):>20}  {doubtful}{short}"
+        said = remark if len(remark) <= _REMARK else remark[: _REMARK - 1] + "…"
+        doubt = "?" if r.doubts else " "
+        line = f"{r.number:6}  {visible(r.specimen):21} {short(r.y_ohm):>11} {short(r.z_ohm):>15} {doubt} {said}"
         yield line.rstrip("; ")
 
 
 def runs(found: Sequence["BenchRun"]) -> Iterator[str]:
     """A line for each recording of the bench."""
     for run in found:
-        yield f"{run.number:6}  {visible(run.specimen):24} recording {run.file[:12]}  {visible(run.remark)}".rstrip()
+        yield f"{run.number:6}  {visible(run.specimen):21} recording {run.file[:12]}  {visible(run.remark)}".rstrip()
 
 
 def reading(r: "Reading") -> Iterator[str]:

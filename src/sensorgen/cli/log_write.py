@@ -130,24 +130,22 @@ def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, the
 
 
 def _bench(
-    specimen: str,
-    lcr_file: str,
-    rig_file: str | None,
-    remark: str,
-    file: str | None,
-    corrects: int | None,
-    *,
-    as_json: bool,
-) -> None:
+    specimen: str, lcr_file: str, rig_file: str | None, remark: str, file: str | None, corrects: int | None, *,
+    columns: tuple[str, ...], rig_columns: tuple[str, ...], as_json: bool,
+) -> None:  # fmt: skip
     """Log a recording of one specimen, its files kept whole.
 
     LCR_FILE is the impedance analyser's, RIG_FILE the rig's with force and position.
     """
     from sensorgen.log import BenchRun, bench
 
+    given = {"columns": pairs(columns, "--column"), "rig_columns": pairs(rig_columns, "--rig-column")}
+    maps = {name: {theirs: ours for ours, theirs in found} for name, found in given.items()}
     with opened(file, create=True) as log:
-        more = {"remark": remark, "supersedes": _uid(log, BenchRun, corrects)}
-        new = bench.take(log, specimen, Path(lcr_file), Path(rig_file) if rig_file else None, **more)
+        new = bench.take(
+            log, specimen, Path(lcr_file), Path(rig_file) if rig_file else None, **maps, remark=remark,
+            supersedes=_uid(log, BenchRun, corrects),
+        )  # fmt: skip
         _say_logged(new, log, as_json=as_json, known=f"{specimen}: the log has this very recording")
 
 
@@ -192,6 +190,14 @@ bench = made(
     click.Argument(["specimen"]),
     click.Argument(["lcr_file"]),
     click.Argument(["rig_file"], required=False),
+    click.Option(
+        ["--column", "columns"], metavar="OURS=THEIRS", multiple=True,
+        help="Column of LCR_FILE, if it is CSV and calls it otherwise: time_s, stamp_s, re_ohm_1.1kHz ...",
+    ),
+    click.Option(
+        ["--rig-column", "rig_columns"], metavar="OURS=THEIRS", multiple=True,
+        help="Column of RIG_FILE: time_s, set_force_n, set_position_mm, force_n, error.",
+    ),
     remark(),
     corrects(),
     where(),

@@ -2,8 +2,10 @@
 
 import json
 import math
+from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.errors import BadInput
@@ -16,8 +18,20 @@ if TYPE_CHECKING:
     from sensorgen.recording import Joined, Recording
 
 
+Columns = Mapping[str, str]
+_NONE: Columns = MappingProxyType({})
+
+
 def take(
-    log: Log, specimen: str, recording: Path, rig: Path | None = None, *, remark: str = "", supersedes: str = ""
+    log: Log,
+    specimen: str,
+    recording: Path,
+    rig: Path | None = None,
+    *,
+    columns: Columns = _NONE,
+    rig_columns: Columns = _NONE,
+    remark: str = "",
+    supersedes: str = "",
 ) -> list[Entry]:
     """Log a recording of one specimen.
 
@@ -29,6 +43,8 @@ def take(
         The specimen's name.
     recording, rig : Path
         The impedance analyser's file, and the rig's, if there is one.
+    columns, rig_columns : mapping
+        What the files call their columns, to what we call them, where they are CSV; kept, to read them again.
     remark : str
         In anybody's words.
     supersedes : str
@@ -44,16 +60,16 @@ def take(
     BadInput
         A name or a file that cannot be read. Nothing is logged or kept then.
     """
-    columns, name = named(specimen)
+    told, name = named(specimen)
     before = [files.raw_file(path) for path in (recording, rig) if path]
-    facts = _facts(recording, rig)
+    facts = _facts((recording, columns), (rig, rig_columns))
     kept = [files.keep(log.files, path) for path in (recording, rig) if path]
     if kept != before:
         raise BadInput(f"{str(recording)!r} {files.CHANGES}")
     design_id, design = design_of_name(name)
     run = BenchRun(
-        uid=sha256(" ".join([str(columns["specimen"]), *(file.uid for file in kept)]).encode()).hexdigest()[:32],
-        **columns,  # type: ignore[arg-type]
+        uid=sha256(" ".join([str(told["specimen"]), *(file.uid for file in kept)]).encode()).hexdigest()[:32],
+        **told,  # type: ignore[arg-type]
         written=specimen, design_id=design_id, design=design, source=recording.name, remark=remark,
         supersedes=supersedes, file=kept[0].uid, rig_file=kept[1].uid if rig else "",
         facts=json.dumps(facts, sort_keys=True, allow_nan=False),
@@ -61,14 +77,15 @@ def take(
     return [row for row in log.add([*kept, run]) if isinstance(row, BenchRun)]
 
 
-def _facts(path: Path, rig: Path | None) -> dict[str, Any]:
+def _facts(lcr: tuple[Path, Columns], rig: tuple[Path | None, Columns]) -> dict[str, Any]:
     """What is counted in a recording and in the rig's log, and how their clocks differ, as plain data."""
     from sensorgen import recording
 
-    found = recording.read_all(path)
-    facts: dict[str, Any] = {"lockins": [_of_recording(r) for r in found]}
-    if rig:
-        log = recording.rig(rig)
+    found = recording.read_all(*lcr)
+    facts: dict[str, Any] = {"columns": dict(lcr[1]), "lockins": [_of_recording(r) for r in found]}
+    if rig[0]:
+        log = recording.rig(rig[0], rig[1])
+        facts["rig_columns"] = dict(rig[1])
         facts["rig"] = {**log.counts(), "notes": list(log.notes), **_of_clocks(recording.joined(found[0], log))}
     return facts
 

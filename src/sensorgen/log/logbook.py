@@ -9,8 +9,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
-from sensorgen.errors import BadInput, UnknownName
-from sensorgen.log import database
+from sensorgen.errors import BadInput, MissingValue, UnknownName
+from sensorgen.log import database, files
 from sensorgen.log.codec import CODECS
 from sensorgen.log.entries import (
     SPECIMEN_COLUMNS,
@@ -102,6 +102,19 @@ class Log:
     def files(self) -> Path:
         """The folder of raw files, beside the log."""
         return self.path.with_name(f"{self.path.name}.files")
+
+    def raw(self, sha256: str) -> Path:
+        """Where the raw file of that SHA-256 is.
+
+        Raises
+        ------
+        MissingValue
+            The log has none such.
+        """
+        found = next(self.entries(RawFile, uid=sha256), None)
+        if found is None:
+            raise MissingValue(f"no raw file {sha256!r:.80} in the log {str(self.path)!r}")
+        return files.place(self.files, found)
 
     def specimens(self, *, iteration: int | None = None) -> tuple[Specimen, ...]:
         """Every specimen that something was logged of, by iteration and name."""
