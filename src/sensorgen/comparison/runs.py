@@ -129,7 +129,8 @@ def _in_blocks(time_s: Real, impedance_ohm: Complex, valid: Bools, force_n: Real
         return time_s, impedance_ohm, valid, force_n
     end = len(time_s) // size * size
     blocks = [values[:end].reshape(-1, size, *values.shape[1:]) for values in (time_s, impedance_ohm, valid, force_n)]
-    return blocks[0].mean(axis=1), blocks[1].mean(axis=1), blocks[2].all(axis=1), np.abs(blocks[3]).max(axis=1)
+    counts = np.asarray(blocks[2].all(axis=1), bool)
+    return blocks[0].mean(axis=1), blocks[1].mean(axis=1), counts, np.abs(blocks[3]).max(axis=1)
 
 
 def _mean(z: Complex) -> tuple[Complex, Complex]:
