@@ -99,6 +99,22 @@ def test_the_split_is_the_same_for_the_same_seed(of_thesis):
     assert held_back(["a", "b", "c"], 1) == frozenset()
 
 
+def test_specimens_held_back_have_no_say(tmp_path):
+    """Whatever they read, the values stay the same; only the error tells."""
+    names = [f"60 triX .1mm {k + 1}" for k in range(8)]
+    kept_back = held_back(sorted(names), 23)
+    made = []
+    for factor in (1.0, 2.0):
+        with Log(tmp_path / f"{factor}.db", create=True) as log:
+            for k, name in enumerate(names):
+                ohm = (600 + 30 * k) * (factor if name in kept_back else 1.0)
+                log.add([words.reading(name, f"{ohm:g}", "OL")])
+            made.append(fit(log, 60))
+    assert set(made[0].held_back) == set(made[1].held_back) == kept_back
+    assert made[0].values == made[1].values
+    assert made[0].errors[0].after != pytest.approx(made[1].errors[0].after)
+
+
 def test_the_next_prediction_takes_the_source(of_thesis, tmp_path):
     own.place().mkdir()
     own.path("fit-23").write_text(text(of_thesis), "utf-8")

@@ -107,7 +107,11 @@ class Page:
             self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code, text=text)
 
     def picture(self, path, *, whole=True):
-        done = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
+        how = {"captureBeyondViewport": whole}
+        if whole:  # beyond 8192 pixels the browser's painter begins anew
+            size = self.run("[innerWidth, Math.min(document.documentElement.scrollHeight, 8000)]")
+            how["clip"] = {"x": 0, "y": 0, "width": size[0], "height": size[1], "scale": 1}
+        done = self.call("Page.captureScreenshot", format="png", **how)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(base64.b64decode(done["data"]))
 
