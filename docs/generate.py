@@ -14,7 +14,7 @@ PAGES = (
     ["predict"], ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["invert"], ["sheet"], ["stack"],
     ["bench"], ["bench", "plan"], ["bench", "plan", "tri"],
     ["log"], *(["log", w] for w in ("multimeter", "import", "bench", "predict", "list", "show", "export", "verify")),
-    ["thesis"], ["list"], ["schema"], ["completion"],
+    ["report"], ["fit"], ["thesis"], ["list"], ["schema"], ["completion"],
 )  # fmt: skip
 
 

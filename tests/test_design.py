@@ -66,8 +66,8 @@ def test_a_new_version_changes_the_id(monkeypatch):
 def test_a_changed_value_in_a_material_changes_the_id(monkeypatch):
     before, load = tri().id(), design.material_files.load
 
-    def changed(name):
-        found = load(name)
+    def changed(name, sources=()):
+        found = load(name, sources)
         value = found.value("density_kg_m3").model_copy(update={"value": 1.0})
         return found.model_copy(update={"properties": found.properties | {"density_kg_m3": [value]}})
 

@@ -57,7 +57,7 @@ def _materials_values(material: material_files.Material) -> list[str]:
 
 
 def _material(name: str) -> dict[str, Any]:
-    found = material_files.load(name)
+    found = material_files.load(name, material_files.own.names())
     return {"about": f"{found.title}: {found.about}", "values": _materials_values(found)}
 
 

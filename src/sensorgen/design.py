@@ -17,6 +17,7 @@ from sensorgen import __version__, registry, shapes, yamlfile
 from sensorgen import materials as material_files
 from sensorgen.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.findings import Finding
+from sensorgen.materials import own
 from sensorgen.printer import Printer, Quality, load_printer, load_quality
 from sensorgen.records import Strict, checked, shown
 from sensorgen.scene import Envelope, Fill, Scene
@@ -115,7 +116,9 @@ class Design(Strict):
 
     def material(self, name: str) -> material_files.Material:
         """A material by name, with the values that this design sets itself."""
-        return material_files.load(name).with_values(self.material_values.get(name, {}))
+        slots = ((getattr(self.materials, part) or "").partition("@") for part in Slots.model_fields)
+        sources = sorted({source for material, _, source in slots if material == name and source})
+        return material_files.load(name, sources).with_values(self.material_values.get(name, {}))
 
     def slot(self, part: str) -> tuple[material_files.Material, str]:
         """Material of a part, and the source to take its values from."""
@@ -296,7 +299,7 @@ def _check_names(design: Design) -> None:
         if getattr(design.materials, part):
             material, source = design.slot(part)
             if source and source not in material.sources():
-                raise UnknownName(f"source of {material.name}", source, material.sources())
+                raise UnknownName(f"source of {material.name}", source, material.sources() | set(own.names()))
             if material.conductor != part.endswith("_electrode"):
                 kind = "conducts" if material.conductor else "does not conduct"
                 raise BadInput(f"materials.{part}: {material.name} {kind}")

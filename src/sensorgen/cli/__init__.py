@@ -29,6 +29,8 @@ COMMANDS = (
     "log",
     "bench",
     "thesis",
+    "report",
+    "fit",
     "list",
     "schema",
     "completion",

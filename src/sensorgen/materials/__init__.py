@@ -1,10 +1,12 @@
 """Materials: every published value under its source, because the sources disagree.
 
 A material is a YAML file beside this one; see ``etpu.yaml``. A design names a material and, if it
-likes, the source to take: ``x60`` or ``x60@thesis-4.1``.
+likes, the source to take: ``x60`` or ``x60@thesis-4.1``. Sources of the user's own, as a fit to
+measurements, are files in a folder of theirs (:mod:`sensorgen.materials.own`); a design that names
+none of them never sees them, so that its identity does not hang on who looks at it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib import resources
 from math import inf
@@ -14,6 +16,7 @@ from pydantic import Field
 
 from sensorgen import yamlfile
 from sensorgen.errors import BadInput, MissingValue, OutOfRange, UnknownName
+from sensorgen.materials import own
 from sensorgen.records import Strict, checked
 
 SET = "set by the user"  # source of a value that stands in a design itself
@@ -30,6 +33,22 @@ class Value(Strict):
     note: str = ""
     low: float | None = None
     high: float | None = None
+
+
+class OwnValue(Strict):
+    """One number of a source of the user's own."""
+
+    value: float
+    note: str = ""
+    low: float | None = None
+    high: float | None = None
+
+
+class Own(Strict):
+    """A source of the user's own: what it is, and its values by material and quantity."""
+
+    about: str
+    materials: dict[str, dict[str, OwnValue]]
 
 
 class Material(Strict):
@@ -119,15 +138,71 @@ def check_own(name: str, values: Mapping[str, float]) -> None:
             raise OutOfRange(f"{quantity} of {name} is {value:g}; expected {expected}")
 
 
-@cache
-def load(name: str) -> Material:
+def load(name: str, sources: Iterable[str] = ()) -> Material:
     """Read a material by name.
+
+    Parameters
+    ----------
+    name : str
+        Of the material.
+    sources : iterable of str
+        Sources of the user's own whose values are wanted too; others among them count for nothing.
 
     Raises
     ------
     UnknownName
         No material goes by that name.
+    BadInput
+        The file of such a source is damaged.
     """
+    found = _shipped(name)
+    for source in sources:
+        if source in own.names():
+            found = _extended(found, source)
+    return found
+
+
+def _extended(material: Material, source: str) -> Material:
+    """A material with the values that a source of the user's own has of it."""
+    added = own_source(source).materials.get(material.name, {})
+    values = {
+        quantity: [*material.properties.get(quantity, []), Value(source=source, **dict(value))]
+        for quantity, value in added.items()
+    }
+    return material.model_copy(update={"properties": material.properties | values})
+
+
+def own_source(source: str) -> Own:
+    """A source of the user's own.
+
+    Raises
+    ------
+    BadInput
+        Its file is damaged, or has the name of a source that ships.
+    """
+    path = own.path(source)
+    try:
+        found = checked(Own, yamlfile.read(path))
+        if source in _shipped_citations():
+            raise BadInput(f"{source} is the name of a source that ships with sensorgen; expected another name")
+        for name, values in found.materials.items():
+            _check_values(name, {key: value.value for key, value in values.items()})
+    except (BadInput, UnknownName, OutOfRange) as error:
+        raise error if str(path) in str(error) else error.within(str(path)) from None
+    return found
+
+
+def _check_values(name: str, values: Mapping[str, float]) -> None:
+    """Refuse values that are none; quantities may be new ones, which nothing reads."""
+    _shipped(name)
+    for quantity, value in values.items():
+        low, high = _RANGES.get(quantity, (0.0, inf))
+        if not low <= value <= high or value in (-inf, inf):
+            raise OutOfRange(f"{quantity} of {name} is {value:g}; expected a number from {low:g} on")
+
+
+@cache
+def _shipped(name: str) -> Material:
     if name not in names():
         raise UnknownName("material", name, names())
     file = f"{name}.yaml"
@@ -138,9 +213,13 @@ def load(name: str) -> Material:
         raise error.within(file) from None
 
 
-@cache
 def citations() -> dict[str, str]:
-    """What each source's name stands for."""
+    """What each source's name stands for, those of the user's own too."""
+    return _shipped_citations() | {name: own_source(name).about for name in own.names()}
+
+
+@cache
+def _shipped_citations() -> dict[str, str]:
     text = (resources.files(__name__) / "sources.yaml").read_text("utf-8")
     data = yamlfile.parse(text, "sources.yaml")
     theses = {str(name): f"{data['thesis']}: {where}" for name, where in data["sources"].items()}

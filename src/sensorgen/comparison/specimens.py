@@ -1,0 +1,169 @@
+"""Specimens of an iteration: readings, designs, predictions and verdicts, row by row; and what cannot be compared."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite, log, nan
+
+from sensorgen.comparison.expected import Predicted, predicted
+from sensorgen.design import Design
+from sensorgen.errors import SensorgenError
+from sensorgen.log import Log, Prediction, Reading
+from sensorgen.process.verdicts import Evidence, Verdict, expected_from, verdict
+from sensorgen.specimen import design_of, parse
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One reading beside what was predicted of its design.
+
+    Attributes
+    ----------
+    reading : Reading
+        As logged.
+    predicted : Predicted or None
+        None where no design is known.
+    evidence, verdict : Evidence, Verdict
+        What the readings say by themselves; what an electrode should have is the median of its own shape.
+    """
+
+    reading: Reading
+    predicted: Predicted | None
+    evidence: Evidence
+    verdict: Verdict
+
+    @property
+    def residual(self) -> float:
+        """Ln of the least R_Y over the prediction's middle [-]; nan where one is missing."""
+        ry, expected = self.verdict.ry_ohm, self.predicted.ry_ohm if self.predicted else None
+        return log(ry / expected.middle()) if expected and isfinite(ry) and ry > 0 else nan
+
+    @property
+    def inside(self) -> bool | None:
+        """Whether a reading of R_Y lies within the prediction's interval; None where one is missing."""
+        expected = self.predicted.ry_ohm if self.predicted else None
+        if expected is None or not self.evidence.ry_ohm:
+            return None
+        return any(expected.lower <= value <= expected.upper for value in self.evidence.ry_ohm)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """An iteration.
+
+    Attributes
+    ----------
+    rows : tuple of Compared
+        One for each reading, in the order of the log.
+    designs : mapping of str to Design
+        Every design that is known, by name.
+    names : mapping of str to str
+        The design's name by the specimen's.
+    predictions : mapping of str to Predicted
+        By the design's name.
+    left_out : tuple of (str, str)
+        What could not be used, and why.
+    """
+
+    rows: tuple[Compared, ...]
+    designs: Mapping[str, Design]
+    names: Mapping[str, str]
+    predictions: Mapping[str, Predicted]
+    left_out: tuple[tuple[str, str], ...]
+
+
+def of_iteration(log: Log, iteration: int) -> Comparison:
+    """Everything in the log about an iteration, compared.
+
+    Parameters
+    ----------
+    log : Log
+        An open one.
+    iteration : int
+        Of the design.
+    """
+    readings = log.readings(iteration=iteration)
+    left_out: list[tuple[str, str]] = [
+        (f"reading {old.number}, {old.specimen}", "a later reading corrects it") for old in _corrected(log, iteration)
+    ]
+    designs = _designs(log, iteration, left_out)
+    found = {name: predicted(design, _stored(log, design)) for name, design in designs.items()}
+    names = {specimen: design.name for specimen, design in _by_specimen(log, iteration, designs)}
+    evidence = [_evidence(reading) for reading in readings]
+    usual = {shape: expected_from([e for e in evidence if e.shape == shape]) for shape in {e.shape for e in evidence}}
+    rows = []
+    for reading, of in zip(readings, evidence, strict=True):
+        known = replace(of, expected_ohm=usual[of.shape])
+        rows.append(Compared(reading, found.get(names.get(reading.specimen, "")), known, verdict(known)))
+    return Comparison(tuple(rows), designs, names, found, tuple(left_out + list(_unused(rows))))
+
+
+def _corrected(log: Log, iteration: int) -> Iterator[Reading]:
+    current = {r.number for r in log.readings(iteration=iteration)}
+    every = log.entries(Reading, superseded=True, iteration=iteration)
+    yield from (r for r in every if r.number not in current)
+
+
+def _designs(log: Log, iteration: int, left_out: list[tuple[str, str]]) -> dict[str, Design]:
+    """The designs that the specimens' names stand for; what the log says of another design is told."""
+    found: dict[str, Design] = {}
+    for specimen in log.specimens(iteration=iteration):
+        try:
+            design = design_of(parse(specimen.specimen))
+        except SensorgenError as error:
+            left_out.append((f"design of {specimen.specimen}", str(error)))
+            continue
+        if design is None:
+            left_out.append((f"design of {specimen.specimen}", "its name does not tell which design it is"))
+        else:
+            found[design.name] = design
+    known = {design.id() for design in found.values()}
+    others = {(r.design, r.design_id) for r in log.readings(iteration=iteration) if r.design_id} - {
+        (design.name, design.id()) for design in found.values()
+    }
+    left_out += [
+        (f"design {name} ({uid})", "the log names it for a specimen whose name stands for another design, or for this "
+         "one in another version of sensorgen: drawn and predicted is what the name stands for now")
+        for name, uid in sorted(others) if uid not in known
+    ]  # fmt: skip
+    return dict(sorted(found.items()))
+
+
+def _by_specimen(log: Log, iteration: int, designs: Mapping[str, Design]) -> Iterator[tuple[str, Design]]:
+    for specimen in log.specimens(iteration=iteration):
+        try:
+            design = design_of(parse(specimen.specimen))
+        except SensorgenError:
+            continue
+        if design is not None:
+            yield specimen.specimen, designs[design.name]
+
+
+def _stored(log: Log, design: Design) -> Sequence[Prediction]:
+    return log.predictions(design_id=design.id())
+
+
+def _evidence(reading: Reading) -> Evidence:
+    """Readings that a resistance can have; a slip below 0 is kept in the log and told as a doubt there."""
+    ry, rz = (tuple(v for v in values if v >= 0) for values in (reading.y_ohm, reading.z_ohm))
+    return Evidence(
+        reading.specimen, ry, rz, nan, reading.shape, reading.film_mm, reading.remark, str(reading.iteration or "")
+    )
+
+
+def _unused(rows: Sequence[Compared]) -> Iterator[tuple[str, str]]:
+    for row in rows:
+        name = f"reading {row.reading.number}, {row.reading.specimen}"
+        if row.predicted is None:
+            yield name, "no design is known: nothing to compare it with"
+        if not row.reading.y_ohm and not row.reading.z_ohm:
+            yield name, "no measurement in it"
+        elif not row.reading.y_ohm or not row.reading.z_ohm:
+            missing = "R_Z" if not row.reading.z_ohm else "R_Y"
+            yield name, f"no {missing}: counts for nothing where both are needed"
+        if any(value < 0 for value in (*row.reading.y_ohm, *row.reading.z_ohm)):
+            yield name, "a resistance below 0 is no reading"
+
+
+def known_iterations(log: Log) -> list[int]:
+    """Iterations that the log knows specimens of."""
+    return sorted({s.iteration for s in log.specimens() if s.iteration is not None})

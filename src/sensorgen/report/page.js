@@ -1,0 +1,67 @@
+"use strict";
+// Figures: drawn when the page is there, in the page's own colours, again where these or a choice change.
+const figures = JSON.parse(document.getElementById("figures").textContent);
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const paper = matchMedia("print");
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+function dressed(layout) {
+  const ink = colour("--ink"), line = colour("--line");
+  const clear = "rgba(0,0,0,0)";
+  const made = {...layout, paper_bgcolor: clear, plot_bgcolor: clear, font: {color: ink, size: 12}, autosize: true,
+    modebar: {bgcolor: clear, color: colour("--faint"), activecolor: ink}};
+  for (const name of Object.keys(layout).filter((key) => /^[xy]axis/.test(key)))
+    made[name] = {...layout[name], gridcolor: line, linecolor: line};
+  if (layout.scene) {
+    made.scene = {...layout.scene};
+    for (const name of ["xaxis", "yaxis", "zaxis"])
+      made.scene[name] = {...layout.scene[name], gridcolor: line, zerolinecolor: line, backgroundcolor: clear};
+  }
+  return made;
+}
+
+function draw(figure, choice = 0) {
+  const place = document.querySelector(`.plot[data-key="${figure.key}"]`);
+  const layout = dressed(figure.layout);
+  if (place.layout && place.layout.scene && layout.scene) layout.scene.camera = place.layout.scene.camera;
+  return Plotly.react(place, figure.choices[choice].data, layout, {responsive: true, displaylogo: false, displayModeBar: innerWidth < 600 ? false : "hover"});
+}
+
+const chosen = (figure) => {
+  const select = document.querySelector(`select[data-for="${figure.key}"]`);
+  return select ? select.selectedIndex : 0;
+};
+const all = () => Promise.all(figures.map((figure) => draw(figure, chosen(figure))));
+
+if (figures.length) {
+  all().then(() => document.documentElement.setAttribute("data-drawn", "yes"));
+  dark.addEventListener("change", all);
+  paper.addEventListener("change", all);
+  for (const figure of figures) {
+    const select = document.querySelector(`select[data-for="${figure.key}"]`);
+    if (select) select.addEventListener("change", () => draw(figure, select.selectedIndex));
+  }
+} else document.documentElement.setAttribute("data-drawn", "yes");
+
+// Tables: a head is a button that sorts by its column, numbers by their value, nothing last.
+const value = (cell) => {
+  if (!("value" in cell.dataset)) return cell.textContent;
+  const said = cell.dataset.value;
+  return said === "" ? null : said === "inf" ? Infinity : Number(said);
+};
+function compare(a, b, sign) {
+  if (a === null || b === null) return (a === null) - (b === null);
+  if (typeof a === "number" && typeof b === "number") return sign * (a - b || 0);
+  return sign * String(a).localeCompare(String(b), "en", {numeric: true});
+}
+for (const head of document.querySelectorAll("thead th")) {
+  head.querySelector("button").addEventListener("click", () => {
+    const rising = head.getAttribute("aria-sort") !== "ascending";
+    for (const other of head.parentNode.children) other.setAttribute("aria-sort", "none");
+    head.setAttribute("aria-sort", rising ? "ascending" : "descending");
+    const body = head.closest("table").tBodies[0], column = head.cellIndex;
+    const rows = [...body.rows].map((row) => [value(row.cells[column]), row]);
+    rows.sort((a, b) => compare(a[0], b[0], rising ? 1 : -1));
+    body.append(...rows.map((row) => row[1]));
+  });
+}

@@ -1,0 +1,64 @@
+"""The variants of an iteration: drawings and bodies."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from sensorgen import drawing, materials
+from sensorgen.comparison import Comparison, Predicted
+from sensorgen.design import Design
+from sensorgen.geometry.meshes import mesh
+from sensorgen.report.charts import Body
+from sensorgen.review import review
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A variant on the page.
+
+    Attributes
+    ----------
+    design, design_id : str
+        Name and identity.
+    svg : str
+        Its drawing.
+    words : str
+        What it is and should measure.
+    """
+
+    design: str
+    design_id: str
+    svg: str
+    words: str
+
+
+def variants(found: Comparison) -> tuple[Variant, ...]:
+    """Every variant that a specimen was printed of."""
+    return tuple(
+        Variant(name, design.id(), drawn(design), _words(found.predictions[name]))
+        for name, design in found.designs.items()
+    )
+
+
+def drawn(design: Design) -> str:
+    """The drawing of the cross-section, with what the checks find, as SVG."""
+    scene, held = design.printed, review(design)
+    known = {m: (materials.load(m).title, materials.load(m).colour) for m in sorted({b.material for b in scene.bodies})}
+    notes = [f"{design.machine.name}, {design.layers.name}, printed {design.orientation}"]
+    return drawing.svg(scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known, notes)
+
+
+def _words(of: Predicted) -> str:
+    r, c = of.ry_ohm, of.capacitance_f
+    parts = [
+        f"R_Y {r.lower:.4g} to {r.upper:.4g} ohm" if r else "R_Y unknown",
+        f"C {c.lower * 1e12:.4g} to {c.upper * 1e12:.4g} pF" if c else f"no capacitance: {of.reason}",
+        of.provenance,
+    ]
+    return "; ".join(parts)
+
+
+def bodies(design: Design) -> Iterator[Body]:
+    """The bodies of the sensor in use, as triangles."""
+    for body in design.in_use.bodies:
+        made = mesh(body)
+        yield Body(body.name.replace("_", " "), made.vertices_mm, made.triangles, materials.load(body.material).colour)

@@ -1,0 +1,28 @@
+"""Files of the bench whose truth is known, of a design that specimens are printed of."""
+
+from dataclasses import replace
+
+import made
+import scipy.io as sio
+
+from sensorgen.comparison.moved import moved
+from sensorgen.sensing import sensor_of
+
+HOSTILE = "</script><script>document.title='taken'</script><img src=x onerror=alert(1)> \"'&$\\frac{ =cmd|'/c calc'!A1"
+FORMULA = '=HYPERLINK("http://example.org";"x")'
+TRUTH = {"resistivity": 0.5, "capacitance": 1.3, "leak_s": 2e-9, "stiffness": 0.5}
+
+
+def truth(design, resistivity=1.0, capacitance=1.0, leak_s=0.0, stiffness=1.0):
+    """The sensor as it really is, by factors to what is predicted."""
+    sensor = moved(sensor_of(design).sensor, resistivity, capacitance, leak_s)
+    return replace(sensor, compression=sensor.compression.stiffer(stiffness))
+
+
+def write(folder, name, sensor, count=12, rate_hz=140.0, noise=1e-4, seed=1, **times):
+    """The instrument's file and the rig's, of so many random presses."""
+    presses = made.presses(count, seed=seed, **({"dwell_s": 3.0, "rest_s": 3.0} | times))
+    run = made.run(presses, rate_hz, noise, of=sensor, seed=seed)
+    lcr, log = folder / f"{name}.mat", folder / f"{name}.csv"
+    sio.savemat(lcr, made.tree([run.impedance_ohm], [run.time_s], made.stamps(run.time_s)))
+    return lcr, made.write_rig(log, made.rig_rows(presses, offset_s=3.5))

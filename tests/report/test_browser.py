@@ -1,0 +1,142 @@
+"""The page in a real browser: with recordings and without readings, narrow and wide, light, dark and on paper."""
+
+import struct
+from pathlib import Path
+
+import pytest
+from bench_files import HOSTILE
+from browser import Page
+
+from sensorgen.log import Log
+from sensorgen.report import report, written
+
+OUT = Path(__file__).parents[2] / "out" / "report"  # CI keeps it
+FIGURES = """[...document.querySelectorAll('.plot')].map(p => [p.dataset.key, p.getBoundingClientRect().width,
+    p.querySelectorAll('.trace, .trace.bars, canvas').length > 0])"""
+SORTED = """(() => {
+  const table = document.getElementById('table-specimens'), rows = [...table.tBodies[0].rows];
+  const at = [...table.tHead.rows[0].cells].findIndex(c => c.textContent.startsWith('R_Z measured'));
+  return [table.tHead.rows[0].cells[at].getAttribute('aria-sort'), rows.map(r => r.cells[at].dataset.value)];
+})()"""
+BUTTONS = "[...document.querySelectorAll('#table-specimens thead button')]"
+HEAD = f"{BUTTONS}.find(b => b.textContent.startsWith('R_Z measured'))"
+CAMERA = "JSON.stringify(document.querySelector('[data-key=bodies]')._fullLayout.scene._scene.getCamera().eye)"
+
+
+@pytest.fixture(scope="module")
+def pages(recorded, thesis, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pages")
+    for name, log, iteration in (("recorded", recorded, 30), ("empty", thesis, 99)):
+        with Log(log) as opened:
+            (folder / f"{name}.html").write_text(written(report(opened, iteration), "html"), "utf-8")
+    return folder
+
+
+@pytest.fixture
+def browser(program, tmp_path):
+    page = Page(program("chromium", "chromium", "chromium-browser", "google-chrome"), tmp_path)
+    yield page
+    page.close()
+
+
+def quiet(page):
+    assert page.complaints() == []
+    assert page.asked() == []
+
+
+def test_with_recordings(browser, pages):
+    browser.size(1920)
+    browser.open(pages / "recorded.html")
+    drawn = browser.run(FIGURES)
+    assert len(drawn) >= 9
+    assert [key for key, width, there in drawn if not there or width < 300] == []
+    assert browser.run("document.title") == "Iteration 30: predicted and measured"
+    assert browser.run(f"document.body.textContent.includes({HOSTILE!r})") or HOSTILE in browser.run(
+        "document.body.textContent"
+    )
+    turned(browser)
+    sorted_by_mouse_and_key(browser)
+    another_choice(browser)
+    browser.run("scrollTo(0, 0)")
+    browser.picture(OUT / "recorded-1920.png")
+    on_paper(browser)
+    quiet(browser)
+
+
+def on_paper(browser):
+    """Printed, it is light whatever the screen is, without what is there for clicking only."""
+    pdf = browser.pdf()
+    (OUT / "recorded.pdf").write_bytes(pdf)
+    assert pdf.startswith(b"%PDF")
+    assert 4 <= pdf.count(b"/Type /Page\n") <= 60
+    browser.media("dark", "print")
+    assert browser.run("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert browser.run("getComputedStyle(document.querySelector('nav')).display") == "none"
+
+
+def turned(browser):
+    """The bodies turn with the mouse."""
+    browser.run("document.querySelector('[data-key=bodies]').scrollIntoView({block: 'center'})")
+    box = browser.run(
+        "(b => [b.x, b.y, b.width, b.height])(document.querySelector('[data-key=bodies]').getBoundingClientRect())"
+    )
+    before = browser.run(CAMERA)
+    middle = [box[0] + box[2] / 2, box[1] + box[3] / 2]
+    browser.drag(middle, [middle[0] + 150, middle[1] + 60])
+    browser.until(f"{CAMERA} !== {before!r}")
+
+
+def sorted_by_mouse_and_key(browser):
+    browser.run(f"{HEAD}.click()")
+    way, values = browser.run(SORTED)
+    assert way == "ascending"
+    assert [float(v) for v in values] == sorted(float(v) for v in values)
+    browser.run(f"{HEAD}.focus()")
+    browser.key("Enter", 13)
+    way, values = browser.run(SORTED)
+    assert way == "descending"
+    assert [float(v) for v in values] == sorted((float(v) for v in values), reverse=True)
+    assert browser.run("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+
+
+def another_choice(browser):
+    """A chosen tone is drawn in place of the first one."""
+    place = "document.querySelector('[data-key=\"series-1-1\"]')"
+    levels = []
+    for k in (0, 6):
+        browser.run(f"(s => {{ s.selectedIndex = {k}; s.dispatchEvent(new Event('change')); }})"
+                    "(document.querySelector('[data-for=\"series-1-1\"]'))")  # fmt: skip
+        levels.append(browser.run(f"Math.abs({place}._fullData[2]._extremes.y2.min[0].val)"))
+    assert levels[0] / levels[1] == pytest.approx(99.7 / 1.1, rel=0.2)
+
+
+@pytest.mark.parametrize("name", ["recorded", "empty"])
+def test_narrow_and_dark(browser, pages, name):
+    browser.size(360)
+    browser.media("dark")
+    browser.open(pages / f"{name}.html")
+    assert browser.run("document.documentElement.scrollWidth") <= 360
+    ground, ink = (
+        browser.run(f"getComputedStyle(document.body).{which}.match(/\\d+/g).slice(0, 3).map(Number)")
+        for which in ("backgroundColor", "color")
+    )
+    assert max(ground) < 60 < 200 < min(ink)
+    if name == "recorded":
+        assert browser.run("document.querySelector('.plot').layout.font.color").startswith("#e")
+        assert browser.run(f"{FIGURES}.every(f => f[2])")
+    browser.picture(OUT / f"{name}-360.png")
+    quiet(browser)
+
+
+def test_the_keyboard_reaches_the_report_first(browser, pages):
+    browser.size(1920)
+    browser.open(pages / "empty.html")
+    browser.key("Tab", 9)
+    assert browser.run("document.activeElement.className") == "skip"
+    assert browser.run("document.activeElement.getBoundingClientRect().left") >= 0
+    browser.key("Enter", 13)
+    browser.until("document.activeElement.id === 'main'")
+    assert "no readings of iteration 99" in browser.run("document.body.innerText")
+    browser.picture(OUT / "empty-1920.png")
+    assert struct.unpack(">I", (OUT / "empty-1920.png").read_bytes()[16:20]) == (1920,)
+    quiet(browser)

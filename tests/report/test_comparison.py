@@ -1,0 +1,165 @@
+"""What is compared: a leaking film against resistors, bounds of electrodes, and where predictions come from."""
+
+import json
+from math import inf, log
+
+import numpy as np
+import pytest
+
+from sensorgen.comparison import of_iteration, predicted
+from sensorgen.comparison.expected import electrode_ohm
+from sensorgen.comparison.leaky import across_ohm, along_ohm, electrode_and_leak
+from sensorgen.comparison.moved import Movable, at_rest, moved, pressed
+from sensorgen.design import make
+from sensorgen.errors import OutOfRange
+from sensorgen.log import Log, words
+from sensorgen.log.batches import prediction
+from sensorgen.models import line
+from sensorgen.models.compression import unconfined
+from sensorgen.predict import prediction as plain_prediction
+from sensorgen.sensor import Sensor
+from sensorgen.specimen import design_of, parse
+
+
+def ladder(electrode, leak, sections):
+    """R_Y and R_Z of two rows of resistors with resistors between them, by Kirchhoff's law."""
+    n = sections + 1
+    at = np.zeros((2 * n, 2 * n))
+
+    def join(a, b, g):
+        at[[a, b], [a, b]] += g
+        at[[a, b], [b, a]] -= g
+
+    for row in (0, n):
+        for k in range(sections):
+            join(row + k, row + k + 1, sections / electrode)
+    for k in range(n):
+        join(k, n + k, leak / sections * (0.5 if k in (0, sections) else 1.0))
+    inverse = np.linalg.pinv(at)
+
+    def between(a, b):
+        return inverse[a, a] + inverse[b, b] - 2 * inverse[a, b]
+
+    return between(0, n - 1), between(0, n)
+
+
+@pytest.mark.parametrize("leak", [1e-5, 1e-3, 2e-2])
+def test_what_a_meter_reads_of_a_leaking_film(leak):
+    along, across = ladder(700.0, leak, 400)
+    assert along_ohm(700.0, leak) == pytest.approx(along, rel=1e-4)
+    assert across_ohm(700.0, leak) == pytest.approx(across, rel=1e-4)
+
+
+@pytest.mark.parametrize("leak", [0.0, 1e-12, 1e-6, 1e-3, 1.0, 1e3])
+def test_electrode_and_leak_come_back(leak):
+    found = electrode_and_leak(along_ohm(700.0, leak), across_ohm(700.0, leak))
+    assert found == (pytest.approx(700.0, rel=1e-9), pytest.approx(leak, rel=1e-6, abs=0))
+
+
+def test_limits_of_a_leak():
+    assert (along_ohm(600.0, 0.0), across_ohm(600.0, 0.0)) == (600.0, inf)
+    assert along_ohm(600.0, 1e12) == pytest.approx(300.0, rel=1e-5)
+    assert across_ohm(600.0, 1e-9) == pytest.approx(1e9 + 400, rel=1e-12)
+    for bad in ((0.0, 1.0), (inf, 1.0), (1.0, 0.0), (float("nan"), 1.0)):
+        with pytest.raises(OutOfRange, match="above 0"):
+            electrode_and_leak(*bad)
+
+
+def test_a_plain_electrode_has_its_own_resistance_for_both_bounds():
+    """rho L / (H W), by hand; top 0.07, bottom 0.2 ohm m."""
+    design = make({"shape": "reference"})
+    p = design.params
+    squares = p.length_mm / (p.electrode_mm * p.width_mm) * 1e3
+    found = electrode_ohm(design)
+    assert (found.lower, found.upper) == (pytest.approx(0.07 * squares), pytest.approx(0.2 * squares))
+
+
+def test_cogs_lower_the_lower_bound_by_the_share_of_their_volume():
+    design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})
+    p = design.params
+    plate = 0.07 * p.length_mm / (p.electrode_mm * p.width_mm) * 1e3
+    volume = design.drawn.body("top_electrode_with_cogs").volume_mm3()
+    assert electrode_ohm(design).lower == pytest.approx(plate * p.length_mm * p.width_mm * p.electrode_mm / volume)
+    assert volume > p.length_mm * p.width_mm * p.electrode_mm * 1.2
+
+
+def test_the_earliest_stored_prediction_is_taken_as_it_was(tmp_path):
+    design = design_of(parse("40 triX .1mm"))
+    tuned = plain_prediction(design)
+    tuned["electrode_resistance_ohm"] = {"top": 1.0, "bottom": 2.0}
+    first = tuned | {"electrode_resistance_ohm": {"top": 1000.0, "bottom": 3000.0}}
+    with Log(tmp_path / "log.db", create=True) as book:
+        book.add([prediction(design.id(), design.name, data) for data in (first, tuned)])
+        book.add([words.reading("40 triX .1mm", "0.65k", "40")])
+        row = of_iteration(book, 40).rows[0]
+    assert row.predicted.ry_ohm.upper == 3000.0
+    assert row.predicted.stored_at
+    assert row.predicted.provenance.startswith("stored ")
+    assert row.residual == pytest.approx(log(650 / row.predicted.ry_ohm.middle()))
+    afterwards = predicted(design)
+    assert not afterwards.stored_at
+    assert "made afterwards" in afterwards.provenance
+
+
+def test_corrected_readings_count_for_nothing_and_are_told(tmp_path):
+    with Log(tmp_path / "log.db", create=True) as book:
+        old = book.add([words.reading("40 triX .1mm", "65", "40")])[0]
+        book.add([words.reading("40 triX .1mm", "0.65k", "40", supersedes=old.uid)])
+        found = of_iteration(book, 40)
+    assert [row.verdict.ry_ohm for row in found.rows] == [650.0]
+    assert ("reading 1, 40 triX .1mm", "a later reading corrects it") in found.left_out
+
+
+def test_readings_below_nought_and_blanks_are_left_out_and_told(tmp_path):
+    with Log(tmp_path / "log.db", create=True) as book:
+        book.add([words.reading("40 triX .1mm", "-650", "40"), words.reading("40 triX .2mm", "650", "")])
+        book.add([words.reading("40 tri .1mm", "650", "40")])
+        found = of_iteration(book, 40)
+    told = dict(found.left_out)
+    assert "below 0" in " ".join(told.values())
+    assert any("no R_Z" in why for why in told.values())
+    assert "does not tell which design" in told["design of 40 tri .1mm"]
+    assert found.rows[2].predicted is None
+    assert np.isnan(found.rows[0].residual)
+
+
+PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (5.0, 5.0), 7.6e-10, unconfined(6e5))
+TONES = np.array([1.1e3, 10.1e3, 99.7e3])
+
+
+def test_moved_parameters_are_those_of_the_line():
+    """Straight from the line's formula, with the parameter itself changed."""
+    other = moved(PLATE, 2.0, 1.5, 1e-6)
+    z = line.impedance(
+        L_m=0.1, W_m=0.01, H_top_m=3e-4, H_bottom_m=3e-4, rho_top_ohm_m=10.0, rho_bottom_ohm_m=10.0,
+        d_m=8.8541878128e-12 * 0.01 / (7.6e-10 * 1.5), eps_r=1.0, E_Pa=6e5, L_p_m=0.01, x_p_left_edge_m=0.045, F_N=0.0,
+        f_Hz=TONES, G_S_per_m=1e-5,
+    )  # fmt: skip
+    assert np.exp(at_rest(other, TONES)) == pytest.approx(z, rel=1e-9)
+
+
+def test_a_stiffer_film_is_one_with_another_modulus():
+    stiff = Sensor(**{**vars(PLATE), "compression": unconfined(12e5)})
+    force, at = np.array([2.0, 6.0]), np.array([0.03, 0.06])
+    expected = np.log(stiff.impedance(TONES, force[:, None], at[:, None]) / stiff.impedance(TONES, 0.0, 0.05))
+    assert pressed(PLATE, TONES, force, at, 2.0) == pytest.approx(expected, rel=1e-9)
+
+
+def test_permittivity_and_film_move_a_plate_in_proportion():
+    """C of a solid plate is eps A / d."""
+    of = Movable(make({"shape": "reference"}))
+    factors, curve = of.by_permittivity
+    assert curve == pytest.approx(factors, abs=1e-9)
+    assert of.by_film[1] == pytest.approx(-factors, abs=1e-9)
+
+
+def test_the_film_of_a_cell_moves_less_than_in_proportion_and_thicker_is_less():
+    factors, curve = Movable(make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})).by_film
+    assert (np.diff(curve) < 0).all()
+    assert (np.abs(curve) <= np.abs(factors) + 1e-9).all()
+
+
+def test_stored_predictions_are_plain_data(tmp_path):
+    design = design_of(parse("40 triX .1mm"))
+    row = prediction(design.id(), design.name, plain_prediction(design))
+    assert json.loads(row.data)["capacitance_f"]["middle"] == predicted(design, [row]).capacitance_f.middle()

@@ -1,0 +1,273 @@
+"""A report of Table D.1 against the table itself, in every format; with bad words, with recordings, with nothing."""
+
+import csv
+import dataclasses
+import io
+import itertools
+import json
+import math
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from statistics import median
+
+import pytest
+from bench_files import FORMULA, HOSTILE
+
+from sensorgen.log import Log, words
+from sensorgen.report import FORMATS, report, written
+from sensorgen.report.pictures import files
+from sensorgen.report.tables import said
+
+TABLE = Path(__file__).parents[2] / "src" / "sensorgen" / "log" / "table_d1.csv"
+FACTOR = {"": 1.0, "k": 1e3, "m": 1e6}
+
+
+def ohms(cell):
+    """Least reading of a cell, read by hand."""
+    found = [re.fullmatch(r"([0-9.]+)([km]?)", part.strip(), re.IGNORECASE) for part in cell.split("/") if part.strip()]
+    return min((float(m[1]) * FACTOR[m[2].lower()] for m in found), default=math.nan)
+
+
+@pytest.fixture(scope="module")
+def by_hand():
+    rows = csv.DictReader(TABLE.read_text("utf-8").splitlines())
+    return [(ohms(r["y"]), ohms(r["z"]), r["specimen"]) for r in rows if r["specimen"].startswith("23")]
+
+
+@pytest.fixture(scope="module")
+def of_thesis(thesis):
+    with Log(thesis) as log:
+        return report(log, 23)
+
+
+@pytest.fixture(scope="module")
+def of_recorded(recorded):
+    with Log(recorded) as log:
+        return report(log, 30)
+
+
+def table(made, key):
+    return next(t for t in made.tables if t.key == key)
+
+
+def column(found, name):
+    at = [c.name for c in found.columns].index(name)
+    return [row[at] for row in found.rows]
+
+
+def test_every_reading_is_there_once_with_its_numbers(of_thesis, by_hand):
+    found = table(of_thesis, "specimens")
+    pairs = zip(column(found, "R_Y measured"), column(found, "R_Z measured"), strict=True)
+    ours = sorted((y if y is not None else -1.0, z if z is not None else -1.0) for y, z in pairs)
+    theirs = sorted((-1.0 if math.isnan(y) else y, -1.0 if math.isnan(z) else z) for y, z, _ in by_hand)
+    assert ours == theirs
+
+
+def test_how_many_have_a_z_of_the_order_of_their_y(of_thesis, by_hand):
+    both = [(y, z) for y, z, _ in by_hand if not math.isnan(y + z)]
+    shorted = sum(z <= 10 * y for y, z in both)
+    said_so = next(text for text in of_thesis.findings if "of the order of R_Y" in text)
+    assert said_so.startswith(f"{shorted} of {len(both)} readings")
+    shares = table(of_thesis, "yield_by_film")
+    assert sum(column(shares, "R_Z of the order of R_Y")) == shorted
+    no_film = [(y, z) for y, z, name in by_hand if not math.isnan(y + z) and "mm" not in name]
+    assert column(shares, "of")[0] == len(no_film)
+
+
+def test_ratios_are_measured_over_the_middle(of_thesis):
+    found = table(of_thesis, "specimens")
+    for y, low, middle, high, ratio, residual in zip(
+        *(column(found, n) for n in ("R_Y measured", "R_Y from", "R_Y predicted", "R_Y to", "ratio", "residual")),
+        strict=True,
+    ):
+        if y is not None:
+            assert middle == pytest.approx(math.sqrt(low * high))
+            assert ratio == pytest.approx(y / middle)
+            assert residual == pytest.approx(math.log(y / middle))
+    sizes = [abs(r) for r in column(found, "residual") if r is not None]
+    assert sizes == sorted(sizes, reverse=True)
+
+
+def test_the_median_that_it_speaks_of(of_thesis, by_hand):
+    found = table(of_thesis, "specimens")
+    ratios = [r for r, y in zip(column(found, "ratio"), column(found, "R_Y measured"), strict=True)
+              if y is not None and 1 < y < 5e4]  # fmt: skip
+    assert of_thesis.findings[0].startswith(f"Electrodes read {median(ratios):.3g} of")
+
+
+def test_resistivity_explains_what_it_must(of_thesis):
+    """With one factor on a logarithm, the best one is the mean residual, and takes away the mean's square."""
+    found, explained = table(of_thesis, "specimens"), table(of_thesis, "explained")
+    residuals = [
+        r for r, y in zip(column(found, "residual"), column(found, "R_Y measured"), strict=True)
+        if y is not None and 1 < y < 5e4
+    ]  # fmt: skip
+    mean = sum(residuals) / len(residuals)
+    row = next(r for r in explained.rows if r[:2] == ("R_Y", "rho"))
+    assert row[3] == pytest.approx(math.exp(mean), rel=1e-5)
+    assert row[6] == pytest.approx(1.0, rel=1e-6)
+    assert row[7] == pytest.approx(100 * len(residuals) * mean**2 / sum(r * r for r in residuals), rel=1e-6)
+    idle = {r[1]: r[7] for r in explained.rows if r[0] == "R_Y"}
+    assert idle["eps_r"] == idle["E"] == idle["d"] == 0
+
+
+def test_it_says_that_predictions_were_made_afterwards(of_thesis, of_recorded):
+    assert "made afterwards" in " ".join(of_thesis.sections[0].words)
+    assert "1 of 1 predictions were stored" in " ".join(of_recorded.sections[0].words)
+    assert any(row[2].startswith("stored 20") for row in table(of_recorded, "provenance").rows)
+
+
+def test_what_explains_recordings_is_what_is_wrong(of_recorded):
+    """C is 1.3 times the prediction, the modulus half of it: nothing else moves X at rest, and presses, so much."""
+    found = {(r[0], r[1]): r for r in table(of_recorded, "explained").rows}
+    rest = [r for r in table(of_recorded, "explained").rows if r[0] == "Z at rest"]
+    assert {rest[0][1], rest[1][1]} == {"eps_r", "d"}
+    assert rest[0][7] > 95
+    assert found["presses", "E"][3] == pytest.approx(0.5, rel=0.03)
+    assert found["presses", "E"][7] > 95
+
+
+def test_tones_beside_their_prediction(of_recorded):
+    found = table(of_recorded, "tones")
+    assert len(found.rows) == 2 * 7
+    c = [v for v, f in zip(column(found, "C measured"), column(found, "tone"), strict=True) if f < 3e3]
+    middle = math.sqrt(column(found, "C from")[0] * column(found, "C to")[0])
+    assert c == pytest.approx([1.3 * middle] * len(c), rel=3e-3)
+    for measured, predicted, residual in zip(
+        *(column(found, n) for n in ("X measured", "X predicted", "residual X")), strict=True
+    ):
+        assert residual == pytest.approx((measured - predicted) / abs(predicted), rel=2e-2)
+
+
+class Page(HTMLParser):
+    """What stands in a page: tags, text outside scripts, and cells by table."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.cells, self.table, self.cell, self.script, self.text = [], {}, None, None, False, []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        attrs = dict(attrs)
+        self.tags.append((tag, attrs))
+        self.script = tag in ("script", "style")
+        if tag == "table":
+            self.table = attrs["id"].removeprefix("table-")
+            self.cells[self.table] = []
+        if tag == "tr":
+            self.cells[self.table].append([])
+        if tag in ("td", "th"):
+            self.cell = [attrs.get("data-value"), ""]
+
+    def handle_endtag(self, tag):
+        self.script = False
+        if tag in ("td", "th") and self.cell:
+            self.cells[self.table][-1].append(tuple(self.cell))
+            self.cell = None
+
+    def handle_data(self, data):
+        if not self.script:
+            self.text.append(data)
+            if self.cell:
+                self.cell[1] += data
+
+
+@pytest.fixture(scope="module")
+def page(of_recorded):
+    return Page(written(of_recorded, "html"))
+
+
+def test_all_formats_have_the_same_numbers(of_recorded, page):
+    rows = list(csv.reader(io.StringIO(written(of_recorded, "csv"))))
+    data = {t["key"]: t for s in json.loads(written(of_recorded, "json"))["sections"] for t in s["tables"]}
+    lines = written(of_recorded, "md").splitlines()
+    for found in of_recorded.tables:
+        ours = [r for r in rows[1:] if r[0] == found.key]
+        assert len(ours) == len(found.rows) * len(found.columns)
+        for k, row in enumerate(found.rows):
+            for j, value in enumerate(row):
+                cell = ours[k * len(found.columns) + j][4]
+                plain, (exact, shown) = data[found.key]["rows"][k][j], page.cells[found.key][k + 1][j]
+                if isinstance(value, str):
+                    assert cell.removeprefix("'") == plain == shown == value
+                elif value is None:
+                    assert (cell, plain, exact) == ("", None, "")
+                else:
+                    assert float(cell) == float(plain) == float(exact) == value
+                    assert shown == said(value)
+        assert sum(line.startswith("| ") for line in lines) >= len(found.rows)
+    assert any(row[4] == f"'{FORMULA}" for row in rows)
+    assert any(row[4] == HOSTILE for row in rows)
+
+
+def test_words_of_strangers_stay_text(of_recorded, page):
+    assert HOSTILE in "".join(page.text)
+    assert [a for t, a in page.tags if t == "img" and a.get("src") == "x"] == []
+    assert sum(tag == "script" for tag, _ in page.tags) == 3
+    assert not any(name.startswith("on") for _, attrs in page.tags for name in attrs)
+    markdown = written(of_recorded, "md")
+    assert "<script>" not in markdown.replace("\\<", "")
+    assert all(line.count("|") - line.count("\\|") in (0, line.count("|")) or line.startswith("|")
+               for line in markdown.splitlines())  # fmt: skip
+
+
+def test_a_page_that_everybody_can_read(page):
+    levels = [int(tag[1]) for tag, _ in page.tags if re.fullmatch("h[1-6]", tag)]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(after - before <= 1 for before, after in itertools.pairwise(levels))
+    assert all(attrs.get("scope") in ("col", "row") for tag, attrs in page.tags if tag == "th")
+    assert sum(tag == "caption" for tag, _ in page.tags) == sum(tag == "table" for tag, _ in page.tags)
+    assert all(attrs.get("alt") for tag, attrs in page.tags if tag == "img")
+    ids = [attrs["id"] for _, attrs in page.tags if "id" in attrs]
+    assert len(ids) == len(set(ids))
+    for _, attrs in page.tags:
+        for target in (attrs.get("aria-labelledby") or "").split():
+            assert target in ids
+        if (attrs.get("href") or "").startswith("#"):
+            assert attrs["href"][1:] in ids
+    assert all("src" not in attrs or attrs["src"].startswith("data:") for _, attrs in page.tags)
+
+
+def test_an_iteration_without_readings_says_so_in_every_format(thesis):
+    with Log(thesis) as log:
+        empty = report(log, 99)
+    assert "no readings of iteration 99" in empty.findings[0]
+    assert "19, 20, 21, 22, 23" in empty.findings[0]
+    assert empty.charts == ()
+    for how in FORMATS:
+        text = written(empty, how)
+        assert how == "csv" or "no readings of iteration 99" in text
+    assert len(written(empty, "html")) < 50_000  # no script that draws nothing
+
+
+def test_readings_without_a_design_make_a_report(tmp_path):
+    with Log(tmp_path / "log.db", create=True) as log:
+        log.add([words.reading("50 tri", "650", "OL"), words.reading("50 sq", "", "")])
+        made = report(log, 50)
+    assert any("does not tell which design" in row[1] for row in table(made, "left_out").rows)
+    for how in FORMATS:
+        assert written(made, how)
+
+
+def test_figures_as_files(of_recorded):
+    wanted = [c for c in of_recorded.charts if c.key in ("residuals", "surface-1-1")]
+    assert len(wanted) == 2
+    for chart in (dataclasses.replace(c, choices=dict(list(c.choices.items())[:2])) for c in wanted):
+        first, second = dict(files(chart)), dict(files(chart))
+        assert first == second
+        assert len(first) == 2 * len(chart.choices)
+        for name, content in first.items():
+            assert content.startswith(b"\x89PNG" if name.endswith("png") else b"<?xml")
+            assert re.fullmatch(r"[A-Za-z0-9.-]+", name)
+
+
+def test_recordings_that_are_gone_are_told(recorded, tmp_path):
+    import shutil
+
+    copy = tmp_path / "log.db"
+    shutil.copy(recorded, copy)
+    with Log(copy) as log:
+        made = report(log, 30)
+    assert sum("recording" in row[0] and "no such file" in row[1] for row in table(made, "left_out").rows) == 2

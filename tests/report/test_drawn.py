@@ -1,0 +1,114 @@
+"""What figures are made of: thinned curves, packed numbers, choices; recordings in blocks; the command."""
+
+import base64
+import json
+
+import numpy as np
+import pytest
+
+from sensorgen.cli import cli
+from sensorgen.comparison import runs
+from sensorgen.errors import BadInput
+from sensorgen.log import Log
+from sensorgen.report.charts import Axis, Chart, Trace
+from sensorgen.report.interactive import figure, packed
+from sensorgen.report.pictures import files
+from sensorgen.report.thinned import kept
+
+
+def test_thinned_curves_keep_what_stands_out():
+    rng = np.random.default_rng(1)
+    values = rng.normal(size=100_003)
+    values[[5, 777, 99_999]] = 50.0, -50.0, 40.0
+    values[5000:5200] = np.nan
+    at = kept(values, 2000)
+    assert len(at) <= 2002
+    assert (np.diff(at) > 0).all()
+    assert {5, 777, 99_999} <= set(at.tolist())
+    width = -(-len(values) // 1000)
+    for start in (0, 40 * width, 999 * width):
+        part = values[start : start + width]
+        here = values[at[(at >= start) & (at < start + width)]]
+        if np.isfinite(part).any():
+            assert (here.min(), here.max()) == (np.nanmin(part), np.nanmax(part))
+
+
+def test_few_points_stay_all():
+    assert kept(np.arange(10.0), 10).tolist() == list(range(10))
+    assert len(kept(np.full(5000, np.nan), 100)) <= 101
+
+
+def unpacked(data):
+    values = np.frombuffer(base64.b64decode(data["bdata"]), np.dtype(data["dtype"]).newbyteorder("<"))
+    return values.reshape([int(n) for n in data["shape"].split(",")]) if "shape" in data else values
+
+
+@pytest.mark.parametrize(
+    ("values", "kind"),
+    [
+        (np.linspace(0, 1, 7), "f4"),
+        (1e6 + np.linspace(0, 1, 7), "f8"),
+        (np.arange(12).reshape(3, 4) ** 2.0, "f4"),
+        (np.array([1, 2, 70_000]), "i4"),
+    ],
+)
+def test_packed_numbers(values, kind):
+    data = packed(values)
+    assert data["dtype"] == kind
+    assert unpacked(data) == pytest.approx(values, rel=1e-6)
+    assert np.ptp(unpacked(data)) == pytest.approx(np.ptp(values), rel=1e-6)
+
+
+def test_names_in_figures_are_text():
+    bad = "<a href='http://example.org'>$\\frac{</a>"
+    chart = Chart(
+        "k", bad, bad, {"": (Trace("points", bad, [1.0], [bad], text=[bad]),)}, Axis(bad), (Axis(bad, names=(bad,)),)
+    )
+    assert "<a" not in json.dumps(figure(chart))
+    svg = dict(files(chart))["k.svg"].decode()
+    assert "<a href" not in svg
+    assert "\\frac{" in svg
+
+
+def test_blocks_are_means_of_what_counts(monkeypatch):
+    monkeypatch.setattr(runs, "_BLOCKS", 4)
+    time, force = np.arange(9.0), np.array([0, 0, 0, 5, 0, 0, -3, 0, 9.0])
+    z = np.column_stack([time + 1j, 2 * time])
+    valid = np.array([True] * 4 + [False] + [True] * 4)
+    t, means, counts, forces = runs._in_blocks(time, z, valid, force)
+    assert t.tolist() == [0.5, 2.5, 4.5, 6.5]
+    assert means[:, 0].tolist() == [0.5 + 1j, 2.5 + 1j, 4.5 + 1j, 6.5 + 1j]
+    assert counts.tolist() == [True, True, False, True]
+    assert forces.tolist() == [0, 5, 0, 3]
+
+
+def test_presses_are_the_same_with_and_without_blocks(recorded, monkeypatch):
+    with Log(recorded) as log:
+        whole = next(runs.runs(log, 30, []))
+        monkeypatch.setattr(runs, "_BLOCKS", 1000)
+        blocks = next(runs.runs(log, 30, []))
+    size = np.abs(whole.pairs.difference_ohm)
+    assert np.abs(blocks.pairs.difference_ohm - whole.pairs.difference_ohm).max() < 1e-3 * size.max()
+    assert len(whole.pairs.time_s) == 7
+
+
+def run(*words):
+    return cli.main(["report", *words], standalone_mode=False)
+
+
+def test_the_command(thesis, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    log = ["--log", str(thesis)]
+    run("--iteration", "99", "--open", *log)
+    assert opened == [(tmp_path / "report-99.html").as_uri()]
+    run("--iteration", "99", "--format", "json", "-o", "-", *log)
+    assert '"iteration": 99' in capsys.readouterr().out
+    run("--iteration", "19", "--format", "csv", "--figures", "figures", *log)
+    assert (tmp_path / "report-19.csv").read_text("utf-8").startswith("table,row,column,unit,value\n")
+    assert (tmp_path / "figures" / "residuals.svg").exists()
+    with pytest.raises(BadInput, match="--open shows an HTML file"):
+        run("--iteration", "23", "--open", "--format", "md", *log)
+    with pytest.raises(BadInput):
+        run("--iteration", "23", "--log", str(tmp_path / "none.db"))

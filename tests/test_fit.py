@@ -1,0 +1,235 @@
+"""Fits against a known truth, what the thesis's table can tell and what not, and the source that comes of it."""
+
+import math
+import statistics
+
+import bench_files
+import pytest
+import yaml
+
+from sensorgen import materials
+from sensorgen.cli import cli
+from sensorgen.comparison.leaky import across_ohm, along_ohm
+from sensorgen.design import make
+from sensorgen.errors import BadInput, OutOfRange, SensorgenError, UnknownName
+from sensorgen.fit import Fit, Fitted, Untold, fit, text
+from sensorgen.fit.fitting import held_back
+from sensorgen.fit.resistance import Allowed, leak, resistivity
+from sensorgen.log import Log, bench, words
+from sensorgen.materials import own
+from sensorgen.predict import prediction
+from sensorgen.specimen import design_of, parse
+
+
+@pytest.fixture(autouse=True)
+def _own(monkeypatch, tmp_path):
+    monkeypatch.setenv(own.PLACE, str(tmp_path / "materials"))
+
+
+def value(made, quantity):
+    return next(v for v in made.values if v.quantity == quantity)
+
+
+@pytest.fixture(scope="module")
+def of_thesis(tmp_path_factory):
+    from sensorgen.log import importing
+
+    with Log(tmp_path_factory.mktemp("fit") / "log.db", create=True) as log:
+        importing.thesis(log)
+        return fit(log, 23)
+
+
+def test_a_known_resistivity_and_leak_come_back(tmp_path):
+    """Readings made by the closed form, of electrodes of 0.05 ohm m between the two bounds of their shape."""
+    design = design_of(parse("60 triX .1mm"))
+    p = design.params
+    squares = p.length_mm / (p.electrode_mm * p.width_mm) * 1e3
+    r, area = 0.05 * squares * 0.8, p.length_mm * p.width_mm * 1e-6
+    with Log(tmp_path / "log.db", create=True) as log:
+        for k in range(8):
+            g = 2e-4 * 1.1 ** (k - 4)
+            name = f"60 triX .1mm {k + 1}"
+            log.add([words.reading(name, f"{along_ohm(r, g):.9g}", f"{across_ohm(r, g):.9g}")])
+        made = fit(log, 60)
+    rho = value(made, "resistivity_ohm_m")
+    assert rho.low < 0.05 < rho.high
+    assert rho.value == pytest.approx(0.05, rel=0.35)
+    conductance = value(made, "leak_s_per_m2")
+    assert conductance.value == pytest.approx(2e-4 / area, rel=0.25)
+    assert len(made.held_back) == 2
+    assert made.errors[0].after < made.errors[0].before
+
+
+def test_the_interval_of_a_resistivity_is_as_wide_as_the_bounds_and_the_scatter():
+    same = [Allowed(math.log(0.03), math.log(0.06), math.nan)] * 9
+    found = resistivity(same, "etpu", 1)
+    assert (found.value, found.low, found.high) == pytest.approx((math.sqrt(0.03 * 0.06), 0.03, 0.06))
+    ends = [0.02, 0.025, 0.03, 0.035, 0.04, 0.05, 0.06]
+    scattered = [Allowed(math.log(v), math.log(v), math.nan) for v in ends]
+    wide = resistivity(scattered, "etpu", 1)
+    assert wide.value == pytest.approx(statistics.median(ends))
+    assert 0.02 <= wide.low < wide.value < wide.high <= 0.06
+    assert isinstance(resistivity(same[:2], "etpu", 1), Untold)
+
+
+def test_leaks_that_differ_by_decades_are_no_property():
+    found = leak([Allowed(0.0, 0.0, math.log(10.0**k)) for k in range(-3, 4)], "x60", 1)
+    assert isinstance(found, Untold)
+    assert "no property of x60" in found.why
+
+
+def test_what_the_thesis_table_tells_and_what_not(of_thesis):
+    rho = value(of_thesis, "resistivity_ohm_m")
+    assert rho.material == "etpu"
+    assert rho.low < 0.07 * 0.8  # better than the best of the sources
+    assert rho.high < 0.2
+    told = {u.parameter for u in of_thesis.untold}
+    assert told == {"resistivity_ohm_m across", "relative_permittivity", "youngs_modulus_pa", "leak"}
+    assert [v.quantity for v in of_thesis.values] == ["resistivity_ohm_m"]
+    error = of_thesis.errors[0]
+    assert error.count == len(of_thesis.held_back) == 12
+    assert error.after < error.before / 2
+
+
+def test_the_split_is_the_same_for_the_same_seed(of_thesis):
+    names = [f"s{k}" for k in range(40)]
+    assert held_back(names, 1) == held_back(list(reversed(names)), 1) or held_back(sorted(names), 1)
+    assert held_back(names, 1) != held_back(names, 2)
+    assert len(held_back(names, 1)) == 10
+    assert held_back(["a", "b", "c"], 1) == frozenset()
+
+
+def test_specimens_held_back_have_no_say(tmp_path):
+    """Whatever they read, the values stay the same; only the error tells."""
+    names = [f"60 triX .1mm {k + 1}" for k in range(8)]
+    kept_back = held_back(sorted(names), 23)
+    made = []
+    for factor in (1.0, 2.0):
+        with Log(tmp_path / f"{factor}.db", create=True) as log:
+            for k, name in enumerate(names):
+                ohm = (600 + 30 * k) * (factor if name in kept_back else 1.0)
+                log.add([words.reading(name, f"{ohm:g}", "OL")])
+            made.append(fit(log, 60))
+    assert set(made[0].held_back) == set(made[1].held_back) == kept_back
+    assert made[0].values == made[1].values
+    assert made[0].errors[0].after != pytest.approx(made[1].errors[0].after)
+
+
+def test_the_next_prediction_takes_the_source(of_thesis, tmp_path):
+    own.place().mkdir()
+    own.path("fit-23").write_text(text(of_thesis), "utf-8")
+    rho = value(of_thesis, "resistivity_ohm_m").value
+    taken = {"top_electrode": "etpu@fit-23", "bottom_electrode": "etpu@fit-23"}
+    design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}, "materials": taken})
+    p, found = design.params, prediction(design)
+    ohm = rho * p.length_mm / (p.electrode_mm * p.width_mm) * 1e3
+    assert found["electrode_resistance_ohm"] == pytest.approx({"top": ohm, "bottom": ohm}, rel=1e-5)
+    assert {v["source"] for v in found["values"] if v["material"] == "etpu"} == {"fit-23"}
+    assert materials.citations()["fit-23"].startswith("fit of iteration 23: 36 specimens, 12 held back")
+
+
+def test_a_source_changes_no_design_that_does_not_name_it(of_thesis):
+    before = make({"shape": "tri"}).id()
+    own.place().mkdir()
+    own.path("fit-23").write_text(text(of_thesis), "utf-8")
+    assert make({"shape": "tri"}).id() == before
+    named = make({"shape": "tri", "materials": {"top_electrode": "etpu@fit-23"}}).id()
+    own.path("fit-23").write_text(text(of_thesis).replace("value: 0.0", "value: 0.1"), "utf-8")
+    assert make({"shape": "tri", "materials": {"top_electrode": "etpu@fit-23"}}).id() != named
+
+
+def test_a_source_that_is_silent_falls_back_to_the_default(of_thesis):
+    own.place().mkdir()
+    own.path("fit-23").write_text(text(of_thesis), "utf-8")
+    found = materials.load("etpu", ["fit-23"])
+    assert found.value("youngs_modulus_pa", "fit-23").source == "thesis-3.2"
+    assert found.value("resistivity_ohm_m").source == "thesis-c.1-top"
+
+
+@pytest.mark.parametrize(
+    ("content", "error", "said"),
+    [
+        (
+            "about: a\nmaterials: {etpu: {resistivity_ohm_m: {value: -1}}}",
+            OutOfRange,
+            "resistivity_ohm_m of etpu is -1",
+        ),
+        ("about: a\nmaterials: {etpy: {resistivity_ohm_m: {value: 1}}}", UnknownName, "etpu"),
+        ("about: a\nmaterials: {etpu: {resistivity_ohm_m: {value: much}}}", BadInput, "value"),
+        ("about: a", BadInput, "materials"),
+        ("{", BadInput, "fit-1.yaml"),
+        ("about: a\nmaterials: {etpu: {resistivity_ohm_m: {value: .inf}}}", OutOfRange, "inf"),
+    ],
+)
+def test_damaged_sources_are_told_with_their_file(content, error, said):
+    own.place().mkdir()
+    own.path("fit-1").write_text(content, "utf-8")
+    with pytest.raises(error, match=said) as caught:
+        make({"shape": "tri", "materials": {"top_electrode": "etpu@fit-1"}})
+    assert "fit-1.yaml" in str(caught.value)
+    assert make({"shape": "tri"})  # nobody else minds
+
+
+def test_a_source_cannot_have_the_name_of_one_that_ships():
+    own.place().mkdir()
+    own.path("thesis-3.1").write_text("about: a\nmaterials: {etpu: {resistivity_ohm_m: {value: 1}}}", "utf-8")
+    with pytest.raises(BadInput, match="ships with sensorgen"):
+        materials.load("etpu", ["thesis-3.1"])
+
+
+def test_words_in_a_source_are_text():
+    bad = 'a": }\n# b: [&x]'
+    made = Fit(
+        1, 1, (Fitted("etpu", "resistivity_ohm_m", 1.0, 0.5, 2.0, bad),), (Untold("E", bad),), (), 1, (), (), bad
+    )
+    data = yaml.safe_load(text(made))
+    assert data["materials"]["etpu"]["resistivity_ohm_m"]["note"] == bad
+    assert set(data) == {"about", "materials"}
+
+
+def test_recordings_give_back_what_they_were_made_with(tmp_path):
+    """Factors to the prediction: resistivity 0.5, capacitance 1.3, modulus 0.5; a leak of 2 nS on 10 cm2."""
+    names = [f"30 triX .1mm {k}" for k in (1, 2)]
+    design = design_of(parse(names[0]))
+    sensor = bench_files.truth(design, **bench_files.TRUTH)
+    with Log(tmp_path / "log.db", create=True) as log:
+        for k, name in enumerate(names):
+            bench.take(log, name, *bench_files.write(tmp_path, f"run{k}", sensor, count=5, seed=k + 1))
+        made = fit(log, 30)
+    assert value(made, "resistivity_ohm_m").value == pytest.approx(0.5 * (0.07 + 0.2) / 2, rel=3e-3)
+    assert value(made, "youngs_modulus_pa").value == pytest.approx(0.5 * 6e6, rel=5e-3)
+    assert value(made, "leak_s_per_m2").value == pytest.approx(2e-9 / 1e-3, rel=0.1)
+    eps = value(made, "relative_permittivity")
+    known = materials.load("x60").value("relative_permittivity").value
+
+    def capacitance(permittivity):
+        data = {"shape": "tri", "parameters": {"dielectric_mm": 0.1}}
+        own_value = {"x60": {"relative_permittivity": permittivity}}
+        return math.sqrt(math.prod(prediction(make(data | {"material_values": own_value}))["capacitance_f"][end]
+                                   for end in ("lower", "upper")))  # fmt: skip
+
+    assert capacitance(eps.value) / capacitance(known) == pytest.approx(1.3, rel=1e-2)
+    assert eps.high / eps.low > 1.5  # the bounds of the cell's model are in it
+    for v in made.values:
+        assert v.low < v.value < v.high
+
+
+def test_nothing_to_fit_to(tmp_path):
+    with Log(tmp_path / "log.db", create=True) as log, pytest.raises(BadInput, match="no readings of sound electrodes"):
+        fit(log, 23)
+
+
+def test_the_command(tmp_path, capsys):
+    place = str(tmp_path / "log.db")
+    with Log(tmp_path / "log.db", create=True) as log:
+        for k in range(6):
+            log.add([words.reading(f"60 triX .1mm {k + 1}", f"{600 + 10 * k}", "OL")])
+    assert not cli.main(["fit", "--iteration", "60", "--log", place, "--dry-run"], standalone_mode=False)
+    assert own.names() == []
+    cli.main(["fit", "--iteration", "60", "--log", place], standalone_mode=False)
+    said = capsys.readouterr().out
+    assert "--material electrode=etpu@fit-60" in said
+    assert "not told: relative_permittivity" in said
+    assert own.names() == ["fit-60"]
+    with pytest.raises(SensorgenError):
+        cli.main(["fit", "--iteration", "61", "--log", place], standalone_mode=False)
