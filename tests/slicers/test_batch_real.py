@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from sensorgen.batch.record import RECORD, differences
 from sensorgen.errors import SlicerFailed
 from sensorgen.gcode import paths
 from sensorgen.printer import load_printer
+from sensorgen.slicer import run
 from sensorgen.slicer.tower import tower
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
@@ -188,7 +190,9 @@ def test_a_batch_that_fails_leaves_the_earlier_one_as_it_was(tmp_path, monkeypat
 
 
 def test_a_slicer_that_hangs_is_ended(tmp_path, monkeypatch):
-    stand_in(tmp_path, monkeypatch, "echo 'still thinking'; sleep 60")
+    said = tmp_path / "said"
+    stand_in(tmp_path, monkeypatch, f"echo 'still thinking'; touch {said}; sleep 600")
+    monkeypatch.setattr(run, "time", SimpleNamespace(monotonic=lambda: 1.0 if said.exists() else 0.0))
     (tmp_path / "plan.yaml").write_text(SMALL, "utf-8")
     with pytest.raises(SlicerFailed, match=r"more than 0.3 s .*still thinking"):
         make(tmp_path / "plan.yaml", tmp_path / "out", time_limit_s=0.3)
