@@ -18,6 +18,7 @@ from sensorgen.design import make
 from sensorgen.errors import BadInput, SlicerFailed, UnknownName, Unwritable
 from sensorgen.gcode.check import check
 from sensorgen.geometry.mesh import Mesh
+from sensorgen.printer import folder
 from sensorgen.printfile import slice_design
 from sensorgen.slicer import run, stl
 from sensorgen.slicing import Placed, alone, sliced
@@ -138,7 +139,9 @@ def test_an_unknown_slicer(tmp_path):
     ("code", "said"),
     [
         ("print('Error: no extrusions'); sys.exit(1)", "exit code 1: Error: no extrusions"),
-        ("os.abort()", "exit code -6"),
+        ("os.abort()", "ended by SIGABRT"),
+        ("os.kill(os.getpid(), 40)", "ended by signal 40"),
+        (WRITES.replace("M0 H1", "M0"), "cut short: it lacks the printer's last line, 'M0 H1'"),
         ("print('all is well')", "wrote no .*raw.gcode: all is well"),
         ("open(out, 'w')", "ended well but wrote no"),
         (WRITES.replace("2.5.0", "2.4.2"), "version 2.4.2; the profiles need 2.5 or later"),
@@ -148,6 +151,19 @@ def test_a_slicer_that_fails_is_quoted(slicer, tmp_path, code, said):
     slicer(code)
     with pytest.raises(SlicerFailed, match=said):
         sliced([alone(SMALL)], "prusa", tmp_path / "x")
+
+
+def test_settings_after_the_end_may_be_long_and_cut(slicer, tmp_path):
+    slicer(f"{WRITES}; open(out, 'a').write('; a = b\\n' * 20000 + '; c')")
+    assert sliced([alone(SMALL)], "prusa", tmp_path / "x").version == "2.5.0"
+
+
+def test_an_end_that_the_slicer_fills_in_is_not_looked_for(slicer, tmp_path):
+    slicer(WRITES.replace("M0 H1", "M0 H3"))
+    own = tmp_path / "own.yaml"
+    text = (folder() / "printers" / "diabase-h5.yaml").read_text("utf-8")
+    own.write_text(text.replace("  M0 H1\n", "  M0 H{current_extruder}\n"), "utf-8")
+    assert sliced([alone(small(printer=str(own)))], "prusa", tmp_path / "x").version == "2.5.0"
 
 
 def test_a_slicer_that_hangs_is_ended_with_all_that_it_started(slicer, tmp_path, monkeypatch):

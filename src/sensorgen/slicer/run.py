@@ -84,9 +84,19 @@ def run(
         except OSError as error:
             raise SlicerFailed(f"cannot run {command[0]}: {error.strerror or error}") from None
         if code != 0:
-            raise SlicerFailed(f"{name} failed with exit code {code}: {_last_words(said)}")
+            raise SlicerFailed(f"{name} {_failed(code)}: {_last_words(said)}")
         if not gcode.is_file() or gcode.stat().st_size == 0:
             raise SlicerFailed(f"{name} ended well but wrote no {gcode}: {_last_words(said)}")
+
+
+def _failed(code: int) -> str:
+    """Exit code in words; a negative one is a signal, as SIGXFSZ where files may not be larger."""
+    if code > 0:
+        return f"failed with exit code {code}"
+    try:
+        return f"was ended by {signal.Signals(-code).name}"
+    except ValueError:
+        return f"was ended by signal {-code}"
 
 
 def _wait(command: Sequence[str], said: BinaryIO, environment: Mapping[str, str], runner: Runner) -> int:
