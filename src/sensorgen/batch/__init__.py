@@ -17,7 +17,7 @@ from sensorgen.errors import BadInput, Unprintable
 from sensorgen.findings import Finding
 from sensorgen.predict import prediction
 from sensorgen.review import Review, Step, review
-from sensorgen.slicer.run import TIMEOUT_S
+from sensorgen.slicer import TIME_LIMIT_S
 
 ACCURACY = 1e-3  # of the expected capacitance: what a print is held against should not be the largest doubt
 STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "record", "done")
@@ -117,7 +117,7 @@ def make(
     out: Path,
     *,
     gcode: bool = True,
-    time_limit_s: float = TIMEOUT_S,
+    time_limit_s: float = TIME_LIMIT_S,
     force: bool = False,
     strict: bool = False,
     step: Step = lambda _: None,

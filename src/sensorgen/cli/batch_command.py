@@ -8,6 +8,7 @@ from click.shell_completion import CompletionItem
 
 from sensorgen.cli import show
 from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.slicer import TIME_LIMIT_S
 
 if TYPE_CHECKING:
     from sensorgen.batch import Batch
@@ -47,7 +48,7 @@ def _plan_command(name: str) -> click.Command:
             click.Option(
                 ["--time-limit", "time_limit_s"],
                 type=float,
-                default=1800.0,
+                default=TIME_LIMIT_S,
                 show_default=True,
                 metavar="SECONDS",
                 help="End a slicer after this time.",

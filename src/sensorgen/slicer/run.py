@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 from sensorgen.errors import SlicerFailed
+from sensorgen.slicer import TIME_LIMIT_S
 
-TIMEOUT_S = 1800.0
 KEPT_LINES = 12
 _TICK_S = 0.1
 _KEPT_BYTES = 1 << 16
@@ -35,7 +35,7 @@ class Runner:
     """
 
     program: str = ""
-    time_limit_s: float = TIMEOUT_S
+    time_limit_s: float = TIME_LIMIT_S
     tick: Callable[[], None] = lambda: None
 
 
