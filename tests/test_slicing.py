@@ -142,6 +142,7 @@ def test_an_unknown_slicer(tmp_path):
     ("code", "said"),
     [
         ("print('Error: no extrusions'); sys.exit(1)", "exit code 1: Error: no extrusions"),
+        (r"print('Error: \x1b]0;red\x07 alert'); sys.exit(1)", r"Error: \]0;red alert"),
         ("os.abort()", "ended by SIGABRT"),
         ("os.kill(os.getpid(), 40)", "ended by signal 40"),
         (WRITES.replace("M0 H1", "M0"), "cut short: it lacks the printer's last line, 'M0 H1'"),

@@ -139,7 +139,8 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
 def _last_words(said: BinaryIO) -> str:
     """What the slicer calls an error, or else the end of what it said; the rest is licence and progress."""
     said.seek(max(0, said.seek(0, os.SEEK_END) - _KEPT_BYTES))
-    lines = [line.strip() for line in said.read().decode(errors="replace").splitlines()]
+    text = said.read().decode(errors="replace").replace("\t", " ")
+    lines = ["".join(filter(str.isprintable, line)).strip() for line in text.splitlines()]
     errors = [line for line in lines if "error" in line.lower()]
     kept = [line for line in lines if line and not any(word in line for word in ("[trace]", "[debug]", "[WARNING]"))]
     return " | ".join((errors or kept)[-KEPT_LINES:]) or "it said nothing"
