@@ -7,7 +7,7 @@ import pytest
 from sensorgen import design
 from sensorgen.asprinted import window
 from sensorgen.asprinted.estimate import estimate, layers
-from sensorgen.asprinted.strips import NoStrips, drawn, scene_of
+from sensorgen.asprinted.strips import NoStrips, Strips, drawn, scene_of
 from sensorgen.checks.slices import Slices
 from sensorgen.errors import UnknownName
 from sensorgen.models import columns
@@ -144,11 +144,24 @@ def test_a_window_is_the_whole_where_nothing_repeats():
 
 def test_edges_that_rounding_parted_become_one():
     lines = [{"along": "y", "bottom_mm": 0.0, "top_mm": 0.1}, {"along": "y", "bottom_mm": 0.1, "top_mm": 0.2}]
-    from sensorgen.asprinted.strips import Strips
-
     found = window.cut(
         [Strips(**lines[0], runs={"a": ((1.0, 2.0005),)}), Strips(**lines[1], runs={"a": ((1.001, 2.4),)})],
         window.Window((1.0, 3.0), (0.0, 1.0)),
     )
     assert found[0].runs["a"] == ((0.0, 1.0005),)
     assert found[1].runs["a"] == ((0.0, 1.4),)
+
+
+def test_edges_that_rounding_parted_within_a_window_meet_in_their_middle():
+    found = window.cut(
+        [Strips("y", 0.0, 0.1, {"a": ((1.2, 2.0),)}), Strips("y", 0.1, 0.2, {"a": ((1.2, 2.001),)})],
+        window.Window((1.0, 3.0), (0.0, 1.0)),
+    )
+    assert {f.runs["a"][0][1] for f in found} == {1.0005}
+
+
+def test_a_layer_that_is_lost_parts_what_is_above_from_what_is_below():
+    like = Scene((Body("a", "x60", (box(0, 1, 0, 1, 0, 0.3),)),), (2.0, 1.0, 0.3))
+    run = {"a": ((0.5, 1.0),)}
+    found = scene_of([Strips("y", 0.0, 0.1, run), Strips("y", 0.1, 0.2, {}), Strips("y", 0.2, 0.3, run)], like)
+    assert sorted(p.span("z") for p in found.body("a").prisms) == [(0.0, 0.1), (0.2, 0.3)]

@@ -171,3 +171,20 @@ def test_resistance_of_the_sliced_electrode(real, degrees):
     for contact, ratio in zip(wanted["contact_ohm_m2"], wanted[degrees], strict=True):
         found = traxels.resistance(electrode, 0.2, contact, (-48.9e-3, 48.9e-3), 3e-6).ratio
         assert found == pytest.approx(ratio, rel=0.01 if contact <= 1e-5 else 0.05), contact
+
+
+def test_sparse_infill_thins_the_film_and_not_what_is_walls_alone(real):
+    full, sparse = (
+        {(r.body, r.layer): r.ratio for r in rule7(v, real("arachne", v)[1])[0]}
+        for v in (small(), small(infill={"x60": {"percent": 50}}))
+    )
+    assert sparse["film_and_lower", 4] < 0.85 * full["film_and_lower", 4]
+    for layer in (7, 8, 9):
+        assert sparse["hanging_dielectric", layer] == pytest.approx(full["hanging_dielectric", layer], rel=1e-3)
+
+
+def test_sparse_infill_leaves_air_in_the_printed_scene(printed):
+    (full, solid), (thin, sparse) = (printed("arachne", v) for v in (small(), small(infill={"x60": {"percent": 50}})))
+    cells = [compared.cell(v, p.layers["vol"])[0] for v, p in ((full, solid), (thin, sparse))]
+    filled = [cell.body("film_and_lower").volume_mm3() for cell in cells]
+    assert filled[1] < 0.95 * filled[0]

@@ -66,6 +66,19 @@ def test_lines_of_two_layers_that_cross():
     assert found.ratio == pytest.approx(expected, rel=1e-9)
 
 
+def test_lines_that_cross_aslant_share_a_longer_place():
+    """As before, the upper line at 45 degrees: each common place is a parallelogram."""
+    way = 5e-3 / np.sqrt(2)
+    lines = Lines(
+        np.array([[-9e-3, 0.0], [-way, -way], [3e-3, 3e-3]]), np.array([[0.0, 0.0], [2 * way, 2 * way], [12e-3, 3e-3]]),
+        np.full(3, W), np.full(3, H), np.array([0, 1, 0]), np.zeros(3, bool),
+    )  # fmt: skip
+    along, joint = RHO / (W * H), (RHO * H + 1e-6) * np.sin(np.pi / 4) / W**2
+    path = 9e-3 + 3e-3 * np.sqrt(2) + 9e-3
+    found = traxels.resistance(lines, RHO, 1e-6, (-8e-3, 8e-3), H * W)
+    assert found.ratio == pytest.approx((path * along + 2 * joint) / (along * 21e-3), rel=1e-9)
+
+
 def test_a_turned_sensor_of_many_directions_lies_between_both_axes():
     contact = 1e-4
     found = [

@@ -25,6 +25,8 @@ from sensorgen.models._traxel_nodes import Nodes
 SOURCE = "Lines as in Dijkshoorn et al., Sensors 2021, 21, 3710 (traxel model); network derived anew"
 COST = 2
 
+_SLENDER = 3.0  # length over width from which a band is less work than the best order for a sheet
+
 
 @dataclass(frozen=True)
 class Resistance:
@@ -109,6 +111,13 @@ def _current(
     free = ~(left | right) & np.isin(part, part[left | right])
     u = np.where(free, 0.0, x)
     if free.any():
-        solver = splu(matrix[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-        u[free] = solver.solve(-(matrix @ np.where(left | right, x, 0.0))[free])
+        where = np.flatnonzero(free)
+        long = np.ptp(nodes.place_m[where, 0]) > _SLENDER * np.ptp(nodes.place_m[where, 1])
+        if long:  # from one end to the other: a narrow band, and time that grows as the length
+            where = where[np.argsort(x[where], kind="stable")]
+        solver = splu(
+            matrix[where][:, where].tocsc(), permc_spec="NATURAL" if long else "MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0, options={"SymmetricMode": True},
+        )  # fmt: skip
+        u[where] = solver.solve(-(matrix @ np.where(left | right, x, 0.0))[where])
     return float((matrix @ u)[right].sum()), int(free.sum())
