@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.asprinted.intervals import Intervals, distance_mm, length_mm, united, within, without
+from sensorgen.asprinted.intervals import Intervals, distances_mm, length_mm, united, within, without
 from sensorgen.asprinted.rules import ROUND
 from sensorgen.asprinted.strips import Strips, drawn
 from sensorgen.checks.slices import Slices
@@ -102,7 +102,7 @@ def _owners(
             rows = np.flatnonzero((tool == one) & (layer == number))
             shown = _nearest(layers, int(number), {scene.bodies[k].name: k for k in mine})
             axis = "xy".index(layers[number].across)
-            away = np.array([_away(runs, middle[rows, axis]) for runs in shown.values()])
+            away = np.array([distances_mm(runs, middle[rows, axis]) for runs in shown.values()])
             owner[rows] = np.array(list(shown))[away.argmin(0)]
     return owner
 
@@ -112,10 +112,6 @@ def _nearest(layers: Sequence[Strips], number: int, mine: Mapping[str, int]) -> 
     order = sorted(range(len(layers)), key=lambda k: abs(k - number))
     found = ({mine[n]: r for n, r in layers[k].runs.items() if n in mine} for k in order)
     return next(filter(None, found))
-
-
-def _away(runs: Intervals, places: Floats) -> Floats:
-    return np.array([min(distance_mm(p, run) for run in runs) for p in places.tolist()])
 
 
 def layers(design: Design, lines: Beads, convention: str = "vol", *, electrode_wins: bool = False) -> list[Strips]:
