@@ -21,6 +21,7 @@ from sensorgen.gcode.check import check
 from sensorgen.geometry.mesh import Mesh
 from sensorgen.printer import folder
 from sensorgen.printfile import slice_design
+from sensorgen.scene import Body, box
 from sensorgen.slicer import run, stl
 from sensorgen.slicing import Placed, alone, sliced
 from sensorgen.threemf.plate import box_mm
@@ -90,6 +91,14 @@ def test_bodies_stand_where_they_were_placed():
     raised = [replace(b, mesh=Mesh(b.mesh.vertices_mm + 7.0, b.mesh.triangles)) for b in bodies]
     low, high = box_mm(threemf.placed(raised, (1.0, 2.0)))
     assert (low[2], *((low + high)[:2] / 2)) == pytest.approx((0.0, 1.0, 2.0))
+
+
+@pytest.mark.parametrize("extra", [(), (Body("tab", "x60", (box(4.0, 9.0, 0.0, 4.0, 0.0, 0.6),)),)])
+def test_the_sensor_has_a_middle_of_its_own_beside_what_is_printed_with_it(extra):
+    piece = Placed(SMALL, (-30.0, 5.0), "a", extra)
+    low, high = box_mm([part for part in slicing.plate_parts([piece]) if part.name != "a tab"])
+    assert piece.sensor_mm() == pytest.approx(((low + high) / 2)[:2])
+    assert piece.sensor_mm() == pytest.approx((-32.5 if extra else -30.0, 5.0))
 
 
 @pytest.mark.parametrize(

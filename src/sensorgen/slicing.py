@@ -47,6 +47,20 @@ class Placed:
     name: str
     extra: tuple[Body, ...] = ()
 
+    def sensor_mm(self) -> tuple[float, float]:
+        """Middle of the sensor alone, without what is printed with it [mm]."""
+        middles = (
+            (size / 2, (min(0.0, *low) + max(size, *high)) / 2)
+            for size, (low, high) in zip(self.design.printed.size_mm[:2], map(self._reach, "xy"), strict=True)
+        )
+        x, y = (place + own - whole for place, (own, whole) in zip(self.centre_mm, middles, strict=True))
+        return x, y
+
+    def _reach(self, axis: str) -> tuple[list[float], list[float]]:
+        """Where the extra bodies' prisms start and end along an axis of the sensor [mm]."""
+        spans = [prism.span(axis) for body in self.extra for prism in body.prisms] or [(0.0, 0.0)]
+        return [start for start, _ in spans], [end for _, end in spans]
+
 
 @dataclass(frozen=True)
 class Sliced:

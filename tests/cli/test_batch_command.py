@@ -98,5 +98,6 @@ def test_a_file_that_the_printer_could_not_print_is_told_and_ends_with_1(run, pl
     assert said.code == 1, said.err
     assert "prusa 2.5.0: at least" in said.out
     assert "error: line" in said.out
+    assert "as printed: no line of" in said.out
     assert "900" in said.out
     assert run("batch", "verify", "out/plan").code == 0

@@ -169,6 +169,23 @@ def stand_in(folder, monkeypatch, script):
     monkeypatch.setenv("PATH", f"{path.parent}:/usr/bin:/bin")
 
 
+@pytest.mark.parametrize("slicer", ["prusa", "cura"])
+def test_the_record_says_what_is_printed_of_each_design(small, slicer):
+    found = small.record["slicers"][slicer]["printed"]
+    assert set(found) == {piece["design_id"] for piece in small.record["specimens"].values()}
+    made = {printed["design"].partition("-")[0]: printed for printed in found.values()}
+    plain, prisms = made["reference"], made["trix"]
+    assert all(row["ratio"] and 0.9 < row["ratio"] < 1.1 for row in plain["layers"])
+    assert plain["electrode_gap_mm"]["printed"] == pytest.approx([0.6, 0.6])
+    expected = small.record["specimens"][plain["specimen"]]["expected"]["capacitance_f"]["middle"]
+    assert plain["capacitance_f"]["printed"]["middle"] == pytest.approx(expected, rel=1e-6)
+    for end, drawn in plain["electrode_resistance_ohm"]["drawn"].items():
+        assert plain["electrode_resistance_ohm"]["printed"][end] == pytest.approx([drawn], rel=0.1)
+    # PrusaSlicer drops the tips of the cogs, one layer of 0.1 mm; Cura fills them with thin lines.
+    assert prisms["electrode_gap_mm"]["printed"][0] == pytest.approx(0.3 if slicer == "prusa" else 0.2)
+    assert small.lost() == 2
+
+
 def test_a_slicer_that_fails_leaves_nothing_and_says_why(tmp_path, monkeypatch):
     stand_in(tmp_path, monkeypatch, "echo 'error: no more tools'; exit 3")
     with pytest.raises(SlicerFailed, match=r"exit code 3: .*no more tools"):

@@ -79,7 +79,8 @@ def beads(design: Design, paths: Paths, centre_mm: Point | None = None) -> Beads
     heights = np.array(design.layers.boundaries_mm(scene.size_mm[2]))
     layer = np.abs(found.end_mm[:, 2, None] - heights[1:]).argmin(1)
     here = np.abs(found.end_mm[:, 2] - heights[1:][layer]) < _LEVEL_MM
-    middle, margin = (ends[0] + ends[1]) / 2, machine.line_mm()
+    # Lines run half a line inside their body: what touches the piece from outside, as a tab, is half a line away.
+    middle, margin = (ends[0] + ends[1]) / 2, machine.line_mm() / 4
     here &= ((middle > -margin) & (middle < np.array(scene.size_mm[:2]) + margin)).all(1)
     here &= np.isin(found.tool, sorted(tools))
     height = np.diff(heights)[layer]
