@@ -5,8 +5,10 @@ from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
 from sensorgen.asprinted.beads import Beads, beads, layers
-from sensorgen.asprinted.intervals import Intervals, length_mm, within
+from sensorgen.asprinted.intervals import Intervals, length_mm
 from sensorgen.asprinted.strips import Strips, drawn
 from sensorgen.checks.slices import Slices
 from sensorgen.design import Design
@@ -135,9 +137,12 @@ def _between(prism: Prism, low_mm: float, high_mm: float) -> float:
 
 def _lost(meant: Intervals, made: Intervals) -> tuple[int, int]:
     """How many strips are gone, and how many run into their neighbours."""
-    gone = sum(length_mm(within(made, a, b)) < VANISHED * (b - a) for a, b in meant)
-    met = [sum(min(b, d) - max(a, c) > SLIVER_MM for c, d in meant) for a, b in made]
-    return gone, sum(count - 1 for count in met if count > 1)
+    plan, found = (np.array(runs, dtype=np.float64).reshape(-1, 2) for runs in (meant, made))
+    shared = np.minimum(plan[:, None, 1], found[:, 1]) - np.maximum(plan[:, None, 0], found[:, 0])
+    shared[shared <= SLIVER_MM] = 0.0
+    gone = shared.sum(axis=1) < VANISHED * (plan[:, 1] - plan[:, 0])
+    met = (shared > 0).sum(axis=0)
+    return int(gone.sum()), int((met - 1).clip(0).sum())
 
 
 def findings(rows: Iterable[Row], scene: Scene) -> list[Finding]:
