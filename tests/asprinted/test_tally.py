@@ -40,6 +40,15 @@ def test_strips_that_are_lost_or_fused_are_counted(runs, vanished, fused):
     assert (row.strips, row.vanished, row.fused) == (6, vanished, fused)
 
 
+def test_the_first_lost_strip_has_its_place():
+    def middle(k):
+        return (sum(RUNS[k]) / 2, 0.0)
+
+    assert row_of(RUNS).place_mm == middle(0)
+    assert row_of((*RUNS[:2], *RUNS[3:])).place_mm == middle(2)
+    assert findings([row_of((*RUNS[:2], *RUNS[3:]))], DESIGN.printed)[0].place_mm == (*middle(2), 0.85)
+
+
 def test_they_are_told_in_the_finding():
     lost, fused = (findings([row_of(runs)], DESIGN.printed)[0].message for runs in (RUNS[2:], ((0.0, 12.0),)))
     assert "2 of 6 strips vanish" in lost
