@@ -130,7 +130,8 @@ def slice_design(
     with tempfile.TemporaryDirectory() as stage:
         made = sliced([alone(design)], slicer, Path(stage), program=program, time_limit_s=time_limit_s, step=step)
         content = made.ready.read_bytes()
-        checked = check(made.ready, design.machine, {design.tool(name): name for name in design.used()})
+        loaded = {design.tool(name): name for name in design.used()}
+        checked = check(made.ready, design.machine, loaded, others_empty=True)
         rows = rule7(design, made.lines)
     result = _printed(design, target, made, held, (checked, *rows), content, forced=force)
     store.replace(target, content)

@@ -160,6 +160,16 @@ def test_what_must_be_accepted_is(text, old, new):
     assert errors(changed(text, old, new)) == set()
 
 
+def test_a_tool_with_nothing_on_it_may_be_refused():
+    def said(loaded):
+        return [f.message for f in check(OWN.splitlines(), DIABASE, loaded, others_empty=True).errors()]
+
+    assert said({3: "etpu", 4: "x60"}) == []
+    assert said({3: "etpu", 5: "x60"}) == ["tool 4 prints, and nothing is on it; loaded are etpu on 3, x60 on 5"]
+    assert len(said({2: "etpu", 5: "x60"})) == 2
+    assert check(OWN.splitlines(), DIABASE, {3: "etpu"}).errors() == []
+
+
 def test_tools_may_be_spindles():
     assert errors(LAB.splitlines()) == set()
     assert errors(LAB.splitlines(), WITH_SPINDLES) == {"tool"}

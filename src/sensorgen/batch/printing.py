@@ -74,7 +74,8 @@ def gcode(
         settings = "settings.json"
         store.write(own, {settings: json_bytes(_engine_settings(found))})
     rmtree(inside)  # what is left are the bodies again, as the slicer took them
-    checked = check(ready, found[0].design.machine, tools(piece.design for piece in found))
+    loaded = tools(piece.design for piece in found)
+    checked = check(ready, found[0].design.machine, loaded, others_empty=True)
     step("as printed")
     printed_designs = printed.of_designs(found, made)
     return {

@@ -1,6 +1,6 @@
 """What the commands of a file ask of the machine, one after the other: tools, heat, homing, modes, fans, macros."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,23 @@ def check(motion: Motion, machine: Printer) -> Iterator[Found]:
         yield from simulation.obey(event)
     yield from simulation.until(len(motion.rows))
     yield from simulation.end()
+
+
+def check_loaded(motion: Motion, loaded: Mapping[int, str]) -> Iterator[Found]:
+    """Refuse lines of tools on which there is nothing.
+
+    Parameters
+    ----------
+    motion : Motion
+        The file.
+    loaded : mapping of int to str
+        Material of each tool that has one.
+    """
+    tools = motion.tools.column(len(motion.rows), NO_TOOL)
+    for tool in np.setdiff1d(tools[motion.extruded_mm > 0], [NO_TOOL, *loaded]).astype(int).tolist():
+        number = int(motion.number[np.flatnonzero((tools == tool) & (motion.extruded_mm > 0))[0]])
+        known = ", ".join(f"{name} on {one}" for one, name in loaded.items())
+        yield error("tool", number, f"tool {tool} prints, and nothing is on it; loaded are {known}", "use another tool")
 
 
 class _Simulation:
