@@ -57,9 +57,16 @@ def test_a_printer_of_the_users_own(own):
     assert (machine.name, machine.nozzle_mm) == ("own", 0.25)
 
 
+def test_heights_of_tools_are_given_in_a_file(own):
+    machine = printer.load_printer(own("spindles: []", 'tool_offsets_mm: {"3": -0.05, "4": 0.1}'))
+    assert machine.control.tool_offsets_mm == {3: -0.05, 4: 0.1}
+
+
 @pytest.mark.parametrize(
     ("old", "new", "key"),
     [
+        ("spindles: []", 'tool_offsets_mm: {"9": 0.1}', "tool 9 under control is not among"),
+        ("spindles: []", 'tool_offsets_mm: {"a": 0.1}', "expected .*integer"),
         ("nozzle_mm: 0.4", "nozzle_mm: -0.4", "nozzle_mm"),
         ("nozzle_mm: 0.4", "nozzle_mm: .nan", "nozzle_mm"),
         ("nozzle_mm: 0.4", "nozle_mm: 0.4", "nozle_mm|nozzle_mm"),

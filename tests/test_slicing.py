@@ -3,10 +3,12 @@
 import os
 import stat
 import sys
+import time
 import zipfile
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,10 +16,13 @@ import pytest
 from sensorgen import slicing, threemf
 from sensorgen.design import make
 from sensorgen.errors import BadInput, SlicerFailed, UnknownName, Unwritable
+from sensorgen.gcode import paths
 from sensorgen.gcode.check import check
 from sensorgen.geometry.mesh import Mesh
+from sensorgen.printer import folder
 from sensorgen.printfile import slice_design
-from sensorgen.slicer import stl
+from sensorgen.scene import Body, box
+from sensorgen.slicer import run, stl
 from sensorgen.slicing import Placed, alone, sliced
 from sensorgen.threemf.plate import box_mm
 
@@ -64,6 +69,8 @@ def test_a_plate_is_sliced_and_put_into_the_printers_words(slicer, tmp_path):
     assert check(made.ready, SMALL.machine).errors() == []
     assert check(made.raw, SMALL.machine).errors()
     assert [s for n, s in enumerate(steps) if s not in steps[:n]] == list(slicing.STEPS)
+    assert (made.lines.tool.tolist(), made.lines.filament_mm.tolist()) == ([3, 4], [0.5, 0.5])
+    assert made.lines.number.tolist() == paths.read(made.raw, SMALL.machine, "slicer").number.tolist()
     assert made.seconds > 0
     with zipfile.ZipFile(tmp_path / "x" / "plate.3mf") as plate:
         config = plate.read("Metadata/Slic3r_PE_model.config").decode()
@@ -84,6 +91,14 @@ def test_bodies_stand_where_they_were_placed():
     raised = [replace(b, mesh=Mesh(b.mesh.vertices_mm + 7.0, b.mesh.triangles)) for b in bodies]
     low, high = box_mm(threemf.placed(raised, (1.0, 2.0)))
     assert (low[2], *((low + high)[:2] / 2)) == pytest.approx((0.0, 1.0, 2.0))
+
+
+@pytest.mark.parametrize("extra", [(), (Body("tab", "x60", (box(4.0, 9.0, 0.0, 4.0, 0.0, 0.6),)),)])
+def test_the_sensor_has_a_middle_of_its_own_beside_what_is_printed_with_it(extra):
+    piece = Placed(SMALL, (-30.0, 5.0), "a", extra)
+    low, high = box_mm([part for part in slicing.plate_parts([piece]) if part.name != "a tab"])
+    assert piece.sensor_mm() == pytest.approx(((low + high) / 2)[:2])
+    assert piece.sensor_mm() == pytest.approx((-32.5 if extra else -30.0, 5.0))
 
 
 @pytest.mark.parametrize(
@@ -136,7 +151,10 @@ def test_an_unknown_slicer(tmp_path):
     ("code", "said"),
     [
         ("print('Error: no extrusions'); sys.exit(1)", "exit code 1: Error: no extrusions"),
-        ("os.abort()", "exit code -6"),
+        (r"print('Error: \x1b]0;red\x07 alert'); sys.exit(1)", r"Error: \]0;red alert"),
+        ("os.abort()", "ended by SIGABRT"),
+        ("os.kill(os.getpid(), 40)", "ended by signal 40"),
+        (WRITES.replace("M0 H1", "M0"), "cut short: it lacks the printer's last line, 'M0 H1'"),
         ("print('all is well')", "wrote no .*raw.gcode: all is well"),
         ("open(out, 'w')", "ended well but wrote no"),
         (WRITES.replace("2.5.0", "2.4.2"), "version 2.4.2; the profiles need 2.5 or later"),
@@ -148,14 +166,42 @@ def test_a_slicer_that_fails_is_quoted(slicer, tmp_path, code, said):
         sliced([alone(SMALL)], "prusa", tmp_path / "x")
 
 
-def test_a_slicer_that_hangs_is_ended_with_all_that_it_started(slicer, tmp_path):
+def test_settings_after_the_end_may_be_long_and_cut(slicer, tmp_path):
+    slicer(f"{WRITES}; open(out, 'a').write('; a = b\\n' * 20000 + '; c')")
+    assert sliced([alone(SMALL)], "prusa", tmp_path / "x").version == "2.5.0"
+
+
+def test_an_end_that_the_slicer_fills_in_is_not_looked_for(slicer, tmp_path):
+    slicer(WRITES.replace("M0 H1", "M0 H3"))
+    own = tmp_path / "own.yaml"
+    text = (folder() / "printers" / "diabase-h5.yaml").read_text("utf-8")
+    own.write_text(text.replace("  M0 H1\n", "  M0 H{current_extruder}\n"), "utf-8")
+    assert sliced([alone(small(printer=str(own)))], "prusa", tmp_path / "x").version == "2.5.0"
+
+
+def test_a_slicer_that_hangs_is_ended_with_all_that_it_started(slicer, tmp_path, monkeypatch):
+    """The clock strikes only once the slicer has started another program, however long that takes."""
     note = tmp_path / "pid"
-    start = f"import subprocess; c = subprocess.Popen(['sleep', '60']); open({str(note)!r}, 'w').write(str(c.pid))"
-    slicer(f"print('20 => Generating perimeters', flush=True); {start}; time.sleep(60)")
+    start = "import subprocess; c = subprocess.Popen(['sleep', '600'])"
+    tell = f"open({str(note)!r} + '~', 'w').write(str(c.pid)); os.rename({str(note)!r} + '~', {str(note)!r})"
+    slicer(f"print('20 => Generating perimeters', flush=True); {start}; {tell}; time.sleep(600)")
+    monkeypatch.setattr(run, "time", SimpleNamespace(monotonic=lambda: 3.0 if note.exists() else 0.0))
     with pytest.raises(SlicerFailed, match=r"more than 2 s and was ended.*it last said: 20 => Generating perimeters"):
         sliced([alone(SMALL)], "prusa", tmp_path / "x", time_limit_s=2.0)
-    state = Path(f"/proc/{note.read_text()}/stat")
-    assert not state.exists() or state.read_text().split()[2] == "Z"
+    assert_gone(note.read_text())
+
+
+def assert_gone(process):
+    """A killed process takes a moment to go; then it is no more, or waits for its parent to notice."""
+    state = Path(f"/proc/{process}/stat")
+    for _ in range(500):
+        try:
+            if state.read_text().rpartition(")")[2].split()[0] == "Z":
+                return
+        except OSError:
+            return
+        time.sleep(0.02)
+    pytest.fail("what the slicer started is still there")
 
 
 def test_a_slicer_may_be_named(slicer, tmp_path):

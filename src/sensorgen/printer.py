@@ -51,7 +51,7 @@ class Control(Strict):
     longest_purge_mm: Positive = 100.0
     standby_c: Positive | None = None  # of a tool that waits; None: as hot as when it prints
     preheat_s: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
-    tool_offsets_mm: dict[int, Finite] = Field(default={}, strict=False)  # baby steps per tool, M290
+    tool_offsets_mm: dict[Annotated[int, Field(strict=False)], Finite] = Field(default={})  # baby steps per tool, M290
     firmware_retraction: bool = False  # G10 and G11 instead of moves of E
 
 

@@ -11,10 +11,9 @@ from sensorgen.asprinted.tally import Row, rule7
 from sensorgen.design import Design
 from sensorgen.errors import Unprintable
 from sensorgen.findings import Finding
-from sensorgen.gcode import paths
 from sensorgen.gcode.check import Checked, check
 from sensorgen.review import Review, review
-from sensorgen.slicer.run import TIMEOUT_S
+from sensorgen.slicer import TIME_LIMIT_S
 from sensorgen.slicing import Sliced, Step, alone, sliced
 
 
@@ -87,7 +86,7 @@ def slice_design(
     slicer: str,
     *,
     program: str = "",
-    time_limit_s: float = TIMEOUT_S,
+    time_limit_s: float = TIME_LIMIT_S,
     force: bool = False,
     strict: bool = False,
     step: Step = lambda _: None,
@@ -131,8 +130,9 @@ def slice_design(
     with tempfile.TemporaryDirectory() as stage:
         made = sliced([alone(design)], slicer, Path(stage), program=program, time_limit_s=time_limit_s, step=step)
         content = made.ready.read_bytes()
-        checked = check(made.ready, design.machine, {design.tool(name): name for name in design.used()})
-        rows = rule7(design, paths.read(made.raw, design.machine, "slicer"))
+        loaded = {design.tool(name): name for name in design.used()}
+        checked = check(made.ready, design.machine, loaded, others_empty=True)
+        rows = rule7(design, made.lines)
     result = _printed(design, target, made, held, (checked, *rows), content, forced=force)
     store.replace(target, content)
     text = json.dumps(result.as_dict() | {"gcode": target.name}, indent=2, ensure_ascii=False) + "\n"

@@ -108,7 +108,8 @@ class _Loader(_Fast):  # type: ignore[misc,valid-type]
         for key, _ in node.value:
             if key.tag != _TEXT:
                 shown = repr(key.value) if isinstance(key, yaml.ScalarNode) else "that is a list or a mapping"
-                raise yaml.constructor.ConstructorError(None, None, f"key {shown}: expected text", key.start_mark)
+                said = f"key {shown}: expected text, a number in quotes"
+                raise yaml.constructor.ConstructorError(None, None, said, key.start_mark)
             if key.value in seen:
                 raise yaml.constructor.ConstructorError(None, None, f"key {key.value!r} is given twice", key.start_mark)
             seen.add(key.value)

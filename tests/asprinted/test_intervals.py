@@ -1,12 +1,10 @@
-import math
 from itertools import pairwise
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sensorgen.asprinted.intervals import distance_mm, length_mm, united, within, without
+from sensorgen.asprinted.intervals import distances_mm, length_mm, united, within, without
 
 whole = st.integers(0, 40)
 runs = st.lists(st.tuples(whole, whole).filter(lambda r: r[0] < r[1]), max_size=8)
@@ -46,6 +44,7 @@ def test_slivers_are_dropped():
     assert within(((0, 1),), 1 - 1e-7, 2) == ()
 
 
-@pytest.mark.parametrize(("place", "away"), [(-1, 1), (0, 0), (1.5, 0), (2.5, 0.5)])
-def test_distance(place, away):
-    assert math.isclose(distance_mm(place, (0, 2)), away)
+@given(runs.filter(bool), st.lists(st.floats(-9, 49), max_size=20))
+def test_distances_to_the_nearest_run(some, places):
+    found = distances_mm(united(some), np.array(places))
+    assert found.tolist() == [min(max(a - p, p - b, 0.0) for a, b in some) for p in places]

@@ -68,7 +68,7 @@ def test_what_cannot_be_printed_is_not_sliced(run, slicer, tmp_path):
         (["--time-limit", "0"], "", "expected seconds above 0"),
         (["--time-limit", "nan"], "", "expected seconds above 0"),
         ([], "print('Error: Objects could not fit on the bed'); sys.exit(1)", "Objects could not fit on the bed"),
-        (["--time-limit", "1"], "print('=> Infilling', flush=True); time.sleep(30)", "it last said: => Infilling"),
+        (["--time-limit", "3"], "print('=> Infilling', flush=True); time.sleep(30)", "it last said: => Infilling"),
         ([], "open(out, 'w').write('M83\\nT9\\nG1 X1 E1\\n')", "takes tool 9"),
         ([], "open(out, 'wb').write(bytes(99))", "is no text"),
     ],

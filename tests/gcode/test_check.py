@@ -95,6 +95,7 @@ PLANTED = [
     ("heat-left", MAKER, "M0 H1", "M84"),
     ("purge", LAB, "G1 E15.000 F1800", "G1 E15.1 F1800"),
     ("purge", OWN, "G1 E-4.7 F2400", "G1 E-25 F2400"),
+    ("end", OWN, "T4", "T4\nM0"),
     ("macro", MAKER, "G32", 'G32\nM98 P"mine.g"'),
     ("relative", MAKER, "G90", "G91"),
     ("relative", MAKER, "G1 X180 Y85 Z200 F12000 ; End", "G91"),
@@ -159,6 +160,16 @@ def test_what_must_be_accepted_is(text, old, new):
     assert errors(changed(text, old, new)) == set()
 
 
+def test_a_tool_with_nothing_on_it_may_be_refused():
+    def said(loaded):
+        return [f.message for f in check(OWN.splitlines(), DIABASE, loaded, others_empty=True).errors()]
+
+    assert said({3: "etpu", 4: "x60"}) == []
+    assert said({3: "etpu", 5: "x60"}) == ["tool 4 prints, and nothing is on it; loaded are etpu on 3, x60 on 5"]
+    assert len(said({2: "etpu", 5: "x60"})) == 2
+    assert check(OWN.splitlines(), DIABASE, {3: "etpu"}).errors() == []
+
+
 def test_tools_may_be_spindles():
     assert errors(LAB.splitlines()) == set()
     assert errors(LAB.splitlines(), WITH_SPINDLES) == {"tool"}
@@ -192,6 +203,19 @@ def test_heaters_left_to_the_stop_macro_are_told():
 
 def test_heights_count_anew_only_where_z_is_named():
     assert "below" in errors(changed(OWN, "G1 Z.2 F3000", "G92 E0\nG1 Z.05 F3000"))
+
+
+def test_a_file_that_changes_the_machine_is_warned_of():
+    result = check(changed(OWN, "M501", "M501\nM203 X90000 Y90000\nM208 X900"), DIABASE)
+    assert [(f.rule, f.severity, f.line) for f in result.findings] == [
+        ("settings", "warning", line + OWN.splitlines().index("M501") + 2) for line in (0, 1)
+    ]
+
+
+def test_a_file_without_its_end_is_warned_of():
+    result = check([line for line in OWN.splitlines() if line != "M0 H1"], DIABASE)
+    assert [(f.rule, f.severity) for f in result.findings] == [("end", "warning")]
+    assert "M0 or M1" in result.findings[0].message
 
 
 def test_many_of_a_kind_are_one_finding():

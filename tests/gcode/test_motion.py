@@ -93,6 +93,11 @@ def test_arcs_have_their_length_and_share_their_filament(line, length):
     assert np.hypot(*motion.end_mm[1:, :2].T).max() == pytest.approx(10.0, abs=0.01) or "R" in line
 
 
+def test_a_wide_arc_is_nearly_straight():
+    motion = follow([R, "G1 X10", "G3 X10 Y100 I-900000000 J50"])
+    assert motion.length_mm()[1:].sum() == pytest.approx(100.0, rel=1e-6)
+
+
 def test_an_arc_turns_the_right_way():
     assert follow([R, "G1 X10", "G3 X-10 I-10"]).end_mm[:, 1].max() == pytest.approx(10, abs=0.01)
     assert follow([R, "G1 X10", "G2 X-10 I-10"]).end_mm[:, 1].min() == pytest.approx(-10, abs=0.01)
@@ -105,7 +110,10 @@ def test_a_spiral_rises_evenly():
     assert np.diff(z) == pytest.approx(np.full(len(z) - 1, 2 / len(z)))
 
 
-@pytest.mark.parametrize("line", ["G2 X5 Y5", "G2 X5 R1", "G2 X9 Y9 I1 J0", "G2 X5 Rnan"])
+@pytest.mark.parametrize(
+    "line",
+    ["G2 X5 Y5", "G2 X5 R1", "G2 X9 Y9 I1 J0", "G2 X5 Rnan", "G3 X9 I9" + 17 * "0", "G3 X9 I" + 400 * "9"],
+)
 def test_an_arc_that_cannot_be_is_a_straight_line_and_said(line):
     motion = follow([R, "G1 X10", line])
     assert len(motion.rows) == 2

@@ -177,6 +177,7 @@ def test_heights_of_tools():
     new = made(PRUSA, with_control(tool_offsets_mm={4: -0.05})).splitlines()
     assert [line for line in new if line.startswith(("T", "M290"))] == [
         "T3",
+        "M290 S0 R0",
         "T4",
         "M290 S-0.05 R0",
         "T3",

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.asprinted.intervals import Intervals, distance_mm, length_mm, united, within, without
+from sensorgen.asprinted.intervals import Intervals, distances_mm, length_mm, united, within, without
 from sensorgen.asprinted.rules import ROUND
 from sensorgen.asprinted.strips import Strips, drawn
 from sensorgen.checks.slices import Slices
@@ -79,7 +79,8 @@ def beads(design: Design, paths: Paths, centre_mm: Point | None = None) -> Beads
     heights = np.array(design.layers.boundaries_mm(scene.size_mm[2]))
     layer = np.abs(found.end_mm[:, 2, None] - heights[1:]).argmin(1)
     here = np.abs(found.end_mm[:, 2] - heights[1:][layer]) < _LEVEL_MM
-    middle, margin = (ends[0] + ends[1]) / 2, machine.line_mm()
+    # Lines run half a line inside their body: what touches the piece from outside, as a tab, is half a line away.
+    middle, margin = (ends[0] + ends[1]) / 2, machine.line_mm() / 4
     here &= ((middle > -margin) & (middle < np.array(scene.size_mm[:2]) + margin)).all(1)
     here &= np.isin(found.tool, sorted(tools))
     height = np.diff(heights)[layer]
@@ -102,7 +103,7 @@ def _owners(
             rows = np.flatnonzero((tool == one) & (layer == number))
             shown = _nearest(layers, int(number), {scene.bodies[k].name: k for k in mine})
             axis = "xy".index(layers[number].across)
-            away = np.array([_away(runs, middle[rows, axis]) for runs in shown.values()])
+            away = np.array([distances_mm(runs, middle[rows, axis]) for runs in shown.values()])
             owner[rows] = np.array(list(shown))[away.argmin(0)]
     return owner
 
@@ -112,10 +113,6 @@ def _nearest(layers: Sequence[Strips], number: int, mine: Mapping[str, int]) -> 
     order = sorted(range(len(layers)), key=lambda k: abs(k - number))
     found = ({mine[n]: r for n, r in layers[k].runs.items() if n in mine} for k in order)
     return next(filter(None, found))
-
-
-def _away(runs: Intervals, places: Floats) -> Floats:
-    return np.array([min(distance_mm(p, run) for run in runs) for p in places.tolist()])
 
 
 def layers(design: Design, lines: Beads, convention: str = "vol", *, electrode_wins: bool = False) -> list[Strips]:

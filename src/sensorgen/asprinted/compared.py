@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from math import ceil
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sensorgen import planner
 from sensorgen.asprinted import estimate
@@ -102,14 +104,17 @@ def cell(design: Design, printed: Sequence[Strips]) -> tuple[Scene, float]:
 
 
 def gap_mm(scene: Scene) -> float:
-    """Smallest distance of top and bottom electrode in a scene of boxes; infinite where one is missing [mm]."""
-    tops, bottoms = (
-        np.array([[p.span(a) for a in "xyz"] for b in scene.bodies if b.terminal == end for p in b.prisms])
-        for end in ("top", "bottom")
-    )
-    if not len(tops) or not len(bottoms):
-        return float("inf")
-    apart = np.maximum(tops[:, None, :, 0] - bottoms[None, :, :, 1], bottoms[None, :, :, 0] - tops[:, None, :, 1])
+    """Smallest distance of two electrodes in a scene of boxes; infinite where there are no two [mm]."""
+    spans: dict[str, list[list[tuple[float, float]]]] = {}
+    for body in filter(lambda b: b.terminal, scene.bodies):
+        spans.setdefault(body.terminal, []).extend([prism.span(axis) for axis in "xyz"] for prism in body.prisms)
+    boxes = [np.array(found) for found in spans.values() if found]
+    return min((_apart_mm(one, other) for one, other in combinations(boxes, 2)), default=float("inf"))
+
+
+def _apart_mm(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Smallest distance of the boxes of two sets, (n, 3, 2) and (m, 3, 2) [mm]."""
+    apart = np.maximum(one[:, None, :, 0] - other[None, :, :, 1], other[None, :, :, 0] - one[:, None, :, 1])
     return float(np.round(np.sqrt((apart.clip(0) ** 2).sum(2)).min(), 9))
 
 

@@ -2,6 +2,9 @@
 
 from collections.abc import Iterable
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sensorgen.scene import SLIVER_MM, Point
 
 Intervals = tuple[Point, ...]
@@ -52,6 +55,15 @@ def length_mm(runs: Intervals) -> float:
     return sum(b - a for a, b in runs)
 
 
-def distance_mm(place_mm: float, run: Point) -> float:
-    """How far a place is from a run, 0 within it [mm]."""
-    return max(run[0] - place_mm, place_mm - run[1], 0.0)
+def distances_mm(runs: Intervals, places_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far each place is from the nearest of some runs, 0 within it [mm].
+
+    >>> distances_mm(((0, 2), (5, 6)), np.array([-1.0, 1.0, 3.0, 4.0])).tolist()
+    [1.0, 0.0, 1.0, 1.0]
+    """
+    low, high = np.array(runs, dtype=np.float64).T
+    after = np.searchsorted(low, places_mm)  # the nearest run is the last that starts before a place, or the next
+    near = np.column_stack([np.maximum(after - 1, 0), np.minimum(after, len(low) - 1)])
+    places = places_mm[:, None]
+    away: NDArray[np.float64] = np.maximum(low[near] - places, places - high[near]).clip(0.0).min(axis=1)
+    return away

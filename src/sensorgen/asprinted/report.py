@@ -1,5 +1,6 @@
 """A design as drawn and as printed, as plain data."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from sensorgen import planner
@@ -10,7 +11,12 @@ from sensorgen.errors import SensorgenError
 from sensorgen.interval import Interval
 
 
-def report(design: Design, printed: Printed, accuracy: float = ACCURACY) -> dict[str, Any]:
+def report(
+    design: Design,
+    printed: Printed,
+    accuracy: float = ACCURACY,
+    contacts_ohm_m2: Sequence[float] = CONTACTS_OHM_M2,
+) -> dict[str, Any]:
     """Electrode gap, capacitance and electrode resistance of both, and rule 7.
 
     Parameters
@@ -21,6 +27,8 @@ def report(design: Design, printed: Printed, accuracy: float = ACCURACY) -> dict
         What is printed of it.
     accuracy : float
         How wide the bounds of a capacitance may be, relative to their middle [-].
+    contacts_ohm_m2 : sequence of float
+        Contact resistivities between lines for which resistances are told [ohm m2].
 
     Returns
     -------
@@ -34,8 +42,8 @@ def report(design: Design, printed: Printed, accuracy: float = ACCURACY) -> dict
         "estimate": printed.lines is None,
         "electrode_gap_mm": {"drawn": compared.drawn_gap_mm(design), "printed": _gaps_mm(design, printed)},
         "capacitance_f": {"drawn": _drawn_f(design, accuracy), **_printed_f(design, printed, accuracy)},
-        "electrode_resistance_ohm": _resistance(design, printed),
-        "contact_ohm_m2": list(CONTACTS_OHM_M2),
+        "electrode_resistance_ohm": _resistance(design, printed, contacts_ohm_m2),
+        "contact_ohm_m2": list(contacts_ohm_m2),
         "layers": [row.as_dict() for row in printed.rows(design)],
         "findings": [f.as_dict() for f in printed.findings(design)],
     }
@@ -63,10 +71,10 @@ def _printed_f(design: Design, printed: Printed, accuracy: float) -> dict[str, A
     return {"printed": span, "by_width": by}
 
 
-def _resistance(design: Design, printed: Printed) -> dict[str, Any]:
+def _resistance(design: Design, printed: Printed, contacts_ohm_m2: Sequence[float]) -> dict[str, Any]:
     try:
         solid = {end: ohm for end, (ohm, _) in compared.solid_ohm(design).items()}
-        return {"drawn": solid, "printed": compared.resistance_ohm(design, printed)}
+        return {"drawn": solid, "printed": compared.resistance_ohm(design, printed, contacts_ohm_m2)}
     except SensorgenError as error:
         return {"drawn": None, "printed": None, "reason": str(error)}
 

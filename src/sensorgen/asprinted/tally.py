@@ -5,8 +5,11 @@ from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sensorgen.asprinted.beads import Beads, beads, layers
-from sensorgen.asprinted.intervals import Intervals, length_mm, within
+from sensorgen.asprinted.intervals import Intervals, length_mm
 from sensorgen.asprinted.strips import Strips, drawn
 from sensorgen.checks.slices import Slices
 from sensorgen.design import Design
@@ -35,6 +38,8 @@ class Row:
         Volume as drawn, and as printed [mm3].
     strips, vanished, fused : int
         How many strips are drawn, how many of them are not printed, and how many run into their neighbours [-].
+    place_mm : (float, float)
+        Middle of the first strip that is not printed, or else of the first, at the front or left edge [mm].
     """
 
     body: str
@@ -46,6 +51,7 @@ class Row:
     strips: int
     vanished: int
     fused: int
+    place_mm: Point
 
     @property
     def ratio(self) -> float:
@@ -105,12 +111,18 @@ def tally(design: Design, printed: Sequence[Strips], lines: Beads | None = None)
             exact = sum(_between(p, meant.bottom_mm, meant.top_mm) for p in body.prisms)
             volume = _volume(made, body, scene) if lines is None else _extruded(lines, k, number)
             if max(exact, volume) > _LEAST * scene.size_mm[0] * scene.size_mm[1] * (meant.top_mm - meant.bottom_mm):
-                here, there = meant.runs.get(body.name, ()), made.runs.get(body.name, ())
-                gone, fused = _lost(here, there)
-                found.append(
-                    Row(body.name, k + 1, meant.bottom_mm, meant.top_mm, exact, volume, len(here), gone, fused)
-                )
+                found.append(_row(body.name, k + 1, meant, made, (exact, volume)))
     return found
+
+
+def _row(body: str, number: int, meant: Strips, made: Strips, exact_printed_mm3: tuple[float, float]) -> Row:
+    """The row of a body in a layer as drawn and as printed."""
+    here = meant.runs.get(body, ())
+    gone, fused = _lost(here, made.runs.get(body, ()))
+    middle = sum(here[int(gone.argmax())]) / 2 if here else 0.0
+    place_mm = (middle, 0.0) if meant.across == "x" else (0.0, middle)
+    strips = len(here), int(gone.sum()), fused
+    return Row(body, number, meant.bottom_mm, meant.top_mm, *exact_printed_mm3, *strips, place_mm)
 
 
 def _extruded(lines: Beads, layer: int, body: int) -> float:
@@ -133,11 +145,14 @@ def _between(prism: Prism, low_mm: float, high_mm: float) -> float:
     )
 
 
-def _lost(meant: Intervals, made: Intervals) -> tuple[int, int]:
-    """How many strips are gone, and how many run into their neighbours."""
-    gone = sum(length_mm(within(made, a, b)) < VANISHED * (b - a) for a, b in meant)
-    met = [sum(min(b, d) - max(a, c) > SLIVER_MM for c, d in meant) for a, b in made]
-    return gone, sum(count - 1 for count in met if count > 1)
+def _lost(meant: Intervals, made: Intervals) -> tuple[NDArray[np.bool_], int]:
+    """Which strips are gone, and how many run into their neighbours."""
+    plan, found = (np.array(runs, dtype=np.float64).reshape(-1, 2) for runs in (meant, made))
+    shared = np.minimum(plan[:, None, 1], found[:, 1]) - np.maximum(plan[:, None, 0], found[:, 0])
+    shared[shared <= SLIVER_MM] = 0.0
+    gone = shared.sum(axis=1) < VANISHED * (plan[:, 1] - plan[:, 0])
+    met = (shared > 0).sum(axis=0)
+    return gone, int((met - 1).clip(0).sum())
 
 
 def findings(rows: Iterable[Row], scene: Scene) -> list[Finding]:
@@ -164,5 +179,6 @@ def _finding(row: Row, scene: Scene) -> Finding:
         "7-printed", "error" if gone and sampled and not support else "warning", row.body,
         f"the layer from {row.bottom_mm:g} to {row.top_mm:g} mm {what}" + "".join(f", {word}" for word in more),
         "widen what is narrow there, or slice with other walls; --compensate does what it can",
-        layer=row.layer, place_mm=(0.0, 0.0, round((row.bottom_mm + row.top_mm) / 2, 9)), count=max(row.vanished, 1),
+        layer=row.layer, place_mm=(*row.place_mm, round((row.bottom_mm + row.top_mm) / 2, 9)),
+        count=max(row.vanished, 1),
     )  # fmt: skip

@@ -17,10 +17,10 @@ from sensorgen.errors import BadInput, Unprintable
 from sensorgen.findings import Finding
 from sensorgen.predict import prediction
 from sensorgen.review import Review, Step, review
-from sensorgen.slicer.run import TIMEOUT_S
+from sensorgen.slicer import TIME_LIMIT_S
 
 ACCURACY = 1e-3  # of the expected capacitance: what a print is held against should not be the largest doubt
-STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "record", "done")
+STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "as printed", "record", "done")
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +77,11 @@ class Batch:
         """How many findings of severity error the check of the G-code has [-]."""
         return sum(f["severity"] == "error" for used in self.record["slicers"].values() for f in used["findings"])
 
+    def lost(self) -> int:
+        """How many layers of bodies are not printed at all, against the will of their design [-]."""
+        designs = (made for used in self.record["slicers"].values() for made in used["printed"].values())
+        return sum(f["severity"] == "error" and not f["waiver"] for made in designs for f in made["findings"])
+
 
 def arranged(path: Path) -> Arranged:
     """A plan's file laid out on its plate.
@@ -117,7 +122,7 @@ def make(
     out: Path,
     *,
     gcode: bool = True,
-    time_limit_s: float = TIMEOUT_S,
+    time_limit_s: float = TIME_LIMIT_S,
     force: bool = False,
     strict: bool = False,
     step: Step = lambda _: None,

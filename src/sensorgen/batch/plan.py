@@ -15,7 +15,6 @@ from sensorgen.printer import Line
 from sensorgen.records import Strict, checked
 
 MOST = 1000  # specimens in one plan
-SLICERS = ("prusa", "cura")
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9._-]{0,58}[A-Za-z0-9])?$", examples=["26", "film-study"])]
 
 

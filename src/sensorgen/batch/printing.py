@@ -7,7 +7,7 @@ from shutil import rmtree
 from typing import Any
 
 from sensorgen import slicing, store
-from sensorgen.batch import tab
+from sensorgen.batch import printed, tab
 from sensorgen.batch.layout import Plate
 from sensorgen.batch.pieces import Piece, tools
 from sensorgen.batch.plan import Plan
@@ -58,7 +58,8 @@ def gcode(
     Returns
     -------
     dict
-        Version of the slicer, the names of its files, what the check of the printer's file found, and what it takes.
+        Version of the slicer, the names of its files, what is printed of each design, what the check of the printer's
+        file found, and what it takes.
     """
     inside, own, ready = folder / f".{slicer}", folder / slicer, folder / f"{name}.{slicer}.gcode"
     made = slicing.sliced(found, slicer, inside, title=name, time_limit_s=time_limit_s, step=lambda _: step("slicing"))
@@ -73,12 +74,16 @@ def gcode(
         settings = "settings.json"
         store.write(own, {settings: json_bytes(_engine_settings(found))})
     rmtree(inside)  # what is left are the bodies again, as the slicer took them
-    checked = check(ready, found[0].design.machine, tools(piece.design for piece in found))
+    loaded = tools(piece.design for piece in found)
+    checked = check(ready, found[0].design.machine, loaded, others_empty=True)
+    step("as printed")
+    printed_designs = printed.of_designs(found, made)
     return {
         "version": made.version,
         "gcode": ready.name,
         "raw": f"{slicer}/raw.gcode",
         "profile": f"{slicer}/{settings}",
+        "printed": printed_designs,
         **checked.as_dict(),
     }
 

@@ -11,6 +11,7 @@ from sensorgen.cli import show
 from sensorgen.cli.show import si
 from sensorgen.cli.words import OneOf
 from sensorgen.errors import BadInput
+from sensorgen.slicer import SLICERS
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.compared import Printed
@@ -34,7 +35,7 @@ def printed_options() -> list[click.Parameter]:
             help="Hold what is printed against what is drawn.",
         ),
         click.Option(
-            ["--slicer"], type=OneOf(("prusa", "cura")),
+            ["--slicer"], type=OneOf(SLICERS),
             help="With --as-printed: slice for real; estimated from each layer's mid-plane if not given.",
         ),
         click.Option(
@@ -59,12 +60,10 @@ def printed(design: "Design", slicer: str | None, walls: str | None) -> "Printed
     if not slicer:
         return compared.estimated(design, walls or "arachne")
     from sensorgen import slicing
-    from sensorgen.gcode import paths
 
     with tempfile.TemporaryDirectory() as folder, show.progress(slicing.STEPS) as step:
         made = slicing.sliced([slicing.alone(design)], slicer, Path(folder), step=step)
-        lines = paths.read(made.raw, design.machine, "slicer")
-    return compared.sliced(design, lines, f"{slicer} {made.version}")
+    return compared.sliced(design, made.lines, f"{slicer} {made.version}")
 
 
 def compensated(
@@ -108,7 +107,10 @@ def lines(found: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _capacitance(c: Mapping[str, Any]) -> Iterator[str]:
-    drawn = c["drawn"] if isinstance(c["drawn"], str) else si(c["drawn"]["middle"], "F")
+    if isinstance(c["drawn"], str):
+        yield f"{'capacitance':18}{'none':>12}   {c['drawn']}"
+        return
+    drawn = si(c["drawn"]["middle"], "F")
     if c["printed"] is None:
         yield f"{'capacitance':18}{drawn:>12}   none: {next(iter(c['by_width'].values()))}"
         return

@@ -8,6 +8,7 @@ from click.shell_completion import CompletionItem
 
 from sensorgen.cli import show
 from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.slicer import TIME_LIMIT_S
 
 if TYPE_CHECKING:
     from sensorgen.batch import Batch
@@ -47,7 +48,7 @@ def _plan_command(name: str) -> click.Command:
             click.Option(
                 ["--time-limit", "time_limit_s"],
                 type=float,
-                default=1800.0,
+                default=TIME_LIMIT_S,
                 show_default=True,
                 metavar="SECONDS",
                 help="End a slicer after this time.",
@@ -83,7 +84,7 @@ def _make(plan: str, *, out: str, no_gcode: bool, time_limit_s: float, force: bo
         show.as_json({"folder": str(made.folder), **made.record})
     else:
         _say(made)
-    return FOUND_ERRORS if made.gcode_errors() else 0
+    return FOUND_ERRORS if made.gcode_errors() or (made.lost() and not force) else 0
 
 
 def _say(made: "Batch") -> None:
@@ -103,6 +104,8 @@ def _say(made: "Batch") -> None:
         click.echo(f"\n{slicer} {used['version']}: {_taken(used)}")
         for f in used["findings"]:
             click.echo(f"  {f['severity']}: line {f['line']}: {f['message']}; {f['advice']}")
+        for printed in used["printed"].values():
+            click.echo(f"  {printed['design']} as printed: {_printed(printed)}")
     click.echo(f"\n{made.folder}: {len(record['files']) + 1} files")
 
 
@@ -120,6 +123,22 @@ def _expected(expected: dict[str, Any]) -> str:
         return "no prediction"
     resistance = sum(expected["electrode_resistance_ohm"].values())
     return f"R {show.si(resistance, 'ohm')}, C {show.si(expected['capacitance_f']['middle'], 'F')}"
+
+
+def _printed(printed: dict[str, Any]) -> str:
+    """What is printed of a design, in one line."""
+    if "reason" in printed:
+        return str(printed["reason"])
+    gaps, drawn = printed["electrode_gap_mm"]["printed"], printed["electrode_gap_mm"]["drawn"]
+    capacitance = printed["capacitance_f"]["printed"]
+    resistances = printed["electrode_resistance_ohm"]["printed"]
+    lost = sum(f["severity"] == "error" and not f["waiver"] for f in printed["findings"])
+    parts = [f"electrode gap {' to '.join(f'{gap:g}' for gap in sorted(set(gaps)))} mm (drawn {drawn:g})"]
+    if capacitance:
+        parts.append(f"C {show.si(capacitance['lower'], 'F')} to {show.si(capacitance['upper'], 'F')}")
+    if resistances:
+        parts.append(f"R {show.si(sum(values[0] for values in resistances.values()), 'ohm')}")
+    return ", ".join(parts) + (f"; {lost} layers of bodies are not printed at all" if lost else "")
 
 
 @click.command("verify", short_help="Hash every file again and say what differs.")

@@ -9,11 +9,10 @@ from sensorgen.cli import asprinted_text, gcode_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf
 from sensorgen.errors import OutOfRange
+from sensorgen.slicer import SLICERS, TIME_LIMIT_S
 
 if TYPE_CHECKING:
     from sensorgen.design import Design
-
-SLICERS = ("prusa", "cura")
 
 OWN: list[click.Parameter] = [
     click.Option(
@@ -22,7 +21,7 @@ OWN: list[click.Parameter] = [
     ),
     click.Option(["--program"], default="", metavar="PATH", help="The slicer's program; the one on PATH if not given."),
     click.Option(
-        ["--time-limit", "time_limit_s"], type=float, default=1800.0, show_default=True, metavar="SECONDS",
+        ["--time-limit", "time_limit_s"], type=float, default=TIME_LIMIT_S, show_default=True, metavar="SECONDS",
         help="End the slicer after this time.",
     ),
     click.Option(["--out"], default="out", show_default=True, metavar="DIR", help="Folder for the designs' folders."),

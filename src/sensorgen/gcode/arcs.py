@@ -49,7 +49,7 @@ def chords(
 def _count(radius: float, turn: float) -> int:
     if not radius > SAG_MM:
         return 1
-    step = 2 * math.acos(1 - SAG_MM / radius)
+    step = 4 * math.asin(math.sqrt(SAG_MM / (2 * radius)))  # acos(1 - sag / radius) would be 0 for a large one
     return max(1, min(MOST_CHORDS, math.ceil(turn / step)))
 
 

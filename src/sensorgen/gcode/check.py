@@ -35,7 +35,13 @@ class Checked:
         return {"findings": [f.as_dict() for f in self.findings], **self.report.as_dict()}
 
 
-def check(source: Path | Iterable[str], machine: Printer, loaded: Mapping[int, str] | None = None) -> Checked:
+def check(
+    source: Path | Iterable[str],
+    machine: Printer,
+    loaded: Mapping[int, str] | None = None,
+    *,
+    others_empty: bool = False,
+) -> Checked:
     """Check a file, whoever has sliced it.
 
     Parameters
@@ -46,6 +52,8 @@ def check(source: Path | Iterable[str], machine: Printer, loaded: Mapping[int, s
         Who is to print it.
     loaded : mapping of int to str, optional
         Material of each tool, for masses.
+    others_empty : bool
+        Whether nothing is on the other tools, so that they must not print.
 
     Raises
     ------
@@ -61,5 +69,8 @@ def check(source: Path | Iterable[str], machine: Printer, loaded: Mapping[int, s
     """
     lines = lines_of(source) if isinstance(source, Path) else source
     motion = follow(lines, machine.control.prime_macro)
+    loads = dict(loaded or {})
     found = [*limits.check(motion, machine), *commands.check(motion, machine)]
-    return Checked(merged(found), report(motion, machine, dict(loaded or {})))
+    if others_empty:
+        found += commands.check_loaded(motion, loads)
+    return Checked(merged(found), report(motion, machine, loads))

@@ -1,6 +1,6 @@
 """What the commands of a file ask of the machine, one after the other: tools, heat, homing, modes, fans, macros."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from sensorgen.gcode.remarks import PRUSA
 from sensorgen.printer import Printer
 
 AXES = "XYZ"
+# Steps, accelerations, speeds, limits, tools and drives of the machine itself, which its own configuration sets.
+SETTINGS = ("M92", "M143", "M201", "M203", "M208", "M302", "M500", "M563", "M569", "M574", "M584", "M906")
 
 
 def check(motion: Motion, machine: Printer) -> Iterator[Found]:
@@ -31,6 +33,23 @@ def check(motion: Motion, machine: Printer) -> Iterator[Found]:
         yield from simulation.obey(event)
     yield from simulation.until(len(motion.rows))
     yield from simulation.end()
+
+
+def check_loaded(motion: Motion, loaded: Mapping[int, str]) -> Iterator[Found]:
+    """Refuse lines of tools on which there is nothing.
+
+    Parameters
+    ----------
+    motion : Motion
+        The file.
+    loaded : mapping of int to str
+        Material of each tool that has one.
+    """
+    tools = motion.tools.column(len(motion.rows), NO_TOOL)
+    for tool in np.setdiff1d(tools[motion.extruded_mm > 0], [NO_TOOL, *loaded]).astype(int).tolist():
+        number = int(motion.number[np.flatnonzero((tools == tool) & (motion.extruded_mm > 0))[0]])
+        known = ", ".join(f"{name} on {one}" for one, name in loaded.items())
+        yield error("tool", number, f"tool {tool} prints, and nothing is on it; loaded are {known}", "use another tool")
 
 
 class _Simulation:
@@ -58,7 +77,7 @@ class _Simulation:
             "G10": self._tool_settings, "M104": self._temperature, "M109": self._temperature, "M568": self._state,
             "M140": self._bed, "M190": self._bed, "M106": self._fan, "M107": self._fan, "M98": self._macro,
             "M82": self._absolute, "M83": self._relative_e, "G90": self._mode, "G91": self._mode, "G92": self._place,
-            "M116": self._waits,
+            "M116": self._waits, **dict.fromkeys(SETTINGS, self._setting),
         }  # fmt: skip
 
     # What holds for a stretch of moves.
@@ -72,6 +91,7 @@ class _Simulation:
             yield from self._pushing(number)
         if (number := self._first(self.prints, first, row)) is not None:
             yield from self._printing(number)
+            yield from self._too_late(number)
         if (number := self._first(self.travels, first, row)) is not None:
             yield from self._moving(number)
 
@@ -113,6 +133,11 @@ class _Simulation:
             yield Found("home", "warning", number, "a move comes before all axes are homed", "home first")
         if self.ended:
             yield Found("end", "warning", number, f"moves after {self.ended} are never reached", "remove them")
+
+    def _too_late(self, number: int) -> Iterator[Found]:
+        if self.ended:
+            message = f"lines after {self.ended} are never printed: it ends the print"
+            yield error("end", number, message, "end the print after its last line")
 
     # What each command does.
 
@@ -198,6 +223,13 @@ class _Simulation:
                 "leave it out",
             )  # fmt: skip
 
+    def _setting(self, event: Event) -> Iterator[Found]:
+        yield Found(
+            "settings", "warning", event.number,
+            f"{event.command.code} changes the machine itself; the check goes by the printer's file",
+            "leave it to the machine's own configuration",
+        )  # fmt: skip
+
     # What must have come by the end.
 
     def end(self) -> Iterator[Found]:
@@ -213,6 +245,9 @@ class _Simulation:
             )
         if not {"M140", "M190"} & self.seen:
             yield Found("start", "warning", 1, "no command for the bed: it stays as it is", "heat it (M140 or M190)")
+        if self.control.ends and not self.ended:
+            ends = " or ".join(self.control.ends)
+            yield Found("end", "warning", last, f"no {ends}: the file may be cut short", f"end with {ends}")
         yield from self._left_on(last)
         yield from self._raw()
 

@@ -25,8 +25,6 @@ _N = f"({words.NUMBER})"
 _PLAIN = re.compile(
     rf"G[01](?: +F{_N})?(?: +X{_N})?(?: +Y{_N})?(?: +Z{_N})?(?: +E{_N})?(?: +F{_N})? *(?:;[ -~\t]*)?[\r\n]*$"
 )
-
-
 _TOOL = re.compile("-?[0-9]{1,6}")
 
 
@@ -199,7 +197,8 @@ class _Follower:
             return None
         centre = start[0] + (i or 0.0) * self.scale, start[1] + (j or 0.0) * self.scale
         radii = [math.dist(centre, place[:2]) for place in (start, end)]
-        return centre if min(radii) > 0 and abs(radii[0] - radii[1]) <= 0.1 + 0.02 * min(radii) else None
+        alike = 0 < min(radii) < MOST_MM and abs(radii[0] - radii[1]) <= 0.1 + 0.02 * min(radii)
+        return centre if alike else None
 
     def _target(self, command: Command, number: int) -> tuple[float, float, float]:
         feed = self._number(command, "F", number)

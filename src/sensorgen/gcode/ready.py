@@ -129,7 +129,7 @@ class _Writer:
         self.homed = machine.tool_at_start() is not None  # such a printer may take tools at any time
         self.ended = False
         self.hot: list[int] = []
-        self.offset_mm = 0.0
+        self.offset_mm = None if self.control.tool_offsets_mm else 0.0  # an earlier print may have left another
         self.changes: dict[str, Callable[[Command], Sequence[str] | None]] = {
             "G10": self._tool_settings, "M104": self._temperature, "M109": self._temperature, "M106": self._fan,
             "M107": self._fan_off, "M82": self._absolute, "M116": self._of_tool, "M568": self._state,

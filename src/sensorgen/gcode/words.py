@@ -22,6 +22,7 @@ _TOKEN = re.compile(
     )""",
     re.VERBOSE | re.IGNORECASE | re.DOTALL,
 )
+_LONGEST = 4096  # characters before a comment; firmwares take a few hundred
 _MOST_FAULTS = 5  # of one line: a line of noise needs no more
 _META = re.compile(r"\s*(?:if|elif|else|while|break|continue|var|global|set|echo|abort|skip)\b", re.IGNORECASE)
 _FREE_TEXT = re.compile(r"\s*(?:N[0-9]+\s*)?(M(?:23|28|30|32|36|38|117))(?![0-9])\s*(.*)", re.IGNORECASE | re.DOTALL)
@@ -90,6 +91,8 @@ def parse(text: str) -> Line:
     >>> parse('M291 P"say ""hi""; go" S3').commands[0].text("P")
     'say "hi"; go'
     """
+    if len(text) > _LONGEST and len(text.partition(";")[0]) > _LONGEST:
+        return Line((), "", (f"a line of {len(text)} characters; no firmware takes it",))
     if free := _FREE_TEXT.match(text):
         code, rest = free.groups()
         return Line((Command(code.upper(), (("", rest.partition(";")[0].strip()),)),))

@@ -1,1 +1,4 @@
 """The slicers: their profiles, in their own formats."""
+
+SLICERS = ("prusa", "cura")  # those that can be run: PrusaSlicer and CuraEngine
+TIME_LIMIT_S = 1800.0  # that a slicer may take when nobody says otherwise

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 from sensorgen.errors import SlicerFailed
+from sensorgen.slicer import TIME_LIMIT_S
 
-TIMEOUT_S = 1800.0
 KEPT_LINES = 12
 _TICK_S = 0.1
 _KEPT_BYTES = 1 << 16
@@ -35,7 +35,7 @@ class Runner:
     """
 
     program: str = ""
-    time_limit_s: float = TIMEOUT_S
+    time_limit_s: float = TIME_LIMIT_S
     tick: Callable[[], None] = lambda: None
 
 
@@ -84,9 +84,19 @@ def run(
         except OSError as error:
             raise SlicerFailed(f"cannot run {command[0]}: {error.strerror or error}") from None
         if code != 0:
-            raise SlicerFailed(f"{name} failed with exit code {code}: {_last_words(said)}")
+            raise SlicerFailed(f"{name} {_failed(code)}: {_last_words(said)}")
         if not gcode.is_file() or gcode.stat().st_size == 0:
             raise SlicerFailed(f"{name} ended well but wrote no {gcode}: {_last_words(said)}")
+
+
+def _failed(code: int) -> str:
+    """Exit code in words; a negative one is a signal, as SIGXFSZ where files may not be larger."""
+    if code > 0:
+        return f"failed with exit code {code}"
+    try:
+        return f"was ended by {signal.Signals(-code).name}"
+    except ValueError:
+        return f"was ended by signal {-code}"
 
 
 def _wait(command: Sequence[str], said: BinaryIO, environment: Mapping[str, str], runner: Runner) -> int:
@@ -129,7 +139,8 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
 def _last_words(said: BinaryIO) -> str:
     """What the slicer calls an error, or else the end of what it said; the rest is licence and progress."""
     said.seek(max(0, said.seek(0, os.SEEK_END) - _KEPT_BYTES))
-    lines = [line.strip() for line in said.read().decode(errors="replace").splitlines()]
+    text = said.read().decode(errors="replace").replace("\t", " ")
+    lines = ["".join(filter(str.isprintable, line)).strip() for line in text.splitlines()]
     errors = [line for line in lines if "error" in line.lower()]
     kept = [line for line in lines if line and not any(word in line for word in ("[trace]", "[debug]", "[WARNING]"))]
     return " | ".join((errors or kept)[-KEPT_LINES:]) or "it said nothing"
