@@ -90,16 +90,27 @@ def run(b: "BenchRun") -> Iterator[str]:
 
 def _counted(facts: Mapping[str, Any]) -> Iterator[str]:
     """What was counted in a recording when it came in."""
-    for lockin in facts.get("lockins", ()):
-        counts = dict(lockin["counts"])
-        samples, valid = counts.pop("samples"), counts.pop("valid")
-        marks = ", ".join(f"{count} {mark}" for mark, count in counts.items() if count)
-        tones = ", ".join(si(tone, "Hz") for tone in lockin["tones_hz"])
-        yield f"lock-in {lockin['lockin']}  {samples} samples, {valid} of them sound; {marks or 'no marks'}"
-        yield f"{'':11}{tones}; {lockin['seconds']:.5g} s by {lockin['program'] or lockin['format']}"
+    for one in facts.get("lockins", ()):
+        yield from counted(
+            one["lockin"], one["counts"], one["tones_hz"], one["seconds"], one["program"] or one["format"]
+        )
     if "rig" in facts:
-        rig = facts["rig"]
-        yield f"{'rig':11}{rig['rows']} rows, {rig['errors']} with errors; {rig['clocks']}"
+        yield rig_counted(facts["rig"])
+        yield f"{'':11}{facts['rig']['clocks']}"
+
+
+def counted(
+    lockin: int, counts: Mapping[str, int], tones_hz: Sequence[float], seconds: float, by: str
+) -> Iterator[str]:
+    """Samples of one lock-in, those that are sound, and marks."""
+    said = ", ".join(f"{n} {mark}" for mark, n in counts.items() if n and mark not in ("samples", "valid"))
+    yield f"lock-in {lockin}  {counts['samples']} samples, {counts['valid']} of them sound; {said or 'no marks'}"
+    yield f"{'':11}{', '.join(si(tone, 'Hz') for tone in tones_hz)}; {seconds:.5g} s by {by}"
+
+
+def rig_counted(counts: Mapping[str, int]) -> str:
+    """Rows of the rig's log, and those with errors."""
+    return f"{'rig':11}{counts['rows']} rows, {counts['errors']} with errors"
 
 
 def plain(entry: "Entry") -> dict[str, Any]:

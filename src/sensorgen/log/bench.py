@@ -15,7 +15,7 @@ from sensorgen.log.logbook import Log
 from sensorgen.log.words import design_of_name, named
 
 if TYPE_CHECKING:
-    from sensorgen.recording import Joined, Recording
+    from sensorgen.recording import Joined, Recording, RigLog
 
 
 Columns = Mapping[str, str]
@@ -75,6 +75,33 @@ def take(
         facts=json.dumps(facts, sort_keys=True, allow_nan=False),
     )  # fmt: skip
     return [row for row in log.add([*kept, run]) if isinstance(row, BenchRun)]
+
+
+def reopened(log: Log, run: BenchRun) -> "tuple[tuple[Recording, ...], RigLog | None]":
+    """What was logged, read again from the raw files, by the columns that were told then.
+
+    Parameters
+    ----------
+    log : Log
+        An open one.
+    run : BenchRun
+        One of its recordings.
+
+    Returns
+    -------
+    tuple of Recording, RigLog or None
+        Every lock-in, and the rig's log if there is one.
+
+    Raises
+    ------
+    BadInput
+        A raw file that is missing or damaged.
+    """
+    from sensorgen import recording
+
+    facts = json.loads(run.facts)
+    found = recording.read_all(log.raw(run.file), facts.get("columns"))
+    return found, recording.rig(log.raw(run.rig_file), facts.get("rig_columns")) if run.rig_file else None
 
 
 def _facts(lcr: tuple[Path, Columns], rig: tuple[Path | None, Columns]) -> dict[str, Any]:

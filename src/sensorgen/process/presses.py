@@ -184,7 +184,7 @@ def pairs(
     presses : list of Press
         As :func:`pressed` or :func:`found` gives them.
     force_n, position_mm : (n,) array
-        What pressed when [N], [mm].
+        What pressed when; nan where nobody knows [N], [mm].
     window_s : float
         How long is averaged: until ``guard_s`` before the press, and until ``guard_s`` before its end [s].
     guard_s : float
@@ -212,7 +212,7 @@ def pairs(
             )
             continue
         means = _mean(time_s[before], impedance_ohm[before]), _mean(time_s[under], impedance_ohm[under])
-        rows.append((press.start_s, float(np.nanmean(force_n[under])), float(np.nanmean(position_mm[under])), *means))
+        rows.append((press.start_s, _middle(force_n[under]), _middle(position_mm[under]), *means))
     if not rows:
         raise BadInput(f"{len(presses)} presses, none with {_LEAST} readings before and under it; expected some")
     at, force, position, first, second = zip(*rows, strict=True)
@@ -223,6 +223,12 @@ def pairs(
                   for a, b in zip(first, second, strict=True)]),
         np.array([(a.samples, b.samples) for a, b in zip(first, second, strict=True)]), tuple(left_out),
     )  # fmt: skip
+
+
+def _middle(values: Real) -> float:
+    """Mean of those that are known; nan where none is."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else np.nan
 
 
 def _column(means: tuple[_Mean, ...]) -> Complex:
