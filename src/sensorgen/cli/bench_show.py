@@ -117,14 +117,15 @@ def _value(pairs: "Pairs", i: int, k: int, part: str) -> str:
 
 
 def in_brackets(value: float, error: float) -> str:
-    """A value, with its standard error in units of its last digit.
+    """A value, with its standard error in units of its last digit: one digit of it, two where it begins with 1.
 
-    >>> in_brackets(-12.3456, 0.0312), in_brackets(12345.6, 41.0), in_brackets(1.0, 0.0), in_brackets(2.0, 0.0996)
-    ('-12.35(3)', '12350(40)', '1', '2.0(1)')
+    >>> in_brackets(-12.3456, 0.0312), in_brackets(12345.6, 41.0), in_brackets(1.0, 0.0), in_brackets(-2.0, 0.0996)
+    ('-12.35(3)', '12350(40)', '1', '-2.00(10)')
     """
     if not error > 0:
         return f"{value:.6g}"
-    power = floor(log10(float(f"{error:.0e}")))
+    power = floor(log10(float(f"{error:.1e}")))
+    power -= error < 1.95 * 10.0**power
     last = round(error / 10.0**power)
     shown = round(value, -power) + 0.0  # never -0
     return f"{shown:.{-power}f}({last})" if power < 0 else f"{shown:.0f}({last * 10**power})"
