@@ -149,8 +149,12 @@ def test_the_command_and_the_way_out_and_in_again(run, path, run_files, tmp_path
         assert [(r.number, r.specimen) for r in log.recordings()] == [(2, "26 triX .1mm 2")]
         assert len(log.recordings(superseded=True)) == 2
     assert json.loads(run("show", "26 triX .1mm", "--json").out)[0]["remark"] == "x"
+    again = run("bench", "26 triX .1mm 2", *run_files, "--corrects", "2", "--remark", "y").out  # or its words alone
+    assert "corrects   row 2" in again
+    assert "corrected  by row 3" in run("show", "26 triX .1mm 2").out
+    assert "has this very recording" in run("bench", "26 triX .1mm 2", *run_files, "--corrects", "2").out
     assert run("export", "out").code == 0
-    assert "4 of 4 rows logged" in run("import", "out", "--log", "new.db").out
+    assert "5 of 5 rows logged" in run("import", "out", "--log", "new.db").out
     with Log(path) as one, Log(tmp_path / "new.db") as other:
         assert one.recordings() == other.recordings()
         assert list(verify.faults(other)) == []

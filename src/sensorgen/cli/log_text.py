@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from sensorgen.cli.show import si
 
 if TYPE_CHECKING:
-    from sensorgen.log import BenchRun, Entry, Reading
+    from sensorgen.log import BenchRun, Entry, Log, Reading
 
 _REMARK = 20  # letters of a remark in a list
 
@@ -133,6 +133,22 @@ def of(entry: "Entry") -> Iterator[str]:
     if isinstance(entry, BenchRun):
         return run(entry)
     return other(entry)
+
+
+def corrections(entry: "Entry", log: "Log") -> Iterator[str]:
+    """Which row this one corrects, and which one corrects it."""
+    from sensorgen.log import BenchRun, Reading
+
+    if isinstance(entry, Reading | BenchRun):
+        if entry.supersedes:
+            yield from (
+                f"  {'corrects':11}row {old.number}"
+                for old in log.entries(type(entry), superseded=True, uid=entry.supersedes)
+            )
+        yield from (
+            f"  {'corrected':11}by row {new.number}"
+            for new in log.entries(type(entry), superseded=True, supersedes=entry.uid)
+        )
 
 
 def other(entry: "Entry") -> Iterator[str]:

@@ -92,7 +92,7 @@ def _say_logged(new: Sequence["Entry"], log: "Log", *, as_json: bool, known: str
         show.as_json([log_text.plain(entry) for entry in new])
         return
     for entry in new:
-        click.echo("logged " + "\n".join([*log_text.of(entry), *_near(entry, log)]))
+        click.echo("logged " + "\n".join([*log_text.of(entry), *log_text.corrections(entry, log), *_near(entry, log)]))
     if not new:
         click.echo(known)
     click.echo(f"in {log.path}")
@@ -148,7 +148,12 @@ def _bench(
             log, specimen, Path(lcr_file), Path(rig_file) if rig_file else None, **maps, remark=remark,
             supersedes=_uid(log, BenchRun, corrects),
         )  # fmt: skip
-        _say_logged(new, log, as_json=as_json, known=f"{specimen}: the log has this very recording")
+        _say_logged(
+            new,
+            log,
+            as_json=as_json,
+            known=f"{specimen}: the log has this very recording; --corrects NUMBER changes remark or columns",
+        )
 
 
 def _predict(design: "Design", *, file: str | None, as_json: bool) -> int:

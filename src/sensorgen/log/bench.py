@@ -68,13 +68,18 @@ def take(
         raise BadInput(f"{str(recording)!r} {files.CHANGES}")
     design_id, design = design_of_name(name)
     run = BenchRun(
-        uid=sha256(" ".join([str(told["specimen"]), *(file.uid for file in kept)]).encode()).hexdigest()[:32],
+        uid=_uid(str(told["specimen"]), *(file.uid for file in kept), supersedes),
         **told,  # type: ignore[arg-type]
         written=specimen, design_id=design_id, design=design, source=recording.name, remark=remark,
         supersedes=supersedes, file=kept[0].uid, rig_file=kept[1].uid if rig else "",
         facts=json.dumps(facts, sort_keys=True, allow_nan=False),
     )  # fmt: skip
     return [row for row in log.add([*kept, run]) if isinstance(row, BenchRun)]
+
+
+def _uid(*says: str) -> str:
+    """A name for life: of the specimen and its files, and of the row that is corrected, if one is."""
+    return sha256(" ".join(filter(None, says)).encode()).hexdigest()[:32]
 
 
 def reopened(log: Log, run: BenchRun) -> "tuple[tuple[Recording, ...], RigLog | None]":
