@@ -117,6 +117,15 @@ def test_a_bad_recording_is_told_and_nothing_is_kept(log, tmp_path, run_files, n
     assert not (tmp_path / "pwned").exists()
 
 
+def test_a_huge_file_is_refused_before_it_is_read(log, tmp_path, run_files, monkeypatch):
+    with (tmp_path / "huge.mat").open("wb") as file:
+        file.truncate(1 << 42)  # takes no space
+    monkeypatch.setattr(files, "raw_file", lambda path: pytest.fail(f"{path} is read"))
+    for pair in ((tmp_path / "huge.mat", None), (run_files[0], tmp_path / "huge.mat")):
+        with pytest.raises(SensorgenError, match=r"huge.mat': 4.1e\+03 GB; expected up to 2 GB"):
+            take(log, "26 triX", *pair)
+
+
 def test_a_recording_that_grows_while_it_is_read_is_refused(log, tmp_path, monkeypatch):
     from sensorgen.log import bench
 

@@ -76,9 +76,10 @@ def test_a_verdict_carries_its_numbers():
     assert isnan(blank.ratio)
     assert verdict(Evidence("z", (650.0,), (6500.0,))).same_order is True
     assert verdict(Evidence("z", (650.0,), (6501.0,))).same_order is False
-    with pytest.raises(OutOfRange, match="from 0 on"):
-        verdict(Evidence("z", (-1.0,)))
-    with pytest.raises(OutOfRange):
+    below = verdict(Evidence("z", (650.0,), (-0.3,), 600.0))  # the meter's offset
+    assert (below.word, below.rz_ohm, below.leak_s) == ("short", 0, inf)
+    assert verdict(Evidence("z", (-5.0,), (inf,), 600.0)).word == "unknown"
+    with pytest.raises(OutOfRange, match="expected numbers, or none"):
         verdict(Evidence("z", (nan,)))
 
 

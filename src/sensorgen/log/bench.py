@@ -61,6 +61,8 @@ def take(
         A name or a file that cannot be read. Nothing is logged or kept then.
     """
     told, name = named(specimen)
+    for path in filter(None, (recording, rig)):
+        _check_size(path)
     before = [files.raw_file(path) for path in (recording, rig) if path]
     facts = _facts((recording, columns), (rig, rig_columns))
     kept = [files.keep(log.files, path) for path in (recording, rig) if path]
@@ -75,6 +77,14 @@ def take(
         facts=json.dumps(facts, sort_keys=True, allow_nan=False),
     )  # fmt: skip
     return [row for row in log.add([*kept, run]) if isinstance(row, BenchRun)]
+
+
+def _check_size(path: Path) -> None:
+    """Refuse what no reader takes before all of it is read for its SHA-256."""
+    from sensorgen.recording.files import MOST_BYTES
+
+    if path.is_file() and (size := path.stat().st_size) > MOST_BYTES:
+        raise BadInput(f"{str(path)!r}: {size / 2**30:.3g} GB; expected up to {MOST_BYTES >> 30} GB: split the run")
 
 
 def _uid(*says: str) -> str:

@@ -164,13 +164,17 @@ def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> Verdict:
     Raises
     ------
     OutOfRange
-        Readings below 0, or an expected resistance that is not above it.
+        A reading that is no number, or an expected resistance that is not above 0.
+
+    Notes
+    -----
+    A reading below 0 is one of 0: a meter's offset, and its leads, are subtracted.
     """
     if of.expected_ohm <= 0:
         raise OutOfRange(f"{of.name}: {of.expected_ohm:g} ohm expected of an electrode; expected a number above 0")
-    if any(not value >= 0 for value in (*of.ry_ohm, *of.rz_ohm)):
-        raise OutOfRange(f"{of.name}: readings {of.ry_ohm} and {of.rz_ohm} ohm; expected numbers from 0 on")
-    ry, rz = min(of.ry_ohm, default=nan), min(of.rz_ohm, default=nan)
+    if any(isnan(value) for value in (*of.ry_ohm, *of.rz_ohm)):
+        raise OutOfRange(f"{of.name}: readings {of.ry_ohm} and {of.rz_ohm} ohm; expected numbers, or none")
+    ry, rz = (max(0.0, min(values)) if values else nan for values in (of.ry_ohm, of.rz_ohm))
     electrode, why_electrode = _electrode(of, ry)
     film, why_film = _film(ry, rz, of.expected_ohm, intact_ohm)
     leak = nan if isnan(rz) or isnan(ry) or ry == inf else leak_s(rz, ry)
