@@ -81,7 +81,7 @@ def take(
 
 def _check_size(path: Path) -> None:
     """Refuse what no reader takes before all of it is read for its SHA-256."""
-    from sensorgen.recording.files import MOST_BYTES
+    from sensorgen.recording.matfive import MOST_BYTES
 
     if path.is_file() and (size := path.stat().st_size) > MOST_BYTES:
         raise BadInput(f"{str(path)!r}: {size / 2**30:.3g} GB; expected up to {MOST_BYTES >> 30} GB: split the run")
