@@ -1,6 +1,7 @@
 """Recordings of the bench: counted, joined with the rig, and kept whole under their SHA-256."""
 
 import json
+import re
 from hashlib import sha256
 
 import made
@@ -55,6 +56,7 @@ def test_counts_and_clocks_are_those_of_the_run(log, run_files):
     assert 0 < lockin["counts"]["transient"] < 40
     assert lockin["rate_hz"] == pytest.approx(140, rel=1e-3)
     assert facts["rig"]["errors"] == 2
+    assert 10 < facts["rig"]["samples"] < 60  # two rows of 50 ms, and what lies before the rig's first
     assert facts["rig"]["offset_s"] == pytest.approx(OFFSET_S + 0.03, abs=4 * facts["rig"]["offset_error_s"])
     assert "s" in facts["rig"]["clocks"]
 
@@ -150,6 +152,7 @@ def test_the_command_and_the_way_out_and_in_again(run, path, run_files, tmp_path
     assert (said.code, said.err) == (0, "")
     assert "recording 1: 26 triX .1mm" in said.out
     assert "rig's clock + 3.2" in said.out
+    assert re.search(r"rows, 2 with errors; \d+ samples beside them", said.out)
     assert "has this very recording" in run("bench", "26 triX .1mm", *run_files).out
     assert "1 recordings" in run("list").out
     assert "no such row" in run("bench", "26 triX .1mm 2", *run_files, "--corrects", "9").line

@@ -6,46 +6,28 @@ from math import nan
 import pytest
 from scipy import stats
 
+from sensorgen.log import Log, importing
 from sensorgen.process.verdicts import Evidence, expected_from, verdict
 from sensorgen.process.yields import dependence, groups
 
-# iteration, shape, film [mm], R_Y and R_Z [ohm], and h for holes or u for not baked among the remarks
-TABLE = """
-19 rect 0.0 900 0 -; 19 rect 0.0 - - -; 20 rect 0.0 1400 - -; 20 rect 0.0 600000 - -; 20 rect 0.0 1400 - -;
-20 rect 0.0 1700 - -; 20 rect - 59000 - u; 20 rect - 6900 70000 -; 21 tri 0.0 2900 - -;
-22 tri 0.0 2300/3800 3300/1300 h; 22 rect 0.0 2500 650000 -; 23 tri 0.0 680 45 -; 23 tri 0.0 600 13 -;
-23 tri 0.0 630 13.6 -; 23 tri 0.0 670 53 -; 23 tri 0.0 680 32 -; 23 tri 0.1 740 28 -; 23 tri 0.1 800 1130 h;
-23 tri 0.1 800 0.27 -; 23 tri 0.2 650 260 h; 23 tri 0.2 8000 39300 h; 23 tri 0.2 850 40 -; 23 tri 0.2 800 300 h;
-23 tri 0.0 360 7 -; 23 tri 0.0 435 16/24 -; 23 tri 0.0 500 18 -; 23 tri 0.0 500 34 -; 23 tri 0.0 450 30 -;
-23 tri 0.1 500 9.2 -; 23 tri 0.1 500 45 -; 23 tri 0.1 900 110 h; 23 tri 0.1 900 300/1800 h; 23 tri 0.1 700 700 h;
-23 tri 0.1 1000 1100 h; 23 tri 0.1 650 36 -; 23 tri 0.1 75000 1100000 u; 23 tri 0.2 900 300 -;
-23 tri 0.2 38000 300000 -; 23 tri 0.2 400 13 -; 23 tri 0.2 600 65/130 -; 23 tri 0.2 500 45 -;
-23 rect 0.0 750 142 -; 23 rect 0.0 1200 2000 h; 23 rect 0.0 800 123 -; 23 rect 0.0 600 60 -;
-23 rect 0.1 1000 2000 -; 23 rect 0.1 1400 700000 -; 23 rect 0.1 2500/3000 5000/0 h; 23 rect 0.1 1100 20000 -;
-23 rect 0.2 1000 1600 h; 23 rect 0.2 2200 5700 h; 23 rect 0.2 1300 700 h; 23 rect 0.2 700 600/800 h;
-23 rect 0.0 600 200/400 h; 23 rect 0.0 1100 1400 h; 23 rect 0.0 900 1200 h; 23 rect 0.0 700 38 -;
-23 rect 0.0 1000 1000 h; 23 rect 0.1 1000 1000 -; 23 rect 0.1 - - -; 23 rect 0.1 0.8 - -; 23 rect 0.2 3000 - -;
-23 rect 0.2 1400 0 -; 23 rect 0.2 1600/1000 500/1000/1300 -; 23 rect 0.2 4000 4000 -; 25 tri 0.0 500/800 260 -;
-25 tri 0.0 400/600 100/180 -; 25 rect 0.0 900/2000 500/3000 -; 25 rect 0.0 800/2300 8500/10500 -
-"""
-
-
-def numbers(text):
-    return () if text == "-" else tuple(map(float, text.split("/")))
-
 
 @pytest.fixture(scope="module")
-def judged():
-    made = []
-    for k, row in enumerate(TABLE.replace("\n", " ").strip().split(";"), 1):
-        iteration, shape, film, ry, rz, remark = row.split()
-        made.append(Evidence(f"row {k}", numbers(ry), numbers(rz), nan, shape, None if film == "-" else float(film),
-                             {"h": "holes", "u": "not baked", "-": ""}[remark], iteration))  # fmt: skip
+def judged(tmp_path_factory):
+    with Log(tmp_path_factory.mktemp("d1") / "log.db", create=True) as log:
+        importing.thesis(log)
+        made = [
+            Evidence(f"row {r.source_row}", r.y_ohm, r.z_ohm, nan, r.shape, r.film_mm, remark(r), str(r.iteration))
+            for r in log.readings()
+        ]
     expected = {shape: expected_from([e for e in made if e.shape == shape and e.remark != "not baked"])
                 for shape in ("tri", "rect")}  # fmt: skip
     assert expected == {"tri": 670, "rect": 1050}
     made = [replace(e, expected_ohm=expected[e.shape]) for e in made]
     return [(e, verdict(e)) for e in made]
+
+
+def remark(reading):
+    return "not baked" if reading.baked is False else "holes" if "holes" in reading.remark else reading.remark
 
 
 def counts(found):

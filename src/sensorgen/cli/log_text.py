@@ -95,8 +95,10 @@ def _counted(facts: Mapping[str, Any]) -> Iterator[str]:
             one["lockin"], one["counts"], one["tones_hz"], one["seconds"], one["program"] or one["format"]
         )
     if "rig" in facts:
-        yield rig_counted(facts["rig"])
-        yield f"{'':11}{facts['rig']['clocks']}"
+        rig = facts["rig"]
+        marked = f"; {rig['samples']} samples beside them, or while it was silent" if rig.get("samples") else ""
+        yield rig_counted(rig) + marked
+        yield from (f"{'':11}{said}" for said in (rig["clocks"], *rig.get("notes", ())))
 
 
 def counted(

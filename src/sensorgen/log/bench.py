@@ -128,7 +128,7 @@ def _facts(lcr: tuple[Path, Columns], rig: tuple[Path | None, Columns]) -> dict[
     if rig[0]:
         log = recording.rig(rig[0], rig[1])
         facts["rig_columns"] = dict(rig[1])
-        facts["rig"] = {**log.counts(), "notes": list(log.notes), **_of_clocks(recording.joined(found[0], log))}
+        facts["rig"] = {**log.counts(), **_of_joined(recording.joined(found[0], log))}
     return facts
 
 
@@ -144,9 +144,11 @@ def _of_recording(r: "Recording") -> dict[str, Any]:
     }
 
 
-def _of_clocks(joined: "Joined") -> dict[str, Any]:
+def _of_joined(joined: "Joined") -> dict[str, Any]:
     names = ("offset_s", "offset_error_s", "skew", "skew_error", "explained")
-    return {"clocks": joined.words()} | {name: _plain(getattr(joined, name)) for name in names}
+    numbers = {name: _plain(getattr(joined, name)) for name in names}
+    samples = joined.recording.counts()["rig error"]
+    return {"clocks": joined.words(), "notes": list(joined.notes), "samples": samples} | numbers
 
 
 def _plain(value: Any) -> Any:
