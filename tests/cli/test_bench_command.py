@@ -79,7 +79,10 @@ def changed(lived):
 def test_a_recording_shows_what_its_presses_change(run, files, lived):
     said = run("bench", "show", "run.mat", "--rig", files)
     assert (said.code, said.err) == (0, "")
-    assert all(len(line) <= 80 for line in said.out.splitlines())
+    table = said.out[said.out.index("start [s]") :].splitlines()
+    assert len(table) == 1 + len(MADE)
+    assert all(len(line) == 77 and line.count("(") in (0, 4) for line in table)
+    assert "99.7kHz" in table[0]
     assert "14 zero, " in said.out
     assert "2 with errors" in said.out
     assert "rig's clock + 3.2" in said.out

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sensorgen.recording import Recording, RigLog
     from sensorgen.recording.samples import Complex, Real
 
-_WIDE = 15  # letters of a column
+_WIDE = 13  # letters of a column
 
 
 def _show(
@@ -101,10 +101,10 @@ def _table(pairs: "Pairs", tones_hz: list[float]) -> Iterator[str]:
     """A line for each press: what it changes at the first and at the last tone."""
     ends = sorted({0, len(tones_hz) - 1})
     heads = (f"Δ{part} {units.frequency_text(tones_hz[k])}" for k in ends for part in "RX")
-    yield f"{'start [s]':>9} {'[N]':>5} {'[mm]':>5}" + "".join(f"{head:>{_WIDE}}" for head in heads)
+    yield f"{'start [s]':>9} {'[N]':>5} {'[mm]':>5}" + "".join(f" {head:>{_WIDE}}" for head in heads)
     for i, start in enumerate(pairs.time_s):
         at = f"{start:9.2f} {_known(pairs.force_n[i], 2):>5} {_known(pairs.position_mm[i], 1):>5}"
-        yield at + "".join(f"{_value(pairs, i, k, part):>{_WIDE}}" for k in ends for part in ("real", "imag"))
+        yield at + "".join(f" {_value(pairs, i, k, part):>{_WIDE}}" for k in ends for part in ("real", "imag"))
 
 
 def _known(value: float, digits: int) -> str:
