@@ -12,7 +12,7 @@ PAGES = (
     [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"],
     ["slice"], ["slice", "tri"], ["gcode"], ["gcode", "check"], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
     ["predict"], ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["invert"], ["sheet"], ["stack"],
-    ["bench"], ["bench", "plan"], ["bench", "plan", "tri"],
+    ["bench"], ["bench", "plan"], ["bench", "plan", "tri"], ["bench", "show"],
     ["log"], *(["log", w] for w in ("multimeter", "import", "bench", "predict", "list", "show", "export", "verify")),
     ["report"], ["fit"], ["thesis"], ["list"], ["schema"], ["completion"],
 )  # fmt: skip

@@ -1,10 +1,15 @@
-"""``sensorgen bench plan``: a design in, presses for a rig out."""
+"""``sensorgen bench``: a design in, presses for a rig out; the rig's recording in, what presses change out."""
 
 import csv
 import io
 import json
 
+import made
+import numpy as np
 import pytest
+import scipy.io
+
+from sensorgen.recording import read, rig
 
 
 def test_a_plan_as_csv_stays_on_the_sensor(run):
@@ -45,3 +50,116 @@ def test_what_cannot_be_planned_is_refused(run, words, said):
     found = run("bench", "plan", "reference", *words)
     assert found.code == 2
     assert said in found.err
+
+
+MADE = made.presses(12, seed=3, dwell_s=3, rest_s=3)
+
+
+@pytest.fixture(scope="module")
+def lived():
+    return made.run(MADE, rate_hz=70, creep=0.02)
+
+
+@pytest.fixture
+def files(tmp_path, lived):
+    """A recording with 14 samples skipped, one of two lock-ins, and the log of a rig with two errors."""
+    z = lived.impedance_ohm.copy()
+    z[1400:1414] = 0
+    one, two = (made.stamps(lived.time_s), (made.TONES_HZ, made.TONES_HZ[:2]))
+    scipy.io.savemat(tmp_path / "run.mat", made.tree([z], [lived.time_s], one))
+    scipy.io.savemat(tmp_path / "two.mat", made.tree([z, z[:4000, :2]], [lived.time_s, lived.time_s[:4000]], one, two))
+    return made.write_rig(tmp_path / "rig.csv", made.rig_rows(MADE, 3.2), {100: "stalled", 101: "stalled"})
+
+
+def changed(lived):
+    """What each press changes in truth [ohm]."""
+    return np.array([made.sensor().impedance(made.TONES_HZ, f, x * 1e-3) for *_, f, x in MADE]) - lived.clean_ohm[0]
+
+
+def test_a_recording_shows_what_its_presses_change(run, files, lived):
+    said = run("bench", "show", "run.mat", "--rig", files)
+    assert (said.code, said.err) == (0, "")
+    table = said.out[said.out.index("start [s]") :].splitlines()
+    assert len(table) == 1 + len(MADE)
+    assert all(len(line) == 77 and line.count("(") in (0, 4) for line in table)
+    assert "99.7kHz" in table[0]
+    assert "14 zero, " in said.out
+    assert "2 with errors" in said.out
+    assert "rig's clock + 3.2" in said.out
+    data = json.loads(run("bench", "show", "run.mat", "--rig", files, "--json").out)
+    assert data["rig"] == {"rows": len(rig(files).time_s), "errors": 2}
+    assert data["counts"]["zero"] == 14
+    assert 0.02 < data["drift"] < 0.06
+    presses = data["presses"]
+    np.testing.assert_allclose([p["force_n"] for p in presses], [m[2] for m in MADE], atol=0.02)
+    np.testing.assert_allclose([p["position_mm"] for p in presses], [m[3] for m in MADE], atol=0.01)
+    off = np.array([p["difference_im_ohm"] for p in presses]) - changed(lived).imag
+    pulls = off / np.array([p["error_im_ohm"] for p in presses])
+    assert 0.7 < np.sqrt(np.mean(pulls**2)) < 1.3
+    kept = json.loads(run("bench", "show", "run.mat", "--rig", files, "--json", "--keep-drift").out)
+    assert kept["drift"] is None
+    worse = np.array([p["difference_im_ohm"] for p in kept["presses"]]) - changed(lived).imag
+    assert np.mean(np.abs(worse)) > 2 * np.mean(np.abs(off))
+
+
+def test_without_a_rig_presses_are_found_in_the_readings_and_their_forces_are_not_known(run, files):
+    said = run("bench", "show", "run.mat")
+    assert "found by the readings alone" in said.out
+    assert "?     ?" in said.out
+    presses = json.loads(run("bench", "show", "run.mat", "--json").out)["presses"]
+    assert len(MADE) - 1 <= len(presses) <= len(MADE)
+    assert all(p["force_n"] is None for p in presses)
+    assert run("bench", "show", "run.mat", "--plot", "out").out.splitlines()[-1] == "out/time.png"
+
+
+def test_a_recording_of_the_log_by_its_number_with_tables_and_pictures(run, files, tmp_path):
+    assert run("log", "bench", "26 triX .1mm", "run.mat", files).code == 0
+    (tmp_path / "run.mat").unlink()
+    said = run("bench", "show", "1", "--presses", "p.csv", "--filtered", "f.csv", "--plot", "out")
+    assert (said.code, said.err) == (0, "")
+    pictures = [f"out/{name}" for name in ("time.png", "resistance.png", "reactance.png", "run.html")]
+    assert said.out.splitlines()[-6:] == ["p.csv", "f.csv", *pictures]
+    assert all((tmp_path / name).stat().st_size > 10_000 for name in pictures)
+    filtered = read(tmp_path / "f.csv")
+    assert filtered.tones_hz.tolist() == made.TONES_HZ.tolist()
+    assert filtered.source.rate_hz == pytest.approx(70, rel=1e-3)
+    back = run("invert", "tri", "p.csv")
+    assert (back.code, back.err) == (0, "")
+    assert f"{len(MADE)} " in back.out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("two.mat",), "2 lock-ins; choose one with --lockin 1 to 2"),
+        (("two.mat", "--lockin", "3"), "--lockin 3: expected 1 to 2"),
+        (("run.mat", "--lockin", "2"), "expected 1, the only one"),
+        (("none.mat",), "there is no such file"),
+        (("rig.csv",), "rig.csv"),
+        (("run.mat", "--rig", "run.mat"), "run.mat"),
+        (("run.mat", "--cutoff", "50"), "a cut-off of 50 Hz at 70 samples/s"),
+        (("7",), "no log at"),
+    ],
+)
+def test_what_cannot_be_shown_is_told(run, files, words, said):
+    found = run("bench", "show", *words)
+    assert found.code == 2
+    assert said in found.line
+
+
+def test_the_log_has_no_such_recording_or_more_than_its_number_is_given(run, files):
+    run("log", "bench", "26 triX .1mm", "two.mat", files)
+    assert "no recording 7 in" in run("bench", "show", "7").line
+    assert "has its rig's log and columns" in run("bench", "show", "1", "--rig", files).line
+    assert "1.1 kHz, 2.3 kHz;" in run("bench", "show", "1", "--lockin", "2").out
+    assert run("bench", "show", "1", "--lockin", "2").out.count("lock-in") == 1
+
+
+def test_noise_alone_has_no_presses(run, tmp_path):
+    rng = np.random.default_rng(1)
+    rows = "".join(f"{k / 50},{100 + x:.6f},{-50 + y:.6f}\n" for k, (x, y) in enumerate(rng.normal(0, 0.1, (3000, 2))))
+    (tmp_path / "a.csv").write_text("time_s,re_ohm_1kHz,im_ohm_1kHz\n" + rows)
+    assert "nothing pressed" in run("bench", "show", "a.csv").out
+    assert "nothing pressed" in run("bench", "show", "a.csv", "--plot", "out").line
+    assert "nothing pressed" in run("bench", "show", "a.csv", "--presses", "p.csv").line
+    assert not (tmp_path / "p.csv").exists()

@@ -1,6 +1,7 @@
 """Recordings of the bench: counted, joined with the rig, and kept whole under their SHA-256."""
 
 import json
+import re
 from hashlib import sha256
 
 import made
@@ -55,6 +56,7 @@ def test_counts_and_clocks_are_those_of_the_run(log, run_files):
     assert 0 < lockin["counts"]["transient"] < 40
     assert lockin["rate_hz"] == pytest.approx(140, rel=1e-3)
     assert facts["rig"]["errors"] == 2
+    assert 10 < facts["rig"]["samples"] < 60  # two rows of 50 ms, and what lies before the rig's first
     assert facts["rig"]["offset_s"] == pytest.approx(OFFSET_S + 0.03, abs=4 * facts["rig"]["offset_error_s"])
     assert "s" in facts["rig"]["clocks"]
 
@@ -117,6 +119,15 @@ def test_a_bad_recording_is_told_and_nothing_is_kept(log, tmp_path, run_files, n
     assert not (tmp_path / "pwned").exists()
 
 
+def test_a_huge_file_is_refused_before_it_is_read(log, tmp_path, run_files, monkeypatch):
+    with (tmp_path / "huge.mat").open("wb") as file:
+        file.truncate(1 << 42)  # takes no space
+    monkeypatch.setattr(files, "raw_file", lambda path: pytest.fail(f"{path} is read"))
+    for pair in ((tmp_path / "huge.mat", None), (run_files[0], tmp_path / "huge.mat")):
+        with pytest.raises(SensorgenError, match=r"huge.mat': 4.1e\+03 GB; expected up to 2 GB"):
+            take(log, "26 triX", *pair)
+
+
 def test_a_recording_that_grows_while_it_is_read_is_refused(log, tmp_path, monkeypatch):
     from sensorgen.log import bench
 
@@ -141,6 +152,7 @@ def test_the_command_and_the_way_out_and_in_again(run, path, run_files, tmp_path
     assert (said.code, said.err) == (0, "")
     assert "recording 1: 26 triX .1mm" in said.out
     assert "rig's clock + 3.2" in said.out
+    assert re.search(r"rows, 2 with errors; \d+ samples beside them", said.out)
     assert "has this very recording" in run("bench", "26 triX .1mm", *run_files).out
     assert "1 recordings" in run("list").out
     assert "no such row" in run("bench", "26 triX .1mm 2", *run_files, "--corrects", "9").line
@@ -149,8 +161,12 @@ def test_the_command_and_the_way_out_and_in_again(run, path, run_files, tmp_path
         assert [(r.number, r.specimen) for r in log.recordings()] == [(2, "26 triX .1mm 2")]
         assert len(log.recordings(superseded=True)) == 2
     assert json.loads(run("show", "26 triX .1mm", "--json").out)[0]["remark"] == "x"
+    again = run("bench", "26 triX .1mm 2", *run_files, "--corrects", "2", "--remark", "y").out  # or its words alone
+    assert "corrects   row 2" in again
+    assert "corrected  by row 3" in run("show", "26 triX .1mm 2").out
+    assert "has this very recording" in run("bench", "26 triX .1mm 2", *run_files, "--corrects", "2").out
     assert run("export", "out").code == 0
-    assert "4 of 4 rows logged" in run("import", "out", "--log", "new.db").out
+    assert "5 of 5 rows logged" in run("import", "out", "--log", "new.db").out
     with Log(path) as one, Log(tmp_path / "new.db") as other:
         assert one.recordings() == other.recordings()
         assert list(verify.faults(other)) == []

@@ -31,6 +31,8 @@ def test_leaks_at_their_limits():
     assert (np.diff(small) < 0).all()
     with pytest.raises(OutOfRange):
         leak_s(-1.0, 600.0)
+    with pytest.raises(OutOfRange, match="0 ohm expected of an electrode"):
+        verdict(Evidence("x", (600.0,), (inf,), 0.0))
 
 
 @pytest.mark.parametrize(
@@ -49,7 +51,9 @@ def test_leaks_at_their_limits():
         ((60_000.0,), (inf,), "open electrode", "open electrode", "intact"),
         ((inf,), (40.0,), "open electrode", "open electrode", "short"),
         ((2000.0,), (5.0,), "short", "dry joint", "short"),
-        ((), (40.0,), "leak", "unknown", "leak"),
+        ((inf,), (5e7,), "open electrode", "open electrode", "leak"),
+        ((), (40.0,), "short", "unknown", "short"),
+        ((), (5000.0,), "leak", "unknown", "leak"),
         ((600.0,), (), "unknown", "sound", "unknown"),
         ((), (), "unknown", "unknown", "unknown"),
         ((0.8,), (inf,), "unknown", "unknown", "intact"),
@@ -72,9 +76,10 @@ def test_a_verdict_carries_its_numbers():
     assert isnan(blank.ratio)
     assert verdict(Evidence("z", (650.0,), (6500.0,))).same_order is True
     assert verdict(Evidence("z", (650.0,), (6501.0,))).same_order is False
-    with pytest.raises(OutOfRange, match="from 0 on"):
-        verdict(Evidence("z", (-1.0,)))
-    with pytest.raises(OutOfRange):
+    below = verdict(Evidence("z", (650.0,), (-0.3,), 600.0))  # the meter's offset
+    assert (below.word, below.rz_ohm, below.leak_s) == ("short", 0, inf)
+    assert verdict(Evidence("z", (-5.0,), (inf,), 600.0)).word == "unknown"
+    with pytest.raises(OutOfRange, match="expected numbers, or none"):
         verdict(Evidence("z", (nan,)))
 
 

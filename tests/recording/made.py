@@ -48,7 +48,7 @@ def force_at(time_s, made, ramp_s=0.2):
     return force, position
 
 
-def run(made, rate_hz=140.0, noise=1e-3, creep=0.0, slope_per_s=0.0, seed=1, of=None, tones_hz=TONES_HZ):
+def run(made, rate_hz=140.0, noise=1e-3, creep=0.0, slope_per_s=0.0, seed=1, of=None, tones_hz=TONES_HZ, law=None):
     of = of or sensor()
     rng = np.random.default_rng(seed)
     time = np.arange(round((made[-1][1] + 4) * rate_hz)) / rate_hz
@@ -60,7 +60,8 @@ def run(made, rate_hz=140.0, noise=1e-3, creep=0.0, slope_per_s=0.0, seed=1, of=
     step = 1e-6
     more = Sensor(**{**vars(of), "capacitance_f_per_m": of.capacitance_f_per_m * (1 + step)})
     by_c = np.log(more.impedance(tones_hz, 0.0, 0.05) / unpressed) / step
-    drift = (creep * np.log1p(time / 20) + slope_per_s * time)[:, None] * by_c
+    grown = law(time, force) if law else creep * np.log1p(time / 20) + slope_per_s * time
+    drift = grown[:, None] * by_c
     z = clean * np.exp(drift)
     z = z + noise * np.abs(z) * (rng.standard_normal(z.shape) + 1j * rng.standard_normal(z.shape))
     return Run(time, force, position, clean, drift, z, made)

@@ -3,6 +3,7 @@
 import made
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from sensorgen.errors import BadInput
 from sensorgen.recording import Clock, Recording, Source, join, joined, rig
@@ -31,7 +32,7 @@ def test_the_offset_is_found_within_its_error(tmp_path, run, offset_s):
     assert found.offset_error_s < 0.01
     assert found.offset_s == pytest.approx(offset_s + 0.03, abs=3 * found.offset_error_s)
     assert found.skew == 0
-    assert f"{found.offset_s:.6g}" in found.words()
+    assert f"{found.offset_s:.4f} +- " in found.words()
     truth, _ = made.force_at(run.time_s, MADE)
     told = np.isfinite(found.force_n)
     assert told.mean() > 0.99
@@ -75,15 +76,18 @@ def test_errors_and_silence_of_the_rig_are_marked_and_counted(tmp_path, run):
     assert not marked[np.searchsorted(run.time_s, [9.9, 10.15, 15.0])].any()
 
 
-def test_a_sensor_that_does_not_answer_leaves_the_clocks_as_they_are(tmp_path, run):
-    rng = np.random.default_rng(0)
-    z = 41 * np.exp(1e-3 * (rng.standard_normal((len(run.time_s), 7)) + 0j))
+@pytest.mark.parametrize("wanders", [0.0, 0.6, 0.99])  # how much of its noise a reading has from the one before
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_sensor_that_does_not_answer_leaves_the_clocks_as_they_are(tmp_path, run, wanders, seed):
+    noise = np.random.default_rng(seed).standard_normal((len(run.time_s), 7))
+    z = 41 * np.exp(1e-3 * lfilter([(1 - wanders**2) ** 0.5], [1, -wanders], noise, axis=0) + 0j)
     dead = made.Run(run.time_s, run.force_n, run.position_mm, z, z, z, run.presses)
     log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(MADE)))
     found = joined(recording(dead), log)
     assert (found.offset_s, found.skew) == (0, 0)
     assert np.isnan(found.offset_error_s)
     assert "believed" in found.words()
+
     with pytest.raises(BadInput, match="too little to find the offset"):
         joined(recording(dead, stamped=False), log)
     far = rig(made.write_rig(tmp_path / "far.csv", made.rig_rows(MADE, 9000.0)))
@@ -138,3 +142,12 @@ def test_errors_of_weights_hold_for_noise_that_hangs_together():
         found.append(weights[-2:])
         said.append(np.sqrt(np.diag(join._covariance(model, noise - model @ weights))))
     np.testing.assert_allclose(np.mean(said, axis=0), np.std(found, axis=0), rtol=0.15)
+
+
+def test_three_presses_in_noise_that_wanders_tell_the_offset(tmp_path):
+    lived = made.run(MADE[:3])
+    noise = np.random.default_rng(1).standard_normal(lived.impedance_ohm.shape)
+    lived.impedance_ohm *= np.exp(1e-3 * lfilter([0.14], [1, -0.99], noise, axis=0))
+    log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(MADE[:3], 3.217)))
+    found = joined(recording(lived), log)
+    assert found.offset_s == pytest.approx(3.247, abs=0.02)

@@ -1,4 +1,4 @@
-"""``sensorgen bench``: what a rig is to do."""
+"""``sensorgen bench``: what a rig is to do, and what it did."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sensorgen import units
-from sensorgen.cli import show
+from sensorgen.cli import bench_show, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Values, one
 from sensorgen.errors import BadInput, OutOfRange
@@ -47,9 +47,9 @@ PLAN: list[click.Parameter] = [
 ]  # fmt: skip
 
 
-@click.group("bench", short_help="Plan what a rig presses.")
+@click.group("bench", short_help="Plan what a rig presses, and see what came of it.")
 def command() -> None:
-    """Plans for the rig that presses sensors."""
+    """Plans for the rig that presses sensors, and its recordings."""
 
 
 def _work(
@@ -117,3 +117,4 @@ command.add_command(
         short_help="Write random presses, seeded, inside the sensor.",
     )
 )  # fmt: skip
+command.add_command(bench_show.command)

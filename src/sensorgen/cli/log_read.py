@@ -48,10 +48,11 @@ def _show(what: str, file: str | None, *, as_json: bool) -> None:
 
     with opened(file) as log:
         found = _found(log, what)
-    if as_json:
-        show.as_json([log_text.plain(entry) for entry in found])
-        return
-    click.echo("\n".join(line for entry in found for line in log_text.of(entry)))
+        if as_json:
+            show.as_json([log_text.plain(entry) for entry in found])
+            return
+        lines = [line for entry in found for line in (*log_text.of(entry), *log_text.corrections(entry, log))]
+    click.echo("\n".join(lines))
 
 
 def _found(log: "Log", what: str) -> list[Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from sensorgen.cli.show import si
 
 if TYPE_CHECKING:
-    from sensorgen.log import BenchRun, Entry, Reading
+    from sensorgen.log import BenchRun, Entry, Log, Reading
 
 _REMARK = 20  # letters of a remark in a list
 
@@ -90,16 +90,29 @@ def run(b: "BenchRun") -> Iterator[str]:
 
 def _counted(facts: Mapping[str, Any]) -> Iterator[str]:
     """What was counted in a recording when it came in."""
-    for lockin in facts.get("lockins", ()):
-        counts = dict(lockin["counts"])
-        samples, valid = counts.pop("samples"), counts.pop("valid")
-        marks = ", ".join(f"{count} {mark}" for mark, count in counts.items() if count)
-        tones = ", ".join(si(tone, "Hz") for tone in lockin["tones_hz"])
-        yield f"lock-in {lockin['lockin']}  {samples} samples, {valid} of them sound; {marks or 'no marks'}"
-        yield f"{'':11}{tones}; {lockin['seconds']:.5g} s by {lockin['program'] or lockin['format']}"
+    for one in facts.get("lockins", ()):
+        yield from counted(
+            one["lockin"], one["counts"], one["tones_hz"], one["seconds"], one["program"] or one["format"]
+        )
     if "rig" in facts:
         rig = facts["rig"]
-        yield f"{'rig':11}{rig['rows']} rows, {rig['errors']} with errors; {rig['clocks']}"
+        marked = f"; {rig['samples']} samples beside them, or while it was silent" if rig.get("samples") else ""
+        yield rig_counted(rig) + marked
+        yield from (f"{'':11}{said}" for said in (rig["clocks"], *rig.get("notes", ())))
+
+
+def counted(
+    lockin: int, counts: Mapping[str, int], tones_hz: Sequence[float], seconds: float, by: str
+) -> Iterator[str]:
+    """Samples of one lock-in, those that are sound, and marks."""
+    said = ", ".join(f"{n} {mark}" for mark, n in counts.items() if n and mark not in ("samples", "valid"))
+    yield f"lock-in {lockin}  {counts['samples']} samples, {counts['valid']} of them sound; {said or 'no marks'}"
+    yield f"{'':11}{', '.join(si(tone, 'Hz') for tone in tones_hz)}; {seconds:.5g} s by {by}"
+
+
+def rig_counted(counts: Mapping[str, int]) -> str:
+    """Rows of the rig's log, and those with errors."""
+    return f"{'rig':11}{counts['rows']} rows, {counts['errors']} with errors"
 
 
 def plain(entry: "Entry") -> dict[str, Any]:
@@ -122,6 +135,22 @@ def of(entry: "Entry") -> Iterator[str]:
     if isinstance(entry, BenchRun):
         return run(entry)
     return other(entry)
+
+
+def corrections(entry: "Entry", log: "Log") -> Iterator[str]:
+    """Which row this one corrects, and which one corrects it."""
+    from sensorgen.log import BenchRun, Reading
+
+    if isinstance(entry, Reading | BenchRun):
+        if entry.supersedes:
+            yield from (
+                f"  {'corrects':11}row {old.number}"
+                for old in log.entries(type(entry), superseded=True, uid=entry.supersedes)
+            )
+        yield from (
+            f"  {'corrected':11}by row {new.number}"
+            for new in log.entries(type(entry), superseded=True, supersedes=entry.uid)
+        )
 
 
 def other(entry: "Entry") -> Iterator[str]:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sensorgen.cli.settings import pairs
+
 if TYPE_CHECKING:
     from sensorgen.log import Log
 
@@ -31,6 +33,18 @@ def corrects() -> click.Option:
     return click.Option(["--corrects"], metavar="NUMBER", type=int, help="Number of the row that this one corrects.")
 
 
+def lcr_columns() -> click.Option:
+    """Names of columns in an instrument's CSV."""
+    about = "Column of the readings' file, if it is CSV and calls it otherwise: time_s, stamp_s, re_ohm_1.1kHz ..."
+    return click.Option(["--column", "columns"], metavar="OURS=THEIRS", multiple=True, help=about)
+
+
+def rig_columns() -> click.Option:
+    """Names of columns in a rig's log."""
+    about = "Column of the rig's log: time_s, set_force_n, set_position_mm, force_n, error."
+    return click.Option(["--rig-column", "rig_columns"], metavar="OURS=THEIRS", multiple=True, help=about)
+
+
 def made(work: Callable[..., Any], name: str, about: str, *params: click.Parameter) -> click.Command:
     """A command that does some work, its help being what the work's docstring says."""
     return click.Command(name, params=list(params), callback=work, help=work.__doc__, short_help=about)
@@ -41,3 +55,8 @@ def opened(file: str | None, *, create: bool = False) -> "Log":
     from sensorgen.log import Log, place
 
     return Log(Path(file) if file else place(), create=create)
+
+
+def columns_of(words: tuple[str, ...], option: str) -> dict[str, str]:
+    """Columns as told by OURS=THEIRS: what the file calls them, to what we do."""
+    return {theirs: ours for ours, theirs in pairs(words, option)}

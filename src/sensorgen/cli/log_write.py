@@ -11,7 +11,7 @@ import click
 from sensorgen.cli import show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.log_words import as_json as json_option
-from sensorgen.cli.log_words import corrects, made, opened, remark, where
+from sensorgen.cli.log_words import columns_of, corrects, lcr_columns, made, opened, remark, rig_columns, where
 from sensorgen.cli.settings import pairs
 from sensorgen.cli.words import OneOf
 from sensorgen.errors import BadInput
@@ -92,7 +92,7 @@ def _say_logged(new: Sequence["Entry"], log: "Log", *, as_json: bool, known: str
         show.as_json([log_text.plain(entry) for entry in new])
         return
     for entry in new:
-        click.echo("logged " + "\n".join([*log_text.of(entry), *_near(entry, log)]))
+        click.echo("logged " + "\n".join([*log_text.of(entry), *log_text.corrections(entry, log), *_near(entry, log)]))
     if not new:
         click.echo(known)
     click.echo(f"in {log.path}")
@@ -139,14 +139,21 @@ def _bench(
     """
     from sensorgen.log import BenchRun, bench
 
-    given = {"columns": pairs(columns, "--column"), "rig_columns": pairs(rig_columns, "--rig-column")}
-    maps = {name: {theirs: ours for ours, theirs in found} for name, found in given.items()}
+    maps = {
+        "columns": columns_of(columns, "--column"),
+        "rig_columns": columns_of(rig_columns, "--rig-column"),
+    }
     with opened(file, create=True) as log:
         new = bench.take(
             log, specimen, Path(lcr_file), Path(rig_file) if rig_file else None, **maps, remark=remark,
             supersedes=_uid(log, BenchRun, corrects),
         )  # fmt: skip
-        _say_logged(new, log, as_json=as_json, known=f"{specimen}: the log has this very recording")
+        _say_logged(
+            new,
+            log,
+            as_json=as_json,
+            known=f"{specimen}: the log has this very recording; --corrects NUMBER changes remark or columns",
+        )
 
 
 def _predict(design: "Design", *, file: str | None, as_json: bool) -> int:
@@ -190,14 +197,8 @@ bench = made(
     click.Argument(["specimen"]),
     click.Argument(["lcr_file"]),
     click.Argument(["rig_file"], required=False),
-    click.Option(
-        ["--column", "columns"], metavar="OURS=THEIRS", multiple=True,
-        help="Column of LCR_FILE, if it is CSV and calls it otherwise: time_s, stamp_s, re_ohm_1.1kHz ...",
-    ),
-    click.Option(
-        ["--rig-column", "rig_columns"], metavar="OURS=THEIRS", multiple=True,
-        help="Column of RIG_FILE: time_s, set_force_n, set_position_mm, force_n, error.",
-    ),
+    lcr_columns(),
+    rig_columns(),
     remark(),
     corrects(),
     where(),

@@ -15,7 +15,7 @@ from sensorgen.log.logbook import Log
 from sensorgen.log.words import design_of_name, named
 
 if TYPE_CHECKING:
-    from sensorgen.recording import Joined, Recording
+    from sensorgen.recording import Joined, Recording, RigLog
 
 
 Columns = Mapping[str, str]
@@ -61,6 +61,8 @@ def take(
         A name or a file that cannot be read. Nothing is logged or kept then.
     """
     told, name = named(specimen)
+    for path in filter(None, (recording, rig)):
+        _check_size(path)
     before = [files.raw_file(path) for path in (recording, rig) if path]
     facts = _facts((recording, columns), (rig, rig_columns))
     kept = [files.keep(log.files, path) for path in (recording, rig) if path]
@@ -68,13 +70,53 @@ def take(
         raise BadInput(f"{str(recording)!r} {files.CHANGES}")
     design_id, design = design_of_name(name)
     run = BenchRun(
-        uid=sha256(" ".join([str(told["specimen"]), *(file.uid for file in kept)]).encode()).hexdigest()[:32],
+        uid=_uid(str(told["specimen"]), *(file.uid for file in kept), supersedes),
         **told,  # type: ignore[arg-type]
         written=specimen, design_id=design_id, design=design, source=recording.name, remark=remark,
         supersedes=supersedes, file=kept[0].uid, rig_file=kept[1].uid if rig else "",
         facts=json.dumps(facts, sort_keys=True, allow_nan=False),
     )  # fmt: skip
     return [row for row in log.add([*kept, run]) if isinstance(row, BenchRun)]
+
+
+def _check_size(path: Path) -> None:
+    """Refuse what no reader takes before all of it is read for its SHA-256."""
+    from sensorgen.recording.matfive import MOST_BYTES
+
+    if path.is_file() and (size := path.stat().st_size) > MOST_BYTES:
+        raise BadInput(f"{str(path)!r}: {size / 2**30:.3g} GB; expected up to {MOST_BYTES >> 30} GB: split the run")
+
+
+def _uid(*says: str) -> str:
+    """A name for life: of the specimen and its files, and of the row that is corrected, if one is."""
+    return sha256(" ".join(filter(None, says)).encode()).hexdigest()[:32]
+
+
+def reopened(log: Log, run: BenchRun) -> "tuple[tuple[Recording, ...], RigLog | None]":
+    """What was logged, read again from the raw files, by the columns that were told then.
+
+    Parameters
+    ----------
+    log : Log
+        An open one.
+    run : BenchRun
+        One of its recordings.
+
+    Returns
+    -------
+    tuple of Recording, RigLog or None
+        Every lock-in, and the rig's log if there is one.
+
+    Raises
+    ------
+    BadInput
+        A raw file that is missing or damaged.
+    """
+    from sensorgen import recording
+
+    facts = json.loads(run.facts)
+    found = recording.read_all(log.raw(run.file), facts.get("columns"))
+    return found, recording.rig(log.raw(run.rig_file), facts.get("rig_columns")) if run.rig_file else None
 
 
 def _facts(lcr: tuple[Path, Columns], rig: tuple[Path | None, Columns]) -> dict[str, Any]:
@@ -86,7 +128,7 @@ def _facts(lcr: tuple[Path, Columns], rig: tuple[Path | None, Columns]) -> dict[
     if rig[0]:
         log = recording.rig(rig[0], rig[1])
         facts["rig_columns"] = dict(rig[1])
-        facts["rig"] = {**log.counts(), "notes": list(log.notes), **_of_clocks(recording.joined(found[0], log))}
+        facts["rig"] = {**log.counts(), **_of_joined(recording.joined(found[0], log))}
     return facts
 
 
@@ -102,9 +144,11 @@ def _of_recording(r: "Recording") -> dict[str, Any]:
     }
 
 
-def _of_clocks(joined: "Joined") -> dict[str, Any]:
+def _of_joined(joined: "Joined") -> dict[str, Any]:
     names = ("offset_s", "offset_error_s", "skew", "skew_error", "explained")
-    return {"clocks": joined.words()} | {name: _plain(getattr(joined, name)) for name in names}
+    numbers = {name: _plain(getattr(joined, name)) for name in names}
+    samples = joined.recording.counts()["rig error"]
+    return {"clocks": joined.words(), "notes": list(joined.notes), "samples": samples} | numbers
 
 
 def _plain(value: Any) -> Any:

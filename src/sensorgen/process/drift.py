@@ -2,10 +2,12 @@ r"""Creep of the elastomer, fitted to the rest between presses and taken out.
 
 Where nothing presses, ln Z moves by
 
-.. math:: \ln Z(t) = a + b t + c \ln(1 + t / \tau)
+.. math:: \ln Z(t) = a_0 + \sum_{i=1}^{3} a_i t^i + \sum_{k=1}^{5} c_k \ln(1 + t / \tau_k)
 
-with one time constant for all tones: a straight part, and the logarithm in which elastomers creep. The fit is made in
-ln Z because a permittivity that creeps multiplies Z and does not add to it, and taken out of the pressed readings too.
+with time constants from a three-hundredth of the run to all of it. An elastomer creeps as a spectrum of relaxations, by
+a power of time or a stretched exponential; five logarithms follow any of them, as one does not, and the polynomial
+follows a room that warms up. The fit is made in ln Z because a permittivity that creeps multiplies Z and does not add
+to it, and taken out of the pressed readings too. What a press leaves behind and the film forgets is no drift.
 """
 
 from dataclasses import dataclass
@@ -16,10 +18,11 @@ from sensorgen.errors import BadInput
 from sensorgen.recording.samples import Bools, Complex, Real
 
 SETTLE_S = 1.0
-_TAUS = 9
+_TAUS = 5
 _FASTEST = 300.0  # of the run: a time constant that short is a step
-_LEAST = 30
-_MOST_SEARCHED = 20_000  # readings that the time constant is looked for in; the rest is fitted to all
+_POWERS = (1, 2, 3)
+_LEAST = 100
+_SAME = 1e-10  # of the largest singular value: what is smaller is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,22 +33,22 @@ class Drift:
     ----------
     start_s : float
         When the readings began [s].
-    tau_s : float
-        Time constant of the logarithm [s].
-    weights : (3, m) array
-        a, b [1/s] and c of every tone, complex: of ln abs(Z) and of the phase.
+    seconds : float
+        How long they went on [s].
+    weights : (9, m) array
+        Of every tone, complex, of ln abs(Z) and of the phase: a, with t as a share of ``seconds``, and c.
     scatter : (m,) array
         What is left of ln Z at rest, root mean square, each part apart in the real and the imaginary part.
     """
 
     start_s: float
-    tau_s: float
+    seconds: float
     weights: Complex
     scatter: Complex
 
     def at(self, time_s: Real) -> Complex:
         """Relative drift of ln Z since the begin (n, m), at any times [s]."""
-        return np.asarray(_basis(time_s - self.start_s, self.tau_s)[:, 1:] @ self.weights[1:])
+        return np.asarray(_basis(time_s - self.start_s, self.seconds)[:, 1:] @ self.weights[1:])
 
     def removed(self, time_s: Real, impedance_ohm: Complex) -> Complex:
         """Readings as they would be without drift [ohm]."""
@@ -83,13 +86,11 @@ def fitted(time_s: Real, impedance_ohm: Complex, valid: Bools, force_n: Real, se
     start = float(time_s[0])
     t, z = time_s[rest] - start, impedance_ohm[rest]
     values = np.log(np.abs(z)) + 1j * np.unwrap(np.angle(z), axis=0)
-    scale = np.maximum(np.abs(np.diff(values, axis=0)).mean(axis=0), 1e-300)  # tones count by their noise
-    some = slice(None, None, max(1, len(t) // _MOST_SEARCHED))
-    tau = _best_tau(t[some], (values / scale)[some])
-    weights = np.linalg.lstsq(_basis(t, tau), values, rcond=None)[0]
-    left = values - _basis(t, tau) @ weights
+    seconds = max(float(time_s[-1]) - start, 1e-9)
+    weights = np.linalg.lstsq(_basis(t, seconds), values, rcond=_SAME)[0]
+    left = values - _basis(t, seconds) @ weights
     scatter = np.sqrt((left.real**2).mean(axis=0)) + 1j * np.sqrt((left.imag**2).mean(axis=0))
-    return Drift(start, tau, weights, scatter)
+    return Drift(start, seconds, weights, scatter)
 
 
 def _disturbed(time_s: Real, force_n: Real, settle_s: float) -> Bools:
@@ -100,21 +101,7 @@ def _disturbed(time_s: Real, force_n: Real, settle_s: float) -> Bools:
     return np.asarray((time_s - last < settle_s) | (coming - time_s < settle_s / 10))
 
 
-def _basis(time_s: Real, tau_s: float) -> Real:
-    return np.column_stack([np.ones_like(time_s), time_s, np.log1p(np.maximum(time_s, 0) / tau_s)])
-
-
-def _best_tau(time_s: Real, values: Complex) -> float:
-    """The time constant that leaves least: the best of a few, then between its neighbours."""
-    from scipy.optimize import minimize_scalar
-
-    def left(log_tau: float) -> float:
-        basis = _basis(time_s, float(np.exp(log_tau)))
-        rest = values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
-        return float((np.abs(rest) ** 2).sum())
-
-    longest = max(float(time_s[-1]), 1e-9)
-    grid = np.log(np.geomspace(longest / _FASTEST, longest, _TAUS))
-    best = int(np.argmin([left(log_tau) for log_tau in grid]))
-    around = (grid[max(best - 1, 0)], grid[min(best + 1, _TAUS - 1)])
-    return float(np.exp(minimize_scalar(left, bounds=around, method="bounded").x))
+def _basis(time_s: Real, seconds: float) -> Real:
+    u = np.maximum(time_s, 0) / seconds
+    taus = np.geomspace(1 / _FASTEST, 1, _TAUS)
+    return np.column_stack([np.ones_like(u), *(u**n for n in _POWERS), *(np.log1p(u / tau) for tau in taus)])

@@ -1,6 +1,7 @@
 """Presses out of a run: where they are, and the readings before and under each."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ WINDOW_S, GUARD_S = 1.0, 0.3
 _SHORTEST_S = 0.2
 _LEAST = 8  # samples that a mean and its error need
 _HYSTERESIS = 0.5
-_SMOOTH_S = 0.2
+_STEP_S, _SURE, _MAD = 0.3, 6.0, 0.6745  # median absolute deviation of noise, over its standard deviation
 
 
 class Press(NamedTuple):
@@ -56,8 +57,10 @@ def found(time_s: Real, impedance_ohm: Complex) -> list[Press]:
 
     Notes
     -----
-    The strongest direction of ln Z, smoothed over 0.2 s and freed of what changes slower than presses, is cut where two
-    groups of values have the least variance within them (Otsu 1979). The larger group is the rest.
+    The strongest direction of ln Z, searched for steps: where means over 0.3 s before and after differ by more than six
+    times their noise. What changes slower is no step, so that creep is no press; nor is a press that takes seconds to
+    come. Which way presses go is told by what they come back to: after a press the readings are where they were before
+    it, between two presses they are not, unless all are equally strong; then the first step is a press.
 
     Raises
     ------
@@ -66,13 +69,47 @@ def found(time_s: Real, impedance_ohm: Complex) -> list[Press]:
     """
     if len(time_s) < 2 * _LEAST:
         raise BadInput(f"{len(time_s)} readings; expected at least {2 * _LEAST} to find presses in")
-    signal = _smoothed(strongest(impedance_ohm), max(1, round(_SMOOTH_S / float(np.median(np.diff(time_s))))))
-    limit = _otsu(signal)
-    if np.count_nonzero(signal > limit) * 2 > len(signal):
-        signal, limit = -signal, -limit
-    rest, press = np.median(signal[signal <= limit]), np.median(signal[signal > limit])
-    quarter = (press - rest) / 8
-    return _spans(time_s, _held(signal > limit + quarter, signal < limit - quarter))
+    width = min(max(1, round(_STEP_S / float(np.median(np.diff(time_s))))), len(time_s) // 2)
+    before, after = _beside(strongest(impedance_ohm), width)
+    step = after - before
+    limit = _SURE * float(np.median(np.abs(step - np.median(step)))) / _MAD
+    edges = [(at, 1) for at in _peaks(step, limit)] + [(at, -1) for at in _peaks(-step, limit)]
+    spans = _returning(sorted(edges), before, after, width)
+    return [Press(float(time_s[i]), float(time_s[j])) for i, j in spans if time_s[j] - time_s[i] >= _SHORTEST_S]
+
+
+def _beside(values: Real, width: int) -> tuple[Real, Real]:
+    """Means over so many samples before and from each one on."""
+    sums = np.concatenate([[0.0], np.cumsum(np.pad(values, width, mode="edge"))])
+    means = (sums[width:] - sums[:-width]) / width
+    return means[: len(values)], means[width : width + len(values)]
+
+
+def _peaks(step: Real, limit: float) -> list[int]:
+    """Where the steps above a limit are steepest, one each."""
+    edges = np.diff(np.concatenate([[False], step > limit, [False]]).astype(int))
+    spans = zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
+    return [int(a + np.argmax(step[a:b])) for a, b in spans]
+
+
+def _returning(edges: list[tuple[int, int]], before: Real, after: Real, width: int) -> list[tuple[int, int]]:
+    """Begins and ends of presses: of the two ways to pair steps, the one that comes back to where it began."""
+    if not edges:
+        return []
+    levels = _moved(before, -(width // 2)), _moved(after, width // 2)
+    first = edges[0][1]
+    likely, other = ([(i, j) for (i, a), (j, b) in pairwise(edges) if (a, b) == (s, -s)] for s in (first, -first))
+    return other if _astray(other, *levels) < _astray(likely, *levels) / 2 else likely
+
+
+def _moved(values: Real, by: int) -> Real:
+    """Values so many places on, at the ends the outermost."""
+    return values[np.clip(np.arange(len(values)) + by, 0, len(values) - 1)]
+
+
+def _astray(spans: list[tuple[int, int]], before: Real, after: Real) -> float:
+    """How far from where they began spans end, in the middle of them."""
+    return float(np.median([abs(after[j] - before[i]) for i, j in spans])) if spans else np.inf
 
 
 def _held(on: Bools, off: Bools) -> Bools:
@@ -87,20 +124,6 @@ def _spans(time_s: Real, on: Bools) -> list[Press]:
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
     spans = (Press(float(time_s[a]), float(time_s[b])) for a, b in zip(starts, ends, strict=True))
     return [span for span in spans if span.end_s - span.start_s >= _SHORTEST_S]
-
-
-def _smoothed(values: Real, width: int) -> Real:
-    padded = np.pad(values, (width // 2, width - 1 - width // 2), mode="edge")
-    return np.convolve(padded, np.full(width, 1 / width), mode="valid")
-
-
-def _otsu(values: Real) -> float:
-    """The cut with the least variance within the two groups."""
-    ordered = np.sort(values)
-    count, sums = np.arange(1, len(ordered)), np.cumsum(ordered)
-    low, high = sums[:-1] / count, (sums[-1] - sums[:-1]) / (len(ordered) - count)
-    best = int(np.argmax(count * (len(ordered) - count) * (high - low) ** 2))
-    return float((ordered[best] + ordered[best + 1]) / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +184,7 @@ def pairs(
     presses : list of Press
         As :func:`pressed` or :func:`found` gives them.
     force_n, position_mm : (n,) array
-        What pressed when [N], [mm].
+        What pressed when; nan where nobody knows [N], [mm].
     window_s : float
         How long is averaged: until ``guard_s`` before the press, and until ``guard_s`` before its end [s].
     guard_s : float
@@ -189,7 +212,7 @@ def pairs(
             )
             continue
         means = _mean(time_s[before], impedance_ohm[before]), _mean(time_s[under], impedance_ohm[under])
-        rows.append((press.start_s, float(np.nanmean(force_n[under])), float(np.nanmean(position_mm[under])), *means))
+        rows.append((press.start_s, _middle(force_n[under]), _middle(position_mm[under]), *means))
     if not rows:
         raise BadInput(f"{len(presses)} presses, none with {_LEAST} readings before and under it; expected some")
     at, force, position, first, second = zip(*rows, strict=True)
@@ -200,6 +223,12 @@ def pairs(
                   for a, b in zip(first, second, strict=True)]),
         np.array([(a.samples, b.samples) for a, b in zip(first, second, strict=True)]), tuple(left_out),
     )  # fmt: skip
+
+
+def _middle(values: Real) -> float:
+    """Mean of those that are known; nan where none is."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else np.nan
 
 
 def _column(means: tuple[_Mean, ...]) -> Complex:

@@ -164,13 +164,19 @@ def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> Verdict:
     Raises
     ------
     OutOfRange
-        Readings below 0.
+        A reading that is no number, or an expected resistance that is not above 0.
+
+    Notes
+    -----
+    A reading below 0 is one of 0: a meter's offset, and its leads, are subtracted.
     """
-    if any(not value >= 0 for value in (*of.ry_ohm, *of.rz_ohm)):
-        raise OutOfRange(f"{of.name}: readings {of.ry_ohm} and {of.rz_ohm} ohm; expected numbers from 0 on")
-    ry, rz = min(of.ry_ohm, default=nan), min(of.rz_ohm, default=nan)
+    if of.expected_ohm <= 0:
+        raise OutOfRange(f"{of.name}: {of.expected_ohm:g} ohm expected of an electrode; expected a number above 0")
+    if any(isnan(value) for value in (*of.ry_ohm, *of.rz_ohm)):
+        raise OutOfRange(f"{of.name}: readings {of.ry_ohm} and {of.rz_ohm} ohm; expected numbers, or none")
+    ry, rz = (max(0.0, min(values)) if values else nan for values in (of.ry_ohm, of.rz_ohm))
     electrode, why_electrode = _electrode(of, ry)
-    film, why_film = _film(ry, rz, intact_ohm)
+    film, why_film = _film(ry, rz, of.expected_ohm, intact_ohm)
     leak = nan if isnan(rz) or isnan(ry) or ry == inf else leak_s(rz, ry)
     ratio = nan if isnan(ry) or isnan(rz) or ry in (0, inf) else rz / ry
     return Verdict(
@@ -205,21 +211,18 @@ def _electrode(of: Evidence, ry: float) -> tuple[str, str]:
     return "sound", f"R_Y {ry:.4g} ohm, nothing expected to hold it against" if isnan(over) else said
 
 
-def _film(ry: float, rz: float, intact_ohm: float) -> tuple[str, str]:
+def _film(ry: float, rz: float, expected_ohm: float, intact_ohm: float) -> tuple[str, str]:
     if isnan(rz):
         return "unknown", "no reading between the electrodes"
     if rz >= intact_ohm:
         return "intact", f"R_Z {rz:.4g} ohm is at or above the {intact_ohm:.4g} ohm of an intact film"
-    if rz == 0 or rz <= 2 * ry:
-        return "short", f"R_Z {rz:.4g} ohm is within the {2 * ry:.4g} ohm of the two electrodes: a bridge reads that"
+    line = next((r for r in (ry, expected_ohm) if 0 <= r < inf), 0.0)  # an open electrode says nothing of a bridge
+    if rz <= 2 * line:
+        return "short", f"R_Z {rz:.4g} ohm is within the {2 * line:.4g} ohm of two electrodes: a bridge reads that"
     return (
         "leak",
-        f"R_Z {rz:.4g} ohm is below the {intact_ohm:.4g} ohm of an intact film: {leak_s(rz, _known(ry)):.3g} S",
+        f"R_Z {rz:.4g} ohm is below the {intact_ohm:.4g} ohm of an intact film: {leak_s(rz, line):.3g} S",
     )
-
-
-def _known(ry: float) -> float:
-    return 0.0 if isnan(ry) or ry == inf else ry
 
 
 def expected_from(group: Sequence[Evidence]) -> float:

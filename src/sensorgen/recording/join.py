@@ -24,6 +24,7 @@ _GRID_S = 0.05  # of the correlation
 _MOST_GRID = 1 << 21
 _MOST_FITTED = 60_000
 _LEAST_SHARE = 0.05  # of the recording's variance that the force must explain before it tells the time
+_LEAST_RATIO = 8.0  # Fisher's F: of what chance explains at the best of thousands of offsets, with noise that wanders
 _SURE = 3.0
 _MOST_SKEW = 1e-3
 _STEPS = 20
@@ -39,6 +40,7 @@ class _Offset(NamedTuple):
     skew: float
     skew_error: float
     explained: float
+    by_chance: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +83,7 @@ class Joined:
         if np.isnan(self.offset_error_s):
             return f"the clocks are believed: the force explains {self.explained:.1%} of the signal and tells no offset"
         skew = f", skew {self.skew * 1e6:.3g} +- {self.skew_error * 1e6:.2g} ppm" if self.skew else ""
-        return f"rig's clock + {self.offset_s:.6g} +- {self.offset_error_s:.2g} s{skew}"
+        return f"rig's clock + {self.offset_s:.4f} +- {self.offset_error_s:.2g} s{skew}"
 
 
 def joined(recording: Recording, rig: RigLog, within_s: float = np.inf) -> Joined:
@@ -110,7 +112,7 @@ def joined(recording: Recording, rig: RigLog, within_s: float = np.inf) -> Joine
     common = bool(np.isfinite(recording.epoch_s))
     time = recording.real_s() if common else recording.time_s
     found = _estimated(recording, time, rig, within_s)
-    if found.explained < _LEAST_SHARE:
+    if found.by_chance:
         if not common:
             raise BadInput(
                 f"the force explains {found.explained:.1%} of the readings: too little to find the offset of the "
@@ -141,7 +143,7 @@ def _beside(recording: Recording, rig: RigLog, time: Real, found: _Offset) -> Jo
         notes.append(f"{np.count_nonzero(silent)} samples while the rig was silent")
     return Joined(
         replace(recording, marks=marks), np.interp(at, rows, force) * blank, rig.set_force_n[good][held] * blank,
-        rig.set_position_mm[good][held] * blank, *found, tuple(notes),
+        rig.set_position_mm[good][held] * blank, *found[:-1], tuple(notes),
     )  # fmt: skip
 
 
@@ -232,13 +234,20 @@ def _refined(time: Real, signal: Real, rig: RigLog, offset: float) -> _Offset:
     error, skew_error = np.sqrt(np.diag(covariance))
     explained = float(np.var(fitted) / (np.var(fitted) + np.var(left))) if np.var(signal) > 0 else 0.0
     sure = bool(abs(skew) > _SURE * skew_error)
-    return _Offset(offset, float(error), skew if sure else 0.0, float(skew_error), explained)
+    ratio = explained / max(1 - explained, 1e-12) * (_independent(left) - model.shape[1]) / shapes.shape[1]
+    by_chance = explained < _LEAST_SHARE or ratio < _LEAST_RATIO
+    return _Offset(offset, float(error), skew if sure else 0.0, float(skew_error), explained, by_chance)
 
 
 def _covariance(model: Real, left: Real) -> Real:
     """Of the last two weights, with residuals that hang together: each counts for as many as are independent."""
+    variance = float((left**2).sum()) / max(len(left) - model.shape[1], 1) * len(left) / _independent(left)
+    return np.asarray(np.linalg.pinv(model.T @ model)[-2:, -2:] * variance)
+
+
+def _independent(left: Real) -> float:
+    """How many residuals are independent of each other, if each hangs on the one before."""
     count = len(left)
     rho = float((left[1:] * left[:-1]).sum() / max(float((left**2).sum()), 1e-300))
     rho = min(max(rho, 0.0), 1 - 1 / count)
-    variance = float((left**2).sum()) / max(count - model.shape[1], 1) * (1 + rho) / (1 - rho)
-    return np.asarray(np.linalg.pinv(model.T @ model)[-2:, -2:] * variance)
+    return count * (1 - rho) / (1 + rho)

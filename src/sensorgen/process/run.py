@@ -1,0 +1,109 @@
+"""A recording worked up in one go: joined with the rig, filtered, freed of drift, and cut into presses."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sensorgen.errors import BadInput
+from sensorgen.process import drift, lowpass, presses
+from sensorgen.recording.join import joined
+from sensorgen.recording.rig import RigLog
+from sensorgen.recording.samples import Bools, Complex, Real, Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Processed:
+    """What a recording says.
+
+    Attributes
+    ----------
+    recording : Recording
+        With the rig's errors among its marks.
+    filtered_s, filtered_ohm : (k,), (k, m) array
+        Low-passed forward and backward on even steps, drift and all [s], [ohm].
+    drift : Drift or None
+        What was taken out of the presses' readings; None if nothing was.
+    pairs : Pairs or None
+        Before and under each press; None where there are none.
+    by_force : bool
+        Whether presses were found by the rig's force; else by the readings alone, force and position unknown.
+    notes : tuple of str
+        How the clocks stand, and what was left out or taken with care.
+    """
+
+    recording: Recording
+    filtered_s: Real
+    filtered_ohm: Complex
+    drift: drift.Drift | None
+    pairs: presses.Pairs | None
+    by_force: bool
+    notes: tuple[str, ...]
+
+
+def processed(
+    recording: Recording, rig: RigLog | None = None, *, remove_drift: bool = True, cutoff_hz: float = lowpass.CUTOFF_HZ
+) -> Processed:
+    """Work up a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        What the instrument measured.
+    rig : RigLog or None
+        What pressed; without it, presses are looked for in the readings.
+    remove_drift : bool
+        Whether the drift of the rest is fitted and taken out of the presses' readings.
+    cutoff_hz : float
+        Of the low-pass [Hz].
+
+    Raises
+    ------
+    BadInput
+        Clocks that cannot be joined; fewer than 16 samples that count.
+    OutOfRange
+        A cut-off that is not between 0 and half the sampling rate.
+    """
+    notes, one = list(recording.source.notes), recording
+    force = position = np.full(len(one.time_s), np.nan)
+    if rig is not None:
+        beside = joined(one, rig)
+        one, force, position = beside.recording, beside.force_n, beside.set_position_mm
+        notes += [beside.words(), *beside.notes]
+    valid = one.valid()
+    filtered = lowpass.filtered(one, cutoff_hz)
+    spans = presses.pressed(one.time_s, force) if rig else presses.found(one.time_s[valid], one.impedance_ohm[valid])
+    fit = _drift(one, valid, force if rig else _told(one.time_s, spans), notes) if remove_drift and spans else None
+    clean = fit.removed(one.time_s, one.impedance_ohm) if fit else one.impedance_ohm
+    pairs = _pairs(one.time_s, clean, valid, spans, force, position, notes)
+    return Processed(one, *filtered, fit, pairs, rig is not None, tuple(notes))
+
+
+def _told(time_s: Real, spans: list[presses.Press]) -> Real:
+    """A force that tells of nothing but when something pressed [N]."""
+    found = np.zeros_like(time_s)
+    for span in spans:
+        found[(time_s >= span.start_s) & (time_s <= span.end_s)] = 1.0
+    return found
+
+
+def _drift(one: Recording, valid: Bools, force: Real, notes: list[str]) -> drift.Drift | None:
+    try:
+        return drift.fitted(one.time_s, one.impedance_ohm, valid, force)
+    except BadInput as error:
+        notes.append(f"drift stays in: {error}")
+        return None
+
+
+def _pairs(
+    time_s: Real, z: Complex, valid: Bools, spans: list[presses.Press], force: Real, position: Real, notes: list[str]
+) -> presses.Pairs | None:
+    if not spans:
+        notes.append("nothing pressed")
+        return None
+    try:
+        found = presses.pairs(time_s, z, valid, spans, force, position)
+    except BadInput as error:
+        notes.append(f"no presses: {error}")
+        return None
+    notes += [f"left out: {said}" for said in found.left_out]
+    return found
