@@ -53,7 +53,9 @@ def test_every_command_of_the_pages_works(words, tmp_path, program):
         (tmp_path / words[2]).parent.mkdir(parents=True)
         (tmp_path / words[2]).write_text(runpy.run_path(str(ROOT / "tests" / "gcode" / "good.py"))["MAKER"], "utf-8")
     if words[0] in ("report", "fit"):
-        subprocess.run([sys.executable, "-m", "sensorgen", "log", "import", "--thesis"], check=True, capture_output=True)
+        subprocess.run(
+            [sys.executable, "-m", "sensorgen", "log", "import", "--thesis"], check=True, capture_output=True
+        )
     extra = ["--no-cad"] if words[0] == "build" else []
     done = subprocess.run(
         [sys.executable, "-m", "sensorgen", *words, *extra], cwd=tmp_path, capture_output=True, text=True
