@@ -163,3 +163,13 @@ def test_noise_alone_has_no_presses(run, tmp_path):
     assert "nothing pressed" in run("bench", "show", "a.csv", "--plot", "out").line
     assert "nothing pressed" in run("bench", "show", "a.csv", "--presses", "p.csv").line
     assert not (tmp_path / "p.csv").exists()
+
+
+def test_a_recording_of_the_log_is_read_by_the_columns_that_were_told(run, tmp_path):
+    rng = np.random.default_rng(1)
+    rows = "".join(f"{k / 50},{100 + x:.6f},{-50 + y:.6f}\n" for k, (x, y) in enumerate(rng.normal(0, 0.1, (500, 2))))
+    (tmp_path / "a.csv").write_text("t,R,X\n" + rows)
+    told = ["--column", "time_s=t", "--column", "re_ohm_1kHz=R", "--column", "im_ohm_1kHz=X"]
+    assert run("log", "bench", "26 triX", "a.csv", *told).code == 0
+    assert "500 samples, 500 of them sound" in run("bench", "show", "1").out
+    assert run("bench", "show", "a.csv", *told).code == 0
