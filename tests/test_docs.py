@@ -38,8 +38,15 @@ def test_each_command_has_help_and_is_in_the_documents(name):
     assert any(f"sensorgen {name}" in page.read_text("utf-8") for page in [*PAGES, ROOT / "docs" / "reference.md"])
 
 
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """The cache of one who follows the pages: what a command has solved, the next one knows."""
+    return tmp_path_factory.mktemp("cache")
+
+
 @pytest.mark.parametrize("words", list(commands()))
-def test_every_command_of_the_pages_works(words, tmp_path, program):
+def test_every_command_of_the_pages_works(words, tmp_path, program, kept, monkeypatch):
+    monkeypatch.setenv("SENSORGEN_CACHE", str(kept))
     if words[0] == "slice":
         program("prusa-slicer", "prusa-slicer")
     for page in PAGES:

@@ -2,15 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from sensorgen.errors import SensorgenError
-from sensorgen.log import BenchRun, Log, RawFile
-from sensorgen.log.files import place
+from sensorgen.log import BenchRun, Log
+from sensorgen.log.bench import reopened
 from sensorgen.process import drift, lowpass, presses
-from sensorgen.recording import joined, read_all, rig
+from sensorgen.recording import joined
 from sensorgen.recording.samples import Bools, Complex, Real, Recording
 
 _LEAST = 16  # valid samples that a mean at rest needs
@@ -68,24 +67,22 @@ def runs(log: Log, iteration: int, left_out: list[tuple[str, str]]) -> Iterator[
     left_out : list of (str, str)
         Grows.
     """
-    raw = {file.uid: file for file in log.entries(RawFile)}
     for entry in log.recordings(iteration=iteration):
         try:
-            yield from _of_entry(entry, log.files, raw)
+            yield from _of_entry(log, entry)
         except (SensorgenError, KeyError) as error:
             left_out.append((f"recording {entry.number}, {entry.specimen}", str(error)))
 
 
-def _of_entry(entry: BenchRun, folder: Path, raw: dict[str, RawFile]) -> Iterator[Run]:
-    found = read_all(place(folder, raw[entry.file]))
-    log = rig(place(folder, raw[entry.rig_file])) if entry.rig_file else None
+def _of_entry(log: Log, entry: BenchRun) -> Iterator[Run]:
+    found, pressed = reopened(log, entry)
     for one in found:
         silent = np.full(len(one.time_s), np.nan)
-        if log is None:
+        if pressed is None:
             yield _processed(entry, one, silent, silent, ["no log of the rig: force and position are not known"])
             continue
         try:
-            beside = joined(one, log)
+            beside = joined(one, pressed)
         except SensorgenError as error:
             yield _processed(entry, one, silent, silent, [f"not joined with the rig's log: {error}"])
             continue
