@@ -10,6 +10,7 @@ from sensorgen.cli import cli
 from sensorgen.comparison import runs
 from sensorgen.errors import BadInput
 from sensorgen.log import Log
+from sensorgen.log.bench import take
 from sensorgen.report.charts import Axis, Chart, Trace
 from sensorgen.report.interactive import figure, packed
 from sensorgen.report.pictures import files
@@ -70,26 +71,11 @@ def test_names_in_figures_are_text():
     assert "\\frac{" in svg
 
 
-def test_blocks_are_means_of_what_counts(monkeypatch):
-    monkeypatch.setattr(runs, "_BLOCKS", 4)
-    time, force = np.arange(9.0), np.array([0, 0, 0, 5, 0, 0, -3, 0, 9.0])
-    z = np.column_stack([time + 1j, 2 * time])
-    valid = np.array([True] * 4 + [False] + [True] * 4)
-    t, means, counts, forces = runs._in_blocks(time, z, valid, force)
-    assert t.tolist() == [0.5, 2.5, 4.5, 6.5]
-    assert means[:, 0].tolist() == [0.5 + 1j, 2.5 + 1j, 4.5 + 1j, 6.5 + 1j]
-    assert counts.tolist() == [True, True, False, True]
-    assert forces.tolist() == [0, 5, 0, 3]
-
-
-def test_presses_are_the_same_with_and_without_blocks(recorded, monkeypatch):
+def test_presses_of_a_run(recorded):
     with Log(recorded) as log:
-        whole = next(runs.runs(log, 30, []))
-        monkeypatch.setattr(runs, "_BLOCKS", 1000)
-        blocks = next(runs.runs(log, 30, []))
-    size = np.abs(whole.pairs.difference_ohm)
-    assert np.abs(blocks.pairs.difference_ohm - whole.pairs.difference_ohm).max() < 1e-3 * size.max()
-    assert len(whole.pairs.time_s) == 7
+        found = next(runs.runs(log, 30, []))
+    assert len(found.pairs.time_s) == 7
+    assert not any("no log of the rig" in note for note in found.notes)
 
 
 def run(*words):
@@ -112,3 +98,17 @@ def test_the_command(thesis, tmp_path, capsys, monkeypatch):
         run("--iteration", "23", "--open", "--format", "md", *log)
     with pytest.raises(BadInput):
         run("--iteration", "23", "--log", str(tmp_path / "none.db"))
+
+
+def test_a_table_with_columns_of_its_own_is_not_left_out(tmp_path):
+    """Read again by the names that were told when it was logged."""
+    rows = "".join(f"{k / 10},{1000 + k % 3},{-5e5 - k % 5}\n" for k in range(60))
+    (tmp_path / "own.csv").write_text("t,r,x\n" + rows, "utf-8")
+    columns = {"t": "time_s", "r": "re_ohm_1.1kHz", "x": "im_ohm_1.1kHz"}
+    left_out = []
+    with Log(tmp_path / "log.db", create=True) as log:
+        take(log, "31 triX .1mm", tmp_path / "own.csv", None, columns=columns)
+        (found,) = runs.runs(log, 31, left_out)
+    assert left_out == []
+    assert found.rest_ohm[0].real == pytest.approx(1001, abs=0.1)
+    assert any("no log of the rig" in note for note in found.notes)

@@ -8,12 +8,10 @@ import numpy as np
 from sensorgen.errors import SensorgenError
 from sensorgen.log import BenchRun, Log
 from sensorgen.log.bench import reopened
-from sensorgen.process import drift, lowpass, presses
-from sensorgen.recording import joined
-from sensorgen.recording.samples import Bools, Complex, Real, Recording
-
-_LEAST = 16  # valid samples that a mean at rest needs
-_BLOCKS = 50_000  # that a drift is fitted to
+from sensorgen.process import presses
+from sensorgen.process.run import Processed, processed
+from sensorgen.recording.rig import RigLog
+from sensorgen.recording.samples import Complex, Real, Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,12 +26,10 @@ class Run:
         What the instrument measured, with its marks.
     time_s, filtered_ohm : (k,), (k, m) array
         Low-passed forward and backward on even steps [s], [ohm].
-    force_n : (n,) array
-        At the recording's samples [N]; nan everywhere without a rig's log.
     rest_ohm, rest_error_ohm : (m,) array
         Impedance at rest, and its standard error: of R in the real, of X in the imaginary part [ohm].
     pairs : Pairs or None
-        Before and under each press; None where there are none.
+        Before and under each press; None where there are none, or no force is known.
     notes : tuple of str
         What was left out, or taken with care.
     """
@@ -42,7 +38,6 @@ class Run:
     recording: Recording
     time_s: Real
     filtered_ohm: Complex
-    force_n: Real
     rest_ohm: Complex
     rest_error_ohm: Complex
     pairs: presses.Pairs | None
@@ -77,57 +72,30 @@ def runs(log: Log, iteration: int, left_out: list[tuple[str, str]]) -> Iterator[
 def _of_entry(log: Log, entry: BenchRun) -> Iterator[Run]:
     found, pressed = reopened(log, entry)
     for one in found:
-        silent = np.full(len(one.time_s), np.nan)
-        if pressed is None:
-            yield _processed(entry, one, silent, silent, ["no log of the rig: force and position are not known"])
-            continue
-        try:
-            beside = joined(one, pressed)
-        except SensorgenError as error:
-            yield _processed(entry, one, silent, silent, [f"not joined with the rig's log: {error}"])
-            continue
-        notes = [beside.words(), *beside.notes]
-        yield _processed(entry, beside.recording, beside.force_n, beside.set_position_mm, notes)
+        yield _brought(entry, *_worked_up(one, pressed))
 
 
-def _processed(entry: BenchRun, one: Recording, force: Real, position: Real, notes: list[str]) -> Run:
-    valid = one.valid()
-    time, filtered = lowpass.filtered(one)
-    counts = {name: count for name, count in one.counts().items() if count and name not in ("samples", "valid")}
-    notes = [*notes, *one.source.notes, *(f"{count} samples marked: {name}" for name, count in counts.items())]
-    pairs = _pairs(one, force, position, notes)
-    at_rest = valid & ~(force >= presses.THRESHOLD_N / 2) if np.isfinite(force).any() else valid
-    if np.count_nonzero(at_rest) < _LEAST:
-        at_rest = valid
-    mean, error = _mean(one.impedance_ohm[at_rest]) if pairs is None else _mean(pairs.before_ohm)
-    return Run(entry, one, time, filtered, force, mean, error, pairs, tuple(notes))
-
-
-def _pairs(one: Recording, force: Real, position: Real, notes: list[str]) -> presses.Pairs | None:
-    """Before and under each press, the drift of the rest taken out; nothing where the force is not known."""
-    if not np.isfinite(force).any():
-        return None
+def _worked_up(one: Recording, pressed: RigLog | None) -> tuple[Processed, str]:
+    """A recording with the rig's log, or without if they cannot be joined; and why it is without."""
+    if pressed is None:
+        return processed(one), "no log of the rig: force and position are not known"
     try:
-        spans = presses.pressed(one.time_s, force)
-        fit = drift.fitted(*_in_blocks(one.time_s, one.impedance_ohm, one.valid(), force))
-        clean = fit.removed(one.time_s, one.impedance_ohm)
-        made = presses.pairs(one.time_s, clean, one.valid(), spans, force, position)
+        return processed(one, pressed), ""
     except SensorgenError as error:
-        notes.append(f"no presses: {error}")
-        return None
-    notes.extend(f"left out: {text}" for text in made.left_out)
-    return made
+        return processed(one), f"not joined with the rig's log: {error}"
 
 
-def _in_blocks(time_s: Real, impedance_ohm: Complex, valid: Bools, force_n: Real) -> tuple[Real, Complex, Bools, Real]:
-    """Means over blocks of neighbours, so that a long recording has ``_BLOCKS`` of them: drift is slower by far."""
-    size = len(time_s) // _BLOCKS
-    if size < 2:
-        return time_s, impedance_ohm, valid, force_n
-    end = len(time_s) // size * size
-    blocks = [values[:end].reshape(-1, size, *values.shape[1:]) for values in (time_s, impedance_ohm, valid, force_n)]
-    counts = np.asarray(blocks[2].all(axis=1), bool)
-    return blocks[0].mean(axis=1), blocks[1].mean(axis=1), counts, np.abs(blocks[3]).max(axis=1)
+def _brought(entry: BenchRun, done: Processed, without: str) -> Run:
+    one = done.recording
+    counts = {name: count for name, count in one.counts().items() if count and name not in ("samples", "valid")}
+    notes = [
+        *filter(None, [without]),
+        *done.notes,
+        *(f"{count} samples marked: {name}" for name, count in counts.items()),
+    ]
+    mean, error = _mean(done.pairs.before_ohm if done.pairs else one.impedance_ohm[one.valid()])
+    pairs = done.pairs if done.by_force else None
+    return Run(entry, one, done.filtered_s, done.filtered_ohm, mean, error, pairs, tuple(notes))
 
 
 def _mean(z: Complex) -> tuple[Complex, Complex]:
