@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import islice
+from math import isinf
 from pathlib import Path
 from typing import TextIO
 
@@ -121,6 +122,8 @@ def _lines(file: TextIO) -> Iterator[tuple[int, str]]:
 
 
 def _cells(row: int, line: str, separator: str) -> list[str]:
+    if '"' not in line:  # then a comma is a comma: ten times as fast
+        return line.rstrip("\r\n").split(separator, _MOST_COLUMNS)[:_MOST_COLUMNS]
     try:
         return list(islice(next(csv.reader([line], delimiter=separator, strict=True), []), _MOST_COLUMNS))
     except csv.Error as error:
@@ -152,7 +155,7 @@ def _value(cells: Sequence[str], at: int | None, name: str, row: int, separator:
         value = float(text)
     except ValueError:
         value = _date(text) if name == TIME else None
-    if value is None or "_" in text or not text.isascii() or np.isinf(value):
+    if value is None or "_" in text or not text.isascii() or isinf(value):
         raise BadInput(f"row {row}, column {name}: {text[:60]!r} is not a number; leave empty what was not measured")
     return value
 
