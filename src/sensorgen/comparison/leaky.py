@@ -27,7 +27,7 @@ def along_ohm(electrode_ohm: float, leak_s: float) -> float:
 
     Examples
     --------
-    >>> along_ohm(600.0, 0.0), round(along_ohm(600.0, 1e9), 3)
+    >>> along_ohm(600.0, 0.0), round(along_ohm(600.0, 1e15), 3)
     (600.0, 300.0)
     """
     q = sqrt(2 * electrode_ohm * leak_s)
