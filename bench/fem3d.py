@@ -1,0 +1,118 @@
+"""What bounds in three dimensions cost: processor time and memory over unknowns, rect with a film of 0.1 mm.
+
+Each mesh is solved in a process of its own, so that its peak of memory is its own. Writes ``results/fem3d.md`` and
+``docs/pictures/cells-cost.png``. Takes five minutes.
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+HERE = Path(__file__).parent
+MESHES = ((1, 2), (1, 3), (1, 4), (1, 5), (1, 6), (1, 7), (2, 5), (2, 6), (3, 5), (3, 6))  # layers, order
+ORDERS = {5: ":", 6: "--"}  # on three meshes each
+MEGABYTE = 1024  # in kilobytes, as the system counts them
+
+
+def solved(layers: int, order: int) -> dict[str, float]:
+    """One mesh, and what it took."""
+    from sensorgen.models import fem3d
+    from sensorgen.scene import Fill
+    from sensorgen.shapes import rect
+
+    fem3d._RUNGS = ((layers, order, order - 1),)
+    scene = rect.scene(rect.Params(length_mm=2.0, width_mm=2.0, dielectric_mm=0.1), Fill())
+    before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
+    (step,) = fem3d.steps(scene, {"x60": 4.68, "air": 1.00059}, 1e-9)
+    seconds, after = time.process_time() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return {
+        "layers": layers,
+        "order": order,
+        "unknowns": step.unknowns,
+        "seconds": seconds,
+        "megabytes": (after - before) / MEGABYTE,
+        "width": step.interval.width(),
+    }
+
+
+def apart(layers: int, order: int) -> dict[str, float]:
+    """The same in a process of its own."""
+    command = [sys.executable, __file__, str(layers), str(order)]
+    said = subprocess.run(
+        command, check=True, capture_output=True, text=True, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    )
+    found: dict[str, float] = json.loads(said.stdout)
+    return found
+
+
+def exponent(found: list[dict[str, float]], key: str, order: int) -> float:
+    """With which power of the unknowns a cost grows on meshes of one order."""
+    import numpy as np
+
+    here = [f for f in found if f["order"] == order]
+    return float(np.polyfit(np.log([f["unknowns"] for f in here]), np.log([f[key] for f in here]), 1)[0])
+
+
+def picture(found: list[dict[str, float]]) -> None:
+    """Draw both costs and the width over the unknowns."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    labels = {"seconds": "processor time [s]", "megabytes": "memory [MB]", "width": "width of the interval [-]"}
+    figure, axes = plt.subplots(1, 3, figsize=(12, 3.8), layout="constrained")
+    for axis, (key, label) in zip(axes, labels.items(), strict=True):
+        for layers, colour in ((1, "#d55e00"), (2, "#009e73"), (3, "#0072b2")):
+            here = [f for f in found if f["layers"] == layers]
+            orders = f"order {here[0]['order']} to {here[-1]['order']}"
+            said = f"{layers} layer{'s' * (layers > 1)} at edges, {orders}"
+            axis.loglog([f["unknowns"] for f in here], [f[key] for f in here], "o-", ms=4, color=colour, label=said)
+        axis.set(xlabel="unknowns N that boxes share [-]", ylabel=label)
+        axis.grid(alpha=0.3)
+    for axis, key in zip(axes, ("seconds", "megabytes"), strict=False):
+        for order, style in ORDERS.items():
+            here = [f for f in found if f["order"] == order]
+            power = exponent(found, key, order)
+            start = here[0]
+            line = [start[key] * (f["unknowns"] / start["unknowns"]) ** power for f in here]
+            axis.loglog([f["unknowns"] for f in here], line, style, color="k", label=f"order {order}: N^{power:.2f}")
+    axes[0].legend(frameon=False, fontsize=8)
+    axes[1].legend(frameon=False, fontsize=8)
+    figure.savefig(HERE.parent / "docs" / "pictures" / "cells-cost.png", dpi=130)
+
+
+def main() -> None:
+    found = sorted((apart(*mesh) for mesh in MESHES), key=lambda f: f["unknowns"])
+    picture(found)
+    powers = [(exponent(found, "seconds", k), exponent(found, "megabytes", k), k) for k in ORDERS]
+    lines = [
+        "# What bounds in three dimensions cost",
+        "",
+        "Made by `bench/fem3d.py`: rect, d = 0.1 mm, one thread.",
+        "",
+        "| layers | order | unknowns | processor time [s] | memory [MB] | width |",
+        "|---|---|---|---|---|---|",
+        *(
+            f"| {f['layers']} | {f['order']} | {f['unknowns']} | {f['seconds']:.3g} | {f['megabytes']:.0f} "
+            f"| {f['width']:.1e} |"
+            for f in found
+        ),
+        "",
+        *(
+            f"Order {k}: time grows as N to the {seconds:.2f}, memory as N to the {size:.2f}."
+            for seconds, size, k in powers
+        ),
+    ]
+    (HERE / "results" / "fem3d.md").write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        print(json.dumps(solved(*map(int, sys.argv[1:]))))
+    else:
+        main()
