@@ -6,31 +6,32 @@ distance of the bounds falls exponentially. See docs/cells.md.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib.util import find_spec
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sensorgen.cells import cell
 from sensorgen.interval import Disc, Interval
 from sensorgen.models import _fem_bounds as fem
+from sensorgen.models._fem_cones import RATIO
 from sensorgen.models._fem_corners import exponents
 from sensorgen.models._fem_grading import graded
 from sensorgen.models._fem_lossy import Fields, Turned, disc, turned
-from sensorgen.models._fem_triangles import TERMINALS, Triangles, triangles
+from sensorgen.models._fem_plane import Cones, Plane
+from sensorgen.models._fem_triangles import Triangles, triangles
 from sensorgen.scene import Scene
 from sensorgen.sections import Section, sections
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
-SOURCE = "Dirichlet's and Thomson's principles; hp finite elements graded at corners (NGSolve)"
+SOURCE = "Dirichlet's and Thomson's principles; hp finite elements, rings without end at corners"
 COST = 2
 
 WIDTH = 1e-4  # of the interval, where the caller does not say
-NEEDS = "NGSolve is not installed: pip install 'sensorgen[fem]'"
 
 _ORDERS = (4, 20)  # of polynomials: the lowest and the highest
 _CORNER_SHARE = 0.01  # of the wanted width: what may stay unresolved at a corner
-_SMALLEST_SHARE = 1e-12
+_MOST_DOUBLINGS = 12  # of rings at a corner: 4096 of them
 _GAIN = 1.2  # by which an order lowers the width, in e-folds, as measured
 _STEP = 2  # of orders, where the field is complex
 _STALLED = 0.7  # a step that leaves more of the width than this gains nothing
@@ -38,8 +39,6 @@ _STALLED = 0.7  # a step that leaves more of the width than this gains nothing
 
 def unfit(scene: Scene) -> str | None:
     """Why this model cannot speak of this scene, or None."""
-    if find_spec("ngsolve") is None:
-        return NEEDS
     try:
         _triangles(scene)
     except ValueError as error:
@@ -116,7 +115,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     """The orders that :func:`capacitance` goes through, until the interval is narrow enough or gains no more."""
     section, coarse = _triangles(scene)
     values = {material: permittivity[material] for material, _ in coarse.regions}
-    mesh = graded(coarse, exponents(coarse, values), max(_CORNER_SHARE * width, _SMALLEST_SHARE))
+    mesh = _graded(coarse, values, width)
     last, order = np.inf, _first(width)
     while order <= _ORDERS[1]:
         try:
@@ -129,7 +128,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
             order -= 3
             continue
         here = interval.times(EPS0_F_PER_M * M_PER_MM * section.depth_mm)
-        yield Step(order, len(mesh.triangles), unknowns, here)
+        yield Step(order, mesh.elements(), unknowns, here)
         if here.width() <= width or here.width() > _STALLED * last:
             return
         order, last = order + _more(here.width(), width), here.width()
@@ -173,7 +172,7 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     values = {material: complex(permittivity[material]) for material, _ in coarse.regions}
     turn = turned(values.values())
     moduli = {material: abs(value) for material, value in values.items()}
-    mesh = graded(coarse, exponents(coarse, moduli), max(_CORNER_SHARE * width, _SMALLEST_SHARE))
+    mesh = _graded(coarse, moduli, width)
     best = _disc(mesh, values, turn, _first(width))
     for order in range(_first(width) + _STEP, _ORDERS[1] + 1, _STEP):
         if best.width() <= width:
@@ -189,18 +188,21 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     return best.times(EPS0_F_PER_M * M_PER_MM * section.depth_mm)
 
 
-def _disc(mesh: Triangles, permittivity: Mapping[str, complex], turn: Turned, order: int) -> Disc:
-    import ngsolve as ng
-
-    names, eps, weights = _by_region(mesh, permittivity)
-    solved = fem.Solved.of(_for_ngsolve(mesh, names), eps, order, order - 1)
-    rho = ng.CoefficientFunction([turn.weight[e] for e in eps])
-    slope, missed = solved.slope(), solved.eps * solved.slope() + solved.flux
-    energy, part = solved.integrals(solved.eps * slope * slope, weights)
-    _, size = solved.integrals((rho * slope * ng.Conj(slope)).real, weights)
-    apart, _ = solved.integrals((missed * ng.Conj(missed)).real / rho, ())
-    found = Fields(solved.lower(), energy, part, size, apart, solved.unknowns)
-    return disc(found, turn, [share for _, share in mesh.regions])
+def _disc(mesh: Cones, permittivity: Mapping[str, complex], turn: Turned, order: int) -> Disc:
+    plane = Plane(mesh, order)
+    eps, weight = _by_triangle(mesh, permittivity)
+    rho = np.array([turn.weight[e] for e in eps.tolist()])
+    u, psi = plane.potential(eps), plane.stream(1 / eps)
+    flux = plane.crossings(u, psi).sum()
+    energy = eps * plane.energies(u, u)
+    square = plane.energies(u, u.conj()).real
+    mixed = eps * plane.crossings(u, psi.conj())
+    apart = (abs(eps) ** 2 * square + plane.energies(psi, psi.conj()).real - 2 * mixed.real) / rho
+    lower = 2 * flux - (plane.energies(psi, psi) / eps).sum()
+    found = Fields(
+        lower, energy.sum(), weight @ energy, float(weight @ (rho * square)), max(apart.sum(), 0.0), plane.unknowns
+    )
+    return disc(found, turn, [share for _, share in mesh.triangles.regions])
 
 
 def _triangles(scene: Scene) -> tuple[Section, Triangles]:
@@ -211,32 +213,25 @@ def _triangles(scene: Scene) -> tuple[Section, Triangles]:
     return found[0], triangles(cell(found[0], scene.size_mm[2]))
 
 
-def _solved(mesh: Triangles, permittivity: Mapping[str, float], order: int) -> tuple[Interval, int]:
-    found = _energies(mesh, permittivity, order)
-    return fem.whole(found, [share for _, share in mesh.regions]), found.unknowns
+def _graded(coarse: Triangles, permittivity: Mapping[str, float], width: float) -> Cones:
+    """Finer at corners, with as many rings as leave a small share of a width unresolved there."""
+    found = exponents(coarse, permittivity)
+    rings = {corner: np.log(_CORNER_SHARE * width) / (2 * value * np.log(RATIO)) for corner, value in found.items()}
+    doublings = {c: int(np.clip(np.ceil(np.log2(max(n, 1.0))), 0, _MOST_DOUBLINGS)) for c, n in rings.items()}
+    return Cones(graded(coarse, found), doublings)
 
 
-def _energies(mesh: Triangles, permittivity: Mapping[str, float], order: int) -> fem.Energies:
-    names, eps, weights = _by_region(mesh, permittivity)
-    return fem.energies(_for_ngsolve(mesh, names), eps, weights, order, order - 1)
+def _solved(mesh: Cones, permittivity: Mapping[str, float], order: int) -> tuple[Interval, int]:
+    plane = Plane(mesh, order)
+    eps, weight = _by_triangle(mesh, permittivity)
+    u, psi = plane.potential(eps), plane.stream(1 / eps)
+    energy = eps * plane.energies(u, u)
+    lower = 2 * plane.crossings(u, psi).sum() - (plane.energies(psi, psi) / eps).sum()
+    found = fem.Energies(float(lower), float(energy.sum()), float(weight @ energy), plane.unknowns)
+    return fem.whole(found, [share for _, share in mesh.triangles.regions]), found.unknowns
 
 
-_Region = tuple[str, float]
-_Number = TypeVar("_Number", float, complex)
-
-
-def _by_region(mesh: Triangles, values: Mapping[str, _Number]) -> tuple[list[_Region], list[_Number], list[float]]:
-    """All regions, and of each its permittivity, and how often it occurs beyond the least."""
-    names = sorted(set(mesh.regions))
-    least = min(share for _, share in names)
-    return names, [values[m] for m, _ in names], [s - least for _, s in names]
-
-
-def _for_ngsolve(mesh: Triangles, names: list[_Region]) -> fem.Mesh:
-    edges = {name: [e for e, end in mesh.terminals.items() if end == name] for name in TERMINALS}
-    return fem.Mesh(
-        mesh.points,
-        np.array(mesh.triangles, dtype=np.int32),
-        np.array([names.index(r) for r in mesh.regions], dtype=np.int32),
-        {name: np.array(found, dtype=np.int32) for name, found in edges.items()},
-    )
+def _by_triangle(mesh: Cones, values: Mapping[str, complex]) -> tuple[NDArray[Any], NDArray[np.float64]]:
+    """Permittivity of each triangle, and how often it occurs beyond the least."""
+    shares = np.array([share for _, share in mesh.triangles.regions])
+    return np.array([values[material] for material, _ in mesh.triangles.regions]), shares - shares.min()
