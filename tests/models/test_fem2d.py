@@ -12,13 +12,10 @@ from scipy.special import ellipk
 
 from sensorgen.errors import OutOfRange
 from sensorgen.interval import Interval
-from sensorgen.models import columns
+from sensorgen.models import _fem_bounds, columns, fem2d
 from sensorgen.scene import Body, Fill, Scene, box
 from sensorgen.shapes import reference, tri
 from sensorgen.units import EPS0_F_PER_M
-
-
-from sensorgen.models import _fem_bounds, fem2d
 
 CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
 VACUUM = {"air": 1.0, "x60": 1.0}

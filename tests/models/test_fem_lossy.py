@@ -11,7 +11,6 @@ from sensorgen.models._fem_lossy import Fields, disc, turned
 from sensorgen.scene import Body, box
 from sensorgen.units import EPS0_F_PER_M
 
-
 BOTH = pytest.mark.parametrize("model", [fem2d, fem3d])
 LOSSY = {"x60": 4.68 * (1 - 0.3j), "air": 1.00059}
 

@@ -1,4 +1,4 @@
-"""Rings of triangles around a corner, without end: in the plane energies have no scale, so that all rings are one.
+"""Rings of triangles around a corner: in the plane energies have no scale, so that all rings are one.
 
 One ring joined to itself makes two, these four, and so on (cyclic reduction): a thousand rings take ten steps, and no
 radius is ever written down, be it 1e-300 of the cell's.
@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.models._fem_fronts import Numbers, Whole, eliminated
+from sensorgen.models._fem_fronts import Numbers, Whole, added, eliminated
 from sensorgen.models._fem_polynomials import Real, numbered
 
 RATIO = 0.25  # of one ring's radius to the last; more lowers the error no further
@@ -29,77 +29,68 @@ class Layout:
 
     Attributes
     ----------
-    ids, signs : (s, 2, 3 order) array
-        Of both triangles in each sector: 1 to m outer, then as many inner, then the held value if any, then others;
-        0 for none.
-    tip_ids, tip_signs : (s, 3 order) array
-        Of the triangle at the corner itself: 1 to m outer, the held value or the corner.
     free : array
-        Spokes that are not held; their outer ends come first.
+        Spokes that are not held. Their outer ends are the first unknowns.
     rim : (s, 2) array
-        Spokes at the ends of the outer sides, the lower first; their modes come next.
+        Spokes at the ends of each outer side, the lower first. Their modes are the next unknowns.
     outer : int
-        m, how many that is.
+        m, how many unknowns these are.
     held : bool
         Whether the corner lies on a line of one value.
+    ring, ring_signs : (s, 2, 3 order) array
+        Unknowns of both triangles in each sector: 1 to m outer, m more inner, the held value if any, others; 0 is none.
+    tip, tip_signs : (s, 3 order) array
+        Of the innermost triangles: 1 to m outer, the held value if any, others.
     """
 
-    ids: Whole
-    signs: Real
-    tip_ids: Whole
-    tip_signs: Real
     free: Whole
     rim: Whole
     outer: int
     held: bool
+    ring: Whole
+    ring_signs: Real
+    tip: Whole
+    tip_signs: Real
 
     @classmethod
     @cache
     def of(cls, spokes: int, closed: bool, ends: tuple[bool, bool], order: int) -> "Layout":
         """For so many spokes, of which the first and the last may be held."""
-        sectors = np.arange(spokes if closed else spokes - 1)
-        a, b = sectors, (sectors + 1) % spokes
-        corners = np.stack([np.stack([b, b + spokes, a], 1), np.stack([b + spokes, a + spokes, a], 1)], 1).reshape(
-            -1, 3
-        )
-        tips = np.stack([np.full_like(a, spokes), a, b], 1)
         fixed = np.zeros(spokes, bool)
         fixed[0], fixed[-1] = ends
-        free = np.flatnonzero(~fixed)
-        outer = len(free) + len(sectors) * (order - 1)
-        held = 2 * outer + 1
-        vertex = np.empty(2 * spokes, np.int64)
-        vertex[np.flatnonzero(fixed)] = vertex[np.flatnonzero(fixed) + spokes] = held
-        vertex[free], vertex[free + spokes] = np.arange(len(free)) + 1, np.arange(len(free)) + 1 + outer
-        names, side = _sides(corners, 2 * spokes)
-        low, high = names // (2 * spokes), names % (2 * spokes)
-        first = np.zeros(len(names), np.int64)
-        is_outer, is_inner = high < spokes, low >= spokes
-        ends_of_rim = np.stack([low[is_outer], high[is_outer]], axis=1)
-        rim = 1 + len(free) + (order - 1) * np.arange(len(sectors))
-        first[is_outer], first[is_inner] = rim, rim + outer
-        other = ~(is_outer | is_inner) & ~((high == low + spokes) & fixed[low % spokes])
-        any_held = bool(fixed.any())
-        first[other] = held + any_held + (order - 1) * np.arange(other.sum())
-        ids, signs = numbered(corners, vertex, first[side], order)
-        tip_vertex = np.append(vertex[:spokes], outer + 1)
-        tip_vertex[:spokes][fixed] = outer + 1
-        tip_names, tip_side = _sides(tips, 2 * spokes)
-        low, high = tip_names // (2 * spokes), tip_names % (2 * spokes)
-        first = np.zeros(len(tip_names), np.int64)
-        first[high < spokes] = rim
-        other = (high == spokes) & ~fixed[low]
-        first[other] = outer + 2 + (order - 1) * np.arange(other.sum())
-        tip_ids, tip_signs = numbered(tips, tip_vertex, first[tip_side], order)
-        shape = (len(sectors), 2, 3 * order)
-        return cls(ids.reshape(shape), signs.reshape(shape), tip_ids, tip_signs, free, ends_of_rim, outer, any_held)
+        a = np.arange(spokes if closed else spokes - 1)
+        b = (a + 1) % spokes
+        pairs = np.stack([b, b + spokes, a, b + spokes, a + spokes, a], axis=1).reshape(-1, 3)
+        ring, ring_signs = _arranged(pairs, spokes, 2, np.tile(fixed, 2), order)
+        tips = np.stack([np.full_like(a, spokes), a, b], axis=1)
+        tip, tip_signs = _arranged(tips, spokes, 1, np.append(fixed, fixed.any()), order)
+        rim = np.stack([np.minimum(a, b), np.maximum(a, b)], axis=1)
+        rim = rim[np.lexsort((rim[:, 1], rim[:, 0]))]
+        outer = int((~fixed).sum()) + len(a) * (order - 1)
+        shape = (len(a), 2, 3 * order)
+        free, held = np.flatnonzero(~fixed), bool(fixed.any())
+        return cls(free, rim, outer, held, ring.reshape(shape), ring_signs.reshape(shape), tip, tip_signs)
 
 
-def _sides(corners: Whole, base: int) -> tuple[Whole, Whole]:
-    """Distinct sides as low * base + high in rising order, and which of them each side (n, 3) is."""
-    after = np.roll(corners, -1, axis=1)
-    names, at = np.unique(np.minimum(corners, after) * base + np.maximum(corners, after), return_inverse=True)
-    return names, at.reshape(corners.shape)
+def _arranged(corners: Whole, spokes: int, levels: int, fixed: NDArray[np.bool_], order: int) -> tuple[Whole, Real]:
+    """Unknowns of triangles, numbered from 1: by levels of so many points, then the held value, then all others."""
+    points, after = np.arange(len(fixed)), np.roll(corners, -1, axis=1)
+    ends = np.sort(np.stack([corners, after], axis=-1), axis=-1).reshape(-1, 2)
+    (low, high), side = np.unique(ends.T, axis=1, return_inverse=True)
+    vertex, first, level = np.zeros(len(fixed), np.int64), np.zeros(len(low), np.int64), np.full(len(low), levels)
+    level[low // spokes == high // spokes] = (low // spokes)[low // spokes == high // spokes]
+    is_spoke = (low % spokes == high % spokes) | (levels == 1)
+    level[fixed[low] & fixed[high] & is_spoke & (level == levels)] = -1
+    count = 1
+    for here in range(levels + 1):
+        if here == levels and fixed.any():
+            vertex[fixed], count = count, count + 1
+        own, sides = (np.minimum(points // spokes, levels) == here) & ~fixed, level == here
+        vertex[own] = count + np.arange(own.sum())
+        count += int(own.sum())
+        first[sides] = count + (order - 1) * np.arange(sides.sum())
+        count += (order - 1) * int(sides.sum())
+    return numbered(corners, vertex, first[side.reshape(corners.shape)], order)
 
 
 @dataclass(frozen=True)
@@ -108,13 +99,21 @@ class Cone:
 
     Attributes
     ----------
+    layout : Layout
+        Of its unknowns.
     matrix : (m, m) or (m + 1, m + 1) array
         Of the outermost unknowns, and of the held value if there is one.
+    in_ring, at_tip : array
+        Unknowns within a ring from those at its rims; of the innermost triangles from their outer ones.
+    between : list of array
+        Unknowns amid two rings, amid four, ... from those at their rims.
+    innermost : array
+        Unknowns at the innermost triangles' rim from what ``matrix`` takes.
     """
 
     layout: Layout
     matrix: Numbers
-    within_ring: Numbers
+    in_ring: Numbers
     between: list[Numbers]
     innermost: Numbers
     at_tip: Numbers
@@ -123,54 +122,50 @@ class Cone:
     def of(cls, layout: Layout, rings: Numbers, tips: Numbers, doublings: int) -> "Cone":
         """Of energies (s, 2, k, k) of one ring's triangles, and (s, k, k) of the innermost, 2 ** doublings rings."""
         m, held = layout.outer, int(layout.held)
-        ring, within = eliminated(_assembled(layout.ids, layout.signs, rings), 2 * m + held)
-        tip, at_tip = eliminated(_assembled(layout.tip_ids, layout.tip_signs, tips), m + held)
+        ring, in_ring = eliminated(_assembled(layout.ring, layout.ring_signs, rings), 2 * m + held)
+        tip, at_tip = eliminated(_assembled(layout.tip, layout.tip_signs, tips), m + held)
         between = []
         for _ in range(doublings):
-            ring, others = _doubled(ring, m)
-            between.append(others)
+            ring, amid = _doubled(ring, m)
+            between.append(amid)
         matrix, innermost = _closed(ring, tip, m)
-        return cls(layout, matrix, within, between, innermost, at_tip)
+        return cls(layout, matrix, in_ring, between, innermost, at_tip)
 
     def inside(self, values: Numbers) -> tuple[Numbers, Numbers]:
-        """From the values that ``matrix`` takes: those of all triangles (rings, s, 2, k), and of the innermost (s, k)."""
+        """Values in all rings' triangles (rings, s, 2, k) and in the innermost (s, k), from those ``matrix`` takes."""
         m = self.layout.outer
         held = values[m:]
-        levels = np.stack([values[:m], self.innermost @ values])
-        for others in reversed(self.between):
-            amid = _with(np.concatenate([levels[:-1], levels[1:]], axis=1), held) @ others.T
-            both = np.empty((len(levels) + len(amid), m), levels.dtype)
-            both[::2], both[1::2] = levels, amid
-            levels = both
-        own = _with(np.concatenate([levels[:-1], levels[1:]], axis=1), held)
-        rings = np.concatenate([np.zeros((len(own), 1)), own, own @ self.within_ring.T], axis=1)
-        own = np.concatenate([levels[-1], held])
-        tip = np.concatenate([[0.0], own, self.at_tip @ own])
-        return rings[:, self.layout.ids] * self.layout.signs, tip[self.layout.tip_ids] * self.layout.tip_signs
+        rims = np.stack([values[:m], self.innermost @ values])
+        for amid in reversed(self.between):
+            finer = np.empty((2 * len(rims) - 1, m), rims.dtype)
+            finer[::2], finer[1::2] = rims, _pairs(rims, held) @ amid.T
+            rims = finer
+        pairs, last = _pairs(rims, held), np.concatenate([rims[-1], held])
+        rings = np.concatenate([np.zeros((len(pairs), 1)), pairs, pairs @ self.in_ring.T], axis=1)
+        tip = np.concatenate([[0.0], last, self.at_tip @ last])
+        layout = self.layout
+        return rings[:, layout.ring] * layout.ring_signs, tip[layout.tip] * layout.tip_signs
 
 
-def _with(rows: Numbers, held: Numbers) -> Numbers:
-    return np.concatenate([rows, np.broadcast_to(held, (len(rows), len(held)))], axis=1)
+def _pairs(rims: Numbers, held: Numbers) -> Numbers:
+    """Each rim beside the next, and the held value."""
+    return np.concatenate([rims[:-1], rims[1:], np.broadcast_to(held, (len(rims) - 1, len(held)))], axis=1)
 
 
 def _assembled(ids: Whole, signs: Real, matrices: Numbers) -> Numbers:
     """Sum of the triangles' energies; unknown 0 is none."""
-    size = int(ids.max()) + 1
-    found = np.zeros(size * size, matrices.dtype)
-    at = ids[..., :, None] * size + ids[..., None, :]
-    np.add.at(found, at.ravel(), (signs[..., :, None] * matrices * signs[..., None, :]).ravel())
-    return found.reshape(size, size)[1:, 1:]
+    return added(int(ids.max()) + 1, ids, signs[..., :, None] * matrices * signs[..., None, :])[1:, 1:]
 
 
 def _doubled(ring: Numbers, m: int) -> tuple[Numbers, Numbers]:
     """Two rings as one, without the unknowns amid them, and the matrix that gives those."""
     outer, inner, held = slice(m), slice(m, 2 * m), slice(2 * m, None)
     mixed = np.concatenate([ring[inner, outer], ring[outer, inner], ring[inner, held] + ring[outer, held]], axis=1)
-    others = -np.linalg.solve(ring[inner, inner] + ring[outer, outer], mixed)
+    amid = -np.linalg.solve(ring[inner, inner] + ring[outer, outer], mixed)
     apart = ring.copy()
     apart[outer, inner] = apart[inner, outer] = 0.0
     apart[held, held] *= 2
-    return apart + mixed.T @ others, others
+    return apart + mixed.T @ amid, amid
 
 
 def _closed(ring: Numbers, tip: Numbers, m: int) -> tuple[Numbers, Numbers]:
@@ -178,7 +173,7 @@ def _closed(ring: Numbers, tip: Numbers, m: int) -> tuple[Numbers, Numbers]:
     inner, kept = slice(m, 2 * m), np.r_[:m, 2 * m : len(ring)]
     mixed = ring[inner][:, kept]
     mixed[:, m:] += tip[:m, m:]
-    others = -np.linalg.solve(ring[inner, inner] + tip[:m, :m], mixed)
+    amid = -np.linalg.solve(ring[inner, inner] + tip[:m, :m], mixed)
     both = ring[kept[:, None], kept]
     both[m:, m:] += tip[m:, m:]
-    return both + mixed.T @ others, others
+    return both + mixed.T @ amid, amid

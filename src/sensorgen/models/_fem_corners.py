@@ -1,6 +1,6 @@
 """How singular the field is at each corner: u grows as r^lambda, and lambda below 1 means an infinite field."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache, lru_cache
 
 import numpy as np
@@ -16,7 +16,7 @@ _SMOOTH = 1e-6  # how near to a whole number lambda counts as one
 _HIGHEST = 3.5  # lambda above which polynomials serve without refinement
 
 
-def exponents(mesh: Triangles, permittivity: dict[str, float]) -> dict[int, float]:
+def exponents(mesh: Triangles, permittivity: Mapping[str, float]) -> dict[int, float]:
     r"""Lowest exponent that is no whole number, for each corner that has one below 3.5.
 
     Around a corner u = r^lambda w(theta), :math:`(\varepsilon w')' + \lambda^2 \varepsilon w = 0`, w = 0 on electrodes,
@@ -46,7 +46,7 @@ def exponents(mesh: Triangles, permittivity: dict[str, float]) -> dict[int, floa
 _Sectors = tuple[tuple[float, float], ...]
 
 
-def _sectors(mesh: Triangles, corner: int, fan: Fan, permittivity: dict[str, float]) -> _Sectors:
+def _sectors(mesh: Triangles, corner: int, fan: Fan, permittivity: Mapping[str, float]) -> _Sectors:
     """Angle and permittivity of the triangles around a corner, in turn."""
     away = mesh.points[[*fan.spokes, *fan.spokes[:1]]] - mesh.points[corner]
     angles = np.arctan2(

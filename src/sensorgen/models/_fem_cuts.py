@@ -52,13 +52,13 @@ def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
     ends = _Ends(around, mesh.terminals, cones)
     count = HELD
     for piece in _pieces(around):
-        ground = next((mirrors[k] for k in piece if k in mirrors), None)
+        ground = min((mirrors[k] for k in piece if k in mirrors), default=-1)
         for name in sorted({mirrors[k] for k in piece if k in mirrors} - {ground}):
             held |= dict.fromkeys((k for k in piece if mirrors.get(k) == name), count)
             count += 1
-        zero = [k for k in piece if mirrors.get(k) == ground] if ground is not None else [min(piece & loops.keys())]
+        zero = {k for k in piece if mirrors.get(k) == ground} or {min((piece & loops.keys()) - set(cones))}
         held |= dict.fromkeys(zero, 0)
-        start = loops[zero[0]]
+        start = loops[min(zero)]
         for path in _cuts(around, {k: loops[k] for k in piece if k in loops}, start, ends):
             for number, corner in _beside(around, path):
                 lifts[number].append((corner, count))

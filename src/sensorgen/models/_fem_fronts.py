@@ -6,12 +6,13 @@ real part that is after a turn: no pivots are looked for between blocks.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Whole = NDArray[np.int64]
-Numbers = NDArray[np.float64] | NDArray[np.complex128]
+Numbers = NDArray[Any]  # real or complex
 
 HELD = 2  # unknowns 0 and 1 are none: their values are 0 and 1
 _LEAF = 8  # blocks that are joined at once
@@ -59,6 +60,14 @@ def eliminated(matrix: Numbers, kept: int) -> tuple[Numbers, Numbers]:
     return matrix[:kept, :kept] + mixed.T @ others, others
 
 
+def added(size: int, ids: Whole, matrices: Numbers) -> Numbers:
+    """Sum (size, size) of matrices (..., k, k) whose rows and columns are those of ``ids`` (..., k)."""
+    at = (ids[..., :, None] * size + ids[..., None, :]).ravel()
+    found = np.zeros(size * size, matrices.dtype)
+    np.add.at(found, at, matrices.ravel())
+    return found.reshape(size, size)
+
+
 def least(blocks: Sequence[Block], count: int) -> Numbers:
     """Values (count,) of all unknowns at which the sum of the energies is least, or stationary."""
     total = np.bincount(np.concatenate([b.ids for b in blocks]), minlength=count)
@@ -95,13 +104,7 @@ def _tree(
 
 def _sum(blocks: list[_Joined]) -> _Joined:
     ids, at = np.unique(np.concatenate([b.ids for b in blocks]), return_inverse=True)
-    size = len(ids)
-    matrix = np.zeros(size * size, dtype=np.result_type(*{b.matrix.dtype for b in blocks}))
-    first = 0
-    for b in blocks:
-        here = at[first : first + len(b.ids)]
-        np.add.at(matrix, (here[:, None] * size + here).ravel(), b.matrix.ravel())
-        first += len(here)
-    return _Joined(
-        ids, matrix.reshape(size, size), np.bincount(at, np.concatenate([b.seen for b in blocks])).astype(np.int64)
-    )
+    places = np.split(at, np.cumsum([len(b.ids) for b in blocks])[:-1])
+    matrix = np.add.reduce([added(len(ids), place, b.matrix) for place, b in zip(places, blocks, strict=True)])
+    seen = np.bincount(at, np.concatenate([b.seen for b in blocks])).astype(np.int64)
+    return _Joined(ids, matrix, seen)

@@ -1,8 +1,8 @@
 r"""Potential and stream function on one mesh: both bounds by the same matrices.
 
 In the plane a flux without sources is the curl of a function psi, which has one value along each line that no flux
-crosses, and :math:`\int |D|^2 / \varepsilon = \int |\nabla \psi|^2 / \varepsilon`. Hence both problems are one, with the
-permittivity or its inverse for a weight, and values held at the electrodes or at the mirrors.
+crosses, and :math:`\int |D|^2 / \varepsilon = \int |\nabla \psi|^2 / \varepsilon`. Hence both problems are one, with
+the permittivity or its inverse for a weight, and values held at the electrodes or at the mirrors.
 """
 
 from collections.abc import Mapping, Sequence
@@ -102,7 +102,8 @@ class Plane:
     @property
     def unknowns(self) -> int:
         """That triangles and cones share, up to those held."""
-        return len(self.mesh.sides[0]) * (self.order - 1) + len(np.unique(self.mesh.corners[self.mesh.plain]))
+        points = len(np.unique(self.mesh.corners[self.mesh.plain]))
+        return points + len(self.mesh.sides[0]) * (self.order - 1)
 
     def potential(self, weight: Numbers) -> Field:
         """The best potential, 0 V at the bottom and 1 V at the top; ``weight`` (n,) of each triangle."""
@@ -155,7 +156,8 @@ class Plane:
 
 
 def _product(f: Numbers, matrix: Numbers, g: Numbers) -> Numbers:
-    return (f * (matrix @ g[..., None])[..., 0]).sum(axis=-1)
+    found: Numbers = (f * (matrix @ g[..., None])[..., 0]).sum(axis=-1)
+    return found
 
 
 @dataclass(frozen=True)
@@ -270,9 +272,7 @@ class _Problem:
         """Minus the function's rise along the top, as an energy with the unknown 1, whose value is 1."""
         count, vertex, _ = self._unknowns
         ends = np.array(flow.top)
-        start, end = (
-            np.bincount(vertex[e] + 1, minlength=count + 1)[1:] for e in ends.T
-        )  # corners of cones, -1, cancel
+        start, end = (np.bincount(vertex[e] + 1, minlength=count + 1)[1:] for e in ends.T)  # -1, at cones, cancels
         rise = (end - start).astype(float)
         for jump, times in flow.rise.items():
             rise[jump] += times

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
 
 SIDES = ((0, 1), (1, 2), (2, 0))  # of a triangle, as pairs of its corners
 
@@ -118,9 +119,7 @@ def crossed(order: int) -> Real:
     return found
 
 
-def numbered(
-    corners: NDArray[np.int64], vertex: NDArray[np.int64], first: NDArray[np.int64], order: int
-) -> tuple[NDArray[np.int64], Real]:
+def numbered(corners: Whole, vertex: Whole, first: Whole, order: int) -> tuple[Whole, Real]:
     """Which unknown each value on the sides of triangles is, and its sign there.
 
     Parameters

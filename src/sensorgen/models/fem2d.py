@@ -136,7 +136,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
 
 def _first(width: float) -> int:
     """The order to begin with, as measured."""
-    return int(np.clip(round(2.3 - 1.25 * np.log10(width)), *_ORDERS))
+    return int(np.clip(round(0.6 - 1.6 * np.log10(width)), *_ORDERS))
 
 
 def _more(now: float, width: float) -> int:
