@@ -21,7 +21,10 @@ class CrossedBounds(SensorgenError):
 
 
 class Unsolved(SensorgenError):
-    """A mesh so slender, or an order so high, that doubles do not solve it."""
+    """A mesh so slender that doubles do not solve it."""
+
+
+ROUNDING = 1e-9  # relative: what doubles may lose in a solve, by which both bounds are moved outwards
 
 
 @dataclass(frozen=True)
@@ -36,12 +39,15 @@ class Energies:
         Of ``upper``: the energy weighted with how often each region occurs beyond the least.
     unknowns : int
         That the larger of the two systems couples.
+    rounding : float
+        Share by which doubles may be off [-].
     """
 
     lower: float
     upper: float
     part: float
     unknowns: int
+    rounding: float = ROUNDING
 
 
 def third_electrode(scene: Scene) -> str | None:
@@ -73,7 +79,7 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
         The lower bound lies above the upper one by more than rounding.
     """
     below, above = found.lower, found.upper
-    if not 0 < below <= above * (1 + ROUNDING):
+    if not 0 < below <= above * (1 + found.rounding):
         raise CrossedBounds(
             f"lower bound {below:.12g} above upper bound {above:.12g}: the solver failed on this scene; report it, "
             "and use --model columns meanwhile"
@@ -82,7 +88,4 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
     part, off = np.sqrt(found.part), np.sqrt((most - least) * max(above - below, 0.0))
     lower = least * below + max(part - off, 0.0) ** 2
     upper = least * above + (part + off) ** 2
-    return Interval(float(min(lower, upper) * (1 - ROUNDING)), float(upper * (1 + ROUNDING)))
-
-
-ROUNDING = 1e-9  # relative: what doubles may lose in a solve, by which both bounds are moved outwards
+    return Interval(float(min(lower, upper) * (1 - found.rounding)), float(upper * (1 + found.rounding)))

@@ -67,9 +67,17 @@ class Cones:
         """One number for each side, by its ends."""
         return np.minimum(a, b) * len(self.triangles.points) + np.maximum(a, b)
 
+    def slenderness(self) -> float:
+        """Of the most slender triangle: its longest side squared over twice its area [-]."""
+        corners = self.triangles.points[self.corners]
+        sides = np.roll(corners, -1, axis=1) - corners
+        area = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
+        return float(((sides**2).sum(axis=2).max(axis=1) / area).max())
+
     def elements(self) -> int:
         """Triangles, those in rings each for itself."""
-        return len(self.plain) + sum(len(f.members) * (1 + 2 ** (self.doublings[c] + 1)) for c, f in self.fans.items())
+        rings = {c: 2 ** (n + 1) for c, n in self.doublings.items()}
+        return len(self.plain) + sum(len(f.members) * (1 + rings[c]) for c, f in self.fans.items())
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from sensorgen.models._fem_cones import RATIO
 from sensorgen.models._fem_corners import exponents
 from sensorgen.models._fem_grading import graded
 from sensorgen.models._fem_lossy import Fields, Turned, disc, turned
-from sensorgen.models._fem_plane import Cones, Plane
+from sensorgen.models._fem_plane import Cones, Field, Plane
 from sensorgen.models._fem_triangles import Triangles, triangles
 from sensorgen.scene import Scene
 from sensorgen.sections import Section, sections
@@ -31,6 +31,7 @@ WIDTH = 1e-4  # of the interval, where the caller does not say
 
 _ORDERS = (4, 20)  # of polynomials: the lowest and the highest
 _CORNER_SHARE = 0.01  # of the wanted width: what may stay unresolved at a corner
+_SLENDER = 2e-15  # of a triangle's slenderness: what its energy may lose in doubles
 _MOST_DOUBLINGS = 12  # of rings at a corner: 4096 of them
 _GAIN = 1.2  # by which an order lowers the width, in e-folds, as measured
 _STEP = 2  # of orders, where the field is complex
@@ -121,12 +122,9 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
         try:
             interval, unknowns = _solved(mesh, values, order)
         except fem.Unsolved:
-            if last < np.inf:
-                return  # doubles end here: what was solved before stands
-            if order - 3 < _ORDERS[0]:
+            if last == np.inf:
                 raise
-            order -= 3
-            continue
+            return  # doubles end here: what was solved before stands
         here = interval.times(EPS0_F_PER_M * M_PER_MM * section.depth_mm)
         yield Step(order, mesh.elements(), unknowns, here)
         if here.width() <= width or here.width() > _STALLED * last:
@@ -192,15 +190,18 @@ def _disc(mesh: Cones, permittivity: Mapping[str, complex], turn: Turned, order:
     plane = Plane(mesh, order)
     eps, weight = _by_triangle(mesh, permittivity)
     rho = np.array([turn.weight[e] for e in eps.tolist()])
-    u, psi = plane.potential(eps), plane.stream(1 / eps)
-    flux = plane.crossings(u, psi).sum()
-    energy = eps * plane.energies(u, u)
-    square = plane.energies(u, u.conj()).real
-    mixed = eps * plane.crossings(u, psi.conj())
-    apart = (abs(eps) ** 2 * square + plane.energies(psi, psi.conj()).real - 2 * mixed.real) / rho
-    lower = 2 * flux - (plane.energies(psi, psi) / eps).sum()
+    u, psi = _fields(plane, eps)
+    energy, square = eps * plane.energies(u, u), plane.energies(u, u.conj()).real
+    mixed = (eps * plane.crossings(u, psi.conj())).real
+    apart = (abs(eps) ** 2 * square + plane.energies(psi, psi.conj()).real - 2 * mixed) / rho
     found = Fields(
-        lower, energy.sum(), weight @ energy, float(weight @ (rho * square)), max(apart.sum(), 0.0), plane.unknowns
+        lower=_thomson(plane, eps, u, psi),
+        energy=energy.sum(),
+        part=weight @ energy,
+        size=float(weight @ (rho * square)),
+        apart=max(float(apart.sum()), 0.0),
+        unknowns=plane.unknowns,
+        rounding=_rounding(mesh),
     )
     return disc(found, turn, [share for _, share in mesh.triangles.regions])
 
@@ -224,11 +225,28 @@ def _graded(coarse: Triangles, permittivity: Mapping[str, float], width: float) 
 def _solved(mesh: Cones, permittivity: Mapping[str, float], order: int) -> tuple[Interval, int]:
     plane = Plane(mesh, order)
     eps, weight = _by_triangle(mesh, permittivity)
-    u, psi = plane.potential(eps), plane.stream(1 / eps)
+    u, psi = _fields(plane, eps)
     energy = eps * plane.energies(u, u)
-    lower = 2 * plane.crossings(u, psi).sum() - (plane.energies(psi, psi) / eps).sum()
-    found = fem.Energies(float(lower), float(energy.sum()), float(weight @ energy), plane.unknowns)
+    lower = float(_thomson(plane, eps, u, psi))
+    found = fem.Energies(lower, float(energy.sum()), float(weight @ energy), plane.unknowns, _rounding(mesh))
     return fem.whole(found, [share for _, share in mesh.triangles.regions]), found.unknowns
+
+
+def _fields(plane: Plane, eps: NDArray[Any]) -> tuple[Field, Field]:
+    """The best potential and the best stream function of one order."""
+    try:
+        return plane.potential(eps), plane.stream(1 / eps)
+    except np.linalg.LinAlgError as error:
+        raise fem.Unsolved(f"the solver failed on this scene ({error}); use --model columns") from None
+
+
+def _thomson(plane: Plane, eps: NDArray[Any], u: Field, psi: Field) -> Any:
+    """Twice what flows into the top, which any potential tells by its own 1 V, less the flux's energy."""
+    return 2 * plane.crossings(u, psi).sum() - (plane.energies(psi, psi) / eps).sum()
+
+
+def _rounding(mesh: Cones) -> float:
+    return max(fem.ROUNDING, _SLENDER * mesh.slenderness())
 
 
 def _by_triangle(mesh: Cones, values: Mapping[str, complex]) -> tuple[NDArray[Any], NDArray[np.float64]]:
