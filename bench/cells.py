@@ -1,6 +1,7 @@
 """Time against true error of every capacitance model, beside scikit-fem's adaptive P2; writes bench/results/cells.*
 
-Processor time on one thread, in the same run, each program warmed up by a coarse run. Errors are against the exact cells of tests/reference/cells.json.
+Processor time on one thread, in the same run, each program warmed up by a coarse one. Errors are against the exact
+cells of tests/reference/cells.json.
 """
 
 import os

@@ -1,6 +1,7 @@
 """Both bounds of a graded cell by NGSolve, on the same triangles: a potential, and a hybrid H(div) flux."""
 
 from collections import defaultdict
+from itertools import pairwise
 
 import numpy as np
 
@@ -27,14 +28,14 @@ def written_out(mesh: Cones) -> tuple[np.ndarray, list[tuple[int, int, int]], li
             points += [here + RATIO**k * (mesh.triangles.points[s] - here) for s in fan.spokes]
         for number, a in zip(fan.members, range(len(fan.members)), strict=True):
             b = (a + 1) % len(fan.spokes)
-            for outer, inner in zip(rims, rims[1:], strict=False):
+            for outer, inner in pairwise(rims):
                 triangles += [(outer[b], inner[b], outer[a]), (inner[b], inner[a], outer[a])]
             triangles.append((corner, rims[-1][a], rims[-1][b]))
             owners += [number] * (2 * len(rims) - 1)
         for k, spoke in enumerate(fan.spokes):
             if name := mesh.triangles.terminals.get((min(corner, spoke), max(corner, spoke))):
                 chain = [*(rim[k] for rim in rims), corner]
-                ends[name] += zip(chain, chain[1:], strict=False)
+                ends[name] += pairwise(chain)
     return np.array(points), triangles, owners, ends
 
 

@@ -1,4 +1,4 @@
-"""The two-dimensional solver's parts: against NGSolve on the same triangles, exact fields, islands and touching pieces."""
+"""The plane's solver: against NGSolve on the same triangles, exact fields, islands, pieces that touch."""
 
 import subprocess
 import sys
@@ -93,7 +93,7 @@ def test_an_island_in_a_closed_box_needs_no_mirror():
 
 
 def wedge(first: float, second: float, ratio: float) -> float:
-    """Exponent l between an electrode and a mirror: cot(l a) = ratio tan(l b), the second permittivity over the first."""
+    """Exponent l between electrode and mirror: cot(l a) = ratio tan(l b), the second permittivity over the first."""
     low, high = 1e-9, np.pi / 2 / max(first, second) * (1 - 1e-12)
     for _ in range(200):
         middle = (low + high) / 2
@@ -255,9 +255,9 @@ def test_air_of_a_nanometre_over_a_millimetre(thin):
 
 def test_it_needs_numpy_only():
     code = (
-        "import sys\n"
-        "from sensorgen.models import fem2d\nfrom sensorgen.shapes import tri\nfrom sensorgen.scene import Fill\n"
-        "fem2d.capacitance(tri.scene(tri.Params(length_mm=2.0, width_mm=1.0), Fill()), {'x60': 4.68, 'air': 1.0}, 1e-6)\n"
+        "import sys\nfrom sensorgen.models import fem2d\nfrom sensorgen.shapes import tri\n"
+        "from sensorgen.scene import Fill\n"
+        "fem2d.capacitance(tri.scene(tri.Params(length_mm=2.0), Fill()), {'x60': 4.68, 'air': 1.0}, 1e-6)\n"
         "assert not {'ngsolve', 'netgen', 'scipy', 'build123d'} & set(sys.modules), sorted(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -76,8 +76,8 @@ class Cones:
 
     def elements(self) -> int:
         """Triangles, those in rings each for itself."""
-        rings = {c: 2 ** (n + 1) for c, n in self.doublings.items()}
-        return len(self.plain) + sum(len(f.members) * (1 + rings[c]) for c, f in self.fans.items())
+        in_rings = [len(fan.members) * (1 + (2 << self.doublings[c])) for c, fan in self.fans.items()]
+        return len(self.plain) + sum(in_rings)
 
 
 @dataclass(frozen=True)
