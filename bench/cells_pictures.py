@@ -20,7 +20,8 @@ from matplotlib import pyplot as plt
 
 from sensorgen.cells import cell
 from sensorgen.models import columns, fem2d
-from sensorgen.models._fem_plane import Cones, Plane
+from sensorgen.models._fem_mesh import Cones
+from sensorgen.models._fem_plane import Plane
 from sensorgen.scene import Body, Fill, Scene, box
 from sensorgen.sections import sections
 from sensorgen.shapes import tri

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from sensorgen.models._fem_cones import RATIO
-from sensorgen.models._fem_plane import Cones
+from sensorgen.models._fem_mesh import Cones
 
 
 def written_out(mesh: Cones) -> tuple[np.ndarray, list[tuple[int, int, int]], list[int], dict[str, list]]:

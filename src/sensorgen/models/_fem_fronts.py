@@ -36,13 +36,6 @@ class Block:
     matrix: Numbers
     place: NDArray[np.float64]
 
-    def lifted(self, added: Sequence[tuple[int, int]]) -> "Block":
-        """Where another unknown adds to some of the values: pairs of a value's place and that unknown."""
-        rows = np.array([*range(len(self.ids)), *(k for k, _ in added)])
-        return Block(
-            np.append(self.ids, [u for _, u in added]).astype(int), self.matrix[rows[:, None], rows], self.place
-        )
-
 
 @dataclass(frozen=True)
 class _Joined:

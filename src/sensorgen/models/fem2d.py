@@ -19,7 +19,9 @@ from sensorgen.models._fem_cones import RATIO
 from sensorgen.models._fem_corners import exponents
 from sensorgen.models._fem_grading import graded
 from sensorgen.models._fem_lossy import Fields, Turned, disc, turned
-from sensorgen.models._fem_plane import Cones, Field, Plane
+from sensorgen.models._fem_mesh import Cones
+from sensorgen.models._fem_plane import Plane
+from sensorgen.models._fem_problem import Field
 from sensorgen.models._fem_triangles import Triangles, triangles
 from sensorgen.scene import Scene
 from sensorgen.sections import Section, sections
