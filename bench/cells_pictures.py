@@ -20,6 +20,8 @@ from matplotlib import pyplot as plt
 
 from sensorgen.cells import cell
 from sensorgen.models import columns, fem2d
+from sensorgen.models._fem_mesh import Cones
+from sensorgen.models._fem_plane import Plane
 from sensorgen.scene import Body, Fill, Scene, box
 from sensorgen.sections import sections
 from sensorgen.shapes import tri
@@ -106,11 +108,11 @@ def apex() -> None:
     scene, exact = tri_scene(0.1), EXACT[0.1]
     _, coarse = fem2d._triangles(scene)
     exponents = fem2d.exponents(coarse, EPS)
-    mesh = fem2d.graded(coarse, exponents, 1e-11)
+    mesh = fem2d._graded(coarse, EPS, 1e-9)
     families = {
         "P1, even mesh": (ORANGE, "o-", list(uniform(scene, skfem.ElementTriP1(), 7))),
         "P2, even mesh": (GREEN, "s-", list(uniform(scene, skfem.ElementTriP2(), 6))),
-        "order 2 to 16, few large triangles": (GREY, "^-", [_of_order(coarse, p) for p in range(2, 17, 2)]),
+        "order 2 to 16, few large triangles": (GREY, "^-", [_of_order(Cones(coarse, {}), p) for p in range(2, 17, 2)]),
         "fem2d: order 2 to 12, rings at corners": (BLUE, "D-", [_of_order(mesh, p) for p in range(2, 13)]),
     }
     figure, axis = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
@@ -125,12 +127,17 @@ def apex() -> None:
     save(figure, "apex")
 
 
-def _of_order(mesh, order: int) -> tuple[int, float]:
-    """Unknowns of a potential of one order that triangles share, and C' from above [F/m]."""
-    edges = {tuple(sorted((t[k - 1], t[k]))) for t in mesh.triangles for k in range(3)}
-    corners = len({k for t in mesh.triangles for k in t})
-    cells = mesh.regions[0][1]
-    return corners + (order - 1) * len(edges), float(fem2d._energies(mesh, EPS, order).upper) * cells * EPS0_F_PER_M
+def _of_order(mesh: Cones, order: int) -> tuple[int, float]:
+    """Unknowns of a potential of one order that triangles share, in rings too, and C' from above [F/m]."""
+    plane = Plane(mesh, order)
+    eps, _ = fem2d._by_triangle(mesh, EPS)
+    u = plane.potential(eps)
+    rings = [
+        (len(fan.spokes) + (order - 1) * (len(fan.spokes) + 2 * len(fan.members))) << mesh.doublings[corner]
+        for corner, fan in mesh.fans.items()
+    ]
+    cells = mesh.triangles.regions[0][1]
+    return plane.unknowns + sum(rings), float((eps * plane.energies(u, u)).sum()) * cells * EPS0_F_PER_M
 
 
 def voxels() -> None:
@@ -207,7 +214,7 @@ def _voxels(scene: Scene, layers: int, side: int) -> tuple[np.ndarray, np.ndarra
 
 def ratios() -> None:
     """Width of the interval over the ratio of permittivities, 1e-4 asked for."""
-    values = np.geomspace(1, 1e4, 17)
+    values = np.geomspace(1, 1e6, 19)
     scenes = {"triangular cell, air wedges at the apex": (tri_scene(0.1), ORANGE), "cog in layers": (stairs(), BLUE)}
     figure, axis = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
     for label, (scene, colour) in scenes.items():

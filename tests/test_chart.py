@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from line_cases import exact, off
 
-from sensorgen import chart, planner
+from sensorgen import chart
 from sensorgen.chart import cells, lines
 from sensorgen.chart.cells import STANDARD
 from sensorgen.chart.measured import Point, with_front
@@ -76,7 +76,6 @@ def test_rungs_end_where_nothing_is_gained(monkeypatch):
 
 @pytest.fixture(scope="module")
 def measured():
-    pytest.importorskip("ngsolve", reason="the extra fem is not installed")
     said = []
     with pytest.MonkeyPatch.context() as patch:  # by accuracy, not by time: a busy machine measures the same points
         patch.setattr(cells, "_LEAST_WIDTH", 1e-6)
@@ -195,12 +194,11 @@ def test_the_page_in_a_browser(measured, tmp_path):
     assert report["marks"] == len(measured)
 
 
-def test_the_command(tmp_path, monkeypatch):
+def test_the_command(tmp_path):
     from click.testing import CliRunner
 
     from sensorgen.cli.chart_command import command
 
-    monkeypatch.setattr(planner, "load_solver", lambda: None)
     out = tmp_path / "new" / "chart"
     done = CliRunner().invoke(command, ["--scene", "plate, 0.6 mm", "--budget", "0.1", "-o", str(out)])
     assert done.exit_code == 0, done.output

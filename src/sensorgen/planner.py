@@ -9,11 +9,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from hashlib import sha256
-from importlib import import_module, resources
-from importlib.util import find_spec
+from importlib import resources
 from json import dumps
 from math import hypot, inf
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -24,7 +22,6 @@ from sensorgen.interval import Disc, Interval
 from sensorgen.scene import Scene
 from sensorgen.sections import overlap
 
-SOLVER = "ngsolve"  # the optional package that dear models need
 _EXACT = 1e-9  # relative width of a capacitance's bounds below which the scene is a plate
 _LOSSLESS, _LOSSY = "capacitance", "lossy"  # functions of a model
 _CHEAP = 1  # up to this cost, a model is asked before it is weighed
@@ -32,10 +29,6 @@ _CHEAP = 1  # up to this cost, a model is asked before it is weighed
 
 class Unpredictable(SensorgenError):
     """No model can speak of the scene; the message holds what each one said."""
-
-
-class Unloadable(SensorgenError):
-    """The solver is installed, but does not load."""
 
 
 class Contradiction(SensorgenError):
@@ -91,8 +84,6 @@ class Answer:
         Whether the answer was known from before.
     loss_f : Interval or None
         Minus the imaginary part, where dielectrics lose [F].
-    hampered : bool
-        Whether a model that might have come nearer did not load; such an answer is not kept.
     """
 
     model: str
@@ -102,7 +93,6 @@ class Answer:
     plan: tuple[Candidate, ...] = ()
     known: bool = False
     loss_f: Interval | None = None
-    hampered: bool = False
 
     def reached(self) -> bool:
         """Whether the interval is as narrow as wanted."""
@@ -198,8 +188,6 @@ def capacitance(
 
 def remember(scene: Scene, permittivity: Mapping[str, complex], model: str, answer: Answer) -> None:
     """Keep an answer to :func:`capacitance` for the next time."""
-    if answer.hampered:
-        return
     cached.keep(_question(scene, permittivity, answer.wanted, model), _plain(answer))
 
 
@@ -270,7 +258,6 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
         raise Unpredictable(f"{overlaps}; expected each place to belong to one body")
     plan: list[Candidate] = []
     refused: list[str] = []
-    hampered = False
     bounds: dict[str, Interval | Disc] = {}
     kind = _kind(permittivity)
     for candidate in _ordered(width, model):
@@ -281,13 +268,7 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
         if reason:
             plan.append(replace(candidate, passed_over=reason))
             continue
-        try:
-            found, seconds = _timed(candidate.model, kind, scene, permittivity, width)
-        except Unloadable as error:  # the others answer as well as they can
-            refused.append(f"{candidate.model}: {error}")
-            plan.append(replace(candidate, passed_over=str(error)))
-            hampered = True
-            continue
+        found, seconds = _timed(candidate.model, kind, scene, permittivity, width)
         bounds[candidate.model] = found
         _refuse_contradiction(bounds)
         plan.append(replace(candidate, width=found.width(), seconds=seconds))
@@ -295,7 +276,7 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
         raise Unpredictable("; ".join(refused))
     best = min(bounds, key=lambda name: bounds[name].width())
     real, loss = _parts(bounds[best])
-    return Answer(best, real, tuple(refused), width, tuple(plan), loss_f=loss, hampered=hampered)
+    return Answer(best, real, tuple(refused), width, tuple(plan), loss_f=loss)
 
 
 def _kind(permittivity: Mapping[str, complex]) -> str:
@@ -340,35 +321,16 @@ def _idle(candidate: Candidate, bounds: Mapping[str, Interval | Disc], width: fl
 def _timed(
     name: str, kind: str, scene: Scene, permittivity: Mapping[str, complex], width: float
 ) -> tuple[Interval | Disc, float]:
-    """A model's bounds, or its disc, and how long they took once everything is loaded [s]."""
+    """A model's bounds, or its disc, and how long they took once the model is loaded [s]."""
     model = capacitance_models()[name]
     given = (model.WIDTH if width == inf else width,) if hasattr(model, "WIDTH") else ()
-    if hasattr(model, "NEEDS"):
-        load_solver()
     start = time.perf_counter()
     found: Interval | Disc = getattr(model, kind)(scene, permittivity, *given)
     return found, time.perf_counter() - start
 
 
-def load_solver() -> None:
-    """Import the solver ahead of the clock, if it is there.
-
-    Raises
-    ------
-    Unloadable
-        It is there, and fails.
-    """
-    try:
-        if find_spec(SOLVER):
-            import_module(SOLVER)
-    except (ImportError, OSError) as error:
-        raise Unloadable(
-            f"NGSolve is installed but does not load ({error}): pip install --force-reinstall ngsolve"
-        ) from None
-
-
 def _question(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str) -> dict[str, Any]:
-    """Everything that decides an answer: the scene's content, materials, what is wanted, and the solver's version."""
+    """Everything that decides an answer: the scene's content, materials, and what is wanted."""
     look = [
         (body.name, body.material, body.terminal, [(p.axis, p.outline, p.start_mm, p.end_mm) for p in body.prisms])
         for body in scene.bodies
@@ -379,16 +341,7 @@ def _question(scene: Scene, permittivity: Mapping[str, complex], width: float, m
         "permittivity": {name: [v.real, v.imag] if isinstance(v, complex) else v for name, v in permittivity.items()},
         "width": width if width < inf else None,
         "model": model,
-        SOLVER: _solver_version(),
     }
-
-
-@cache
-def _solver_version() -> str:
-    """Version of the solver, "" where it is not installed; without importlib.metadata, which takes 30 ms to load."""
-    spec = find_spec(SOLVER)
-    folders = Path(spec.origin).parent.parent.glob(f"{SOLVER}-*.dist-info") if spec and spec.origin else ()
-    return " ".join(sorted(folder.stem for folder in folders)) or ("unknown" if spec else "")
 
 
 def _plain(answer: Answer) -> dict[str, Any]:

@@ -60,8 +60,6 @@ def test_cogs_are_as_wide_as_the_slicers_print_them(walls):
 def test_capacitance_of_the_rules(walls, along):
     from sensorgen.models import fem2d
 
-    if fem2d.unfit(tri().drawn):
-        pytest.skip("NGSolve is not installed")
     sides = {"length_mm": 12.0, "width_mm": 10.0}
     scene, plan = one_period(tri(along=along, **sides), walls)
     found = fem2d.capacitance(scene, EPS, 1e-3).middle() / (plan.area_mm2() / 2 * 1e-3) * 1e12

@@ -55,8 +55,6 @@ WITHIN = {"arachne": 0.02, "classic": 0.02, "cura": 0.04, "cura-gaps": 0.05}
 
 @pytest.mark.parametrize("walls", WALLS)
 def test_capacitance_by_every_convention(printed, walls):
-    if fem2d.unfit(small().drawn):
-        pytest.skip("NGSolve is not installed")
     variant, made = printed(walls)
     for convention, wanted in REFERENCE["capacitance_pf_per_m"][walls].items():
         assert per_period(variant, made.layers[convention]) == pytest.approx(wanted, rel=WITHIN[walls]), convention
@@ -66,8 +64,6 @@ def test_capacitance_by_every_convention(printed, walls):
     ("walls", "within"), [("arachne", 0.02), ("classic", 0.02), ("cura", 0.07), ("cura-gaps", 0.07)]
 )
 def test_the_estimate_comes_near_the_real_slicers(printed, walls, within):
-    if fem2d.unfit(small().drawn):
-        pytest.skip("NGSolve is not installed")
     variant, made = printed(walls)
     guess = compared.estimated(variant, walls)
     found = per_period(variant, next(iter(guess.layers.values())))

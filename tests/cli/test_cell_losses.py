@@ -9,8 +9,6 @@ import pytest
 
 from sensorgen.units import EPS0_F_PER_M
 
-pytest.importorskip("ngsolve", reason="the extra fem is not installed")
-
 PLATE_F_PER_M2 = EPS0_F_PER_M * 4.68 / 0.6e-3
 
 

@@ -12,14 +12,10 @@ from scipy.special import ellipk
 
 from sensorgen.errors import OutOfRange
 from sensorgen.interval import Interval
-from sensorgen.models import columns
+from sensorgen.models import _fem_bounds, columns, fem2d
 from sensorgen.scene import Body, Fill, Scene, box
 from sensorgen.shapes import reference, tri
 from sensorgen.units import EPS0_F_PER_M
-
-pytest.importorskip("ngsolve", reason="finite elements of cross-sections need NGSolve: pip install 'sensorgen[fem]'")
-
-from sensorgen.models import _fem_bounds, fem2d
 
 CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
 VACUUM = {"air": 1.0, "x60": 1.0}
@@ -56,7 +52,7 @@ def test_widths_shrink_and_lie_within_each_other():
 
 def test_the_width_falls_exponentially_with_the_order():
     section, coarse = fem2d._triangles(tri_cell(0.1))
-    mesh = fem2d.graded(coarse, fem2d.exponents(coarse, EPS), 1e-10)
+    mesh = fem2d._graded(coarse, EPS, 1e-10)
     widths = [fem2d._solved(mesh, EPS, p)[0].width() for p in (3, 5, 7, 9)]
     assert section.depth_mm == 1.0
     assert all(b < a / 5 for a, b in pairwise(widths))  # a factor of 9 to 12, measured
@@ -433,9 +429,3 @@ def test_what_it_cannot_speak_of():
     assert "three directions" in (fem2d.unfit(rect_cell(0.1)) or "")
     assert "two electrodes" in (fem2d.unfit(middle) or "")
     assert fem2d.unfit(tri_cell(0.1)) is None
-
-
-def test_without_ngsolve_it_says_how_to_get_it(monkeypatch):
-    monkeypatch.setattr(fem2d, "find_spec", lambda name: None)
-    assert "pip install" in (fem2d.unfit(tri_cell(0.1)) or "")
-    assert columns.unfit(tri_cell(0.1)) is None

@@ -6,7 +6,7 @@ from scipy.spatial import Delaunay
 
 from sensorgen.models._fem_corners import exponent, exponents
 from sensorgen.models._fem_flips import flipped
-from sensorgen.models._fem_triangles import Triangles
+from sensorgen.models._fem_triangles import Triangles, apart
 
 
 def close(expected: float, rel: float):
@@ -31,20 +31,25 @@ def test_exponents_of_corners_that_textbooks_know():
     """pi/w between electrodes w apart, pi/(2 w) from electrode to mirror; quadrants of eps, 1, eps, 1 in turn
     (Kellogg): tan(lambda pi / 4) = eps^-1/2.
     """
-    assert exponent([(1.5 * np.pi, 4.68)], (True, True)) == close(2 / 3, 1e-9)
-    assert exponent([(0.75 * np.pi, 4.68)], (True, False)) == close(2 / 3, 1e-9)
-    assert exponent([(0.75 * np.pi, 4.68)], (False, True)) == close(2 / 3, 1e-9)
+    assert exponent(((1.5 * np.pi, 4.68),), (True, True)) == close(2 / 3, 1e-9)
+    assert exponent(((0.75 * np.pi, 4.68),), (True, False)) == close(2 / 3, 1e-9)
+    assert exponent(((0.75 * np.pi, 4.68),), (False, True)) == close(2 / 3, 1e-9)
     for eps in (3.0, 161.4476):
-        quadrants = [(np.pi / 2, eps), (np.pi / 2, 1.0)] * 2
+        quadrants = ((np.pi / 2, eps), (np.pi / 2, 1.0)) * 2
         assert exponent(quadrants, None) == close(4 / np.pi * np.arctan(eps**-0.5), 1e-8)
-    assert exponent([(np.pi / 2, 2.0)] * 4, None) > 7  # smooth, as far as its polynomials go
+    assert exponent(((np.pi / 2, 2.0),) * 4, None) > 7  # smooth, as far as its polynomials go
 
 
-def test_the_lowest_exponent_of_all_that_meets_at_a_corner_counts():
+def test_pieces_that_meet_at_a_point_have_an_exponent_each():
     """Two pieces of dielectric, 3.3 and 2.2 rad wide, meet at a point of the electrode, in either turn."""
     wide, narrow = [(1.1, 2.0)] * 3, [(1.1, 3.0)] * 2
     for fans in ((wide, narrow), (narrow, wide)):
-        assert exponents(*around(*fans))[0] == close(np.pi / 3.3, 1e-8)
+        mesh, eps = around(*fans)
+        parted = apart(mesh)
+        found = exponents(parted, eps)
+        values = [found[k] for k in sorted(found) if np.hypot(*parted.points[k]) == 0]
+        assert sorted(values) == close([np.pi / 3.3, np.pi / 2.2], 1e-8)
+        assert sorted(parted.terminals.values()) == sorted(mesh.terminals.values())
 
 
 def test_flips_end_at_delaunays_triangles():

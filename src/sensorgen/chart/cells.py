@@ -61,7 +61,6 @@ def points(name: str, budget_s: float) -> list[Point]:
     budget_s : float
         A model is not asked for more where that would take longer, ten times the last one taken as a guess [s].
     """
-    planner.load_solver()
     design = designs.make(STANDARD[name].data)
     return [*_formulas(name, design), *_bounds(name, design, budget_s)]
 

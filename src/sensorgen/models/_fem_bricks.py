@@ -184,12 +184,12 @@ def _wanted(around: list[int], values: Sequence[float], layers: int) -> int:
     if not any(free):
         return 0
     if all(free):
-        fan = [(np.pi / 2, values[code]) for code in around]
+        fan = tuple((np.pi / 2, values[code]) for code in around)
         return layers // 2 if exponent(fan, None) < _INFINITE else 0
     starts = [k for k in range(4) if free[k] and not free[k - 1]]
     for start in starts:
         run = [around[(start + k) % 4] for k in range(next(k for k in range(1, 4) if not free[(start + k) % 4]))]
-        if exponent([(np.pi / 2, values[code]) for code in run], (True, True)) < _INFINITE:
+        if exponent(tuple((np.pi / 2, values[code]) for code in run), (True, True)) < _INFINITE:
             return layers
     return 0
 

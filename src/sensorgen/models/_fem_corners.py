@@ -1,13 +1,13 @@
 """How singular the field is at each corner: u grows as r^lambda, and lambda below 1 means an infinite field."""
 
-from collections import defaultdict
-from functools import cache
-from typing import Any
+from collections.abc import Iterable, Mapping
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.models._fem_triangles import Edge, Triangles
+from sensorgen.models._fem_fans import Fan, fans
+from sensorgen.models._fem_triangles import Triangles
 
 _DEGREE = 8  # of the polynomials in a sector
 _WIDEST = np.pi / 3  # of a sector
@@ -16,7 +16,7 @@ _SMOOTH = 1e-6  # how near to a whole number lambda counts as one
 _HIGHEST = 3.5  # lambda above which polynomials serve without refinement
 
 
-def exponents(mesh: Triangles, permittivity: dict[str, float]) -> dict[int, float]:
+def exponents(mesh: Triangles, permittivity: Mapping[str, float]) -> dict[int, float]:
     r"""Lowest exponent that is no whole number, for each corner that has one below 3.5.
 
     Around a corner u = r^lambda w(theta), :math:`(\varepsilon w')' + \lambda^2 \varepsilon w = 0`, w = 0 on electrodes,
@@ -25,7 +25,7 @@ def exponents(mesh: Triangles, permittivity: dict[str, float]) -> dict[int, floa
     Parameters
     ----------
     mesh : Triangles
-        The cell's few triangles.
+        The cell's few triangles; one fan at each corner.
     permittivity : dict of str to float
         Relative, of each material; its modulus where it is complex [-].
 
@@ -34,70 +34,38 @@ def exponents(mesh: Triangles, permittivity: dict[str, float]) -> dict[int, floa
     dict of int to float
         Corner's number to lambda [-].
     """
-    around: dict[int, list[int]] = defaultdict(list)
-    for number, corners in enumerate(mesh.triangles):
-        for corner in corners:
-            around[corner].append(number)
-    known: dict[Any, float] = {}
     found: dict[int, float] = {}
-    for corner, here in around.items():
-        sectors, ends = _sectors(mesh, corner, here, permittivity)
-        for fan, fixed in zip(sectors, ends, strict=True):
-            key = (tuple((round(w, 9), eps) for w, eps in fan), fixed)
-            if key not in known:
-                known[key] = exponent(fan, fixed)
-            value = known[key]
-            if value < _HIGHEST:
-                found[corner] = min(value, found.get(corner, value))
+    for corner, (fan,) in fans(mesh.triangles).items():
+        ends = None if fan.closed else tuple(_on_terminal(mesh, corner, fan.spokes[k]) for k in (0, -1))
+        value = exponent(_sectors(mesh, corner, fan, permittivity), ends)
+        if value < _HIGHEST:
+            found[corner] = value
     return found
 
 
-_Fan = list[tuple[float, float]]
+_Sectors = tuple[tuple[float, float], ...]
 
 
-def _sectors(
-    mesh: Triangles, corner: int, here: list[int], permittivity: dict[str, float]
-) -> tuple[list[_Fan], list[tuple[bool, bool] | None]]:
-    """Angle and permittivity of the triangles around a corner, in turn, for each piece of dielectric that meets there.
-
-    The ends say whether the first and the last line are electrodes; None where the pieces close to a ring.
-    """
-    turned = {n: _turned(mesh.triangles[n], corner) for n in here}
-    by_first = {first: n for n, (first, _) in turned.items()}
-    lasts = {last for _, last in turned.values()}
-    fans, ends = [], []
-    starts = [n for first, n in by_first.items() if first not in lasts] or here[:1]
-    for start in starts:
-        fan, n, first = [], start, turned[start][0]
-        while True:
-            a, b = (mesh.points[p] - mesh.points[corner] for p in turned[n])
-            fan.append((float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)), permittivity[mesh.regions[n][0]]))
-            last = turned[n][1]
-            if last == first or last not in by_first:
-                break
-            n = by_first[last]
-        fans.append(_merged(fan))
-        ends.append(None if last == first else (_on_terminal(mesh, corner, first), _on_terminal(mesh, corner, last)))
-    return fans, ends
-
-
-def _turned(corners: tuple[int, int, int], corner: int) -> Edge:
-    """The other two corners of a triangle, in turn."""
-    k = corners.index(corner)
-    return corners[k - 2], corners[k - 1]
+def _sectors(mesh: Triangles, corner: int, fan: Fan, permittivity: Mapping[str, float]) -> _Sectors:
+    """Angle and permittivity of the triangles around a corner, in turn."""
+    away = mesh.points[[*fan.spokes, *fan.spokes[:1]]] - mesh.points[corner]
+    angles = np.arctan2(
+        away[:-1, 0] * away[1:, 1] - away[:-1, 1] * away[1:, 0], (away[:-1] * away[1:]).sum(axis=1)
+    ).tolist()
+    return _merged((angle, permittivity[mesh.regions[n][0]]) for angle, n in zip(angles, fan.members, strict=False))
 
 
 def _on_terminal(mesh: Triangles, a: int, b: int) -> bool:
     return (min(a, b), max(a, b)) in mesh.terminals
 
 
-def _merged(fan: _Fan) -> _Fan:
-    found: _Fan = []
-    for angle, eps in fan:
+def _merged(sectors: Iterable[tuple[float, float]]) -> _Sectors:
+    found: list[tuple[float, float]] = []
+    for angle, eps in sectors:
         if found and found[-1][1] == eps:
             angle += found.pop()[0]
-        found.append((angle, eps))
-    return found
+        found.append((round(angle, 12), eps))
+    return tuple(found)
 
 
 @cache
@@ -112,13 +80,14 @@ def _reference() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return (slope.T * weight) @ slope, (value.T * weight) @ value
 
 
-def exponent(fan: _Fan, fixed: tuple[bool, bool] | None) -> float:
+@lru_cache(maxsize=1000)
+def exponent(sectors: _Sectors, fixed: tuple[bool, ...] | None) -> float:
     """The lowest exponent that is no whole number, or infinity.
 
-    ``fan`` holds angle [rad] and permittivity [-] of the sectors in turn; ``fixed`` says whether an electrode bounds
+    ``sectors`` holds angle [rad] and permittivity [-] in turn; ``fixed`` says whether an electrode bounds
     the first and the last, and is None where they close to a ring.
     """
-    parts = [(angle / n, eps) for angle, eps in fan for n in [int(np.ceil(angle / _WIDEST))] for _ in range(n)]
+    parts = [(angle / n, eps) for angle, eps in sectors for n in [int(np.ceil(angle / _WIDEST))] for _ in range(n)]
     size = _DEGREE * len(parts) + 1
     stiffness, mass = np.zeros((size, size)), np.zeros((size, size))
     for k, (angle, eps) in enumerate(parts):
@@ -134,7 +103,7 @@ def exponent(fan: _Fan, fixed: tuple[bool, bool] | None) -> float:
     return float(odd.min()) if len(odd) else np.inf
 
 
-def _kept(size: int, fixed: tuple[bool, bool] | None) -> NDArray[np.float64]:
+def _kept(size: int, fixed: tuple[bool, ...] | None) -> NDArray[np.float64]:
     """From free values to all values: 0 on electrodes, the same at both ends of a ring."""
     if fixed is None:
         keep = np.eye(size)[:, :-1]

@@ -1,7 +1,7 @@
-"""Rings of triangles around corners, each ring a fixed share of the last: what makes polynomials converge there."""
+"""Room for rings around corners: a tip of each triangle cut off, and what is left in few triangles."""
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from itertools import pairwise
 from math import ceil, log
 
@@ -10,48 +10,43 @@ from numpy.typing import NDArray
 
 from sensorgen.models._fem_triangles import Edge, Triangle, Triangles, edges_of, fan
 
-RATIO = 0.15  # of one ring's radius to the last: near the best for exponential convergence (Gui and Babuska, 1986)
-_REACH = 0.4  # of a corner's shortest edge: radius of its outermost ring
+_RATIO = 0.15  # of one ring's radius to the next: near the best for exponential convergence (Gui and Babuska, 1986)
+_REACH = 0.45  # of a corner's shortest edge: radius of its tips
 _LONG = 5.0  # times a corner's shortest edge: an edge so long gets rings further out
-_SMALLEST = 1e-13  # of the cell's size: no ring is smaller, for doubles end there
 
 
-def graded(mesh: Triangles, exponents: dict[int, float], error: float) -> Triangles:
-    """Split triangles towards corners until what is left there holds less than a share of the energy.
+def graded(mesh: Triangles, corners: Collection[int]) -> Triangles:
+    """Split triangles so that each of some corners has a small one of its own in every triangle that it had.
 
-    The energy within radius r goes as r^(2 lambda): each corner gets as many rings as its own exponent asks for.
     Corners near each other, as over a thin film, get rings outwards too, up to the length of their long edges.
 
     Parameters
     ----------
     mesh : Triangles
         A cell's few triangles.
-    exponents : dict of int to float
-        Of the corners that need rings [-].
-    error : float
-        Share of the energy that may stay unresolved at a corner [-].
+    corners : collection of int
+        That get tips.
 
     Returns
     -------
     Triangles
-        Finer, of the same regions and terminals.
+        Finer, of the same regions and terminals; corners keep their numbers.
     """
-    return _Splitter(mesh, exponents, error).split()
+    return _Splitter(mesh, corners).split()
 
 
 class _Splitter:
     """Points on edges, shared by the triangles at both sides, and the triangles between them."""
 
-    def __init__(self, mesh: Triangles, exponents: dict[int, float], error: float) -> None:
+    def __init__(self, mesh: Triangles, corners: Collection[int]) -> None:
         self.mesh = mesh
+        self.tipped = corners
         self.points: list[NDArray[np.float64]] = list(mesh.points)
         lengths = {e: self._length(e) for corners in mesh.triangles for e in edges_of(corners)}
         self.radius: dict[int, float] = defaultdict(lambda: np.inf)
         for edge, length in lengths.items():
             for corner in edge:
                 self.radius[corner] = min(self.radius[corner], _REACH * length)
-        size = max(lengths.values())
-        self.rings = {c: self._ring_count(c, value, error, size) for c, value in exponents.items()}
         self.on_edge = {edge: self._edge_points(edge, length) for edge, length in lengths.items()}
 
     def split(self) -> Triangles:
@@ -72,19 +67,13 @@ class _Splitter:
         a, b = (self.mesh.points[k] for k in edge)
         return float(np.hypot(*(b - a)))
 
-    def _ring_count(self, corner: int, exponent: float, error: float, size: float) -> int:
-        wanted = ceil(log(error) / (2 * exponent * log(RATIO)))
-        possible = int(log(_SMALLEST * size / self.radius[corner]) / log(RATIO))
-        return max(1, min(wanted, possible))
-
     def _radii(self, corner: int, length: float) -> list[float]:
         """Of the rings that cross an edge of some length at a corner, the largest first [mm]."""
         start = self.radius[corner]
         outer = []
         if length > _LONG * start / _REACH:
-            outer = [start * RATIO**-k for k in range(ceil(log(_REACH * length / start) / -log(RATIO)))][::-1]
-        inner = [start * RATIO**k for k in range(self.rings[corner] + 1)] if corner in self.rings else []
-        return outer[: len(outer) - 1 if inner else None] + inner
+            outer = [start * _RATIO**-k for k in range(ceil(log(_REACH * length / start) / -log(_RATIO)))][::-1]
+        return outer or ([start] if corner in self.tipped else [])
 
     def _edge_points(self, edge: Edge, length: float) -> tuple[list[int], list[int]]:
         """Numbers of the points on an edge around its first corner and around its second, the outermost first."""
@@ -109,18 +98,8 @@ class _Splitter:
         hub: list[int] = []
         for k, corner in enumerate(corners):
             before, after = corners[k - 1], corners[k - 2]
-            count = self.rings.get(corner, -1) + 1
             left, right = self._around(corner, before), self._around(corner, after)
-            if count:
-                yield from _tip(corner, left[-count:], right[-count:])
-            inwards, outwards = left[: len(left) - count + 1], right[: len(right) - count + 1][::-1]
-            hub += [*inwards, *outwards] if count else [*left, corner, *right[::-1]]
+            hub += [*left, *([] if corner in self.tipped else [corner]), *right[::-1]]
+            if corner in self.tipped:
+                yield corner, right[-1], left[-1]
         yield from fan(np.array([self.points[n] for n in hub]), hub)
-
-
-def _tip(corner: int, left: list[int], right: list[int]) -> Iterator[Triangle]:
-    """Rings around one corner of a triangle: ``left`` on the edge that comes before it in turn, ``right`` after."""
-    for k in range(len(left) - 1):
-        yield left[k], left[k + 1], right[k]
-        yield left[k + 1], right[k + 1], right[k]
-    yield left[-1], corner, right[-1]

@@ -76,6 +76,8 @@ class Fields:
         eta squared.
     unknowns : int
         That the larger of the two systems couples.
+    rounding : float
+        Share by which doubles may be off [-].
     """
 
     lower: complex
@@ -84,6 +86,7 @@ class Fields:
     size: float
     apart: float
     unknowns: int
+    rounding: float = ROUNDING
 
 
 def disc(found: Fields, turn: Turned, shares: Sequence[float]) -> Disc:
@@ -95,7 +98,10 @@ def disc(found: Fields, turn: Turned, shares: Sequence[float]) -> Disc:
     least, most = min(shares), max(shares) - min(shares)
     beyond = 2 * np.sqrt(most * found.size * found.apart) + most * found.apart
     return min(
-        (_grown(least * c + found.part, least * off + turn.kappa() * beyond) for c, off in _whole(found, turn)),
+        (
+            _grown(least * c + found.part, least * off + turn.kappa() * beyond, found.rounding)
+            for c, off in _whole(found, turn)
+        ),
         key=lambda near: near.radius,
     )
 
@@ -108,6 +114,6 @@ def _whole(found: Fields, turn: Turned) -> Iterator[tuple[complex, float]]:
         yield (found.energy + found.lower) / 2, found.apart / 2 * np.sqrt((1 + t) / (1 - t))
 
 
-def _grown(centre: complex, off: float) -> Disc:
+def _grown(centre: complex, off: float, rounding: float) -> Disc:
     """A disc with room for rounding."""
-    return Disc(complex(centre), float(off + ROUNDING * abs(centre)))
+    return Disc(complex(centre), float(off + rounding * abs(centre)))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.cells import Cell, Slice
+from sensorgen.models._fem_fans import Fan, fans
 from sensorgen.models._fem_flips import flipped
 from sensorgen.sections import ROUNDING_MM
 
@@ -64,7 +65,28 @@ def triangles(cell: Cell) -> Triangles:
     _refuse_open(points, owners, inside, cell)
     kept = sorted(inside)
     regions = [found[n][1] for n in kept]
-    return Triangles(points, flipped(points, [found[n][0] for n in kept], regions), regions, terminals)
+    return apart(Triangles(points, flipped(points, [found[n][0] for n in kept], regions), regions, terminals))
+
+
+def apart(mesh: Triangles) -> Triangles:
+    """The same, with a point for each of the pieces that only touch there: no field runs through a point."""
+    for corner, found in fans(mesh.triangles).items():
+        if len(found) > 1:
+            return apart(_parted(mesh, corner, found[1]))
+    return mesh
+
+
+def _parted(mesh: Triangles, corner: int, fan: Fan) -> Triangles:
+    """One of a corner's fans with a new point at the same place."""
+    new = len(mesh.points)
+    corners, terminals = list(mesh.triangles), dict(mesh.terminals)
+    for n in fan.members:
+        a, b, c = (new if k == corner else k for k in corners[n])
+        corners[n] = (a, b, c)
+    for spoke in fan.spokes:
+        if name := terminals.pop((min(corner, spoke), max(corner, spoke)), ""):
+            terminals[spoke, new] = name
+    return Triangles(np.vstack([mesh.points, mesh.points[corner]]), corners, mesh.regions, terminals)
 
 
 def edges_of(corners: Triangle) -> list[Edge]:

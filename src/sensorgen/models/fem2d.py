@@ -6,31 +6,36 @@ distance of the bounds falls exponentially. See docs/cells.md.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib.util import find_spec
-from typing import TypeVar
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sensorgen.cells import cell
 from sensorgen.interval import Disc, Interval
 from sensorgen.models import _fem_bounds as fem
+from sensorgen.models._fem_cones import RATIO
 from sensorgen.models._fem_corners import exponents
 from sensorgen.models._fem_grading import graded
 from sensorgen.models._fem_lossy import Fields, Turned, disc, turned
-from sensorgen.models._fem_triangles import TERMINALS, Triangles, triangles
+from sensorgen.models._fem_mesh import Cones
+from sensorgen.models._fem_plane import Plane
+from sensorgen.models._fem_problem import Field
+from sensorgen.models._fem_triangles import Triangles, triangles
 from sensorgen.scene import Scene
 from sensorgen.sections import Section, sections
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
-SOURCE = "Dirichlet's and Thomson's principles; hp finite elements graded at corners (NGSolve)"
+SOURCE = "Dirichlet's and Thomson's principles; hp finite elements, rings without end at corners"
 COST = 2
 
 WIDTH = 1e-4  # of the interval, where the caller does not say
-NEEDS = "NGSolve is not installed: pip install 'sensorgen[fem]'"
 
 _ORDERS = (4, 20)  # of polynomials: the lowest and the highest
 _CORNER_SHARE = 0.01  # of the wanted width: what may stay unresolved at a corner
-_SMALLEST_SHARE = 1e-12
+_SLENDER = 2e-15  # of a triangle's slenderness: what its energy may lose in doubles
+_MOST_DOUBLINGS = 12  # of rings at a corner: 4096 of them
 _GAIN = 1.2  # by which an order lowers the width, in e-folds, as measured
 _STEP = 2  # of orders, where the field is complex
 _STALLED = 0.7  # a step that leaves more of the width than this gains nothing
@@ -38,8 +43,6 @@ _STALLED = 0.7  # a step that leaves more of the width than this gains nothing
 
 def unfit(scene: Scene) -> str | None:
     """Why this model cannot speak of this scene, or None."""
-    if find_spec("ngsolve") is None:
-        return NEEDS
     try:
         _triangles(scene)
     except ValueError as error:
@@ -116,20 +119,17 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     """The orders that :func:`capacitance` goes through, until the interval is narrow enough or gains no more."""
     section, coarse = _triangles(scene)
     values = {material: permittivity[material] for material, _ in coarse.regions}
-    mesh = graded(coarse, exponents(coarse, values), max(_CORNER_SHARE * width, _SMALLEST_SHARE))
+    mesh = _graded(coarse, values, width)
     last, order = np.inf, _first(width)
     while order <= _ORDERS[1]:
         try:
             interval, unknowns = _solved(mesh, values, order)
         except fem.Unsolved:
-            if last < np.inf:
-                return  # doubles end here: what was solved before stands
-            if order - 3 < _ORDERS[0]:
+            if last == np.inf:
                 raise
-            order -= 3
-            continue
+            return  # doubles end here: what was solved before stands
         here = interval.times(EPS0_F_PER_M * M_PER_MM * section.depth_mm)
-        yield Step(order, len(mesh.triangles), unknowns, here)
+        yield Step(order, mesh.elements(), unknowns, here)
         if here.width() <= width or here.width() > _STALLED * last:
             return
         order, last = order + _more(here.width(), width), here.width()
@@ -137,7 +137,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
 
 def _first(width: float) -> int:
     """The order to begin with, as measured."""
-    return int(np.clip(round(2.3 - 1.25 * np.log10(width)), *_ORDERS))
+    return int(np.clip(round(0.6 - 1.6 * np.log10(width)), *_ORDERS))
 
 
 def _more(now: float, width: float) -> int:
@@ -173,7 +173,7 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     values = {material: complex(permittivity[material]) for material, _ in coarse.regions}
     turn = turned(values.values())
     moduli = {material: abs(value) for material, value in values.items()}
-    mesh = graded(coarse, exponents(coarse, moduli), max(_CORNER_SHARE * width, _SMALLEST_SHARE))
+    mesh = _graded(coarse, moduli, width)
     best = _disc(mesh, values, turn, _first(width))
     for order in range(_first(width) + _STEP, _ORDERS[1] + 1, _STEP):
         if best.width() <= width:
@@ -189,20 +189,27 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     return best.times(EPS0_F_PER_M * M_PER_MM * section.depth_mm)
 
 
-def _disc(mesh: Triangles, permittivity: Mapping[str, complex], turn: Turned, order: int) -> Disc:
-    import ngsolve as ng
+def _disc(mesh: Cones, permittivity: Mapping[str, complex], turn: Turned, order: int) -> Disc:
+    plane = Plane(mesh, order)
+    eps, weight = _by_triangle(mesh, permittivity)
+    rho = np.array([turn.weight[e] for e in eps.tolist()])
+    u, psi = _fields(plane, eps)
+    energy, square = eps * plane.energies(u, u), plane.energies(u, u.conj()).real
+    mixed = (eps * plane.crossings(u, psi.conj())).real
+    apart = (abs(eps) ** 2 * square + plane.energies(psi, psi.conj()).real - 2 * mixed) / rho
+    found = Fields(
+        lower=_thomson(plane, eps, u, psi),
+        energy=energy.sum(),
+        part=weight @ energy,
+        size=float(weight @ (rho * square)),
+        apart=max(float(apart.sum()), 0.0),
+        unknowns=plane.unknowns,
+        rounding=_rounding(mesh),
+    )
+    return disc(found, turn, [share for _, share in mesh.triangles.regions])
 
-    names, eps, weights = _by_region(mesh, permittivity)
-    solved = fem.Solved.of(_for_ngsolve(mesh, names), eps, order, order - 1)
-    rho = ng.CoefficientFunction([turn.weight[e] for e in eps])
-    slope, missed = solved.slope(), solved.eps * solved.slope() + solved.flux
-    energy, part = solved.integrals(solved.eps * slope * slope, weights)
-    _, size = solved.integrals((rho * slope * ng.Conj(slope)).real, weights)
-    apart, _ = solved.integrals((missed * ng.Conj(missed)).real / rho, ())
-    found = Fields(solved.lower(), energy, part, size, apart, solved.unknowns)
-    return disc(found, turn, [share for _, share in mesh.regions])
 
-
+@lru_cache(maxsize=8)  # unfit() asks before capacitance() does, and a long sensor's cell takes as long as its field
 def _triangles(scene: Scene) -> tuple[Section, Triangles]:
     """The scene's only cross-section, and its repeating cell in few triangles."""
     found = sections(scene)
@@ -211,32 +218,42 @@ def _triangles(scene: Scene) -> tuple[Section, Triangles]:
     return found[0], triangles(cell(found[0], scene.size_mm[2]))
 
 
-def _solved(mesh: Triangles, permittivity: Mapping[str, float], order: int) -> tuple[Interval, int]:
-    found = _energies(mesh, permittivity, order)
-    return fem.whole(found, [share for _, share in mesh.regions]), found.unknowns
+def _graded(coarse: Triangles, permittivity: Mapping[str, float], width: float) -> Cones:
+    """Finer at corners, with as many rings as leave a small share of a width unresolved there."""
+    found = exponents(coarse, permittivity)
+    rings = {corner: np.log(_CORNER_SHARE * width) / (2 * value * np.log(RATIO)) for corner, value in found.items()}
+    doublings = {c: int(np.clip(np.ceil(np.log2(max(n, 1.0))), 0, _MOST_DOUBLINGS)) for c, n in rings.items()}
+    return Cones(graded(coarse, found), doublings)
 
 
-def _energies(mesh: Triangles, permittivity: Mapping[str, float], order: int) -> fem.Energies:
-    names, eps, weights = _by_region(mesh, permittivity)
-    return fem.energies(_for_ngsolve(mesh, names), eps, weights, order, order - 1)
+def _solved(mesh: Cones, permittivity: Mapping[str, float], order: int) -> tuple[Interval, int]:
+    plane = Plane(mesh, order)
+    eps, weight = _by_triangle(mesh, permittivity)
+    u, psi = _fields(plane, eps)
+    energy = eps * plane.energies(u, u)
+    lower = float(_thomson(plane, eps, u, psi))
+    found = fem.Energies(lower, float(energy.sum()), float(weight @ energy), plane.unknowns, _rounding(mesh))
+    return fem.whole(found, [share for _, share in mesh.triangles.regions]), found.unknowns
 
 
-_Region = tuple[str, float]
-_Number = TypeVar("_Number", float, complex)
+def _fields(plane: Plane, eps: NDArray[Any]) -> tuple[Field, Field]:
+    """The best potential and the best stream function of one order."""
+    try:
+        return plane.potential(eps), plane.stream(1 / eps)
+    except np.linalg.LinAlgError as error:
+        raise fem.Unsolved(f"the solver failed on this scene ({error}); use --model columns") from None
 
 
-def _by_region(mesh: Triangles, values: Mapping[str, _Number]) -> tuple[list[_Region], list[_Number], list[float]]:
-    """All regions, and of each its permittivity, and how often it occurs beyond the least."""
-    names = sorted(set(mesh.regions))
-    least = min(share for _, share in names)
-    return names, [values[m] for m, _ in names], [s - least for _, s in names]
+def _thomson(plane: Plane, eps: NDArray[Any], u: Field, psi: Field) -> Any:
+    """Twice what flows into the top, which any potential tells by its own 1 V, less the flux's energy."""
+    return 2 * plane.crossings(u, psi).sum() - (plane.energies(psi, psi) / eps).sum()
 
 
-def _for_ngsolve(mesh: Triangles, names: list[_Region]) -> fem.Mesh:
-    edges = {name: [e for e, end in mesh.terminals.items() if end == name] for name in TERMINALS}
-    return fem.Mesh(
-        mesh.points,
-        np.array(mesh.triangles, dtype=np.int32),
-        np.array([names.index(r) for r in mesh.regions], dtype=np.int32),
-        {name: np.array(found, dtype=np.int32) for name, found in edges.items()},
-    )
+def _rounding(mesh: Cones) -> float:
+    return max(fem.ROUNDING, _SLENDER * mesh.slenderness())
+
+
+def _by_triangle(mesh: Cones, values: Mapping[str, complex]) -> tuple[NDArray[Any], NDArray[np.float64]]:
+    """Permittivity of each triangle, and how often it occurs beyond the least."""
+    shares = np.array([share for _, share in mesh.triangles.regions])
+    return np.array([values[material] for material, _ in mesh.triangles.regions]), shares - shares.min()

@@ -1,0 +1,73 @@
+"""Triangles of which those at singular corners stand for rings, and what of them both problems share."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sensorgen.models._fem_cuts import Flow, flow
+from sensorgen.models._fem_fans import Fan, fans
+from sensorgen.models._fem_fronts import Whole
+from sensorgen.models._fem_triangles import Triangles
+
+
+@dataclass(frozen=True)
+class Cones:
+    """Triangles of which those at singular corners stand for rings without end.
+
+    Attributes
+    ----------
+    triangles : Triangles
+        Each corner has one fan.
+    doublings : dict of int to int
+        Of singular corners: logarithm of the number of their rings.
+    """
+
+    triangles: Triangles
+    doublings: Mapping[int, int]
+
+    @cached_property
+    def corners(self) -> Whole:
+        """Of all triangles (n, 3)."""
+        return np.array(self.triangles.triangles)
+
+    @cached_property
+    def fans(self) -> dict[int, Fan]:
+        """Triangles at each singular corner."""
+        return {c: found[0] for c, found in fans(self.triangles.triangles).items() if c in self.doublings}
+
+    @cached_property
+    def plain(self) -> Whole:
+        """Numbers of the triangles that are no tips."""
+        is_plain = np.ones(len(self.corners), bool)
+        is_plain[[n for fan in self.fans.values() for n in fan.members]] = False
+        return np.flatnonzero(is_plain)
+
+    @cached_property
+    def sides(self) -> tuple[Whole, Whole]:
+        """Distinct sides of the plain triangles (:meth:`names`), and which of them each of these has (k, 3)."""
+        corners = self.corners[self.plain]
+        found, at = np.unique(self.names(corners, np.roll(corners, -1, axis=1)), return_inverse=True)
+        return found, at.reshape(corners.shape)
+
+    @cached_property
+    def flow(self) -> Flow:
+        """The boundary as a flux sees it."""
+        return flow(self.triangles, self.fans)
+
+    def names(self, a: Whole, b: Whole) -> Whole:
+        """One number for each side, by its ends."""
+        return np.minimum(a, b) * len(self.triangles.points) + np.maximum(a, b)
+
+    def slenderness(self) -> float:
+        """Of the most slender triangle: its longest side squared over twice its area [-]."""
+        corners = self.triangles.points[self.corners]
+        sides = np.roll(corners, -1, axis=1) - corners
+        area = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
+        return float(((sides**2).sum(axis=2).max(axis=1) / area).max())
+
+    def elements(self) -> int:
+        """Triangles, those in rings each for itself."""
+        in_rings = [len(fan.members) * (1 + (2 << self.doublings[c])) for c, fan in self.fans.items()]
+        return len(self.plain) + sum(in_rings)
