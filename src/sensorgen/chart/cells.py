@@ -100,9 +100,9 @@ def _rungs(
 def _formulas(name: str, design: Design) -> Iterator[Point]:
     """The thesis's formulas for this shape."""
     eps = next(t.value for t in planner.permittivities(design) if t.material == "x60")
-    for model, (shape, formula) in thesis_cells.NAMED.items():
-        if shape == design.shape:
-            value, seconds = timed(lambda formula=formula: formula(design.params, eps))  # type: ignore[misc]
+    for model, law in thesis_cells.NAMED.items():
+        if design.shape in law.shapes:
+            value, seconds = timed(lambda law=law: law.value_f_per_m2(design.params, eps))  # type: ignore[misc]
             yield _point(name, model, None, Interval(value, value), False, seconds)
 
 
