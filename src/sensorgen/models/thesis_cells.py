@@ -190,7 +190,7 @@ def film_only_f_per_m2(p: tri.Params | rect.Params, eps_r: float) -> float:
     return EPS0_F_PER_M * eps_r / _film_m(p)
 
 
-def swept_f_per_m2(p: tri.Params | rect.Params, eps_r: float, press_mm: float, formula: Callable[..., float]) -> float:
+def swept_f_per_m2(p: Any, eps_r: float, press_mm: float, formula: Callable[..., float]) -> float:
     """What a formula gives for the sizes that 3.1.2 makes of a pressed cell, per area of the sensor at rest [F/m2].
 
     Parameters

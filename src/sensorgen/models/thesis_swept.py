@@ -4,8 +4,10 @@ A model of compression by sizes alone: any model of capacitance can speak of the
 solved compression stands in docs/cells.md.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import asin, atan2, cos, hypot, sin
+from typing import Any, TypeVar, cast
 
 from sensorgen.errors import OutOfRange
 from sensorgen.shapes import rect, tri
@@ -18,7 +20,10 @@ SHAPES = ("tri", "rect")
 _HALVINGS = 60  # of an angle: as far as doubles go
 
 
-def swept(p: tri.Params | rect.Params, press_mm: float) -> tri.Params | rect.Params:
+_P = TypeVar("_P", tri.Params, rect.Params)
+
+
+def swept(p: _P, press_mm: float) -> _P:
     """Sizes of a cell whose top has come down.
 
     Parameters
@@ -35,7 +40,8 @@ def swept(p: tri.Params | rect.Params, press_mm: float) -> tri.Params | rect.Par
     """
     if not press_mm >= 0:
         raise OutOfRange(f"pressed by {press_mm:g} mm; expected 0 or more")
-    return _flattened(p, press_mm) if isinstance(p, tri.Params) else _widened(p, press_mm)
+    ways: dict[type, Callable[[Any, float], Any]] = {tri.Params: _flattened, rect.Params: _widened}
+    return cast(_P, ways[type(p)](p, press_mm))
 
 
 def stretch(rest: tri.Params | rect.Params, now: tri.Params | rect.Params) -> float:
