@@ -165,8 +165,8 @@ def _print_plan(design: "Design", asked: "Asked") -> None:
     click.echo(f"plan for an accuracy of {asked.width:g}")
     lossy = bool(losses.set_losses(design))
     for c in planner.weighed(design.in_use, asked.width, asked.model, lossy):
-        click.echo(f"  {c.model:10}{cell_text.expectation(vars(c)):28}{c.passed_over}".rstrip())
-    click.echo("  the first that does is taken; cheap ones are asked first in any case")
+        click.echo(f"  {c.model:10}{cell_text.expectation(vars(c), asked.width):32}{c.passed_over}".rstrip())
+    click.echo("  the first that does is taken; what is asked in any case costs next to nothing")
 
 
 @contextmanager

@@ -58,14 +58,16 @@ def measured(plan: Iterable[Data]) -> Iterator[str]:
     """What each model of a plan gave, or why it was not asked."""
     for c in plan:
         came = f"{c['width']:.2g} in {_seconds(c['seconds'])}" if c["seconds"] is not None else "not asked"
-        yield f"{c['model']:10}{came:28}{c['passed_over']}".rstrip()
+        yield f"{c['model']:10}{came:32}{c['passed_over']}".rstrip()
 
 
-def expectation(candidate: Data) -> str:
+def expectation(candidate: Data, wanted: float) -> str:
     """What is expected of a model."""
-    if candidate["expected_width"] is None:
-        return "never measured"
-    return f"about {candidate['expected_width']:.2g} in {_seconds(candidate['expected_seconds'])}"
+    width, seconds = candidate["expected_width"], candidate["expected_seconds"]
+    if width is None:
+        return "in any case"
+    reach = f"within {wanted:g}" if width <= wanted else f"about {width:.2g}"
+    return f"{reach} in about {_seconds(seconds)}"
 
 
 def _seconds(value: float) -> str:
