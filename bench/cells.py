@@ -89,9 +89,9 @@ def rows() -> Iterator[dict[str, object]]:  # noqa: C901
     for case in CELLS["tri"]:
         exact, scene, name = case["C_F_per_m"] * MM, tri_scene(case["d"]), f"tri d={case['d']}"
         p = tri.Params(dielectric_mm=case["d"])
-        for model, (shape, formula) in thesis_cells.NAMED.items():
-            if shape == "tri":
-                seconds, error = timed(lambda f=formula, p=p: f(p, 4.68) * 2 * MM * MM, exact)
+        for model, law in thesis_cells.NAMED.items():
+            if "tri" in law.shapes:
+                seconds, error = timed(lambda f=law, p=p: f.value_f_per_m2(p, 4.68) * 2 * MM * MM, exact)
                 yield row(name, model, seconds, error)
         for side in ("lower", "upper"):
             seconds, error = timed(lambda s=side, sc=scene: getattr(columns.capacitance(sc, EPS), s), exact)
@@ -109,9 +109,9 @@ def rows() -> Iterator[dict[str, object]]:  # noqa: C901
             seconds, error = timed(lambda s=side, sc=scene: getattr(columns.capacitance(sc, EPS), s), exact)
             yield row(name, f"columns, {side}", seconds, error)
         p3 = rect.Params(dielectric_mm=case["d"])
-        for model, (shape, formula) in thesis_cells.NAMED.items():
-            if shape == "rect":
-                seconds, error = timed(lambda f=formula, p=p3: f(p, 4.68) * 4e-6, exact)
+        for model, law in thesis_cells.NAMED.items():
+            if "rect" in law.shapes:
+                seconds, error = timed(lambda f=law, p=p3: f.value_f_per_m2(p, 4.68) * 4e-6, exact)
                 yield row(name, model, seconds, error)
         start = time.process_time()
         for step in fem3d.steps(scene, EPS, 1e-3):

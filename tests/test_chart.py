@@ -8,18 +8,25 @@ import os
 import re
 import shutil
 import subprocess
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from line_cases import exact, off
+from line_cases import exact as exact_line
+from line_cases import off
 
 from sensorgen import chart
-from sensorgen.chart import cells, lines
+from sensorgen.chart import cells, exact, lines, presses
 from sensorgen.chart.cells import STANDARD
 from sensorgen.chart.measured import Point, with_front
 from sensorgen.interval import Interval
 from sensorgen.plots import chart as pictures
+
+REFERENCE = Path(__file__).parent / "reference"
 
 
 def point(seconds, error, model="m", bounded=True, scene="s"):
@@ -41,15 +48,63 @@ def test_the_front_is_what_nothing_beats(pairs):
 
 
 def test_errors_are_of_the_bound_that_is_further_off():
-    exact = STANDARD["plate, 0.6 mm"].capacitance_f_per_m2
-    assert cells._point(
-        "plate, 0.6 mm", "m", None, Interval(0.9 * exact, 1.05 * exact), True, 1.0
-    ).error == pytest.approx(0.1)
-    assert cells._point(
-        "plate, 0.6 mm", "m", None, Interval(0.9 * exact, 1.2 * exact), True, 1.0
-    ).error == pytest.approx(0.2)
-    rect = STANDARD["rect, 0.1 mm"].capacitance_f_per_m2
-    assert cells._point("rect, 0.1 mm", "m", None, Interval(rect, rect), True, 1.0).error == 2.7e-5
+    def error(name, low, high):
+        standard = STANDARD[name]()
+        exact = standard.capacitance_f_per_m2
+        return cells.point("s", "m", Interval(low * exact, high * exact), standard, 1.0).error
+
+    assert error("plate, 0.6 mm", 0.9, 1.05) == pytest.approx(0.1)
+    assert error("plate, 0.6 mm", 0.9, 1.2) == pytest.approx(0.2)
+    assert error("rect, 0.1 mm", 1.0, 1.0) == 2.7e-5
+
+
+def test_every_cell_of_the_reference_is_there():
+    known = json.loads((REFERENCE / "cells.json").read_text("utf-8"))
+    for case in known["tri"]:
+        ours = STANDARD[f"tri, {case['d']} mm"]()
+        assert ours.capacitance_f_per_m2 == case["C_F_per_m"] / 2e-3
+        assert ours.known_to >= case["rel_error_halfwidth"]
+    for case in known["rect"]:
+        ours = STANDARD[f"rect, {case['d']} mm"]()
+        assert ours.capacitance_f_per_m2 == pytest.approx(case["C_F"] / 4e-6, rel=1e-9, abs=0)
+        assert ours.known_to >= case["rel_error_halfwidth"]
+    plate = STANDARD["plate, 0.6 mm"]().capacitance_f_per_m2
+    assert plate == pytest.approx(known["plate"]["C_F_per_m2"], rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize("film", ["0.1 mm", "0.2 mm"])
+def test_presses_are_those_of_the_reference(film):
+    known, ours = json.loads((REFERENCE / "contact.json").read_text("utf-8")), presses.CELLS[film]
+    theirs = known[f"tri_d{film.removesuffix(' mm')}"]
+    at = [theirs["p_kPa"].index(kpa) for kpa in ours.stress_kpa]
+    for mine, key, error, floor in (
+        (ours.down_um, "uy_um", "uy_err_um", ours.known_to[0]),
+        (ours.rise_pf_per_m, "dC_pF_per_m", "dC_err", ours.known_to[1]),
+    ):
+        assert list(mine) == [theirs[key][k] for k in at]
+        assert max(theirs[error][k] / theirs[key][k] for k in at) <= floor
+    assert ours.rest_pf_per_m == theirs["C0_exact_pF_per_m"]
+
+
+def test_textbook_scenes_are_met():
+    """Ratios of elliptic integrals by scipy; polygons by their limit: a third-order fall with their corners."""
+    from scipy.special import ellipk
+
+    for k in (0.1, 0.7, 0.99):
+        assert exact._ratio(k) == pytest.approx(ellipk(k**2) / ellipk(1 - k**2), rel=1e-12)
+    pytest.importorskip("ngsolve", reason="the extra fem is not installed")
+    from sensorgen.models import fem2d
+
+    def off(case):
+        found = fem2d.capacitance(case.scene, exact.PERMITTIVITY, 1e-5).middle()
+        return abs(found / (case.capacitance_f_per_m * 1e-3) - 1)
+
+    for case in (exact.stripline(), exact.interdigital()):
+        assert off(case) < 1e-6
+    for circles in (exact.coaxial, exact.eccentric):
+        errors = [off(circles(corners)) for corners in (3, 6)]
+        assert errors[1] * (6 / exact.CORNERS) ** 3 < circles().known_to
+        assert errors[0] / errors[1] > 6
 
 
 def test_rungs_go_on_until_it_costs_too_much(monkeypatch):
@@ -95,7 +150,7 @@ def test_every_model_that_can_speak_is_there(measured):
 def test_what_is_known_of_errors(measured):
     """Thesis 3.35 is off by -24 %, as printed negative; bounds hold the truth; the plate is exact."""
     for p in measured:
-        known = STANDARD[p.scene]
+        known = STANDARD[p.scene]()
         if p.bounded:
             slack = 1e-9 * known.capacitance_f_per_m2
             assert p.lower_f_per_m2 - slack <= known.capacitance_f_per_m2 <= p.upper_f_per_m2 + slack
@@ -111,7 +166,7 @@ def test_what_is_known_of_errors(measured):
 def test_lines_are_known_to_the_last_digit(name):
     """The same line by transfer matrices in 60 digits."""
     for tone, known in lines.STANDARD[name].items():
-        whole, real = off(known, exact(60, **lines.PLATE, f_Hz=tone))
+        whole, real = off(known, exact_line(60, **lines.PLATE, f_Hz=tone))
         assert max(whole, real) < 2e-16
 
 
@@ -128,11 +183,48 @@ def test_what_is_known_of_lines(of_lines):
     assert max(low["line"], wide["line"]) < 1e-15
     assert wide["line_abcd"] > 1e6 * wide["line"]
     assert low["line_closed, B.48 as printed"] > 0.5
+    assert max(found["stack of one film"] for found in (low, wide)) < 1e-12
+    grid = [p.error for p in of_lines if p.model == "sheet" and p.scene == "line, seven tones"]
+    assert [a / b for a, b in pairwise(grid)] == pytest.approx([4, 4], rel=0.3)  # of second order, too
     ladder = [p.error for p in of_lines if p.model == "line_ladder" and p.scene == "line, seven tones"]
     assert len(ladder) == 3
     assert ladder[0] / ladder[1] == pytest.approx(100, rel=0.01)
     assert ladder[1] / ladder[2] == pytest.approx(100, rel=0.01)
     assert all(p.seconds > 0 and not p.bounded and "Re Z by" in p.said for p in of_lines)
+
+
+def test_what_is_known_of_presses(monkeypatch):
+    """Cheap laws are off by what docs/press.md and docs/cells.md say; a budget ends the meshes."""
+    monkeypatch.setattr(presses, "_pressed", lambda *_: iter(()))
+    down, rise = (
+        {p.model: p for p in presses.points(f"tri pressed, 0.1 mm: {w}", 1.0)} for w in ("top down", "rise of C")
+    )
+    assert down["compression: unconfined"].error == pytest.approx(1 - 0.6e-3 * 1e4 / 6e6 / 6.1323e-6, abs=1e-4)
+    assert down["compression: bonded"].error > 0.99
+    assert down["springs"].error > 1
+    assert rise["thesis-3.1.2"].error == pytest.approx(0.818, abs=0.002)
+    assert rise["thesis-3.35-swept"].error == pytest.approx(0.780, abs=0.002)
+    assert "off by -" in rise["thesis-3.1.2"].said
+
+
+def test_meshes_of_presses_come_nearer_until_it_costs_too_much(monkeypatch):
+    asked = []
+
+    def work(cell, solids, stress, permittivity, fineness):
+        asked.append(fineness.apex_mm)
+        return SimpleNamespace(
+            converged_pa=stress[-1], displacement_m=np.array([0, *presses.CELLS["0.1 mm"].down_um]) * 1.01e-6
+        )
+
+    monkeypatch.setattr(presses.press2d, "press", work)
+    monkeypatch.setattr(presses, "timed", lambda work: (work(), 1.0))
+    found = [p for p in presses.points("tri pressed, 0.1 mm: top down", 5.0) if p.model == "press2d"]
+    assert (len(found), len(asked)) == (1, 1)
+    assert found[0].error == pytest.approx(0.01)
+    asked.clear()
+    presses.points("tri pressed, 0.1 mm: top down", 50.0)
+    assert asked == sorted(asked, reverse=True)
+    assert len(asked) == 3
 
 
 def test_a_budget_ends_the_ladders(monkeypatch):

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from sensorgen import expectations, planner, registry
 from sensorgen import models as model_files
-from sensorgen import planner, registry
+from sensorgen.chart.cells import STANDARD
 from sensorgen.design import make
 from sensorgen.errors import OutOfRange, UnknownName
 from sensorgen.interval import Interval
@@ -30,7 +31,7 @@ class Fake:
     def __init__(self, monkeypatch):
         self.models, self.expected, self.asked = {}, {}, []
         monkeypatch.setattr(planner, "capacitance_models", lambda: dict(self.models))
-        monkeypatch.setattr(planner, "_expectations", lambda: self.expected)
+        monkeypatch.setattr(expectations, "measured", lambda: self.expected)
 
     def add(self, name, cost, width, *points, unfit=None, middle=1.0):
         def work(scene, permittivity, wanted=None):
@@ -43,7 +44,7 @@ class Fake:
             model.WIDTH = 1e-3
         self.models[name] = model
         if points:
-            self.expected[name] = list(points)
+            self.expected[name] = expectations.Measured("plate", "bands", 3, 1.0, list(points))
 
     @property
     def names(self):
@@ -229,13 +230,55 @@ def test_bodies_that_only_touch_do_not_overlap():
 
 
 def test_expectations_are_of_models_that_exist_and_fall():
-    found = planner._expectations()
+    found = expectations.measured()
     assert set(found) <= set(registry.names(model_files))
-    for points in found.values():
-        widths, seconds = zip(*points, strict=True)
+    for entry in found.values():
+        widths, seconds = zip(*entry.points, strict=True)
         assert list(widths) == sorted(widths, reverse=True)
         assert list(seconds) == sorted(seconds)
         assert min(seconds) > 0
+        assert entry.parts == expectations.COUNTED[entry.counted](STANDARD[entry.scene]().scene).parts
+
+
+def test_time_grows_with_the_parts_of_a_cell(fake):
+    """A plate of two layers has four bands in its cell, one of one layer three; however long it is."""
+    ladder(fake)
+    halves = [Body(f"f{k}", m, (box(0, 10, 0, 1, 0.3 + 0.3 * k, 0.6 + 0.3 * k),)) for k, m in enumerate(("x60", "y"))]
+    layers = replace(PLATE, bodies=(PLATE.bodies[0], *halves, PLATE.bodies[2]))
+    assert expectations.expected("mid", PLATE, 1e-3) == (1e-4, 0.2)
+    assert expectations.expected("mid", layers, 1e-3) == (1e-4, pytest.approx(0.2 * 4 / 3))
+    one, many = (make({"shape": "tri", "parameters": {"length_mm": length}}).in_use for length in (2.0, 100.0))
+    assert expectations.expected("mid", one, 1e-3) == expectations.expected("mid", many, 1e-3)
+    assert expectations.expected("other", PLATE, 1e-3) == (None, None)
+    strips = make({"shape": "rect"}).in_use  # no bands: three cross-sections
+    fake.expected["boxed"] = expectations.Measured("rect", "boxes", 21, 2.0, [(1e-3, 1.0)])
+    assert expectations.expected("boxed", strips, 1e-3) == (1e-3, 1.0)
+    shorted = make({"shape": "rect", "parameters": {"dielectric_mm": 0.0}}).in_use
+    assert expectations.expected("boxed", shorted, 1e-3) == (1e-3, 1.0)
+
+
+def test_a_sensor_that_is_cut_amid_a_cell_needs_twice_the_digits(fake):
+    ladder(fake)
+    cut = make({"shape": "tri", "parameters": {"length_mm": 7.3}}).in_use
+    width, _ = expectations.expected("mid", cut, 1e-3)
+    assert width == pytest.approx(1e-4)  # the root of 1e-8
+    assert expectations.expected("mid", cut, 1e-5)[0] == pytest.approx(1e-4)  # no more
+
+
+def test_a_solver_that_fails_on_a_scene_leaves_it_to_the_others(fake):
+    from sensorgen.models._fem_bounds import Unsolved
+
+    fake.add("cheap", 1, 0.4)
+    fake.add("weak", 2, 1e-6)
+
+    def fails(scene, permittivity, width):
+        raise Unsolved("too slender")
+
+    fake.models["weak"].capacitance = fails
+    found = capacitance(PLATE, EPS, 1e-3)
+    assert (found.model, found.reached(), found.hampered) == ("cheap", False, False)
+    assert found.refused == ("weak: too slender",)
+    assert planner.is_known(PLATE, EPS, 1e-3)
 
 
 def test_a_real_plate_is_exact_without_any_solver():

@@ -1,7 +1,6 @@
 """The capacitance of designs between bounds, one design or many: what ``sensorgen cell`` answers, as plain data."""
 
 import signal
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
@@ -10,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from sensorgen import losses, planner
 from sensorgen.design import Design
-from sensorgen.errors import OutOfRange, SensorgenError
-from sensorgen.models import thesis_cells
+from sensorgen.errors import SensorgenError
 from sensorgen.planner import Answer, Unpredictable
 from sensorgen.scene import Scene
 from sensorgen.units import M_PER_MM
@@ -60,56 +58,6 @@ def answer(design: Design, asked: Asked) -> dict[str, Any]:
         A dielectric without a permittivity.
     """
     return _plain(design, _solved(design.in_use, _permittivity(design, asked), asked), asked)
-
-
-def formula(design: Design, name: str) -> dict[str, Any]:
-    """What one of the thesis's formulas gives for a design, which says nothing of how far it is off.
-
-    Parameters
-    ----------
-    design : Design
-        Of the shape that the formula speaks of.
-    name : str
-        Of ``thesis_cells.NAMED``.
-
-    Raises
-    ------
-    Unpredictable
-        The formula speaks of another shape.
-    OutOfRange
-        As the formula itself.
-    """
-    shape, work = thesis_cells.NAMED[name]
-    if design.shape != shape:
-        raise Unpredictable(f"{name} speaks of {shape}, not of {design.shape}")
-    if losses.set_losses(design):
-        raise Unpredictable(f"{name} knows no losses; leave out --model, or the loss")
-    taken = [t for t in planner.permittivities(design) if t.material == design.slot("film")[0].name]
-    start = time.perf_counter()
-    value = work(design.params, taken[0].value)
-    return {
-        "design": design.name, "model": name, "value_f_per_m2": value, "lower_f_per_m2": None, "upper_f_per_m2": None,
-        "seconds": time.perf_counter() - start, "values": [vars(t) for t in taken],
-        "reason": f"{thesis_cells.SOURCE}: a formula alone, without bounds; air is taken for 1",
-    }  # fmt: skip
-
-
-def formulas(designs: Sequence[Design], name: str) -> list[dict[str, Any]]:
-    """The same for many designs; one that the formula cannot speak of has a reason in place of a number.
-
-    Raises
-    ------
-    Unpredictable
-        The formula speaks of another shape, or knows no losses.
-    """
-    return [_formula_or_why(design, name) for design in designs]
-
-
-def _formula_or_why(design: Design, name: str) -> dict[str, Any]:
-    try:
-        return formula(design, name)
-    except OutOfRange as error:
-        return {"design": design.name, "model": None, "value_f_per_m2": None, "reason": str(error)}
 
 
 def answers(designs: Sequence[Design], asked: Asked, jobs: int, done: Callable[[], None]) -> list[dict[str, Any]]:

@@ -1,23 +1,22 @@
 """The cheapest model that can speak of a design, for each thing that has to be known of it before it is pressed.
 
 Models that cost next to nothing are always asked: their own bounds tell whether more is needed. The dear ones are
-weighed first, by what they cost and reached on a known scene (``models/expected.yaml``), and asked one after the other.
+weighed first, by what they should cost and reach (:mod:`sensorgen.expectations`), and asked one after the other.
 """
 
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from functools import cache
 from hashlib import sha256
-from importlib import resources
 from json import dumps
 from math import hypot, inf
 from types import ModuleType
 from typing import Any
 
-from sensorgen import cached, materials, models, registry, yamlfile
+from sensorgen import cached, materials, models, registry
 from sensorgen.design import Design
 from sensorgen.errors import OutOfRange, SensorgenError, UnknownName
+from sensorgen.expectations import expected
 from sensorgen.interval import Disc, Interval
 from sensorgen.scene import Scene
 from sensorgen.sections import overlap
@@ -44,8 +43,8 @@ class Candidate:
     model : str
         Its name.
     expected_width, expected_seconds : float or None
-        Width of the bounds relative to their middle [-], and time [s], as on the scene that it was measured on; None
-        where it never was.
+        Width of the bounds relative to their middle [-], and time [s], scaled from the scene that it was measured on;
+        None where it never was.
     passed_over : str
         Why it was not asked, or "".
     width, seconds : float or None
@@ -207,15 +206,17 @@ def weighed(scene: Scene, width: float = inf, model: str = "", lossy: bool = Fal
         Whether a dielectric loses.
     """
     kind = _LOSSY if lossy else _LOSSLESS
-    return tuple(replace(c, passed_over=c.passed_over or _unfit(c, scene, kind)) for c in _ordered(width, model))
+    plan = _ordered(scene, width, model)
+    return tuple(replace(c, passed_over=c.passed_over or _unfit(c, scene, kind)) for c in plan)
 
 
-def _ordered(width: float, model: str) -> list[Candidate]:
+def _ordered(scene: Scene, width: float, model: str) -> list[Candidate]:
     loaded = capacitance_models()
     if model and model not in loaded:
         raise UnknownName("model of capacitance", model, loaded)
     found = [
-        Candidate(name, *_expected(name, width), "" if model in ("", name) else f"--model {model}") for name in loaded
+        Candidate(name, *expected(name, scene, width), "" if model in ("", name) else f"--model {model}")
+        for name in loaded
     ]
     return sorted(found, key=lambda c: _rank(c, loaded[c.model].COST, width))
 
@@ -236,23 +237,9 @@ def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, f
     return short, candidate.reach() if short else 0.0, cost
 
 
-def _expected(model: str, width: float) -> tuple[float | None, float | None]:
-    """Width and seconds of the cheapest measurement that did, or of the one that came nearest."""
-    points = _expectations().get(model, [])
-    enough = [point for point in points if point[0] <= width]
-    nearest = min(enough, key=lambda p: p[1]) if enough else min(points, default=None)
-    return (nearest[0], nearest[1]) if nearest else (None, None)
-
-
-@cache
-def _expectations() -> dict[str, list[tuple[float, float]]]:
-    """Width and seconds of each model on its scene."""
-    file = "expected.yaml"
-    data = yamlfile.parse((resources.files(models) / file).read_text("utf-8"), file)
-    return {name: [(width, seconds) for width, seconds in entry["points"]] for name, entry in data.items()}
-
-
 def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str) -> Answer:
+    from sensorgen.models._fem_bounds import Unsolved
+
     overlaps = overlap(scene)
     if overlaps:
         raise Unpredictable(f"{overlaps}; expected each place to belong to one body")
@@ -260,7 +247,7 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
     refused: list[str] = []
     bounds: dict[str, Interval | Disc] = {}
     kind = _kind(permittivity)
-    for candidate in _ordered(width, model):
+    for candidate in _ordered(scene, width, model):
         reason = candidate.passed_over or _idle(candidate, bounds, width)
         if not reason:
             reason = _unfit(candidate, scene, kind)
@@ -268,7 +255,12 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
         if reason:
             plan.append(replace(candidate, passed_over=reason))
             continue
-        found, seconds = _timed(candidate.model, kind, scene, permittivity, width)
+        try:
+            found, seconds = _timed(candidate.model, kind, scene, permittivity, width)
+        except Unsolved as error:  # the others answer as well as they can
+            refused.append(f"{candidate.model}: {error}")
+            plan.append(replace(candidate, passed_over=str(error)))
+            continue
         bounds[candidate.model] = found
         _refuse_contradiction(bounds)
         plan.append(replace(candidate, width=found.width(), seconds=seconds))

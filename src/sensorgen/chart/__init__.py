@@ -5,10 +5,11 @@ Times are the processor's, imports left out, so that a busy machine shows nearly
 
 from collections.abc import Callable, Sequence
 
-from sensorgen.chart import cells, lines
+from sensorgen.chart import cells, lines, presses
 from sensorgen.chart.measured import Point, with_front
 
-SCENES = (*cells.STANDARD, *lines.STANDARD)
+_KINDS = (cells, presses, lines)
+SCENES = tuple(name for kind in _KINDS for name in kind.STANDARD)
 
 
 def points(scenes: Sequence[str], budget_s: float, started: Callable[[str], None]) -> list[Point]:
@@ -26,6 +27,6 @@ def points(scenes: Sequence[str], budget_s: float, started: Callable[[str], None
     found = []
     for name in scenes:
         started(name)
-        here = cells.points(name, budget_s) if name in cells.STANDARD else lines.points(name, budget_s)
-        found += with_front(here)
+        kind = next(kind for kind in _KINDS if name in kind.STANDARD)
+        found += with_front(kind.points(name, budget_s))
     return found

@@ -1,16 +1,19 @@
 """Models of a cell's capacitance on scenes whose capacitance is known."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from sensorgen import design as designs
 from sensorgen import planner
+from sensorgen.chart import exact
 from sensorgen.chart.measured import Point, timed
-from sensorgen.design import Design
+from sensorgen.errors import SensorgenError
 from sensorgen.interval import Interval
 from sensorgen.models import thesis_cells
+from sensorgen.scene import Scene
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
 _LEAST_WIDTH = 1e-9  # that is asked of a model
@@ -23,31 +26,49 @@ class Standard:
 
     Attributes
     ----------
-    data : dict
-        The design, as in its file.
+    scene : Scene
+        As models see it.
+    permittivity : mapping of str to float
+        Of its dielectrics and of "air" [-].
     capacitance_f_per_m2 : float
         Per area of the sensor [F/m2].
     known_to : float
-        Relative half-width of the bounds that it was computed with [-].
+        Relative half-width of what is known of it [-].
+    shape, params : str, Params or None
+        What it was made from, for formulas of one shape.
     """
 
-    data: dict[str, Any]
+    scene: Scene
+    permittivity: Mapping[str, float]
     capacitance_f_per_m2: float
     known_to: float
+    shape: str = ""
+    params: Any = None
 
 
-def _film(shape: str, dielectric_mm: float) -> dict[str, Any]:
-    return {"shape": shape, "parameters": {"dielectric_mm": dielectric_mm}}
+def _designed(shape: str, dielectric_mm: float, capacitance_f_per_m2: float, known_to: float) -> Standard:
+    design = designs.make({"shape": shape, "parameters": {"dielectric_mm": dielectric_mm}})
+    return Standard(design.in_use, _EPS, capacitance_f_per_m2, known_to, shape, design.params)
 
 
-# Relative permittivities 4.68 and 1.00059. tri: hp finite elements, agreeing with two other programs; rect: H1 and
-# H(div) elements, agreeing with finite volumes; the plate is exact.
-STANDARD = {
-    "tri, 0.1 mm": Standard(_film("tri", 0.1), 1.5965204052211506e-10 / 2e-3, 9e-10),
-    "tri, 0.2 mm": Standard(_film("tri", 0.2), 1.2851365895937111e-10 / 2e-3, 8e-10),
-    "rect, 0.1 mm": Standard(_film("rect", 0.1), 8.123429165e-13 / 4e-6, 2.7e-5),
-    "rect, 0.2 mm": Standard(_film("rect", 0.2), 4.852340605e-13 / 4e-6, 2.5e-5),
-    "plate, 0.6 mm": Standard(_film("reference", 0.6), EPS0_F_PER_M * 4.68 / 0.6e-3, 1e-15),
+def _exact(case: exact.Exact) -> Standard:
+    per_area = case.capacitance_f_per_m / (case.scene.size_mm[0] * M_PER_MM)
+    return Standard(case.scene, exact.PERMITTIVITY, per_area, case.known_to)
+
+
+# tri: hp finite elements, agreeing with two other programs; rect: H1 and H(div) elements, agreeing with finite volumes;
+# the others are exact.
+_EPS = {"x60": 4.68, "air": 1.00059}
+STANDARD: dict[str, Callable[[], Standard]] = {
+    "tri, 0.1 mm": lambda: _designed("tri", 0.1, 1.5965204052211506e-10 / 2e-3, 9e-10),
+    "tri, 0.2 mm": lambda: _designed("tri", 0.2, 1.2851365895937111e-10 / 2e-3, 8e-10),
+    "rect, 0.1 mm": lambda: _designed("rect", 0.1, 8.123429165e-13 / 4e-6, 2.7e-5),
+    "rect, 0.2 mm": lambda: _designed("rect", 0.2, 4.852340605e-13 / 4e-6, 2.5e-5),
+    "plate, 0.6 mm": lambda: _designed("reference", 0.6, EPS0_F_PER_M * _EPS["x60"] / 0.6e-3, 1e-15),
+    "coaxial line": lambda: _exact(exact.coaxial()),
+    "eccentric cylinders": lambda: _exact(exact.eccentric()),
+    "stripline": lambda: _exact(exact.stripline()),
+    "interdigital, half space": lambda: _exact(exact.interdigital()),
 }
 
 
@@ -61,19 +82,19 @@ def points(name: str, budget_s: float) -> list[Point]:
     budget_s : float
         A model is not asked for more where that would take longer, ten times the last one taken as a guess [s].
     """
-    design = designs.make(STANDARD[name].data)
-    return [*_formulas(name, design), *_bounds(name, design, budget_s)]
+    standard = STANDARD[name]()
+    return [*_formulas(name, standard), *_bounds(name, standard, budget_s)]
 
 
-def _bounds(name: str, design: Design, budget_s: float) -> Iterator[Point]:
+def _bounds(name: str, standard: Standard, budget_s: float) -> Iterator[Point]:
     """Every model with bounds, from coarse to fine."""
-    eps = {t.material: t.value for t in planner.permittivities(design)}
-    area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
+    area = standard.scene.size_mm[0] * standard.scene.size_mm[1] * M_PER_MM**2
     for model, module in planner.capacitance_models().items():
-        if module.unfit(design.in_use):
+        if module.unfit(standard.scene):
             continue
-        for wanted, interval, seconds in _rungs(module.capacitance, (design.in_use, eps), module, budget_s):
-            yield _point(name, model, wanted, interval.times(1 / area), True, seconds)
+        given = (standard.scene, standard.permittivity)
+        for wanted, interval, seconds in _rungs(module.capacitance, given, module, budget_s):
+            yield point(name, model, interval.times(1 / area), standard, seconds, wanted=wanted)
 
 
 def _rungs(
@@ -86,7 +107,10 @@ def _rungs(
     wanted, last = 0.1, math.inf
     while wanted >= _LEAST_WIDTH * (1 - 1e-6):
         asked = wanted
-        interval, seconds = timed(lambda asked=asked: work(*given, asked))  # type: ignore[misc]
+        try:
+            interval, seconds = timed(lambda asked=asked: work(*given, asked))  # type: ignore[misc]
+        except SensorgenError:
+            return  # doubles end here
         width = interval.width()
         if width >= last:
             return
@@ -96,17 +120,20 @@ def _rungs(
         wanted, last = 10.0 ** math.ceil(math.log10(width) - 1), width
 
 
-def _formulas(name: str, design: Design) -> Iterator[Point]:
+def _formulas(name: str, standard: Standard) -> Iterator[Point]:
     """The thesis's formulas for this shape."""
-    eps = next(t.value for t in planner.permittivities(design) if t.material == "x60")
-    for model, (shape, formula) in thesis_cells.NAMED.items():
-        if shape == design.shape:
-            value, seconds = timed(lambda formula=formula: formula(design.params, eps))  # type: ignore[misc]
-            yield _point(name, model, None, Interval(value, value), False, seconds)
+    for model, law in thesis_cells.NAMED.items():
+        if standard.shape in law.shapes:
+            given = standard.params, standard.permittivity["x60"]
+            value, seconds = timed(partial(law.value_f_per_m2, *given))
+            yield point(name, model, Interval(value, value), standard, seconds, bounded=False)
 
 
-def _point(scene: str, model: str, wanted: float | None, found: Interval, bounded: bool, seconds: float) -> Point:
-    standard = STANDARD[scene]
+def point(
+    scene: str, model: str, found: Interval, standard: Standard, seconds: float, *,
+    wanted: float | None = None, bounded: bool = True,
+) -> Point:  # fmt: skip
+    """What a model gave per area, held against what is known."""
     off = [abs(bound / standard.capacitance_f_per_m2 - 1) for bound in (found.lower, found.upper)]
     error = max(*off, standard.known_to)
     said = f"{found.lower:.9g} to {found.upper:.9g} F/m²" if bounded else f"{found.lower:.9g} F/m²"

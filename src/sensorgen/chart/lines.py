@@ -12,7 +12,10 @@ import numpy as np
 
 from sensorgen.chart.measured import Point, timed
 from sensorgen.errors import OutOfRange
-from sensorgen.models import line, line_abcd, line_closed, line_ladder
+from sensorgen.models import line, line_abcd, line_closed, line_ladder, sheet, stack
+from sensorgen.models._line_inputs import read
+from sensorgen.models.sheet import Patch, Sheet
+from sensorgen.units import EPS0_F_PER_M
 
 # The plate of Table 3.1, pressed by 3 N in its middle.
 PLATE = {
@@ -40,6 +43,7 @@ STANDARD: dict[str, dict[float, complex]] = {
 }
 
 _LADDERS = (1, 10, 100, 1000, 10_000)  # cells per section
+_GRIDS = (20, 40, 80)  # cells along the sheet
 _DIGITS = 2.0**-53  # no error is less than this
 
 Model = Callable[..., Any]
@@ -55,7 +59,7 @@ def points(name: str, budget_s: float) -> list[Point]:
     budget_s : float
         A ladder gets no more cells where that would take longer, ten times the last one taken as a guess [s].
     """
-    return [*_closed(name), *_ladders(name, budget_s)]
+    return [*_closed(name), *_grown(name, budget_s)]
 
 
 def _closed(name: str) -> Iterator[Point]:
@@ -66,6 +70,7 @@ def _closed(name: str) -> Iterator[Point]:
         "line_closed, B.48 as printed": partial(line_closed.impedance, "B.48"),
         "line_closed, uniform": line_closed.uniform,
         "line_closed, R and C in series": line_closed.series,
+        "stack of one film": _stack,
     }
     for model, work in models.items():
         try:
@@ -74,12 +79,35 @@ def _closed(name: str) -> Iterator[Point]:
             continue  # it has no number there
 
 
-def _ladders(name: str, budget_s: float) -> Iterator[Point]:
-    for cells in _LADDERS:
-        point = _point(name, "line_ladder", partial(line_ladder.impedance, cells), f"{cells} cells per section, ")
-        yield point
-        if point.seconds * 10 > budget_s:
-            return
+def _grown(name: str, budget_s: float) -> Iterator[Point]:
+    """Ladders and grids, from coarse to fine."""
+    for model, work, cells in (("line_ladder", line_ladder.impedance, _LADDERS), ("sheet", _sheet, _GRIDS)):
+        for number in cells:
+            try:
+                point = _point(name, model, partial(work, number), f"{number} cells, ")
+            except OutOfRange:
+                break  # current reaches less deep than a cell
+            yield point
+            if point.seconds * 10 > budget_s:
+                break
+
+
+def _stack(**inputs: Any) -> Any:
+    """Two tracks and the film between them."""
+    sections = read(inputs).sections()
+    tracks = [[0.5 * r, 0.5 * r] for r in sections.r_ohm_per_m]  # what a loop runs through is their sum
+    return stack.impedance(tracks, [[y] for y in sections.y_s_per_m], sections.length_m)[..., 0, 0]
+
+
+def _sheet(cells: int, **inputs: Any) -> Any:
+    """Two sheets with contacts all along one edge, pressed across their whole width."""
+    p = inputs
+    resistances = p["rho_top_ohm_m"] / p["H_top_m"], p["rho_bottom_ohm_m"] / p["H_bottom_m"]
+    plate = Sheet(p["L_m"], p["W_m"], resistances, EPS0_F_PER_M * p["eps_r"] / p["d_m"])
+    thinner = 1 / (1 - p["F_N"] / (p["W_m"] * p["L_p_m"] * p["E_Pa"]))
+    press = Patch(p["x_p_left_edge_m"], 0.0, p["L_p_m"], p["W_m"], thinner)
+    contacts = plate.edge("top", "left"), plate.edge("bottom", "left")
+    return sheet.impedance(plate, [contacts], p["f_Hz"], press, cells)[:, 0, 0]
 
 
 def _point(name: str, model: str, work: Model, said: str = "") -> Point:

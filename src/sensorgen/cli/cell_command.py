@@ -9,45 +9,35 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, settings, show
+from sensorgen.cli import FOUND_ERRORS, cell_text, settings, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Ratio, Values, one
-from sensorgen.errors import BadInput
-from sensorgen.units import FREQUENCY_HZ
+from sensorgen.errors import BadInput, UnknownName
+from sensorgen.units import FREQUENCY_HZ, LENGTH_MM
 
 if TYPE_CHECKING:
     from sensorgen.bounds import Asked
     from sensorgen.design import Design
 
 Data = dict[str, Any]
+Points = Sequence[tuple[Any, "Design"]]
 
 ACCURACY = 1e-3
-QUANTITIES = {
-    "relative_permittivity": "relative permittivity",
-    "loss_tangent": "loss tangent",
-    "resistivity_ohm_m": "resistivity [ohm m]",
-}
-COLUMNS = (
-    "lower_f_per_m2",
-    "upper_f_per_m2",
-    "loss_lower_f_per_m2",
-    "loss_upper_f_per_m2",
-    "relative_width",
-    "model",
-    "seconds",
-    "reached",
-    "reason",
-)
+FORMULA = "thesis-"  # how the names of formulas begin
 
 OWN: list[click.Parameter] = [
     click.Option(
         ["--accuracy"], type=Ratio(), default=str(ACCURACY), show_default=True,
         help="How far the bounds may be apart, as a share of their middle.",
     ),
-    click.Option(["--model"], metavar="NAME", default="", help="Ask this model only, as columns, or thesis-3.35."),
+    click.Option(["--model"], metavar="NAME", default="", help="Ask this model only: columns, thesis-3.35."),
     click.Option(
         ["--frequency"], type=Values(FREQUENCY_HZ, zero=False), default=None,
         help="Of the field, where a dielectric leaks: --set resistivity_x60=1e8; a loss_x60=0.02 needs none.",
+    ),
+    click.Option(
+        ["--press", "press_mm"], type=Values(LENGTH_MM, zero=True), default=None,
+        help="How far the top has come down, as 20um or 0:0.05:0.01, for formulas of it; solved: compress.",
     ),
     click.Option(["--explain"], is_flag=True, help="Print the plan, and what came of it."),
     click.Option(["--no-cache"], is_flag=True, help="Solve anew, and keep nothing."),
@@ -67,80 +57,82 @@ OWN: list[click.Parameter] = [
 
 def _work(
     design: "Design", *, accuracy: float, model: str, no_cache: bool, frequency: tuple[float, ...] | None,
-    sweep: str | None, jobs: int | None, **how: Any,
+    sweep: str | None, jobs: int | None, press_mm: tuple[float, ...] | None, **how: Any,
 ) -> int:  # fmt: skip
     from sensorgen.bounds import Asked
 
-    _refuse_pairs(sweep, how)
+    formula = model.startswith(FORMULA)
+    _refuse_pairs(how, many=bool(sweep or (formula and press_mm)))
     asked = Asked(accuracy, model, not no_cache, one("--frequency", frequency) if frequency else None)
-    if sweep is None:
-        return _one(design, asked, how)
-    key, points = settings.sweep(sweep, design)
-    return _many(key, points, asked, jobs or os.cpu_count() or 1, how)
+    key, points = settings.sweep(sweep, design) if sweep else ("", [("", design)])
+    if formula:
+        return _formula(key, points, asked, press_mm, how)
+    if press_mm:
+        raise BadInput("--press is for formulas, as --model thesis-3.1.2; solved, under a stress: sensorgen compress")
+    return _many(key, points, asked, jobs or os.cpu_count() or 1, how) if sweep else _one(design, asked, how)
 
 
-def _refuse_pairs(sweep: str | None, how: Data) -> None:
+def _refuse_pairs(how: Data, *, many: bool) -> None:
     if how["as_json"] and how["as_csv"]:
         raise BadInput("--json and --csv at once; expected one of them")
-    if how["as_csv"] and sweep is None:
+    if how["as_csv"] and not many:
         raise BadInput("--csv is for a sweep, as --sweep dielectric_mm=0.05:0.2:0.05; expected --json")
-    if how["explain"] and (sweep or how["as_json"]):
+    if how["explain"] and (many or how["as_json"]):
         raise BadInput("--explain is for people, and one design; --json holds the plan too")
 
 
 def _one(design: "Design", asked: "Asked", how: Data) -> int:
     from sensorgen import bounds
-    from sensorgen.models import thesis_cells
 
-    if asked.model in thesis_cells.NAMED:
-        return _formula(bounds.formula(design, asked.model), how)
     if how["explain"]:
         _print_plan(design, asked)
     data = bounds.answer(design, asked)
-    lines = [show.json_text(data)] if how["as_json"] else (f"{line}\n" for line in _lines(data, explain=how["explain"]))
-    _deliver(lines, how["output"])
+    lines = (f"{line}\n" for line in cell_text.lines(data, explain=how["explain"]))
+    _deliver([show.json_text(data)] if how["as_json"] else lines, how["output"])
     return _verdict([data])
 
 
-def _formula(data: Data, how: Data) -> int:
-    lines = [
-        f"{data['design']}: {data['value_f_per_m2']:.10g} F/m2 by {data['model']}\n",
-        f"{data['reason']}\n",
-    ]
-    _deliver([show.json_text(data)] if how["as_json"] else lines, how["output"])
-    return 0
-
-
-def _many(key: str, points: Sequence[tuple[float | str, "Design"]], asked: "Asked", jobs: int, how: Data) -> int:
+def _many(key: str, points: Points, asked: "Asked", jobs: int, how: Data) -> int:
     from sensorgen import bounds
-    from sensorgen.models import thesis_cells
 
-    if asked.model in thesis_cells.NAMED:
-        return _formulas(key, points, asked.model, how)
     with _bar(len(points)) as done:
         found = bounds.answers([design for _, design in points], asked, jobs, done)
     rows = [{key: value} | data for (value, _), data in zip(points, found, strict=True)]
     if how["as_json"]:
         _deliver([show.json_text(rows)], how["output"])
     else:
-        _deliver(_csv(key, rows) if how["as_csv"] else _table(key, rows), how["output"])
+        _deliver(cell_text.rows_csv(key, rows) if how["as_csv"] else cell_text.table(key, rows), how["output"])
     return _verdict(found)
 
 
-def _formulas(key: str, points: Sequence[tuple[float | str, "Design"]], model: str, how: Data) -> int:
-    from sensorgen import bounds
+def _formula(key: str, points: Points, asked: "Asked", press_mm: tuple[float, ...] | None, how: Data) -> int:
+    """A formula alone, along a sweep, or along presses."""
+    from sensorgen import formulas
 
-    found = bounds.formulas([design for _, design in points], model)
-    rows = [{key: value} | data for (value, _), data in zip(points, found, strict=True)]
-    columns = ("value_f_per_m2", "model", "reason")
-    if how["as_json"]:
-        _deliver([show.json_text(rows)], how["output"])
-    elif how["as_csv"]:
-        _deliver(_csv(key, rows, columns), how["output"])
-    else:
-        lines = (f"{_cell(row[key]):>16}  {_cell(row['value_f_per_m2']):>24}  {row['reason']}\n" for row in rows)
-        _deliver([f"{key:>16}  {f'{model} [F/m2]':>24}\n", *lines], how["output"])
+    if asked.model not in formulas.NAMES:
+        raise UnknownName("formula", asked.model, formulas.NAMES)
+    if how["explain"]:
+        raise BadInput(f"--explain: {asked.model} is asked alone, there is no plan; leave out --model")
+    presses: tuple[float | None, ...] = press_mm or (None,)
+    if not key and len(presses) == 1:
+        data = formulas.answer(points[0][1], asked, presses[0])
+        _deliver([show.json_text(data)] if how["as_json"] else cell_text.formula_lines(data), how["output"])
+        return 0
+    if key and len(presses) > 1:
+        raise BadInput("--sweep and several values of --press at once; expected one of them")
+    sweep = points if key else [(press, points[0][1]) for press in presses]
+    found = formulas.answers([design for _, design in sweep], asked, presses * (len(sweep) // len(presses)))
+    rows = [{key or "press_mm": value} | data for (value, _), data in zip(sweep, found, strict=True)]
+    _deliver(_formula_rows(key or "press_mm", rows, asked.model, how), how["output"])
     return 0 if all(row["model"] for row in rows) else FOUND_ERRORS
+
+
+def _formula_rows(key: str, rows: Sequence[Data], model: str, how: Data) -> Iterable[str]:
+    if how["as_json"]:
+        return [show.json_text(rows)]
+    if how["as_csv"]:
+        return cell_text.rows_csv(key, rows, cell_text.OF_FORMULAS)
+    return cell_text.formula_table(key, rows, model)
 
 
 def _verdict(found: Sequence[Data]) -> int:
@@ -167,86 +159,14 @@ def _shortfall(data: Data) -> str:
     )
 
 
-def _lines(data: Data, *, explain: bool) -> Iterator[str]:
-    low, high = data["lower_f_per_m2"], data["upper_f_per_m2"]
-    if explain:
-        yield "measured"
-        yield from (f"  {line}" for line in _measured(data["plan"]))
-        yield ""
-    yield f"{data['design']}: {show.si(low * data['area_m2'], 'F')} to {show.si(high * data['area_m2'], 'F')}"
-    yield f"{'per area':12}{low:.10g} to {high:.10g} F/m2"
-    if "loss_lower_f_per_m2" in data:
-        yield from _loss(data)
-    yield f"{'apart by':12}{data['relative_width']:.2g} of their middle, {data['accuracy']:g} wanted"
-    when = ", known from before" if data["known"] else ""
-    yield f"{'model':12}{data['model']}, {data['seconds']:.2g} s{when}"
-    for quantity in dict.fromkeys(v["quantity"] for v in data["values"]):
-        here = [v for v in data["values"] if v["quantity"] == quantity]
-        values = ", ".join(f"{v['material']} {v['value']:g} ({v['source']})" for v in here)
-        yield f"{'with':12}{QUANTITIES[quantity]} of {values}"
-
-
-def _loss(data: Data) -> Iterator[str]:
-    low, high = data["loss_lower_f_per_m2"], data["loss_upper_f_per_m2"]
-    at = f" at {show.si(data['frequency_hz'], 'Hz')}" if data["frequency_hz"] else ""
-    yield f"{'loss':12}{low:.10g} to {high:.10g} F/m2, minus the imaginary part{at}"
-    if data["tan_delta"]:
-        yield f"{'tan delta':12}{data['tan_delta'][0]:.6g} to {data['tan_delta'][1]:.6g}"
-
-
 def _print_plan(design: "Design", asked: "Asked") -> None:
     from sensorgen import losses, planner
 
     click.echo(f"plan for an accuracy of {asked.width:g}")
     lossy = bool(losses.set_losses(design))
     for c in planner.weighed(design.in_use, asked.width, asked.model, lossy):
-        click.echo(f"  {c.model:10}{_expectation(vars(c)):28}{c.passed_over}".rstrip())
-    click.echo("  the first that does is taken; cheap ones are asked first in any case")
-
-
-def _measured(plan: Iterable[Data]) -> Iterator[str]:
-    for c in plan:
-        came = f"{c['width']:.2g} in {_seconds(c['seconds'])}" if c["seconds"] is not None else "not asked"
-        yield f"{c['model']:10}{came:28}{c['passed_over']}".rstrip()
-
-
-def _expectation(candidate: Data) -> str:
-    if candidate["expected_width"] is None:
-        return "never measured"
-    return f"about {candidate['expected_width']:.2g} in {_seconds(candidate['expected_seconds'])}"
-
-
-def _seconds(value: float) -> str:
-    return show.si(float(f"{value:.2g}"), "s")
-
-
-def _table(key: str, rows: Sequence[Data]) -> Iterator[str]:
-    yield f"{key:>16}  {'lower [F/m2]':>16}  {'upper [F/m2]':>16}  {'apart by':>9}  {'seconds':>8}  model\n"
-    for row in rows:
-        if row["model"] is None:
-            yield f"{_cell(row[key]):>16}  no answer: {row['reason']}\n"
-        else:
-            yield (
-                f"{_cell(row[key]):>16}  {row['lower_f_per_m2']:16.9g}  {row['upper_f_per_m2']:16.9g}  "
-                f"{row['relative_width']:9.2g}  {row['seconds']:8.2g}  {row['model']}\n"
-            )
-
-
-def _csv(key: str, rows: Sequence[Data], columns: Sequence[str] = COLUMNS) -> Iterator[str]:
-    import csv
-    import io
-
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow([key, *columns])
-    table.writerows([_cell(row[key]), *(_cell(row.get(name)) for name in columns)] for row in rows)
-    yield text.getvalue()
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, float):
-        return repr(value)
-    return "" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+        click.echo(f"  {c.model:10}{cell_text.expectation(vars(c), asked.width):32}{c.passed_over}".rstrip())
+    click.echo("  the first that does is taken; what is asked in any case costs next to nothing")
 
 
 @contextmanager

@@ -5,14 +5,17 @@ air of permittivity 1, as in the thesis. How far each is off stands in docs/cell
 """
 
 from collections.abc import Callable
-from dataclasses import replace
-from math import atan2, cos, hypot, log, sin
+from dataclasses import dataclass
+from functools import partial
+from math import log
+from typing import Any
 
 from sensorgen.errors import OutOfRange
+from sensorgen.models import thesis_swept
 from sensorgen.shapes import rect, tri
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
-SOURCE = "Thesis 3.1.2, 3.2.1 and 3.2.2, Eqs. 3.24, 3.34, 3.35, 3.49 and 3.55"
+SOURCE = "Thesis 3.2.1 and 3.2.2, Eqs. 3.24, 3.34, 3.35, 3.49 and 3.55"
 COST = 0
 
 
@@ -67,10 +70,15 @@ def under_cog_f_per_m(p: tri.Params, eps_r: float, printed: bool = False) -> flo
     """
     width, slopes = _flank(p)
     alpha = eps_r * slopes[0] - (eps_r - 1) * slopes[1]
-    beta = p.dielectric_mm * M_PER_MM
-    if beta <= 0:
-        raise OutOfRange("dielectric_mm is 0: the cogs touch the bottom electrode; expected a film")
+    beta = _film_m(p)
     return EPS0_F_PER_M * eps_r / alpha * log((beta + alpha * width) / (alpha if printed else beta))
+
+
+def _film_m(p: tri.Params | rect.Params) -> float:
+    """Thickness of the film [m]."""
+    if p.dielectric_mm <= 0:
+        raise OutOfRange("dielectric_mm is 0: the cogs touch the bottom electrode; expected a film")
+    return p.dielectric_mm * M_PER_MM
 
 
 def _flank(p: tri.Params) -> tuple[float, tuple[float, float]]:
@@ -116,9 +124,7 @@ def strips_f_per_m2(p: rect.Params, eps_r: float, even: bool = True) -> float:
     OutOfRange
         The film has no thickness.
     """
-    d, t1, t2 = (v * M_PER_MM for v in (p.dielectric_mm, p.upper_height_mm, p.lower_height_mm))
-    if d <= 0:
-        raise OutOfRange("dielectric_mm is 0: the cogs touch the bottom electrode; expected a film")
+    d, t1, t2 = _film_m(p), p.upper_height_mm * M_PER_MM, p.lower_height_mm * M_PER_MM
     own = {"etpu": p.etpu_width_mm, "air": p.air_width_mm, "x60": p.x60_width_mm}
     upper = dict.fromkeys(own, p.period_mm / 4) if even else own
     counts = {"etpu": 1, "air": 2, "x60": 1}
@@ -166,40 +172,6 @@ def bulging_f_per_m2(p: rect.Params, eps_r: float, press_mm: float = 0.0, printe
     return strips_f_per_m2(p, eps_r) + 8 / 16 * (term(press_mm) - (0.0 if printed else term(0.0)))
 
 
-def swept(p: tri.Params, turned_rad: float) -> tri.Params:
-    """The triangular design with its flanks turned flatter at constant length, air purged, solids kept (3.1.2).
-
-    Hanging flanks of length r keep it: base r cos, height r sin of their angle. The lower triangles and the film keep
-    their areas per period. Hanging triangles keep theirs at 45 degrees to first order, as r^2 sin(2 phi) / 4 is
-    greatest there. Any model can then speak of the new sizes; per period, the sensor has become longer.
-
-    Parameters
-    ----------
-    p : tri.Params
-        Sizes at rest.
-    turned_rad : float
-        By how much the flanks are turned [rad].
-
-    Raises
-    ------
-    OutOfRange
-        The flanks would meet the lower triangles: all air is gone before.
-    """
-    quarter = p.period_mm / 4
-    flank, angle = hypot(quarter, p.hang_height_mm), atan2(p.hang_height_mm, quarter) - turned_rad
-    base = flank * cos(angle)
-    lower, hang = p.lower_height_mm * quarter / base, flank * sin(angle)
-    if not 0 < lower < hang:
-        raise OutOfRange(f"turned by {turned_rad:g} rad: no air is left; expected less")
-    return replace(
-        p,
-        period_mm=4 * base,
-        hang_height_mm=hang,
-        lower_height_mm=lower,
-        dielectric_mm=p.dielectric_mm * quarter / base,
-    )
-
-
 def film_only_f_per_m2(p: tri.Params | rect.Params, eps_r: float) -> float:
     """Capacitance per area if the film alone counted, as though a plate lay on it [F/m2].
 
@@ -209,15 +181,66 @@ def film_only_f_per_m2(p: tri.Params | rect.Params, eps_r: float) -> float:
         Sizes.
     eps_r : float
         Relative permittivity of the film [-].
+
+    Raises
+    ------
+    OutOfRange
+        The film has no thickness.
     """
-    return EPS0_F_PER_M * eps_r / (p.dielectric_mm * M_PER_MM)
+    return EPS0_F_PER_M * eps_r / _film_m(p)
 
 
-NAMED: dict[str, tuple[str, Callable[..., float]]] = {
-    "thesis-3.35": ("tri", triangles_f_per_m2),
-    "thesis-3.34-printed": ("tri", lambda p, eps_r: triangles_f_per_m2(p, eps_r, printed=True)),
-    "thesis-film-only": ("tri", film_only_f_per_m2),
-    "thesis-3.49": ("rect", strips_f_per_m2),
-    "thesis-3.49-own-widths": ("rect", lambda p, eps_r: strips_f_per_m2(p, eps_r, even=False)),
-    "thesis-3.55": ("rect", bulging_f_per_m2),
+def swept_f_per_m2(p: Any, eps_r: float, press_mm: float, formula: Callable[..., float]) -> float:
+    """What a formula gives for the sizes that 3.1.2 makes of a pressed cell, per area of the sensor at rest [F/m2].
+
+    Parameters
+    ----------
+    p : tri.Params or rect.Params
+        Sizes at rest.
+    eps_r : float
+        Relative permittivity of film and solids [-].
+    press_mm : float
+        By how much the top has come down [mm].
+    formula : callable
+        Of sizes and permittivity, per area of its own period [F/m2].
+    """
+    q = thesis_swept.swept(p, press_mm)
+    return formula(q, eps_r) * thesis_swept.stretch(p, q)
+
+
+@dataclass(frozen=True)
+class Named:
+    """A formula that can be asked for by name.
+
+    Attributes
+    ----------
+    shapes : tuple of str
+        That it speaks of.
+    work : callable
+        Of sizes and permittivity, and of ``press_mm`` where ``pressed`` [F/m2].
+    pressed : bool
+        Whether it speaks of a pressed cell.
+    """
+
+    shapes: tuple[str, ...]
+    work: Callable[..., float]
+    pressed: bool = False
+
+    def value_f_per_m2(self, p: Any, eps_r: float, press_mm: float = 0.0) -> float:
+        """What it gives for sizes, a permittivity [-] and, if it knows one, a press [mm]."""
+        return self.work(p, eps_r, press_mm) if self.pressed else self.work(p, eps_r)
+
+
+_OWN_WIDTHS = partial(strips_f_per_m2, even=False)
+
+NAMED = {
+    "thesis-film-only": Named(("tri", "rect"), film_only_f_per_m2),
+    "thesis-3.35": Named(("tri",), triangles_f_per_m2),
+    "thesis-3.34-printed": Named(("tri",), partial(triangles_f_per_m2, printed=True)),
+    "thesis-3.35-swept": Named(("tri",), partial(swept_f_per_m2, formula=triangles_f_per_m2), pressed=True),
+    "thesis-3.49": Named(("rect",), strips_f_per_m2),
+    "thesis-3.49-own-widths": Named(("rect",), _OWN_WIDTHS),
+    "thesis-3.49-swept": Named(("rect",), partial(swept_f_per_m2, formula=_OWN_WIDTHS), pressed=True),
+    "thesis-3.55": Named(("rect",), bulging_f_per_m2, pressed=True),
+    "thesis-3.55-corrected": Named(("rect",), partial(bulging_f_per_m2, printed=False), pressed=True),
 }

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c564b", "#555555")
 _MARKERS = "osD^vPX<>"
 _SIDE_IN = (4.3, 3.5)
+_COLUMNS = 4
 _TIME, _ERROR = "processor time [s]", "relative error [-]"
 
 
@@ -21,7 +22,7 @@ def png(points: Sequence[Point]) -> bytes:
     from matplotlib.lines import Line2D
 
     scenes, models = _names(points)
-    columns = min(3, len(scenes) + 1)
+    columns = min(_COLUMNS, len(scenes) + 1)
     rows = -(-(len(scenes) + 1) // columns)
     figure = Figure(figsize=(columns * _SIDE_IN[0], rows * _SIDE_IN[1]), dpi=100, layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
@@ -78,7 +79,7 @@ def html(points: Sequence[Point]) -> str:
     from plotly.subplots import make_subplots
 
     scenes, models = _names(points)
-    columns = min(3, len(scenes))
+    columns = min(_COLUMNS, len(scenes))
     rows = -(-len(scenes) // columns)
     figure = make_subplots(
         rows=rows, cols=columns, subplot_titles=scenes, horizontal_spacing=0.07, vertical_spacing=0.3 / rows

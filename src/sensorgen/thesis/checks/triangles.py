@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen import design as designs
-from sensorgen.models import columns, thesis_cells
+from sensorgen.models import columns, thesis_cells, thesis_swept
 from sensorgen.shapes import tri
 from sensorgen.thesis.checks._columns import (
     EPS_R,
@@ -202,7 +202,7 @@ def whole() -> list[Part]:
 
 def swept() -> list[Part]:
     """Figure 6.7: the geometry whose flanks are turned flatter, by our formula."""
-    turned = [thesis_cells.swept(_CELL, angle) for angle in _TURNED_RAD]
+    turned = [thesis_swept.turned(_CELL, angle) for angle in _TURNED_RAD]
     found = [thesis_cells.triangles_f_per_m2(p, EPS_R) for p in turned]
     return [Part("C/A, turned by 0, 0.1 and 0.2 rad", "F/m2", found)]
 

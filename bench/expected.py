@@ -1,0 +1,108 @@
+"""What the planner expects of dear models: measured anew, and held against other scenes than those it was measured on.
+
+Writes ``src/sensorgen/models/expected.yaml`` and ``results/expected.md``. ``--check`` leaves the first as it is.
+"""
+
+import os
+
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+import sys
+import time
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+
+from sensorgen import expectations, planner
+from sensorgen.chart import cells
+from sensorgen.design import make
+from sensorgen.errors import SensorgenError
+from sensorgen.scene import Body, Scene, box
+
+HERE = Path(__file__).parent
+FILE = HERE.parent / "src" / "sensorgen" / "models" / expectations.FILE
+EPS = {"x60": 4.68, "air": 1.00059}
+BUDGET_S = 60.0  # a model is not asked for more where that would take longer
+
+
+def shape(name: str, **parameters: float) -> Scene:
+    return make({"shape": name, "parameters": parameters}).in_use
+
+
+def stairs(steps: int) -> Scene:
+    """A cog printed in layers, over a film."""
+    width, rise = 0.5 / steps, 0.4 / steps
+    cog = tuple(box(0, width * (k + 1), 0, 1, 0.5 + rise * k, 0.5 + rise * (k + 1)) for k in range(steps))
+    bodies = (
+        Body("low", "etpu", (box(0, 2, 0, 1, 0, 0.3),), "bottom"),
+        Body("film", "x60", (box(0, 2, 0, 1, 0.3, 0.4),)),
+        Body("top", "etpu", (*cog, box(0, 2, 0, 1, 0.9, 1.2)), "top"),
+    )
+    return Scene(bodies, (2.0, 1.0, 1.2))
+
+
+OTHERS = {
+    "fem2d": {
+        "tri, film 0.2 mm": shape("tri", dielectric_mm=0.2),
+        "tri, film 1 um": shape("tri", dielectric_mm=0.001),
+        "tri, film 1 nm": shape("tri", dielectric_mm=1e-6),
+        "tri, steep": shape("tri", hang_height_mm=2.0, lower_height_mm=0.5),
+        "tri, cut at 7.3 mm": shape("tri", length_mm=7.3),
+        "stairs of 3": stairs(3),
+        "stairs of 12": stairs(12),
+        "stairs of 30": stairs(30),
+    },
+    "fem3d": {
+        "rect, film 0.2 mm": shape("rect", dielectric_mm=0.2),
+        "rect, film 0.01 mm": shape("rect", dielectric_mm=0.01),
+        "rect, cut at 7 x 5 mm": shape("rect", length_mm=7.0, width_mm=5.0),
+    },
+}
+ACCURACIES = {"fem2d": (1e-2, 1e-3, 1e-4, 1e-6), "fem3d": (1e-2, 1e-3)}
+
+
+def anew() -> Iterator[str]:
+    """The file with points and parts as measured now, its comment and its choices as they are."""
+    yield from (line for line in FILE.read_text("utf-8").splitlines() if line.startswith("#"))
+    for model, entry in expectations.measured().items():
+        scene = cells.STANDARD[entry.scene]().scene
+        yield f"{model}:\n  scene: {entry.scene}\n  counted: {entry.counted}"
+        yield f"  parts: {expectations.COUNTED[entry.counted](scene).parts}\n  power: {entry.power}\n  points:"
+        for point in cells.points(entry.scene, BUDGET_S):
+            if point.model == model:
+                width = 2 * (point.upper_f_per_m2 - point.lower_f_per_m2)
+                width /= point.upper_f_per_m2 + point.lower_f_per_m2
+                yield f"    - [{width:.2g}, {point.seconds:.2g}]"
+
+
+def held_against_others() -> Iterator[str]:
+    planner.load_solver()
+    yield "| model | scene | asked | expected | reached | seconds expected | seconds | ratio |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for model, scenes in OTHERS.items():
+        module = import_module(f"sensorgen.models.{model}")
+        for name, scene in scenes.items():
+            for wanted in ACCURACIES[model]:
+                width, seconds = expectations.expected(model, scene, wanted)
+                start = time.process_time()
+                try:
+                    reached = f"{module.capacitance(scene, EPS, wanted).width():.2g}"
+                except SensorgenError as error:
+                    reached = type(error).__name__
+                taken = time.process_time() - start
+                within = f"within {wanted:g}" if width <= wanted else f"{width:.2g}"
+                yield (
+                    f"| {model} | {name} | {wanted:g} | {within} | {reached} | {seconds:.2g} | {taken:.2g} "
+                    f"| {taken / seconds:.2g} |"
+                )
+
+
+def main() -> None:
+    if "--check" not in sys.argv:
+        FILE.write_text("\n".join(anew()) + "\n", "utf-8")
+        expectations.measured.cache_clear()
+    (HERE / "results" / "expected.md").write_text("\n".join(held_against_others()) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    main()
