@@ -135,7 +135,8 @@ def _explained(explained: list[Explanation]) -> Section:
         return Section("explained", "Explained")
     words = (
         "Each parameter is moved alone, for all specimens at once, until the squared residuals are least. R_Z is "
-        "compared up to the meter's highest range, which is also what a film without a leak is predicted to read.",
+        "compared up to the meter's highest range, which is also what a film without a leak is predicted to read; "
+        "where the electrodes touch as drawn, it is not compared.",
     )  # fmt: skip
     return Section("explained-by", "Which parameter explains the residuals", words, (table_of(explained),))
 
@@ -152,7 +153,7 @@ def _verdicts(found: Comparison) -> Section:
     return Section(
         "verdicts",
         "Verdicts and yield",
-        yields.words(),
+        yields.words(found),
         (*yields.tables(found), specimens.reasons(found)),
         figures.verdicts(found),
     )
