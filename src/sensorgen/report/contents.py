@@ -144,7 +144,8 @@ def _explained(explained: list[Explanation]) -> Section:
 def _recordings(recorded: list[Run]) -> Section:
     if not recorded:
         return Section("recorded", "Recordings")
-    return Section("recorded", "Recordings", (), (recordings.facts(recorded),), recordings.figures(recorded))
+    drawn = (*recordings.normalised_differences(recorded), *recordings.figures(recorded))
+    return Section("recorded", "Recordings", (), (recordings.facts(recorded),), drawn)
 
 
 def _verdicts(found: Comparison) -> Section:
@@ -162,7 +163,8 @@ def _verdicts(found: Comparison) -> Section:
 def _variants(found: Comparison) -> Section:
     made = variants(found)
     card = identified.table_of(found)
-    return Section("variants", "The variants", (), (card,) if card else (), figures.bodies(found), made)
+    drawn = (*figures.bodies(found), *identified.figure(found))
+    return Section("variants", "The variants", (), (card,) if card else (), drawn, made)
 
 
 def _left_out(rows: list[tuple[str, str]]) -> Section:
