@@ -84,10 +84,10 @@ def test_tall_figures_in_pieces_on_paper(browser, tmp_path):
     browser.open(tmp_path / "tall.html")
     whole = browser.run(PIECES)
     browser.media("light", "print")
-    browser.until("document.querySelectorAll('.more').length > 0")
+    browser.until("document.querySelectorAll('.more').length === 4 && document.documentElement.dataset.drawn")
     pieces = browser.run(PIECES)
     browser.media("light", "")
-    browser.until("document.querySelectorAll('.more').length === 0")
+    browser.until("document.querySelectorAll('.more').length === 0 && document.documentElement.dataset.drawn")
     again = browser.run(PIECES)
     assert len(whole) == len(again) == 1
     assert whole[0] == again[0]

@@ -57,10 +57,14 @@ const chosen = (figure) => {
   const select = document.querySelector(`select[data-for="${figure.key}"]`);
   return select ? select.selectedIndex : 0;
 };
-const all = () => Promise.all(figures.map((figure) => draw(figure, chosen(figure))));
+async function all() {
+  document.documentElement.removeAttribute("data-drawn");
+  await Promise.all(figures.map((figure) => draw(figure, chosen(figure))));
+  document.documentElement.setAttribute("data-drawn", "yes");
+}
 
 if (figures.length) {
-  all().then(() => document.documentElement.setAttribute("data-drawn", "yes"));
+  all();
   dark.addEventListener("change", all);
   paper.addEventListener("change", all);
   for (const figure of figures) {
