@@ -6,6 +6,7 @@ import statistics
 import bench_files
 import pytest
 import yaml
+from scipy import stats
 
 from sensorgen import materials
 from sensorgen.cli import cli
@@ -15,9 +16,12 @@ from sensorgen.errors import BadInput, OutOfRange, SensorgenError, UnknownName
 from sensorgen.fit import Fit, Fitted, Untold, fit, text
 from sensorgen.fit.fitting import held_back
 from sensorgen.fit.resistance import Allowed, leak, resistivity
+from sensorgen.fit.tones import _together
 from sensorgen.log import Log, bench, words
+from sensorgen.losses import lost
 from sensorgen.materials import own
 from sensorgen.predict import prediction
+from sensorgen.sensing import sensor_of
 from sensorgen.specimen import design_of, parse
 
 
@@ -212,6 +216,42 @@ def test_recordings_give_back_what_they_were_made_with(tmp_path):
     assert eps.high / eps.low > 1.5  # the bounds of the cell's model are in it
     for v in made.values:
         assert v.low < v.value < v.high
+
+
+def test_a_leak_comes_back_in_the_next_prediction(tmp_path):
+    """A film that leaks a third of what it stores at the lowest tone: measured, fitted, kept, predicted."""
+    design, name = design_of(parse("30 triX .1mm")), "30 triX .1mm 1"
+    sensor = bench_files.truth(design, resistivity=0.5, capacitance=1.2, leak_s=4e-7)
+    with Log(tmp_path / "log.db", create=True) as log:
+        bench.take(log, name, *bench_files.write(tmp_path, "run", sensor, count=3))
+        made = fit(log, 30)
+    own.place().mkdir()
+    own.path("fit-30").write_text(text(made), "utf-8")
+    taken = {"top_electrode": "etpu@fit-30", "bottom_electrode": "etpu@fit-30", "dielectric": "x60@fit-30"}
+    found = prediction(make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}, "materials": taken}), judged=False)
+    unfitted = prediction(design, judged=False)
+    truth = [complex(sensor.impedance(t["frequency_hz"], 0.0, 0.05)) for t in found["impedance_ohm"]]
+    for z, now in zip(truth, found["impedance_ohm"], strict=True):
+        assert (now["re"], now["im"]) == (pytest.approx(z.real, rel=0.02), pytest.approx(z.imag, rel=0.02))
+    assert unfitted["impedance_ohm"][0]["re"] < truth[0].real / 20
+    assert {"leak_s_per_m2": "fit-30"}.items() <= {v["quantity"]: v["source"] for v in found["values"]}.items()
+    line_of = sensor_of(make({"shape": "tri", "materials": taken})).sensor
+    assert line_of.leak_s_per_m * line_of.length_m == pytest.approx(4e-7, rel=0.02)
+
+
+def test_a_leak_that_the_design_sets_itself():
+    """Per area: twice the sensor leaks twice as much."""
+    for width in (10.0, 20.0):
+        given = {"shape": "tri", "parameters": {"width_mm": width}, "material_values": {"x60": {"leak_s_per_m2": 1e-3}}}
+        assert lost(make(given)).leak_s == pytest.approx(1e-3 * width * 1e-3 * 0.1, rel=1e-12, abs=0)
+
+
+def test_few_recordings_are_less_sure_than_their_scatter():
+    """Student: of two means the interval is 12.7 standard errors wide, not two."""
+    mean, error = _together([(1.0, 1e-9), (1.2, 1e-9)])
+    assert (mean, 2 * error) == (pytest.approx(1.1), pytest.approx(stats.t.ppf(0.975, 1) * 0.1))
+    assert _together([(1.0, 0.3), (1.0, 0.4)]) == (1.0, pytest.approx(0.25))
+    assert _together([(1.0, 0.3)]) == (1.0, 0.3)
 
 
 def test_nothing_to_fit_to(tmp_path):

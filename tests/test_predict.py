@@ -409,7 +409,7 @@ def test_losses_reach_the_line():
         assert row["re"] == pytest.approx(float(z.real), rel=1e-6)
         assert row["im"] == pytest.approx(float(z.imag), rel=1e-6)
     assert (
-        "of dielectric loss and leak, loss_tangent of x60 and resistivity_ohm_m of x60 as set" in found["assumptions"]
+        "of dielectric loss and leak, loss_tangent of x60 and resistivity_ohm_m of x60 as given" in found["assumptions"]
     )
     sensor = sensor_of(make(LOSSY)).sensor
     assert sensor.tan_delta == pytest.approx(0.02, rel=1e-6)

@@ -10,13 +10,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from sensorgen import __version__, drawing, materials, printer, slicing, store, threemf
+from sensorgen import __version__, materials, printer, slicing, store, threemf
 from sensorgen.design import Design
 from sensorgen.errors import Unprintable
 from sensorgen.geometry.cad import CadProcess
 from sensorgen.predict import prediction
-from sensorgen.review import Review, Step, report, review
-from sensorgen.scene import Scene
+from sensorgen.review import Review, Step, draw, report, review
 from sensorgen.slicer import cura, prusa
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
@@ -123,20 +122,6 @@ def _await(job: "Future[None]", step: Step) -> None:
             return job.result(timeout=0.2)
         except TimeoutError:
             continue
-
-
-def draw(design: Design, held: Review, printed: Scene | None = None, source: str = "") -> str:
-    """The drawing of the cross-section, as SVG, with what is printed outlined over it if that is given."""
-    scene = design.printed
-    names = {body.material for body in scene.bodies}
-    notes = [
-        f"{design.machine.name}, {design.layers.name}, printed {design.orientation}",
-        *([f"green outlines: {source}"] if source else []),
-    ]
-    known = {name: (materials.load(name).title, materials.load(name).colour) for name in sorted(names)}
-    return drawing.svg(
-        scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known, notes, printed
-    )
 
 
 def profiles(design: Design) -> dict[str, str]:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from math import pi
 
 from sensorgen.design import Design
-from sensorgen.errors import BadInput
-from sensorgen.materials import SET
+from sensorgen.errors import BadInput, MissingValue
+from sensorgen.materials import FILM_LEAK, SET
 from sensorgen.planner import Taken, capacitance, permittivities
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
 LOSSES = ("loss_tangent", "resistivity_ohm_m")
 LOWEST_HZ = 1.1e3  # of the bench's tones: a leak is strongest there
@@ -100,10 +100,11 @@ class Lost:
 
 
 def lost(design: Design) -> Lost:
-    r"""What the dielectrics of a design lose, as far as the design sets it.
+    r"""What the dielectrics of a design lose, as far as the design or a source that it names says.
 
     A weak leak is a conductance :math:`G = \omega C''`: to first order in :math:`1 / (\omega \varepsilon \varrho)` it
-    does not depend on the frequency, whatever lies in series with what leaks. It is taken at the lowest tone.
+    does not depend on the frequency, whatever lies in series with what leaks. It is taken at the lowest tone. What a
+    film leaks per area, as a fit finds it, is a conductance of its own beside that.
 
     Raises
     ------
@@ -113,7 +114,22 @@ def lost(design: Design) -> Lost:
     taken, sets = permittivities(design), set_losses(design)
     parts = {quantity: [t for t in sets if t.quantity == quantity] for quantity in LOSSES}
     tangents, leaks = (_tangent(design, taken, parts[quantity]) for quantity in LOSSES)
-    return Lost(tangents[0], 2 * pi * LOWEST_HZ * leaks[1], tuple(sets), tuple(_strong(taken, parts[LOSSES[1]])))
+    film, p = _film_leak(design), design.params
+    through_film_s = sum(t.value for t in film) * p.length_mm * p.width_mm * M_PER_MM**2
+    return Lost(
+        tangents[0], 2 * pi * LOWEST_HZ * leaks[1] + through_film_s, (*sets, *film),
+        tuple(_strong(taken, parts[LOSSES[1]])),
+    )  # fmt: skip
+
+
+def _film_leak(design: Design) -> list[Taken]:
+    """Leak of the film per area [S/m2], where one is known."""
+    material, source = design.slot("film")
+    try:
+        value = material.value(FILM_LEAK, source or design.used().get(material.name, ""))
+    except MissingValue:
+        return []
+    return [Taken(material.name, FILM_LEAK, value.value, value.source)]
 
 
 def _tangent(design: Design, taken: Sequence[Taken], some: Sequence[Taken]) -> tuple[float, float]:

@@ -89,7 +89,7 @@ def prediction(
 def _lossless(gone: Lost) -> str:
     said = " and ".join(f"{t.quantity} of {t.material}" for t in gone.taken)
     return (
-        f"of dielectric loss and leak, {said} as set"
+        f"of dielectric loss and leak, {said} as given"
         if said
         else "no dielectric loss and no leak: the sources give none"
     )

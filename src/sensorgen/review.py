@@ -4,11 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from sensorgen import checks
+from sensorgen import checks, drawing, materials
 from sensorgen.design import Design
 from sensorgen.findings import Finding
 from sensorgen.geometry import meshes, validity
 from sensorgen.geometry.mesh import Mesh
+from sensorgen.scene import Scene
 from sensorgen.slicer.tower import tower
 
 Step = Callable[[str], None]
@@ -121,3 +122,17 @@ def report(design: Design, held: Review) -> dict[str, Any]:
         "counts": held.counts(),
         "findings": [f.as_dict() for f in held.findings],
     }
+
+
+def draw(design: Design, held: Review, printed: Scene | None = None, source: str = "") -> str:
+    """The drawing of the cross-section, as SVG, with what is printed outlined over it if that is given."""
+    scene = design.printed
+    names = {body.material for body in scene.bodies}
+    notes = [
+        f"{design.machine.name}, {design.layers.name}, printed {design.orientation}",
+        *([f"green outlines: {source}"] if source else []),
+    ]
+    known = {name: (materials.load(name).title, materials.load(name).colour) for name in sorted(names)}
+    return drawing.svg(
+        scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known, notes, printed
+    )

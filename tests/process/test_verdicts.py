@@ -119,8 +119,22 @@ def test_three_groups_against_every_table_with_the_same_sums():
     chances = np.array([law.pmf(t) for t in every])
     assert chances.sum() == pytest.approx(1)
     assert independence(table) == pytest.approx(chances[chances <= law.pmf(np.array(table)) * 1.000001].sum(), rel=1e-9)
-    with pytest.raises(OutOfRange, match="smaller groups"):
-        independence([(500, 500)] * 4)
+    with pytest.raises(OutOfRange, match="from 0 on"):
+        independence([(-1, 5), (3, 4)])
+
+
+@pytest.mark.parametrize("table", [[(620, 380), (560, 440)], [(5, 1995), (0, 3000)]])
+def test_many_readings_are_fishers_test_too(table):
+    exact = stats.fisher_exact(np.array(table)).pvalue
+    assert independence(table) == pytest.approx(exact, abs=4 * np.sqrt(exact / 100_000))
+
+
+def test_many_groups_are_held_against_pearsons_test():
+    """With hundreds in each cell both tests say the same."""
+    table = [(500, 500), (520, 480), (545, 455), (490, 510)]
+    assert independence(table) == pytest.approx(stats.chi2_contingency(np.array(table)).pvalue, rel=0.05)
+    assert independence([(9000, 1000), (1000, 9000), (500, 500)]) == pytest.approx(1e-5, rel=0.01)
+    assert independence([(5000, 5000)] * 2) == 1
 
 
 def test_groups_count_what_is_known_only():

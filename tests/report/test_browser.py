@@ -7,7 +7,7 @@ import pytest
 from bench_files import HOSTILE
 from browser import Page
 
-from sensorgen.log import Log
+from sensorgen.log import Log, words
 from sensorgen.report import report, written
 
 OUT = Path(__file__).parents[2] / "out" / "report"  # CI keeps it
@@ -20,6 +20,8 @@ SORTED = """(() => {
 })()"""
 BUTTONS = "[...document.querySelectorAll('#table-specimens thead button')]"
 HEAD = f"{BUTTONS}.find(b => b.textContent.startsWith('R_Z measured'))"
+PIECES = """[...document.getElementById('figure-residuals').querySelectorAll('.plot')].map(p => ({
+    x: p._fullLayout.xaxis.range, y: p._fullLayout.yaxis.range, height: p.getBoundingClientRect().height}))"""
 CAMERA = "JSON.stringify(document.querySelector('[data-key=bodies]')._fullLayout.scene._scene.getCamera().eye)"
 
 
@@ -72,6 +74,28 @@ def on_paper(browser):
     browser.media("dark", "print")
     assert browser.run("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
     assert browser.run("getComputedStyle(document.querySelector('nav')).display") == "none"
+
+
+def test_tall_figures_in_pieces_on_paper(browser, tmp_path):
+    """Seventy rows do not fit on a page: every row stands in one piece, none higher than a page."""
+    with Log(tmp_path / "log.db", create=True) as log:
+        log.add([words.reading(f"40 triX .1mm {k + 1}", f"{600 + 3 * k}", "30") for k in range(70)])
+        (tmp_path / "tall.html").write_text(written(report(log, 40), "html"), "utf-8")
+    browser.open(tmp_path / "tall.html")
+    whole = browser.run(PIECES)
+    browser.media("light", "print")
+    browser.until("document.querySelectorAll('.more').length === 4 && document.documentElement.dataset.drawn")
+    pieces = browser.run(PIECES)
+    browser.media("light", "")
+    browser.until("document.querySelectorAll('.more').length === 0 && document.documentElement.dataset.drawn")
+    again = browser.run(PIECES)
+    assert len(whole) == len(again) == 1
+    assert whole[0] == again[0]
+    assert len(pieces) == 3
+    low, high = zip(*(sorted(piece["y"]) for piece in pieces), strict=True)
+    assert (low, high) == ((-0.5, 23.5, 47.5), (23.5, 47.5, 69.5))
+    assert all(piece["x"] == pytest.approx(pieces[0]["x"]) and piece["height"] < 700 for piece in pieces)
+    quiet(browser)
 
 
 def turned(browser):

@@ -13,9 +13,12 @@ from statistics import median
 
 import pytest
 from bench_files import FORMULA, HOSTILE
+from scipy import stats
 
 from sensorgen.log import Log, words
 from sensorgen.report import FORMATS, report, written
+from sensorgen.report import page as page_of
+from sensorgen.report.figures import MOST_ROWS
 from sensorgen.report.pictures import files
 from sensorgen.report.tables import said
 
@@ -68,11 +71,72 @@ def test_how_many_have_a_z_of_the_order_of_their_y(of_thesis, by_hand):
     both = [(y, z) for y, z, _ in by_hand if not math.isnan(y + z)]
     shorted = sum(z <= 10 * y for y, z in both)
     said_so = next(text for text in of_thesis.findings if "of the order of R_Y" in text)
-    assert said_so.startswith(f"{shorted} of {len(both)} readings")
+    assert said_so.startswith(f"{shorted} of {len(both)} specimens")
+    film = [(y, z) for y, z, name in by_hand if not math.isnan(y + z) and "mm" in name]
+    assert f"{len(both) - len(film)} of them shorts by design" in said_so
     shares = table(of_thesis, "yield_by_film")
-    assert sum(column(shares, "R_Z of the order of R_Y")) == shorted
-    no_film = [(y, z) for y, z, name in by_hand if not math.isnan(y + z) and "mm" not in name]
-    assert column(shares, "of")[0] == len(no_film)
+    assert sum(column(shares, "R_Z of the order of R_Y")) == sum(z <= 10 * y for y, z in film)
+    assert column(shares, "of") == [0, 16, 16]
+    assert column(shares, "share")[0] is column(shares, "from")[0] is None
+
+
+def test_shorts_by_design_say_nothing_of_the_yield(of_thesis, by_hand):
+    """What touches as drawn cannot be intact: 0 of the others is an upper bound of 1 - 0.025^(1/32)."""
+    film = [(y, z) for y, z, name in by_hand if not math.isnan(y + z) and "mm" in name]
+    said_so = next(text for text in of_thesis.findings if "intact" in text)
+    assert said_so.startswith(f"0 of {len(film)} specimens")
+    assert said_so.endswith(f"a yield of 0 to {100 * (1 - 0.025 ** (1 / len(film))):.3g} %.")
+    exact = stats.binomtest(sum(z <= 10 * y for y, z in film), len(film)).proportion_ci(0.95, "exact")
+    assert any(f"{100 * exact.low:.3g} to {100 * exact.high:.3g} %" in text for text in of_thesis.findings)
+
+
+def test_whether_groups_differ_is_asked_of_films_only(of_thesis, by_hand):
+    def table_by(groups):
+        rows = [(z <= 10 * y, name) for y, z, name in by_hand if not math.isnan(y + z) and "mm" in name]
+        return [[sum(s for s, n in rows if g in n), sum(not s for s, n in rows if g in n)] for g in groups]
+
+    for by, groups in (("film", (".1mm", "2mm")), ("shape", ("tri", "sq"))):
+        said_so = next(text for text in of_thesis.findings if text.startswith(f"By {by}:"))
+        chance = stats.fisher_exact(table_by(groups)).pvalue
+        assert f"p = {chance:.2g}" in said_so
+        assert "do not differ" in said_so
+
+
+def test_r_z_is_not_compared_where_the_electrodes_touch_as_drawn(of_thesis, by_hand):
+    """One leak for all: ln of the meter's highest range and of the readings, without those of 0 ohm and of no film."""
+    known = [z for y, z, name in by_hand if "mm" in name and z > 0 and 1 < y < 5e4]
+    row = next(r for r in table(of_thesis, "explained").rows if r[:2] == ("R_Z", "leak"))
+    mean = sum(map(math.log, known)) / len(known)
+    left = sum((math.log(z) - mean) ** 2 for z in known) / sum((math.log(z) - math.log(1e8)) ** 2 for z in known)
+    assert row[7] == pytest.approx(100 * (1 - left), abs=0.2)
+
+
+def test_a_specimen_counts_once_and_with_its_last_reading(tmp_path):
+    with Log(tmp_path / "log.db", create=True) as log:
+        log.add([words.reading("40 triX .1mm", "0.7k", z) for z in ("10", "12", "OL")])
+        log.add([words.reading("40 triX .1mm 2", "0.7k", "20")])
+        made = report(log, 40)
+    assert any(text.startswith("1 of 2 specimens that allow") for text in made.findings)
+    assert any(text.startswith("1 of 2 specimens with both") for text in made.findings)
+    assert "2 earlier readings count for nothing" in " ".join(w for s in made.sections for w in s.words)
+    assert len(table(made, "specimens").rows) == 4
+
+
+def test_thousands_of_readings(tmp_path, monkeypatch):
+    """Of so many only what a browser can bear is drawn and listed, and it says so; the files for programs hold all."""
+    monkeypatch.setattr(page_of, "MOST_ROWS", 50)
+    with Log(tmp_path / "log.db", create=True) as log:
+        names = [f"40 {shape} .1mm {k + 1}" for k in range(600) for shape in ("triX", "triY")]
+        log.add([words.reading(n, f"{700 + k % 99}", "30" if k % 3 else "OL") for k, n in enumerate(names)])
+        made = report(log, 40)
+    charts = {chart.key: chart for chart in made.charts}
+    assert [len(charts[key].y[0].names) for key in ("residuals", "resistance")] == [MOST_ROWS] * 2
+    assert f"Not drawn: {1200 - MOST_ROWS}" in charts["residuals"].alt
+    assert "400 of 1200" in " ".join(made.findings)
+    page = Page(written(made, "html"))
+    assert len(page.cells["specimens"]) == 50 + 1
+    assert "the first 50 of 1200 rows" in "".join(page.text)
+    assert written(made, "csv").count("\nspecimens,") == 1200 * 16
 
 
 def test_ratios_are_measured_over_the_middle(of_thesis):

@@ -2,6 +2,7 @@
 
 import base64
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ from sensorgen.errors import BadInput
 from sensorgen.log import Log
 from sensorgen.log.bench import take
 from sensorgen.report.charts import Axis, Chart, Trace
+from sensorgen.report.identified import _lines
 from sensorgen.report.interactive import figure, packed
 from sensorgen.report.pictures import files
+from sensorgen.report.recordings import normalised_differences
 from sensorgen.report.thinned import kept
 
 
@@ -69,6 +72,58 @@ def test_names_in_figures_are_text():
     svg = dict(files(chart))["k.svg"].decode()
     assert "<a href" not in svg
     assert "\\frac{" in svg
+
+
+def test_logarithmic_axes_have_plain_numbers():
+    """Formulas are not drawn, names being text; a decade's tick would otherwise stand there as its TeX."""
+    for high in (5.0, 500.0, 5e6):
+        drawn = (Trace("points", "", [1.0, high], [1.0, high]),)
+        chart = Chart("k", "t", "a", {"": drawn}, Axis("x", log=True), (Axis("y", log=True),))
+        svg = dict(files(chart))["k.svg"].decode()
+        assert "math" not in svg
+        assert sum(f">{number}</text>" in svg for number in ("1", "2", "5", "10", "100", "1000")) >= 2
+
+
+def test_what_is_no_number_is_a_gap():
+    chart = Chart("k", "t", "a", {"": (Trace("line", "", [1.0, 2.0], [np.nan, np.inf]),)}, Axis("x"), (Axis("y"),))
+    assert figure(chart)["choices"][0]["data"][0]["y"] == [None, None]
+
+
+def test_differences_of_all_recordings_on_scales_of_their_own(recorded):
+    with Log(recorded) as log:
+        every = list(runs.runs(log, 30, []))
+    (chart,) = normalised_differences(every)
+    assert len(chart.choices) == 7
+    for k, traces in enumerate(chart.choices.values()):
+        assert [t.row for t in traces] == [0, 0, 1, 1]
+        for trace, run in zip(traces, every * 2, strict=True):
+            moved = run.pairs.pressed_ohm[:, k] - run.pairs.before_ohm[:, k]
+            part = moved.imag if trace.row else moved.real
+            assert trace.x == pytest.approx(run.pairs.force_n)
+            assert trace.y == pytest.approx((part - part.min()) / (part.max() - part.min()))
+    shifted = replace(every[1], recording=replace(every[1].recording, tones_hz=every[1].recording.tones_hz * 1.01))
+    (chart,) = normalised_differences([every[0], shifted])
+    assert len(chart.choices["1.1kHz"]) == 2
+    assert "1 recordings of other tones are left out" in chart.alt
+    assert not list(normalised_differences([]))
+
+
+def test_what_impedance_could_tell_is_the_cards_map():
+    card = {
+        "required": {"sigma_force_n": 0.6, "sigma_position_m": 0.01},
+        "map": {
+            "force_n": [0.0, 1.0, 2.0, 3.0, 4.0], "position_m": [0.0, 0.05],
+            "sigma_force_n": [[k, 10.0 + k] for k in range(5)],
+            "sigma_position_m": [[None, k / 1e3] for k in range(5)],
+        },
+    }  # fmt: skip
+    weak, middling, strong, needed, *below = _lines(card)
+    assert [list(t.y) for t in (weak, middling, strong, needed)] == [[1, 11], [2, 12], [4, 14], [0.6, 0.6]]
+    assert [t.name for t in (weak, middling, strong)] == ["press of 1 N", "press of 2 N", "press of 4 N"]
+    assert np.isnan([t.y[0] for t in below[:3]]).all()
+    assert [t.y[1] for t in below] == pytest.approx([1.0, 2.0, 4.0, 10.0])
+    assert list(weak.x) == [0.0, 50.0]
+    assert {t.row for t in below} == {1}
 
 
 def test_presses_of_a_run(recorded):

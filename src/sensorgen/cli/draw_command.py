@@ -22,8 +22,7 @@ OWN: list[click.Parameter] = [
 
 def _work(design: "Design", *, output: str | None, as_printed: bool, slicer: str | None, walls: str | None) -> int:
     from sensorgen import store
-    from sensorgen.build import draw
-    from sensorgen.review import STEPS, review
+    from sensorgen.review import STEPS, draw, review
 
     asprinted_text.refuse_strays(as_printed=as_printed, slicer=slicer, walls=walls)
     made = asprinted_text.printed(design, slicer, walls) if as_printed else None

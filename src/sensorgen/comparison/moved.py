@@ -42,8 +42,7 @@ class Movable:
     @cached_property
     def permittivity(self) -> float:
         """Of the film, as predicted [-]."""
-        material, source = self.design.slot("film")
-        return material.value(PERMITTIVITY, source).value
+        return next(t.value for t in self.sensed.unloaded.taken if t.material == self.film)
 
     def capacitance_f(self, permittivity: float) -> Interval:
         """With another permittivity of the film's material [F]."""

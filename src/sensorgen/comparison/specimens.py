@@ -1,6 +1,6 @@
 """Specimens of an iteration: readings, designs, predictions and verdicts, row by row; and what cannot be compared."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, log, nan
 
@@ -9,7 +9,7 @@ from sensorgen.design import Design
 from sensorgen.errors import SensorgenError
 from sensorgen.log import Log, Prediction, Reading
 from sensorgen.process.verdicts import Evidence, Verdict, expected_from, verdict
-from sensorgen.specimen import design_of, parse
+from sensorgen.specimen import Specimen, design_of, parse
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,11 @@ class Comparison:
     predictions: Mapping[str, Predicted]
     left_out: tuple[tuple[str, str], ...]
 
+    @property
+    def last(self) -> tuple[Compared, ...]:
+        """The last reading of each specimen: a yield counts specimens, however often one was measured."""
+        return tuple({row.reading.specimen: row for row in self.rows}.values())
+
 
 def of_iteration(log: Log, iteration: int) -> Comparison:
     """Everything in the log about an iteration, compared.
@@ -85,10 +90,12 @@ def of_iteration(log: Log, iteration: int) -> Comparison:
     left_out: list[tuple[str, str]] = [
         (f"reading {old.number}, {old.specimen}", "a later reading corrects it") for old in _corrected(log, iteration)
     ]
-    designs = _designs(log, iteration, left_out)
+    by_specimen = _by_specimen(log, iteration, left_out)
+    names = {specimen: design.name for specimen, design in by_specimen.items()}
+    designs = dict(sorted((design.name, design) for design in by_specimen.values()))
+    left_out += _other_designs(readings, designs.values())
     found = {name: predicted(design, _stored(log, design)) for name, design in designs.items()}
-    names = {specimen: design.name for specimen, design in _by_specimen(log, iteration, designs)}
-    evidence = [_evidence(reading) for reading in readings]
+    evidence = [_evidence(reading, found.get(names.get(reading.specimen, ""))) for reading in readings]
     usual = {shape: expected_from([e for e in evidence if e.shape == shape]) for shape in {e.shape for e in evidence}}
     rows = []
     for reading, of in zip(readings, evidence, strict=True):
@@ -103,51 +110,46 @@ def _corrected(log: Log, iteration: int) -> Iterator[Reading]:
     yield from (r for r in every if r.number not in current)
 
 
-def _designs(log: Log, iteration: int, left_out: list[tuple[str, str]]) -> dict[str, Design]:
-    """The designs that the specimens' names stand for; what the log says of another design is told."""
+def _by_specimen(log: Log, iteration: int, left_out: list[tuple[str, str]]) -> dict[str, Design]:
+    """The designs that the specimens' names stand for, each made once."""
     found: dict[str, Design] = {}
+    made: dict[Specimen, Design | None] = {}
     for specimen in log.specimens(iteration=iteration):
         try:
-            design = design_of(parse(specimen.specimen))
+            kind = replace(parse(specimen.specimen), iteration=None, replicate=None, place="")
+            design = made[kind] if kind in made else made.setdefault(kind, design_of(kind))
         except SensorgenError as error:
             left_out.append((f"design of {specimen.specimen}", str(error)))
             continue
         if design is None:
             left_out.append((f"design of {specimen.specimen}", "its name does not tell which design it is"))
         else:
-            found[design.name] = design
-    known = {design.id() for design in found.values()}
-    others = {(r.design, r.design_id) for r in log.readings(iteration=iteration) if r.design_id} - {
-        (design.name, design.id()) for design in found.values()
-    }
-    left_out += [
+            found[specimen.specimen] = design
+    return found
+
+
+def _other_designs(readings: Sequence[Reading], designs: Iterable[Design]) -> list[tuple[str, str]]:
+    """What the log says of designs that the names do not stand for."""
+    known = {design.id() for design in designs}
+    others = {(r.design, r.design_id) for r in readings if r.design_id and r.design_id not in known}
+    return [
         (f"design {name} ({uid})", "the log names it for a specimen whose name stands for another design, or for this "
          "one in another version of sensorgen: drawn and predicted is what the name stands for now")
-        for name, uid in sorted(others) if uid not in known
+        for name, uid in sorted(others)
     ]  # fmt: skip
-    return dict(sorted(found.items()))
-
-
-def _by_specimen(log: Log, iteration: int, designs: Mapping[str, Design]) -> Iterator[tuple[str, Design]]:
-    for specimen in log.specimens(iteration=iteration):
-        try:
-            design = design_of(parse(specimen.specimen))
-        except SensorgenError:
-            continue
-        if design is not None:
-            yield specimen.specimen, designs[design.name]
 
 
 def _stored(log: Log, design: Design) -> Sequence[Prediction]:
     return log.predictions(design_id=design.id())
 
 
-def _evidence(reading: Reading) -> Evidence:
+def _evidence(reading: Reading, of: Predicted | None) -> Evidence:
     """Readings that a resistance can have; a slip below 0 is kept in the log and told as a doubt there."""
     ry, rz = (tuple(v for v in values if v >= 0) for values in (reading.y_ohm, reading.z_ohm))
     return Evidence(
-        reading.specimen, ry, rz, nan, reading.shape, reading.film_mm, reading.remark, str(reading.iteration or "")
-    )
+        reading.specimen, ry, rz, nan, reading.shape, reading.film_mm, reading.remark,
+        str(reading.iteration or ""), of is not None and of.touches,
+    )  # fmt: skip
 
 
 def _unused(rows: Sequence[Compared]) -> Iterator[tuple[str, str]]:

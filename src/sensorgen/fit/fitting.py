@@ -12,7 +12,7 @@ from sensorgen.comparison.runs import Run, runs
 from sensorgen.design import Design, make
 from sensorgen.errors import BadInput, SensorgenError
 from sensorgen.fit import resistance, tones
-from sensorgen.fit.results import LEAK, Error, Fit, Fitted, Untold
+from sensorgen.fit.results import Error, Fit, Fitted, Untold
 from sensorgen.log import Log
 
 HELD_BACK = 0.25  # of the specimens
@@ -123,8 +123,7 @@ def with_values(design: Design, values: Sequence[Fitted]) -> Design:
     """A design with fitted values in place of those of its sources."""
     own: dict[str, dict[str, float]] = {}
     for value in values:
-        if value.quantity != LEAK:
-            own.setdefault(value.material, {})[value.quantity] = value.value
+        own.setdefault(value.material, {})[value.quantity] = value.value
     data = design.model_dump(exclude_defaults=True, mode="json")
     return make(data | {"material_values": data.get("material_values", {}) | own})
 

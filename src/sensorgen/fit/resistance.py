@@ -15,7 +15,8 @@ from sensorgen.comparison import Compared
 from sensorgen.comparison.expected import ENDS, electrode_ohm
 from sensorgen.comparison.leaky import electrode_and_leak
 from sensorgen.design import Design
-from sensorgen.fit.results import LEAK, LEVEL, Fitted, Untold
+from sensorgen.fit.results import LEVEL, Fitted, Untold
+from sensorgen.materials import FILM_LEAK
 from sensorgen.recording.samples import Real
 from sensorgen.units import M_PER_MM
 
@@ -92,6 +93,6 @@ def leak(readings: Sequence[Allowed], material: str, seed: int) -> Fitted | Unto
         )
     outer = np.percentile(_medians(known[:, None], seed)[:, 0], 100 * np.array([(1 - LEVEL) / 2, (1 + LEVEL) / 2]))
     return Fitted(
-        material, LEAK, exp(middle), exp(outer[0]), exp(outer[1]),
-        f"R_Z of {len(known)} specimens, taken to leak evenly; no prediction reads it",
+        material, FILM_LEAK, exp(middle), exp(outer[0]), exp(outer[1]),
+        f"R_Z of {len(known)} specimens, taken to leak evenly",
     )  # fmt: skip

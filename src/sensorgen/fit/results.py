@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 LEVEL = 0.95  # of the intervals
-LEAK = "leak_s_per_m2"  # quantity: leak of a film per area
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ import numpy as np
 from sensorgen.comparison.moved import PERMITTIVITY, Movable, at_rest, moved, pressed
 from sensorgen.comparison.runs import Run
 from sensorgen.errors import SensorgenError
-from sensorgen.fit.results import LEAK, Fitted, Untold
+from sensorgen.fit.results import LEVEL, Fitted, Untold
+from sensorgen.materials import FILM_LEAK
 from sensorgen.recording.samples import Complex, Real
 from sensorgen.units import M_PER_MM
 
@@ -102,11 +103,18 @@ def values(fits: Sequence[OfRun]) -> list[Fitted | Untold]:
 
 
 def _together(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Mean, and its standard error from the errors or from the scatter, whichever is more."""
+    """Mean, and its standard error from the errors or from the scatter, whichever is more.
+
+    Few recordings tell their own scatter badly: it counts as much more as Student's interval is wider.
+    """
+    from scipy.special import stdtrit
+
     at, errors = np.array(found).T
-    own = sqrt(float((errors**2).sum())) / len(at)
-    between = float(at.std(ddof=1)) / sqrt(len(at)) if len(at) > 1 else 0.0
-    return float(at.mean()), max(own, between)
+    own, count = sqrt(float((errors**2).sum())) / len(at), len(at)
+    if count == 1:
+        return float(at[0]), own
+    wider = float(stdtrit(count - 1, (1 + LEVEL) / 2)) / _SURE
+    return float(at.mean()), max(own, wider * float(at.std(ddof=1)) / sqrt(count))
 
 
 def _resistivity(fits: Sequence[OfRun]) -> list[Fitted | Untold]:
@@ -135,7 +143,7 @@ def _permittivity(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
                 f"{fit.run.name} has {exp(fit.capacitance[0]):.3g} times the predicted capacitance; a permittivity of "
                 f"{fit.of.permittivity * exp(factor[0]):.3g} to {fit.of.permittivity * exp(factor[-1]):.3g} makes none",
             )
-        slope = float(np.gradient(curve, factor).mean())
+        slope = float(np.interp(fit.capacitance[0], curve, np.gradient(curve, factor)))
         at = float(np.interp(fit.capacitance[0], curve, factor))
         bounds = fit.of.sensed.unloaded.answer.capacitance_f
         open_ = log(bounds.upper / bounds.lower) / 2 / _SURE  # what the model of the cell leaves open
@@ -169,8 +177,10 @@ def _leak(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
         most = max(at + _SURE * error for at, error in found)
         return Untold("leak", f"in {len(found)} recordings no more than {most:.2g} S/m2, and none of it certain")
     at, error = _together(found)
-    return Fitted(film, LEAK, at, max(at - _SURE * error, 0.0), at + _SURE * error,
-                  f"Z of {len(found)} recordings at their lowest tones; no prediction reads it")  # fmt: skip
+    if at <= _SURE * error:
+        return Untold("leak", f"{len(found)} recordings differ too much: {at:.2g} S/m2, give or take {error:.2g}")
+    return Fitted(film, FILM_LEAK, at, at - _SURE * error, at + _SURE * error,
+                  f"Z of {len(found)} recordings at their lowest tones")  # fmt: skip
 
 
 def _modulus_of(fit: OfRun, film: str) -> float:

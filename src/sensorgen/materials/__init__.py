@@ -19,6 +19,7 @@ from sensorgen.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.materials import own
 from sensorgen.records import Strict, checked
 
+FILM_LEAK = "leak_s_per_m2"  # leak of a film per area; a matter of how it was printed: no source that ships gives one
 SET = "set by the user"  # source of a value that stands in a design itself
 _RANGES = {"poisson_ratio": (-1.0, 0.5)}  # both ends belong to it; anything else is above 0
 
@@ -114,8 +115,8 @@ def names() -> list[str]:
 
 @cache
 def quantities() -> list[str]:
-    """Names of all quantities that any material's file gives, those of printing left out."""
-    return sorted({quantity for name in names() for quantity in load(name).properties})
+    """Names of all quantities that a material can have, those of printing left out."""
+    return sorted({quantity for name in names() for quantity in load(name).properties} | {FILM_LEAK})
 
 
 def check_own(name: str, values: Mapping[str, float]) -> None:

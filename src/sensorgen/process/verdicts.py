@@ -44,6 +44,8 @@ class Evidence:
         For groups [mm].
     iteration : str
         For groups.
+    touching : bool
+        Whether the electrodes touch as drawn: such a short says nothing of how well it was printed.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Evidence:
     film_mm: float | None = None
     remark: str = ""
     iteration: str = ""
+    touching: bool = False
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,19 @@ the stated confidence whatever the true yield is. Wilson's are narrower because 
 told a yield of "0 to 6 %" should not find 8.
 """
 
+from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import comb, isnan, nan, prod
 from statistics import median
+from typing import Any
 
 from sensorgen.errors import OutOfRange
 from sensorgen.process.verdicts import ORDER, Evidence, Verdict
 
 CONFIDENCE = 0.95
-_MOST_TABLES = 1_000_000
+_MOST_TABLES, _MOST = 20_000, 1000  # tables, and readings in them, that are all looked at
+_DRAWS, _SEED, _ALIKE = 100_000, 23, 1e-6  # of tables, where there are more; ln of chances that are the same
 _SAME = 1 + 1e-9  # tables as likely as the one seen count as such in spite of rounding
 
 
@@ -42,9 +45,10 @@ class Group:
     key : tuple
         What they have in common.
     intact : Share
-        The yield: those that are intact, of those that a verdict was possible on.
+        The yield: those that are intact, of those that a verdict was possible on; shorts by design are none of either.
     shorted : Share
-        Those whose R_Z is of the order of their R_Y or below, of those that have both readings.
+        Those whose R_Z is of the order of their R_Y or below, of those that have both readings; again without shorts by
+        design.
     median_ratio : float
         Median of R_Z over R_Y [-]; nan where none has both.
     words : mapping of str to int
@@ -111,25 +115,24 @@ def groups(
     order : float
         R_Z over R_Y up to which a specimen counts as shorted [-].
     """
-    found: dict[tuple[Hashable, ...], list[Verdict]] = {}
+    found: dict[tuple[Hashable, ...], list[Judged]] = {}
     for of, verdict in judged:
-        found.setdefault(by(of), []).append(verdict)
+        found.setdefault(by(of), []).append((of, verdict))
     return [
         _group(key, found[key], confidence, order)
         for key in sorted(found, key=lambda key: [(k is None, str(k)) for k in key])
     ]
 
 
-def _group(key: tuple[Hashable, ...], verdicts: Sequence[Verdict], confidence: float, order: float) -> Group:
-    known = [v for v in verdicts if v.word != "unknown"]
-    both = [v for v in verdicts if not isnan(v.ratio)]
-    words: dict[str, int] = {}
-    for v in verdicts:
-        words[v.word] = words.get(v.word, 0) + 1
+def _group(key: tuple[Hashable, ...], judged: Sequence[Judged], confidence: float, order: float) -> Group:
+    open_ = [v for of, v in judged if not of.touching]
+    known = [v for v in open_ if v.word != "unknown"]
+    both = [v for v in open_ if not isnan(v.ratio)]
+    ratios = [v.ratio for _, v in judged if not isnan(v.ratio)]
     return Group(
         key, share(sum(v.word == "intact" for v in known), len(known), confidence),
         share(sum(v.ratio <= order for v in both), len(both), confidence),
-        median([v.ratio for v in both]) if both else nan, words,
+        median(ratios) if ratios else nan, Counter(v.word for _, v in judged),
     )  # fmt: skip
 
 
@@ -148,6 +151,8 @@ def dependence(found: Sequence[Group]) -> float:
 def independence(table: Sequence[tuple[int, int]]) -> float:
     """Probability of a table at least as unlikely as this one, if the group does not matter (Fisher, Freeman, Halton).
 
+    Exact where all tables with the same sums can be looked at; of more, 100 000 are drawn at random, always the same.
+
     Parameters
     ----------
     table : sequence of (int, int)
@@ -156,7 +161,7 @@ def independence(table: Sequence[tuple[int, int]]) -> float:
     Raises
     ------
     OutOfRange
-        Counts below 0, or so many groups and counts that their tables cannot all be looked at.
+        Counts below 0.
 
     Examples
     --------
@@ -165,12 +170,29 @@ def independence(table: Sequence[tuple[int, int]]) -> float:
     >>> round(independence([(4, 0), (0, 4)]), 4)
     0.0286
     """
-    if any(n < 0 for row in table for n in row) or prod(sorted(a + b + 1 for a, b in table)[:-1]) > _MOST_TABLES:
-        raise OutOfRange("expected counts from 0 on, in fewer or smaller groups")
-    sizes, did = [a + b for a, b in table], sum(a for a, _ in table)
-    ways = _ways([a for a, _ in table], sizes)
-    likely = sum(n for n in _every(sizes, did) if n <= ways * _SAME)
-    return likely / comb(sum(sizes), did)
+    if any(n < 0 for row in table for n in row):
+        raise OutOfRange("expected counts from 0 on")
+    sizes, seen = [a + b for a, b in table], [a for a, _ in table]
+    if sum(sizes) > _MOST or prod(sorted(n + 1 for n in sizes)[:-1]) > _MOST_TABLES:
+        return _drawn(sizes, seen)
+    ways = _ways(seen, sizes)
+    likely = sum(n for n in _every(sizes, sum(seen)) if n <= ways * _SAME)
+    return likely / comb(sum(sizes), sum(seen))
+
+
+def _drawn(sizes: Sequence[int], seen: Sequence[int]) -> float:
+    """The same from tables that are drawn; the one seen counts as one of them, so that it is never 0."""
+    import numpy as np
+    from scipy.special import gammaln
+
+    size = np.array(sizes)
+
+    def ln_ways(did: Any) -> Any:
+        return (gammaln(size + 1) - gammaln(did + 1) - gammaln(size - did + 1)).sum(axis=-1)
+
+    tables = np.random.default_rng(_SEED).multivariate_hypergeometric(size, sum(seen), _DRAWS)
+    unlikely = int((ln_ways(tables) <= ln_ways(np.array(seen)) + _ALIKE).sum())
+    return (1 + unlikely) / (1 + _DRAWS)
 
 
 def _ways(did: Sequence[int], sizes: Sequence[int]) -> int:

@@ -135,7 +135,8 @@ def _explained(explained: list[Explanation]) -> Section:
         return Section("explained", "Explained")
     words = (
         "Each parameter is moved alone, for all specimens at once, until the squared residuals are least. R_Z is "
-        "compared up to the meter's highest range, which is also what a film without a leak is predicted to read.",
+        "compared up to the meter's highest range, which is also what a film without a leak is predicted to read; "
+        "where the electrodes touch as drawn, it is not compared.",
     )  # fmt: skip
     return Section("explained-by", "Which parameter explains the residuals", words, (table_of(explained),))
 
@@ -143,7 +144,8 @@ def _explained(explained: list[Explanation]) -> Section:
 def _recordings(recorded: list[Run]) -> Section:
     if not recorded:
         return Section("recorded", "Recordings")
-    return Section("recorded", "Recordings", (), (recordings.facts(recorded),), recordings.figures(recorded))
+    drawn = (*recordings.normalised_differences(recorded), *recordings.figures(recorded))
+    return Section("recorded", "Recordings", (), (recordings.facts(recorded),), drawn)
 
 
 def _verdicts(found: Comparison) -> Section:
@@ -152,7 +154,7 @@ def _verdicts(found: Comparison) -> Section:
     return Section(
         "verdicts",
         "Verdicts and yield",
-        yields.words(),
+        yields.words(found),
         (*yields.tables(found), specimens.reasons(found)),
         figures.verdicts(found),
     )
@@ -161,7 +163,8 @@ def _verdicts(found: Comparison) -> Section:
 def _variants(found: Comparison) -> Section:
     made = variants(found)
     card = identified.table_of(found)
-    return Section("variants", "The variants", (), (card,) if card else (), figures.bodies(found), made)
+    drawn = (*figures.bodies(found), *identified.figure(found))
+    return Section("variants", "The variants", (), (card,) if card else (), drawn, made)
 
 
 def _left_out(rows: list[tuple[str, str]]) -> Section:

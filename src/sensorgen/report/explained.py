@@ -83,7 +83,7 @@ def _resistances(found: Comparison) -> Iterator[Kind]:
     middles = [row.predicted.ry_ohm.middle() for row in rows if row.predicted and row.predicted.ry_ohm]
     if rows:
         yield Kind("R_Y", np.log([row.verdict.ry_ohm for row in rows]).astype(complex), _along(middles))
-    both = [k for k, row in enumerate(rows) if row.verdict.rz_ohm > 0]
+    both = [k for k, row in enumerate(rows) if row.verdict.rz_ohm > 0 and not row.evidence.touching]
     if both:
         measured = np.log([min(rows[k].verdict.rz_ohm, INTACT_OHM) for k in both])
         yield Kind("R_Z", measured.astype(complex), _across([middles[k] for k in both]))

@@ -1,5 +1,6 @@
 """The figures of a report, from what was compared."""
 
+from collections import Counter
 from math import exp, isfinite
 
 from sensorgen.comparison import Compared, Comparison
@@ -17,28 +18,32 @@ _COLOURS = dict(
 )
 _SHAPES = {"tri": "circle", "rect": "square", "reference": "diamond", "double": "cross"}
 _STRETCH = (1.0, 1.0, 10.0)
+MOST_ROWS, MOST_POINTS = 200, 3000  # that anybody can read, and that a browser draws at once
 
 
 def residuals(found: Comparison) -> tuple[Chart, ...]:
     """Measured over predicted, and both beside each other."""
-    rows = [row for row in found.rows if isfinite(row.residual) and row.verdict.electrode != "unknown"]
-    low = sum(isfinite(row.residual) for row in found.rows) - len(rows)
-    if not rows:
+    known = [row for row in found.rows if isfinite(row.residual)]
+    every = sorted((row for row in known if row.verdict.electrode != "unknown"), key=lambda row: row.residual)
+    if not every:
         return ()
-    return _ratios(rows, f" Left out: {low}, too low for an electrode." if low else ""), _beside(rows)
+    rows = every if len(every) <= MOST_ROWS else every[: MOST_ROWS // 2] + every[-MOST_ROWS // 2 :]
+    low, more = len(known) - len(every), len(every) - len(rows)
+    said = f" Left out: {low}, too low for an electrode." if low else ""
+    said += f" Not drawn: {more} of residuals between the least and the largest." if more else ""
+    return _ratios(rows, said), _beside(sorted(rows, key=lambda row: row.reading.number))
 
 
 def _names(rows: list[Compared]) -> tuple[str, ...]:
     """Names of the rows; a specimen that was measured twice has the reading's number too."""
-    names = [row.reading.specimen for row in rows]
+    count = Counter(row.reading.specimen for row in rows)
     return tuple(
-        name if names.count(name) == 1 else f"{name} (no. {row.reading.number})"
-        for name, row in zip(names, rows, strict=True)
+        row.reading.specimen + (f" (no. {row.reading.number})" if count[row.reading.specimen] > 1 else "")
+        for row in rows
     )
 
 
 def _ratios(rows: list[Compared], left_out: str) -> Chart:
-    rows = sorted(rows, key=lambda row: row.residual)
     names = _names(rows)
     bounds = [_relative(row) for row in rows]
     traces = (
@@ -98,6 +103,7 @@ def _short(found: Comparison) -> Chart | None:
     rows = [r for r in found.rows if isfinite(r.verdict.ratio) and r.verdict.rz_ohm > 0]
     if not rows:
         return None
+    every, rows = len(rows), rows[:: -(-len(rows) // MOST_POINTS)]
     low, high = min(r.verdict.ry_ohm for r in rows), max(r.verdict.ry_ohm for r in rows)
     ends = [low / 1.5, high * 1.5]
     traces = [
@@ -114,9 +120,9 @@ def _short(found: Comparison) -> Chart | None:
     zero = sum(r.verdict.rz_ohm == 0 for r in found.rows)
     return Chart(
         "shorts", "R_Z beside R_Y",
-        f"Resistance between the electrodes over that along one, both logarithmic, for {len(rows)} readings. Below the "
-        f"solid line a bridge can read that; below the dashed one R_Z is of the order of R_Y. {zero} readings of 0 ohm "
-        "have no place on the axis.",
+        f"Resistance between the electrodes over that along one, both logarithmic, for {len(rows)} of {every} "
+        "readings. Below the solid line a bridge can read that; below the dashed one R_Z is of the order of R_Y. "
+        f"{zero} readings of 0 ohm have no place on the axis.",
         {"": tuple(traces)}, Axis("R_Y [ohm]", log=True), (Axis("R_Z [ohm]", log=True),),
     )  # fmt: skip
 
@@ -130,8 +136,8 @@ def _counts(found: Comparison) -> Chart:
         if any(g.words.get(word) for g in groups)
     )
     return Chart(
-        "verdict-counts", "Verdicts by shape and film", "How many readings of each shape and film have which verdict.",
-        {"": traces}, Axis("readings"), (Axis("", names=names),),
+        "verdict-counts", "Verdicts by shape and film", "How many specimens of each shape and film have which verdict.",
+        {"": traces}, Axis("specimens"), (Axis("", names=names),),
     )  # fmt: skip
 
 
@@ -147,7 +153,8 @@ def _shares(found: Comparison) -> Chart | None:
     )  # fmt: skip
     return Chart(
         "shorted", "R_Z of the order of R_Y, by shape and film",
-        "Share of readings whose R_Z is at most ten times R_Y, for each shape and film, with exact intervals.",
+        "Share of specimens whose R_Z is at most ten times R_Y, for each shape and film, with exact intervals; without "
+        "those whose electrodes touch as drawn.",
         {"": (trace,)}, Axis("share [%]", low=0.0, high=102.0), (Axis("", names=names),),
     )  # fmt: skip
 

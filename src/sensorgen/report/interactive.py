@@ -157,7 +157,7 @@ def _spread(part: Trace, how: dict[str, Any]) -> dict[str, Any]:
 def _values(values: Values) -> Any:
     if isinstance(values, np.ndarray):
         return packed(values)
-    return [escape(v) if isinstance(v, str) else float(v) for v in values]
+    return [escape(v) if isinstance(v, str) else float(v) if isfinite(v) else None for v in values]
 
 
 def packed(values: NDArray[Any] | Sequence[float]) -> dict[str, str]:

@@ -20,21 +20,51 @@ function dressed(layout) {
   return made;
 }
 
+// Paper ends where a screen scrolls: a figure of many rows is drawn in pieces of one page, over the same x axis.
+const ROWS = 28;
+function pieces(layout) {
+  const count = layout.yaxis?.categoryarray?.length ?? 0;
+  if (!paper.matches || count <= ROWS) return [layout];
+  const many = Math.ceil(count / ROWS), each = Math.ceil(count / many);
+  return Array.from({length: many}, (_, k) => {
+    const first = k * each, last = Math.min(first + each, count);
+    const height = layout.height * (last - first) / count + 110 * (1 - (last - first) / count);
+    return {...layout, height, yaxis: {...layout.yaxis, range: [last - 0.5, first - 0.5]}};
+  });
+}
+
+function places(key, count) {
+  const first = document.querySelector(`.plot[data-key="${key}"]`);
+  for (const more of document.querySelectorAll(`.more[data-of="${key}"]`)) { Plotly.purge(more); more.remove(); }
+  const rest = Array.from({length: count - 1}, () => Object.assign(document.createElement("div"), {className: "plot more"}));
+  for (const more of rest) more.dataset.of = key;
+  first.after(...rest);
+  first.closest("figure").classList.toggle("parted", count > 1);
+  return [first, ...rest];
+}
+
 function draw(figure, choice = 0) {
-  const place = document.querySelector(`.plot[data-key="${figure.key}"]`);
-  const layout = dressed(figure.layout);
-  if (place.layout && place.layout.scene && layout.scene) layout.scene.camera = place.layout.scene.camera;
-  return Plotly.react(place, figure.choices[choice].data, layout, {responsive: true, displaylogo: false, displayModeBar: innerWidth < 600 ? false : "hover"});
+  const parts = pieces(figure.layout);
+  return Promise.all(places(figure.key, parts.length).map((place, k) => {
+    const layout = dressed(parts[k]);
+    place.style.minHeight = `${layout.height}px`;
+    if (place.layout && place.layout.scene && layout.scene) layout.scene.camera = place.layout.scene.camera;
+    return Plotly.react(place, figure.choices[choice].data, layout, {responsive: true, displaylogo: false, displayModeBar: innerWidth < 600 ? false : "hover"});
+  }));
 }
 
 const chosen = (figure) => {
   const select = document.querySelector(`select[data-for="${figure.key}"]`);
   return select ? select.selectedIndex : 0;
 };
-const all = () => Promise.all(figures.map((figure) => draw(figure, chosen(figure))));
+async function all() {
+  document.documentElement.removeAttribute("data-drawn");
+  await Promise.all(figures.map((figure) => draw(figure, chosen(figure))));
+  document.documentElement.setAttribute("data-drawn", "yes");
+}
 
 if (figures.length) {
-  all().then(() => document.documentElement.setAttribute("data-drawn", "yes"));
+  all();
   dark.addEventListener("change", all);
   paper.addEventListener("change", all);
   for (const figure of figures) {

@@ -17,6 +17,7 @@ from sensorgen.report.variants import Variant
 
 # Nothing may be fetched, whatever a name or a remark holds.
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+MOST_ROWS = 2000  # of a table
 
 
 def html(report: Report) -> str:
@@ -91,13 +92,16 @@ def _chart(chart: Chart) -> Iterator[str]:
 
 
 def _table(table: Table) -> Iterator[str]:
+    """A table; of a long one the first rows, because a browser has to lay out all that it is given."""
+    count = len(table.rows)
+    rest = f" (the first {MOST_ROWS} of {count} rows; all are in --format csv)" if count > MOST_ROWS else ""
     yield f'<div class="scroll" tabindex="0" role="region" aria-labelledby="{table.key}-caption">'
-    yield f'<table id="table-{table.key}"><caption id="{table.key}-caption">{escape(table.caption)}</caption>'
+    yield f'<table id="table-{table.key}"><caption id="{table.key}-caption">{escape(table.caption + rest)}</caption>'
     yield "<thead><tr>"
     yield from (_head(column) for column in table.columns)
     yield "</tr></thead><tbody>"
     named = next((k for k, c in enumerate(table.columns) if c.name in ("specimen", "what", "name")), 0)
-    for row in table.rows:
+    for row in table.rows[:MOST_ROWS]:
         cells = (_cell(value, header=k == named) for k, value in enumerate(row))
         yield f"<tr>{''.join(cells)}</tr>"
     yield "</tbody></table></div>"

@@ -11,6 +11,7 @@ from sensorgen.report.charts import GREY, Axis, Body, Chart, Content, Relief, Tr
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis as AxisOf
     from matplotlib.figure import Figure
 
 _WIDE_IN, _ROW_IN, _PANEL_IN, _FRAME_IN = 9.0, 0.17, 3.0, 1.3
@@ -77,8 +78,22 @@ def _dress(panel: "Axes", x: Axis, y: Axis) -> None:
         panel.set_ylim(len(y.names) - 0.4, -0.6)
     if np.isfinite(x.low):
         panel.set_xlim(x.low, x.high)
+    for axis, log in ((panel.xaxis, x.log), (panel.yaxis, y.log and not y.names)):
+        if log:
+            _decades(axis)
     panel.grid(alpha=0.3)
     panel.set_axisbelow(True)
+
+
+def _decades(axis: "AxisOf") -> None:
+    """Plain numbers at a logarithmic axis, between the decades too where there are few: formulas are not drawn."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    between = (1.0, 2.0, 3.0, 5.0, 7.0) if high < 10 * low else (1.0, 2.0, 5.0) if high < 1e3 * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=between))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _trace(panel: "Axes", trace: Trace, places: dict[str, int], left: Any) -> None:

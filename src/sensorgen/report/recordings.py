@@ -9,7 +9,7 @@ from sensorgen.comparison import Comparison, Predicted
 from sensorgen.comparison.expected import Tone
 from sensorgen.comparison.runs import Run
 from sensorgen.errors import SensorgenError
-from sensorgen.process.surfaces import surface
+from sensorgen.process.surfaces import normalised, surface
 from sensorgen.recording.samples import Real
 from sensorgen.report import charts
 from sensorgen.report.charts import Axis, Chart, Relief, Trace
@@ -28,6 +28,8 @@ _TONES = (
 )  # fmt: skip
 _SAME = 1e-6  # relative: tones nearer than this are the same
 _POINTS = 40  # of a surface, to either side
+_COLOURS = (charts.BLUE, charts.ORANGE, charts.GREEN, charts.PINK, charts.YELLOW, charts.SKY)
+_SYMBOLS = ("circle", "square", "diamond", "cross", "x")
 
 
 def predicted_of(run: Run, found: Comparison) -> Predicted | None:
@@ -106,6 +108,46 @@ def residuals(recorded: Sequence[Run], found: Comparison) -> Iterator[Chart]:
         "Measured less predicted, R above and X below, as a share of the magnitude of the predicted Z, over the tone. "
         "The table below has every number.",
         {"": tuple(traces)}, Axis("tone [Hz]", log=True), (Axis("residual of R / |Z|"), Axis("residual of X / |Z|")),
+    )  # fmt: skip
+
+
+def normalised_differences(recorded: Sequence[Run]) -> Iterator[Chart]:
+    """What presses change in every recording, each on a scale of its own from 0 to 1 (figure 6.33 of the thesis)."""
+    pressed = [run for run in recorded if run.pairs is not None and len(run.pairs.time_s) > 1]
+    alike = [run for run in pressed if _same_tones(run, pressed[0])]
+    if not alike:
+        return
+    tones_hz = alike[0].recording.tones_hz
+    scaled = [normalised([_both(run)])[0] for run in alike]
+    left_out = f" {len(pressed) - len(alike)} recordings of other tones are left out." if alike != pressed else ""
+    yield Chart(
+        "normalised", "Differences that presses make, each recording on a scale of its own",
+        f"Change of R above and of X below by each press of {len(alike)} recordings over its force, at the chosen "
+        "tone: 0 is the least and 1 the largest change of that recording, so that courses compare and sizes do not."
+        f"{left_out}",
+        {
+            frequency_text(float(f)): tuple(
+                _differences(run, values[:, k + row * len(tones_hz)], j, row)
+                for row in (0, 1)
+                for j, (run, values) in enumerate(zip(alike, scaled, strict=True))
+            )
+            for k, f in enumerate(tones_hz)
+        },
+        Axis("force [N]"), (Axis("ΔR, normalised"), Axis("ΔX, normalised")), "tone",
+    )  # fmt: skip
+
+
+def _same_tones(run: Run, other: Run) -> bool:
+    ours, theirs = run.recording.tones_hz, other.recording.tones_hz
+    return len(ours) == len(theirs) and bool(np.allclose(ours, theirs, rtol=_SAME))
+
+
+def _differences(run: Run, values: Real, number: int, row: int) -> Trace:
+    assert run.pairs is not None  # noqa: S101 - chosen so
+    return Trace(
+        "points", "" if row else run.name, run.pairs.force_n, values, colour=_COLOURS[number % len(_COLOURS)],
+        symbol=_SYMBOLS[number // len(_COLOURS) % len(_SYMBOLS)], row=row,
+        text=[f"{run.name}, at {x:.4g} mm" for x in run.pairs.position_mm],
     )  # fmt: skip
 
 

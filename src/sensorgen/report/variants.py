@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from sensorgen import drawing, materials
+from sensorgen import materials
 from sensorgen.comparison import Comparison, Predicted
 from sensorgen.design import Design
 from sensorgen.geometry.meshes import mesh
 from sensorgen.report.charts import Body
-from sensorgen.review import review
+from sensorgen.review import draw, review
 
 
 @dataclass(frozen=True)
@@ -34,17 +34,9 @@ class Variant:
 def variants(found: Comparison) -> tuple[Variant, ...]:
     """Every variant that a specimen was printed of."""
     return tuple(
-        Variant(name, design.id(), drawn(design), _words(found.predictions[name]))
+        Variant(name, design.id(), draw(design, review(design)), _words(found.predictions[name]))
         for name, design in found.designs.items()
     )
-
-
-def drawn(design: Design) -> str:
-    """The drawing of the cross-section, with what the checks find, as SVG."""
-    scene, held = design.printed, review(design)
-    known = {m: (materials.load(m).title, materials.load(m).colour) for m in sorted({b.material for b in scene.bodies})}
-    notes = [f"{design.machine.name}, {design.layers.name}, printed {design.orientation}"]
-    return drawing.svg(scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known, notes)
 
 
 def _words(of: Predicted) -> str:

@@ -4,8 +4,8 @@ from collections.abc import Callable, Hashable, Iterator
 from math import isnan
 
 from sensorgen.comparison import Comparison
-from sensorgen.process.verdicts import WORDS, Evidence
-from sensorgen.process.yields import Group, dependence, groups
+from sensorgen.process.verdicts import ORDER, WORDS, Evidence
+from sensorgen.process.yields import Group, Share, dependence, groups
 from sensorgen.report.tables import Cell, Column, Table, table
 
 BY: dict[str, Callable[[Evidence], tuple[Hashable, ...]]] = {
@@ -14,35 +14,53 @@ BY: dict[str, Callable[[Evidence], tuple[Hashable, ...]]] = {
     "shape and film": lambda of: (of.shape or "unknown", f"{of.film_mm:g} mm" if of.film_mm is not None else "unknown"),
     "remark": lambda of: (of.remark or "none",),
 }
-ALMOST = 0.05  # probability by chance below which groups are said to differ
+TESTED = ("film", "shape")  # groups that are asked whether they differ
+DIFFER = 0.05 / len(TESTED)  # probability by chance below which one is said to: all together by chance in 1 of 20 logs
 
 
 def judged(found: Comparison, by: str) -> list[Group]:
     """Groups of one kind."""
-    return groups([(row.evidence, row.verdict) for row in found.rows], BY[by])
+    return groups([(row.evidence, row.verdict) for row in found.last], BY[by])
 
 
 def everything(found: Comparison) -> Group:
     """All specimens as one group."""
-    return groups([(row.evidence, row.verdict) for row in found.rows], lambda _: ())[0]
+    return groups([(row.evidence, row.verdict) for row in found.last], lambda _: ())[0]
 
 
 def findings(found: Comparison) -> Iterator[str]:
     """What the groups say, in sentences."""
     whole = everything(found)
-    if whole.shorted.total:
-        s = whole.shorted
+    yield from _shorted(found, whole)
+    if whole.intact.total:
         yield (
-            f"{s.count} of {s.total} readings with both resistances have an R_Z of the order of R_Y or below (up to "
-            f"ten times): {_percent(s.low)} to {_percent(s.high)} of such prints are shorted or leak as much, at 95 % "
-            f"confidence. Median R_Z / R_Y: {whole.median_ratio:.3g}."
+            f"{whole.intact.count} of {whole.intact.total} specimens that allow a verdict, and whose electrodes do not "
+            f"touch as drawn, are intact: a yield of {_range(whole.intact)}."
         )
-    yield (
-        f"{whole.intact.count} of {whole.intact.total} readings that allow a verdict are of an intact specimen: a "
-        f"yield of {_percent(whole.intact.low)} to {_percent(whole.intact.high)}."
-    )
-    for by in ("film", "shape"):
+    for by in TESTED:
         yield from _dependence(judged(found, by), by)
+
+
+def _shorted(found: Comparison, whole: Group) -> Iterator[str]:
+    both = [row for row in found.last if row.verdict.same_order is not None]
+    if not both:
+        return
+    such = [row for row in both if row.verdict.same_order]
+    yield (
+        f"{len(such)} of {len(both)} specimens with both resistances have an R_Z of the order of R_Y or below (up to "
+        f"{ORDER:g} times), {sum(row.evidence.touching for row in such)} of them shorts by design, "
+        f"{sum(row.verdict.electrode != 'sound' for row in such)} beside an R_Y that is no sound electrode's. Median "
+        f"R_Z / R_Y: {whole.median_ratio:.3g}."
+    )
+    if whole.shorted.total:
+        yield (
+            f"Without those whose electrodes touch as drawn: {whole.shorted.count} of {whole.shorted.total}; "
+            f"{_range(whole.shorted)} of such prints are shorted or leak as much, at 95 % confidence."
+        )
+
+
+def _range(share: Share) -> str:
+    return f"{100 * share.low:.3g} to {100 * share.high:.3g} %"
 
 
 def _dependence(found: list[Group], by: str) -> Iterator[str]:
@@ -51,24 +69,27 @@ def _dependence(found: list[Group], by: str) -> Iterator[str]:
         return
     chance = dependence(known)
     parts = ", ".join(f"{_key(g)}: {g.shorted.count} of {g.shorted.total}" for g in known)
-    differ = "differ" if chance < ALMOST else "do not differ more than chance makes them"
-    yield f"By {by}: {parts}. The groups {differ} (exact test, p = {chance:.2g})."
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.3g} %"
+    differ = "differ" if chance < DIFFER else "do not differ more than chance makes them"
+    yield f"By {by}: {parts}. The groups {differ} (p = {chance:.2g})."
 
 
 def _key(group: Group) -> str:
     return ", ".join(map(str, group.key))
 
 
-def words() -> tuple[str, ...]:
-    """How verdicts come about."""
+def words(found: Comparison) -> tuple[str, ...]:
+    """How verdicts come about, and what is counted."""
+    earlier = len(found.rows) - len(found.last)
     return (
         "The verdict is the gravest of what the readings of electrode and film show. An electrode is held against the "
         "median of its own shape. R_Z up to the two electrodes in series is what a bridge may read: a short; above, "
-        "and below the meter's highest range, the film leaks. Intervals are Clopper's and Pearson's, at 95 %.",
+        "and below the meter's highest range, the film leaks.",
+        "Each specimen counts once, with its last reading"
+        + (f"; {earlier} earlier readings count for nothing here. " if earlier else ". ")
+        + "Specimens whose electrodes touch as drawn have a verdict, but count for no share: they are shorts however "
+        "well they were printed. Intervals are Clopper's and Pearson's, at 95 %. Whether groups differ is asked of "
+        "film and of shape (Fisher's exact test, for more groups Freeman's and Halton's), and affirmed below "
+        f"p = {DIFFER:g}, half of 0.05; every other comparison of groups here is exploratory, and proves nothing.",
     )
 
 
@@ -80,13 +101,13 @@ def tables(found: Comparison) -> tuple[Table, ...]:
 def _table(found: list[Group], by: str) -> Table:
     parts = by.split(" and ")
     columns = [
-        *(Column(part) for part in parts), Column("readings"), *(Column(word) for word in WORDS),
+        *(Column(part) for part in parts), Column("specimens"), *(Column(word) for word in WORDS),
         Column("intact", "%"), Column("from", "%"), Column("to", "%"),
         Column("R_Z of the order of R_Y"), Column("of"), Column("share", "%"), Column("share from", "%"),
         Column("share to", "%"), Column("median R_Z / R_Y"),
     ]  # fmt: skip
     caption = f"Verdicts and yield by {by}"
-    if len(found) > 1 and sum(bool(g.shorted.total) for g in found) > 1 and by != "remark":
+    if by in TESTED and sum(bool(g.shorted.total) for g in found) > 1:
         caption += f"; differences in shorts as large by chance alone: p = {dependence(found):.2g}"
     return table(f"yield_by_{by.replace(' ', '_')}", caption, columns, [_row(g) for g in found])
 
@@ -94,7 +115,11 @@ def _table(found: list[Group], by: str) -> Table:
 def _row(g: Group) -> list[Cell]:
     return [
         *map(str, g.key), sum(g.words.values()), *(g.words.get(word, 0) for word in WORDS),
-        100 * g.intact.share, 100 * g.intact.low, 100 * g.intact.high, g.shorted.count, g.shorted.total,
-        100 * g.shorted.share, 100 * g.shorted.low, 100 * g.shorted.high,
+        *_percents(g.intact), g.shorted.count, g.shorted.total, *_percents(g.shorted),
         None if isnan(g.median_ratio) else g.median_ratio,
     ]  # fmt: skip
+
+
+def _percents(of: Share) -> tuple[Cell, Cell, Cell]:
+    """Share and its interval; nothing of nothing."""
+    return (100 * of.share, 100 * of.low, 100 * of.high) if of.total else (None, None, None)
