@@ -71,7 +71,7 @@ def test_only_who_asks_for_an_accuracy_waits_for_an_unknown_cell(monkeypatch):
     from sensorgen import celllaw
     from sensorgen.errors import BadInput
 
-    def solver(_):
+    def solver(*_):
         raise BadInput("solved in vain")
 
     monkeypatch.setattr(celllaw, "solved", solver)

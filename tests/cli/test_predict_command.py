@@ -268,7 +268,7 @@ def test_json_is_plain(run):
     assert all(math.isfinite(x) for plane in found["re_ohm"] for row in plane for x in row)
     assert set(found) == {
         "design", "design_id", "model", "compression", "tip_mm", "doubts", "values", "axes", "frequency_hz", "force_n",
-        "position_mm", "re_ohm", "im_ohm", "profile", "budget", "noise", "identifiability",
+        "position_mm", "re_ohm", "im_ohm", "profile", "contact_mm", "budget", "noise", "identifiability",
     }  # fmt: skip
 
 
