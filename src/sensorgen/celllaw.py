@@ -163,6 +163,7 @@ def solved(design: Design, printed: Piece | None = None, **held: str) -> Law:
     moduli, ratios = values(design, "youngs_modulus_pa"), values(design, "poisson_ratio")
     eps = {t.material: t.value for t in permittivities(design)}
     solids = {name: (moduli[name].value, ratios[name].value) for name in moduli}
+    refuse_crushing(STRESS_PA[-1], {name: t.value for name, t in moduli.items()})
     piece = printed or drawn(design)
     cell = sha256(dumps(asdict(piece), sort_keys=True).encode()).hexdigest()
     question = {"what": "compression", "cell": cell, "solids": solids, "permittivity": eps, "held": held}
@@ -174,6 +175,16 @@ def solved(design: Design, printed: Piece | None = None, **held: str) -> Law:
     held_else = compression.held_of(found["of"])
     curve = replace(curve, within=found["within"], held=held_else, moved_m=found["moved_m"])
     return _cell(curve, {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, doubts)
+
+
+def refuse_crushing(stress_pa: float, youngs_modulus_pa: Mapping[str, float]) -> None:
+    """Refuse a stress above the least modulus [Pa], by material: it would be reached in no time that anyone waits."""
+    softest = min(youngs_modulus_pa, key=lambda name: youngs_modulus_pa[name])
+    if stress_pa > youngs_modulus_pa[softest]:
+        raise OutOfRange(
+            f"{stress_pa / 1e3:g} kPa on {softest} of {youngs_modulus_pa[softest] / 1e3:g} kPa (Young's modulus): "
+            "expected a stress up to the least modulus"
+        )
 
 
 def _pressed(

@@ -8,9 +8,9 @@ from sensorgen import cached
 from sensorgen.asprinted.compared import Printed
 from sensorgen.asprinted.pressed import piece as printed_piece
 from sensorgen.asprinted.pressed import width_by
-from sensorgen.celllaw import Piece, drawn
+from sensorgen.celllaw import Piece, drawn, refuse_crushing
 from sensorgen.design import Design
-from sensorgen.errors import OutOfRange
+from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.models import press2d, press3d, springs
 from sensorgen.models.press2d import Elastic, Fineness, Held
 from sensorgen.models.press3d import Pieces
@@ -63,7 +63,8 @@ def answer(
     MissingValue
         A modulus, a Poisson's ratio or a permittivity that no source gives, or no mesher.
     BadInput, OutOfRange
-        As :func:`sensorgen.models.press2d.press`.
+        As :func:`sensorgen.models.press2d.press`; other electrodes than two, sides that a bonded base holds, a
+        stress above the least modulus.
     """
     piece = printed_piece(design, printed) if printed else drawn(design)
     found = _answer(design, piece, stress_kpa, held, model, check_mesh=check_mesh, keep=keep, step=step)
@@ -86,6 +87,8 @@ def _answer(
     name = model or next(m for m, refuses in _UNFIT.items() if not refuses(piece.scene))
     if name == "springs":
         return _springs(piece.scene, solids, asked)
+    _refuse_unpressable(piece.scene, held)
+    refuse_crushing(asked[-1], {name: solid.youngs_modulus_pa for name, solid in solids.items()})
     permittivity = {t.material: t.value for t in permittivities(design)}
     press, cell = _PRESSED[name](piece)
 
@@ -109,6 +112,18 @@ def _answer(
     }
     known: Data = cached.answer(question, work)
     return known
+
+
+def _refuse_unpressable(scene: Scene, held: Held) -> None:
+    """Refuse what would be answered, but not as it was asked."""
+    ends = sorted({body.terminal for body in scene.bodies if body.terminal})
+    if ends != ["bottom", "top"]:
+        raise BadInput(
+            f"a cell with electrodes {', '.join(ends) or 'of no kind'}: expected two, bottom and top, whose capacitance "
+            "a press changes; --model springs tells the displacement alone"
+        )
+    if held.period == "free" and held.base == "bonded":
+        raise BadInput("sides that give way over a base that is bonded cannot: expected base 'sliding' with them")
 
 
 def _in_2d(piece: Piece) -> tuple[Callable[..., press2d.Pressed], str]:

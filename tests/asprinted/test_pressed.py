@@ -19,7 +19,7 @@ needs_mesher = pytest.mark.skipif("not __import__('importlib').util.find_spec('n
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
 EPS = {"x60": 4.68, "air": 1.00059}
 QUICK = Fineness(corner_mm=0.08, coarse_mm=0.2)
-# Half widths by layer of 0.1 mm, from the film up, found by hand from sliced triX; of the film's feet by the same rules.
+# Half widths by layer of 0.1 mm from the film up, found by hand from sliced triX; of the film's feet by its rules.
 BY_HAND = {
     "arachne": {"cog": (0, 0.170, 0.239, 0.340, 0.440), "low": (0.385, 0.177)},
     "classic": {"cog": (0, 0, 0.239, 0.339, 0.439), "low": (0.385,)},
