@@ -119,8 +119,8 @@ def _refuse_unpressable(scene: Scene, held: Held) -> None:
     ends = sorted({body.terminal for body in scene.bodies if body.terminal})
     if ends != ["bottom", "top"]:
         raise BadInput(
-            f"a cell with electrodes {', '.join(ends) or 'of no kind'}: expected two, bottom and top, whose capacitance "
-            "a press changes; --model springs tells the displacement alone"
+            f"a cell with electrodes {', '.join(ends) or 'of no kind'}: expected two, bottom and top, whose "
+            "capacitance a press changes; --model springs tells the displacement alone"
         )
     if held.period == "free" and held.base == "bonded":
         raise BadInput("sides that give way over a base that is bonded cannot: expected base 'sliding' with them")

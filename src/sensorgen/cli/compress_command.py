@@ -29,7 +29,7 @@ OWN: list[click.Parameter] = [
         help="Stresses on the top [kPa]; 0 is put before them.",
     ),
     _choice("--base", "base", ["bonded", "sliding"], "How the bottom is held."),
-    _choice("--sides", "period", ["fixed", "free"], "Whether the sides of the cell stay, or give way (with --base sliding)."),
+    _choice("--sides", "period", ["fixed", "free"], "Whether its sides stay, or give way (with --base sliding)."),
     _choice("--top", "top", ["even", "rigid"], "Even pressure, or a stiff plate."),
     _choice("--contact", "contact", ["frictionless", "stick"], "What faces do that touch."),
     click.Option(
