@@ -117,6 +117,7 @@ def test_a_shape_that_a_model_cannot_speak_of_is_refused(run):
         (["--model", "springs", "--stress", "9000MPa"], "flat"),
         (["--set", "youngs_modulus_x60=5e4"], "100 kPa on x60 of 50 kPa"),
         (["--sides", "free"], "expected base 'sliding'"),
+        (["--plot", "a.pdf"], ".png"),
         (["--walls", "cura"], "expected --as-printed"),
         (["--as-printed", "--slicer", "cura", "--walls", "cura"], "expected one"),
     ],

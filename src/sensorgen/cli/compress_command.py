@@ -12,6 +12,7 @@ from sensorgen import units
 from sensorgen.cli import FOUND_ERRORS, asprinted_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf, Values
+from sensorgen.errors import BadInput
 
 if TYPE_CHECKING:
     from sensorgen.design import Design
@@ -53,6 +54,8 @@ def _work(
     asprinted_text.refuse_strays(as_printed=as_printed, slicer=slicer, walls=walls)
     stresses = compressed.stresses_kpa(stress)
     if plot:
+        if not plot.lower().endswith(".png"):
+            raise BadInput(f"--plot {plot}: expected a file that ends in .png")
         from sensorgen.plots.libraries import needed
 
         needed("matplotlib")
