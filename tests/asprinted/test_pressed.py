@@ -126,6 +126,14 @@ def test_crossed_strips_are_pressed_in_three_dimensions(monkeypatch):
     assert found["lower_f_per_m2"][0] * 4e-6 < 0.79334e-12 < found["upper_f_per_m2"][0] * 4e-6  # found by hand
 
 
+def test_a_print_is_the_same_scene_in_every_process():
+    """Else no answer about it would be found again: boxes of a layer from left to right, layers from below."""
+    scene, _ = compared.cell(small(), compared.estimated(small()).first())
+    for body in scene.bodies:
+        places = [(prism.span("z")[0], prism.span("x")[0]) for prism in body.prisms]
+        assert places == sorted(places)
+
+
 def test_a_plate_has_no_period():
     design = small("reference", {"length_mm": 20.0, "width_mm": 8.0})
     printed = compared.estimated(design)
