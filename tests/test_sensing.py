@@ -3,7 +3,7 @@
 import pytest
 
 from sensorgen.design import make
-from sensorgen.errors import MissingValue, OutOfRange, UnknownName
+from sensorgen.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.sensing import sensor_of
 
 
@@ -62,6 +62,36 @@ def test_what_cannot_be_is_refused():
         sensed("tri", "bondet")
 
 
+def test_a_round_tip_on_the_film_and_on_the_cell_as_a_bed():
+    """Length of the contact at 6 N over 10 mm: Hertz's with E / (1 - nu^2), a bed's with pressure over displacement."""
+    plate, tri = make({"shape": "reference"}), make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})
+    load, radius = 6 / 0.01, 0.05
+    thick = sensor_of(plate, profile="hertz", radius_m=radius).sensor
+    assert float(thick.contact_m(6.0)[0]) == pytest.approx(4 * (load * radius / (3.14159265 * 8e6)) ** 0.5, rel=1e-3)
+    for design, bed in ((plate, 6e6 / 6e-4), (tri, 1e5 / 33.12e-6)):
+        found = sensor_of(design, profile="parabola", radius_m=radius).sensor
+        assert float(found.contact_m(6.0)[0]) == pytest.approx(2 * (1.5 * radius * load / bed) ** (1 / 3), rel=1e-6)
+    stiff = sensor_of(plate, "bonded", profile="parabola", radius_m=radius).sensor
+    assert stiff.contact_m(6.0)[0] < thick.contact_m(6.0)[0]
+    long = sensor_of(tri, tip_m=2e-3, profile="parabola", radius_m=radius).sensor
+    assert float(long.contact_m(6.0)[0]) == 2e-3
+
+
+def test_a_flat_tip_has_no_radius():
+    with pytest.raises(BadInput, match="has no radius"):
+        sensor_of(make({"shape": "tri"}), radius_m=0.01)
+    with pytest.raises(OutOfRange, match="above 0"):
+        sensor_of(make({"shape": "tri"}), profile="hertz", radius_m=0.0)
+
+
+def test_a_cell_that_says_no_displacement_is_no_bed():
+    from sensorgen.models import compression
+
+    law = compression.curve("c", "made up", [0, 1e4], [1, 1.1])
+    with pytest.raises(MissingValue, match="how far the top comes down"):
+        law.bed_pa_per_m(1e-3)
+
+
 def test_a_modulus_that_no_source_gives_is_missing():
     with pytest.raises(MissingValue):
         sensed("tri", materials={"film": "pla"})
@@ -69,9 +99,8 @@ def test_a_modulus_that_no_source_gives_is_missing():
 
 def test_only_who_asks_for_an_accuracy_waits_for_an_unknown_cell(monkeypatch):
     from sensorgen import celllaw
-    from sensorgen.errors import BadInput
 
-    def solver(_):
+    def solver(*_):
         raise BadInput("solved in vain")
 
     monkeypatch.setattr(celllaw, "solved", solver)

@@ -190,14 +190,15 @@ def _permittivity(design: Design, sensed: Sensed, seen: _Seen) -> Iterator[Term]
     known = {t.material: t for t in permittivities(design)}
     values = {name: t.value for name, t in known.items()}
     answer = sensed.unloaded.answer
-    cheap = answer if answer.wanted == inf else capacitance(design.in_use, values)
+    scene = sensed.piece.scene
+    cheap = answer if answer.wanted == inf else capacitance(scene, values)
     middle = cheap.capacitance_f.middle()
     used, sensor = design.used() | {"air": ""}, sensed.sensor
     for name, taken in known.items():
         low, high = _range(design.material(name), used[name], taken.quantity)
         if low < high:
             others = [values | {name: end} for end in (low, high) if end != taken.value]
-            found = [capacitance(design.in_use, other).capacitance_f.middle() for other in others]
+            found = [capacitance(scene, other).capacitance_f.middle() for other in others]
             ends = [replace(sensor, capacitance_f_per_m=sensor.capacitance_f_per_m * c / middle) for c in found]
             yield Term(f"permittivity of {name}", f"{low:g} to {high:g}", seen.change(*ends))
 

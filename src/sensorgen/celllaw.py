@@ -1,7 +1,7 @@
 """How the film of a design gives way, by the best that is known of its cell; and by how much that may be wrong.
 
 A plate has two laws, free to give way sideways and bonded, which bracket it. A cell with gaps is solved once and for
-all where it is a prototype's; any other one is solved when asked for, and kept.
+all where it is a prototype's as drawn; any other one, as a printed cell, is solved when asked for, and kept.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,6 +17,7 @@ from sensorgen.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.models import compression
 from sensorgen.models.compression import Compression, Curve
 from sensorgen.planner import Answer, Taken, is_plate, permittivities
+from sensorgen.scene import Scene
 from sensorgen.units import M_PER_MM
 
 if TYPE_CHECKING:
@@ -26,7 +27,21 @@ if TYPE_CHECKING:
 LAWS = ("unconfined", "bonded", "solved")
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)))  # 6 N on a tip of 10 x 10 mm are 60 kPa
 _LEAST = 0.006  # of the rise: what mesh levels, penalties and a second discretisation agree to at best
+_LANDING = f"feet land at no force to speak of: what C rises by up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
 _COARSER = 1.5  # mesh that a solution is compared with, by its edges
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What is pressed of a sensor: a scene with its support gone, and the period of its pattern, if it has one [mm]."""
+
+    scene: Scene
+    period_mm: float | None
+
+
+def drawn(design: Design) -> Piece:
+    """The whole sensor as drawn."""
+    return Piece(design.in_use, getattr(design.params, "period_mm", None))
 
 
 @dataclass(frozen=True)
@@ -57,7 +72,7 @@ class Law:
     bounded: bool = True
 
 
-def law_of(design: Design, answer: Answer, name: str = "", *, solve: bool = False) -> Law:
+def law_of(design: Design, answer: Answer, name: str = "", *, solve: bool = False, printed: Piece | None = None) -> Law:
     """The law of compression of a design.
 
     Parameters
@@ -70,6 +85,8 @@ def law_of(design: Design, answer: Answer, name: str = "", *, solve: bool = Fals
         One of ``LAWS``, or "" for the best that is known.
     solve : bool
         Whether "" may take seconds to solve a cell that is not known.
+    printed : Piece, optional
+        What is printed of it; as drawn where not given.
 
     Raises
     ------
@@ -80,42 +97,43 @@ def law_of(design: Design, answer: Answer, name: str = "", *, solve: bool = Fals
     """
     if name not in ("", *LAWS):
         raise UnknownName("law of compression", name, LAWS)
-    moduli = _values(design, "youngs_modulus_pa")
+    moduli = values(design, "youngs_modulus_pa")
     if is_plate(answer):
-        return _plate(design, moduli, name)
+        return _plate(design, moduli, name, printed or drawn(design))
     if name == "bonded":
         raise OutOfRange(f"the law 'bonded' speaks of a solid plate; {design.shape} has gaps: expected 'unconfined'")
-    known = compression.solved(design.shape, vars(design.params), {n: t.value for n, t in moduli.items()})
+    stiff = {n: t.value for n, t in moduli.items()}
+    known = None if printed else compression.solved(design.shape, vars(design.params), stiff)
     if known and name != "unconfined":
         return _cell(known, moduli)
     if name == "solved":
-        return solved(design)
+        return solved(design, printed)
     if solve and not name:
         try:
-            return solved(design)
+            return solved(design, printed)
         except SensorgenError as error:
             return _as_plate(design, moduli, str(error))
     return _as_plate(design, moduli, "ask for the law 'solved', which takes some seconds")
 
 
-def _plate(design: Design, moduli: Mapping[str, Taken], name: str) -> Law:
+def _plate(design: Design, moduli: Mapping[str, Taken], name: str, piece: Piece) -> Law:
     """Free or bonded, the other one being as good as it."""
     if name == "solved":
         raise OutOfRange(f"{design.shape} is a solid plate: expected the law 'unconfined' or 'bonded'")
-    film = moduli[_film(design)]
-    free = compression.unconfined(film.value)
-    tied = compression.bonded(film.value, design.params.width_mm * M_PER_MM, _gap_m(design))
+    soft = moduli[film(design)]
+    free = compression.unconfined(soft.value)
+    tied = compression.bonded(soft.value, design.params.width_mm * M_PER_MM, gap_m(piece.scene))
     if name == "bonded":
-        return Law(tied, (film,), others=(free,))
+        return Law(tied, (soft,), others=(free,))
     return Law(
-        free, (film,), ("a plate free to give way sideways: bonded to its electrodes it would be stiffer",), (tied,)
+        free, (soft,), ("a plate free to give way sideways: bonded to its electrodes it would be stiffer",), (tied,)
     )
 
 
 def _as_plate(design: Design, moduli: Mapping[str, Taken], why: str) -> Law:
-    film = moduli[_film(design)]
-    doubt = f"{design.shape} taken to give way as a free solid plate of {film.material} (B.49): its cell was not solved"
-    return Law(compression.unconfined(film.value), (film,), (f"{doubt}; {why}",), bounded=False)
+    soft = moduli[film(design)]
+    doubt = f"{design.shape} taken to give way as a free solid plate of {soft.material} (B.49): its cell was not solved"
+    return Law(compression.unconfined(soft.value), (soft,), (f"{doubt}; {why}",), bounded=False)
 
 
 def _cell(found: Curve, moduli: Mapping[str, Taken], doubts: tuple[str, ...] = ()) -> Law:
@@ -125,13 +143,15 @@ def _cell(found: Curve, moduli: Mapping[str, Taken], doubts: tuple[str, ...] = (
     return Law(found, tuple(moduli.values()), doubts, others, held)
 
 
-def solved(design: Design, **held: str) -> Law:
+def solved(design: Design, printed: Piece | None = None, **held: str) -> Law:
     """The law of a cell by finite elements, or from the cache.
 
     Parameters
     ----------
     design : Design
         As drawn.
+    printed : Piece, optional
+        What is printed of it; as drawn where not given.
     **held : str
         How it is held and touched, as of :class:`sensorgen.models._press.support.Held`.
 
@@ -140,30 +160,43 @@ def solved(design: Design, **held: str) -> Law:
     MissingValue, BadInput, OutOfRange
         No modulus or Poisson's ratio, no NGSolve; a cell that is no prism; a solution that is not to be trusted.
     """
-    moduli, ratios = _values(design, "youngs_modulus_pa"), _values(design, "poisson_ratio")
+    moduli, ratios = values(design, "youngs_modulus_pa"), values(design, "poisson_ratio")
     eps = {t.material: t.value for t in permittivities(design)}
     solids = {name: (moduli[name].value, ratios[name].value) for name in moduli}
-    scene = sha256(dumps(asdict(design.in_use), sort_keys=True).encode()).hexdigest()
-    question = {"what": "compression", "scene": scene, "solids": solids, "permittivity": eps, "held": held}
-    found = cached.answer(question | {"stress_pa": STRESS_PA}, lambda: _pressed(design, solids, eps, held))
-    doubts: tuple[str, ...] = ()
+    refuse_crushing(STRESS_PA[-1], {name: t.value for name, t in moduli.items()})
+    piece = printed or drawn(design)
+    cell = sha256(dumps(asdict(piece), sort_keys=True).encode()).hexdigest()
+    question = {"what": "compression", "cell": cell, "solids": solids, "permittivity": eps, "held": held}
+    found = cached.answer(question | {"stress_pa": STRESS_PA}, lambda: _pressed(piece, solids, eps, held))
+    doubts = tuple(found["doubts"])
     if found["stress_pa"][-1] < STRESS_PA[-1]:
-        doubts = (f"the solution of the cell ended at {found['stress_pa'][-1] / 1e3:.3g} kPa",)
+        doubts = (*doubts, f"the solution of the cell ended at {found['stress_pa'][-1] / 1e3:.3g} kPa")
     curve = compression.curve("solved", found["source"], found["stress_pa"], found["ratio"])
-    curve = replace(curve, within=found["within"], held=compression.held_of(found["of"]))
+    held_else = compression.held_of(found["of"])
+    curve = replace(curve, within=found["within"], held=held_else, moved_m=found["moved_m"])
     return _cell(curve, {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, doubts)
 
 
+def refuse_crushing(stress_pa: float, youngs_modulus_pa: Mapping[str, float]) -> None:
+    """Refuse a stress above the least modulus [Pa], by material: it would be reached in no time that anyone waits."""
+    softest = min(youngs_modulus_pa, key=lambda name: youngs_modulus_pa[name])
+    if stress_pa > youngs_modulus_pa[softest]:
+        raise OutOfRange(
+            f"{stress_pa / 1e3:g} kPa on {softest} of {youngs_modulus_pa[softest] / 1e3:g} kPa (Young's modulus): "
+            "expected a stress up to the least modulus"
+        )
+
+
 def _pressed(
-    design: Design, solids: Mapping[str, tuple[float, float]], eps: Mapping[str, float], given: Mapping[str, str]
+    piece: Piece, solids: Mapping[str, tuple[float, float]], eps: Mapping[str, float], given: Mapping[str, str]
 ) -> dict[str, Any]:
     """The curve of a cell on two meshes, as plain data; as far as it converged."""
     from sensorgen.models import press2d, press3d
 
     elastic = {name: press2d.Elastic(*pair) for name, pair in solids.items()}
     held, stress = press2d.Held(**given), list(STRESS_PA)
-    flat = press2d.unfit(design.in_use) is None or press3d.unfit(design.in_use) is not None
-    press, coarse = _flat(design) if flat else _boxes(design)
+    flat = press2d.unfit(piece.scene) is None or press3d.unfit(piece.scene) is not None
+    press, coarse = _flat(piece) if flat else _boxes(piece)
     found = press(elastic, stress, eps, held)
     if 0 < found.converged_pa < stress[-1]:
         stress = [p for p in stress if p <= found.converged_pa]
@@ -178,39 +211,41 @@ def _pressed(
         "ratio": curve.ratio,
         "within": max(within, _LEAST),
         "of": "tri" if flat else "rect",
+        "moved_m": float(found.displacement_m[-1]) - found.fall_m,
+        "doubts": [*found.doubts, *([_LANDING] if found.fall_m else [])],
     }
 
 
-def _flat(design: Design) -> tuple[Callable[..., "Pressed"], "Fineness"]:
+def _flat(piece: Piece) -> tuple[Callable[..., "Pressed"], "Fineness"]:
     """How to press a cross-section, and a coarser mesh."""
     from sensorgen.models import press2d
 
-    cell, fine = press2d.cell(design.in_use, getattr(design.params, "period_mm", None)), press2d.Fineness()
+    cell, fine = press2d.cell(piece.scene, piece.period_mm), press2d.Fineness()
     coarse = replace(fine, corner_mm=_COARSER * fine.corner_mm, coarse_mm=_COARSER * fine.coarse_mm)
     return partial(press2d.press, cell), coarse
 
 
-def _boxes(design: Design) -> tuple[Callable[..., "Pressed"], "Pieces"]:
+def _boxes(piece: Piece) -> tuple[Callable[..., "Pressed"], "Pieces"]:
     """How to press a scene of boxes, and a coarser mesh."""
     from sensorgen.models import press3d
 
-    return partial(press3d.press, press3d.cell(design.in_use)), press3d.Pieces().coarser()
+    return partial(press3d.press, press3d.cell(piece.scene)), press3d.Pieces().coarser()
 
 
-def _film(design: Design) -> str:
+def film(design: Design) -> str:
+    """Name of the material between the electrodes."""
     return design.materials.dielectric.partition("@")[0]
 
 
-def _gap_m(design: Design) -> float:
-    """Distance of the electrodes of a plate [m]."""
+def gap_m(scene: Scene) -> float:
+    """Distance of the electrodes' plates, whatever stands on them [m]."""
     spans = {
-        end: [p.span("z") for b in design.in_use.bodies if b.terminal == end for p in b.prisms]
-        for end in ("top", "bottom")
+        end: [p.span("z") for b in scene.bodies if b.terminal == end for p in b.prisms] for end in ("top", "bottom")
     }
-    return (min(low for low, _ in spans["top"]) - max(high for _, high in spans["bottom"])) * M_PER_MM
+    return (max(low for low, _ in spans["top"]) - min(high for _, high in spans["bottom"])) * M_PER_MM
 
 
-def _values(design: Design, quantity: str) -> dict[str, Taken]:
+def values(design: Design, quantity: str) -> dict[str, Taken]:
     """A quantity of every material in the sensor."""
     used, names = design.used(), sorted({body.material for body in design.in_use.bodies})
     found = {name: design.material(name).value(quantity, used[name]) for name in names}

@@ -5,11 +5,17 @@ from functools import partial
 from typing import Any
 
 from sensorgen import cached
+from sensorgen.asprinted.compared import Printed
+from sensorgen.asprinted.pressed import piece as printed_piece
+from sensorgen.asprinted.pressed import width_by
+from sensorgen.celllaw import Piece, drawn, refuse_crushing
 from sensorgen.design import Design
-from sensorgen.errors import OutOfRange
+from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.models import press2d, press3d, springs
 from sensorgen.models.press2d import Elastic, Fineness, Held
 from sensorgen.models.press3d import Pieces
+from sensorgen.planner import permittivities
+from sensorgen.scene import Scene
 
 __all__ = ["MODELS", "Held", "answer", "stresses_kpa"]
 
@@ -29,6 +35,7 @@ def answer(
     check_mesh: bool = False,
     keep: bool = True,
     step: Callable[[float], None] | None = None,
+    printed: Printed | None = None,
 ) -> Data:
     """Displacement and bounds of the capacitance per area over stress.
 
@@ -48,21 +55,42 @@ def answer(
         Take an answer that is known from before, and keep a new one.
     step : callable, optional
         Told every stress that is reached [Pa].
+    printed : Printed, optional
+        What is printed of it, to be pressed in place of the drawing.
 
     Raises
     ------
     MissingValue
         A modulus, a Poisson's ratio or a permittivity that no source gives, or no mesher.
     BadInput, OutOfRange
-        As :func:`sensorgen.models.press2d.press`.
+        As :func:`sensorgen.models.press2d.press`; other electrodes than two, sides that a bonded base holds, a
+        stress above the least modulus.
     """
-    solids = _solids(design)
+    piece = printed_piece(design, printed) if printed else drawn(design)
+    found = _answer(design, piece, stress_kpa, held, model, check_mesh=check_mesh, keep=keep, step=step)
+    return found | {"printed": width_by(printed)} if printed else found
+
+
+def _answer(
+    design: Design,
+    piece: Piece,
+    stress_kpa: Sequence[float],
+    held: Held,
+    model: str,
+    *,
+    check_mesh: bool,
+    keep: bool,
+    step: Callable[[float], None] | None,
+) -> Data:
+    solids = _solids(design, piece.scene)
     asked = [_PA_PER_KPA * kpa for kpa in stress_kpa]
-    name = model or next(m for m, refuses in _UNFIT.items() if not refuses(design))
+    name = model or next(m for m, refuses in _UNFIT.items() if not refuses(piece.scene))
     if name == "springs":
-        return _springs(design, solids, asked)
-    permittivity = _permittivity(design)
-    press, cell = _PRESSED[name](design)
+        return _springs(piece.scene, solids, asked)
+    _refuse_unpressable(piece.scene, held)
+    refuse_crushing(asked[-1], {name: solid.youngs_modulus_pa for name, solid in solids.items()})
+    permittivity = {t.material: t.value for t in permittivities(design)}
+    press, cell = _PRESSED[name](piece)
 
     def work() -> Data:
         found: press2d.Pressed = press(solids, asked, permittivity, held, step=step)
@@ -82,46 +110,47 @@ def answer(
         "held": vars(held),
         "check_mesh": check_mesh,
     }
-    found: Data = cached.answer(question, work)
-    return found
+    known: Data = cached.answer(question, work)
+    return known
 
 
-def _in_2d(design: Design) -> tuple[Callable[..., press2d.Pressed], str]:
-    cell = press2d.cell(design.in_use, _period_mm(design))
+def _refuse_unpressable(scene: Scene, held: Held) -> None:
+    """Refuse what would be answered, but not as it was asked."""
+    ends = sorted({body.terminal for body in scene.bodies if body.terminal})
+    if ends != ["bottom", "top"]:
+        raise BadInput(
+            f"a cell with electrodes {', '.join(ends) or 'of no kind'}: expected two, bottom and top, whose "
+            "capacitance a press changes; --model springs tells the displacement alone"
+        )
+    if held.period == "free" and held.base == "bonded":
+        raise BadInput("sides that give way over a base that is bonded cannot: expected base 'sliding' with them")
+
+
+def _in_2d(piece: Piece) -> tuple[Callable[..., press2d.Pressed], str]:
+    cell = press2d.cell(piece.scene, piece.period_mm)
     return partial(press2d.press, cell), repr(cell)
 
 
-def _in_3d(design: Design) -> tuple[Callable[..., press2d.Pressed], str]:
-    cell = press3d.cell(design.in_use)
+def _in_3d(piece: Piece) -> tuple[Callable[..., press2d.Pressed], str]:
+    cell = press3d.cell(piece.scene)
     return partial(press3d.press, cell), cell.written()
 
 
 _PRESSED = {"press2d": _in_2d, "press3d": _in_3d}
-_UNFIT: dict[str, Callable[[Design], str | None]] = {
-    "press2d": lambda design: press2d.unfit(design.in_use),
-    "press3d": lambda design: press3d.unfit(design.in_use),
+_UNFIT: dict[str, Callable[[Scene], str | None]] = {
+    "press2d": press2d.unfit,
+    "press3d": press3d.unfit,
     "springs": lambda _: None,
 }
 
 
-def _period_mm(design: Design) -> float | None:
-    found: float | None = getattr(design.params, "period_mm", None)
-    return found
-
-
-def _solids(design: Design) -> dict[str, Elastic]:
+def _solids(design: Design, scene: Scene) -> dict[str, Elastic]:
     used = design.used()
-    loaded = {name: design.material(name) for name in sorted({body.material for body in design.in_use.bodies})}
+    loaded = {name: design.material(name) for name in sorted({body.material for body in scene.bodies})}
     return {
         name: Elastic(m.value("youngs_modulus_pa", used[name]).value, m.value("poisson_ratio", used[name]).value)
         for name, m in loaded.items()
     }
-
-
-def _permittivity(design: Design) -> dict[str, float]:
-    used = design.used() | {"air": ""}
-    names = {body.material for body in design.in_use.bodies if not body.terminal} | {"air"}
-    return {name: design.material(name).value("relative_permittivity", used[name]).value for name in sorted(names)}
 
 
 def _plain(found: press2d.Pressed, model: str, held: Held) -> Data:
@@ -140,13 +169,13 @@ def _plain(found: press2d.Pressed, model: str, held: Held) -> Data:
     }
 
 
-def _springs(design: Design, solids: Mapping[str, Elastic], stress_pa: Sequence[float]) -> Data:
+def _springs(scene: Scene, solids: Mapping[str, Elastic], stress_pa: Sequence[float]) -> Data:
     """What springs of columns know: a displacement, and no capacitance."""
-    why = press2d.unfit(design.in_use)
+    why = press2d.unfit(scene)
     plane = why is None
     moduli = {name: s.youngs_modulus_pa / ((1 - s.poisson_ratio**2) if plane else 1.0) for name, s in solids.items()}
-    moved = springs.displacement_m(design.in_use, moduli, stress_pa)
-    boxes = all(prism.is_box() for body in design.in_use.bodies for prism in body.prisms)
+    moved = springs.displacement_m(scene, moduli, stress_pa)
+    boxes = all(prism.is_box() for body in scene.bodies for prism in body.prisms)
     said = "at most this, at small strain under a stiff plate" if boxes else "a guess: columns that know no neighbours"
     return {
         "model": "springs",

@@ -35,7 +35,8 @@ Complex = NDArray[np.complex128]
 
 def prediction(
     design: Design, frequency_hz: Sequence[float] = TONES_HZ, law: str = "", tip_m: float = TIP_M,
-    *, profile: str = UNIFORM, accuracy: float = inf, noise: float = NOISE, judged: bool = True,
+    *, profile: str = UNIFORM, radius_m: float | None = None, accuracy: float = inf, noise: float = NOISE,
+    judged: bool = True,
 ) -> dict[str, Any]:  # fmt: skip
     """Everything that is predicted of a design, as plain data for ``prediction.json`` (SI units).
 
@@ -45,8 +46,8 @@ def prediction(
         As drawn.
     frequency_hz : sequence of float
         Tones of the impedance [Hz].
-    law, tip_m, profile : str, float, str
-        Law of compression, length of the tip [m] and how its pressure is spread, as of
+    law, tip_m, profile, radius_m : str, float, str, float
+        Law of compression, length of the tip [m], how its pressure is spread and its radius [m], as of
         :func:`sensorgen.sensing.sensor_of`, for the card and the error budget.
     accuracy : float
         Wanted of abs(Z), relative [-]; the capacitance is bounded as nearly, and an unknown cell solved.
@@ -73,7 +74,7 @@ def prediction(
         "capacitance_per_area_f_per_m2": _bounds(found.answer.capacitance_f.times(1 / area)),
         "electrode_resistance_ohm": resistance,
         **_line(sum(resistance.values()), found.answer.capacitance_f, gone, frequency_hz),
-        **(_pressed(design, found, frequency_hz, (law, tip_m, profile), accuracy, noise) if judged else {}),
+        **(_pressed(design, found, frequency_hz, (law, tip_m, profile, radius_m), accuracy, noise) if judged else {}),
         "values": [vars(t) for t in (*found.taken, *gone.taken)],
         "assumptions": [
             "ideal electrodes and no fringe at the sensor's edge for the capacitance",
@@ -99,14 +100,16 @@ def _pressed(
     design: Design,
     found: Unloaded,
     frequency_hz: Sequence[float],
-    press: tuple[str, float, str],
+    press: tuple[str, float, str, float | None],
     accuracy: float,
     noise: float,
 ) -> dict[str, Any]:
     """What can be judged of a press of ``FORCE_N`` in the middle, or why nothing can."""
-    law, tip_m, profile = press
+    law, tip_m, profile, radius_m = press
     try:
-        sensed = sensor_of(design, law, tip_m, profile=profile, accuracy=accuracy, known=found)
+        sensed = sensor_of(
+            design, law, tip_m, profile=profile, radius_m=radius_m, accuracy=accuracy, known=found
+        )  # fmt: skip
     except SensorgenError as error:
         return _unjudged(error)
     return _judged(design, sensed, frequency_hz, (FORCE_N, sensed.sensor.length_m / 2), accuracy, noise)
@@ -298,6 +301,7 @@ def presses(
         "compression": law.source,
         "tip_mm": sensor.tip_m / M_PER_MM,
         "profile": sensor.profile,
+        "contact_mm": float(sensor.contact_m(force_n[-1])[0]) / M_PER_MM,
         "noise": noise,
         **_judged(
             design, sensed, frequency_hz, (force_n[-1], float(position_m[len(position_m) // 2])), accuracy, noise

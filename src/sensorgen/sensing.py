@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 from math import inf
 
-from sensorgen.celllaw import Law, law_of
+from sensorgen.celllaw import Law, Piece, drawn, film, gap_m, law_of, values
 from sensorgen.design import Design
+from sensorgen.errors import BadInput
 from sensorgen.losses import Lost, lost
+from sensorgen.models import pressure
 from sensorgen.planner import Taken, Unloaded, unloaded
 from sensorgen.sensor import UNIFORM, Sensor
 from sensorgen.units import M_PER_MM
@@ -27,12 +29,18 @@ class Sensed:
         How it gives way, and how surely.
     lost : Lost
         What its dielectrics lose, as far as the design sets it.
+    piece : Piece
+        What of it is pressed: as drawn, or as printed.
+    caveats : tuple of str
+        What else to know of it.
     """
 
     sensor: Sensor
     unloaded: Unloaded
     law: Law
     lost: Lost
+    piece: Piece
+    caveats: tuple[str, ...] = ()
 
     @property
     def taken(self) -> tuple[Taken, ...]:
@@ -42,12 +50,12 @@ class Sensed:
     @property
     def doubts(self) -> tuple[str, ...]:
         """Why its answers are to be taken with care."""
-        return (*self.law.doubts, *self.lost.doubts)
+        return (*self.caveats, *self.law.doubts, *self.lost.doubts)
 
 
 def sensor_of(
-    design: Design, law: str = "", tip_m: float = TIP_M, *, profile: str = UNIFORM, accuracy: float = inf,
-    known: Unloaded | None = None,
+    design: Design, law: str = "", tip_m: float = TIP_M, *, profile: str = UNIFORM, radius_m: float | None = None,
+    accuracy: float = inf, known: Unloaded | None = None, printed: Piece | None = None,
 ) -> Sensed:  # fmt: skip
     """The sensor that a design makes, for the line and all that rests on it.
 
@@ -61,21 +69,28 @@ def sensor_of(
         Length of the tip along the sensor [m].
     profile : str
         How its pressure is spread: one of :data:`sensorgen.models.pressure.PROFILES`.
+    radius_m : float, optional
+        Of a hard round tip, whose contact grows with the force up to ``tip_m``; all of it touches if not given [m].
     accuracy : float
         Wanted of the capacitance, relative [-]; where one is, a cell that is not known is solved too.
     known : Unloaded
         What :func:`sensorgen.planner.unloaded` says to that accuracy, if it is at hand.
+    printed : Piece
+        What is printed of it, where that is pressed and not the drawing.
 
     Raises
     ------
     Unpredictable, MissingValue
         As :func:`sensorgen.planner.unloaded`.
     UnknownName, OutOfRange
-        As :func:`sensorgen.celllaw.law_of`.
+        As :func:`sensorgen.celllaw.law_of`; a radius that is not above 0.
+    BadInput
+        A radius of a flat tip.
     """
     found, p = known or unloaded(design, accuracy), design.params
     gone = lost(design)
-    how = law_of(design, found.answer, law, solve=accuracy < inf)
+    how = law_of(design, found.answer, law, solve=accuracy < inf, printed=printed)
+    piece = printed or drawn(design)
     sensor = Sensor(
         length_m=p.length_mm * M_PER_MM,
         width_m=p.width_mm * M_PER_MM,
@@ -85,7 +100,21 @@ def sensor_of(
         compression=how.compression,
         tip_m=tip_m,
         profile=profile,
+        contact=None if radius_m is None else _contact(design, how, piece, profile, radius_m),
         tan_delta=gone.tan_delta,
         leak_s_per_m=gone.leak_s / (p.length_mm * M_PER_MM),
     )
-    return Sensed(sensor, found, how, gone)
+    return Sensed(sensor, found, how, gone, piece)
+
+
+def _contact(design: Design, how: Law, piece: Piece, profile: str, radius_m: float) -> pressure.Contact:
+    """How a round tip's contact grows: on the film as a thick body, or on the cell as a bed of springs."""
+    if profile == "hertz":
+        soft = film(design)
+        modulus, ratio = (values(design, key)[soft].value for key in ("youngs_modulus_pa", "poisson_ratio"))
+        return pressure.hertz(radius_m, modulus / (1 - ratio**2))
+    if profile == "parabola":
+        return pressure.bed(radius_m, how.compression.bed_pa_per_m(gap_m(piece.scene)))
+    raise BadInput(
+        f"a tip with a pressure like a {profile!r} one is flat and has no radius; expected hertz or parabola"
+    )

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sensorgen.errors import OutOfRange
 from sensorgen.models import line, line_tip
 from sensorgen.models.compression import Compression
-from sensorgen.models.pressure import pieces
+from sensorgen.models.pressure import Contact
 from sensorgen.units import EPS0_F_PER_M
 
 UNIFORM = "uniform"
@@ -62,6 +62,8 @@ class Sensor:
         Length of the tip along the sensor [m].
     profile : str
         How its pressure is spread: one of :data:`sensorgen.models.pressure.PROFILES`.
+    contact : Contact or None
+        How the contact of a round tip grows with the force, up to ``tip_m``; None where all of the tip always touches.
     pieces : int
         That a tip whose pressure is not uniform is cut into.
     tan_delta : float
@@ -83,6 +85,7 @@ class Sensor:
     compression: Compression
     tip_m: float = 0.01
     profile: str = UNIFORM
+    contact: Contact | None = None
     pieces: int = PIECES
     tan_delta: float = 0.0
     leak_s_per_m: float = 0.0
@@ -186,16 +189,20 @@ class Sensor:
             "S_n_bottom_per_N": s_bottom, "far_end": self.far_end,
         }  # fmt: skip
 
+    def contact_m(self, force_n: ArrayLike) -> tuple[Real, Real]:
+        """Length of the contact where it lies on the sensor whole [m], and its derivative by the force [m/N]."""
+        if self.contact is None:
+            return np.asarray(self.tip_m), np.zeros(())
+        length, by_load = self.contact.length_m(np.asarray(force_n, float) / self.width_m, self.tip_m)
+        return length, by_load / self.width_m
+
     def _tip(self, force_n: Real, position_m: ArrayLike) -> line_tip.Tip:
-        """A tip that is cut into pieces; the whole one always into the same."""
-        patch, at = self.patch(position_m), np.asarray(position_m, float)
-        cut = pieces(self.profile, self.pieces)
-        if patch.length_m.ndim or patch.length_m < self.tip_m:
-            begin = (patch.left_m - at) / self.tip_m + 0.5
-            ends = (np.maximum(begin, 0.0), np.minimum(begin + patch.length_m / self.tip_m, 1.0))
-            by_begin = (patch.left_slope - 1) / self.tip_m
-            cut = pieces(self.profile, self.pieces, ends, (by_begin, by_begin + patch.length_slope / self.tip_m))
-        return line_tip.Tip(force_n, *patch, self.width_m, cut)
+        """A tip that is cut into pieces; where it lies on the sensor whole, always into the same."""
+        self.patch(position_m)  # refuses what is no place
+        return line_tip.resting(
+            self.length_m, self.width_m, (self.profile, self.pieces), force_n, np.asarray(position_m, float),
+            self.contact_m(force_n),
+        )  # fmt: skip
 
     def _track(self) -> line_tip.Track:
         per_m = [rho / (h * self.width_m) for rho, h in zip(self.resistivity_ohm_m, self.electrode_m, strict=True)]

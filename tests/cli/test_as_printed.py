@@ -46,8 +46,8 @@ def test_json_is_plain(run):
         (["--slicer", "prusa"], "--as-printed"),
         (["--walls", "cura"], "--as-printed"),
         (["--as-printed", "--slicer", "prusa", "--walls", "cura"], "expected one"),
-        (["--as-printed", "--force", "1"], "at rest"),
-        (["--as-printed", "--csv"], "at rest"),
+        (["--as-printed", "--tip", "5"], "at rest"),
+        (["--as-printed", "--compression", "solved"], "at rest"),
         (["--as-printed", "--walls", "arachn"], "arachne"),
         (["--as-printed", "--slicer", "pruser"], "prusa"),
     ],
@@ -56,6 +56,32 @@ def test_words_that_do_not_go_together(run, words, told):
     said = run("predict", *SMALL, *words)
     assert said.code == 2
     assert told in said.line
+
+
+def pressed(run, *words):
+    said = run("predict", *words, "--force", "0:6:3", "--position", "6", "--frequencies", "1.1kHz", "--json")
+    assert said.code == 0
+    return json.loads(said.out)
+
+
+def test_presses_of_a_plate_are_as_drawn(run):
+    """Its print is the plate itself."""
+    words = ("reference", "--size", "12x8")
+    drawn, printed = pressed(run, *words), pressed(run, *words, "--as-printed")
+    assert printed["im_ohm"][0] == [[pytest.approx(x, rel=1e-9) for x in row] for row in drawn["im_ohm"][0]]
+    assert printed["doubts"][0].startswith("as printed: estimate")
+
+
+def test_presses_are_of_the_printed_capacitance(run):
+    """X at rest and low frequency is 1 / (2 pi f C), and C of the print is what it is told to be at rest."""
+    words = (*SMALL, "--dielectric", "0.1", "--compression", "unconfined")
+    printed, classic = pressed(run, *words, "--as-printed"), pressed(run, *words, "--as-printed", "--walls", "classic")
+    at_rest = [
+        json.loads(run("predict", *SMALL, "--dielectric", "0.1", "--as-printed", "--walls", w, "--json").out)
+        for w in ("arachne", "classic")
+    ]
+    expected = [-1 / (2 * 3.14159265 * 1.1e3 * found["capacitance_f"]["printed"]["middle"]) for found in at_rest]
+    assert [f["im_ohm"][0][0][0] for f in (printed, classic)] == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_missing_slicer_is_told(run, monkeypatch):

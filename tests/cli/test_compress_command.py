@@ -115,12 +115,34 @@ def test_a_shape_that_a_model_cannot_speak_of_is_refused(run):
         (["--set", "youngs_modulus_x6=1e6"], "x6"),
         (["--material", "dielectric=bvoh"], "bvoh"),
         (["--model", "springs", "--stress", "9000MPa"], "flat"),
+        (["--set", "youngs_modulus_x60=5e4"], "100 kPa on x60 of 50 kPa"),
+        (["--sides", "free"], "expected base 'sliding'"),
+        (["--plot", "a.pdf"], ".png"),
+        (["--walls", "cura"], "expected --as-printed"),
+        (["--as-printed", "--slicer", "cura", "--walls", "cura"], "expected one"),
     ],
 )
 def test_wrong_words_end_with_2_and_one_line(run, words, said):
     found = run("compress", "tri", *words)
     assert found.code == 2
     assert said in found.line
+
+
+def test_three_electrodes_have_no_one_capacitance(run):
+    assert "expected two, bottom and top" in run("compress", "double").line
+    springs = json.loads(run("compress", "double", "--model", "springs", "--stress", "10", "--json").out)
+    assert springs["displacement_um"][1] > 0
+
+
+@needs_mesher
+def test_a_print_is_pressed_in_place_of_the_drawing(run):
+    """Plain Cura loses the foot: the cell comes down by the layer that is lost, and says so."""
+    said = run("compress", "tri", "--size", "12x8", "--stress", "10", "--as-printed", "--walls", "cura", "--json")
+    found = json.loads(said.out)
+    assert (said.code, found["model"], found["converged_kpa"]) == (0, "press2d", 10.0)
+    assert 100 < found["displacement_um"][1] < 102
+    assert "falls 100 um" in found["doubts"][0]
+    assert found["printed"] == "estimate from mid-planes, cura walls, lines by mid-plane"
 
 
 def test_without_the_mesher_it_says_how_to_install_it(run, monkeypatch):

@@ -268,7 +268,7 @@ def test_json_is_plain(run):
     assert all(math.isfinite(x) for plane in found["re_ohm"] for row in plane for x in row)
     assert set(found) == {
         "design", "design_id", "model", "compression", "tip_mm", "doubts", "values", "axes", "frequency_hz", "force_n",
-        "position_mm", "re_ohm", "im_ohm", "profile", "budget", "noise", "identifiability",
+        "position_mm", "re_ohm", "im_ohm", "profile", "contact_mm", "budget", "noise", "identifiability",
     }  # fmt: skip
 
 
@@ -330,3 +330,15 @@ def test_a_law_that_does_not_speak_of_the_shape_is_refused(run):
     said = run("predict", "reference", "--compression", "solved", "--force", "1")
     assert said.code == 2
     assert "reference is a solid plate: expected the law 'unconfined' or 'bonded'" in said.line
+
+
+def test_a_round_tip_touches_over_a_length_that_grows(run):
+    """On a bed eight times the force is twice the length; a flat tip has no radius."""
+    words = ("predict", "reference", "--position", "50", "--profile", "parabola", "--tip-radius", "20")
+    one, eight = (json.loads(run(*words, "--force", force, "--json").out)["contact_mm"] for force in ("0.5", "4"))
+    assert eight == pytest.approx(2 * one, rel=1e-9)
+    assert f"{eight:.3g} mm of it touch at 4 N" in run(*words, "--force", "4").out
+    said = run("predict", "reference", "--force", "1", "--tip-radius", "20")
+    assert said.code == 2
+    assert "has no radius" in said.line
+    assert "has no radius" in run("predict", "reference", "--tip-radius", "20").line

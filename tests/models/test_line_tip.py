@@ -9,7 +9,7 @@ from line_cases import TONES, matrix, terminated
 
 from sensorgen.errors import OutOfRange
 from sensorgen.models import compression, line_tip
-from sensorgen.models.pressure import pieces
+from sensorgen.models.pressure import bed, hertz
 from sensorgen.sensor import Sensor
 from sensorgen.units import EPS0_F_PER_M
 
@@ -71,8 +71,7 @@ def test_against_mpmath(profile, position, far_end):
 @pytest.mark.parametrize("count", [1, 5])
 def test_pieces_of_even_pressure_are_one_patch(sensor, count):
     one = sensor.response(TONE[:, None], 3.0, np.array(PLACES))
-    tip = replace(sensor, profile="hertz")._tip(np.asarray(3.0), np.array(PLACES))
-    cut = replace(tip, pieces=pieces("uniform", count))
+    cut = replace(sensor, pieces=count)._tip(np.asarray(3.0), np.array(PLACES))
     many = line_tip.response(sensor._track(), cut, sensor.compression, TONE[:, None])
     assert line_tip.impedance(sensor._track(), cut, sensor.compression, TONE[:, None]) == pytest.approx(
         one[0], rel=1e-14
@@ -177,3 +176,65 @@ def test_whole_tips_of_a_grid_are_the_same_press():
     assert (apart == together).all()
     assert PLATE.patch(inside).length_m.shape == ()
     assert PLATE.whole([0.0, 0.0051, 0.05, 0.0949, 0.0951]).tolist() == [False, True, True, True, False]
+
+
+ROUND = {
+    "hertz": replace(SOFT, profile="hertz", contact=hertz(0.2, 8e6)),
+    "parabola": replace(SOFT, profile="parabola", contact=bed(0.1, 1e10)),
+}
+
+
+@pytest.mark.parametrize("profile", ROUND)
+@pytest.mark.parametrize("position", PLACES)
+@pytest.mark.parametrize(("force", "far_end"), [(0.5, "open"), (2.0, "open"), (2.0, "short")])
+def test_slopes_of_a_contact_that_grows(profile, position, force, far_end):
+    """Against differences by Richardson's rule; where the contact hangs over an end, too."""
+    sensor, inside = replace(ROUND[profile], far_end=far_end), min(max(position, 1e-3), 0.099)
+    assert 1e-3 < sensor.contact_m(force)[0] < sensor.tip_m
+
+    def by(step, move):
+        ahead = [
+            (sensor.impedance(TONE, *move(h)) - sensor.impedance(TONE, *move(-h))) / (2 * h) for h in (step, step / 2)
+        ]
+        return (4 * ahead[1] - ahead[0]) / 3
+
+    found = sensor.response(TONE, force, inside)
+    for part in (np.real, np.imag):
+        assert part(found.by_force_ohm_per_n) == pytest.approx(part(by(2e-3, lambda h: (force + h, inside))), rel=5e-6)
+        assert part(found.by_position_ohm_per_m) == pytest.approx(
+            part(by(5e-5, lambda h: (force, inside + h))), rel=2e-3, abs=1e-3
+        )
+
+
+@pytest.mark.parametrize("profile", ROUND)
+@pytest.mark.parametrize("position", [0.001, 0.03, 0.0995])
+def test_at_one_force_it_is_a_tip_of_that_length(profile, position):
+    """And from where all of the tip touches it stays as long as that."""
+    sensor = ROUND[profile]
+    as_long = replace(sensor, contact=None, tip_m=float(sensor.contact_m(1.0)[0]))
+    assert sensor.impedance(TONE, 1.0, position) == pytest.approx(as_long.impedance(TONE, 1.0, position), rel=1e-14)
+    flatter = replace(sensor, contact=replace(sensor.contact, length_at_one_m=1.0))
+    for one, other in zip(
+        flatter.response(TONE, 2.0, position), replace(sensor, contact=None).response(TONE, 2.0, position), strict=True
+    ):
+        assert one == pytest.approx(other, rel=1e-14)
+
+
+@pytest.mark.parametrize("profile", ROUND)
+def test_the_pieces_bear_the_force_whatever_it_is(profile):
+    sensor, forces, places = ROUND[profile], np.array([[1e-3], [0.5], [2.0]]), np.array([0.001, 0.05, 0.0995])
+    tip = sensor._tip(forces, places)
+    borne = (tip.mean_pa()[..., None] * tip.pieces.pressure * tip.pieces.length).sum(-1) * tip.length_m * tip.width_m
+    assert borne == pytest.approx(np.broadcast_to(forces, borne.shape), rel=1e-12)
+
+
+@pytest.mark.parametrize("profile", ROUND)
+def test_a_lighter_press_is_sharper_but_starts_like_a_flat_one(profile):
+    """Half the force on a shorter contact is more than half the pressure; at no force only the force counts."""
+    sensor = ROUND[profile]
+    assert sensor.stress_pa(0.5, 0.05) > 0.5 * sensor.stress_pa(1.0, 0.05)
+    first = sensor.response(1.1e3, 0.0, 0.05)
+    flat = replace(sensor, contact=None).response(1.1e3, 0.0, 0.05)
+    assert first.impedance_ohm == flat.impedance_ohm
+    assert first.by_force_ohm_per_n.imag == pytest.approx(flat.by_force_ohm_per_n.imag, rel=1e-6)
+    assert first.by_force_ohm_per_n.real == pytest.approx(flat.by_force_ohm_per_n.real, rel=0.05)  # R tells of place

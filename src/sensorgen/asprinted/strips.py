@@ -84,8 +84,8 @@ def _boxes(layers: Sequence[Strips], name: str, size_mm: tuple[float, float, flo
     """One box for each run; equal runs above each other are one box."""
     growing: dict[tuple[str, float, float], tuple[float, float]] = {}
     for layer in layers:
-        here = {(layer.along, a, b) for a, b in layer.runs.get(name, ())}
-        for key in here:
+        for a, b in layer.runs.get(name, ()):
+            key = (layer.along, a, b)
             bottom, top = growing.get(key, (layer.bottom_mm, layer.bottom_mm))
             if top < layer.bottom_mm - SLIVER_MM:
                 yield _box(key, bottom, top, size_mm)

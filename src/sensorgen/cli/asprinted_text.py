@@ -27,13 +27,10 @@ def compensate_option() -> click.Option:
     )  # fmt: skip
 
 
-def printed_options() -> list[click.Parameter]:
-    """``--as-printed`` with whose print is meant, for commands that hold a print against the drawing."""
+def printed_options(about: str = "Hold what is printed against what is drawn.") -> list[click.Parameter]:
+    """``--as-printed`` with whose print is meant, for commands that look at a print beside the drawing."""
     return [
-        click.Option(
-            ["--as-printed"], is_flag=True,
-            help="Hold what is printed against what is drawn.",
-        ),
+        click.Option(["--as-printed"], is_flag=True, help=about),
         click.Option(
             ["--slicer"], type=OneOf(SLICERS),
             help="With --as-printed: slice for real; estimated from each layer's mid-plane if not given.",

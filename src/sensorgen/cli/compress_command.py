@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sensorgen import units
-from sensorgen.cli import FOUND_ERRORS, show
+from sensorgen.cli import FOUND_ERRORS, asprinted_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf, Values
+from sensorgen.errors import BadInput
 
 if TYPE_CHECKING:
     from sensorgen.design import Design
@@ -29,13 +30,14 @@ OWN: list[click.Parameter] = [
         help="Stresses on the top [kPa]; 0 is put before them.",
     ),
     _choice("--base", "base", ["bonded", "sliding"], "How the bottom is held."),
-    _choice("--sides", "period", ["fixed", "free"], "Whether the sides of the cell stay, or give way (base sliding)."),
+    _choice("--sides", "period", ["fixed", "free"], "Whether its sides stay, or give way (with --base sliding)."),
     _choice("--top", "top", ["even", "rigid"], "Even pressure, or a stiff plate."),
     _choice("--contact", "contact", ["frictionless", "stick"], "What faces do that touch."),
     click.Option(
         ["--model"], type=OneOf(["press2d", "press3d", "springs"]), default=None,
         help="Finite elements of a cross-section or of boxes, or springs of columns; the first that fits if not given.",
     ),
+    *asprinted_text.printed_options("Press what is printed in place of what is drawn; feet that were lost hang free."),
     click.Option(["--check-mesh"], is_flag=True, help="Solve on a finer mesh too, and compare."),
     click.Option(["--no-cache"], is_flag=True, help="Solve anew, and keep nothing."),
     click.Option(["--plot"], metavar="FILE.png", help="Draw displacement and capacitance over stress."),
@@ -45,19 +47,24 @@ OWN: list[click.Parameter] = [
 
 def _work(
     design: "Design", *, stress: tuple[float, ...], model: str | None, check_mesh: bool, no_cache: bool,
-    plot: str | None, as_json: bool, **held: str,
+    plot: str | None, as_json: bool, as_printed: bool, slicer: str | None, walls: str | None, **held: str,
 ) -> int:  # fmt: skip
     from sensorgen import compressed
 
+    asprinted_text.refuse_strays(as_printed=as_printed, slicer=slicer, walls=walls)
     stresses = compressed.stresses_kpa(stress)
     if plot:
+        if not plot.lower().endswith(".png"):
+            raise BadInput(f"--plot {plot}: expected a file that ends in .png")
         from sensorgen.plots.libraries import needed
 
         needed("matplotlib")
+    print_of = asprinted_text.printed(design, slicer, walls) if as_printed else None
     with _bar(stresses) as step:
         data = compressed.answer(
-            design, stresses, compressed.Held(**held), model or "", check_mesh=check_mesh, keep=not no_cache, step=step
-        )
+            design, stresses, compressed.Held(**held), model or "", check_mesh=check_mesh, keep=not no_cache, step=step,
+            printed=print_of,
+        )  # fmt: skip
     if plot:
         from sensorgen import store
         from sensorgen.plots import compression
@@ -85,6 +92,8 @@ def _table(data: Data) -> None:
         click.echo(f"{stress:12.4g}  {moved:17.4g}  {bounds}")
     held = ", ".join(f"{key} {value}" for key, value in data["held"].items())
     click.echo(f"{data['model']}, converged up to {data['converged_kpa']:.4g} kPa; {held}")
+    if "printed" in data:
+        click.echo(f"as printed: {data['printed']}")
     for doubt in data["doubts"]:
         click.echo(f"doubt: {doubt}")
 

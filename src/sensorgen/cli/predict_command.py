@@ -35,6 +35,11 @@ OWN: list[click.Parameter] = [
     ),
     click.Option(["--tip", "tip_mm"], type=Length(), default=None, help="Length of the tip.  [default: 10 mm]"),
     click.Option(
+        ["--tip-radius", "radius_mm"], type=Length(), default=None,
+        help="Radius of a hard round tip across the sensor, with --profile hertz or parabola: its contact grows with "
+        "the force up to the tip's length. All of the tip touches if not given.",
+    ),
+    click.Option(
         ["--compression"], type=OneOf(("unconfined", "bonded", "solved")),
         help="How the film gives way: a plate free or bonded, a cell solved (needs NGSolve, takes some seconds); the "
         "best that is known of it if not given.",
@@ -51,7 +56,9 @@ OWN: list[click.Parameter] = [
         ["--accuracy"], type=Ratio(), default=None,
         help="Wanted of |Z|, as 1e-3: bounds the capacitance as nearly, solves an unknown cell, says what misses it.",
     ),
-    *asprinted_text.printed_options(),
+    *asprinted_text.printed_options(
+        "Hold what is printed against what is drawn; with presses, predict them of what is printed, its cell solved."
+    ),
     click.Option(["--json", "as_json"], is_flag=True, help="Print as JSON."),
     click.Option(["--csv", "as_csv"], is_flag=True, help="Print R and X as CSV, a row per force and position."),
     click.Option(["--plot"], metavar="DIR", help="Draw R, X, sensitivities and inverse maps there, as PNG and HTML."),
@@ -66,6 +73,7 @@ def _work(
     force_n: Sequence[float] | None,
     position_mm: Sequence[float] | None,
     tip_mm: float | None,
+    radius_mm: float | None,
     compression: str | None,
     profile: str,
     accuracy: float | None,
@@ -73,25 +81,42 @@ def _work(
     **how: Any,
 ) -> int:
     asprinted_text.refuse_strays(as_printed=how["as_printed"], slicer=how["slicer"], walls=how["walls"])
-    if how["as_printed"]:
-        _refuse_strangers(how, (frequency_hz, force_n, position_mm, tip_mm, compression))
-        return _as_printed(design, accuracy, how)
-    from sensorgen.predict import FORCES_N, TONES_HZ, positions_mm, prediction
-    from sensorgen.sensing import TIP_M, sensor_of
-
     _refuse_two(how)
     proper("--noise", noise)
+    pressed = bool(force_n or position_mm or how["as_csv"] or how["plot"])
+    tip: dict[str, Any] = {
+        "law": compression or "",
+        "profile": profile,
+        "radius_m": None if radius_mm is None else radius_mm * units.M_PER_MM,
+        **({} if tip_mm is None else {"tip_m": tip_mm * units.M_PER_MM}),
+    }
+    if how["as_printed"] and not pressed:
+        _refuse_strangers((frequency_hz, tip_mm, radius_mm, compression))
+        return _as_printed(design, accuracy, how)
+    from sensorgen.predict import FORCES_N, TONES_HZ, positions_mm, prediction
+
     tones, wanted = frequency_hz or TONES_HZ, accuracy or inf
-    law, tip_m = compression or "", TIP_M if tip_mm is None else tip_mm * units.M_PER_MM
-    if not (force_n or position_mm or how["as_csv"] or how["plot"]):
-        predicted = prediction(design, tones, law, tip_m, profile=profile, accuracy=wanted, noise=noise)
-        if compression or tip_mm is not None:
+    if not pressed:
+        predicted = prediction(design, tones, accuracy=wanted, noise=noise, **tip)
+        if compression or tip_mm is not None or radius_mm is not None:
             _refuse_unjudged(predicted)
         _deliver(_unpressed(predicted, as_json=how["as_json"]), how["output"])
         return _verdict(predicted, accuracy)
-    sensed = sensor_of(design, law, tip_m, profile=profile, accuracy=wanted)
-    _pressed(design, sensed, (tones, force_n or FORCES_N, position_mm or positions_mm(design)), (wanted, noise), how)
+    axes = tones, force_n or FORCES_N, position_mm or positions_mm(design)
+    _pressed(design, _sensed(design, accuracy, tip, how), axes, (wanted, noise), how)
     return 0
+
+
+def _sensed(design: "Design", accuracy: float | None, tip: dict[str, Any], how: dict[str, Any]) -> "Sensed":
+    """The sensor as drawn, or as printed."""
+    if not how["as_printed"]:
+        from sensorgen.sensing import sensor_of
+
+        return sensor_of(design, accuracy=accuracy or inf, **tip)
+    from sensorgen.asprinted import compared, pressed
+
+    printed = asprinted_text.printed(design, how["slicer"], how["walls"])
+    return pressed.sensor_of(design, printed, accuracy=accuracy or compared.ACCURACY, **tip)
 
 
 def _as_printed(design: "Design", accuracy: float | None, how: dict[str, Any]) -> int:
@@ -106,10 +131,13 @@ def _as_printed(design: "Design", accuracy: float | None, how: dict[str, Any]) -
     return FOUND_ERRORS if any(f["severity"] == "error" and not f["waiver"] for f in found["findings"]) else 0
 
 
-def _refuse_strangers(how: dict[str, Any], pressed: Sequence[object]) -> None:
-    """What is printed is told of the sensor at rest."""
-    if any(given is not None for given in pressed) or how["as_csv"] or how["plot"]:
-        raise BadInput("--as-printed speaks of the sensor at rest; expected no tones, presses, --csv or --plot with it")
+def _refuse_strangers(pressing: Sequence[object]) -> None:
+    """Without a press, what is printed is told of the sensor at rest."""
+    if any(given is not None for given in pressing):
+        raise BadInput(
+            "--as-printed without a press speaks of the sensor at rest; expected --force or --position with tones, a "
+            "tip or a law of compression"
+        )
 
 
 def _refuse_unjudged(predicted: dict[str, Any]) -> None:

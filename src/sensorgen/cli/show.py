@@ -85,7 +85,9 @@ def presses(predicted: Mapping[str, Any], moves: Sequence[Mapping[str, float | N
     """R and X over force and position, as lines: their ranges, how far they move, and corners at the highest tone."""
     force, at = predicted["force_n"], predicted["position_mm"]
     law, profile = predicted["model"]["compression"], predicted["profile"]
-    spread = "" if profile == "uniform" else f" ({profile})"
+    touches = predicted["contact_mm"]
+    grown = f", {touches:.3g} mm of it touch at {force[-1]:g} N" if touches < predicted["tip_mm"] else ""
+    spread = "" if profile == "uniform" else f" ({profile}{grown})"
     yield f"{predicted['design']}: {_axis(force, 'force', 'N')}, {_axis(at, 'position', 'mm')};"
     yield f"tip {predicted['tip_mm']:g} mm{spread}, compression {law}"
     for doubt in predicted["doubts"]:

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen import yamlfile
-from sensorgen.errors import OutOfRange
+from sensorgen.errors import MissingValue, OutOfRange
 
 SOURCE = "Thesis Eq. B.49; Gent and Lindley (1959) for the bonded plate; solved cells as their file says"
 COST = 0
 
 REACH = 3.0  # how far beyond its last stress a curve is extended by its last slope, as a factor [-]
-_PA_PER_KPA = 1e3
+_PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _SAME = 1e-6  # relative difference up to which two parameters are one
 
 Real = NDArray[np.float64]
@@ -53,6 +53,10 @@ class Plate:
             raise OutOfRange(f"the stress thins the film by {np.max(share):.3g}: at 1 its electrodes touch (Eq. B.49)")
         return share, np.full_like(share, 1 / self.modulus_pa)
 
+    def bed_pa_per_m(self, gap_m: float) -> float:
+        """Pressure per displacement of the top [Pa/m], of a plate that fills a gap between its electrodes [m]."""
+        return self.modulus_pa / gap_m
+
     def stiffer(self, factor: float) -> "Plate":
         """The same of a material that many times as stiff."""
         return replace(self, modulus_pa=self.modulus_pa * factor)
@@ -76,6 +80,8 @@ class Curve:
         Share by which its rise may be off [-].
     held : tuple of float
         Shares by which the rise differs for the same cell held or touched otherwise [-].
+    moved_m : float or None
+        How far the top has come down at the last stress [m]; None where nobody says.
 
     Examples
     --------
@@ -91,6 +97,7 @@ class Curve:
     slope_per_pa: tuple[float, ...]
     within: float = 0.0
     held: tuple[float, ...] = ()
+    moved_m: float | None = None
 
     def thinning(self, stress_pa: Real) -> tuple[Real, Real]:
         """Thinning [-] and its derivative [1/Pa]; raises OutOfRange for a pull and far beyond the last point."""
@@ -104,6 +111,12 @@ class Curve:
             )
         rise, slope = self._rise(stress_pa)
         return rise / (1 + rise), slope / (1 + rise) ** 2
+
+    def bed_pa_per_m(self, gap_m: float) -> float:  # noqa: ARG002 - the cell's own height is in it
+        """Pressure per displacement of the top up to the last stress [Pa/m]; raises MissingValue where nobody says."""
+        if self.moved_m is None:
+            raise MissingValue(f"the curve {self.name!r} does not say how far the top comes down")
+        return self.stress_pa[-1] / self.moved_m
 
     def stiffer(self, factor: float) -> "Curve":
         """The same of materials that are all that many times as stiff: stresses scale."""
@@ -232,7 +245,8 @@ def solved(shape: str, parameters: Mapping[str, Any], youngs_modulus_pa: Mapping
             stress = [kpa * _PA_PER_KPA * factors[0] for kpa in cell["stress_kpa"]]
             ratio = [1 + percent / 100 for percent in cell["rise_percent"]]
             found = curve("solved", cell["source"], stress, ratio)
-            return replace(found, within=cell["within"], held=tuple(cell["held"].values()))
+            moved_m = cell["displacement_um"] / _UM_PER_M
+            return replace(found, within=cell["within"], held=tuple(cell["held"].values()), moved_m=moved_m)
     return None
 
 

@@ -11,7 +11,7 @@ from sensorgen.models import line
 from sensorgen.models._line_inputs import HIGHEST_OHM, far_load
 from sensorgen.models._line_slopes import Chain
 from sensorgen.models.compression import Compression
-from sensorgen.models.pressure import Pieces
+from sensorgen.models.pressure import Pieces, pieces, pressure_slope
 
 SOURCE = line.SOURCE
 COST = 0
@@ -49,29 +49,42 @@ class Track:
     far_end: str | float
 
 
+class Motion(NamedTuple):
+    """What one more newton, or a tip that stands one metre further, changes of what rests on the line."""
+
+    left: Real
+    """Of where it begins [m/N] or [-]."""
+    length: Real
+    """Of its length [m/N] or [-]."""
+    pressure: Real
+    """Of the pressure of each piece over the mean [1/N] or [1/m]; the last axis counts the pieces."""
+
+
 @dataclass(frozen=True)
 class Tip:
-    """What rests on the line: arrays that broadcast, with derivatives by the tip's position where they have one.
+    """What rests on the line: arrays that broadcast.
 
     Attributes
     ----------
     force_n : array
         Force [N].
-    left_m, length_m, left_slope, length_slope : array
-        Where it begins and how long it is [m], and how both move [-].
+    left_m, length_m : array
+        Where it begins and how long it is [m].
     width_m : float
         Across the sensor [m].
     pieces : Pieces
         How its pressure is spread.
+    by_force, by_position : Motion
+        How all this moves.
     """
 
     force_n: Real
     left_m: Real
     length_m: Real
-    left_slope: Real
-    length_slope: Real
     width_m: float
     pieces: Pieces
+    by_force: Motion
+    by_position: Motion
 
     def mean_pa(self) -> Real:
         """Mean pressure [Pa]."""
@@ -80,6 +93,54 @@ class Tip:
     def highest_pa(self) -> Real:
         """Pressure of the piece that bears most [Pa]."""
         return np.asarray(self.mean_pa() * self.pieces.pressure.max(axis=-1))
+
+
+def resting(
+    line_m: float,
+    width_m: float,
+    cut_as: tuple[str, int],
+    force_n: Real,
+    position_m: Real,
+    contact_m: tuple[Real, Real],
+) -> Tip:
+    """A tip centred at a position, its contact cut at the ends of the line, and into pieces.
+
+    Parameters
+    ----------
+    line_m, width_m : float
+        Length and width of the line [m].
+    cut_as : (str, int)
+        Profile of the pressure, and number of pieces.
+    force_n, position_m : array
+        Force [N] and centre of the tip [m].
+    contact_m : (array, array)
+        Length of the contact as if the line had no ends [m], and its derivative by the force [m/N].
+
+    Notes
+    -----
+    A contact that an end cuts carries the whole force on what is left of it.
+    """
+    (whole, grows), at = contact_m, position_m
+    low, high = at - whole / 2, at + whole / 2
+    over = low < 0, high > line_m
+    if not (over[0].any() or over[1].any()):
+        still = np.zeros(cut_as[1])
+        by_force, by_position = Motion(-grows / 2, grows, still), Motion(np.ones(()), np.zeros(()), still)
+        return Tip(force_n, low, whole, width_m, pieces(*cut_as), by_force, by_position)
+    left, right = np.where(over[0], 0.0, low), np.where(over[1], line_m, high)
+    shares = -at / whole, (line_m - at) / whole  # where the line ends, from the middle of the tip
+    ends = np.where(over[0], 0.5 + shares[0], 0.0), np.where(over[1], 0.5 + shares[1], 1.0)
+
+    def motion(edges: tuple[Real, Real], share_slopes: tuple[Real, Real]) -> Motion:
+        by_left, by_right = (np.where(o, 0.0, edge) for o, edge in zip(over, edges, strict=True))
+        by_begin, by_end = (np.where(o, slope, 0.0) for o, slope in zip(over, share_slopes, strict=True))
+        return Motion(by_left, by_right - by_left, pressure_slope(*cut_as, ends, (by_begin, by_end)))
+
+    one = np.ones(())
+    by_force = motion((-grows / 2, grows / 2), (-shares[0] * grows / whole, -shares[1] * grows / whole))
+    by_position = motion((one, one), (-1 / whole, -1 / whole))
+    length = np.where(over[0] | over[1], right - left, whole)
+    return Tip(force_n, left, length, width_m, pieces(*cut_as, ends), by_force, by_position)
 
 
 class _Piece(NamedTuple):
@@ -124,18 +185,26 @@ def response(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> tu
     pieces = _pieces(track, tip, law, frequency_hz)
     with np.errstate(all="ignore"):
         chain = Chain(*_sections(track, tip, pieces, frequency_hz), far_load(track.far_end))
-        by_force, by_position = np.zeros((), complex), np.zeros((), complex)
-        for k, piece in enumerate(pieces, 1):
-            by_force = by_force + sum(chain.by_matter(k, *piece.by_force))
-            by_position = by_position + tip.left_slope * chain.by_shift(k, piece.contrast)
-            if np.any(tip.length_slope):
-                longer = piece.length_share * (chain.by_length(k) - chain.by_length(len(pieces) + 1))
-                by_position = by_position + tip.length_slope * longer
-            by_position = by_position + sum(chain.by_matter(k, *piece.by_position))
+        by_force = _along(chain, pieces, tip.by_force, [piece.by_force for piece in pieces])
+        by_position = _along(chain, pieces, tip.by_position, [piece.by_position for piece in pieces])
     found = np.broadcast_arrays(chain.z, by_force, by_position)
     if not (abs(found[0].sum()) < HIGHEST_OHM and all(np.isfinite(value.sum()) for value in found)):
         raise OutOfRange("no derivative where Z is infinite or beyond double precision")
     return found[0], found[1], found[2]
+
+
+def _along(chain: Chain, pieces: list[_Piece], motion: Motion, matter: list[tuple[Real, Complex]]) -> Complex:
+    """Derivative of Z as the pieces move, grow, and change their matter."""
+    found = np.zeros((), complex)
+    moves, grows = np.any(motion.left), np.any(motion.length)
+    for k, (piece, change) in enumerate(zip(pieces, matter, strict=True), 1):
+        found = found + sum(chain.by_matter(k, *change))
+        if moves:
+            found = found + motion.left * chain.by_shift(k, piece.contrast)
+        if grows:
+            longer = piece.length_share * (chain.by_length(k) - chain.by_length(len(pieces) + 1))
+            found = found + motion.length * longer
+    return found
 
 
 def _unpressed(track: Track, frequency_hz: Real) -> Complex:
@@ -157,24 +226,34 @@ def _sections(
 
 
 def _pieces(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> list[_Piece]:
-    mean, per_newton = tip.mean_pa(), 1 / (tip.width_m * tip.length_m)
+    mean = tip.mean_pa()
     film, away = _susceptance(track, frequency_hz), _unpressed(track, frequency_hz)
     found = []
     for k, share in enumerate(tip.pieces.length):
-        weight, moved = tip.pieces.pressure[..., k], tip.pieces.pressure_slope[..., k]
+        weight = tip.pieces.pressure[..., k]
         thinning, slope = law.thinning(np.asarray(weight * mean))
-        by_stress = film * (slope / (1 - thinning) ** 2)
         rise = track.rise_ohm_per_m_per_n * (weight * tip.force_n)
         thinned = film * (thinning / (1 - thinning))
-        spread = moved * mean - weight * mean * (tip.length_slope / tip.length_m)
+        by_stress = film * (slope / (1 - thinning) ** 2)
         found.append(
             _Piece(
                 np.asarray(track.r_ohm_per_m + rise),
                 np.asarray(away + thinned),
                 float(share),
                 np.asarray(track.r_ohm_per_m * thinned - rise * away),
-                (np.asarray(track.rise_ohm_per_m_per_n * weight), np.asarray(by_stress * (weight * per_newton))),
-                (np.asarray(track.rise_ohm_per_m_per_n * (moved * tip.force_n)), np.asarray(by_stress * spread)),
+                _matter(track, tip, k, by_stress, tip.by_force, 1.0),
+                _matter(track, tip, k, by_stress, tip.by_position, 0.0),
             )
         )
     return found
+
+
+def _matter(track: Track, tip: Tip, k: int, by_stress: Complex, motion: Motion, newtons: float) -> tuple[Real, Complex]:
+    """How resistance and admittance of a piece change as the tip moves, or as the force grows."""
+    weight, moved, mean = tip.pieces.pressure[..., k], motion.pressure[..., k], tip.mean_pa()
+    grown = newtons / (tip.width_m * tip.length_m) - mean * (motion.length / tip.length_m)
+    by_weight = moved * tip.force_n + weight * newtons
+    return (
+        np.asarray(track.rise_ohm_per_m_per_n * by_weight),
+        np.asarray(by_stress * (moved * mean + weight * grown)),
+    )

@@ -1,10 +1,12 @@
 r"""How pressure is spread along a tip: a profile is the share of the force that rests on the tip up to a place.
 
 Between two places the mean pressure is then exact, whatever the profile, and the pieces of a tip carry its whole force.
+The contact of a round tip grows with the force, by a law that goes with its profile.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,8 @@ from sensorgen.errors import OutOfRange, UnknownName
 
 SOURCE = "Hertz (1882) for a round tip on a thick soft body; Johnson, Contact Mechanics (1985), 5.8 for a thin one"
 COST = 0
+
+BLUNT_M = 1e-6  # a round tip touches over this length at least, so that no force is a point's
 
 Real = NDArray[np.float64]
 
@@ -67,6 +71,103 @@ def profile(name: str) -> Profile:
 
 
 @dataclass(frozen=True)
+class Contact:
+    r"""How long a round tip touches: :math:`l = c\,(F/W)^n`, up to the tip's own length.
+
+    Attributes
+    ----------
+    length_at_one_m : float
+        c, the length at 1 N per metre of width [m].
+    power : float
+        n [-].
+    """
+
+    length_at_one_m: float
+    power: float
+
+    def length_m(self, line_load_n_per_m: Real, longest_m: float) -> tuple[Real, Real]:
+        """Length of the contact [m] and its derivative by the load [m2/N], 0 once the whole tip touches.
+
+        Parameters
+        ----------
+        line_load_n_per_m : array
+            Force over width, 0 or more [N/m].
+        longest_m : float
+            Length of the tip [m].
+        """
+        load = np.asarray(line_load_n_per_m, float)
+        length = self.length_at_one_m * load**self.power
+        grows = (length > BLUNT_M) & (length < longest_m)
+        slope = self.power * length / np.where(load > 0, load, 1.0)
+        return np.clip(length, BLUNT_M, longest_m), np.where(grows, slope, 0.0)
+
+
+def hertz(radius_m: float, plane_modulus_pa: float) -> Contact:
+    r"""A hard cylinder across a body that is much thicker than the contact is long.
+
+    .. math:: l = 2 a = 4 \sqrt{\frac{F R}{\pi W E^*}}, \quad E^* = \frac{E}{1 - \nu^2}
+
+    Parameters
+    ----------
+    radius_m, plane_modulus_pa : float
+        R [m]; E* of the body [Pa].
+
+    Raises
+    ------
+    OutOfRange
+        A radius or a modulus that is not above 0.
+
+    Notes
+    -----
+    Johnson, Contact Mechanics (1985), Eq. 4.43.
+
+    Examples
+    --------
+    >>> length, _ = hertz(0.01, 8e6).length_m(np.asarray(100.0), 0.01)
+    >>> round(float(length) * 1e3, 4)
+    0.7979
+    """
+    _refuse_none(radius_m, plane_modulus_pa)
+    return Contact(4 * float(np.sqrt(radius_m / (pi * plane_modulus_pa))), 1 / 2)
+
+
+def bed(radius_m: float, stiffness_pa_per_m: float) -> Contact:
+    r"""A hard cylinder on a thin layer that gives way as a bed of springs, each by its own pressure.
+
+    .. math:: l = 2 a = 2 \sqrt[3]{\frac{3 F R}{2 W k}}, \quad p = \frac{k}{2 R} (a^2 - x^2)
+
+    Parameters
+    ----------
+    radius_m, stiffness_pa_per_m : float
+        R [m]; k, pressure per displacement [Pa/m].
+
+    Raises
+    ------
+    OutOfRange
+        A radius or a stiffness that is not above 0.
+
+    Notes
+    -----
+    Johnson, Contact Mechanics (1985), 4.3 and 5.8.
+
+    Examples
+    --------
+    >>> length, _ = bed(0.01, 1e10).length_m(np.asarray(100.0), 0.01)
+    >>> round(float(length) * 1e3, 4)
+    1.0627
+    """
+    _refuse_none(radius_m, stiffness_pa_per_m)
+    return Contact(2 * float(np.cbrt(1.5 * radius_m / stiffness_pa_per_m)), 1 / 3)
+
+
+def _refuse_none(radius_m: float, stiffness: float) -> None:
+    if not (0 < radius_m < np.inf and 0 < stiffness < np.inf):
+        raise OutOfRange(
+            f"a round tip of radius {radius_m * 1e3:g} mm on a stiffness of {stiffness:g}: expected both above 0"
+        )
+
+
+@dataclass(frozen=True)
 class Pieces:
     """A tip, or the part of it that rests on a sensor, cut into pieces; the last axis counts them.
 
@@ -76,21 +177,13 @@ class Pieces:
         Of each piece over that of the part [-]; they add up to 1.
     pressure : (..., n) array
         Mean pressure of each piece over that of the part [-].
-    pressure_slope : (..., n) array
-        Its derivative along with the part's ends [1/m].
     """
 
     length: Real
     pressure: Real
-    pressure_slope: Real
 
 
-def pieces(
-    name: str,
-    count: int,
-    ends: tuple[Real, Real] = (np.zeros(()), np.ones(())),
-    slopes: tuple[Real, Real] | None = None,
-) -> Pieces:
+def pieces(name: str, count: int, ends: tuple[Real, Real] = (np.zeros(()), np.ones(()))) -> Pieces:
     r"""Cut a tip into pieces that are short towards its ends, where the pressure changes most.
 
     .. math:: w_k = \frac{G(u_{k+1}) - G(u_k)}{(G(b) - G(a))\,(t_{k+1} - t_k)}, \quad u_k = a + (b - a)\, t_k, \quad
@@ -104,8 +197,6 @@ def pieces(
         Pieces, 1 or more.
     ends : (array, array)
         Where on the tip the part that rests begins and ends, of one shape; the whole tip is 0 to 1 [-].
-    slopes : (array, array), optional
-        Their derivatives by something [1/m].
 
     Raises
     ------
@@ -127,17 +218,35 @@ def pieces(
     """
     if count < 1:
         raise OutOfRange(f"{count} pieces of a tip; expected 1 or more")
-    known = profile(name)
-    begin, end = (np.asarray(e, float)[..., None] for e in ends)
-    places = (1 - np.cos(np.pi * np.arange(count + 1) / count)) / 2
-    length = np.diff(places)
-    at = begin + (end - begin) * places
-    share = known.share(at)
-    whole = share[..., -1:] - share[..., :1]
-    pressure = np.diff(share) / (whole * length)
-    if slopes is None:
-        return Pieces(length, pressure, np.zeros_like(pressure))
+    length, _, share, whole = _shares(name, count, ends)
+    return Pieces(length, np.diff(share) / (whole * length))
+
+
+def pressure_slope(name: str, count: int, ends: tuple[Real, Real], slopes: tuple[Real, Real]) -> Real:
+    """Derivative of the pressure of :func:`pieces` along with their ends.
+
+    Parameters
+    ----------
+    name, count, ends : str, int, (array, array)
+        As of :func:`pieces`.
+    slopes : (array, array)
+        Derivatives of the ends by something, [1/m] by a place.
+    """
+    length, at, share, whole = _shares(name, count, ends)
     by_begin, by_end = (np.asarray(s, float)[..., None] for s in slopes)
-    moved = known.density(at) * (by_begin + (by_end - by_begin) * places)
+    moved = profile(name).density(at) * (by_begin + (by_end - by_begin) * _places(count))
     whole_moved = moved[..., -1:] - moved[..., :1]
-    return Pieces(length, pressure, np.diff(moved) / (whole * length) - pressure * (whole_moved / whole))
+    return np.asarray((np.diff(moved) - np.diff(share) * (whole_moved / whole)) / (whole * length))
+
+
+def _places(count: int) -> Real:
+    return np.asarray((1 - np.cos(np.pi * np.arange(count + 1) / count)) / 2)
+
+
+def _shares(name: str, count: int, ends: tuple[Real, Real]) -> tuple[Real, Real, Real, Real]:
+    """Length of each piece, where they meet on the tip, the share of the force up to there, and what rests in all."""
+    begin, end = (np.asarray(e, float)[..., None] for e in ends)
+    places = _places(count)
+    at = begin + (end - begin) * places
+    share = profile(name).share(at)
+    return np.diff(places), at, share, share[..., -1:] - share[..., :1]

@@ -61,20 +61,7 @@ class Cell:
 
 
 def cell_of(scene: Scene, period_mm: float | None) -> Cell:
-    """The cell of a prismatic scene: half a period between two mirrors where there are such, else a whole period.
-
-    Parameters
-    ----------
-    scene : Scene
-        As drawn or as printed, its support gone.
-    period_mm : float or None
-        Period of the pattern; None for a scene without one, as a plate [mm].
-
-    Raises
-    ------
-    BadInput
-        The scene is no prism, or shorter than its period.
-    """
+    """As :func:`sensorgen.models.press2d.cell`, which documents it."""
     try:
         found = sections(scene)
     except ValueError as error:

@@ -1,0 +1,94 @@
+"""What is printed of a design under pressure: the cell that is pressed, and the sensor that it makes."""
+
+from dataclasses import replace
+
+from sensorgen import planner, sensing
+from sensorgen.asprinted import compared
+from sensorgen.asprinted.compared import Printed
+from sensorgen.celllaw import Piece, drawn
+from sensorgen.design import Design
+from sensorgen.interval import Interval
+from sensorgen.planner import Unloaded, Unpredictable
+from sensorgen.sections import sections
+from sensorgen.sensing import Sensed
+from sensorgen.sensor import UNIFORM
+
+_SOLID = "electrodes as solid plates: the contacts between printed lines add to their resistance"
+_LOSSES = "losses of the cell as drawn"
+
+
+def piece(design: Design, printed: Printed) -> Piece:
+    """One period of a print, by the first convention for a line's width.
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    printed : Printed
+        What is printed of it.
+    """
+    scene, _ = compared.cell(design, printed.first())
+    if drawn(design).period_mm is None:
+        return Piece(scene, None)
+    return Piece(scene, scene.size_mm["xy".index(sections(scene)[0].across)])
+
+
+def width_by(printed: Printed) -> str:
+    """Who says what is printed, and how wide its lines are taken to be where it is pressed."""
+    return f"{printed.source}, lines by {next(iter(printed.layers))}"
+
+
+def unloaded(design: Design, printed: Printed, accuracy: float = compared.ACCURACY) -> Unloaded:
+    """What is known of a print before anything presses on it; its capacitance between all conventions.
+
+    Parameters
+    ----------
+    design, printed : Design, Printed
+        As of :func:`piece`.
+    accuracy : float
+        How wide the bounds by one convention may be, relative to their middle [-].
+
+    Raises
+    ------
+    Unpredictable
+        No model can speak of what is printed, or of what is drawn.
+    """
+    found = compared.capacitance_f(design, printed, accuracy)
+    known = [c for c in found.values() if isinstance(c, Interval)]
+    if not known:
+        raise Unpredictable(f"as printed: {next(iter(found.values()))}")
+    span = Interval(min(c.lower for c in known), max(c.upper for c in known))
+    plain = planner.unloaded(design)
+    said = f"printed, lines by {', '.join(found)}"
+    return replace(plain, answer=planner.Answer(said, span, (), wanted=accuracy))
+
+
+def sensor_of(
+    design: Design, printed: Printed, law: str = "", tip_m: float = sensing.TIP_M, *,
+    profile: str = UNIFORM, radius_m: float | None = None, accuracy: float = compared.ACCURACY,
+) -> Sensed:  # fmt: skip
+    """The sensor that is printed, its cell solved.
+
+    Parameters
+    ----------
+    design, printed : Design, Printed
+        As of :func:`piece`.
+    law, tip_m, profile, radius_m : str, float, str, float
+        As of :func:`sensorgen.sensing.sensor_of`; lengths in [m].
+    accuracy : float
+        As of :func:`unloaded` [-].
+
+    Raises
+    ------
+    Unpredictable
+        As :func:`unloaded`.
+    MissingValue, UnknownName, OutOfRange
+        As :func:`sensorgen.sensing.sensor_of`.
+    """
+    found = sensing.sensor_of(
+        design, law, tip_m, profile=profile, radius_m=radius_m, accuracy=accuracy,
+        known=unloaded(design, printed, accuracy), printed=piece(design, printed),
+    )  # fmt: skip
+    return replace(
+        found, caveats=(f"as printed: {width_by(printed)}", _SOLID, *([_LOSSES] if found.lost.taken else []))
+    )
