@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 from sensorgen.models.compression import unconfined
 from sensorgen.sensor import Sensor
@@ -65,6 +66,25 @@ def run(made, rate_hz=140.0, noise=1e-3, creep=0.0, slope_per_s=0.0, seed=1, of=
     z = clean * np.exp(drift)
     z = z + noise * np.abs(z) * (rng.standard_normal(z.shape) + 1j * rng.standard_normal(z.shape))
     return Run(time, force, position, clean, drift, z, made)
+
+
+def answering(share_per_n, tau_s):
+    """A film that creeps under the tip, and forgets, with one time constant."""
+
+    def law(time_s, force_n):
+        kept = np.exp(-(time_s[1] - time_s[0]) / tau_s)
+        return share_per_n * lfilter([(1 - kept) / 2] * 2, [1, -kept], force_n)
+
+    return law
+
+
+def walking(share, seed=7):
+    """A film that wanders at random, by that share in a standard deviation at the end."""
+
+    def law(time_s, _):
+        return share * np.random.default_rng(seed).standard_normal(len(time_s)).cumsum() / np.sqrt(len(time_s))
+
+    return law
 
 
 def stamps(time_s, seed=2, jitter_s=0.005, skew=0.0, late_s=0.03, block=BLOCK):

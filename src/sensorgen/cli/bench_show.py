@@ -27,8 +27,8 @@ _WIDE = 13  # letters of a column
 
 def _show(
     what: str, rig_file: str | None, file: str | None, lockin: int | None, cutoff_hz: tuple[float, ...] | None, *,
-    columns: tuple[str, ...], rig_columns: tuple[str, ...], keep_drift: bool, presses: str | None,
-    filtered: str | None, plot: str | None, as_json: bool,
+    columns: tuple[str, ...], rig_columns: tuple[str, ...], keep_drift: bool, law: str | None,
+    presses: str | None, filtered: str | None, plot: str | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Show what a recording says: samples and marks, clocks, drift, and what each press changes.
 
@@ -40,7 +40,7 @@ def _show(
 
     found, rig = _opened(what, rig_file, columns, rig_columns, file)
     cutoff = one("--cutoff", cutoff_hz) if cutoff_hz else lowpass.CUTOFF_HZ
-    worked = run.processed(_chosen(found, lockin), rig, remove_drift=not keep_drift, cutoff_hz=cutoff)
+    worked = run.processed(_chosen(found, lockin), rig, remove_drift=not keep_drift, law=law or "", cutoff_hz=cutoff)
     name = what if found[0].source.file == Path(what).name else f"recording {what}"
     files = [*_tables(worked, presses, filtered), *(_drawn(worked, name, Path(plot)) if plot else ())]
     if as_json:
@@ -86,6 +86,7 @@ def _lines(worked: "Processed", rig: "RigLog | None") -> Iterator[str]:
     yield from (f"{'':11}{note}" for note in worked.notes)
     if worked.drift:
         yield f"{'drift':11}{_drifted(worked):.2%} of Z over the run, fitted to the rest, taken out of the presses"
+        yield f"{'':11}{worked.drift.law}: {worked.drift.reason}"
     if worked.pairs is not None:
         how = "" if worked.by_force else ", found by the readings alone"
         yield f"{'presses':11}{len(worked.pairs.time_s)}{how}; ΔR and ΔX [ohm], standard errors in brackets"
@@ -138,7 +139,7 @@ def _data(worked: "Processed", rig: "RigLog | None") -> dict[str, Any]:
         "file": one.source.file, "lockin": one.source.lockin, "program": one.source.program or one.source.format,
         "rate_hz": one.source.rate_hz, "tones_hz": one.tones_hz.tolist(), "counts": one.counts(),
         "rig": rig.counts() if rig else None, "notes": list(worked.notes), "by_force": worked.by_force,
-        "drift": _drifted(worked) if worked.drift else None,
+        "drift": _drifted(worked) if worked.drift else None, "drift_law": worked.drift.law if worked.drift else None,
         "presses": [] if pairs is None else [_press(pairs, i) for i in range(len(pairs.time_s))],
     }  # fmt: skip
 
