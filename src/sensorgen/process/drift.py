@@ -99,8 +99,7 @@ def fitted(
         No such law.
     """
     for name in among:
-        if name not in LAWS:
-            raise UnknownName("law of drift", name, LAWS)
+        check(name)
     rest = valid & ~_disturbed(time_s, force_n, settle_s)
     if np.count_nonzero(rest) < _LEAST:
         raise BadInput(f"{np.count_nonzero(rest)} readings at rest; expected {_LEAST} or more to fit a drift to")
@@ -115,6 +114,12 @@ def fitted(
         if "wandering" in name:
             found[name] = laws.wandering(bins, found["memory" if "memory" in name else "smooth"])
     return _chosen({name: found[name] for name in LAWS if name in among}, start)
+
+
+def check(law: str) -> None:
+    """Refuse what is no name of a law."""
+    if law not in LAWS:
+        raise UnknownName("law of drift", law, LAWS)
 
 
 def _chosen(found: Mapping[str, laws.Fit], start_s: float) -> Drift:

@@ -14,6 +14,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from sensorgen.recording.movement import slowly
 from sensorgen.recording.samples import Complex, Real
 
 BIN_S = 0.25  # beyond the demodulator's own memory, so that bins are independent of each other
@@ -21,7 +22,6 @@ _TAUS = 5
 _FASTEST = 300.0  # of the run: a time constant that short is a step
 _POWERS = (1, 2, 3)
 _SAME = 1e-10  # of the largest singular value: what is smaller is rounding
-_GRID_S = 0.02
 _SCAN, _MOST_MEMORIES = 24, 3
 _KNOTS_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 
@@ -72,36 +72,14 @@ class Smooth:
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """Force over time as a film with one time constant answers to it: at even steps [s], [N]."""
+    """Force over time as a film with one time constant answers to it."""
 
     tau_s: float
-    grid_s: Real
-    answer_n: Real
+    answer_n: Callable[[Real], Real]
 
     def columns(self, time_s: Real) -> Real:
-        """One column."""
-        return np.interp(time_s, self.grid_s, self.answer_n)[:, None]
-
-
-class _Pressed(NamedTuple):
-    """Force at even steps [s], [N]."""
-
-    grid_s: Real
-    force_n: Real
-
-    def answer(self, log_tau: float) -> Memory:
-        """Of a film whose time constant has this logarithm."""
-        from scipy.signal import lfilter
-
-        tau = float(np.exp(log_tau))
-        kept = np.exp(-_GRID_S / tau)
-        return Memory(tau, self.grid_s, lfilter([(1 - kept) / 2] * 2, [1, -kept], self.force_n))
-
-
-def _evenly(time_s: Real, force_n: Real) -> _Pressed:
-    """Where nobody knows the force, it is what lies between the known ones."""
-    grid, known = np.arange(time_s[0], time_s[-1] + _GRID_S, _GRID_S), np.isfinite(force_n)
-    return _Pressed(grid, np.interp(grid, time_s[known], force_n[known]) if known.any() else np.zeros_like(grid))
+        """One column [N]."""
+        return self.answer_n(time_s)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,12 +172,16 @@ def remembering(bins: Bins, found: Fit, time_s: Real, force_n: Real, fastest_s: 
     fastest_s : float
         The shortest time constant that shows at rest [s].
     """
-    pressed = _evenly(time_s, force_n)
+
+    def memory(log_tau: float) -> Memory:
+        tau = float(np.exp(log_tau))
+        return Memory(tau, slowly(time_s, force_n, tau))
+
     taus = np.log(np.geomspace(fastest_s, max(2 * fastest_s, float(time_s[-1] - time_s[0])), _SCAN))
     base, weight = np.linalg.qr(_basis(found.terms, bins.time_s) * bins.weight[:, None])[0], bins.weight[:, None]
 
     def misfit(logs: Real) -> float:
-        columns = weight * np.hstack([pressed.answer(x).columns(bins.time_s) for x in logs])
+        columns = weight * np.hstack([memory(x).columns(bins.time_s) for x in logs])
         new = np.linalg.qr(columns - base @ (base.T @ columns))[0]
         return _misfit(_squares(found.left) - _squares(new.T @ found.left))
 
@@ -207,7 +189,7 @@ def remembering(bins: Bins, found: Fit, time_s: Real, force_n: Real, fastest_s: 
     for _ in range(_MOST_MEMORIES):
         first = min(taus, key=lambda x: misfit(np.append(logs, x)))
         logs = _refined(misfit, np.append(logs, first), taus[[0, -1]])
-        more = explained(bins, (*found.terms, *(pressed.answer(x) for x in logs)), found.shared + len(logs))
+        more = explained(bins, (*found.terms, *(memory(x) for x in logs)), found.shared + len(logs))
         if more.bic() >= best.bic():
             break
         best = more

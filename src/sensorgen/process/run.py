@@ -19,6 +19,8 @@ class Processed:
     ----------
     recording : Recording
         With the rig's errors among its marks.
+    force_n : (n,) array
+        What pressed at each sample [N]; nan where nobody knows.
     filtered_s, filtered_ohm : (k,), (k, m) array
         Low-passed forward and backward on even steps, drift and all [s], [ohm].
     drift : Drift or None
@@ -32,6 +34,7 @@ class Processed:
     """
 
     recording: Recording
+    force_n: Real
     filtered_s: Real
     filtered_ohm: Complex
     drift: drift.Drift | None
@@ -69,6 +72,8 @@ def processed(
     UnknownName
         No such law of drift.
     """
+    if law:
+        drift.check(law)
     notes, one = list(recording.source.notes), recording
     force = position = np.full(len(one.time_s), np.nan)
     if rig is not None:
@@ -83,7 +88,7 @@ def processed(
     fit = _drift(one, valid, pressing, tuple(among), notes) if remove_drift and spans else None
     clean = fit.removed(one.time_s, one.impedance_ohm) if fit else one.impedance_ohm
     pairs = _pairs(one.time_s, clean, valid, spans, force, position, notes)
-    return Processed(one, *filtered, fit, pairs, rig is not None, tuple(notes))
+    return Processed(one, force, *filtered, fit, pairs, rig is not None, tuple(notes))
 
 
 def _told(time_s: Real, spans: list[presses.Press]) -> Real:
