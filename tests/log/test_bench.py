@@ -61,6 +61,20 @@ def test_counts_and_clocks_are_those_of_the_run(log, run_files):
     assert "s" in facts["rig"]["clocks"]
 
 
+def test_every_lock_in_is_joined_with_the_rig(log, run_files, tmp_path):
+    lived = made.run(MADE)
+    noise = np.random.default_rng(1).standard_normal((len(lived.time_s), 2))
+    dead = 41 * np.exp(1e-3 * noise + 0j)  # a shorted sensor on the first lock-in
+    tones = (made.TONES_HZ[:2], made.TONES_HZ)
+    tree = made.tree([dead, lived.impedance_ohm], [lived.time_s] * 2, made.stamps(lived.time_s), tones)
+    scipy.io.savemat(tmp_path / "two.mat", tree)
+    (run,) = take(log, "26 triX .1mm", tmp_path / "two.mat", run_files[1])
+    facts = json.loads(run.facts)
+    assert facts["rig"]["offset_s"] == pytest.approx(OFFSET_S + 0.03, abs=4 * facts["rig"]["offset_error_s"])
+    marked = [lockin["counts"]["rig error"] for lockin in facts["lockins"]]
+    assert marked[0] == marked[1] == facts["rig"]["samples"] > 10
+
+
 def test_columns_of_csv_by_other_names_are_kept_to_read_it_again(run, path, run_files, tmp_path):
     lived = made.run(MADE, tones_hz=made.TONES_HZ[:1])
     rows = zip(lived.time_s, lived.impedance_ohm[:, 0], strict=True)

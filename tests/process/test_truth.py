@@ -4,7 +4,6 @@ import made
 import numpy as np
 import pytest
 import scipy.io as sio
-from scipy.signal import lfilter
 
 from sensorgen.card.fisher import bounds, slopes
 from sensorgen.invert import Estimator
@@ -97,18 +96,23 @@ def test_force_and_position_come_back_whatever_the_drift_follows(law):
     assert max(found) < 1.5
 
 
-def test_what_the_film_forgets_between_presses_is_no_drift_and_stays():
-    """Creep under the tip itself, a hundredth of C per newton with a minute to it: no fit of the rest knows of it."""
-    rate = np.exp(-1 / (RATE * 60))
-    found = off_over_bound(lambda _, f: 0.01 * lfilter([1 - rate], [1, -rate], f))
-    assert 5 < found[0] < 50
+@pytest.mark.parametrize("tau_s", [2.0, 60.0])
+def test_what_a_film_remembers_of_the_presses_goes_out_with_its_law_and_no_other(tau_s):
+    law = made.answering(0.01, tau_s)
+    assert max(off_over_bound(law)) < 1.5
+    assert off_over_bound(law, ["smooth"])[0] > 10
 
 
-def off_over_bound(law):
+def test_what_wanders_goes_straight_from_rest_to_rest():
+    law = made.walking(0.02)
+    assert off_over_bound(law)[0] < 0.7 * off_over_bound(law, ["smooth"])[0]
+
+
+def off_over_bound(law, among=tuple(drift.LAWS)):
     """Root mean square errors of force and position over the Cramer-Rao bound, drift fitted and taken out."""
     truth = made.run(MADE, RATE, NOISE, seed=5, law=law)
     every = np.ones(len(truth.time_s), bool)
-    fit = drift.fitted(truth.time_s, truth.impedance_ohm, every, truth.force_n)
+    fit = drift.fitted(truth.time_s, truth.impedance_ohm, every, truth.force_n, among=among)
     clean = fit.removed(truth.time_s, truth.impedance_ohm) * truth.clean_ohm[0] / fit.rest_ohm()
     spans = presses.pressed(truth.time_s, truth.force_n)
     found = presses.pairs(truth.time_s, clean, every, spans, truth.force_n, truth.position_mm)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 from sensorgen.models.compression import unconfined
 from sensorgen.sensor import Sensor
@@ -48,11 +49,22 @@ def force_at(time_s, made, ramp_s=0.2):
     return force, position
 
 
-def run(made, rate_hz=140.0, noise=1e-3, creep=0.0, slope_per_s=0.0, seed=1, of=None, tones_hz=TONES_HZ, law=None):
+def run(
+    made,
+    rate_hz=140.0,
+    noise=1e-3,
+    creep=0.0,
+    slope_per_s=0.0,
+    seed=1,
+    of=None,
+    tones_hz=TONES_HZ,
+    law=None,
+    ramp_s=0.2,
+):
     of = of or sensor()
     rng = np.random.default_rng(seed)
     time = np.arange(round((made[-1][1] + 4) * rate_hz)) / rate_hz
-    force, position = force_at(time, made)
+    force, position = force_at(time, made, ramp_s)
     pressed, unpressed = force > 0, of.impedance(tones_hz, 0.0, 0.05)
     clean = np.tile(unpressed, (len(time), 1))
     clean[pressed] = of.impedance(tones_hz, force[pressed, None], position[pressed, None] * 1e-3)
@@ -67,6 +79,25 @@ def run(made, rate_hz=140.0, noise=1e-3, creep=0.0, slope_per_s=0.0, seed=1, of=
     return Run(time, force, position, clean, drift, z, made)
 
 
+def answering(share_per_n, tau_s):
+    """A film that creeps under the tip, and forgets, with one time constant."""
+
+    def law(time_s, force_n):
+        kept = np.exp(-(time_s[1] - time_s[0]) / tau_s)
+        return share_per_n * lfilter([(1 - kept) / 2] * 2, [1, -kept], force_n)
+
+    return law
+
+
+def walking(share, seed=7):
+    """A film that wanders at random, by that share in a standard deviation at the end."""
+
+    def law(time_s, _):
+        return share * np.random.default_rng(seed).standard_normal(len(time_s)).cumsum() / np.sqrt(len(time_s))
+
+    return law
+
+
 def stamps(time_s, seed=2, jitter_s=0.005, skew=0.0, late_s=0.03, block=BLOCK):
     """As the instrument's program makes them: a block's first by the computer's clock, the rest by counting on."""
     rng = np.random.default_rng(seed)
@@ -77,12 +108,12 @@ def stamps(time_s, seed=2, jitter_s=0.005, skew=0.0, late_s=0.03, block=BLOCK):
     return EPOCH_S + (1 + skew) * time_s[first] + late_s + lag + inside
 
 
-def rig_rows(made, offset_s=0.0, skew=0.0, rate_hz=20.0, seed=3, noise_n=0.02, end_s=None):
+def rig_rows(made, offset_s=0.0, skew=0.0, rate_hz=20.0, seed=3, noise_n=0.02, end_s=None, ramp_s=0.2):
     """Columns of the rig's log; its clock shows ``offset_s`` less than real time in the middle of the run."""
     rng = np.random.default_rng(seed)
     end = end_s or made[-1][1] + 4
     time = np.arange(0, end, 1 / rate_hz)
-    force, position = force_at(time, made)
+    force, position = force_at(time, made, ramp_s)
     told = np.zeros_like(time)
     for start, stop, f, _ in made:
         told[(time >= start) & (time < stop)] = f

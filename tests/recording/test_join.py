@@ -1,12 +1,14 @@
 """Recording and rig's log on one time, with offsets that are known."""
 
+from dataclasses import replace
+
 import made
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from sensorgen.errors import BadInput
-from sensorgen.recording import Clock, Recording, Source, join, joined, rig
+from sensorgen.recording import Clock, Recording, Source, joined, joined_all, offset, rig
 from sensorgen.recording.clock import rebuilt
 from sensorgen.recording.samples import blank, sifted
 
@@ -49,6 +51,30 @@ def test_errors_of_the_offset_are_what_they_say(tmp_path):
         found = joined(recording(one), log)
         pulls.append((found.offset_s - 1.03) / found.offset_error_s)
     assert 0.15 < np.sqrt(np.mean(np.square(pulls))) < 1.8
+
+
+def test_lock_ins_share_the_clock_of_the_one_that_tells_it_best(tmp_path, run):
+    log = rig(made.write_rig(tmp_path / "rig.csv", made.rig_rows(MADE, 3.217, skew=2e-4), {90: "stalled"}))
+    good = recording(run, stamped=False)
+    half = len(run.time_s) // 2
+    noise = np.random.default_rng(1).standard_normal((len(run.time_s), 7))
+    deaf = replace(good, impedance_ohm=41 * np.exp(1e-3 * noise + 0j))
+    dead = replace(good, impedance_ohm=np.full_like(good.impedance_ohm, 41))
+    short = Recording(
+        run.time_s[:half], good.tones_hz[:2], good.impedance_ohm[:half, :2], blank(half), good.clock, good.source
+    )
+    alone = joined(good, log)
+    found = joined_all((deaf, short, dead, good), log)
+    assert {one.offset_s for one in found} == {alone.offset_s}
+    assert [one.recording.tones_hz.size for one in found] == [7, 2, 7, 7]
+    for one in found:
+        count = len(one.recording.time_s)
+        np.testing.assert_allclose(one.force_n, alone.force_n[:count])
+        assert one.recording.counts()["rig error"] == np.count_nonzero(alone.recording.marks["rig error"][:count])
+    with pytest.raises(BadInput, match="too little to find the offset"):
+        joined_all((deaf, deaf), log)
+    with pytest.raises(BadInput, match="all the same"):
+        joined_all((dead, dead), log)
 
 
 def test_a_skew_of_the_rigs_clock_is_found(tmp_path):
@@ -140,7 +166,7 @@ def test_errors_of_weights_hold_for_noise_that_hangs_together():
             noise[k] = 0.7 * noise[k - 1] + white[k]
         weights = np.linalg.lstsq(model, noise, rcond=None)[0]
         found.append(weights[-2:])
-        said.append(np.sqrt(np.diag(join._covariance(model, noise - model @ weights))))
+        said.append(np.sqrt(np.diag(offset._covariance(model, noise - model @ weights))))
     np.testing.assert_allclose(np.mean(said, axis=0), np.std(found, axis=0), rtol=0.15)
 
 

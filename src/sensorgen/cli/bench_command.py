@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sensorgen import units
-from sensorgen.cli import bench_show, show
+from sensorgen.cli import bench_hysteresis, bench_live, bench_sets, bench_show, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Values, one
 from sensorgen.errors import BadInput, OutOfRange
@@ -117,4 +117,5 @@ command.add_command(
         short_help="Write random presses, seeded, inside the sensor.",
     )
 )  # fmt: skip
-command.add_command(bench_show.command)
+for _each in (bench_show, bench_hysteresis, bench_sets, bench_live):
+    command.add_command(_each.command)

@@ -9,26 +9,25 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sensorgen import units
-from sensorgen.cli import show
+from sensorgen.cli import bench_opened, show
 from sensorgen.cli.log_text import counted, rig_counted, visible
 from sensorgen.cli.log_words import as_json as json_option
-from sensorgen.cli.log_words import columns_of, lcr_columns, made, opened, rig_columns, where
+from sensorgen.cli.log_words import made
 from sensorgen.cli.words import Values, one
 from sensorgen.errors import BadInput
 
 if TYPE_CHECKING:
     from sensorgen.process.presses import Pairs
     from sensorgen.process.run import Processed
-    from sensorgen.recording import Recording, RigLog
+    from sensorgen.recording import RigLog
     from sensorgen.recording.samples import Complex, Real
 
 _WIDE = 13  # letters of a column
 
 
 def _show(
-    what: str, rig_file: str | None, file: str | None, lockin: int | None, cutoff_hz: tuple[float, ...] | None, *,
-    columns: tuple[str, ...], rig_columns: tuple[str, ...], keep_drift: bool, presses: str | None,
-    filtered: str | None, plot: str | None, as_json: bool,
+    what: str, rig_file: str | None, cutoff_hz: tuple[float, ...] | None, presses: str | None, filtered: str | None,
+    plot: str | None, *, as_json: bool, **how: Any,
 ) -> None:  # fmt: skip
     """Show what a recording says: samples and marks, clocks, drift, and what each press changes.
 
@@ -36,45 +35,17 @@ def _show(
     looked for in the readings, and their forces are not known. Differences are pressed less before, of means over a
     second, with their standard errors.
     """
-    from sensorgen.process import lowpass, run
+    from sensorgen.process import lowpass
 
-    found, rig = _opened(what, rig_file, columns, rig_columns, file)
     cutoff = one("--cutoff", cutoff_hz) if cutoff_hz else lowpass.CUTOFF_HZ
-    worked = run.processed(_chosen(found, lockin), rig, remove_drift=not keep_drift, cutoff_hz=cutoff)
-    name = what if found[0].source.file == Path(what).name else f"recording {what}"
+    worked, rig = bench_opened.worked_up(what, rig_file, cutoff_hz=cutoff, **how)
+    name = bench_opened.name_of(what)
     files = [*_tables(worked, presses, filtered), *(_drawn(worked, name, Path(plot)) if plot else ())]
     if as_json:
         show.as_json(_data(worked, rig) | {"files": files})
         return
     for line in (*_lines(worked, rig), *files):
         click.echo(visible(line))
-
-
-def _opened(
-    what: str, rig_file: str | None, columns: tuple[str, ...], rig_columns: tuple[str, ...], file: str | None
-) -> "tuple[tuple[Recording, ...], RigLog | None]":
-    """Recordings and the rig's log, from files or by their number in the log."""
-    from sensorgen import recording
-    from sensorgen.log import BenchRun, bench
-
-    if not (what.isascii() and what.isdigit()) or Path(what).is_file():
-        read = recording.read_all(what, columns_of(columns, "--column"))
-        return read, recording.rig(rig_file, columns_of(rig_columns, "--rig-column")) if rig_file else None
-    if rig_file or columns or rig_columns:
-        raise BadInput(f"recording {what} of the log has its rig's log and columns; expected no others beside it")
-    with opened(file) as log:
-        entry = next(log.entries(BenchRun, superseded=True, number=int(what)), None)
-        if entry is None:
-            raise BadInput(f"no recording {what} in {str(log.path)!r}; sensorgen log list shows their numbers")
-        return bench.reopened(log, entry)
-
-
-def _chosen(found: "tuple[Recording, ...]", lockin: int | None) -> "Recording":
-    if lockin is None and len(found) > 1:
-        raise BadInput(f"{len(found)} lock-ins; choose one with --lockin 1 to {len(found)}")
-    if lockin is not None and lockin > len(found):
-        raise BadInput(f"--lockin {lockin}: expected 1{f' to {len(found)}' if len(found) > 1 else ', the only one'}")
-    return found[(lockin or 1) - 1]
 
 
 def _lines(worked: "Processed", rig: "RigLog | None") -> Iterator[str]:
@@ -86,6 +57,7 @@ def _lines(worked: "Processed", rig: "RigLog | None") -> Iterator[str]:
     yield from (f"{'':11}{note}" for note in worked.notes)
     if worked.drift:
         yield f"{'drift':11}{_drifted(worked):.2%} of Z over the run, fitted to the rest, taken out of the presses"
+        yield f"{'':11}{worked.drift.law}: {worked.drift.reason}"
     if worked.pairs is not None:
         how = "" if worked.by_force else ", found by the readings alone"
         yield f"{'presses':11}{len(worked.pairs.time_s)}{how}; ΔR and ΔX [ohm], standard errors in brackets"
@@ -138,7 +110,7 @@ def _data(worked: "Processed", rig: "RigLog | None") -> dict[str, Any]:
         "file": one.source.file, "lockin": one.source.lockin, "program": one.source.program or one.source.format,
         "rate_hz": one.source.rate_hz, "tones_hz": one.tones_hz.tolist(), "counts": one.counts(),
         "rig": rig.counts() if rig else None, "notes": list(worked.notes), "by_force": worked.by_force,
-        "drift": _drifted(worked) if worked.drift else None,
+        "drift": _drifted(worked) if worked.drift else None, "drift_law": worked.drift.law if worked.drift else None,
         "presses": [] if pairs is None else [_press(pairs, i) for i in range(len(pairs.time_s))],
     }  # fmt: skip
 
@@ -208,17 +180,13 @@ command = made(
     _show, "show", "Show a recording: its marks, presses and what they change.",
     click.Argument(["what"], metavar="RECORDING_FILE|NUMBER"),
     click.Option(["--rig", "rig_file"], metavar="FILE", help="The rig's log that belongs to RECORDING_FILE."),
-    lcr_columns(),
-    rig_columns(),
-    click.Option(["--lockin"], type=click.IntRange(1), help="Which one, if the file has several."),
     click.Option(
         ["--cutoff", "cutoff_hz"], type=Values(units.FREQUENCY_HZ, zero=False), metavar="HZ",
         help="Of the low-pass; the thesis's 0.2727 Hz if not given.",
     ),
-    click.Option(["--keep-drift"], is_flag=True, help="Leave the drift in the presses' readings."),
     click.Option(["--presses"], metavar="FILE.csv", help="Write readings under the presses, as 'invert' takes them."),
     click.Option(["--filtered"], metavar="FILE.csv", help="Write the low-passed readings, their drift left in."),
     click.Option(["--plot"], metavar="DIR", help="Draw readings over time and surfaces of the differences there."),
-    where(),
+    *bench_opened.options(),
     json_option(),
 )  # fmt: skip

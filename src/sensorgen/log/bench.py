@@ -127,8 +127,11 @@ def _facts(lcr: tuple[Path, Columns], rig: tuple[Path | None, Columns]) -> dict[
     facts: dict[str, Any] = {"columns": dict(lcr[1]), "lockins": [_of_recording(r) for r in found]}
     if rig[0]:
         log = recording.rig(rig[0], rig[1])
+        joined = recording.joined_all(found, log)
         facts["rig_columns"] = dict(rig[1])
-        facts["rig"] = {**log.counts(), **_of_joined(recording.joined(found[0], log))}
+        facts["rig"] = {**log.counts(), **_of_joined(joined[0])}
+        for said, one in zip(facts["lockins"], joined, strict=True):
+            said["counts"] = one.recording.counts()
     return facts
 
 

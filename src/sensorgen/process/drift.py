@@ -1,28 +1,39 @@
-r"""Creep of the elastomer, fitted to the rest between presses and taken out.
+r"""Drift of the elastomer, fitted to the rest between presses and taken out.
 
 Where nothing presses, ln Z moves by
 
-.. math:: \ln Z(t) = a_0 + \sum_{i=1}^{3} a_i t^i + \sum_{k=1}^{5} c_k \ln(1 + t / \tau_k)
+.. math:: \ln Z(t) = a_0 + \sum_i a_i b_i(t) + \sum_k c_k \int_0^t F(s)\, e^{-(t - s)/\tau_k} \frac{ds}{\tau_k} + w(t)
 
-with time constants from a three-hundredth of the run to all of it. An elastomer creeps as a spectrum of relaxations, by
-a power of time or a stretched exponential; five logarithms follow any of them, as one does not, and the polynomial
-follows a room that warms up. The fit is made in ln Z because a permittivity that creeps multiplies Z and does not add
-to it, and taken out of the pressed readings too. What a press leaves behind and the film forgets is no drift.
+with courses b that depend on the time alone, what the film remembers of the presses before, and what wanders: see
+:mod:`sensorgen.process.laws`. Each law has some of these terms. The one is taken that explains the rest with the least
+of Schwarz's criterion (BIC): the logarithm of what is left, and a price for every number that was fitted. The fit is
+made in ln Z because a permittivity that creeps multiplies Z and does not add to it, and taken out of the pressed
+readings too.
 """
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from sensorgen.errors import BadInput
+from sensorgen.errors import BadInput, UnknownName
+from sensorgen.process import laws
 from sensorgen.recording.samples import Bools, Complex, Real
 
 SETTLE_S = 1.0
-_TAUS = 5
-_FASTEST = 300.0  # of the run: a time constant that short is a step
-_POWERS = (1, 2, 3)
+LAWS = {
+    "line": "a straight line over time",
+    "smooth": "a cubic and five logarithms of time",
+    "memory": "smooth, and what the film remembers of the presses before",
+    "wandering": "smooth, and what wanders from rest to rest",
+    "memory+wandering": "smooth, what the film remembers of the presses before, and what wanders from rest to rest",
+}
+"""Laws of drift by their names, and what each means."""
+
+BY_TIME = ("line", "smooth", "wandering")
+"""Laws that ask for no force."""
+
 _LEAST = 100
-_SAME = 1e-10  # of the largest singular value: what is smaller is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,24 +42,24 @@ class Drift:
 
     Attributes
     ----------
+    law : str
+        Of :data:`LAWS`.
+    reason : str
+        Why this one, in words.
     start_s : float
         When the readings began [s].
-    seconds : float
-        How long they went on [s].
-    weights : (9, m) array
-        Of every tone, complex, of ln abs(Z) and of the phase: a, with t as a share of ``seconds``, and c.
-    scatter : (m,) array
-        What is left of ln Z at rest, root mean square, each part apart in the real and the imaginary part.
+    fit : Fit
+        The law with its numbers: ln Z at rest, at any time.
     """
 
+    law: str
+    reason: str
     start_s: float
-    seconds: float
-    weights: Complex
-    scatter: Complex
+    fit: laws.Fit
 
     def at(self, time_s: Real) -> Complex:
         """Relative drift of ln Z since the begin (n, m), at any times [s]."""
-        return np.asarray(_basis(time_s - self.start_s, self.seconds)[:, 1:] @ self.weights[1:])
+        return np.asarray(self.fit.at(time_s) - self.fit.at(np.array([self.start_s])))
 
     def removed(self, time_s: Real, impedance_ohm: Complex) -> Complex:
         """Readings as they would be without drift [ohm]."""
@@ -56,10 +67,13 @@ class Drift:
 
     def rest_ohm(self) -> Complex:
         """What the sensor has at rest, when the readings begin (m,) [ohm]."""
-        return np.asarray(np.exp(self.weights[0]))
+        return np.asarray(np.exp(self.fit.at(np.array([self.start_s]))[0]))
 
 
-def fitted(time_s: Real, impedance_ohm: Complex, valid: Bools, force_n: Real, settle_s: float = SETTLE_S) -> Drift:
+def fitted(
+    time_s: Real, impedance_ohm: Complex, valid: Bools, force_n: Real, settle_s: float = SETTLE_S,
+    among: Collection[str] = tuple(LAWS),
+) -> Drift:  # fmt: skip
     """The drift of the rest between presses.
 
     Parameters
@@ -74,23 +88,49 @@ def fitted(time_s: Real, impedance_ohm: Complex, valid: Bools, force_n: Real, se
         What pressed; rest is where it is below a tenth of a newton, and was for ``settle_s`` [N].
     settle_s : float
         How long the sensor needs to come back after a press [s].
+    among : collection of str
+        Names of :data:`LAWS` to choose from.
 
     Raises
     ------
     BadInput
-        Too little rest to fit to.
+        Too little rest to fit to, or no law to choose from.
+    UnknownName
+        No such law.
     """
+    for name in among:
+        check(name)
     rest = valid & ~_disturbed(time_s, force_n, settle_s)
     if np.count_nonzero(rest) < _LEAST:
         raise BadInput(f"{np.count_nonzero(rest)} readings at rest; expected {_LEAST} or more to fit a drift to")
-    start = float(time_s[0])
-    t, z = time_s[rest] - start, impedance_ohm[rest]
-    values = np.log(np.abs(z)) + 1j * np.unwrap(np.angle(z), axis=0)
+    z, start = impedance_ohm[rest], float(time_s[0])
+    bins = laws.binned(time_s[rest], np.log(np.abs(z)) + 1j * np.unwrap(np.angle(z), axis=0))
     seconds = max(float(time_s[-1]) - start, 1e-9)
-    weights = np.linalg.lstsq(_basis(t, seconds), values, rcond=_SAME)[0]
-    left = values - _basis(t, seconds) @ weights
-    scatter = np.sqrt((left.real**2).mean(axis=0)) + 1j * np.sqrt((left.imag**2).mean(axis=0))
-    return Drift(start, seconds, weights, scatter)
+    smooth = laws.explained(bins, (laws.Smooth(start, seconds),))
+    found = {"line": laws.explained(bins, (laws.Line(start, seconds),)), "smooth": smooth}
+    if any("memory" in name for name in among):
+        found["memory"] = laws.remembering(bins, smooth, time_s, force_n, settle_s / 2)
+    for name in among:
+        if "wandering" in name:
+            found[name] = laws.wandering(bins, found["memory" if "memory" in name else "smooth"])
+    return _chosen({name: found[name] for name in LAWS if name in among}, start)
+
+
+def check(law: str) -> None:
+    """Refuse what is no name of a law."""
+    if law not in LAWS:
+        raise UnknownName("law of drift", law, LAWS)
+
+
+def _chosen(found: Mapping[str, laws.Fit], start_s: float) -> Drift:
+    """The law that explains the rest best, and by how much."""
+    if not found:
+        raise BadInput(f"no law of drift to choose from; expected some of {', '.join(LAWS)}")
+    scores = {name: fit.bic() for name, fit in found.items()}
+    name = min(scores, key=lambda name: scores[name])
+    others = [f"{other} {scores[other] - scores[name]:.0f}" for other in scores if scores[other] > scores[name]]
+    reason = f"BIC higher of {', '.join(others)}" if others else "no other explains it otherwise"
+    return Drift(name, f"{LAWS[name]} ({reason})", start_s, found[name])
 
 
 def _disturbed(time_s: Real, force_n: Real, settle_s: float) -> Bools:
@@ -99,9 +139,3 @@ def _disturbed(time_s: Real, force_n: Real, settle_s: float) -> Bools:
     last = np.maximum.accumulate(np.where(pressing, time_s, -np.inf))
     coming = np.minimum.accumulate(np.where(pressing, time_s, np.inf)[::-1])[::-1]
     return np.asarray((time_s - last < settle_s) | (coming - time_s < settle_s / 10))
-
-
-def _basis(time_s: Real, seconds: float) -> Real:
-    u = np.maximum(time_s, 0) / seconds
-    taus = np.geomspace(1 / _FASTEST, 1, _TAUS)
-    return np.column_stack([np.ones_like(u), *(u**n for n in _POWERS), *(np.log1p(u / tau) for tau in taus)])

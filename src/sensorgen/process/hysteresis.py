@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sensorgen.errors import BadInput
+from sensorgen.process.presses import THRESHOLD_N, pressed
+from sensorgen.process.run import Processed
 from sensorgen.recording.samples import Real
 
 _FORCES = 41
@@ -63,8 +65,51 @@ def hysteresis(force_n: Real, values: Real) -> Hysteresis:
 
 
 def _way(force_n: Real, values: Real, at: Real) -> Real:
-    """Readings at given forces, of equal forces their mean."""
-    forces, places = np.unique(force_n, return_inverse=True)
+    """Readings at given forces, straight between the means of those that are nearest to each."""
+    step = (at[-1] - at[0]) / (len(at) - 1)
+    _, places = np.unique(np.round((force_n - at[0]) / step), return_inverse=True)
     counts = np.bincount(places)
-    means = [np.bincount(places, column) / counts for column in values.T]
+    forces, *means = (np.bincount(places, column) / counts for column in (force_n, *values.T))
     return np.column_stack([np.interp(at, forces, mean) for mean in means])
+
+
+class Ways(NamedTuple):
+    """Of all presses of a run."""
+
+    ways: dict[float, Hysteresis]
+    """By the begin of the press [s]; columns are R, then X, tone by tone."""
+    left_out: tuple[str, ...]
+    """Presses that do not go up and down again, in words."""
+
+
+def of_presses(worked: Processed, threshold_n: float = THRESHOLD_N) -> Ways:
+    """Hysteresis of every press of a run, its drift taken out.
+
+    Parameters
+    ----------
+    worked : Processed
+        A recording, worked up with the rig's log.
+    threshold_n : float
+        Force from which on the tip presses [N].
+
+    Raises
+    ------
+    BadInput
+        No press that goes up and down again.
+    """
+    one, valid = worked.recording, worked.recording.valid()
+    time, force = one.time_s[valid], worked.force_n[valid]
+    z = one.impedance_ohm[valid]
+    clean = worked.drift.removed(time, z) if worked.drift else z
+    values = np.hstack([clean.real, clean.imag])
+    found: dict[float, Hysteresis] = {}
+    left_out = []
+    for press in pressed(time, force, threshold_n):
+        during = (time >= press.start_s) & (time <= press.end_s)
+        try:
+            found[press.start_s] = hysteresis(force[during], values[during])
+        except BadInput as error:
+            left_out.append(f"left out: press at {press.start_s:.6g} s: {error}")
+    if not found:
+        raise BadInput(left_out[0] if left_out else "nothing pressed")
+    return Ways(found, tuple(left_out))

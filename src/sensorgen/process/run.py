@@ -6,7 +6,7 @@ import numpy as np
 
 from sensorgen.errors import BadInput
 from sensorgen.process import drift, lowpass, presses
-from sensorgen.recording.join import joined
+from sensorgen.recording.join import Joined, joined
 from sensorgen.recording.rig import RigLog
 from sensorgen.recording.samples import Bools, Complex, Real, Recording
 
@@ -19,6 +19,8 @@ class Processed:
     ----------
     recording : Recording
         With the rig's errors among its marks.
+    force_n : (n,) array
+        What pressed at each sample [N]; nan where nobody knows.
     filtered_s, filtered_ohm : (k,), (k, m) array
         Low-passed forward and backward on even steps, drift and all [s], [ohm].
     drift : Drift or None
@@ -32,6 +34,7 @@ class Processed:
     """
 
     recording: Recording
+    force_n: Real
     filtered_s: Real
     filtered_ohm: Complex
     drift: drift.Drift | None
@@ -41,18 +44,22 @@ class Processed:
 
 
 def processed(
-    recording: Recording, rig: RigLog | None = None, *, remove_drift: bool = True, cutoff_hz: float = lowpass.CUTOFF_HZ
-) -> Processed:
+    recording: Recording, rig: RigLog | Joined | None = None, *, remove_drift: bool = True, law: str = "",
+    cutoff_hz: float = lowpass.CUTOFF_HZ,
+) -> Processed:  # fmt: skip
     """Work up a recording.
 
     Parameters
     ----------
     recording : Recording
         What the instrument measured.
-    rig : RigLog or None
-        What pressed; without it, presses are looked for in the readings.
+    rig : RigLog or Joined or None
+        What pressed, or the recording with that beside it already; without it, presses are looked for in the readings.
     remove_drift : bool
         Whether the drift of the rest is fitted and taken out of the presses' readings.
+    law : str
+        That the drift follows, of :data:`sensorgen.process.drift.LAWS`; the one that explains it best if not given.
+        Where no force is known, one that asks for none.
     cutoff_hz : float
         Of the low-pass [Hz].
 
@@ -62,20 +69,26 @@ def processed(
         Clocks that cannot be joined; fewer than 16 samples that count.
     OutOfRange
         A cut-off that is not between 0 and half the sampling rate.
+    UnknownName
+        No such law of drift.
     """
+    if law:
+        drift.check(law)
     notes, one = list(recording.source.notes), recording
     force = position = np.full(len(one.time_s), np.nan)
     if rig is not None:
-        beside = joined(one, rig)
+        beside = joined(one, rig) if isinstance(rig, RigLog) else rig
         one, force, position = beside.recording, beside.force_n, beside.set_position_mm
         notes += [beside.words(), *beside.notes]
     valid = one.valid()
     filtered = lowpass.filtered(one, cutoff_hz)
     spans = presses.pressed(one.time_s, force) if rig else presses.found(one.time_s[valid], one.impedance_ohm[valid])
-    fit = _drift(one, valid, force if rig else _told(one.time_s, spans), notes) if remove_drift and spans else None
+    among = (law,) if law else drift.LAWS if rig else drift.BY_TIME
+    pressing = force if rig else _told(one.time_s, spans)
+    fit = _drift(one, valid, pressing, tuple(among), notes) if remove_drift and spans else None
     clean = fit.removed(one.time_s, one.impedance_ohm) if fit else one.impedance_ohm
     pairs = _pairs(one.time_s, clean, valid, spans, force, position, notes)
-    return Processed(one, *filtered, fit, pairs, rig is not None, tuple(notes))
+    return Processed(one, force, *filtered, fit, pairs, rig is not None, tuple(notes))
 
 
 def _told(time_s: Real, spans: list[presses.Press]) -> Real:
@@ -86,9 +99,9 @@ def _told(time_s: Real, spans: list[presses.Press]) -> Real:
     return found
 
 
-def _drift(one: Recording, valid: Bools, force: Real, notes: list[str]) -> drift.Drift | None:
+def _drift(one: Recording, valid: Bools, force: Real, among: tuple[str, ...], notes: list[str]) -> drift.Drift | None:
     try:
-        return drift.fitted(one.time_s, one.impedance_ohm, valid, force)
+        return drift.fitted(one.time_s, one.impedance_ohm, valid, force, among=among)
     except BadInput as error:
         notes.append(f"drift stays in: {error}")
         return None

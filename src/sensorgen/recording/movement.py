@@ -1,10 +1,13 @@
-"""The direction in which readings of several tones move together."""
+"""The direction in which readings of several tones move together, and what a film makes of a force."""
+
+from collections.abc import Callable
 
 import numpy as np
 
 from sensorgen.errors import BadInput
 from sensorgen.recording.samples import Complex, Real
 
+_GRID_S = 0.02
 _NOISELESS = 1e-9  # of the spread: below it, noise is none
 
 
@@ -33,3 +36,29 @@ def strongest(impedance_ohm: Complex) -> Real:
     channels = channels - basis @ np.linalg.lstsq(basis, channels, rcond=None)[0]
     directions = np.linalg.svd(channels.T @ channels)[2]
     return np.asarray(channels @ directions[0])
+
+
+def slowly(time_s: Real, force_n: Real, tau_s: float) -> Callable[[Real], Real]:
+    r"""A force as a film with one time constant answers to it, :math:`\int F(s) e^{-(t - s)/\tau} ds / \tau`.
+
+    Parameters
+    ----------
+    time_s, force_n : (n,) array
+        What pressed when, rising [s], [N]; between, and where nobody knows, straight lines.
+    tau_s : float
+        The time constant [s].
+
+    Returns
+    -------
+    callable
+        From any times [s] to the answer [N].
+    """
+    from scipy.signal import lfilter
+
+    known = np.isfinite(force_n)
+    if not known.any():
+        return np.zeros_like
+    grid = np.arange(time_s[0], time_s[-1] + _GRID_S, _GRID_S)
+    kept = np.exp(-_GRID_S / tau_s)
+    answer = lfilter([(1 - kept) / 2] * 2, [1, -kept], np.interp(grid, time_s[known], force_n[known]))
+    return lambda at_s: np.interp(at_s, grid, answer)

@@ -1,0 +1,78 @@
+"""Recordings that the commands of ``sensorgen bench`` work with: files with the rig's log, or numbers of the log."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sensorgen.cli.log_words import columns_of, lcr_columns, opened, rig_columns, where
+from sensorgen.errors import BadInput
+
+if TYPE_CHECKING:
+    from sensorgen.process.run import Processed
+    from sensorgen.recording import Recording, RigLog
+
+
+def options() -> list[click.Parameter]:
+    """Words that say which recording is meant, and how it is worked up."""
+    return [
+        lcr_columns(),
+        rig_columns(),
+        click.Option(["--lockin"], type=click.IntRange(1), help="Which one, if the file has several."),
+        click.Option(
+            ["--drift", "law"], metavar="LAW",
+            help="Law that the drift follows, line, smooth, memory, wandering or memory+wandering; the one that "
+            "explains it best if not given.",
+        ),
+        click.Option(["--keep-drift"], is_flag=True, help="Leave the drift in the presses' readings."),
+        where(),
+    ]  # fmt: skip
+
+
+def worked_up(
+    what: str, rig_file: str | None, *, columns: tuple[str, ...], rig_columns: tuple[str, ...], lockin: int | None,
+    law: str | None, keep_drift: bool, file: str | None, **how: Any,
+) -> "tuple[Processed, RigLog | None]":  # fmt: skip
+    """A recording with what pressed, freed of drift, cut into presses; and the rig's log, if there is one."""
+    from sensorgen import recording
+    from sensorgen.process.run import processed
+
+    if keep_drift and law:
+        raise BadInput(f"--keep-drift and --drift {law} at once; expected one of them")
+    found, rig = _opened(what, rig_file, columns, rig_columns, file)
+    which = _chosen(found, lockin)
+    beside = recording.joined_all(found, rig)[which] if rig else None
+    return processed(found[which], beside, remove_drift=not keep_drift, law=law or "", **how), rig
+
+
+def _opened(
+    what: str, rig_file: str | None, columns: tuple[str, ...], rig_columns: tuple[str, ...], file: str | None
+) -> "tuple[tuple[Recording, ...], RigLog | None]":
+    """Recordings and the rig's log, from files or by their number in the log."""
+    from sensorgen import recording
+    from sensorgen.log import BenchRun, bench
+
+    if not (what.isascii() and what.isdigit()) or Path(what).is_file():
+        read = recording.read_all(what, columns_of(columns, "--column"))
+        return read, recording.rig(rig_file, columns_of(rig_columns, "--rig-column")) if rig_file else None
+    if rig_file or columns or rig_columns:
+        raise BadInput(f"recording {what} of the log has its rig's log and columns; expected no others beside it")
+    with opened(file) as log:
+        entry = next(log.entries(BenchRun, superseded=True, number=int(what)), None)
+        if entry is None:
+            raise BadInput(f"no recording {what} in {str(log.path)!r}; sensorgen log list shows their numbers")
+        return bench.reopened(log, entry)
+
+
+def _chosen(found: "tuple[Recording, ...]", lockin: int | None) -> int:
+    """Which of the lock-ins, from 0."""
+    if lockin is None and len(found) > 1:
+        raise BadInput(f"{len(found)} lock-ins; choose one with --lockin 1 to {len(found)}")
+    if lockin is not None and lockin > len(found):
+        raise BadInput(f"--lockin {lockin}: expected 1{f' to {len(found)}' if len(found) > 1 else ', the only one'}")
+    return (lockin or 1) - 1
+
+
+def name_of(what: str) -> str:
+    """What a recording is called in a title: its file, or its number in the log."""
+    return f"recording {what}" if what.isdigit() and not Path(what).is_file() else Path(what).name

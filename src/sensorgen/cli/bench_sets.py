@@ -1,0 +1,129 @@
+"""``sensorgen bench sets``: what presses change, of several recordings on one scale."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sensorgen import units
+from sensorgen.cli import bench_opened, show
+from sensorgen.cli.log_text import visible
+from sensorgen.cli.log_words import as_json as json_option
+from sensorgen.cli.log_words import made
+from sensorgen.errors import BadInput
+
+if TYPE_CHECKING:
+    from sensorgen.process.presses import Pairs
+    from sensorgen.recording.samples import Real
+
+
+def _sets(
+    what: tuple[str, ...], rig_files: tuple[str, ...], output: str | None, plot: str | None, *, together: bool,
+    as_json: bool, **how: Any,
+) -> None:  # fmt: skip
+    """Bring what presses change of several recordings to a scale from 0 to 1, tone by tone, R and X apart.
+
+    0 is the least difference and 1 the largest: of each recording by itself, so that their courses compare, or of all
+    of them --together, so that their sizes do. Files need a --rig each, in the same order; recordings of the log have
+    theirs.
+    """
+    if rig_files and len(rig_files) != len(what):
+        raise BadInput(f"{len(rig_files)} --rig for {len(what)} recordings; expected one each, in the same order")
+    tones, sets = _read(what, rig_files or (None,) * len(what), **how)
+    files = [*_table(sets, tones, output, together=together), *_drawn(sets, tones, plot, together=together)]
+    if as_json:
+        show.as_json({"tones_hz": tones.tolist(), "sets": {k: _data(v) for k, v in sets.items()}, "files": files})
+        return
+    for line in (*_lines(sets, tones), *files):
+        click.echo(visible(line))
+
+
+def _read(what: tuple[str, ...], rigs: tuple[str | None, ...], **how: Any) -> "tuple[Real, dict[str, Pairs]]":
+    """Tones that all sets share, and presses by the names of the sets."""
+    import numpy as np
+
+    tones, found = None, {}
+    for one, rig_file in zip(what, rigs, strict=True):
+        worked, rig = bench_opened.worked_up(one, rig_file, **how)
+        name = bench_opened.name_of(one)
+        if rig is None or worked.pairs is None:
+            raise BadInput(f"{one}: {worked.notes[-1] if rig else 'no log of a rig, so that its forces are not known'}")
+        if tones is not None and not np.array_equal(tones, worked.recording.tones_hz):
+            raise BadInput(f"{one} has tones of {worked.recording.tones_hz.tolist()} Hz; expected {tones.tolist()}")
+        if name in found:
+            raise BadInput(f"{name!r} twice; expected each recording once")
+        tones, found[name] = worked.recording.tones_hz, worked.pairs
+    return np.asarray(tones), found
+
+
+def _lines(sets: "Mapping[str, Pairs]", tones_hz: "Real") -> Iterator[str]:
+    """A line for each set: from which to which difference, at the first and at the last tone."""
+    ends = sorted({0, len(tones_hz) - 1})
+    heads = [f"Δ{part} {units.frequency_text(float(tones_hz[k]))} [ohm]" for k in ends for part in "RX"]
+    yield f"{'presses':>7}" + "".join(f" {head:>22}" for head in heads) + "  set"
+    for name, pairs in sets.items():
+        z = pairs.difference_ohm
+        spans = (part[:, k] for k in ends for part in (z.real, z.imag))
+        said = (f" {f'{span.min():.4g} to {span.max():.4g}':>22}" for span in spans)
+        yield f"{len(z):7}" + "".join(said) + f"  {name}"
+
+
+def _data(pairs: "Pairs") -> dict[str, Any]:
+    """For programs: the differences as they are; ``-o`` writes them on their scale."""
+    z = pairs.difference_ohm
+    return {
+        "force_n": pairs.force_n.tolist(), "position_mm": pairs.position_mm.tolist(),
+        "difference_re_ohm": z.real.tolist(), "difference_im_ohm": z.imag.tolist(),
+    }  # fmt: skip
+
+
+def _table(sets: "Mapping[str, Pairs]", tones_hz: "Real", output: str | None, *, together: bool) -> list[str]:
+    """Write a row for each press of each set, on their scale."""
+    if output is None:
+        return []
+    import csv
+    import io
+
+    import numpy as np
+
+    from sensorgen import store
+    from sensorgen.process.surfaces import normalised
+
+    scaled = [
+        normalised([getattr(pairs.difference_ohm, part) for pairs in sets.values()], together=together)
+        for part in ("real", "imag")
+    ]
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    names = [f"{part}_share_{units.frequency_text(float(f))}" for part in ("re", "im") for f in tones_hz]
+    rows.writerow(["set", "time_s", "force_n", "position_mm", *names])
+    for (name, pairs), re, im in zip(sets.items(), *scaled, strict=True):
+        for row in np.column_stack([pairs.time_s, pairs.force_n, pairs.position_mm, re, im]).tolist():
+            rows.writerow([name, *(f"{value:.9g}".replace("nan", "") for value in row)])
+    store.replace(Path(output), text.getvalue().encode())
+    return [output]
+
+
+def _drawn(sets: "Mapping[str, Pairs]", tones_hz: "Real", plot: str | None, *, together: bool) -> list[str]:
+    if plot is None:
+        return []
+    from sensorgen import store
+    from sensorgen.plots import bench
+
+    if not plot.lower().endswith(".png"):
+        raise BadInput(f"--plot {plot}: expected a file that ends in .png")
+    store.replace(Path(plot), bench.normalised_differences(sets, tones_hz, together=together))
+    return [plot]
+
+
+command = made(
+    _sets, "sets", "Compare what presses change of several recordings.",
+    click.Argument(["what"], metavar="RECORDING_FILE|NUMBER ...", nargs=-1, required=True),
+    click.Option(["--rig", "rig_files"], metavar="FILE", multiple=True, help="A rig's log for each RECORDING_FILE."),
+    click.Option(["--together"], is_flag=True, help="One scale for all, so that sizes compare."),
+    *bench_opened.options(),
+    click.Option(["--output", "-o"], metavar="FILE.csv", help="Write a row per press, on its scale."),
+    click.Option(["--plot"], metavar="FILE.png", help="Draw them over the force, tone by tone."),
+    json_option(),
+)  # fmt: skip
