@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from sensorgen.gcode.found import Found, error
 from sensorgen.gcode.heat import Heaters, known_tool, tool_there
-from sensorgen.gcode.motion import macro_name
 from sensorgen.gcode.moves import NO_TOOL, Change, Event, Motion
+from sensorgen.gcode.reading import macro_name
 from sensorgen.gcode.remarks import PRUSA
 from sensorgen.printer import Printer
 
@@ -59,7 +59,7 @@ class _Simulation:
         self.motion, self.machine, self.control = motion, machine, machine.control
         self.pushes = np.flatnonzero(motion.filament_mm != 0)
         self.prints = np.flatnonzero(motion.extruded_mm > 0)
-        self.travels = np.flatnonzero(motion.length_mm() > 0)
+        self.travels = np.flatnonzero(motion.length_mm > 0)
         self.changes = {change.number: change for change in motion.changes}
         start = machine.tool_at_start()
         self.tool = NO_TOOL if start is None else start
