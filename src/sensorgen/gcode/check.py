@@ -70,5 +70,5 @@ def check(
     loads = dict(loaded or {})
     found = [*limits.check(motion, machine), *commands.check(motion, machine)]
     if others_empty:
-        found += commands.check_loaded(motion, loads)
+        found += limits.check_loaded(motion, loads)
     return Checked(merged(found), report(motion, machine, loads))

@@ -1,13 +1,13 @@
 """What the moves of a file ask of the axes: each rule looks at all moves at once."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.gcode.found import Found
-from sensorgen.gcode.moves import Motion
+from sensorgen.gcode.found import Found, error
+from sensorgen.gcode.moves import NO_TOOL, Motion
 from sensorgen.gcode.words import Command
 from sensorgen.printer import Printer
 
@@ -32,6 +32,23 @@ def check(motion: Motion, machine: Printer) -> Iterator[Found]:
     """
     for rule in RULES:
         yield from rule(motion, machine)
+
+
+def check_loaded(motion: Motion, loaded: Mapping[int, str]) -> Iterator[Found]:
+    """Refuse lines of tools on which there is nothing.
+
+    Parameters
+    ----------
+    motion : Motion
+        The file.
+    loaded : mapping of int to str
+        Material of each tool that has one.
+    """
+    tools = motion.tools.column(len(motion.rows), NO_TOOL)
+    for tool in np.setdiff1d(tools[motion.extruded_mm > 0], [NO_TOOL, *loaded]).astype(int).tolist():
+        number = int(motion.number[np.flatnonzero((tools == tool) & (motion.extruded_mm > 0))[0]])
+        known = ", ".join(f"{name} on {one}" for one, name in loaded.items())
+        yield error("tool", number, f"tool {tool} prints, and nothing is on it; loaded are {known}", "use another tool")
 
 
 def _found(motion: Motion, wrong: Mask, rule: str, severity: str, message: str, advice: str) -> Iterator[Found]:

@@ -62,6 +62,8 @@ class _Steps:
         far = ~(np.abs(rows[:, :9]) < MOST_MM).all(axis=1)
         rows[far, :9] = np.clip(rows[far, :9], -MOST_MM, MOST_MM)
         faults = [Fault(int(number), "a number beyond all measure") for number in rows[far, 9][:1]]
+        back = self.moves & (self.code < 2) & ~np.isnan(self.words["R"])
+        faults += [Fault(n >> SHIFT, "R of G0 or G1 goes by a stored place") for n in self.place[back].tolist()]
         arcs, wrong = self._arcs(rows)
         return Motion(
             rows, arcs, self._events(), self._changes(), self._track(said.tools), tuple(said.kinds),

@@ -167,6 +167,8 @@ class Reading:
 
     def _move(self, command: Command, place: int) -> None:
         numbers = [self._number(command, letter, place) for letter in columns.WORDS]
+        if command.has("H") and command.number("H") != 0:
+            self._fault(place, f"H{command.text('H')} of {command.code}: an axis goes until it meets something")
         self._put(place, float(command.code[1:]), numbers)
 
     def _place(self, command: Command, place: int) -> None:
