@@ -12,7 +12,7 @@ import numpy as np
 from sensorgen import materials, store, threemf
 from sensorgen.design import Design, Infill
 from sensorgen.errors import BadInput, SlicerFailed, UnknownName
-from sensorgen.gcode.files import lines_of
+from sensorgen.gcode.files import text_of
 from sensorgen.gcode.motion import follow
 from sensorgen.gcode.moves import Motion
 from sensorgen.gcode.paths import Paths, paths_of
@@ -170,9 +170,10 @@ def _make_ready(raw: Path, made: Path, machine: Printer) -> Motion:
     Unwritable
         The place cannot be written to, or the disk is full.
     """
-    motion = follow(lines_of(raw))
+    text = text_of(raw)
+    motion = follow(text)
     with store.replacing(made) as file:
-        file.writelines(line.encode("utf-8", "surrogateescape") for line in ready(lines_of(raw), motion, machine))
+        file.writelines(ready(text, motion, machine))
     return motion
 
 

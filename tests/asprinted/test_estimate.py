@@ -8,7 +8,6 @@ from sensorgen import design
 from sensorgen.asprinted import window
 from sensorgen.asprinted.estimate import estimate, layers
 from sensorgen.asprinted.strips import NoStrips, Strips, drawn, scene_of
-from sensorgen.checks.slices import Slices
 from sensorgen.errors import UnknownName
 from sensorgen.models import columns
 from sensorgen.scene import Body, Prism, Scene, area_mm2, box
@@ -36,7 +35,7 @@ def tri(quality="fine", orientation="as-drawn", **more):
 
 def one_period(d, walls):
     scene = d.printed
-    plan = window.window(drawn(scene, Slices(scene, d.layers)), scene)
+    plan = window.window(drawn(scene, d.layers), scene)
     found = window.cut(layers(scene, d.machine, d.layers, walls), plan)
     return scene_of(found, replace(scene, size_mm=(*plan.sides_mm(), scene.size_mm[2]))), plan
 
@@ -136,7 +135,7 @@ def test_an_unknown_way_of_walls():
 
 def test_a_window_is_the_whole_where_nothing_repeats():
     d = design.make({"shape": "tri", "parameters": {"length_mm": 2.0}})
-    plan = window.window(drawn(d.printed, Slices(d.printed, d.layers)), d.printed)
+    plan = window.window(drawn(d.printed, d.layers), d.printed)
     assert (plan.x_mm, plan.y_mm) == ((0.0, 2.0), (0.0, 10.0))
 
 

@@ -6,12 +6,11 @@ import pytest
 
 from sensorgen.asprinted.strips import drawn
 from sensorgen.asprinted.tally import findings, tally
-from sensorgen.checks.slices import Slices
 from sensorgen.design import make
 
 DESIGN = make({"shape": "tri", "parameters": {"length_mm": 12.0, "width_mm": 8.0}})
 BODY, LAYER = "top_electrode_with_cogs", 8  # cogs of six periods, from 0.8 to 0.9 mm
-PLAN = drawn(DESIGN.printed, Slices(DESIGN.printed, DESIGN.layers))
+PLAN = drawn(DESIGN.printed, DESIGN.layers)
 RUNS = PLAN[LAYER].runs[BODY]
 
 

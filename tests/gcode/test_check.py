@@ -99,6 +99,41 @@ PLANTED = [
     ("macro", MAKER, "G32", 'G32\nM98 P"mine.g"'),
     ("relative", MAKER, "G90", "G91"),
     ("relative", MAKER, "G1 X180 Y85 Z200 F12000 ; End", "G91"),
+    ("effect", OWN, "T4", "T4\nM221 S95"),
+    ("effect", OWN, "T4", "T4\nM221 D1 S105\nM221 D0 S100"),
+    ("effect", OWN, "G54", "G55"),
+    ("effect", OWN, "G54", "G59.3"),
+    ("effect", OWN, "G54", "G10 L2 P1 X10"),
+    ("effect", OWN, "G54", "G10 L20 P1 X0 Y0"),
+    ("effect", OWN, "T4", "G10 P4 Z-0.3\nT4"),
+    ("effect", OWN, "T4", "T4\nG68 X0 Y0 R30"),
+    ("effect", OWN, "T4", "T4\nM579 X1.01 Y1.01"),
+    ("effect", OWN, "T4", "T4\nM556 S100 X0.5"),
+    ("effect", OWN, "T4", "T4\nM206 Z-0.2"),
+    ("effect", OWN, "T4", "T4\nM92 E840"),
+    ("effect", OWN, "T4", "T4\nM200 D1.75"),
+    ("effect", OWN, "T4", "T4\nM563 P4 D0 H1"),
+    ("effect", OWN, "T4", "T4\nM564 S0 H0"),
+    ("effect", OWN, "T4", "T4\nM567 P4 E0.5:0.5"),
+    ("effect", OWN, "T4", "T4\nM592 D1 A0.01 B0.001"),
+    ("effect", OWN, "T4", "T4\nM669 K1"),
+    ("effect", OWN, "T4", "T4\nG93"),
+    ("effect", OWN, "T4", "T4\nM37 S1"),
+    ("effect", OWN, "T4", "T4\nM28 other.g"),
+    ("effect", OWN, "T4", "T4\nM453"),
+    ("end", OWN, "T4", "T4\nM112"),
+    ("end", OWN, "G28", "M999"),
+    ("end", OWN, "T4", "T4\nM81"),
+    ("end", OWN, "T4", "T4\nM99"),
+    ("end", OWN, "T4", "T4\nM2"),
+    ("macro", OWN, "T4", "M32 other.g\nT4"),
+    ("macro", OWN, "T4", 'M701 S"etpu"\nT4'),
+    ("home", OWN, "T4", "M84\nT4"),
+    ("home", OWN, "T4", "M18 Y\nT4"),
+    ("level", OWN, "T4", "M561\nT4"),
+    ("read", OWN, "T4", "T4\nG5 X10 Y10 I1 J1 P1 Q1"),
+    ("read", OWN, "G1 X5 Y5 F7200", "G1 R1 X5 Y5 F7200"),
+    ("read", OWN, "G1 X5 Y5 F7200", "G1 H2 X5 Y5 F7200"),
     ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Ynan E.2 F1200"),
     ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X-nan Y5 E.2 F1200"),
     ("read", OWN, "G1 X15 Y5 E.2 F1200", "G1 X15 Y5 E.2 F1200 \N{DEGREE SIGN}"),
@@ -144,6 +179,13 @@ def test_a_finding_names_the_line():
         (OWN, "M106 P3 S255", "M106 S255"),
         (OWN, "M568 P4 A2", 'M291 P"Go on; it\'s fine?" S3'),
         (OWN, "M116", "M25"),
+        (OWN, "T4", "M221 S95\nM221 S100\nT4"),
+        (OWN, "T4", "M221 S100\nM221\nM92\nM579 X1 Y1\nM206 X0\nM200 D0\nM564 S1 H1\nM37 S0\nT4"),
+        (OWN, "T4", "G55\nG1 X3\nG54\nG68 R9\nG69\nG93\nG94\nM453\nM451\nT4"),
+        (OWN, "T4", "M84 S600\nM84 E\nM290 S0 R0\nM220 S100\nG53 G1 X3\nG17\nT4"),
+        (OWN, "T4", "G10 L2 P1 X0 Y0\nM204 P500\nM566 X300\nM572 D1 S0\nM207 S2\nT4"),
+        (OWN, "G28", "M221 S95\nG28\nM84\nM561"),
+        (OWN, "M0 H1", "M0 H1\nM81"),
         (OWN, "G1 X5 Y5 F7200", "G10\nG1 X5 Y5 F7200\nG11"),
         (OWN, "G1 X5 Y5 F7200", "G1 X208 Y-90 F7200"),
         (OWN, "G1 X5 Y5 F7200", "G1 X5 Y5 F20000"),
@@ -210,6 +252,25 @@ def test_a_file_that_changes_the_machine_is_warned_of():
     assert [(f.rule, f.severity, f.line) for f in result.findings] == [
         ("settings", "warning", line + OWN.splitlines().index("M501") + 2) for line in (0, 1)
     ]
+
+
+@pytest.mark.parametrize(
+    ("line", "rule", "severity"),
+    [
+        ("M220 S150", "speed", "warning"), ("M121", "modes", "warning"), ("T4 P0", "tool-change", "warning"),
+        ("M290 S0.3 R0", "height", "warning"), ("M290 S0", "height", "warning"), ("M226", "pause", "info"),
+        ("M303 H1 S200", "settings", "warning"), ("M500", "settings", "warning"),
+    ],
+)  # fmt: skip
+def test_what_may_be_meant_is_told(line, rule, severity):
+    assert (rule, severity) in found(changed(OWN, "T4", f"T4\n{line}"))
+    assert errors(changed(OWN, "T4", f"T4\n{line}")) == set()
+
+
+def test_an_effect_is_told_once_where_it_starts():
+    lines = changed(OWN, "T4", "T4\nM221 S95\nM221 S90")
+    (fault,) = check(lines, DIABASE).errors()
+    assert (lines[fault.line - 1], "M221 S90" in fault.message) == ("M221 S90\n", True)
 
 
 def test_a_file_without_its_end_is_warned_of():

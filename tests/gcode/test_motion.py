@@ -4,8 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from sensorgen.gcode import paths
 from sensorgen.gcode.motion import follow
+from sensorgen.gcode.words import parse
+from sensorgen.printer import load_printer
 
 R = "M83"
 
@@ -23,9 +28,9 @@ def test_absolute_and_relative_places():
 def test_starts_are_where_the_last_move_ended():
     motion = follow([R, "G1 X1", "G92 X5", "G1 X6", "G28 Y", "G1 Y2"])
     assert motion.start_mm[:, 0].tolist() == [0, 5, 6]
-    assert motion.length_mm().tolist() == [1, 1, 2]
-    assert follow([R, "G1 Z1", "G92 Y9 Z5", "G1 Z6", "G1 Y10"]).length_mm().tolist() == [1, 1, 1]
-    assert follow([R, "G1 X1 Y1 Z1", "G92", "G1 X3"]).length_mm()[1] == 3
+    assert motion.length_mm.tolist() == [1, 1, 2]
+    assert follow([R, "G1 Z1", "G92 Y9 Z5", "G1 Z6", "G1 Y10"]).length_mm.tolist() == [1, 1, 1]
+    assert follow([R, "G1 X1 Y1 Z1", "G92", "G1 X3"]).length_mm[1] == 3
 
 
 def test_inches():
@@ -87,7 +92,7 @@ def test_feed_holds_until_the_next():
 )
 def test_arcs_have_their_length_and_share_their_filament(line, length):
     motion = follow([R, "G1 X10", line])
-    assert motion.length_mm()[1:].sum() == pytest.approx(length, rel=1e-3)
+    assert motion.length_mm[1:].sum() == pytest.approx(length, rel=1e-3)
     assert motion.extruded_mm.sum() == pytest.approx(3.0)
     assert set(motion.number.tolist()) == {2, 3}
     assert np.hypot(*motion.end_mm[1:, :2].T).max() == pytest.approx(10.0, abs=0.01) or "R" in line
@@ -95,19 +100,65 @@ def test_arcs_have_their_length_and_share_their_filament(line, length):
 
 def test_a_wide_arc_is_nearly_straight():
     motion = follow([R, "G1 X10", "G3 X10 Y100 I-900000000 J50"])
-    assert motion.length_mm()[1:].sum() == pytest.approx(100.0, rel=1e-6)
+    assert motion.length_mm[1:].sum() == pytest.approx(100.0, rel=1e-6)
 
 
-def test_an_arc_turns_the_right_way():
-    assert follow([R, "G1 X10", "G3 X-10 I-10"]).end_mm[:, 1].max() == pytest.approx(10, abs=0.01)
-    assert follow([R, "G1 X10", "G2 X-10 I-10"]).end_mm[:, 1].min() == pytest.approx(-10, abs=0.01)
-    assert follow([R, "G1 X10", "G3 X0 Y10 R10"]).end_mm[:, 0].max() == pytest.approx(10, abs=0.01)
+@pytest.mark.parametrize(
+    ("line", "low", "high"),
+    [
+        ("G3 X-10 I-10", (-10, 0), (10, 10)),
+        ("G2 X-10 I-10", (-10, -10), (10, 0)),
+        ("G3 X0 Y10 R10", (0, 0), (10, 10)),
+        ("G3 X0 Y10 R-10", (0, 0), (20, 20)),
+        ("G2 X0 Y10 I-10", (-10, -10), (10, 10)),
+        ("G3 X-8 Y6 I-10 ", (-8, 0), (10, 10)),
+        ("G3 X8 Y6 I-10 ", (8, 0), (10, 6)),
+        ("G3 I-10 Z4", (-10, -10), (10, 10)),
+    ],
+)
+def test_an_arc_turns_the_right_way_and_reaches_as_far_as_its_chords(line, low, high):
+    motion = follow([R, "G1 X10", f"{line} E2"])
+    lowest, highest = motion.box_mm()
+    assert (lowest[1, :2], highest[1, :2]) == (pytest.approx(low, abs=1e-9), pytest.approx(high, abs=1e-9))
+    _, start, end = motion.arcs.chords()
+    every = np.concatenate([start, end])
+    assert every.min(axis=0)[:2] == pytest.approx(low, abs=0.006)
+    assert every.max(axis=0)[:2] == pytest.approx(high, abs=0.006)
+    assert start[1:] == pytest.approx(end[:-1])
+    assert np.hypot(*(end - start)[:, :2].T).sum() == pytest.approx(motion.across_mm[1], rel=1e-3)
+
+
+@pytest.mark.parametrize("radius", [0.003, 0.05, 1.0, 80.0, 5e4])
+def test_chords_stay_near_their_arc(radius):
+    motion = follow([R, f"G1 X{radius:.4f}", f"G3 I{-radius:.4f} E2", f"G2 I{-radius:.4f} E2"])
+    which, start, end = motion.arcs.chords()
+    middle = (start + end) / 2
+    assert radius - np.hypot(*middle[:, :2].T).min() < max(0.0051, radius * 2e-5)
+    assert np.bincount(which).tolist() == [len(which) / 2] * 2
 
 
 def test_a_spiral_rises_evenly():
-    z = follow([R, "G1 X10", "G3 X-10 Z2 I-10"]).end_mm[1:, 2]
-    assert z[-1] == 2.0
-    assert np.diff(z) == pytest.approx(np.full(len(z) - 1, 2 / len(z)))
+    _, _, end = follow([R, "G1 X10", "G3 X-10 Z2 I-10"]).arcs.chords()
+    assert end[-1].tolist() == [-10, 0, 2]
+    assert np.diff(end[:, 2]) == pytest.approx(np.full(len(end) - 1, 2 / len(end)))
+    assert follow([R, "G1 X10", "G3 X-10 Z2 I-10"]).length_mm[1] == pytest.approx(math.hypot(10 * math.pi, 2))
+
+
+def test_a_printed_arc_is_read_as_chords_that_share_its_filament():
+    found = paths.read([R, "G1 X10 E1", "G3 X-10 I-10 E3", "G1 X-20 E1", "G2 X-20 I5"], load_printer("diabase-h5"))
+    inner = found.number == 3
+    assert found.number.tolist() == sorted(found.number.tolist())
+    assert inner.sum() > 40
+    assert found.filament_mm[inner] == pytest.approx(3 / inner.sum())
+    assert found.start_mm[1:] == pytest.approx(found.end_mm[:-1])
+    assert found.length_mm()[inner].sum() == pytest.approx(10 * math.pi, rel=1e-3)
+    assert np.hypot(*found.end_mm[inner, :2].T) == pytest.approx(np.full(inner.sum(), 10.0))
+
+
+def test_arcs_beside_the_plane_of_the_bed_are_straight_and_said():
+    motion = follow([R, "G1 X10", "G18", "G3 X-10 I-10 J0", "G17", "G3 X10 I10 J0"])
+    assert motion.arcs.row.tolist() == [2]
+    assert [fault.number for fault in motion.faults] == [4]
 
 
 @pytest.mark.parametrize(
@@ -143,3 +194,70 @@ def test_values_that_are_none_are_faults_and_no_places():
 def test_an_empty_file():
     motion = follow([])
     assert (len(motion.rows), motion.lines, motion.kind.column(0).tolist()) == (0, 0, [])
+
+
+NUMBERS = st.one_of(
+    st.integers(-999, 999).map(str),
+    st.decimals(-500, 500, places=5).map(lambda value: f"{value:f}"),
+    st.sampled_from(
+        [".5", "-.25", "+3", "007.10", "-0", "0.1234567890123456789", "1e3", "1.2.3", "--1", "5.", ".", ""]
+    ),
+)
+MOVES = st.builds(
+    lambda code, words: " ".join([code, *(letter + number for letter, number in words)]),
+    st.sampled_from(["G0", "G1", "G1", "G1", "G2", "G3"]),
+    st.lists(st.tuples(st.sampled_from("XYZEFIJR"), NUMBERS), max_size=5),
+)
+MODES = st.sampled_from(
+    ["G90", "G91", "M82", "M83", "G20", "G21", "T1", "T2", "G92 E0", "G92 X1", "G28 Y", "G92", "G91 G1 X1 G90 G1 Y2"]
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(st.one_of(MOVES, MOVES, MOVES, MODES), max_size=40))
+def test_moves_read_all_at_once_are_those_read_one_by_one(lines):
+    """A bracket with nothing in it makes a line one that is read word by word, and changes nothing."""
+    fast, slow = follow(lines), follow([f"{line} ()" for line in lines])
+    assert fast.rows.tolist() == slow.rows.tolist()
+    assert fast.arcs.centre_mm.tolist() == slow.arcs.centre_mm.tolist()
+    assert [(f.number, f.what) for f in fast.faults] == [(f.number, f.what) for f in slow.faults]
+    assert fast.tools.column(len(fast.rows)).tolist() == pytest.approx(
+        slow.tools.column(len(slow.rows)).tolist(), nan_ok=True
+    )
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(st.one_of(MOVES, MOVES, MODES), max_size=40))
+def test_columns_are_what_a_machine_does_line_by_line(lines):
+    """Followed anew as a firmware does it, with one state."""
+    at, held, rows = dict.fromkeys("XYZE", 0.0), {"scale": 1.0, "G91": False, "M82": True, "F": 3000.0}, []
+    owed, tool = {}, -1
+    for line in lines:
+        for command in parse(line).commands:
+            code, given = command.code, {k: command.number(k) for k in "XYZEF" if command.has(k)}
+            given = {k: v * held["scale"] for k, v in given.items() if v == v}
+            if code in ("G0", "G1", "G2", "G3"):
+                held["F"] = given.pop("F", held["F"])
+                start = dict(at)
+                moved = given.get("E", 0.0) - (at["E"] if held["M82"] and "E" in given else 0.0)
+                at["E"] += moved
+                for axis in set("XYZ") & set(given):
+                    at[axis] = given[axis] + (at[axis] if held["G91"] else 0.0)
+                debt = owed.get(tool, 0.0)
+                extruded, owed[tool] = max(0.0, moved - debt), max(0.0, debt - moved)
+                rows.append([*(start[a] for a in "XYZ"), *(at[a] for a in "XYZ"), extruded, moved, held["F"]])
+            elif code in ("G92", "G28"):
+                names = [k for k in "XYZE" if command.has(k)] or list("XYZE" if code == "G92" else "XYZ")
+                at.update(
+                    {
+                        k: 0.0 if code == "G28" else given.get(k, at[k] if given or command.has(k) else 0.0)
+                        for k in names
+                    }
+                )
+            elif code[0] == "T":
+                tool = int(code[1:])
+            else:
+                held.update({"G20": {"scale": 25.4}, "G21": {"scale": 1.0}}.get(code, {}))
+                held.update({"G90": {"G91": False}, "G91": {"G91": True}}.get(code, {}))
+                held.update({"M82": {"M82": True}, "M83": {"M82": False}}.get(code, {}))
+    assert follow(lines).rows[:, :9] == pytest.approx(np.array(rows).reshape(-1, 9), abs=1e-9)

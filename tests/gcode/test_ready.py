@@ -4,6 +4,7 @@ import pytest
 
 from sensorgen.errors import BadInput
 from sensorgen.gcode.check import check
+from sensorgen.gcode.files import text_of
 from sensorgen.gcode.motion import follow
 from sensorgen.gcode.ready import ready
 from sensorgen.printer import load_printer
@@ -94,8 +95,8 @@ M104 S0
 
 
 def made(text, machine=DIABASE):
-    lines = text.splitlines(keepends=True)
-    return "".join(ready(lines, follow(lines), machine))
+    raw = text_of(text.splitlines())
+    return b"".join(ready(raw, follow(raw), machine)).decode()
 
 
 def with_control(**more):

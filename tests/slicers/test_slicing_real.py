@@ -11,7 +11,7 @@ import pytest
 from sensorgen import design, yamlfile
 from sensorgen.gcode import extruded, paths
 from sensorgen.gcode.check import check
-from sensorgen.gcode.files import lines_of
+from sensorgen.gcode.files import text_of
 from sensorgen.gcode.motion import follow
 from sensorgen.slicing import Placed, alone, sliced
 
@@ -56,7 +56,7 @@ def test_each_variant_passes_the_printers_check(name, orientation, quality, slic
     assert {tool.tool for tool in result.report.tools} == {3, 4}
     assert all(tool.purge_mm > 5 for tool in result.report.tools)  # the tower primes both
     assert made.version.split(".")[0].isdecimal()
-    printed = extruded.read(lines_of(made.ready), variant.machine.filament_mm)
+    printed = extruded.read(made.ready, variant.machine.filament_mm)
     assert set(printed.model_mm3()) == {3, 4}
     layers = paths.read(made.ready, variant.machine).model()
     heights = np.unique(np.round(layers.end_mm[:, 2], 4))
@@ -67,12 +67,14 @@ def test_each_variant_passes_the_printers_check(name, orientation, quality, slic
 def test_what_the_rewriting_leaves_alone(slicer, tmp_path):
     variant = small("23/trix-d0.1.yaml")
     made = sliced([alone(variant)], slicer, tmp_path)
-    before, after = follow(lines_of(made.raw)), follow(lines_of(made.ready))
+    before, after = follow(made.raw), follow(made.ready)
     assert np.array_equal(before.rows[:, :9], after.rows[:, :9])
     assert np.array_equal(
         paths.paths_of(before, variant.machine, "slicer").tool, paths.paths_of(after, variant.machine).tool
     )
-    comments = [[line for line in lines_of(path) if line.startswith(";")] for path in (made.raw, made.ready)]
+    comments = [
+        [line for line in text_of(path).splitlines() if line.startswith(b";")] for path in (made.raw, made.ready)
+    ]
     assert comments[0] == comments[1]
 
 
@@ -106,7 +108,7 @@ def test_retraction_by_the_firmware(slicer, tmp_path):
     control = variant.machine.control.model_copy(update={"firmware_retraction": True})
     variant.__dict__["machine"] = variant.machine.model_copy(update={"control": control})
     made = sliced([alone(variant)], slicer, tmp_path)
-    motion = follow(lines_of(made.ready))
+    motion = follow(made.ready)
     assert not (motion.filament_mm < 0).any()
     plain = [
         event.command.code

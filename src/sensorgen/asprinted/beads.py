@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from sensorgen.asprinted.intervals import Intervals, distances_mm, length_mm, united, within, without
 from sensorgen.asprinted.rules import ROUND
 from sensorgen.asprinted.strips import Strips, drawn
-from sensorgen.checks.slices import Slices
 from sensorgen.design import Design
 from sensorgen.errors import UnknownName
 from sensorgen.gcode.paths import Paths
@@ -95,7 +94,7 @@ def _owners(
     design: Design, scene: Scene, tool: NDArray[np.int64], layer: NDArray[np.int64], middle: Floats
 ) -> NDArray[np.int64]:
     """The body that each line belongs to: of its tool's, the one that is drawn nearest in its layer, or near it."""
-    layers = drawn(scene, Slices(scene, design.layers))
+    layers = drawn(scene, design.layers)
     owner = np.zeros(len(tool), np.int64)
     for one in {design.tool(body.material) for body in scene.bodies}:
         mine = [k for k, body in enumerate(scene.bodies) if design.tool(body.material) == one]
@@ -140,7 +139,7 @@ def layers(design: Design, lines: Beads, convention: str = "vol", *, electrode_w
     if convention not in CONVENTIONS:
         raise UnknownName("convention for a line's width", convention, CONVENTIONS)
     scene = design.printed
-    plan = drawn(scene, Slices(scene, design.layers))
+    plan = drawn(scene, design.layers)
     return [
         _printed(layer, scene, lines.of(lines.layer == k), convention, electrode_wins=electrode_wins)
         for k, layer in enumerate(plan)

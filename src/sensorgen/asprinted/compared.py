@@ -16,7 +16,6 @@ from sensorgen.asprinted.rectilinear import plate
 from sensorgen.asprinted.strips import Strips, drawn, scene_of
 from sensorgen.asprinted.tally import Row, findings, tally
 from sensorgen.asprinted.window import cut, evened, window
-from sensorgen.checks.slices import Slices
 from sensorgen.design import Design
 from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.findings import Finding
@@ -91,7 +90,7 @@ def sliced(design: Design, paths: Paths, source: str, centre_mm: tuple[float, fl
 def cell(design: Design, printed: Sequence[Strips]) -> tuple[Scene, float]:
     """One period of a print as a scene, bottom electrode down, and how many of its plan the sensor has [-]."""
     scene = design.printed
-    plan = window(drawn(scene, Slices(scene, design.layers)), scene)
+    plan = window(drawn(scene, design.layers), scene)
     layers = cut(printed, plan)
     if all(side < whole for side, whole in zip(plan.sides_mm(), scene.size_mm[:2], strict=True)):
         layers = evened(layers, plan)

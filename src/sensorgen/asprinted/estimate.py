@@ -6,7 +6,6 @@ Tests hold it against the real slicers: capacitance within 2 % of PrusaSlicer's,
 from sensorgen.asprinted.intervals import Intervals, united, within, without
 from sensorgen.asprinted.rules import Rule, rule
 from sensorgen.asprinted.strips import Strips, drawn, scene_of
-from sensorgen.checks.slices import Slices
 from sensorgen.printer import Printer, Quality
 from sensorgen.scene import SLIVER_MM, Body, Scene
 
@@ -45,7 +44,7 @@ def estimate(scene: Scene, printer: Printer, quality: Quality, walls: str = "ara
 def layers(scene: Scene, printer: Printer, quality: Quality, walls: str = "arachne") -> list[Strips]:
     """The layers of :func:`estimate`."""
     wide = rule(walls)
-    return [_printed(layer, scene, printer, wide) for layer in drawn(scene, Slices(scene, quality))]
+    return [_printed(layer, scene, printer, wide) for layer in drawn(scene, quality)]
 
 
 def _printed(layer: Strips, scene: Scene, printer: Printer, wide: Rule) -> Strips:

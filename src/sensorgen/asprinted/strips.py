@@ -2,10 +2,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
 
 from sensorgen.asprinted.intervals import Intervals, united
 from sensorgen.checks.slices import Rectangle, Slices, slanted
 from sensorgen.errors import SensorgenError
+from sensorgen.printer import Quality
 from sensorgen.scene import SLIVER_MM, Body, Prism, Scene, box
 
 
@@ -38,7 +41,8 @@ class Strips:
         return "x" if self.along == "y" else "y"
 
 
-def drawn(scene: Scene, slices: Slices) -> list[Strips]:
+@lru_cache(maxsize=16)
+def drawn(scene: Scene, quality: Quality) -> tuple[Strips, ...]:
     """Every layer of a scene as a slicer samples it, at mid-height.
 
     Raises
@@ -46,20 +50,27 @@ def drawn(scene: Scene, slices: Slices) -> list[Strips]:
     NoStrips
         A layer is slanted in plan, or has strips in both directions.
     """
-    heights = slices.layers.boundaries_mm
-    return [_drawn(scene, slices, k, heights[k], heights[k + 1]) for k in range(len(slices.layers))]
+    heights = quality.boundaries_mm(scene.size_mm[2])
+    if any(slanted(p) for b in scene.bodies for p in b.prisms):
+        raise _no_strips(1, heights[0], heights[1])
+    slices = Slices(scene, quality)
+    return tuple(_drawn(scene, slices, k, *between) for k, between in enumerate(pairwise(heights)))
 
 
 def _drawn(scene: Scene, slices: Slices, layer: int, bottom_mm: float, top_mm: float) -> Strips:
     shown = {body.name: slices.body(body, layer) for body in scene.bodies}
-    axes = [along for along in "yx" if all(_spans(r, along, scene) for rs in shown.values() for r in rs)]
-    if not axes or any(slanted(p) for b in scene.bodies for p in b.prisms):
-        raise NoStrips(
-            f"layer {layer + 1}, from {bottom_mm:g} to {top_mm:g} mm, is not made of strips along x or y; expected a "
-            "shape that is, as tri, rect or reference: look at the slices themselves"
-        )
-    runs = {name: united(_across(r, axes[0]) for r in rs) for name, rs in shown.items() if rs}
-    return Strips(axes[0], bottom_mm, top_mm, runs)
+    along = next((axis for axis in "yx" if all(_spans(r, axis, scene) for rs in shown.values() for r in rs)), None)
+    if along is None:
+        raise _no_strips(layer + 1, bottom_mm, top_mm)
+    runs = {name: united(_across(r, along) for r in rs) for name, rs in shown.items() if rs}
+    return Strips(along, bottom_mm, top_mm, runs)
+
+
+def _no_strips(layer: int, bottom_mm: float, top_mm: float) -> NoStrips:
+    return NoStrips(
+        f"layer {layer}, from {bottom_mm:g} to {top_mm:g} mm, is not made of strips along x or y; expected a "
+        "shape that is, as tri, rect or reference: look at the slices themselves"
+    )
 
 
 def _spans(r: Rectangle, along: str, scene: Scene) -> bool:

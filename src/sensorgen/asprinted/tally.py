@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from sensorgen.asprinted.beads import Beads, beads, layers
 from sensorgen.asprinted.intervals import Intervals, length_mm
 from sensorgen.asprinted.strips import Strips, drawn
-from sensorgen.checks.slices import Slices
 from sensorgen.design import Design
 from sensorgen.findings import Finding
 from sensorgen.gcode.paths import Paths
@@ -104,11 +103,16 @@ def tally(design: Design, printed: Sequence[Strips], lines: Beads | None = None)
         The lines that print it, whose own volume counts; that of the strips if not given, as for an estimate.
     """
     scene = design.printed
-    plan = drawn(scene, Slices(scene, design.layers))
+    plan = drawn(scene, design.layers)
+    heights = [[prism.span("z") for prism in body.prisms] for body in scene.bodies]
     found = []
     for k, (meant, made) in enumerate(zip(plan, printed, strict=True)):
         for number, body in enumerate(scene.bodies):
-            exact = sum(_between(p, meant.bottom_mm, meant.top_mm) for p in body.prisms)
+            here = (
+                prism for prism, (bottom, top) in zip(body.prisms, heights[number], strict=True)
+                if bottom < meant.top_mm and top > meant.bottom_mm
+            )  # fmt: skip
+            exact = sum(_between(prism, meant.bottom_mm, meant.top_mm) for prism in here)
             volume = _volume(made, body, scene) if lines is None else _extruded(lines, k, number)
             if max(exact, volume) > _LEAST * scene.size_mm[0] * scene.size_mm[1] * (meant.top_mm - meant.bottom_mm):
                 found.append(_row(body.name, k + 1, meant, made, (exact, volume)))

@@ -1,76 +1,133 @@
-"""Arcs as chords."""
+"""Arcs in the plane of the bed: their middles, their lengths, what they reach, and chords for who needs lines."""
 
 import math
-from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 SAG_MM = 0.005  # how far a chord may be from its arc: a tenth of what the printer can place
 MOST_CHORDS = 720
+_FULL = 1e-9  # a turn below this is a full circle [rad]
 
 
-def chords(
-    start: tuple[float, float, float],
-    end: tuple[float, float, float],
-    centre: tuple[float, float],
-    *,
-    clockwise: bool,
-) -> Iterator[tuple[float, float, float]]:
-    """Ends of the chords of an arc in the plane of the bed; Z rises evenly.
+@dataclass(frozen=True, eq=False)
+class Arcs:
+    """Moves that are arcs.
 
-    Parameters
+    Attributes
     ----------
-    start, end : (float, float, float)
-        Where it begins and ends [mm]; the same place means a full circle.
-    centre : (float, float)
-        Middle of the circle [mm].
-    clockwise : bool
-        As seen from above: G2.
+    row : (n,) int64 array
+        The move of each.
+    start_mm, end_mm : (n, 3) float64 array
+        Where each begins and ends [mm]; Z rises evenly.
+    centre_mm : (n, 2) float64 array
+        Middle of its circle [mm].
+    turn : (n,) float64 array
+        Angle that it turns, to the left positive [rad]; never 0.
 
     Examples
     --------
-    >>> ends = list(chords((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0), clockwise=False))
-    >>> ends[-1], round(max(y for _, y, _ in ends), 3)
-    ((-1.0, 0.0, 0.0), 1.0)
+    >>> start, end = np.array([[1.0, 0, 0]]), np.array([[-1.0, 0, 0]])
+    >>> half = Arcs.of(np.array([4]), start, end, np.zeros((1, 2)), np.array([False]))
+    >>> [m.round(3).tolist() for m in (half.across_mm(), *half.box_mm())]
+    [[3.142], [[-1.0, 0.0, 0.0]], [[1.0, 1.0, 0.0]]]
     """
-    radius = math.hypot(start[0] - centre[0], start[1] - centre[1])
-    first = math.atan2(start[1] - centre[1], start[0] - centre[0])
-    last = math.atan2(end[1] - centre[1], end[0] - centre[0])
-    turn = (first - last if clockwise else last - first) % math.tau
-    if turn < 1e-9:
-        turn = math.tau
-    count = _count(radius, turn)
-    for k in range(1, count):
-        share = k / count
-        angle = first + (-turn if clockwise else turn) * share
-        height = start[2] + (end[2] - start[2]) * share
-        yield centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle), height
-    yield end
+
+    row: Ints
+    start_mm: Floats
+    end_mm: Floats
+    centre_mm: Floats
+    turn: Floats
+
+    @classmethod
+    def of(cls, row: Ints, start_mm: Floats, end_mm: Floats, centre_mm: Floats, clockwise: Mask) -> "Arcs":
+        """Arcs between two places; the same place twice means a full circle. Clockwise is as seen from above: G2."""
+        first, last = (_angle(place[:, :2] - centre_mm) for place in (start_mm, end_mm))
+        left = (last - first) % math.tau
+        right = (first - last) % math.tau
+        turn = np.where(clockwise, right, left)
+        turn = np.where(turn < _FULL, math.tau, turn)
+        return cls(row, start_mm, end_mm, centre_mm, np.where(clockwise, -turn, turn))
+
+    def __len__(self) -> int:
+        """How many there are [-]."""
+        return len(self.row)
+
+    def chosen(self, rows: Mask) -> "Arcs":
+        """The arcs of a mask."""
+        return Arcs(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+    def radius_mm(self) -> Floats:
+        """Radius at the start of each [mm]."""
+        off = self.start_mm[:, :2] - self.centre_mm
+        return np.asarray(np.hypot(off[:, 0], off[:, 1]))
+
+    def across_mm(self) -> Floats:
+        """Length of each in plan [mm]."""
+        return np.asarray(self.radius_mm() * np.abs(self.turn))
+
+    def box_mm(self) -> tuple[Floats, Floats]:
+        """Lowest and highest place of each on every axis, (n, 3) [mm]."""
+        low, high = np.minimum(self.start_mm, self.end_mm), np.maximum(self.start_mm, self.end_mm)
+        first = _angle(self.start_mm[:, :2] - self.centre_mm)
+        for quarter in range(4):
+            way = (np.sign(self.turn) * (quarter * math.tau / 4 - first)) % math.tau
+            axis, side = quarter % 2, 1 if quarter < 2 else -1
+            edge = self.centre_mm[:, axis] + side * self.radius_mm()
+            bound, worse = (high, np.maximum) if side > 0 else (low, np.minimum)
+            bound[:, axis] = np.where(way < np.abs(self.turn), worse(bound[:, axis], edge), bound[:, axis])
+        return low, high
+
+    def chords(self) -> tuple[Ints, Floats, Floats]:
+        """Chords of all arcs in order: which arc each belongs to, and where it starts and ends, (m, 3) [mm]."""
+        count = self._count()
+        which = np.repeat(np.arange(len(self)), count)
+        step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+        start, end = self._at(which, step / count[which]), self._at(which, (step + 1) / count[which])
+        first, last = step == 0, step == count[which] - 1
+        start[first], end[last] = self.start_mm, self.end_mm
+        return which, start, end
+
+    def _count(self) -> Ints:
+        """How many chords each takes."""
+        sag = np.minimum(SAG_MM / (2 * np.maximum(self.radius_mm(), SAG_MM)), 0.5)
+        step = 4 * np.arcsin(np.sqrt(sag))  # acos(1 - sag / radius) would be 0 for a large one
+        return np.asarray(np.clip(np.ceil(np.abs(self.turn) / step), 1, MOST_CHORDS), np.int64)
+
+    def _at(self, which: Ints, share: Floats) -> Floats:
+        """Places at a share of the way of some arcs."""
+        angle = _angle(self.start_mm[:, :2] - self.centre_mm)[which] + self.turn[which] * share
+        radius, (x, y) = self.radius_mm()[which], self.centre_mm[which].T
+        bottom, top = self.start_mm[which, 2], self.end_mm[which, 2]
+        return np.column_stack(
+            [x + radius * np.cos(angle), y + radius * np.sin(angle), bottom + (top - bottom) * share]
+        )
 
 
-def _count(radius: float, turn: float) -> int:
-    if not radius > SAG_MM:
-        return 1
-    step = 4 * math.asin(math.sqrt(SAG_MM / (2 * radius)))  # acos(1 - sag / radius) would be 0 for a large one
-    return max(1, min(MOST_CHORDS, math.ceil(turn / step)))
+def _angle(off: Floats) -> Floats:
+    return np.asarray(np.arctan2(off[:, 1], off[:, 0]))
 
 
-def centre_of_radius(
-    start: tuple[float, float], end: tuple[float, float], radius: float, *, clockwise: bool
-) -> tuple[float, float] | None:
-    """Middle of the arc of a given radius, or None where none leads from start to end.
+def centres_of_radius(start: Floats, end: Floats, radius: Floats, clockwise: Mask) -> Floats:
+    """Middles of arcs of given radii, (n, 2) [mm]; nan where none leads from start to end.
 
     Parameters
     ----------
-    start, end : (float, float)
-        Its ends [mm].
-    radius : float
-        Its radius [mm]; negative for the longer way round.
-    clockwise : bool
+    start, end : (n, 2) array
+        Their ends [mm].
+    radius : (n,) array
+        Their radii [mm]; negative for the longer way round.
+    clockwise : (n,) array of bool
         As seen from above: G2.
     """
-    dx, dy = end[0] - start[0], end[1] - start[1]
-    chord = math.hypot(dx, dy)
-    if chord == 0 or not chord <= 2 * abs(radius) * (1 + 1e-6):
-        return None
-    off = math.sqrt(max(0.0, radius**2 - chord**2 / 4)) / chord
-    side = off if (radius > 0) != clockwise else -off
-    return (start[0] + end[0]) / 2 - dy * side, (start[1] + end[1]) / 2 + dx * side
+    step = end - start
+    chord = np.hypot(step[:, 0], step[:, 1])
+    there = (chord > 0) & (chord <= 2 * np.abs(radius) * (1 + 1e-6))
+    off = np.sqrt(np.maximum(0.0, radius**2 - chord**2 / 4)) / np.where(there, chord, np.nan)
+    side = np.where((radius > 0) != clockwise, off, -off)[:, None]
+    return np.asarray((start + end) / 2 + side * np.column_stack([-step[:, 1], step[:, 0]]))

@@ -1,13 +1,12 @@
 """A file of G-code held against a printer: what it would do wrong, and what it takes."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from sensorgen.findings import SEVERITIES
 from sensorgen.gcode import commands, limits
-from sensorgen.gcode.files import lines_of
+from sensorgen.gcode.files import Source
 from sensorgen.gcode.found import Found, merged
 from sensorgen.gcode.motion import follow
 from sensorgen.gcode.report import Report, report
@@ -36,7 +35,7 @@ class Checked:
 
 
 def check(
-    source: Path | Iterable[str],
+    source: Source,
     machine: Printer,
     loaded: Mapping[int, str] | None = None,
     *,
@@ -46,8 +45,8 @@ def check(
 
     Parameters
     ----------
-    source : Path or iterable of str
-        The file, or its lines.
+    source : Path, bytes or iterable of str
+        The file, its content, or its lines.
     machine : Printer
         Who is to print it.
     loaded : mapping of int to str, optional
@@ -67,10 +66,9 @@ def check(
     >>> found[0].rule, found[0].line, found[0].message
     ('tool', 4, 'tool 9 gets a temperature; diabase-h5 has 1, 2, 3, 4, 5')
     """
-    lines = lines_of(source) if isinstance(source, Path) else source
-    motion = follow(lines, machine.control.prime_macro)
+    motion = follow(source, machine.control.prime_macro)
     loads = dict(loaded or {})
     found = [*limits.check(motion, machine), *commands.check(motion, machine)]
     if others_empty:
-        found += commands.check_loaded(motion, loads)
+        found += limits.check_loaded(motion, loads)
     return Checked(merged(found), report(motion, machine, loads))

@@ -1,20 +1,19 @@
 """What the commands of a file ask of the machine, one after the other: tools, heat, homing, modes, fans, macros."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.gcode.effects import STOPS, Effects, judge
 from sensorgen.gcode.found import Found, error
 from sensorgen.gcode.heat import Heaters, known_tool, tool_there
-from sensorgen.gcode.motion import macro_name
 from sensorgen.gcode.moves import NO_TOOL, Change, Event, Motion
+from sensorgen.gcode.reading import macro_name
 from sensorgen.gcode.remarks import PRUSA
 from sensorgen.printer import Printer
 
 AXES = "XYZ"
-# Steps, accelerations, speeds, limits, tools and drives of the machine itself, which its own configuration sets.
-SETTINGS = ("M92", "M143", "M201", "M203", "M208", "M302", "M500", "M563", "M569", "M574", "M584", "M906")
 
 
 def check(motion: Motion, machine: Printer) -> Iterator[Found]:
@@ -35,23 +34,6 @@ def check(motion: Motion, machine: Printer) -> Iterator[Found]:
     yield from simulation.end()
 
 
-def check_loaded(motion: Motion, loaded: Mapping[int, str]) -> Iterator[Found]:
-    """Refuse lines of tools on which there is nothing.
-
-    Parameters
-    ----------
-    motion : Motion
-        The file.
-    loaded : mapping of int to str
-        Material of each tool that has one.
-    """
-    tools = motion.tools.column(len(motion.rows), NO_TOOL)
-    for tool in np.setdiff1d(tools[motion.extruded_mm > 0], [NO_TOOL, *loaded]).astype(int).tolist():
-        number = int(motion.number[np.flatnonzero((tools == tool) & (motion.extruded_mm > 0))[0]])
-        known = ", ".join(f"{name} on {one}" for one, name in loaded.items())
-        yield error("tool", number, f"tool {tool} prints, and nothing is on it; loaded are {known}", "use another tool")
-
-
 class _Simulation:
     """The machine between two moves."""
 
@@ -59,25 +41,26 @@ class _Simulation:
         self.motion, self.machine, self.control = motion, machine, machine.control
         self.pushes = np.flatnonzero(motion.filament_mm != 0)
         self.prints = np.flatnonzero(motion.extruded_mm > 0)
-        self.travels = np.flatnonzero(motion.length_mm() > 0)
+        self.travels = np.flatnonzero(motion.length_mm > 0)
         self.changes = {change.number: change for change in motion.changes}
         start = machine.tool_at_start()
         self.tool = NO_TOOL if start is None else start
         self.last: Change | None = None
-        self.heaters = Heaters(machine)
+        self.heaters, self.effects = Heaters(machine), Effects()
         self.homed: set[str] = set()
         self.levelled = not self.control.levels
         self.relative = False
         self.absolute_e = True
         self.row = 0
-        self.ended = ""
+        self.ended = self.stopped = ""
         self.seen: set[str] = set()
         self.warned: set[str] = set()
         self.does: dict[str, Callable[[Event], Iterator[Found]]] = {
             "G10": self._tool_settings, "M104": self._temperature, "M109": self._temperature, "M568": self._state,
             "M140": self._bed, "M190": self._bed, "M106": self._fan, "M107": self._fan, "M98": self._macro,
             "M82": self._absolute, "M83": self._relative_e, "G90": self._mode, "G91": self._mode, "G92": self._place,
-            "M116": self._waits, **dict.fromkeys(SETTINGS, self._setting),
+            "M116": self._waits, "M18": self._motors_off, "M84": self._motors_off, "M561": self._unlevelled,
+            "M290": self._height,
         }  # fmt: skip
 
     # What holds for a stretch of moves.
@@ -125,6 +108,7 @@ class _Simulation:
                 "level", number, "the file prints before the bed is levelled",
                 f"level first ({' or '.join(self.control.levels)})",
             )  # fmt: skip
+        yield from self.effects.printing()
         if self.relative:
             yield error("relative", number, "the file prints in relative coordinates (G91)", "write G90 before it")
 
@@ -135,8 +119,8 @@ class _Simulation:
             yield Found("end", "warning", number, f"moves after {self.ended} are never reached", "remove them")
 
     def _too_late(self, number: int) -> Iterator[Found]:
-        if self.ended:
-            message = f"lines after {self.ended} are never printed: it ends the print"
+        if ended := self.ended or self.stopped:
+            message = f"lines after {ended} are never printed: it ends the print"
             yield error("end", number, message, "end the print after its last line")
 
     # What each command does.
@@ -152,6 +136,9 @@ class _Simulation:
         self.levelled |= code in self.control.levels
         if code in self.control.ends:
             self.ended = " ".join([code, *(f"{a}{b}" for a, b in event.command.words)])
+        self.stopped = code if code in STOPS else self.stopped
+        self.effects.obey(event)
+        yield from judge(event.command, event.number)
         if code in self.does:
             yield from self.does[code](event)
 
@@ -223,12 +210,26 @@ class _Simulation:
                 "leave it out",
             )  # fmt: skip
 
-    def _setting(self, event: Event) -> Iterator[Found]:
-        yield Found(
-            "settings", "warning", event.number,
-            f"{event.command.code} changes the machine itself; the check goes by the printer's file",
-            "leave it to the machine's own configuration",
-        )  # fmt: skip
+    def _motors_off(self, event: Event) -> Iterator[Found]:
+        """The axes may drift, and count as not homed; a number of seconds only sets when that happens."""
+        if not event.command.has("S"):
+            self.homed -= {axis for axis in AXES if event.command.has(axis) or not event.command.has(f"{AXES}E")}
+        yield from ()
+
+    def _unlevelled(self, _: Event) -> Iterator[Found]:
+        self.levelled = not self.control.levels
+        yield from ()
+
+    def _height(self, event: Event) -> Iterator[Found]:
+        """All heights are shifted, as for a tool whose nozzle stands higher than the printer's others."""
+        meant_mm = self.control.tool_offsets_mm.get(self.tool, 0.0)
+        given_mm = next((event.command.number(letter) for letter in "SZ" if event.command.has(letter)), None)
+        if given_mm is not None and (given_mm != meant_mm or event.command.number("R") != 0):
+            yield Found(
+                "height", "warning", event.number,
+                f"M290 shifts all heights; the printer's file says {meant_mm:g} mm for tool {self.tool}",
+                f"write M290 S{meant_mm:g} R0, or leave it out",
+            )  # fmt: skip
 
     # What must have come by the end.
 

@@ -2,11 +2,11 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
+from sensorgen.gcode.files import Source
 from sensorgen.gcode.motion import follow
 from sensorgen.gcode.moves import NO_TOOL, Motion
 
@@ -42,7 +42,7 @@ class Extruded:
         return {tool: sums[tool] for tool in sorted(sums)}
 
 
-def read(lines: Iterable[str], filament_mm: float) -> Extruded:
+def read(source: Source, filament_mm: float) -> Extruded:
     """Follow tools and extruder through a file.
 
     Filament drawn back is owed by its tool: pushing it forward again counts for nothing, and only what
@@ -50,7 +50,7 @@ def read(lines: Iterable[str], filament_mm: float) -> Extruded:
 
     Parameters
     ----------
-    lines : iterable of str
+    source : Path, bytes or iterable of str
         The G-code, with the slicer's tool numbers (from 0) and its ``;TYPE:`` comments.
     filament_mm : float
         Diameter of the filament [mm].
@@ -66,7 +66,7 @@ def read(lines: Iterable[str], filament_mm: float) -> Extruded:
     >>> found.tools, round(found.total_mm3()[1] / math.pi, 6)
     ((1, 0, 1), 2.5)
     """
-    motion = follow(lines)
+    motion = follow(source)
     area_mm2 = math.pi / 4 * filament_mm**2
     return Extruded(_selected(motion), {key: length * area_mm2 for key, length in lengths_mm(motion).items()})
 

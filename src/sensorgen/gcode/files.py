@@ -1,6 +1,6 @@
 """Files of G-code from strangers: opened as text, or refused with the reason."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 from sensorgen.errors import BadInput
@@ -13,30 +13,44 @@ _MAGIC = {
 _PEEK = 1 << 16
 
 
-def lines_of(path: Path) -> Iterator[str]:
-    """Lines of a file of G-code, whatever ends them; bytes that are no UTF-8 become lone surrogates.
+Source = Path | bytes | Iterable[str]
+
+
+def text_of(source: Source) -> bytes:
+    r"""Text of a file of G-code, or of lines; every line ends with a line feed, whatever ended it before.
 
     Parameters
     ----------
-    path : Path
-        The file.
+    source : Path, bytes or iterable of str
+        The file, its content, or its lines with or without their ends; lone surrogates stand for bytes that are no
+        UTF-8.
 
     Raises
     ------
     BadInput
         It cannot be read, is empty, or holds something else than text.
+
+    Examples
+    --------
+    >>> text_of(["G28", "G1 X1\n"])
+    b'G28\nG1 X1\n'
     """
+    if isinstance(source, bytes):
+        return _one_end(source)
+    if not isinstance(source, Path):
+        return b"".join(_one_end(line.encode("utf-8", "surrogateescape") or b"\n") for line in source)
     try:
-        with path.open("rb") as file:
-            _refuse(path, file.read(_PEEK))
+        text = source.read_bytes()
     except OSError as error:
-        raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None
-    return _lines(path)
+        raise BadInput(f"cannot read {str(source)!r}: {error.strerror or error}") from None
+    _refuse(source, text[:_PEEK])
+    return _one_end(text)
 
 
-def _lines(path: Path) -> Iterator[str]:
-    with path.open(encoding="utf-8", errors="surrogateescape") as file:
-        yield from file
+def _one_end(text: bytes) -> bytes:
+    if b"\r" in text:
+        text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return text if text.endswith(b"\n") or not text else text + b"\n"
 
 
 def _refuse(path: Path, head: bytes) -> None:

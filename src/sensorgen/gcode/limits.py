@@ -1,13 +1,13 @@
 """What the moves of a file ask of the axes: each rule looks at all moves at once."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.gcode.found import Found
-from sensorgen.gcode.moves import Motion
+from sensorgen.gcode.found import Found, error
+from sensorgen.gcode.moves import NO_TOOL, Motion
 from sensorgen.gcode.words import Command
 from sensorgen.printer import Printer
 
@@ -34,6 +34,23 @@ def check(motion: Motion, machine: Printer) -> Iterator[Found]:
         yield from rule(motion, machine)
 
 
+def check_loaded(motion: Motion, loaded: Mapping[int, str]) -> Iterator[Found]:
+    """Refuse lines of tools on which there is nothing.
+
+    Parameters
+    ----------
+    motion : Motion
+        The file.
+    loaded : mapping of int to str
+        Material of each tool that has one.
+    """
+    tools = motion.tools.column(len(motion.rows), NO_TOOL)
+    for tool in np.setdiff1d(tools[motion.extruded_mm > 0], [NO_TOOL, *loaded]).astype(int).tolist():
+        number = int(motion.number[np.flatnonzero((tools == tool) & (motion.extruded_mm > 0))[0]])
+        known = ", ".join(f"{name} on {one}" for one, name in loaded.items())
+        yield error("tool", number, f"tool {tool} prints, and nothing is on it; loaded are {known}", "use another tool")
+
+
 def _found(motion: Motion, wrong: Mask, rule: str, severity: str, message: str, advice: str) -> Iterator[Found]:
     """A finding if any move is wrong."""
     if wrong.any():
@@ -44,8 +61,10 @@ def _found(motion: Motion, wrong: Mask, rule: str, severity: str, message: str, 
 def _reach(motion: Motion, machine: Printer) -> Iterator[Found]:
     """No axis leaves its limits."""
     reach = machine.reach_mm()
-    for name, column, (low, high) in zip("XYZ", motion.end_mm.T, (reach.x, reach.y, reach.z), strict=True):
-        for wrong, worst in ((column < low - HAIR_MM, np.min), (column > high + HAIR_MM, np.max)):
+    lowest, highest = motion.box_mm()
+    for k, (name, (low, high)) in enumerate(zip("XYZ", (reach.x, reach.y, reach.z), strict=True)):
+        below, above = lowest[:, k], highest[:, k]
+        for wrong, column, worst in ((below < low - HAIR_MM, below, np.min), (above > high + HAIR_MM, above, np.max)):
             value = float(worst(column[wrong])) if wrong.any() else 0.0
             yield from _found(
                 motion, wrong, "reach", "error",
@@ -58,7 +77,8 @@ def _bed(motion: Motion, machine: Printer) -> Iterator[Found]:
     """Nothing is printed beside the bed or above the print volume."""
     prints = _prints(motion)
     middle = np.array(machine.bed_centre_mm())
-    beside = np.abs(motion.end_mm[:, :2] - middle) - np.array(machine.bed_mm) / 2
+    low, high = (box[:, :2] for box in motion.box_mm())
+    beside = np.maximum(high - middle, middle - low) - np.array(machine.bed_mm) / 2
     wrong = prints & (beside > HAIR_MM).any(axis=1)
     far = float(beside[wrong].max()) if wrong.any() else 0.0
     wide, deep = machine.bed_mm
@@ -66,16 +86,16 @@ def _bed(motion: Motion, machine: Printer) -> Iterator[Found]:
         motion, wrong, "bed", "error", f"lines are printed up to {far:.3g} mm beside the bed of {wide:g} x {deep:g} mm",
         "place the print on the bed",
     )  # fmt: skip
-    high = prints & (motion.end_mm[:, 2] > machine.height_mm + HAIR_MM)
+    above = prints & (motion.end_mm[:, 2] > machine.height_mm + HAIR_MM)
     yield from _found(
-        motion, high, "bed", "error", f"lines are printed above {machine.height_mm:g} mm",
+        motion, above, "bed", "error", f"lines are printed above {machine.height_mm:g} mm",
         "print a lower piece",
     )  # fmt: skip
 
 
 def _below(motion: Motion, _: Printer) -> Iterator[Found]:
     """No move across goes lower than what is already printed: the nozzle would plough through it."""
-    prints, across = _prints(motion), _across(motion) > 0
+    prints, across = _prints(motion), motion.across_mm > 0
     lowest = np.minimum(motion.start_mm[:, 2], motion.end_mm[:, 2])
     printed = np.where(prints, lowest, -np.inf)
     edges = [0, *sorted({e.row for e in motion.events if _names_z(e.command)}), len(lowest)]
@@ -97,13 +117,13 @@ def _names_z(command: Command) -> bool:
 def _speed(motion: Motion, machine: Printer) -> Iterator[Found]:
     """No axis is asked for more than its limit."""
     feed = motion.feed_mm_min / MM_MIN
-    along = np.abs(motion.end_mm - motion.start_mm)
-    across, filament = np.hypot(along[:, 0], along[:, 1]), np.abs(motion.filament_mm)
-    way = np.hypot(across, along[:, 2])
+    across, filament = motion.across_mm, np.abs(motion.filament_mm)
+    up = np.abs(motion.rows[:, 5] - motion.rows[:, 2])
+    way = np.hypot(across, up)
     rate = feed / np.where(way > 0, way, np.maximum(filament, 1e-12))
     limits = machine.max_speed_mm_s
     extrudes = motion.extruded_mm > 0
-    axes = (("X and Y", across, limits.xy), ("Z", along[:, 2], limits.z), ("E", filament, limits.extruder))
+    axes = (("X and Y", across, limits.xy), ("Z", up, limits.z), ("E", filament, limits.extruder))
     for name, length, limit in axes:
         fast = rate * length
         over = fast > limit * (1 + 1e-6)
@@ -129,7 +149,7 @@ def _feed(motion: Motion, _: Printer) -> Iterator[Found]:
 def _purge(motion: Motion, machine: Printer) -> Iterator[Found]:
     """Filament that is pushed on the spot stays within what was seen to work."""
     most = machine.control.longest_purge_mm
-    pushed = np.where(_across(motion) > 0, 0.0, np.abs(motion.filament_mm))
+    pushed = np.where(motion.across_mm > 0, 0.0, np.abs(motion.filament_mm))
     wrong = pushed > most + HAIR_MM
     value = float(pushed.max()) if wrong.any() else 0.0
     yield from _found(
@@ -150,14 +170,8 @@ def _read(motion: Motion, _: Printer) -> Iterator[Found]:
             yield Found("read", severity, rest[0].number, message, advice, len(rest))
 
 
-def _across(motion: Motion) -> Floats:
-    step = motion.end_mm[:, :2] - motion.start_mm[:, :2]
-    way: Floats = np.hypot(step[:, 0], step[:, 1])
-    return way
-
-
 def _prints(motion: Motion) -> Mask:
-    rows: Mask = (motion.extruded_mm > 0) & (_across(motion) > 0)
+    rows: Mask = (motion.extruded_mm > 0) & (motion.across_mm > 0)
     return rows
 
 

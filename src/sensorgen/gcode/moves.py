@@ -2,17 +2,18 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.gcode.arcs import Arcs
 from sensorgen.gcode.words import Command
 
 Floats = NDArray[np.float64]
 
 NO_TOOL = -1
-COLUMNS = 10  # of the table of moves
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,20 +44,12 @@ class Change:
     macro: bool
 
 
-@dataclass
+@dataclass(frozen=True, slots=True)
 class Track:
     """Something that holds from one place in the file to the next: its values, and the moves before each."""
 
-    rows: list[int] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
-
-    def put(self, row: int, value: float) -> None:
-        """Let a value hold from the next move on."""
-        if self.rows and self.rows[-1] == row:
-            self.values[-1] = value
-        else:
-            self.rows.append(row)
-            self.values.append(value)
+    rows: list[int]
+    values: list[float]
 
     def column(self, count: int, before: float = math.nan) -> Floats:
         """What holds for each of ``count`` moves."""
@@ -73,7 +66,9 @@ class Motion:
     ----------
     rows : (n, 10) float64 array
         Start and end [mm], filament that is extruded and filament that is moved [mm], feed [mm/min], and
-        the line. Arcs stand as chords. Filament that only makes good for a retraction is moved, not extruded.
+        the line. Filament that only makes good for a retraction is moved, not extruded.
+    arcs : Arcs
+        Moves that do not go straight.
     events : sequence of Event
         All other commands.
     changes : sequence of Change
@@ -84,8 +79,6 @@ class Motion:
         Kinds of line that comments name, in lower case; the first is "".
     kind, width_mm, height_mm, layer : Track
         Index into ``kinds``, and what comments say of the lines: width and height [mm], and layer from 1.
-    relative : Track
-        1 where X, Y and Z are relative, 0 where they are absolute.
     absolute_e : Track
         1 where E is absolute, 0 where it is relative.
     faults : sequence of Fault
@@ -97,6 +90,7 @@ class Motion:
     """
 
     rows: Floats
+    arcs: Arcs
     events: Sequence[Event]
     changes: Sequence[Change]
     tools: Track
@@ -105,7 +99,6 @@ class Motion:
     width_mm: Track
     height_mm: Track
     layer: Track
-    relative: Track
     absolute_e: Track
     faults: Sequence[Fault]
     lines: int
@@ -141,7 +134,24 @@ class Motion:
         """Line of each move, from 1 [-]."""
         return self.rows[:, 9].astype(np.int64)
 
+    @cached_property
+    def across_mm(self) -> Floats:
+        """Way of the nozzle in plan, in each move [mm]."""
+        step = self.rows[:, 3:5] - self.rows[:, 0:2]
+        way: Floats = np.hypot(step[:, 0], step[:, 1])
+        way[self.arcs.row] = self.arcs.across_mm()
+        return way
+
+    @cached_property
     def length_mm(self) -> Floats:
         """Way of the nozzle in each move [mm]."""
-        way: Floats = np.sqrt(((self.end_mm - self.start_mm) ** 2).sum(axis=1))
+        way: Floats = np.hypot(self.across_mm, self.rows[:, 5] - self.rows[:, 2])
         return way
+
+    def box_mm(self) -> tuple[Floats, Floats]:
+        """Lowest and highest place of each move, (n, 3) twice [mm]; a straight one counts by its end."""
+        if not len(self.arcs):
+            return self.end_mm, self.end_mm
+        low, high = self.end_mm.copy(), self.end_mm.copy()
+        low[self.arcs.row], high[self.arcs.row] = self.arcs.box_mm()
+        return low, high

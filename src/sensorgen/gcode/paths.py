@@ -1,16 +1,14 @@
 """The lines that a file prints, in columns: what every model of the printed piece reads."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.gcode.extruded import NOT_MODEL
-from sensorgen.gcode.files import lines_of
+from sensorgen.gcode.files import Source
 from sensorgen.gcode.motion import follow
 from sensorgen.gcode.moves import NO_TOOL, Motion
 from sensorgen.printer import Printer
@@ -83,13 +81,13 @@ class Paths:
         return self.chosen(bodies[self.kind] & (self.length_mm() > 0))
 
 
-def read(source: Path | Iterable[str], machine: Printer, numbering: Literal["printer", "slicer"] = "printer") -> Paths:
+def read(source: Source, machine: Printer, numbering: Literal["printer", "slicer"] = "printer") -> Paths:
     """Read the lines that a file prints.
 
     Parameters
     ----------
-    source : Path or iterable of str
-        The file, or its lines.
+    source : Path, bytes or iterable of str
+        The file, its content, or its lines.
     machine : Printer
         Whose G-code it is.
     numbering : "printer" or "slicer"
@@ -107,19 +105,18 @@ def read(source: Path | Iterable[str], machine: Printer, numbering: Literal["pri
     >>> paths.tool.tolist(), paths.length_mm().tolist(), paths.width_mm.tolist(), paths.layer.tolist()
     ([3], [10.0], [0.44], [1])
     """
-    lines = lines_of(source) if isinstance(source, Path) else source
-    return paths_of(follow(lines, machine.control.prime_macro), machine, numbering)
+    return paths_of(follow(source, machine.control.prime_macro), machine, numbering)
 
 
 def paths_of(motion: Motion, machine: Printer, numbering: Literal["printer", "slicer"] = "printer") -> Paths:
     """The lines that a followed file prints; see :func:`read`."""
-    rows = np.flatnonzero(motion.extruded_mm > 0)
+    rows, start, end, share = _straight(motion, np.flatnonzero(motion.extruded_mm > 0))
     count = len(motion.rows)
     tools = motion.tools.column(count, NO_TOOL)[rows].astype(np.int64)
     return Paths(
-        start_mm=motion.start_mm[rows],
-        end_mm=motion.end_mm[rows],
-        filament_mm=motion.extruded_mm[rows],
+        start_mm=start,
+        end_mm=end,
+        filament_mm=motion.extruded_mm[rows] * share,
         tool=_own_numbers(tools, machine) if numbering == "slicer" else _or_first(tools, machine),
         kind=motion.kind.column(count, 0)[rows].astype(np.int64),
         height_mm=motion.height_mm.column(count)[rows],
@@ -128,6 +125,19 @@ def paths_of(motion: Motion, machine: Printer, numbering: Literal["printer", "sl
         number=motion.number[rows],
         kinds=motion.kinds,
     )
+
+
+def _straight(motion: Motion, rows: Integers) -> tuple[Integers, Floats, Floats, Floats]:
+    """Some moves as straight lines: the move of each, its start and end [mm], and its share of the move's filament."""
+    bent = np.isin(motion.arcs.row, rows)
+    which, start, end = motion.arcs.chosen(bent).chords()
+    row = motion.arcs.row[bent]
+    kept = rows[~np.isin(rows, row)]
+    every = np.concatenate([kept, row[which]])
+    order = np.argsort(every, kind="stable")
+    starts, ends = np.concatenate([motion.start_mm[kept], start]), np.concatenate([motion.end_mm[kept], end])
+    share = np.concatenate([np.ones(len(kept)), 1.0 / np.bincount(which, minlength=1)[which]])
+    return every[order], starts[order], ends[order], share[order]
 
 
 def _or_first(tools: Integers, machine: Printer) -> Integers:

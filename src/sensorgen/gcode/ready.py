@@ -16,8 +16,10 @@ comments, moves and everything else stay as they are. What changes is the printe
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from math import isfinite
+from sys import maxsize
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sensorgen.errors import BadInput
 from sensorgen.gcode import words
@@ -26,16 +28,14 @@ from sensorgen.gcode.timing import seconds
 from sensorgen.gcode.words import Command
 from sensorgen.printer import Printer
 
-_MOVES = frozenset({"G0 ", "G1 ", "G2 ", "G3 "})
 
-
-def ready(lines: Iterable[str], motion: Motion, machine: Printer) -> Iterator[str]:
-    r"""Lines for the printer.
+def ready(text: bytes, motion: Motion, machine: Printer) -> Iterator[bytes]:
+    r"""The file for the printer, in pieces of whole lines.
 
     Parameters
     ----------
-    lines : iterable of str
-        A slicer's own file, each line with its end; it counts tools from 0.
+    text : bytes
+        A slicer's own file, each line with its line feed; it counts tools from 0.
     motion : Motion
         The same file, followed.
     machine : Printer
@@ -51,8 +51,8 @@ def ready(lines: Iterable[str], motion: Motion, machine: Printer) -> Iterator[st
     --------
     >>> from sensorgen.gcode.motion import follow
     >>> from sensorgen.printer import load_printer
-    >>> raw = ["G28\n", "M83\n", "T2 ; go\n", "M104 S210 ; warm\n", "M106 S255\n", "G1 X1 E1 F60 ; T2\n"]
-    >>> print("".join(ready(raw, follow(raw), load_printer("diabase-h5"))), end="")
+    >>> raw = b"G28\nM83\nT2 ; go\nM104 S210 ; warm\nM106 S255\nG1 X1 E1 F60 ; T2\n"
+    >>> print(b"".join(ready(raw, follow(raw), load_printer("diabase-h5"))).decode(), end="")
     G28
     M83
     T3 ; go
@@ -63,20 +63,35 @@ def ready(lines: Iterable[str], motion: Motion, machine: Printer) -> Iterator[st
     G10 P3 S0 R0
     """
     _refuse_absolute(motion, machine)
-    writer = _Writer(machine)
-    before = dict(_preheats(motion, machine))
-    end = _last_line(motion)
-    for number, line in enumerate(lines, 1):
-        is_move = line[:3] in _MOVES
-        if is_move:
-            yield from writer.take()
-        yield from before.get(number, ())
-        if is_move or line[:1] == ";" or line.isspace():
-            yield line
-        else:
-            yield from writer.line(line)
-        if number == end:
-            yield from writer.cold()
+    writer, moves = _Writer(machine), np.unique(motion.number)
+    starts = np.flatnonzero(np.frombuffer(b"\n" + text, np.uint8) == ord("\n")).tolist()  # of each line, and the end
+    commands = {event.number for event in motion.events}
+    before, end = dict(_preheats(motion, machine)), _last_line(motion)
+    done = 0  # lines
+    for number in sorted({*commands, *before, end, len(starts)} - {0}):
+        move = _after(moves, done)
+        if move <= number and (held := writer.take()):
+            yield text[starts[done] : starts[move - 1]] + _coded(held)
+            done = move - 1
+        yield text[starts[done] : starts[number - 1]] + _coded(before.get(number, ()))
+        done = min(number, len(starts) - 1)
+        line = text[starts[number - 1] : starts[done]]
+        yield _coded(writer.line(line.decode("utf-8", "surrogateescape"))) if number in commands else line
+        yield _coded(writer.cold() if number == end else ())
+        if writer.ended:
+            break
+    said = commands.union(moves.tolist())
+    yield from (text[starts[n] : starts[n + 1]] for n in range(done, len(starts) - 1) if n + 1 not in said)
+
+
+def _after(moves: NDArray[np.int64], done: int) -> int:
+    """Line of the first move after some lines; without one, beyond all lines."""
+    place = int(np.searchsorted(moves, done, side="right"))
+    return int(moves[place]) if place < len(moves) else maxsize
+
+
+def _coded(lines: Iterable[str]) -> bytes:
+    return "".join(lines).encode("utf-8", "surrogateescape")
 
 
 def _refuse_absolute(motion: Motion, machine: Printer) -> None:
@@ -138,8 +153,6 @@ class _Writer:
     def line(self, line: str) -> Iterator[str]:
         """A line that may have to change."""
         said = words.parse(line)
-        if self.ended and said.commands:
-            return
         made = [self._command(command) for command in said.commands]
         if all(new is None for new in made):
             yield line

@@ -71,10 +71,10 @@ def report(motion: Motion, machine: Printer, loaded: dict[int, str] | None = Non
         Material of each tool; the printer's usual ones where a tool has one only.
     """
     printed = motion.extruded_mm > 0
-    across = printed & (motion.length_mm() > 0)
-    ends = motion.end_mm[across]
+    across = printed & (motion.length_mm > 0)
+    low, high = (side[across] for side in motion.box_mm())
     taken = [change.tool for change in motion.changes if change.tool != NO_TOOL]
-    box = (tuple(ends.min(axis=0).tolist()), tuple(ends.max(axis=0).tolist())) if len(ends) else None
+    box = (tuple(low.min(axis=0).tolist()), tuple(high.max(axis=0).tolist())) if len(low) else None
     return Report(
         lines=motion.lines,
         moves=len(motion.rows),
@@ -105,7 +105,7 @@ def _tools(motion: Motion, machine: Printer, loaded: dict[int, str]) -> tuple[Of
     start = machine.tool_at_start()
     tools = motion.tools.column(count, NO_TOOL if start is None else start).astype(np.int64)
     kinds = motion.kind.column(count, 0).astype(np.int64)
-    waste = np.array([kind in NOT_MODEL for kind in motion.kinds])[kinds] | (motion.length_mm() == 0)
+    waste = np.array([kind in NOT_MODEL for kind in motion.kinds])[kinds] | (motion.length_mm == 0)
     extruded = motion.extruded_mm
     found = []
     for tool in np.unique(tools[extruded > 0]).tolist():

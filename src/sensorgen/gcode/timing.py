@@ -23,11 +23,10 @@ def seconds(motion: Motion, fastest: MaxSpeed) -> Floats:
     fastest : MaxSpeed
         The axes' limits [mm/s].
     """
-    along = np.abs(motion.end_mm - motion.start_mm)
     filament = np.abs(motion.filament_mm)
-    across = np.hypot(along[:, 0], along[:, 1])
-    way = np.hypot(across, along[:, 2])
+    across, up = motion.across_mm, np.abs(motion.rows[:, 5] - motion.rows[:, 2])
+    way = np.hypot(across, up)
     asked = np.where(way > 0, way, filament) / np.maximum(motion.feed_mm_min / 60, 1e-3)
-    limits = (across / fastest.xy, along[:, 2] / fastest.z, filament / fastest.extruder)
+    limits = (across / fastest.xy, up / fastest.z, filament / fastest.extruder)
     longest: Floats = np.maximum.reduce([asked, *limits])
     return longest

@@ -25,8 +25,6 @@ from sensorgen.models._traxel_nodes import Nodes
 SOURCE = "Lines as in Dijkshoorn et al., Sensors 2021, 21, 3710 (traxel model); network derived anew"
 COST = 2
 
-_SLENDER = 3.0  # length over width from which a band is less work than the best order for a sheet
-
 
 @dataclass(frozen=True)
 class Resistance:
@@ -95,7 +93,6 @@ def _current(
     nodes: Nodes, found: links.Links, conductance: NDArray[np.float64], ends_m: tuple[float, float]
 ) -> tuple[float, int]:
     """Current along x in a mean field of 1 V/m [A], and the unknowns that it took."""
-    from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.sparse.linalg import splu
 
@@ -103,21 +100,15 @@ def _current(
     left, right = x <= ends_m[0], x >= ends_m[1]
     if not left.any() or not right.any():
         raise OutOfRange(f"no line reaches beyond {ends_m[0]:g} and {ends_m[1]:g} m: put the ends within the electrode")
-    values = conductance[:, None, None] * found.weight[:, :, None] * found.weight[:, None, :]
-    rows, columns = np.broadcast_arrays(found.node[:, :, None], found.node[:, None, :])
-    matrix = coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(len(x), len(x))).tocsr()
-    matrix.eliminate_zeros()
+    matrix = found.matrix(conductance, len(x))
     _, part = connected_components(matrix, directed=False)
     free = ~(left | right) & np.isin(part, part[left | right])
     u = np.where(free, 0.0, x)
     if free.any():
         where = np.flatnonzero(free)
-        long = np.ptp(nodes.place_m[where, 0]) > _SLENDER * np.ptp(nodes.place_m[where, 1])
-        if long:  # from one end to the other: a narrow band, and time that grows as the length
-            where = where[np.argsort(x[where], kind="stable")]
-        solver = splu(
-            matrix[where][:, where].tocsc(), permc_spec="NATURAL" if long else "MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0, options={"SymmetricMode": True},
-        )  # fmt: skip
+        inner = matrix[where][:, where].tocsc()
+        solver = splu(  # columns one by one: so sparse a factor has no panels worth their room
+            inner, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, options={"SymmetricMode": True}
+        )
         u[where] = solver.solve(-(matrix @ np.where(left | right, x, 0.0))[where])
     return float((matrix @ u)[right].sum()), int(free.sum())
