@@ -76,7 +76,6 @@ def anew() -> Iterator[str]:
 
 
 def held_against_others() -> Iterator[str]:
-    planner.load_solver()
     yield "| model | scene | asked | expected | reached | seconds expected | seconds | ratio |"
     yield "|---|---|---|---|---|---|---|---|"
     for model, scenes in OTHERS.items():
