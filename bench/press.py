@@ -77,19 +77,126 @@ def reference_table():
     figure.savefig(PICTURES / "press-reference.png", dpi=130)
 
 
-def convergence_table():
-    yield "\n## Mesh (tri, film 0.1 mm, 100 kPa)\n"
-    yield "| triangles' sizes apex / corner / far [mm] | displacement [um] | rise of C [pF/m] | seconds | said |"
-    yield "|---|---|---|---|---|"
-    coarse = (Fineness(2.8e-3, 0.2, 0.4, 1.0), Fineness(1.4e-3, 0.1, 0.3, 1.0), Fineness(7e-4, 0.1, 0.3, 1.0))
-    for fineness in (*coarse, Fineness()):
-        start = time.process_time()
-        found = once(tri()[1], solids(), list(STRESSES[::2]), fineness, EPS)
-        seconds = time.process_time() - start
-        size = f"{fineness.apex_mm:g} / {fineness.corner_mm:g} / {fineness.coarse_mm:g}"
-        said = "; ".join((*found.faults, *found.doubts))
-        moved = found.displacement_m[-1] * 1e6
-        yield f"| {size} | {moved:.3f} | {rise(found)[-1]:.2f} | {seconds:.1f} | {said} |"
+def moved(name, materials, fineness, stresses=STRESSES):
+    """A row: displacements at 10 and 100 kPa, triangles and seconds."""
+    start = time.process_time()
+    found, run = press2d._solved(tri()[1], materials, stresses, Held(), fineness, lambda _: None)
+    seconds = time.process_time() - start
+    u = [np.interp(p, found.stress_pa, found.displacement_m, right=np.nan) * 1e6 for p in (1e4, 1e5)]
+    said = "; ".join(found.faults)
+    return f"| {name} | {u[0]:.3f} | {u[1]:.3f} | {len(run.mesh.triangles)} | {seconds:.1f} | {said} |"
+
+
+def mesh_table():
+    yield "\n## Mesh (tri, film 0.1 mm, one size changed at a time; used: apex 1 um, 0.05 / 0.15 mm, growth 0.5)\n"
+    yield "| size | displacement at 10 kPa [um] | at 100 kPa [um] | triangles | seconds | said |"
+    yield "|---|---|---|---|---|---|"
+    for apex in (9.0, 3.0, 1.0, 0.5):
+        yield moved(f"apex {apex:g} um", solids(), Fineness(apex * 1e-3))
+    for corner in (0.1, 0.025):
+        yield moved(f"corners {corner:g}, far {3 * corner:g} mm", solids(), Fineness(1e-3, corner, 3 * corner))
+    for growth in (0.35, 0.25):
+        yield moved(f"growth {growth:g}", solids(), Fineness(growth=growth))
+    yield moved("finer in all but the apex", solids(), Fineness(1e-3, 0.025, 0.075, 0.25))
+
+
+def method_tables():
+    """Penalty and load step."""
+    penalty, step = press2d.penalty_pa, press2d._STEP
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained", sharey=True)
+    studies = (
+        (axes[0], "penalty [MPa]", (10, 30, 60, 100, 300, 360, 1000), STRESSES, 360),
+        (axes[1], "longest load step [kPa]", (2.5, 5, 10, 25, 50), [0.0, 1e5], 40),
+    )
+    for ax, name, values, stresses, used in studies:
+        rows = []
+        yield f"\n## {name.capitalize()} (tri, film 0.1 mm, 100 kPa; used: {used})\n"
+        yield f"| {name} | displacement [um] | rise of C [pF/m] | said |"
+        yield "|---|---|---|---|"
+        for value in values:
+            if ax is axes[0]:
+                press2d.penalty_pa = lambda _, value=value: value * 1e6
+            else:
+                press2d._STEP = value * 1e3 / 6e6
+            found = once(tri()[1], solids(), stresses, Fineness(), EPS)
+            press2d.penalty_pa, press2d._STEP = penalty, step
+            rows.append((value, found.displacement_m[-1] * 1e6, rise(found)[-1]))
+            yield f"| {value:g} | {rows[-1][1]:.3f} | {rows[-1][2]:.2f} | {'; '.join(found.faults)} |"
+        x, u, c = np.array(rows).T
+        known = REFERENCE["tri_d0.1"]
+        for y, key, colour, label in ((u, "uy_um", BLUE, "displacement"), (c, "dC_pF_per_m", ORANGE, "rise of C'")):
+            ax.semilogx(x, 100 * (y / known[key][-1] - 1), "o-", ms=3, color=colour, label=label)
+        ax.axvline(used, color=GREY, lw=0.8, ls=":")
+        ax.axhspan(-1, 1, color="0.93", zorder=0)
+        ax.set(xlabel=name)
+    axes[0].set(ylabel="off the reference at 100 kPa [%]")
+    axes[0].legend(frameon=False, fontsize=8)
+    figure.savefig(PICTURES / "press-method.png", dpi=130)
+
+
+def pressed_row(name, cell, materials, stresses=STRESSES):
+    found, seconds = timed(cell, materials, stresses, EPS)
+    known = [c for c in found.capacitance_f_per_m2 if c]
+    c = found.capacitance_f_per_m2[-1]
+    grown = f"{c.middle() / known[0].middle() - 1:.1%}" if c else "not known"
+    u = found.displacement_m[[1, -1]] * 1e6
+    apex = next((d.split(" um")[0].removeprefix("triangles of ") for d in found.doubts if d.startswith("tri")), "1")
+    said = "; ".join(found.faults)
+    return (
+        f"| {name} | {found.converged_pa / 1e3:g} | {u[0]:.3f} | {u[1]:.2f} | {grown} | {apex} "
+        f"| {max(x.width() for x in known):.1e} | {seconds:.1f} | {said} |"
+    )
+
+
+RANGE_HEAD = (
+    "| cell | reached [kPa] | displacement at the first load [um] | at the last [um] | C rises by | apex [um] "
+    "| bounds apart by | seconds | said |\n|---|---|---|---|---|---|---|---|---|"
+)
+
+
+def moduli_table():
+    yield "\n## Moduli of X60 (eTPU 22 MPa), 10 to 100 kPa\n"
+    yield RANGE_HEAD
+    for film in (0.1, 0.2):
+        for e in (1, 2, 3, 6, 12, 30):
+            yield pressed_row(f"film {film:g} mm, E {e} MPa", tri(film)[1], solids(x60=e * 1e6))
+    yield "\nE of 1 MPa on meshes that differ (film 0.1 mm):\n"
+    yield "| size | displacement at 10 kPa [um] | at 100 kPa [um] | triangles | seconds | said |"
+    yield "|---|---|---|---|---|---|"
+    for fineness in (
+        Fineness(3e-3),
+        Fineness(9e-3),
+        Fineness(3e-3, 0.025, 0.075, 0.35),
+        Fineness(5e-3, 0.025, 0.075, 0.25),
+    ):
+        sizes = f"apex {fineness.apex_mm * 1e3:g} um, {fineness.corner_mm:g} / {fineness.coarse_mm:g} mm, growth "
+        yield moved(sizes + f"{fineness.growth:g}", solids(x60=1e6), fineness)
+
+
+def angles_table():
+    yield "\n## Angles, periods and films (E 6 MPa; film 0.1, period 2, hanging height 0.5, lower one 0.24 mm where not said)\n"
+    yield RANGE_HEAD
+    cases = (
+        ("hanging 0.2, lower 0.1", {"hang_height_mm": 0.2, "lower_height_mm": 0.1}),
+        ("hanging 0.3", {"hang_height_mm": 0.3}),
+        ("hanging 1", {"hang_height_mm": 1.0}),
+        ("hanging 1, lower 0.4", {"hang_height_mm": 1.0, "lower_height_mm": 0.4}),
+        ("lower 0.1", {"lower_height_mm": 0.1}),
+        ("lower 0.4", {"lower_height_mm": 0.4}),
+        ("period 1", {"period_mm": 1.0}),
+        ("period 4", {"period_mm": 4.0}),
+        ("film 0.02", {"dielectric_mm": 0.02}),
+    )
+    for name, changed in cases:
+        design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1} | changed})
+        yield pressed_row(name + " mm", press2d.cell(design.in_use, design.params.period_mm), solids())
+
+
+def far_table():
+    yield "\n## On to 1 MPa (E 6 MPa)\n"
+    yield RANGE_HEAD
+    for film in (0.1, 0.2):
+        yield pressed_row(f"film {film:g} mm", tri(film)[1], solids(), np.linspace(0, 1e6, 11))
 
 
 def rungs_table():
@@ -212,7 +319,7 @@ def shapes_picture():
 
 def main():
     lines = ["# Cells under pressure", "", "Made by `bench/press.py`.", ""]
-    for table in (reference_table, convergence_table, rungs_table):
+    for table in (reference_table, mesh_table, method_tables, moduli_table, angles_table, far_table, rungs_table):
         lines += table()
     (HERE / "results" / "press.md").write_text("\n".join(lines) + "\n")
     for picture in (locking_picture, shapes_picture):

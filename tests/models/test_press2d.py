@@ -40,8 +40,9 @@ def test_the_reference_curve_at_every_load(film):
     assert (middle - middle[0])[1:] == pytest.approx(known["dC_pF_per_m"][1:], rel=0.015)
     unloaded = found.capacitance_f_per_m2[0].times(PER_M)
     assert unloaded.lower < known["C0_exact_pF_per_m"] < unloaded.upper
-    assert max(c.width() for c in found.capacitance_f_per_m2) < 1e-3
-    assert abs(found.imbalance[-1]) < 0.002  # work of the load is the energy stored
+    assert max(c.width() for c in found.capacitance_f_per_m2) < 1.5e-3
+    assert found.imbalance == pytest.approx(0 * STRESSES, abs=0.002)  # dE = F du along the whole curve
+    assert abs(found.imbalance[-1]) < 0.001
 
 
 @pytest.mark.parametrize(
@@ -67,11 +68,22 @@ def test_exactly_incompressible_is_the_limit():
     assert moved[0] > moved[1] > moved[2]
 
 
-def test_stress_scales_with_the_moduli():
-    """All else equal, only stress over modulus counts (the penalty scales too)."""
+@pytest.mark.parametrize("softer", [1 / 5, 3.667])
+def test_only_stress_over_modulus_counts(softer):
+    """Dimensions: the same cell at a share of all moduli and of all stresses gives way as far, by as many steps."""
     one = press2d.press(tri(), solids(), STRESSES[:4])
-    five = press2d.press(tri(), solids(x60=30e6, etpu=110e6), 5 * STRESSES[:4])
-    assert five.displacement_m == pytest.approx(one.displacement_m, rel=1e-6, abs=1e-15)
+    scaled = press2d.press(tri(), solids(x60=6e6 / softer, etpu=22e6 / softer), STRESSES[:4] / softer)
+    assert scaled.displacement_m == pytest.approx(one.displacement_m, rel=1e-6, abs=1e-15)
+
+
+def test_soft_x60_reaches_100_kpa():
+    """E of 1 MPa: a mesh that nothing repeats, half as coarse behind the apex, gives the same curve."""
+    stress = [0.0, 1e4, 5e4, 1e5]
+    found = press2d.press(tri(), solids(x60=1e6), stress, EPS)
+    assert (found.faults, found.converged_pa) == ((), 1e5)
+    finer = press2d.press(tri(), solids(x60=1e6), stress, fineness=Fineness(3e-3, 0.025, 0.075, 0.35))
+    assert finer.faults == ()
+    assert found.displacement_m[1:] == pytest.approx(finer.displacement_m[1:], rel=0.01)
 
 
 def test_a_finer_mesh_agrees():
@@ -122,13 +134,13 @@ def test_coarser_triangles_take_over_where_finer_ones_fail(monkeypatch):
     stepped = load.Problem.stepped
 
     def fine_fail(self, state, pressure, before):
-        fine = self.elements.mesh.lengths_m().min() < 1e-6
+        fine = self.elements.mesh.lengths_m().min() < 2e-6
         return None if fine and pressure > 1.5e4 else stepped(self, state, pressure, before)
 
     monkeypatch.setattr(load.Problem, "stepped", fine_fail)
     found = press2d.press(tri(), solids(), [0.0, 1e4, 2e4])
     assert (found.converged_pa, found.faults) == (2e4, ())
-    assert found.doubts[-1].startswith("triangles of 1.4 um at the apex")
+    assert found.doubts[-1].startswith("triangles of 3 um at the apex")
     assert "up to 10 kPa" in found.doubts[-1]
     assert found.displacement_m[-1] * 1e6 == pytest.approx(REFERENCE["tri_d0.1"]["uy_um"][2], rel=0.03)
 

@@ -30,7 +30,7 @@ def elements(mesh, e, nu):
 
 
 def pressed(mesh, e, nu, held, stress, steps=5):
-    free = support.free_of(mesh.points_m, held, np.empty((0, 2), int))
+    free = support.free_of(mesh.points_m, held)
     problem = load.Problem(elements(mesh, e, nu), none(mesh), free, support.top_load(mesh), 1.0)
     return problem, list(load.curve(problem, np.linspace(0, stress, steps + 1), stress))[-1]
 

@@ -63,7 +63,7 @@ def test_a_free_foot_falls_and_then_carries_as_if_it_stuck(bonded, lift):
 
 def test_a_foot_that_slips_is_softer(bonded):
     slips = press2d.press(stacked(0.2, 0.3, lift=1e-3), SOLIDS, [0.0, 1e4], fineness=QUICK)
-    assert slips.displacement_m[1] - slips.fall_m > 1.02 * bonded.displacement_m[2]
+    assert slips.displacement_m[1] - slips.fall_m > 1.01 * bonded.displacement_m[2]
 
 
 def test_a_foot_wider_below_than_above_is_no_graph_over_x():

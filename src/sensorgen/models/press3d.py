@@ -173,7 +173,7 @@ def _solved(
     problem = load.Problem(
         elements,
         faces,
-        support.free_of(mesh.points_m, held, np.empty((0, 2), np.int64), bricks.spans_m(), used),
+        support.free_of(mesh.points_m, held, bricks.spans_m(), used),
         brick_touch.top_load(mesh),
         penalty_pa(float(moduli.min())),
         solver=brick_touch.cholesky(),

@@ -22,7 +22,7 @@ _ROUND = [0, 3, 1, 4, 2, 5]  # the nodes of a triangle, in turn
 _BETWEEN = 0.3  # and less than this share where both ends of the side touch [-]
 
 
-def deformed(cell: Cell, mesh: Mesh, faces: Faces, tied: Whole, u_m: Real, closed: float) -> Cell:
+def deformed(cell: Cell, mesh: Mesh, faces: Faces, u_m: Real, closed: float) -> Cell:
     """The cell at given displacements (2n) [m]; the sides of gaps become two straight pieces each.
 
     Gaps less than ``closed`` of the length of their side are none.
@@ -30,7 +30,7 @@ def deformed(cell: Cell, mesh: Mesh, faces: Faces, tied: Whole, u_m: Real, close
     places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
     found = _edges(cell, mesh)
     if u_m.any():
-        found = _closed(found, _air(cell), places, faces, tied, mesh.points_m, closed)
+        found = _closed(found, _air(cell), places, faces, mesh.points_m, closed)
     edges = {}
     for (a, b), sides in found.items():
         p, q = (tuple(np.round(places[k], 9).tolist()) for k in (a, b))
@@ -83,12 +83,12 @@ def _edges(cell: Cell, mesh: Mesh) -> Sides:
     return {run: sides for run, sides in found.items() if sides[0] != sides[1]}
 
 
-def _closed(edges: Sides, air: int, places: Real, faces: Faces, tied: Whole, drawn: Real, closed: float) -> Sides:
+def _closed(edges: Sides, air: int, places: Real, faces: Faces, drawn: Real, closed: float) -> Sides:
     """Edges with the upper faces laid along the lower ones where they touch; corners in ``places`` may move a bit."""
     lower, upper = (_runs(side) for side in (faces.lower, faces.upper))
     if not (lower and upper):
         return edges
-    instead = _touching(places, lower, upper, closed) | _tied(tied, upper)
+    instead = _touching(places, lower, upper, closed)
     for corner in _corners(drawn, upper) & set(instead):
         places[instead[corner]] = places[corner]  # the point below moves to the corner of an upper face
     found: Sides = {}
@@ -100,11 +100,6 @@ def _closed(edges: Sides, air: int, places: Real, faces: Faces, tied: Whole, dra
                 known = found.get(key, (air, air))
                 found[key] = (known[0] if here[0] == air else here[0], known[1] if here[1] == air else here[1])
     return found
-
-
-def _tied(tied: Whole, upper: list[Run]) -> dict[int, int]:
-    above = {k for run in upper for k in run}
-    return {(a if a in above else b): (b if a in above else a) for a, b in tied.tolist()}
 
 
 def _touching(places: Real, lower: list[Run], upper: list[Run], closed: float) -> dict[int, int]:

@@ -1,7 +1,7 @@
 """Newton's method, and load steps that are cut when it fails."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -22,10 +22,10 @@ Solver = Callable[[csr_matrix, Real], Real | None]
 _ENOUGH = 1e-6  # residual over load
 _NEARLY = 1e-3  # the same before the contact partners are looked for anew
 _STILL = 1e-10  # a step so much shorter than the way is rounding: nu near 1/2 turns it into forces
-_MOST_STEPS = 25
+_MOST_STEPS = 15
 _LEAST_J = 0.05  # a step may not squeeze a triangle below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
-_MOST_CUTS = 8  # failed load steps in all before a cell is given up
+_MOST_CUTS = 4  # failed load steps in all before a cell is given up
 _FLAT = 1e-3  # gaps that differ by less than this share of their side close at once [-]
 _DEEPEST = 0.1  # how far a foot may sink in to begin with, over the length of a side [-]
 _ROUNDING = 1e-9
@@ -86,7 +86,6 @@ class State:
     pairs: Pairs
     stuck: Pairs | None = None
     cuts: int = 0
-    stale: int = 0
 
 
 @dataclass(frozen=True)
@@ -107,8 +106,6 @@ class Problem:
         Contact pressure per penetration, times the length of the side [Pa].
     stick : bool
         What has touched sticks.
-    tied : (k, 2) array
-        Nodes that move as one.
     solver : callable
         Of the linear systems.
     """
@@ -119,7 +116,6 @@ class Problem:
     load: Real
     penalty_pa: float
     stick: bool = False
-    tied: Whole = field(default_factory=lambda: np.empty((0, 2), np.int64))
     solver: Solver = by_lu
 
     @property
@@ -159,8 +155,7 @@ class Problem:
         """Nodes of pieces that nothing holds up."""
         d, nodes = self.dimension, len(self.elements.points_m)
         joined = self.elements.freedoms[:, ::d] // d
-        starts = np.concatenate([np.repeat(joined[:, 0], joined.shape[1] - 1), self.tied[:, 0]])
-        ends = np.concatenate([joined[:, 1:].ravel(), self.tied[:, 1]])
+        starts, ends = np.repeat(joined[:, 0], joined.shape[1] - 1), joined[:, 1:].ravel()
         _, piece = connected_components(coo_matrix((np.ones(len(starts)), (starts, ends)), (nodes, nodes)))
         used = np.zeros(nodes, bool)
         used[joined] = True
@@ -278,10 +273,7 @@ class Problem:
         stuck = self._stuck(first) if self.stick else None
         fresh = self.project(first.u_m, stuck)
         second = self.newton(first, pressure_pa, fresh, _ENOUGH)
-        if second is None:
-            settled = self.newton(first, pressure_pa, first.pairs, _ENOUGH)
-            return replace(settled, stale=first.stale + 1) if settled else None
-        return replace(second, stuck=stuck, stale=0)
+        return replace(second, stuck=stuck) if second else None
 
     def _stuck(self, state: State) -> Pairs:
         return contact.stuck(state.pairs, self.gaps(state.pairs, state.u_m) < 0)

@@ -108,7 +108,7 @@ class Fineness:
     ``growth`` is by how much the size grows per distance [-].
     """
 
-    apex_mm: float = 3.5e-4
+    apex_mm: float = 1e-3
     corner_mm: float = 0.05
     coarse_mm: float = 0.15
     growth: float = 0.5

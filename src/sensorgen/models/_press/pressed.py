@@ -17,12 +17,13 @@ from sensorgen.models._press.support import CHOICES, Held
 if TYPE_CHECKING:
     from sensorgen.models._press.load import Problem, State
 
-_PENALTY = 10.0  # over the least Young's modulus of a solid [-]
-_LEAST_PENALTY_PA = 60e6
+_PENALTY = 60.0  # over the least Young's modulus of a solid [-]
 _LEAST_VOLUME = 0.2  # J below which an element says nothing any more [-]
 _DEEPEST = 0.3  # penetration over the side it happens on [-]
 _BALANCE = 0.01  # by which work and energy may differ [-]
 _LEVELS = 0.01  # by which two meshes may differ [-]
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)  # of the work between two loads
 
 Real = NDArray[np.float64]
 
@@ -87,7 +88,7 @@ class Pressed:
 
 def penalty_pa(softest_pa: float) -> float:
     """Contact pressure per penetration, times the length of a side [Pa]; ``softest_pa`` is the least modulus."""
-    return max(_LEAST_PENALTY_PA, _PENALTY * softest_pa)
+    return _PENALTY * softest_pa
 
 
 def reached(
@@ -108,7 +109,7 @@ def reached(
     stress = np.array([s.pressure_pa for s in states])
     fall = problem.fall_m(states[0])
     imbalance = _imbalance(stress, (down - fall) * width, energy)
-    faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance, sum(s.stale > 0 for s in states)))
+    faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance))
     said = (f"feet hang free as drawn: the top falls {fall * 1e6:.4g} um before they carry",) if fall > 0 else ()
     return Pressed(stress, down, (), (), volume, depth, imbalance, fall, faults, said, source), states
 
@@ -167,23 +168,26 @@ def check(stress_pa: Sequence[float], held: Held) -> None:
 def _imbalance(stress: Real, moved: Real, energy: Real) -> Real:
     """Work of the load less the energy stored, from the first load on, over the energy stored [-].
 
-    Between two loads stress and displacement follow a power law; before the first, feet may still be landing.
+    Between the loads log displacement is a spline of log stress; before the first, feet may still be landing.
     """
+    from scipy.interpolate import CubicSpline
+
     found = np.zeros(len(stress))
     if len(stress) < 3:
         return found
-    powers = np.log(moved[2:] / moved[1:-1]) / np.log(stress[2:] / stress[1:-1])
-    work = np.cumsum(powers / (1 + powers) * np.diff((stress * moved)[1:]))
+    logs = np.log(stress[1:])
+    law, half = CubicSpline(logs, np.log(moved[1:])), np.diff(logs) / 2
+    at = logs[:-1] + half * (1 + _NODES[:, None])
+    work = np.cumsum(half * (_WEIGHTS @ (np.exp(at + law(at)) * law(at, 1))))
     found[2:] = (work - (energy[2:] - energy[1])) / energy[2:]
     return found
 
 
-def _faults(stress: Real, asked: Sequence[float], volume: Real, depth: Real, imbalance: Real, stale: int) -> list[str]:
+def _faults(stress: Real, asked: Sequence[float], volume: Real, depth: Real, imbalance: Real) -> list[str]:
     said = {
         f"converged up to {stress[-1] / 1e3:.4g} of {asked[-1] / 1e3:.4g} kPa": stress[-1] < asked[-1] * (1 - 1e-9),
         f"a triangle is squeezed to {volume.min():.2g} of its volume": volume.min() < _LEAST_VOLUME,
         f"faces run into each other by {depth.max():.2g} of a side": depth.max() > _DEEPEST,
         f"work and energy differ by {imbalance[-1]:.1%}": abs(imbalance[-1]) > _BALANCE,
-        f"old contact partners at {stale} of {len(stress)} stresses": stale > 0,
     }
     return [words for words, holds in said.items() if holds]

@@ -9,7 +9,6 @@ from scipy.sparse import csr_matrix
 from sensorgen.models._press.mesh import Mesh
 
 Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 _SAME = 1e-9  # of the cell's width: places nearer than this are one
 
@@ -45,7 +44,7 @@ CHOICES = {
 
 
 def free_of(
-    points_m: Real, held: Held, tied: Whole, spans_m: Real | None = None, used: NDArray[np.bool_] | None = None
+    points_m: Real, held: Held, spans_m: Real | None = None, used: NDArray[np.bool_] | None = None
 ) -> csr_matrix:
     """Displacements (x, y of each node, or x, y, z) from the free ones, as a sparse matrix of ones.
 
@@ -55,8 +54,6 @@ def free_of(
         Places of the nodes, the height last; all sides of the cell are mirrors [m].
     held : Held
         Choices of the boundary.
-    tied : (k, 2) array
-        Pairs of nodes that move as one, where solids touch in a point.
     spans_m : (d, 2) array, optional
         Where the cell begins and ends; as far as its nodes reach where not given [m].
     used : (n,) array, optional
@@ -69,8 +66,6 @@ def free_of(
     wide = d * nodes + np.arange(d - 1)  # these numbers stand for how the cell widens
     leader = np.arange(d * nodes + d - 1)
     fixed = np.zeros(len(leader), bool)
-    for one, other in tied:
-        leader[d * other : d * other + d] = d * one + np.arange(d)
     for axis, (start, stop) in enumerate(ends[:-1]):
         fixed[d * start + axis] = True
         leader[d * stop + axis] = wide[axis]
@@ -100,23 +95,3 @@ def top_load(mesh: Mesh) -> Real:
     for node, share in zip(mesh.rim[on_top].T, (1 / 6, 1 / 6, 2 / 3), strict=True):
         np.add.at(force, 2 * node + 1, -share * mesh.lengths_m()[on_top])
     return force
-
-
-def tied_nodes(mesh: Mesh) -> Whole:
-    """Nodes of the first sides on both faces of a gap that begins where solids touch in a point, in pairs.
-
-    A point contact has no stiffness to begin with; tied over one side it has, and the sides are short.
-    """
-    ends = mesh.rim[:, :2].ravel()
-    nodes, count = np.unique(ends, return_counts=True)
-    pairs = []
-    for node in nodes[count >= 4]:
-        here = mesh.rim[(mesh.rim[:, :2] == node).any(axis=1)]
-        far = np.where(here[:, 0] == node, here[:, 1], here[:, 0])
-        way = mesh.points_m[far] - mesh.points_m[node]
-        level = abs(way[:, 0]) > 1e-6 * np.hypot(*way.T)
-        for sign in (-1, 1):
-            faces = np.flatnonzero(level & (sign * way[:, 0] > 0))
-            if len(faces) == 2:
-                pairs += [far[faces], here[faces, 2]]
-    return np.array(pairs, int).reshape(-1, 2)
