@@ -1,15 +1,25 @@
 """Boxes under pressure: closed forms, the plane-strain model, another field solver, and what must not change."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.sparse import csr_matrix
 
 from sensorgen.design import make
 from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.models import fem3d, press2d, press3d, springs
-from sensorgen.models._press import brick_air, brick_element, brick_field, brick_touch, element, load, pressed
+from sensorgen.models._press import (
+    brick_air,
+    brick_element,
+    brick_factors,
+    brick_field,
+    brick_touch,
+    element,
+    load,
+    pressed,
+)
 from sensorgen.models._press.brick_field import Orders
 from sensorgen.models._press.bricks import Bricks
 from sensorgen.models._press.cell import Region
@@ -297,16 +307,29 @@ def test_many_boxes_are_cut_into_fewer_pieces_and_that_is_said(monkeypatch):
 
 
 def test_conjugate_gradients_make_new_factors_where_the_old_ones_do_not_serve():
-    pytest.importorskip("ngsolve")
-    from scipy.sparse import diags
-
-    rng, solver = np.random.default_rng(3), brick_touch.cholesky()
+    rng = np.random.default_rng(3)
+    places = np.array(list(product(range(0, 12, 2), repeat=3)))
+    near = abs(places[:, None] - places[None]).max(axis=2) <= 2
+    solver = brick_factors.Solver(places, 1e-9)
     for scale in (1.0, 1.01, 1e4):
-        d = 2 + rng.random(200) * scale
-        matrix = diags([-np.ones(199), d, -np.ones(199)], [-1, 0, 1]).tocsr()
-        right = rng.normal(size=200)
-        assert matrix @ solver(matrix, right) == pytest.approx(right, abs=1e-6)
-    assert solver(diags([[0.0] * 200], [0]).tocsr(), right) is None
+        full = np.where(near, -1.0, 0.0) + np.diag(27 + rng.random(216) * scale)
+        right = rng.normal(size=216)
+        assert full @ solver(csr_matrix(full), right) == pytest.approx(right, abs=1e-6)
+    assert solver(csr_matrix(full - 1e6 * np.eye(216)), right) is None
+
+
+def test_factors_are_those_of_the_whole_matrix():
+    rng = np.random.default_rng(4)
+    places = np.array(list(product(range(9), range(7), range(5))))
+    near = abs(places[:, None] - places[None]).max(axis=2) <= 1
+    half = np.where(near, rng.normal(size=near.shape), 0.0)
+    matrix = csr_matrix(half @ half.T + np.eye(len(places)))
+    order = brick_factors.order_of(matrix, places)
+    assert len(order.fronts) > 5
+    assert sorted(order.turn) == list(range(len(places)))
+    right = rng.normal(size=len(places))
+    found = brick_factors.factored(matrix, order).solve(right)
+    assert found == pytest.approx(np.linalg.solve(matrix.toarray(), right), rel=1e-8, abs=1e-10)
 
 
 def test_air_goes_along_evenly_with_what_is_stretched_evenly():
@@ -315,7 +338,7 @@ def test_air_goes_along_evenly_with_what_is_stretched_evenly():
     bricks = boxes(((0, 0.3, 0.6, 1.0, 1.2), (0, 1), (0, 0.2, 0.6, 0.8)), fill).cut(2, 0.5)
     whole, solid = (brick_element.mesh_of(bricks, w) for w in (np.ones(bricks.fill.shape, bool), bricks.fill > 0))
     stretched = np.array([0.03, 0.02, -0.1])
-    found = brick_air.extended(whole, solid, solid.points_m * stretched).reshape(-1, 3)
+    found = brick_air.extended(whole, solid, solid.points_m * stretched, []).reshape(-1, 3)
     assert found == pytest.approx(whole.points_m * stretched, abs=1e-12)
 
 

@@ -159,7 +159,7 @@ def _solved(
     held: Held,
     step: Callable[[float], None],
 ) -> tuple[Pressed, _Run]:
-    from sensorgen.models._press import brick_element, brick_touch, element, load, support
+    from sensorgen.models._press import brick_element, brick_factors, brick_touch, element, load, support
 
     mesh = brick_element.mesh_of(bricks, bricks.fill > 0)
     materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in bricks.regions]
@@ -170,13 +170,15 @@ def _solved(
     used = np.zeros(len(mesh.points_m), bool)
     used[elements.freedoms // 3] = True
     faces = brick_touch.BrickFaces(mesh)
+    free = support.free_of(mesh.points_m, held, np.empty((0, 2), np.int64), bricks.spans_m(), used)
+    first = free.tocsc().indices[free.tocsc().indptr[:-1]]
     problem = load.Problem(
         elements,
         faces,
-        support.free_of(mesh.points_m, held, np.empty((0, 2), np.int64), bricks.spans_m(), used),
+        free,
         brick_touch.top_load(mesh),
         penalty_pa(float(moduli.min())),
-        solver=brick_touch.cholesky(),
+        solver=brick_factors.Solver(mesh.lattice[first // 3]),
     )
     found, states = reached(problem, stress_pa, _STEP * float(moduli.min()), step, SOURCE)
     return _judged(found, problem, faces, states, held), _Run(elements, faces, states)
@@ -214,7 +216,7 @@ def _field(
 
     moved = run.elements.all_nodes(state.u_m, state.inner)
     for share in _OPEN:
-        u = brick_air.extended(whole, run.elements.mesh, run.faces.opened(moved, share))
+        u = brick_air.extended(whole, run.elements.mesh, *run.faces.opened(moved, share))
         try:
             return brick_field.capacitance(whole, u, permittivity, orders)
         except brick_field.Folded:

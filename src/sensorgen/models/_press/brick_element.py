@@ -72,12 +72,15 @@ class BrickMesh:
         Which box each brick is, along x, y and z.
     nodes : (m, 27) array
         Of each brick.
+    lattice : (n, 3) array
+        Of each node, its place counted in half bricks along x, y and z.
     """
 
     bricks: Bricks
     points_m: Real
     boxes: Whole
     nodes: Whole
+    lattice: Whole
 
     def edges_m(self) -> Real:
         """Edges of each brick (m, 3) [m]."""
@@ -97,13 +100,9 @@ def mesh_of(bricks: Bricks, which: NDArray[np.bool_]) -> BrickMesh:
     flat = np.ravel_multi_index(tuple(np.moveaxis(corners, -1, 0)), tuple(size))
     used, nodes = np.unique(flat, return_inverse=True)
     lattice = [np.interp(np.arange(2 * len(p) - 1) / 2, np.arange(len(p)), p) for p in bricks.planes_m]
-    places = np.unravel_index(used, tuple(size))
-    return BrickMesh(
-        bricks,
-        np.column_stack([line[k] for line, k in zip(lattice, places, strict=True)]),
-        boxes,
-        nodes.reshape(flat.shape),
-    )
+    places = np.column_stack(np.unravel_index(used, tuple(size)))
+    points = np.column_stack([line[k] for line, k in zip(lattice, places.T, strict=True)])
+    return BrickMesh(bricks, points, boxes, nodes.reshape(flat.shape), places)
 
 
 @dataclass(frozen=True)

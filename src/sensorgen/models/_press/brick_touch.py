@@ -1,9 +1,8 @@
-"""What bricks stand on and run into: their top, the faces on both sides of each gap, and the linear systems' solver."""
+"""What bricks stand on and run into: their top, and the faces on both sides of each gap."""
 
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise, product
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +10,14 @@ from scipy.sparse import csr_matrix
 
 from sensorgen.models._press.brick_element import BrickMesh, values
 from sensorgen.models._press.contact import Pairs
-from sensorgen.models._press.load import Solver, by_lu
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _SHAPE = np.einsum("ai,bj->abij", values(_POINTS), values(_POINTS)).reshape(9, 9)  # (points, nodes) of a face
-_MOST_TURNS = 30  # of conjugate gradients, before new factors are made
-_ENOUGH = 1e-7  # residual over right side
+_SHUT, _OPEN = 0.25, 0.5  # of a gap's width: below and above, its faces' nodes are opposite each other, or as they are
+_THIN = 0.1  # of a gap's width: its air is squeezed evenly
 _WEIGHT = np.outer(_WEIGHTS, _WEIGHTS).ravel() / 4
 _FACE = {
     (axis, side): np.array([n for n, at in enumerate(product(range(3), repeat=3)) if at[axis] == 2 * side])
@@ -50,6 +48,30 @@ def facing(fill: Whole) -> list[tuple[int, Whole, Whole]]:
         lower, upper = (np.insert(rows[:, :2], axis, rows[:, k], axis=1) for k in (2, 3))
         found.append((axis, lower, upper))
     return found
+
+
+def _bulged(gap: Real, nodes: Whole, least: float) -> Real:
+    """Gaps at the nine nodes of faces (k, 9), raised where the parabolas through them would dip below a least one.
+
+    Coefficients of Bernstein's polynomials bound a parabola: all are held above. Faces share nodes.
+    """
+
+    def shared(values: Real) -> Real:
+        highest = np.zeros(nodes.max() + 1)
+        np.maximum.at(highest, nodes, values.reshape(nodes.shape))
+        return np.asarray(highest[nodes].reshape(-1, 3, 3))
+
+    found = gap.reshape(-1, 3, 3).copy()
+    ends = [0, 2]
+    found[:, 1, ends] = np.maximum(found[:, 1, ends], found[:, ends][:, :, ends].sum(axis=1) / 4 + least / 2)
+    found[:, ends, 1] = np.maximum(found[:, ends, 1], found[:, ends][:, :, ends].sum(axis=2) / 4 + least / 2)
+    found = shared(found)
+    edges, corners = (
+        found[:, 1, ends].sum(axis=1) + found[:, ends, 1].sum(axis=1),
+        found[:, ends][:, :, ends].sum((1, 2)),
+    )
+    found[:, 1, 1] = np.maximum(found[:, 1, 1], (least + edges - corners / 4) / 4)
+    return found.reshape(-1, 9)
 
 
 @dataclass(frozen=True)
@@ -90,21 +112,28 @@ class BrickFaces:
         stiffness = np.repeat(edges.prod(axis=1), 9) / side * np.tile(_WEIGHT, len(nodes))
         return Pairs(gap, csr_matrix(shape), stiffness, side, np.arange(count), np.zeros(count, bool))
 
-    def opened(self, moved: Real, share: float) -> Real:
-        """Displacements of all nodes (n, 3), gaps that are thinner than a share of their width held open so far [m].
+    def opened(self, moved: Real, share: float) -> tuple[Real, list[tuple[int, Whole, Whole]]]:
+        """Displacements of all nodes (n, 3) with gaps held open, and the nodes on both sides of nearly shut ones.
 
-        There the lower face's nodes slide along it to those that they face, or the air beside would fold.
+        A gap that is thinner than a share of its width is opened so far, and those beside it until its parabola stays
+        above. Where it is nearly shut, the lower face's nodes slide along it to those that they face, or the air
+        between would be sheared until it folds.
         """
         found = moved.copy()
         nodes, axes, _ = self._sides
-        for far, near, axis in zip(nodes[:, :9], nodes[:, 9:], axes.tolist(), strict=True):
+        columns = []
+        for axis in np.unique(axes).tolist():
+            far, near = nodes[axes == axis, :9], nodes[axes == axis, 9:]
             width = self.mesh.points_m[far, axis] - self.mesh.points_m[near, axis]
-            gap = width + found[far, axis] - found[near, axis]
-            shut = gap < share * width
-            found[far[shut], axis] += (share * width - gap)[shut]
-            for across in {0, 1, 2} - {axis}:
-                found[near[shut], across] = found[far[shut], across]
-        return found
+            drawn = 1 + (moved[far, axis] - moved[near, axis]) / width
+            gap = _bulged(np.maximum(drawn, share), far, share)
+            found[far, axis] += (gap - drawn) * width
+            slide = np.clip((_OPEN - drawn) / (_OPEN - _SHUT), 0.0, 1.0)[..., None] * (moved[far] - moved[near])
+            slide[..., axis] = 0.0
+            found[near] = moved[near] + slide
+            thin = (gap < _THIN).any(axis=1)
+            columns.append((axis, near[thin].ravel(), far[thin].ravel()))
+        return found, columns
 
     def slid_m(self, u_m: Real, which: NDArray[np.bool_]) -> Real:
         """How far each of some points has slid along its partner [m]."""
@@ -113,61 +142,3 @@ class BrickFaces:
         along = np.einsum("qn,knd->kqd", np.concatenate([_SHAPE, -_SHAPE], axis=1), moved)
         along[np.arange(len(axes)), :, axes] = 0.0
         return np.asarray(np.linalg.norm(along, axis=2).ravel()[which])
-
-
-def cholesky() -> Solver:
-    """A solver that keeps the order of elimination while the pattern stays; by LU where NGSolve is not installed."""
-    try:
-        import ngsolve as ng
-    except ImportError:
-        return by_lu
-    return _Cholesky(ng)
-
-
-@dataclass
-class _Cholesky:
-    """Conjugate gradients, preconditioned by the factors of an earlier system while these serve."""
-
-    ng: Any
-    factors: Any = None
-
-    def __call__(self, stiffness: csr_matrix, right: Real) -> Real | None:
-        """The step that a force makes, or None where a piece has nothing that holds it."""
-        found = self._iterated(stiffness, right) if self.factors else None
-        if found is None:
-            self.factors = self._factored(stiffness)
-            found = self._iterated(stiffness, right)
-        return found
-
-    def _factored(self, stiffness: csr_matrix) -> Any:
-        rows = np.repeat(np.arange(stiffness.shape[0], dtype=np.int32), np.diff(stiffness.indptr))
-        matrix = self.ng.la.SparseMatrixd.CreateFromCOO(
-            rows, stiffness.indices.astype(np.int32), stiffness.data, *stiffness.shape
-        )
-        return matrix.Inverse(inverse="sparsecholesky")
-
-    def _preconditioned(self, residual: Real) -> Real:
-        force, step = (self.factors.CreateColVector() for _ in range(2))
-        force.FV().NumPy()[:] = residual
-        step.data = self.factors * force
-        return np.array(step.FV().NumPy(), float)
-
-    def _iterated(self, stiffness: csr_matrix, right: Real) -> Real | None:
-        found, residual = np.zeros_like(right), right.copy()
-        way = direction = self._preconditioned(residual)
-        power = residual @ way
-        for _ in range(_MOST_TURNS):
-            if not (np.isfinite(power) and power > 0):
-                return None
-            pushed = stiffness @ direction
-            bearing = direction @ pushed
-            if not bearing > 0:
-                return None
-            share = power / bearing
-            found, residual = found + share * direction, residual - share * pushed
-            if np.abs(residual).max() < _ENOUGH * np.abs(right).max():
-                return np.asarray(found)
-            way = self._preconditioned(residual)
-            before, power = power, residual @ way
-            direction = way + power / before * direction
-        return None
