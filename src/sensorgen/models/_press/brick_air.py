@@ -1,7 +1,7 @@
 """How the air of a cell goes along with its boxes, so that the field has a map without folds.
 
-In the columns of a gap that is nearly shut, evenly between the two faces; elsewhere harmonically, by differences between
-neighbouring nodes: no displacement there is beyond those around it.
+In the columns of a gap that is nearly shut, evenly between the two faces; elsewhere harmonically, by differences
+between neighbouring nodes: no displacement there is beyond those around it.
 """
 
 from itertools import product
