@@ -114,7 +114,7 @@ def facing_points(places_m: Real, own: Whole, shape: Real, faces: Whole, axis: i
     at, ok = _inverse(there[face][..., ways], here[point][:, ways])
     both = _on_face(values(at[:, 0]), values(at[:, 1]))
     gap = np.einsum("kn,kn->k", both, there[face][..., axis]) - here[point, axis]
-    point, face, at, both, gap = (v[ok] for v in (point, face, at, both, gap))
+    point, face, at, both, gap = point[ok], face[ok], at[ok], both[ok], gap[ok]
     order = np.lexsort((np.abs(gap), point))
     first = order[np.unique(point[order], return_index=True)[1]]
     count = len(own)
@@ -144,7 +144,7 @@ def _inverse(faces: Real, wanted: Real) -> tuple[Real, NDArray[np.bool_]]:
         place = np.einsum("kn,knd->kd", _on_face(values(at[:, 0]), values(at[:, 1])), faces)
         jacobian = np.einsum("kwn,knd->kdw", _moves(at), faces)
         at = np.clip(at + np.linalg.solve(jacobian, (wanted - place)[..., None])[..., 0], -2.0, 2.0)
-    return at, (np.abs(at) <= 1 + _REACH).all(axis=1)
+    return at, np.asarray((np.abs(at) <= 1 + _REACH).all(axis=1))
 
 
 def _slopes_at(faces: Real, at: Real, ways: list[int], axis: int) -> Real:
@@ -162,9 +162,11 @@ def _rows(weights: Real, nodes: Whole, axis: int, size: int) -> csr_matrix:
 def joined(parts: list[Pairs], size: int) -> Pairs:
     """Pairs of several kinds as one."""
     gap, slip = (vstack([csr_matrix((0, size)), *(getattr(p, k) for p in parts)]).tocsr() for k in ("gap", "slip"))
-    kinds = {"stiffness_pa": float, "length_m": float, "point": np.int64, "sticks": bool}
-    rest = [np.concatenate([np.empty(0, kind), *(getattr(p, k) for p in parts)]) for k, kind in kinds.items()]
-    return Pairs(gap, slip, *rest)
+    stiff, long, which, held = (
+        np.concatenate([np.empty(0), *(getattr(p, k) for p in parts)])
+        for k in ("stiffness_pa", "length_m", "point", "sticks")
+    )
+    return Pairs(gap, slip, stiff, long, which.astype(np.int64), held.astype(bool))
 
 
 @dataclass(frozen=True)
@@ -203,8 +205,9 @@ class BrickFaces:
         gap.eliminate_zeros()
         slips = [_rows(weights * np.sqrt(2), nodes, way, size) for way in ways] if self.sticks else [0 * gap]
         n = len(slips)
-        rest = (np.tile(v[here], n) for v in (stiffness / n, side, points))
-        return Pairs(vstack([gap] * n).tocsr(), vstack(slips).tocsr(), *rest, np.zeros(n * len(here), bool))
+        stiff, long, which = np.tile(stiffness[here] / n, n), np.tile(side[here], n), np.tile(points[here], n)
+        both = vstack([gap] * n).tocsr(), vstack(slips).tocsr()
+        return Pairs(*both, stiff, long, which, np.zeros(n * len(here), bool))
 
     @cached_property
     def _sides(self) -> tuple[Whole, Whole, Real]:
