@@ -1,15 +1,25 @@
 """Boxes under pressure: closed forms, the plane-strain model, another field solver, and what must not change."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.sparse import csr_matrix
 
 from sensorgen.design import make
 from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.models import fem3d, press2d, press3d, springs
-from sensorgen.models._press import brick_air, brick_element, brick_field, brick_touch, element, load, pressed
+from sensorgen.models._press import (
+    brick_air,
+    brick_element,
+    brick_factors,
+    brick_field,
+    brick_touch,
+    element,
+    load,
+    pressed,
+)
 from sensorgen.models._press.brick_field import Orders
 from sensorgen.models._press.bricks import Bricks
 from sensorgen.models._press.cell import Region
@@ -203,18 +213,36 @@ def stairs(*widths, lift=0.0, film=0.1):
 def test_stairs_as_boxes_are_stairs_as_a_cross_section(lift):
     """Bars along y are pressed alike by both models, bonded or falling onto the film and slipping on it."""
     scene, stress = stairs(0.2, 0.3, lift=lift), [0.0, 1e4, 2e4]
-    eps = EPS if lift == 0 else None
-    flat = press2d.press(press2d.cell(scene, 2.0), solids(), stress, eps)
-    solid = press3d.press(press3d.cell(scene), solids(), stress, eps, fineness=Pieces(2, 0.4))
+    flat = press2d.press(press2d.cell(scene, 2.0), solids(), stress, EPS)
+    solid = press3d.press(press3d.cell(scene), solids(), stress, EPS, fineness=Pieces(2, 0.4))
     assert flat.faults == solid.faults == ()
     assert solid.fall_m == pytest.approx(lift * 1e-3, rel=1e-9)
     own = [f.displacement_m[1:] - f.fall_m for f in (flat, solid)]
-    assert own[1] == pytest.approx(own[0], rel=0.02)
+    assert own[1] == pytest.approx(own[0], rel=0.033 if lift else 0.02)
     assert ("faces of gaps touch, without friction" in solid.doubts) == (lift > 0)
-    if eps:
+    grown = [[c.middle() for c in f.capacitance_f_per_m2] for f in (flat, solid)]
+    assert grown[1] == pytest.approx(grown[0], rel=2e-3)
+    assert grown[1][2] / grown[1][0] - 1 == pytest.approx(grown[0][2] / grown[0][0] - 1, rel=0.01 if lift else 0.04)
+
+
+def test_feet_that_stick_are_stiffer_by_as_much_as_in_a_cross_section():
+    """By how much sticking stiffens is known far better than the displacement, whose error is the mesh's."""
+    scene, stress = stairs(0.3, lift=0.02), [0.0, 1e4, 2e4, 5e4]
+    moved = {}
+    for contact in ("frictionless", "stick"):
+        held = Held(contact=contact)
+        flat = press2d.press(press2d.cell(scene, 2.0), solids(), stress, EPS, held)
+        solid = press3d.press(press3d.cell(scene), solids(), stress, EPS, held, Pieces(2, 0.4))
+        assert solid.faults == ()
+        assert abs(solid.imbalance[-1]) < 2e-3
+        moved[contact] = flat, solid
+    less = [moved["stick"][k].displacement_m[1:] / moved["frictionless"][k].displacement_m[1:] - 1 for k in range(2)]
+    assert less[1] == pytest.approx(less[0], rel=0.03)
+    assert all(less[1] < -1e-3)
+    for flat, solid in moved.values():
         grown = [[c.middle() for c in f.capacitance_f_per_m2] for f in (flat, solid)]
         assert grown[1] == pytest.approx(grown[0], rel=2e-3)
-        assert grown[1][2] / grown[1][0] - 1 == pytest.approx(grown[0][2] / grown[0][0] - 1, rel=0.04)
+    assert "faces of gaps touch, and hold fast" in moved["stick"][1].doubts
 
 
 def test_upright_walls_hold_each_other_apart():
@@ -228,6 +256,32 @@ def test_upright_walls_hold_each_other_apart():
     slopes = np.diff(found.displacement_m)
     assert slopes[-1] < 0.75 * slopes[0]
     assert 0 < found.penetration[-1] < 0.02
+
+
+def test_points_meet_the_nearest_face_at_the_same_place():
+    """A bent sheet over two points: the place on it, its height and slope, are those of the parabola that it is."""
+    mesh = brick_element.mesh_of(
+        boxes(((0, 1, 2), (0, 1), (0, 0.1, 0.3, 0.4)), [[[1, 0, 1]]] * 2), np.ones((2, 1, 3), bool)
+    )
+    x, y, z = mesh.points_m.T
+    sheet = brick_touch._FACE[2, 0]
+    upper, lower = mesh.nodes[mesh.boxes[:, 2] == 2][:, sheet], mesh.nodes[mesh.boxes[:, 2] == 0]
+    moved = mesh.points_m.copy()
+    above = z > 0.2e-3
+    moved[above, 2] += 100 * x[above] ** 2 - 1e-4 * y[above] * 1e3
+    moved[above, 0] += 2e-4 + 50 * x[above] * y[above]
+    own = lower[:, brick_touch._FACE[2, 1]]
+    met = brick_touch.facing_points(moved, own, brick_touch._SHAPE[[0, 8]], upper, 2)
+    here = np.einsum("kn,knd->kd", brick_touch._SHAPE[[0, 8]], moved[own])
+    drawn = (here[:, 0] - 2e-4) / (1 + 50 * here[:, 1])
+    assert met.found.tolist() == [drawn[0] > 0, True]
+    height = 0.3e-3 + 100 * drawn**2 - 0.1 * here[:, 1]
+    assert met.gap_m[1] == pytest.approx((height - here[:, 2])[1], rel=1e-9)
+    sideways = 200 * drawn / (1 + 50 * here[:, 1])
+    slopes = [sideways[1], -0.1 - sideways[1] * 50 * drawn[1]]
+    assert met.slopes[1] == pytest.approx(slopes, rel=1e-9)
+    level = np.einsum("kn,knd->kd", met.weights, moved[met.nodes])
+    assert level[1] == pytest.approx([0, 0, met.gap_m[1]], abs=1e-15)
 
 
 def test_gaps_are_runs_of_air_between_solids_along_each_axis():
@@ -297,16 +351,29 @@ def test_many_boxes_are_cut_into_fewer_pieces_and_that_is_said(monkeypatch):
 
 
 def test_conjugate_gradients_make_new_factors_where_the_old_ones_do_not_serve():
-    pytest.importorskip("ngsolve")
-    from scipy.sparse import diags
-
-    rng, solver = np.random.default_rng(3), brick_touch.cholesky()
+    rng = np.random.default_rng(3)
+    places = np.array(list(product(range(0, 12, 2), repeat=3)))
+    near = abs(places[:, None] - places[None]).max(axis=2) <= 2
+    solver = brick_factors.Solver(places, 1e-9)
     for scale in (1.0, 1.01, 1e4):
-        d = 2 + rng.random(200) * scale
-        matrix = diags([-np.ones(199), d, -np.ones(199)], [-1, 0, 1]).tocsr()
-        right = rng.normal(size=200)
-        assert matrix @ solver(matrix, right) == pytest.approx(right, abs=1e-6)
-    assert solver(diags([[0.0] * 200], [0]).tocsr(), right) is None
+        full = np.where(near, -1.0, 0.0) + np.diag(27 + rng.random(216) * scale)
+        right = rng.normal(size=216)
+        assert full @ solver(csr_matrix(full), right) == pytest.approx(right, abs=1e-6)
+    assert solver(csr_matrix(full - 1e6 * np.eye(216)), right) is None
+
+
+def test_factors_are_those_of_the_whole_matrix():
+    rng = np.random.default_rng(4)
+    places = np.array(list(product(range(9), range(7), range(5))))
+    near = abs(places[:, None] - places[None]).max(axis=2) <= 1
+    half = np.where(near, rng.normal(size=near.shape), 0.0)
+    matrix = csr_matrix(half @ half.T + np.eye(len(places)))
+    order = brick_factors.order_of(matrix, places)
+    assert len(order.fronts) > 5
+    assert sorted(order.turn) == list(range(len(places)))
+    right = rng.normal(size=len(places))
+    found = brick_factors.factored(matrix, order).solve(right)
+    assert found == pytest.approx(np.linalg.solve(matrix.toarray(), right), rel=1e-8, abs=1e-10)
 
 
 def test_air_goes_along_evenly_with_what_is_stretched_evenly():
@@ -315,7 +382,7 @@ def test_air_goes_along_evenly_with_what_is_stretched_evenly():
     bricks = boxes(((0, 0.3, 0.6, 1.0, 1.2), (0, 1), (0, 0.2, 0.6, 0.8)), fill).cut(2, 0.5)
     whole, solid = (brick_element.mesh_of(bricks, w) for w in (np.ones(bricks.fill.shape, bool), bricks.fill > 0))
     stretched = np.array([0.03, 0.02, -0.1])
-    found = brick_air.extended(whole, solid, solid.points_m * stretched).reshape(-1, 3)
+    found = brick_air.extended(whole, solid, solid.points_m * stretched, []).reshape(-1, 3)
     assert found == pytest.approx(whole.points_m * stretched, abs=1e-12)
 
 

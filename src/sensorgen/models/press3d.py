@@ -45,7 +45,6 @@ __all__ = ["Elastic", "Held", "Pieces", "Pressed", "cell", "compared", "curve_of
 _STEP = 1 / 60  # longest load step over the least Young's modulus: 100 kPa for 6 MPa [-]
 _MOST = 4000  # solid bricks: more would take hours
 _OPEN = (1e-4, 1e-3, 1e-2)  # least height of a gap in the field, over that as drawn: to be tried in turn [-]
-_SLID = 0.25  # of a side: further faces may not slide along each other [-]
 
 Real = NDArray[np.float64]
 
@@ -122,7 +121,7 @@ def press(
     permittivity : mapping of str to float, optional
         Relative permittivity by material, with "air"; without it no capacitance is computed [-].
     held : Held, optional
-        Base, period ("free": in both directions) and top; contact is without friction.
+        Base, period ("free": in both directions), top and contact.
     fineness : Pieces, optional
         Of the mesh; fewer pieces, which is said, where they would be too many.
     step : callable, optional
@@ -159,7 +158,7 @@ def _solved(
     held: Held,
     step: Callable[[float], None],
 ) -> tuple[Pressed, _Run]:
-    from sensorgen.models._press import brick_element, brick_touch, element, load, support
+    from sensorgen.models._press import brick_element, brick_factors, brick_touch, element, load, support
 
     mesh = brick_element.mesh_of(bricks, bricks.fill > 0)
     materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in bricks.regions]
@@ -169,32 +168,30 @@ def _solved(
     elements = brick_element.BrickElements(mesh, element.law(moduli, ratios))
     used = np.zeros(len(mesh.points_m), bool)
     used[elements.freedoms // 3] = True
-    faces = brick_touch.BrickFaces(mesh)
+    faces = brick_touch.BrickFaces(mesh, held.contact == "stick")
+    free = support.free_of(mesh.points_m, held, bricks.spans_m(), used)
+    first = free.tocsc().indices[free.tocsc().indptr[:-1]]
     problem = load.Problem(
         elements,
         faces,
-        support.free_of(mesh.points_m, held, bricks.spans_m(), used),
+        free,
         brick_touch.top_load(mesh),
         penalty_pa(float(moduli.min())),
-        solver=brick_touch.cholesky(),
+        held.contact == "stick",
+        solver=brick_factors.Solver(mesh.lattice[first // 3]),
     )
     found, states = reached(problem, stress_pa, _STEP * float(moduli.min()), step, SOURCE)
-    return _judged(found, problem, faces, states, held), _Run(elements, faces, states)
+    return _judged(found, problem, states, held), _Run(elements, faces, states)
 
 
-def _judged(found: Pressed, problem: "Problem", faces: "BrickFaces", states: "list[State]", held: Held) -> Pressed:
+def _judged(found: Pressed, problem: "Problem", states: "list[State]", held: Held) -> Pressed:
     """With what is to be known of its contact."""
     last = states[-1]
     touching = problem.gaps(last.pairs, last.u_m) < 0
     if not touching.any():
         return found
-    slid = float((faces.slid_m(last.u_m, touching) / last.pairs.length_m[touching]).max())
-    said = {
-        f"faces that touch slid by {slid:.2g} of a side, more than is followed": slid > _SLID,
-        "faces touch, which slide without friction in 3D: sticking is not known there": held.contact == "stick",
-    }
-    faults = (*found.faults, *(words for words, holds in said.items() if holds))
-    return replace(found, faults=faults, doubts=(*found.doubts, "faces of gaps touch, without friction"))
+    how = "and hold fast" if held.contact == "stick" else "without friction"
+    return replace(found, doubts=(*found.doubts, f"faces of gaps touch, {how}"))
 
 
 def _with_fields(found: Pressed, run: _Run, permittivity: Mapping[str, float], orders: Orders) -> Pressed:
@@ -214,7 +211,7 @@ def _field(
 
     moved = run.elements.all_nodes(state.u_m, state.inner)
     for share in _OPEN:
-        u = brick_air.extended(whole, run.elements.mesh, run.faces.opened(moved, share))
+        u = brick_air.extended(whole, run.elements.mesh, *run.faces.opened(moved, share))
         try:
             return brick_field.capacitance(whole, u, permittivity, orders)
         except brick_field.Folded:

@@ -1,35 +1,59 @@
-"""How the air of a cell goes along with its boxes: harmonically, so that the field has a map without folds."""
+"""How the air of a cell goes along with its boxes, so that the field has a map without folds.
+
+In the columns of a gap that is nearly shut, evenly between the two faces; elsewhere harmonically, by differences
+between neighbouring nodes: no displacement there is beyond those around it.
+"""
+
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
-from sensorgen.models._press.brick_element import BrickMesh, slopes, values
+from sensorgen.models._press.brick_element import BrickMesh
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 _ROUNDING = 1e-9
-_ALONG = 300.0  # weight of a displacement's derivative along itself: air between two faces is squeezed evenly [-]
+_PLACES = np.array(list(product(range(3), repeat=3)))  # of a brick's 27 nodes
+_SHARES = np.array([0.25, 0.5, 0.25])  # of a brick's width that belong to its three nodes
 
 
-def extended(mesh: BrickMesh, solid: BrickMesh, moved: Real) -> Real:
-    """Displacements of all nodes of a cell (3n,) from those of its solid boxes, harmonic in the air.
+def extended(mesh: BrickMesh, solid: BrickMesh, moved: Real, columns: list[tuple[int, Whole, Whole]]) -> Real:
+    """Displacements of all nodes of a cell (3n,) from those of its solid boxes.
 
     What the air does between the faces does not matter to the capacitance, as long as it does not fold.
+
+    Parameters
+    ----------
+    mesh, solid : BrickMesh
+        All boxes of the cell, and the solid ones.
+    moved : (n, 3) array
+        Displacements of the solid nodes [m].
+    columns : list
+        Gaps that are nearly shut: along which axis, and the solid nodes on both sides, the near ones first.
     """
+    size = mesh.lattice.max(axis=0) + 1
+    number = np.ravel_multi_index(tuple(solid.lattice.T), tuple(size))
     u = np.full((len(mesh.points_m), 3), np.nan)
-    u[mesh.nodes[mesh.region > 0]] = moved[solid.nodes]
+    u[number] = moved
+    for axis, near, far in columns:
+        stride = int(np.prod(size[axis + 1 :]))
+        for start, stop in zip(number[near].tolist(), number[far].tolist(), strict=True):
+            nodes = np.arange(start, stop + 1, stride)
+            share = (mesh.points_m[nodes, axis] - mesh.points_m[start, axis])[:, None]
+            u[nodes] = u[start] + share / share[-1] * (u[stop] - u[start])
     air = mesh.nodes[mesh.region == 0]
-    if not len(air):
-        return u.ravel()
-    for axis in range(3):
-        u[:, axis] = _harmonic(mesh, air, u[:, axis], axis)
+    if np.isnan(u).any():
+        matrix = _differences(mesh, air)
+        for axis in range(3):
+            u[:, axis] = _harmonic(mesh, matrix, u[:, axis], axis)
     return u.ravel()
 
 
-def _harmonic(mesh: BrickMesh, air: Whole, given: Real, axis: int) -> Real:
+def _harmonic(mesh: BrickMesh, matrix: csr_matrix, given: Real, axis: int) -> Real:
     """One component; at the mirrors across its axis it is as elsewhere on them."""
     found = given.copy()
     place = mesh.points_m[:, axis]
@@ -37,29 +61,28 @@ def _harmonic(mesh: BrickMesh, air: Whole, given: Real, axis: int) -> Real:
         at = np.abs(place - end) < _ROUNDING * np.ptp(place)
         known = found[at & ~np.isnan(found)]
         found[at & np.isnan(found)] = known.mean() if axis < 2 and len(known) else 0.0
-    free = np.zeros(len(found), bool)
-    free[air] = np.isnan(found[air])
+    free = np.isnan(found)
     if not free.any():
         return found
-    found[np.isnan(found)] = 0.0
-    local = _laplace(mesh.edges_m()[mesh.region == 0], np.where(np.arange(3) == axis, _ALONG, 1.0))
-    rows, columns = np.repeat(air, 27, axis=1).ravel(), np.tile(air, (1, 27)).ravel()
-    matrix = coo_matrix((local.ravel(), (rows, columns)), (len(found),) * 2).tocsr()
+    found[free] = 0.0
     inner = matrix[free][:, free].tocsc()
     solver = splu(inner, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     found[free] = solver.solve(-(matrix @ found)[free])
     return found
 
 
-def _laplace(edges: Real, weight_of: Real) -> Real:
-    """Integrals of grad . grad of the 27 functions of boxes (m, 27, 27), each direction by its weight."""
-    at, weight = np.polynomial.legendre.leggauss(3)
-    value, slope = values(at), slopes(at)
-    stiffness, mass = (v.T @ (weight[:, None] * v) for v in (slope, value))
-    scale = weight_of * edges.prod(axis=1)[:, None] / (2 * edges**2)
-    parts = [_product([stiffness if a == axis else mass for a in range(3)]) for axis in range(3)]
-    return np.asarray(np.einsum("ma,aij->mij", scale, np.array(parts)))
-
-
-def _product(factors: list[Real]) -> Real:
-    return np.asarray(np.kron(np.kron(factors[0], factors[1]), factors[2]))
+def _differences(mesh: BrickMesh, air: Whole) -> csr_matrix:
+    """Sum over neighbours of (area between them over their distance) times difference."""
+    edges = mesh.edges_m()[mesh.region == 0]
+    rows, columns, weights = [], [], []
+    for axis in range(3):
+        start = np.flatnonzero(_PLACES[:, axis] < 2)
+        a, b = (k for k in range(3) if k != axis)
+        share = _SHARES[_PLACES[start, a]] * _SHARES[_PLACES[start, b]]
+        weight = ((2 * edges[:, a] * edges[:, b] / edges[:, axis])[:, None] * share).ravel()
+        one, other = air[:, start].ravel(), air[:, start + 3 ** (2 - axis)].ravel()
+        rows += [one, other, one, other]
+        columns += [one, other, other, one]
+        weights += [weight, weight, -weight, -weight]
+    places = np.concatenate(rows), np.concatenate(columns)
+    return coo_matrix((np.concatenate(weights), places), (len(mesh.points_m),) * 2).tocsr()

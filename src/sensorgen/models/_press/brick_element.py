@@ -6,9 +6,10 @@ The pressure jumps between bricks (Q2 / P1, which does not lock: Boffi and Gasta
 are condensed, brick by brick.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ Whole = NDArray[np.int64]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _INNER = 13  # of the 27 nodes, the one in the middle
 _OUTER = np.delete(np.arange(27), _INNER)
+_CHUNK = 64  # bricks at once
 _STIFF = 1e6  # in the tangent of an incompressible brick, the pressure's stiffness over mu
 
 
@@ -72,12 +74,19 @@ class BrickMesh:
         Which box each brick is, along x, y and z.
     nodes : (m, 27) array
         Of each brick.
+    lattice : (n, 3) array
+        Of each node, its place counted in half bricks along x, y and z.
     """
 
     bricks: Bricks
     points_m: Real
     boxes: Whole
     nodes: Whole
+    lattice: Whole
+
+    def some(self, which: slice) -> "BrickMesh":
+        """Some of its bricks, with all nodes."""
+        return replace(self, boxes=self.boxes[which], nodes=self.nodes[which])
 
     def edges_m(self) -> Real:
         """Edges of each brick (m, 3) [m]."""
@@ -97,13 +106,9 @@ def mesh_of(bricks: Bricks, which: NDArray[np.bool_]) -> BrickMesh:
     flat = np.ravel_multi_index(tuple(np.moveaxis(corners, -1, 0)), tuple(size))
     used, nodes = np.unique(flat, return_inverse=True)
     lattice = [np.interp(np.arange(2 * len(p) - 1) / 2, np.arange(len(p)), p) for p in bricks.planes_m]
-    places = np.unravel_index(used, tuple(size))
-    return BrickMesh(
-        bricks,
-        np.column_stack([line[k] for line, k in zip(lattice, places, strict=True)]),
-        boxes,
-        nodes.reshape(flat.shape),
-    )
+    places = np.column_stack(np.unravel_index(used, tuple(size)))
+    points = np.column_stack([line[k] for line, k in zip(lattice, places.T, strict=True)])
+    return BrickMesh(bricks, points, boxes, nodes.reshape(flat.shape), places)
 
 
 @dataclass(frozen=True)
@@ -112,6 +117,7 @@ class BrickElements:
 
     mesh: BrickMesh
     law: Law
+    _last: list[Any] = field(default_factory=list, repr=False, compare=False)
 
     @property
     def points_m(self) -> Real:
@@ -167,9 +173,25 @@ class BrickElements:
         held = p * (j - 1) - 0.5 * p**2 * self.law.yielding_per_pa[:, None]
         return float((self._weights * (shape + held)).sum())
 
+    @cached_property
+    def _chunks(self) -> "list[tuple[slice, BrickElements]]":
+        """The same in pieces that stay near the processor."""
+        places = [slice(k, k + _CHUNK) for k in range(0, len(self.mesh.nodes), _CHUNK)]
+        return [
+            (k, BrickElements(self.mesh.some(k), Law(self.law.mu_pa[k], self.law.yielding_per_pa[k]))) for k in places
+        ]
+
     def tangent(self, u: Real, inner: Inner) -> Tangent:
-        """Residual and its derivative at a state whose J is above 0."""
-        return condensed(*self.full(u, inner), 78, 4, self.law.mu_pa)
+        """Residual and its derivative at a state whose J is above 0; the last one is kept."""
+        if not (self._last and self._last[0] is u and self._last[1] is inner):
+            parts = [
+                condensed(*some.full(u, Inner(inner.bubble[k], inner.pressure[k])), 78, 4, some.law.mu_pa)
+                for k, some in self._chunks
+            ]
+            found = Tangent(*(np.concatenate([getattr(p, key.name) for p in parts]) for key in fields(Tangent)))
+            self._last[:] = [u, inner, found]
+        kept: Tangent = self._last[2]
+        return kept
 
     def full(self, u: Real, inner: Inner) -> tuple[Real, Real]:
         """Residual (m, 85) and its derivative: 26 nodes, the one in the middle, the pressure."""

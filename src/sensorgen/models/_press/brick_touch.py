@@ -1,25 +1,25 @@
-"""What bricks stand on and run into: their top, the faces on both sides of each gap, and the linear systems' solver."""
+"""What bricks stand on and run into: their top, and the faces on both sides of each gap."""
 
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise, product
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, vstack
 
-from sensorgen.models._press.brick_element import BrickMesh, values
+from sensorgen.models._press.brick_element import BrickMesh, slopes, values
 from sensorgen.models._press.contact import Pairs
-from sensorgen.models._press.load import Solver, by_lu
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _SHAPE = np.einsum("ai,bj->abij", values(_POINTS), values(_POINTS)).reshape(9, 9)  # (points, nodes) of a face
-_MOST_TURNS = 30  # of conjugate gradients, before new factors are made
-_ENOUGH = 1e-7  # residual over right side
+_SHUT, _OPEN = 0.25, 0.5  # of a gap's width: below and above, its faces' nodes are opposite each other, or as they are
+_REACH = 1e-9  # how far past its ends a face still carries [-]
+_TURNS = 5  # of Newton's method that finds a place on a face, which is nearly flat
+_THIN = 0.1  # of a gap's width: its air is squeezed evenly
 _WEIGHT = np.outer(_WEIGHTS, _WEIGHTS).ravel() / 4
 _FACE = {
     (axis, side): np.array([n for n, at in enumerate(product(range(3), repeat=3)) if at[axis] == 2 * side])
@@ -52,17 +52,162 @@ def facing(fill: Whole) -> list[tuple[int, Whole, Whole]]:
     return found
 
 
+def _bulged(gap: Real, nodes: Whole, least: float) -> Real:
+    """Gaps at the nine nodes of faces (k, 9), raised where the parabolas through them would dip below a least one.
+
+    Coefficients of Bernstein's polynomials bound a parabola: all are held above. Faces share nodes.
+    """
+
+    def shared(values: Real) -> Real:
+        highest = np.zeros(nodes.max() + 1)
+        np.maximum.at(highest, nodes, values.reshape(nodes.shape))
+        return np.asarray(highest[nodes].reshape(-1, 3, 3))
+
+    found = gap.reshape(-1, 3, 3).copy()
+    ends = [0, 2]
+    found[:, 1, ends] = np.maximum(found[:, 1, ends], found[:, ends][:, :, ends].sum(axis=1) / 4 + least / 2)
+    found[:, ends, 1] = np.maximum(found[:, ends, 1], found[:, ends][:, :, ends].sum(axis=2) / 4 + least / 2)
+    found = shared(found)
+    edges, corners = (
+        found[:, 1, ends].sum(axis=1) + found[:, ends, 1].sum(axis=1),
+        found[:, ends][:, :, ends].sum((1, 2)),
+    )
+    found[:, 1, 1] = np.maximum(found[:, 1, 1], (least + edges - corners / 4) / 4)
+    return found.reshape(-1, 9)
+
+
+@dataclass(frozen=True)
+class Met:
+    """What each of some points faces along an axis.
+
+    Attributes
+    ----------
+    axis : int
+        Along which.
+    found : (k,) array
+        Whether there is anything.
+    gap_m : (k,) array
+        How far away, below 0 where they have run into each other [m].
+    slopes : (k, 2) array
+        Of the face that is met, to the two other axes [-].
+    nodes, weights : (k, 18) array
+        Difference of the two places from those of nodes: the face that is met, less the point.
+    """
+
+    axis: int
+    found: NDArray[np.bool_]
+    gap_m: Real
+    slopes: Real
+    nodes: Whole
+    weights: Real
+
+
+def facing_points(places_m: Real, own: Whole, shape: Real, faces: Whole, axis: int) -> Met:
+    """The nearest of some faces (f, 9) that points, of nodes ``own`` (k, 9) by ``shape``, meet along an axis."""
+    ways = [k for k in range(3) if k != axis]
+    here = np.einsum("kn,knd->kd", shape, places_m[own])
+    there = places_m[faces]
+    low, high = there[..., ways].min(axis=1), there[..., ways].max(axis=1)
+    reach = _REACH * (high - low)
+    level = here[:, None, ways]
+    point, face = np.nonzero(((level >= low - reach) & (level <= high + reach)).all(axis=2))
+    at, ok = _inverse(there[face][..., ways], here[point][:, ways])
+    both = _on_face(values(at[:, 0]), values(at[:, 1]))
+    gap = np.einsum("kn,kn->k", both, there[face][..., axis]) - here[point, axis]
+    point, face, at, both, gap = point[ok], face[ok], at[ok], both[ok], gap[ok]
+    order = np.lexsort((np.abs(gap), point))
+    first = order[np.unique(point[order], return_index=True)[1]]
+    count = len(own)
+    weights, nodes = np.concatenate([np.zeros((count, 9)), -shape], axis=1), np.concatenate([own, own], axis=1)
+    weights[point[first], :9], nodes[point[first], :9] = both[first], faces[face[first]]
+    found, far, slopes = np.zeros(count, bool), np.full(count, np.inf), np.zeros((count, 2))
+    found[point[first]], far[point[first]] = True, gap[first]
+    slopes[point[first]] = _slopes_at(there[face[first]], at[first], ways, axis)
+    return Met(axis, found, far, slopes, nodes, weights)
+
+
+def _on_face(one: Real, other: Real) -> Real:
+    """Products of three functions each at k places: those of a face (k, 9)."""
+    return np.asarray(np.einsum("ki,kj->kij", one, other).reshape(len(one), 9))
+
+
+def _moves(at: Real) -> Real:
+    """Derivatives of the nine functions to both ways along the face (k, 2, 9)."""
+    one, other = at.T
+    return np.stack([_on_face(slopes(one), values(other)), _on_face(values(one), slopes(other))], axis=1)
+
+
+def _inverse(faces: Real, wanted: Real) -> tuple[Real, NDArray[np.bool_]]:
+    """Where on faces (k, 9, 2), from -1 to 1, given places (k, 2) are; and whether they are there at all."""
+    at = np.zeros_like(wanted)
+    for _ in range(_TURNS):
+        place = np.einsum("kn,knd->kd", _on_face(values(at[:, 0]), values(at[:, 1])), faces)
+        jacobian = np.einsum("kwn,knd->kdw", _moves(at), faces)
+        at = np.clip(at + np.linalg.solve(jacobian, (wanted - place)[..., None])[..., 0], -2.0, 2.0)
+    return at, np.asarray((np.abs(at) <= 1 + _REACH).all(axis=1))
+
+
+def _slopes_at(faces: Real, at: Real, ways: list[int], axis: int) -> Real:
+    """Slope of the height along the axis to the two others, at places on faces (k, 9, 3)."""
+    moves = np.einsum("kwn,knd->kwd", _moves(at), faces)
+    return np.asarray(np.linalg.solve(moves[..., ways], moves[..., axis, None])[..., 0])
+
+
+def _rows(weights: Real, nodes: Whole, axis: int, size: int) -> csr_matrix:
+    """Rows (k, size) of weights of one component of nodes."""
+    starts = np.arange(len(nodes) + 1) * nodes.shape[1]
+    return csr_matrix((weights.ravel(), (3 * nodes + axis).ravel(), starts), (len(nodes), size))
+
+
+def joined(parts: list[Pairs], size: int) -> Pairs:
+    """Pairs of several kinds as one."""
+    gap, slip = (vstack([csr_matrix((0, size)), *(getattr(p, k) for p in parts)]).tocsr() for k in ("gap", "slip"))
+    stiff, long, which, held = (
+        np.concatenate([np.empty(0), *(getattr(p, k) for p in parts)])
+        for k in ("stiffness_pa", "length_m", "point", "sticks")
+    )
+    return Pairs(gap, slip, stiff, long, which.astype(np.int64), held.astype(bool))
+
+
 @dataclass(frozen=True)
 class BrickFaces:
-    """Faces on both sides of gaps, each opposite its partner as drawn: they may slide by less than their own size."""
+    """Faces on both sides of gaps along each axis; ``sticks`` where what touches may hold fast."""
 
     mesh: BrickMesh
+    sticks: bool = False
 
-    def project(self, places_m: Real, penalty_pa: float, kept: Pairs | None = None) -> Pairs:  # noqa: ARG002 - as in 2D
-        """The same partners at all places."""
-        k = penalty_pa * self._pairs.stiffness_pa
-        p = self._pairs
-        return Pairs(p.gap, p.slip, k, p.length_m, p.point, p.sticks)
+    def project(self, places_m: Real, penalty_pa: float, kept: Pairs | None = None) -> Pairs:
+        """Find the partner of every point at given places of the nodes (n, 3); those of ``kept`` stay as they are."""
+        nodes, axes, edges = self._sides
+        known = kept.point if kept else np.empty(0, np.int64)
+        made = [kept] if kept else []
+        for axis in np.unique(axes).tolist():
+            rows = np.flatnonzero(axes == axis)
+            points = np.setdiff1d((9 * rows[:, None] + np.arange(9)).ravel(), known)
+            met = facing_points(places_m, nodes[points // 9, 9:], _SHAPE[points % 9], nodes[rows, :9], axis)
+            side = edges[points // 9].min(axis=1)
+            area = edges[points // 9].prod(axis=1) * _WEIGHT[points % 9]
+            made.append(self._made(met, points, penalty_pa * area / side, side))
+        return joined(made, 3 * len(self.mesh.points_m))
+
+    def _made(self, met: Met, points: Whole, stiffness: Real, side: Real) -> Pairs:
+        """One row for each point that has met something; two where it may stick, one for each way that it may slip."""
+        here = np.flatnonzero(met.found & (met.gap_m > -side))
+        near = met.gap_m[here] < side[here]
+        weights, nodes = met.weights[here], met.nodes[here]
+        ways = [k for k in range(3) if k != met.axis]
+        level = [np.where(near, met.slopes[here, k], 0.0) for k in range(2)]
+        size = 3 * len(self.mesh.points_m)
+        gap = _rows(weights, nodes, met.axis, size) - sum(
+            (_rows(weights * m[:, None], nodes, way, size) for m, way in zip(level, ways, strict=True)),
+            csr_matrix((len(here), size)),
+        )
+        gap.eliminate_zeros()
+        slips = [_rows(weights * np.sqrt(2), nodes, way, size) for way in ways] if self.sticks else [0 * gap]
+        n = len(slips)
+        stiff, long, which = np.tile(stiffness[here] / n, n), np.tile(side[here], n), np.tile(points[here], n)
+        both = vstack([gap] * n).tocsr(), vstack(slips).tocsr()
+        return Pairs(*both, stiff, long, which, np.zeros(n * len(here), bool))
 
     @cached_property
     def _sides(self) -> tuple[Whole, Whole, Real]:
@@ -78,96 +223,26 @@ class BrickFaces:
             sides.append(np.delete(edges[one], axis, axis=1))
         return np.concatenate(nodes), np.concatenate(axes), np.concatenate(sides)
 
-    @cached_property
-    def _pairs(self) -> Pairs:
-        """Of unit penalty; the gap runs along an axis."""
-        nodes, axes, edges = self._sides
-        count, shape = 9 * len(nodes), (9 * len(nodes), 3 * len(self.mesh.points_m))
-        weight = np.tile(np.concatenate([_SHAPE, -_SHAPE], axis=1), (len(nodes), 1))
-        columns = np.repeat(3 * nodes + axes[:, None], 9, axis=0)
-        gap = csr_matrix((weight.ravel(), (np.repeat(np.arange(count), 18), columns.ravel())), shape)
-        side = np.repeat(edges.min(axis=1), 9)
-        stiffness = np.repeat(edges.prod(axis=1), 9) / side * np.tile(_WEIGHT, len(nodes))
-        return Pairs(gap, csr_matrix(shape), stiffness, side, np.arange(count), np.zeros(count, bool))
+    def opened(self, moved: Real, share: float) -> tuple[Real, list[tuple[int, Whole, Whole]]]:
+        """Displacements of all nodes (n, 3) with gaps held open, and the nodes on both sides of nearly shut ones.
 
-    def opened(self, moved: Real, share: float) -> Real:
-        """Displacements of all nodes (n, 3), gaps that are thinner than a share of their width held open so far [m].
-
-        There the lower face's nodes slide along it to those that they face, or the air beside would fold.
+        A gap that is thinner than a share of its width is opened so far, and those beside it until its parabola stays
+        above. Where it is nearly shut, the lower face's nodes slide along it to those that they face, or the air
+        between would be sheared until it folds.
         """
         found = moved.copy()
         nodes, axes, _ = self._sides
-        for far, near, axis in zip(nodes[:, :9], nodes[:, 9:], axes.tolist(), strict=True):
+        columns = []
+        for axis in np.unique(axes).tolist():
+            far, near = nodes[axes == axis, :9], nodes[axes == axis, 9:]
             width = self.mesh.points_m[far, axis] - self.mesh.points_m[near, axis]
-            gap = width + found[far, axis] - found[near, axis]
-            shut = gap < share * width
-            found[far[shut], axis] += (share * width - gap)[shut]
-            for across in {0, 1, 2} - {axis}:
-                found[near[shut], across] = found[far[shut], across]
-        return found
-
-    def slid_m(self, u_m: Real, which: NDArray[np.bool_]) -> Real:
-        """How far each of some points has slid along its partner [m]."""
-        nodes, axes, _ = self._sides
-        moved = u_m.reshape(-1, 3)[nodes]
-        along = np.einsum("qn,knd->kqd", np.concatenate([_SHAPE, -_SHAPE], axis=1), moved)
-        along[np.arange(len(axes)), :, axes] = 0.0
-        return np.asarray(np.linalg.norm(along, axis=2).ravel()[which])
-
-
-def cholesky() -> Solver:
-    """A solver that keeps the order of elimination while the pattern stays; by LU where NGSolve is not installed."""
-    try:
-        import ngsolve as ng
-    except ImportError:
-        return by_lu
-    return _Cholesky(ng)
-
-
-@dataclass
-class _Cholesky:
-    """Conjugate gradients, preconditioned by the factors of an earlier system while these serve."""
-
-    ng: Any
-    factors: Any = None
-
-    def __call__(self, stiffness: csr_matrix, right: Real) -> Real | None:
-        """The step that a force makes, or None where a piece has nothing that holds it."""
-        found = self._iterated(stiffness, right) if self.factors else None
-        if found is None:
-            self.factors = self._factored(stiffness)
-            found = self._iterated(stiffness, right)
-        return found
-
-    def _factored(self, stiffness: csr_matrix) -> Any:
-        rows = np.repeat(np.arange(stiffness.shape[0], dtype=np.int32), np.diff(stiffness.indptr))
-        matrix = self.ng.la.SparseMatrixd.CreateFromCOO(
-            rows, stiffness.indices.astype(np.int32), stiffness.data, *stiffness.shape
-        )
-        return matrix.Inverse(inverse="sparsecholesky")
-
-    def _preconditioned(self, residual: Real) -> Real:
-        force, step = (self.factors.CreateColVector() for _ in range(2))
-        force.FV().NumPy()[:] = residual
-        step.data = self.factors * force
-        return np.array(step.FV().NumPy(), float)
-
-    def _iterated(self, stiffness: csr_matrix, right: Real) -> Real | None:
-        found, residual = np.zeros_like(right), right.copy()
-        way = direction = self._preconditioned(residual)
-        power = residual @ way
-        for _ in range(_MOST_TURNS):
-            if not (np.isfinite(power) and power > 0):
-                return None
-            pushed = stiffness @ direction
-            bearing = direction @ pushed
-            if not bearing > 0:
-                return None
-            share = power / bearing
-            found, residual = found + share * direction, residual - share * pushed
-            if np.abs(residual).max() < _ENOUGH * np.abs(right).max():
-                return np.asarray(found)
-            way = self._preconditioned(residual)
-            before, power = power, residual @ way
-            direction = way + power / before * direction
-        return None
+            drawn = 1 + (moved[far, axis] - moved[near, axis]) / width
+            gap = _bulged(np.maximum(drawn, share), far, share)
+            slide = np.clip((_OPEN - drawn) / (_OPEN - _SHUT), 0.0, 1.0)[..., None] * (moved[far] - moved[near])
+            slide[..., axis] = 0.0
+            last = np.argsort(-(drawn * width), axis=None)  # a node at a corner has two gaps: the thinner one counts
+            found[far.ravel()[last], axis] += ((gap - drawn) * width).ravel()[last]
+            found[near.ravel()[last]] = (moved[near] + slide).reshape(-1, 3)[last]
+            thin = (gap < _THIN).any(axis=1)
+            columns.append((axis, near[thin].ravel(), far[thin].ravel()))
+        return found, columns
