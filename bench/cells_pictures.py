@@ -225,7 +225,7 @@ def ratios() -> None:
             axis.loglog(values, np.maximum(widths, 1e-9), style, ms=3.5, color=colour, label=f"{name}: {label}")
     axis.axhline(1e-4, color=GREY, ls=":", label="asked for")
     axis.set(
-        xlabel="permittivity of the solid over that of air [-]", ylabel="width of the interval [-]", ylim=(1e-7, 5)
+        xlabel="permittivity of the solid over that of air [-]", ylabel="width of the interval [-]", ylim=(3e-8, 5)
     )
     figure.legend(frameon=False, fontsize=8, ncols=2, loc="outside lower center")
     save(figure, "ratios")

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cell_scenes import EPS, MM, bumps, plates, stairs, tri_cell
+from cell_scenes import EPS, MM, bumps, plates, prism, stairs, tri_cell
 from numpy.polynomial import legendre
 
 from sensorgen.models import fem2d, fem3d
@@ -248,12 +248,17 @@ def test_high_ratios_of_permittivity_at_a_sharp_wedge(ratio):
 
 @pytest.mark.parametrize("thin", [1e-5, 1e-6, 2e-7])
 def test_air_of_a_nanometre_over_a_millimetre(thin):
-    """Layers in series; and a wedge of air from a nanometre to nothing, C = eps0 int dx / (h / eps + g(x))."""
+    """Layers in series, where doubles lose more than elsewhere; and a film that bends by half its own thickness."""
     gap = plates(Body("x", "x60", (box(0, 2, 0, 1, 0.2, 1.2 - thin),)))
     exact = EPS0_F_PER_M * 2 * MM / ((1 - thin) / 4.68 + thin / 1.00059)
     found = fem2d.capacitance(gap, EPS, 1e-6)
     assert found.lower <= exact <= found.upper
     assert found.width() < 1e-6
+    bent = prism((0, 0.2), (2, 0.2), (2, 1.2 - thin), (1, 1.2 - thin / 2), (0, 1.2 - thin))
+    thinner = fem2d.capacitance(plates(Body("x", "x60", (bent,))), EPS, 1e-4)
+    assert thinner.width() < 1e-6
+    assert found.lower < thinner.upper
+    assert thinner.lower < EPS0_F_PER_M * 2 * MM / ((1 - thin / 2) / 4.68 + thin / 2 / 1.00059)
 
 
 def test_it_needs_numpy_only():

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from sensorgen.models._fem_triangles import Edge, Triangle, Triangles, edges_of, fan
 
-_RATIO = 0.15  # of one ring's radius to the next: near the best for exponential convergence (Gui and Babuska, 1986)
+_RATIO = 0.25  # of one ring's radius to the next
 _REACH = 0.45  # of a corner's shortest edge: radius of its tips
-_LONG = 5.0  # times a corner's shortest edge: an edge so long gets rings further out
+_LONG = 3.0  # times a corner's shortest edge: an edge so long gets rings further out
 
 
 def graded(mesh: Triangles, corners: Collection[int]) -> Triangles:

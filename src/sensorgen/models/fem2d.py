@@ -32,11 +32,11 @@ COST = 2
 
 WIDTH = 1e-4  # of the interval, where the caller does not say
 
-_ORDERS = (4, 20)  # of polynomials: the lowest and the highest
+_ORDERS = (3, 20)  # of polynomials: the lowest and the highest
 _CORNER_SHARE = 0.01  # of the wanted width: what may stay unresolved at a corner
 _SLENDER = 2e-15  # of a triangle's slenderness: what its energy may lose in doubles
 _MOST_DOUBLINGS = 12  # of rings at a corner: 4096 of them
-_GAIN = 1.2  # by which an order lowers the width, in e-folds, as measured
+_GAIN = 1.6  # by which an order lowers the width, in e-folds, as measured
 _STEP = 2  # of orders, where the field is complex
 _STALLED = 0.7  # a step that leaves more of the width than this gains nothing
 
@@ -137,7 +137,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
 
 def _first(width: float) -> int:
     """The order to begin with, as measured."""
-    return int(np.clip(round(0.6 - 1.6 * np.log10(width)), *_ORDERS))
+    return int(np.clip(round(0.3 - 1.25 * np.log10(width)), *_ORDERS))
 
 
 def _more(now: float, width: float) -> int:
