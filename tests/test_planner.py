@@ -138,6 +138,9 @@ def test_nobody_can_speak(fake):
     fake.add("two", 2, 0.1, unfit="too flat")
     with pytest.raises(Unpredictable, match=r"^one: too round; two: too flat$"):
         capacitance(PLATE, EPS, 1e-3)
+    fake.add("three", 2, 0.1, unfit="too round")
+    with pytest.raises(Unpredictable, match=r"^one, three: too round; two: too flat$"):
+        capacitance(PLATE, EPS, 1e-3)
 
 
 def test_a_model_by_name(fake):

@@ -5,7 +5,7 @@ weighed first, by what they should cost and reach (:mod:`sensorgen.expectations`
 """
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
 from json import dumps
@@ -265,10 +265,19 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
         _refuse_contradiction(bounds)
         plan.append(replace(candidate, width=found.width(), seconds=seconds))
     if not bounds:
-        raise Unpredictable("; ".join(refused))
+        raise Unpredictable(_together(refused))
     best = min(bounds, key=lambda name: bounds[name].width())
     real, loss = _parts(bounds[best])
     return Answer(best, real, tuple(refused), width, tuple(plan), loss_f=loss)
+
+
+def _together(refused: Sequence[str]) -> str:
+    """What models said, each reason once."""
+    names: dict[str, list[str]] = {}
+    for line in refused:
+        name, _, reason = line.partition(": ")
+        names.setdefault(reason, []).append(name)
+    return "; ".join(f"{', '.join(those)}: {reason}" for reason, those in names.items())
 
 
 def _kind(permittivity: Mapping[str, complex]) -> str:
