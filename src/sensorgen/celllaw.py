@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from hashlib import sha256
+from itertools import takewhile
 from json import dumps
 from typing import TYPE_CHECKING, Any
 
@@ -190,7 +191,7 @@ def refuse_crushing(stress_pa: float, youngs_modulus_pa: Mapping[str, float]) ->
 def _pressed(
     piece: Piece, solids: Mapping[str, tuple[float, float]], eps: Mapping[str, float], given: Mapping[str, str]
 ) -> dict[str, Any]:
-    """The curve of a cell on two meshes, as plain data; as far as it converged."""
+    """The curve of a cell on two meshes, as plain data; as far as it converged and its capacitance is known."""
     from sensorgen.models import press2d, press3d
 
     elastic = {name: press2d.Elastic(*pair) for name, pair in solids.items()}
@@ -198,8 +199,8 @@ def _pressed(
     flat = press2d.unfit(piece.scene) is None or press3d.unfit(piece.scene) is not None
     press, coarse = _flat(piece) if flat else _boxes(piece)
     found = press(elastic, stress, eps, held)
-    if 0 < found.converged_pa < stress[-1]:
-        stress = [p for p in stress if p <= found.converged_pa]
+    if 0 < _reach_pa(found) < stress[-1]:
+        stress = [p for p in stress if p <= _reach_pa(found)]
         found = press(elastic, stress, eps, held)
     curve = press2d.curve_of(found)
     other = press2d.curve_of(press(elastic, stress, eps, held, coarse))
@@ -214,6 +215,12 @@ def _pressed(
         "moved_m": float(found.displacement_m[-1]) - found.fall_m,
         "doubts": [*found.doubts, *([_LANDING] if found.fall_m else [])],
     }
+
+
+def _reach_pa(found: "Pressed") -> float:
+    """Highest pressure up to which every capacitance is known; 0 where only that at rest is [Pa]."""
+    pairs = zip(found.stress_pa.tolist(), found.capacitance_f_per_m2, strict=True)
+    return max((p for p, _ in takewhile(lambda pair: pair[1] is not None, pairs)), default=0.0)
 
 
 def _flat(piece: Piece) -> tuple[Callable[..., "Pressed"], "Fineness"]:
