@@ -111,7 +111,7 @@ def print_staircases() -> None:
     """Readings of a staircase whose X60 feet all touch, the cog's with them or 0.2 mm short of the film."""
     head = (
         "cog",
-        "layers",
+        "half widths",
         "feet on the film",
         "held",
         "displacement [um]",

@@ -37,8 +37,8 @@ def estimate(scene: Scene, printer: Printer, quality: Quality, walls: str = "ara
 
     Notes
     -----
-    Where two bodies swell into each other the electrode keeps the place, and support gives it up. Nothing sags: gaps are
-    upper limits.
+    Where two bodies swell into each other the electrode keeps the place, and support gives it up. Nothing
+    sags: gaps are upper limits.
     """
     return scene_of(layers(scene, printer, quality, walls), scene)
 
