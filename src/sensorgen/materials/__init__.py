@@ -101,7 +101,7 @@ class Material(Strict):
             named = ", ".join(sorted(v.source for v in values))
             raise MissingValue(
                 f"{self.name} has no default {quantity}"
-                + (f"; name one of its sources: {named}" if named else ": no source gives it")
+                + (f"; name one of its sources: {named}" if named else ": no source gives it; set one with --set or material_values")
             )
         return chosen[0]
 
