@@ -1,4 +1,4 @@
-"""How tri gives way when held, touched or printed otherwise: three tables of docs/sensitivity.md, in some minutes.
+"""How tri gives way when held, touched or printed otherwise: four tables of docs/sensitivity.md, in some minutes.
 
 Run with NGSolve installed: python bench/held.py
 """
@@ -8,9 +8,11 @@ from collections.abc import Sequence
 from sensorgen.asprinted import compared, pressed
 from sensorgen.asprinted.rules import RULES
 from sensorgen.design import Design, make
+from sensorgen.errors import OutOfRange
 from sensorgen.models import press2d
 from sensorgen.models.press2d import Elastic, Held
 from sensorgen.scene import Body, Prism, Scene, rectangle
+from sensorgen.sensing import sensor_of
 
 STRESS_PA = [0.0, 1e5]
 FREE = Held(base="sliding", period="free")
@@ -109,7 +111,7 @@ def print_staircases() -> None:
     """Readings of a staircase whose X60 feet all touch, the cog's with them or 0.2 mm short of the film."""
     head = (
         "cog",
-        "layers",
+        "half widths",
         "feet on the film",
         "held",
         "displacement [um]",
@@ -128,12 +130,42 @@ def print_staircases() -> None:
             print(row(touch, name, low, held, *numbers), flush=True)
 
 
+def print_tips() -> None:
+    """How long round tips touch, the highest pressure under them, and what they change of X beside a flat one."""
+    head = (
+        "sensor",
+        "profile",
+        "radius [mm]",
+        "contact at 1 N [mm]",
+        "at 6 N [mm]",
+        "highest at 6 N [kPa]",
+        "change of X over a flat tip's",
+    )
+    print(row(*head), row(*["---"] * len(head)), sep="\n")
+    for name, profile in (("reference", "hertz"), ("reference", "parabola"), ("tri", "parabola")):
+        design = make({"shape": name, "parameters": {} if name == "reference" else {"dielectric_mm": 0.1}})
+        for radius_mm in (5.0, 20.0, 100.0, 500.0):
+            round_tip = sensor_of(design, profile=profile, radius_m=radius_mm * 1e-3).sensor
+            flat = sensor_of(design).sensor
+            lengths = [f"{float(round_tip.contact_m(force)[0]) * 1e3:.2f}" for force in (1.0, 6.0)]
+            highest = float(round_tip.stress_pa(6.0, 0.05))
+            try:
+                moved = [
+                    s.impedance(1.1e3, 6.0, 0.05).imag / s.impedance(1.1e3, 0.0, 0.05).imag - 1
+                    for s in (round_tip, flat)
+                ]
+                share = f"{moved[0] / moved[1]:.3f}"
+            except OutOfRange:
+                share = "beyond the law"
+            print(row(name, profile, f"{radius_mm:g}", *lengths, f"{highest / 1e3:.0f}", share))
+
+
 def row(*cells: str) -> str:
     """A row of a table."""
     return "| " + " | ".join(cells) + " |"
 
 
 if __name__ == "__main__":
-    for table in (print_held, print_printed, print_staircases):
+    for table in (print_tips, print_held, print_printed, print_staircases):
         table()
         print()

@@ -1,9 +1,9 @@
-"""Sensitivity of tri and rect beside the plate, all held in the same way: first table and picture of docs/sensitivity.md.
+"""Sensitivity of tri and rect beside the plate, all held in the same way: table and picture of docs/sensitivity.md.
 
 Run with NGSolve installed: python bench/sensitivity.py. It presses ten cells (plate, tri and rect with two films each,
-free and bonded), prints the table as Markdown, and draws docs/pictures/sensitivity.png: their rise over stress beside the
-least standard errors of a press. The first run takes some eight minutes, most of it for rect in three dimensions; what is
-solved is kept (SENSORGEN_CACHE), so that the next one takes seconds.
+free and bonded), prints the table as Markdown, and draws docs/pictures/sensitivity.png: their rise over stress beside
+the least standard errors of a press. The first run takes some eight minutes, most of it for rect in three dimensions;
+what is solved is kept (SENSORGEN_CACHE), so that the next one takes seconds.
 """
 
 from itertools import product

@@ -1,6 +1,7 @@
 """Cells that are solved on demand: what is asked, what is kept, and what is said where it does not work."""
 
 import sys
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -78,6 +79,23 @@ def test_without_the_solver_a_plate_stands_in_and_that_is_said(monkeypatch):
     law = law_of(make(OTHER), GAPS, solve=True)
     assert not law.bounded
     assert "pip install" in law.doubts[0]
+
+
+def test_a_curve_ends_where_the_capacitance_is_no_longer_known(monkeypatch):
+    pytest.importorskip("netgen", reason="solves a cell: pip install sensorgen[fem]")
+    from sensorgen import celllaw
+    from sensorgen.models import press2d
+
+    def lost_above_5_kpa(*given, press=press2d.press, **more):
+        found = press(*given, **more)
+        known = tuple(c if p <= 5e3 else None for p, c in zip(found.stress_pa, found.capacitance_f_per_m2, strict=True))
+        return replace(found, capacitance_f_per_m2=known, faults=() if all(known) else ("no capacitance",))
+
+    monkeypatch.setattr(press2d, "press", lost_above_5_kpa)
+    monkeypatch.setattr(celllaw, "STRESS_PA", (0.0, 5e3, 1e4))
+    law = law_of(make(OTHER), GAPS, "solved")
+    assert law.compression.stress_pa == (0.0, 5e3)
+    assert law.doubts == ("the solution of the cell ended at 5 kPa",)
 
 
 def test_an_unknown_cell_is_solved_once(monkeypatch):

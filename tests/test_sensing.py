@@ -34,6 +34,11 @@ def test_solved_cells_answer_for_themselves(shape, film):
     assert found.doubts == ()
 
 
+def test_exactly_incompressible_is_the_same_cell():
+    found = sensed("tri", material_values={"x60": {"poisson_ratio": 0.5}, "etpu": {"poisson_ratio": 0.5}})
+    assert found.sensor.compression.name == "solved"
+
+
 FIRM = {"film": "x60@thesis-4.1", "dielectric": "x60@thesis-4.1"}  # another modulus than the solved cell's
 
 
@@ -43,6 +48,8 @@ FIRM = {"film": "x60@thesis-4.1", "dielectric": "x60@thesis-4.1"}  # another mod
         ("rect", {"parameters": {"air_width_mm": 0.4}}),
         ("tri", {"parameters": {"period_mm": 2.5}}),
         ("tri", {"materials": FIRM}),
+        ("tri", {"material_values": {"x60": {"poisson_ratio": 0.45}}}),
+        ("tri", {"material_values": {"etpu": {"poisson_ratio": 0.3}}}),
     ],
 )
 def test_other_cells_are_taken_for_free_plates_and_that_is_said(shape, rest):

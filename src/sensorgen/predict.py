@@ -236,8 +236,9 @@ def check_presses(sensor: Sensor, force_n: ArrayLike, position_m: ArrayLike) -> 
     first = bisect_left(force, True, key=lambda value: bool(_refusal(sensor, value, hardest)))
     if first < len(force):
         fine = f"up to {force[first - 1]:g} N there" if first else "less"
+        larger = "rounder" if sensor.contact else "longer"
         where = f"force {force[first]:g} N at position {hardest / M_PER_MM:g} mm"
-        raise OutOfRange(f"{where}: {_refusal(sensor, force[first], hardest)}; expected {fine}, or a longer tip")
+        raise OutOfRange(f"{where}: {_refusal(sensor, force[first], hardest)}; expected {fine}, or a {larger} tip")
 
 
 def _refusal(sensor: Sensor, force_n: float, position_m: float) -> str:

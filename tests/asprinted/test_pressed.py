@@ -19,10 +19,11 @@ needs_mesher = pytest.mark.skipif("not __import__('importlib').util.find_spec('n
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
 EPS = {"x60": 4.68, "air": 1.00059}
 QUICK = Fineness(corner_mm=0.08, coarse_mm=0.2)
-# Half widths by layer of 0.1 mm from the film up, found by hand from sliced triX; of the film's feet by its rules.
+# Half widths by layer of 0.1 mm from the film up, of both kinds of feet, found by hand from sliced triX; of the film's
+# own feet by the slicer's rules.
 BY_HAND = {
-    "arachne": {"cog": (0, 0.170, 0.239, 0.340, 0.440), "low": (0.385, 0.177)},
-    "classic": {"cog": (0, 0, 0.239, 0.339, 0.439), "low": (0.385,)},
+    "arachne": ((0, 0.170, 0.239, 0.340, 0.440), (0.385, 0.177)),
+    "classic": ((0, 0, 0.239, 0.339, 0.439), (0.385,)),
 }
 
 
@@ -33,15 +34,14 @@ def _quick(monkeypatch, tmp_path):
     monkeypatch.setattr(celllaw, "STRESS_PA", (0.0, 1e4, 2e4))
 
 
-def by_hand(walls, film=0.1):
-    """Half a cell of bars: the film's feet under x = 0.5, a cog at 1, hanging feet at 0 that are alike."""
-    found, low = BY_HAND[walls]["cog"], BY_HAND[walls]["low"]
+def built(widths, film=0.1):
+    """A cell of bars of given half widths: the film's feet under x = 0.5, a cog at 1, hanging feet at 0."""
     floor, roof = 0.3 + film, 0.8 + film
 
-    def bars(widths, *places):
+    def bars(name, *places):
         return [
             (max(x - w, 0), min(x + w, 2), floor + 0.1 * k, floor + 0.1 * (k + 1))
-            for x in places for k, w in enumerate(widths) if w
+            for x in places for k, w in enumerate(widths[name]) if w
         ]  # fmt: skip
 
     def body(name, material, terminal, *boxes):
@@ -49,9 +49,9 @@ def by_hand(walls, film=0.1):
 
     bodies = (
         body("bottom_electrode", "etpu", "bottom", (0, 2, 0, 0.3)),
-        body("film_and_lower", "x60", "", (0, 2, 0.3, floor), *bars(low, 0.5, 1.5)),
-        body("hanging", "x60", "", *bars(found, 0, 2)),
-        body("top_electrode", "etpu", "top", (0, 2, roof, roof + 0.3), *bars(found, 1)),
+        body("film_and_lower", "x60", "", (0, 2, 0.3, floor), *bars("low", 0.5, 1.5)),
+        body("hanging", "x60", "", *bars("feet", 0, 2)),
+        body("top_electrode", "etpu", "top", (0, 2, roof, roof + 0.3), *bars("cog", 1)),
     )
     return press2d.cell(Scene(bodies, (2.0, 8.0, roof + 0.3)), 2.0)
 
@@ -66,7 +66,8 @@ def test_a_printed_cell_gives_way_like_one_built_by_hand(walls, fall_um):
     """Classic walls lose the foot's lowest layer too: it hangs free, and falls by what was lost."""
     design = small()
     found = answered(design, compared.estimated(design, walls), 20.0)
-    hand = press2d.press(by_hand(walls), SOLIDS, [0.0, 2e4], EPS, fineness=QUICK)
+    both, low = BY_HAND[walls]
+    hand = press2d.press(built({"cog": both, "feet": both, "low": low}), SOLIDS, [0.0, 2e4], EPS, fineness=QUICK)
     assert (found["model"], found["faults"], hand.faults) == ("press2d", [], ())
     moved = np.array(found["displacement_um"][1:]) - fall_um
     assert moved == pytest.approx((hand.displacement_m[1:] - hand.fall_m) * 1e6, rel=0.01)
@@ -132,6 +133,27 @@ def test_a_print_is_the_same_scene_in_every_process():
     for body in scene.bodies:
         places = [(prism.span("z")[0], prism.span("x")[0]) for prism in body.prisms]
         assert places == sorted(places)
+
+
+@pytest.mark.parametrize("walls", ["arachne", "classic", "cura", "cura-gaps"])
+def test_support_takes_no_place_from_what_stays(walls):
+    """It swells too where it is narrow; PrusaSlicer prints the same feet with it as without."""
+    bare, held = (
+        pressed.piece(design, compared.estimated(design, walls))
+        for design in (small(), small(materials={"support": "bvoh"}))
+    )
+    assert held == bare
+
+
+@needs_mesher
+def test_the_staircase_whose_cog_ends_short_of_the_film():
+    """Published: 47 um, C' from 88 to 112 pF/m; feet of X60 at mid-layer, the cog narrowest, base and sides free."""
+    bars = {"cog": (0, 0, 0.2, 0.3, 0.4), "feet": (0.05, 0.15, 0.25, 0.35, 0.45), "low": (0.3958,)}
+    free = Held(base="sliding", period="free")
+    found = press2d.press(built(bars), SOLIDS, [0.0, 1e5], EPS, free, QUICK)
+    assert found.faults == ()
+    assert found.displacement_m[1] * 1e6 == pytest.approx(47, rel=0.03)
+    assert [c.middle() * 2e9 for c in found.capacitance_f_per_m2] == pytest.approx([88, 112], rel=0.03)
 
 
 def test_a_plate_has_no_period():

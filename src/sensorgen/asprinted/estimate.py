@@ -36,7 +36,8 @@ def estimate(scene: Scene, printer: Printer, quality: Quality, walls: str = "ara
 
     Notes
     -----
-    Where two bodies swell into each other the electrode keeps the place. Nothing sags: gaps are upper limits.
+    Where two bodies swell into each other the electrode keeps the place, and support gives it up. Nothing
+    sags: gaps are upper limits.
     """
     return scene_of(layers(scene, printer, quality, walls), scene)
 
@@ -61,8 +62,9 @@ def _printed(layer: Strips, scene: Scene, printer: Printer, wide: Rule) -> Strip
     return Strips(layer.along, layer.bottom_mm, layer.top_mm, {name: found for name, found in runs.items() if found})
 
 
-def _order(body: Body) -> bool:
-    return not body.terminal
+def _order(body: Body) -> tuple[bool, bool]:
+    """Electrodes first and support last, as their tools are."""
+    return body.is_support(), not body.terminal
 
 
 def _widened(start: float, end: float, width: float) -> tuple[float, float]:

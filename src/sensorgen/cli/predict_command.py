@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from sensorgen.design import Design
     from sensorgen.sensing import Sensed
 
+_PRESSING = ("pressing the printed cell",)
 Axes = tuple[Sequence[float], Sequence[float], Sequence[float]]
 
 OWN: list[click.Parameter] = [
@@ -116,7 +117,9 @@ def _sensed(design: "Design", accuracy: float | None, tip: dict[str, Any], how: 
     from sensorgen.asprinted import compared, pressed
 
     printed = asprinted_text.printed(design, how["slicer"], how["walls"])
-    return pressed.sensor_of(design, printed, accuracy=accuracy or compared.ACCURACY, **tip)
+    with show.progress(_PRESSING) as step:
+        step(_PRESSING[0])
+        return pressed.sensor_of(design, printed, accuracy=accuracy or compared.ACCURACY, **tip)
 
 
 def _as_printed(design: "Design", accuracy: float | None, how: dict[str, Any]) -> int:

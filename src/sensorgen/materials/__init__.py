@@ -100,9 +100,9 @@ class Material(Strict):
         chosen = own or [v for v in values if v.source == source] or [v for v in values if v.default]
         if not chosen:
             named = ", ".join(sorted(v.source for v in values))
+            unnamed = ": no source gives it; set one with --set or material_values"
             raise MissingValue(
-                f"{self.name} has no default {quantity}"
-                + (f"; name one of its sources: {named}" if named else ": no source gives it")
+                f"{self.name} has no default {quantity}" + (f"; name one of its sources: {named}" if named else unnamed)
             )
         return chosen[0]
 

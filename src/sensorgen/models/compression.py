@@ -18,6 +18,7 @@ from sensorgen.errors import MissingValue, OutOfRange
 SOURCE = "Thesis Eq. B.49; Gent and Lindley (1959) for the bonded plate; solved cells as their file says"
 COST = 0
 
+SOLVED_RATIO = 0.4999  # Poisson's ratio of all materials of the cells that were solved once and for all [-]
 REACH = 3.0  # how far beyond its last stress a curve is extended by its last slope, as a factor [-]
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _SAME = 1e-6  # relative difference up to which two parameters are one
