@@ -188,18 +188,6 @@ def test_verify_says_what_is_wrong_and_ends_with_1(run, path, tmp_path):
     assert said.out.startswith("raw file batch.json (")
 
 
-def test_where_the_log_is(monkeypatch, tmp_path):
-    monkeypatch.setenv("SENSORGEN_LOG", str(tmp_path / "x.db"))
-    assert place() == tmp_path / "x.db"
-    monkeypatch.delenv("SENSORGEN_LOG")
-    monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
-    assert place() == tmp_path / "sensorgen" / "log.db"
-    monkeypatch.setenv("XDG_DATA_HOME", "relative")
-    monkeypatch.setenv("HOME", str(tmp_path))
-    assert place() == tmp_path / ".local" / "share" / "sensorgen" / "log.db"
-
-
 def test_a_long_list_loads_little(tmp_path):
     """Of 100 000 readings the latest are read, and nothing heavy is loaded for it."""
     path = tmp_path / "log.db"
