@@ -140,7 +140,7 @@ def demodulation_table():
     yield f"\n{seconds / spent:.0f} times faster than the waveforms last, clipping looked for too."
     yield "\n| samples/s | samples of a window | times faster than they last |"
     yield "|---|---|---|"
-    for slower in (1, 6.25, 50):
+    for slower in (1, 6.25, 25):
         many = [x[: round(len(x) / slower)] for x in shown]
         yield f"| {rate / slower:.3g} | {round(rate / slower * 0.01)} | {speed(many, rate / slower):.0f} |"
 
@@ -215,8 +215,8 @@ LAWS = {
 def laws():
     """What drift leaves of force and position, law by law, over two bounds."""
     yield "\n## Laws of drift: root mean square errors of force and position over the Cramer-Rao bound\n"
-    yield "60 presses of 3 s. First two columns of errors: over the bound of a sensor without drift. Last: drift as chosen taken"
-    yield "out, then force, position and C fitted together, over the bound of these three.\n"
+    yield "60 presses of 3 s. The first two columns of errors: over the bound of a sensor without drift. The last one: drift"
+    yield "taken out by the law chosen, then force, position and C fitted together, over the bound of these three.\n"
     yield "| drift | pressed over before | law chosen | drift taken out | and C fitted beside |"
     yield "|---|---|---|---|---|"
     plan = made.presses(60, dwell_s=3.0, rest_s=3.0, seed=11)
@@ -236,8 +236,8 @@ def laws():
         three = beside(of, free.pressed_ohm, single, plan)
         said = (", ".join(f"{x:.3g}" for x in pair) for pair in (before, after, three))
         yield "| {} | {} | {} | {} | {} |".format(name, next(said), fit.law, *said)
-    widened = widths(of, plan)
-    yield f"\nThe bound with C unknown is {widened[0]:.2f} times that without drift for force, {widened[1]:.2f} times for position."
+    wider = "The bound with C unknown over that without drift: {:.2f} for force, {:.2f} for position."
+    yield "\n" + wider.format(*widths(of, plan))
 
 
 def by_capacitance(of):

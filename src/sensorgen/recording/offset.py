@@ -185,7 +185,7 @@ def _ratio(signal: Real, drift: Real, shapes: Real, left: Real) -> float:
     at_once = shapes.shape[1] - len(_ANSWERS_S)
     free = float(_independent(left)) - slow.shape[1] - at_once
     more = float(without @ without) / max(float(left @ left), 1e-300) - 1
-    return more * free / at_once
+    return float(more * free / at_once)
 
 
 def _solved(model: Real, signal: Real) -> Real:
