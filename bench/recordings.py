@@ -25,6 +25,7 @@ from sensorgen.invert import Estimator  # noqa: E402
 from sensorgen.plots import bench  # noqa: E402
 from sensorgen.process import drift, lowpass, presses, waveform  # noqa: E402
 from sensorgen.recording import joined, read, rig  # noqa: E402
+from sensorgen.sensor import Sensor  # noqa: E402
 
 SAMPLES = 1_000_000
 NOISE, RATE = 1e-3, 140.0
@@ -82,10 +83,22 @@ def offset_table():
             )
 
 
+def slow_table():
+    yield "\n## Offset of two clocks, by films that answer slowly: 12 presses, 1 % of C per N\n"
+    yield "| film answers within [s] | ramps [s] | off by [ms] | stated error [ms] |"
+    yield "|---|---|---|---|"
+    with tempfile.TemporaryDirectory() as folder:
+        for tau, ramp in ((1.4, 0.2), (3, 0.2), (60, 0.2), (1.4, 2), (3, 2), (60, 2)):
+            found, _ = joined_run(
+                Path(folder), made.presses(12, dwell_s=4.0), 12.34, 0.0, law=made.answering(0.01, tau), ramp_s=ramp
+            )
+            yield f"| {tau:g} | {ramp:g} | {(found.offset_s - 12.37) * 1e3:.2f} | {found.offset_error_s * 1e3:.2f} |"
+
+
 def joined_run(folder, plan, offset_s, skew, **how):
     run = made.run(plan, RATE, NOISE, **how)
     sio.savemat(folder / "run.mat", made.tree([run.impedance_ohm], [run.time_s], made.stamps(run.time_s)))
-    log = rig(made.write_rig(folder / "rig.csv", made.rig_rows(plan, offset_s, skew)))
+    log = rig(made.write_rig(folder / "rig.csv", made.rig_rows(plan, offset_s, skew, ramp_s=how.get("ramp_s", 0.2))))
     return joined(read(folder / "run.mat"), log), run
 
 
@@ -120,11 +133,26 @@ def demodulation_table():
             steps = [1.05 * np.abs(x).max() / 2 ** (bits - 1) for x in shown]
             shown = [np.round(x / q + rng.uniform(-0.5, 0.5, len(x))) * q for x, q in zip(shown, steps, strict=True)]
         start = time.process_time()
-        found = waveform.impedance(*shown, rate, made.TONES_HZ).impedance_ohm / z
+        found = waveform.impedance(*shown, rate, made.TONES_HZ, 1e9, 1e9).impedance_ohm / z
         spent = time.process_time() - start
         one, mean = (rms(x) for x in (found - 1, found.reshape(seconds, 100, 7).mean(axis=1) - 1))
         yield f"| {bits or 'all'} | {one.min():.1e}, {one.max():.1e} | {mean.min():.1e}, {mean.max():.1e} |"
-    yield f"\n{seconds / spent:.0f} times faster than the waveforms last."
+    yield f"\n{seconds / spent:.0f} times faster than the waveforms last, clipping looked for too."
+    yield "\n| samples/s | samples of a window | times faster than they last |"
+    yield "|---|---|---|"
+    for slower in (1, 6.25, 25):
+        many = [x[: round(len(x) / slower)] for x in shown]
+        yield f"| {rate / slower:.3g} | {round(rate / slower * 0.01)} | {speed(many, rate / slower):.0f} |"
+
+
+def speed(shown, rate):
+    """Of demodulation, over the time that the waveforms last: the middle of five."""
+    spent = []
+    for _ in range(5):
+        start = time.process_time()
+        waveform.impedance(*shown, rate, made.TONES_HZ, 1e9, 1e9)
+        spent.append(time.process_time() - start)
+    return len(shown[0]) / rate / sorted(spent)[2]
 
 
 def rms(values):
@@ -159,6 +187,104 @@ def truth():
     pictures(run, raw)
 
 
+LAWS = {
+    "logarithm, 2 % per e-fold": lambda t, _: 0.02 * np.log1p(t / 20),
+    "power of time, 0.3": lambda t, _: 0.02 * (t / 60) ** 0.3,
+    "power of time, 0.7": lambda t, _: 0.02 * (t / 60) ** 0.7,
+    "stretched exponential, 80 s, 0.5": lambda t, _: 0.04 * (1 - np.exp(-((t / 80) ** 0.5))),
+    "exponential, 60 s": lambda t, _: 0.04 * (1 - np.exp(-t / 60)),
+    "warming and cooling, a period of 10 min": lambda t, _: 0.02 * np.sin(t / 95.5),
+    "none": lambda t, _: 0 * t,
+    "creep under the tip, 1 % of C per N, 60 s": made.answering(0.01, 60.0),
+    "creep under the tip, 1 % of C per N, 2 s": made.answering(0.01, 2.0),
+    "creep under the tip, 1 % of C per N each, 2 s and 60 s": lambda t, f: sum(
+        made.answering(0.01, x)(t, f) for x in (2, 60)
+    ),
+    "creep under the tip by a power of time: 0.2 % each, 1, 4, 16, 64, 256 s": lambda t, f: sum(
+        made.answering(0.002, x)(t, f) for x in (1, 4, 16, 64, 256)
+    ),
+    "creep under the tip, 1 % of C per N, 0.3 s": made.answering(0.01, 0.3),
+    "random walk, 0.2 % over the run": made.walking(0.002),
+    "random walk, 2 % over the run": made.walking(0.02),
+    "random walk, 2 %, and creep under the tip, 3 % of C per N, 2 s": lambda t, f: (
+        made.walking(0.02)(t, f) + made.answering(0.03, 2.0)(t, f)
+    ),
+}
+
+
+def laws():
+    """What drift leaves of force and position, law by law, over two bounds."""
+    yield "\n## Laws of drift: root mean square errors of force and position over the Cramer-Rao bound\n"
+    yield "60 presses of 3 s. The first two columns of errors: over the bound of a sensor without drift. The last one: drift"
+    yield "taken out by the law chosen, then force, position and C fitted together, over the bound of these three.\n"
+    yield "| drift | pressed over before | law chosen | drift taken out | and C fitted beside |"
+    yield "|---|---|---|---|---|"
+    plan = made.presses(60, dwell_s=3.0, rest_s=3.0, seed=11)
+    of, single = made.sensor(), NOISE / np.sqrt(presses.WINDOW_S * RATE)
+    rest = of.impedance(made.TONES_HZ, 0.0, 0.05)
+    for name, law in LAWS.items():
+        run = made.run(plan, RATE, NOISE, seed=5, law=law)
+        every = np.ones(len(run.time_s), bool)
+        fit = drift.fitted(run.time_s, run.impedance_ohm, every, run.force_n)
+        clean = fit.removed(run.time_s, run.impedance_ohm) * rest / fit.rest_ohm()
+        at = presses.pressed(run.time_s, run.force_n)
+        raw, free = (
+            presses.pairs(run.time_s, z, every, at, run.force_n, run.position_mm) for z in (run.impedance_ohm, clean)
+        )
+        before = pulls(of, rest * raw.pressed_ohm / raw.before_ohm, single * 2**0.5, plan)[:2]
+        after = pulls(of, free.pressed_ohm, single, plan)[:2]
+        three = beside(of, free.pressed_ohm, single, plan)
+        said = (", ".join(f"{x:.3g}" for x in pair) for pair in (before, after, three))
+        yield "| {} | {} | {} | {} | {} |".format(name, next(said), fit.law, *said)
+    wider = "The bound with C unknown over that without drift: {:.2f} for force, {:.2f} for position."
+    yield "\n" + wider.format(*widths(of, plan))
+
+
+def by_capacitance(of):
+    """How ln Z moves with ln C at rest (m,)."""
+    step = 1e-6
+    more = Sensor(**{**vars(of), "capacitance_f_per_m": of.capacitance_f_per_m * (1 + step)})
+    return np.log(more.impedance(made.TONES_HZ, 0.0, 0.05) / of.impedance(made.TONES_HZ, 0.0, 0.05)) / step
+
+
+def parts(z):
+    return np.concatenate([z.real, z.imag], -1)
+
+
+def directions(of, force, at):
+    """Derivatives of ln Z by force, position and ln C (presses, 2 m, 3)."""
+    by_force, by_position = slopes(of, made.TONES_HZ, force, at)
+    return np.stack(
+        [parts(by_force), parts(by_position), np.broadcast_to(parts(by_capacitance(of)), parts(by_force).shape)], -1
+    )
+
+
+def errors(fisher):
+    return np.sqrt(np.linalg.inv(fisher)[:, [0, 1], [0, 1]]).T
+
+
+def widths(of, plan):
+    force, at = np.array([m[2] for m in plan]), np.array([m[3] for m in plan]) * 1e-3
+    d = directions(of, force, at)
+    with_c, without = (errors(x.transpose(0, 2, 1) @ x) for x in (d, d[..., :2]))
+    return np.sqrt(((with_c / without) ** 2).mean(axis=1))
+
+
+def beside(of, z, noise, plan):
+    """Force, position and C fitted together by Gauss-Newton from the truth: errors over their bound."""
+    true = np.array([m[2] for m in plan]), np.array([m[3] for m in plan]) * 1e-3, np.zeros(len(plan))
+    now = np.stack(true, -1)
+    for _ in range(20):
+        force, at, grown = now.T
+        model = np.log(of.impedance(made.TONES_HZ, force[:, None], at[:, None])) + grown[:, None] * by_capacitance(of)
+        d = directions(of, force, at)
+        off = parts(np.log(z / np.exp(model)))[..., None]
+        step = np.linalg.solve(d.transpose(0, 2, 1) @ d, d.transpose(0, 2, 1) @ off)[..., 0]
+        now = np.clip(now + np.clip(step, [-0.3, -5e-3, -0.1], [0.3, 5e-3, 0.1]), [0.2, 0.006, -1], [10, 0.094, 1])
+    bound = errors(d.transpose(0, 2, 1) @ d) * noise
+    return [rms((now[:, k] - true[k]) / bound[k]) for k in (0, 1)]
+
+
 def pulls(of, z, noise, plan):
     force, at = np.array([m[2] for m in plan]), np.array([m[3] for m in plan]) * 1e-3
     limits = bounds(slopes(of, made.TONES_HZ, force, at), noise)
@@ -191,7 +317,7 @@ def pictures(run, pairs):
 
 def main():
     lines = ["# Recordings\n", "Made by `bench/recordings.py`.\n"]
-    for part in (import_table, offset_table, filter_table, demodulation_table, truth):
+    for part in (import_table, offset_table, slow_table, filter_table, demodulation_table, truth, laws):
         lines += part()
     text = "\n".join(lines) + "\n"
     (HERE / "results" / "recordings.md").write_text(text, "utf-8")

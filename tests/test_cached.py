@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -125,27 +124,6 @@ def test_the_version_covers_the_models_and_what_they_stand_on(monkeypatch, tmp_p
         found.append(cached._version())
     cached._version.cache_clear()
     assert len(set(found)) == len(found)
-
-
-@pytest.mark.parametrize(
-    ("platform", "environment", "expected"),
-    [
-        ("linux", {"XDG_CACHE_HOME": "/fast"}, "/fast/sensorgen"),
-        ("linux", {"XDG_CACHE_HOME": "relative"}, "~/.cache/sensorgen"),
-        ("linux", {}, "~/.cache/sensorgen"),
-        ("darwin", {"XDG_CACHE_HOME": "/fast"}, "~/Library/Caches/sensorgen"),
-        ("win32", {"LOCALAPPDATA": "/local"}, "/local/sensorgen"),
-        ("win32", {}, "~/AppData/Local/sensorgen"),
-        ("linux", {"XDG_CACHE_HOME": "/fast", "SENSORGEN_CACHE": "/own"}, "/own"),
-    ],
-)
-def test_where_it_is(monkeypatch, platform, environment, expected):
-    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA", "SENSORGEN_CACHE"):
-        monkeypatch.delenv(name, raising=False)
-    for name, value in environment.items():
-        monkeypatch.setenv(name, value)
-    monkeypatch.setattr(cached.sys, "platform", platform)
-    assert cached.folder() == Path(expected).expanduser()
 
 
 WRITER = """

@@ -5,15 +5,13 @@ a new version of either asks anew. Deleting the folder costs time only.
 """
 
 import json
-import os
-import sys
 from collections.abc import Callable, Mapping
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from sensorgen import __version__, store
+from sensorgen import __version__, places, store
 from sensorgen.errors import Unwritable
 
 PLACE = "SENSORGEN_CACHE"  # environment variable with another folder
@@ -80,18 +78,7 @@ def keep(question: Mapping[str, JSON], found: JSON) -> None:
 
 def folder() -> Path:
     """Where entries are: the system's place for caches, or what SENSORGEN_CACHE says."""
-    own = os.environ.get(PLACE)
-    return Path(own) if own else _system_place() / "sensorgen"
-
-
-def _system_place() -> Path:
-    """The folder for caches: XDG's, Apple's or Microsoft's."""
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches"
-    given = os.environ.get("XDG_CACHE_HOME", "")
-    return Path(given) if Path(given).is_absolute() else Path.home() / ".cache"  # XDG ignores relative paths
+    return places.cache(PLACE)
 
 
 def _file(question: Mapping[str, JSON]) -> Path:

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from sensorgen.log import Log, Reading, place
+from sensorgen.log import Log, Reading
 from sensorgen.log.words import reading
 
 
@@ -136,6 +136,59 @@ def test_a_prediction_is_kept_when_it_is_made(run, path):
     assert "is sound: 2 rows" in run("verify").out
 
 
+def test_a_prediction_ahead_of_the_measurement(run, path, tmp_path):
+    said = run("multimeter", "26 triX .1mm", "--y", "650", "--predict")
+    assert (said.code, said.err) == (0, "")
+    assert said.out.index("logged prediction 1") < said.out.index("logged reading 1")
+    again = run("multimeter", "26 triX .1mm 2", "--y", "660", "--predict", "--json")
+    assert (json.loads(again.out)[0]["number"], again.err) == (2, "")
+    first = run("multimeter", "23 triX .2mm", "--y", "1k", "--predict", "--json")
+    assert json.loads(first.out)[0]["number"] == 3
+    assert "logged prediction 2" in first.err
+    assert "does not tell its design" in run("multimeter", "22 triY 10mm", "--y", "1", "--predict").line
+    failed = run("multimeter", "26 triY .1mm", "--visa", "nowhere", "--axis", "y", "--predict")
+    assert failed.code == 2  # no meter, but what it should have read is on record
+    with Log(path) as log:
+        readings, predictions = log.readings(), log.predictions()
+        assert [r.design for r in readings] == ["trix-d0.1", "trix-d0.1", "trix-d0.2"]
+        assert [p.design for p in predictions] == ["trix-d0.1", "trix-d0.2", "triy-d0.1"]
+        assert predictions[0].logged_at <= readings[0].logged_at
+        assert predictions[1].design_id == readings[2].design_id
+
+
+def test_a_print_beds_own_design_is_the_one_that_is_predicted(run, path, tmp_path):
+    (tmp_path / "batch.json").write_text(json.dumps(BATCH))
+    run("import", "batch.json")
+    assert run("multimeter", "26 triX .1mm", "--y", "650", "--predict").code == 0  # the print bed brought its own
+    for piece in (bare := json.loads(json.dumps(BATCH)))["specimens"].values():
+        del piece["expected"]
+    (tmp_path / "batch.json").write_text(json.dumps(bare))
+    run("import", "batch.json", "--log", "other.db")
+    words = ("multimeter", "26 triX .1mm", "--y", "650", "--predict", "--log", "other.db")
+    assert "sensorgen log predict takes the design's file" in run(*words).line
+    with Log(path) as log, Log(tmp_path / "other.db") as other:
+        assert len(log.predictions()) == 1
+        assert other.predictions() == other.readings() == ()
+
+
+def test_what_slicers_print_is_kept_beside_what_was_drawn(run, path, tmp_path):
+    report = {"specimen": "26 triX .1mm", "capacitance_f": {"drawn": {"lower": 1e-11}, "printed": {"lower": 2e-11}}}
+    used = {"prusa": {"printed": {"a" * 16: report}}, "cura": {"version": "4"}}
+    (tmp_path / "batch.json").write_text(json.dumps(BATCH | {"slicers": used}))
+    assert "5 of 5 rows logged" in run("import", "batch.json").out
+    with Log(path) as log:
+        (kept,) = log.predictions()
+    assert json.loads(kept.data) == {"capacitance_f": {"lower": 1e-11}, "printed": {"prusa": report}}
+    for slicers, message in (
+        (3, "slicers holds 3"),
+        ({"prusa": []}, "slicer prusa holds []"),
+        ({"prusa": {"printed": "x"}}, "printed by prusa holds 'x'"),
+    ):
+        (tmp_path / "batch.json").write_text(json.dumps(BATCH | {"slicers": slicers}))
+        said = run("import", "batch.json", "--log", "new.db")
+        assert message in said.line
+
+
 BATCH = {
     "batch": "26",
     "specimens": {
@@ -186,18 +239,6 @@ def test_verify_says_what_is_wrong_and_ends_with_1(run, path, tmp_path):
     said = run("verify")
     assert said.code == 1
     assert said.out.startswith("raw file batch.json (")
-
-
-def test_where_the_log_is(monkeypatch, tmp_path):
-    monkeypatch.setenv("SENSORGEN_LOG", str(tmp_path / "x.db"))
-    assert place() == tmp_path / "x.db"
-    monkeypatch.delenv("SENSORGEN_LOG")
-    monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
-    assert place() == tmp_path / "sensorgen" / "log.db"
-    monkeypatch.setenv("XDG_DATA_HOME", "relative")
-    monkeypatch.setenv("HOME", str(tmp_path))
-    assert place() == tmp_path / ".local" / "share" / "sensorgen" / "log.db"
 
 
 def test_a_long_list_loads_little(tmp_path):

@@ -206,6 +206,12 @@ def test_hysteresis_of_two_known_ways():
     assert found.share == pytest.approx([2.0 / 16, 0], abs=2e-3)  # 0.5 F (4 - F) has its top of 2 at 2 N
     assert found.at_n[0] == pytest.approx(2, abs=0.1)
     assert found.lost == pytest.approx([0.5 * 64 / 6 / (64 / 3), 0], abs=5e-3)
+    noise = np.random.default_rng(0).standard_normal((400, 2)) * 0.1
+    several = [hysteresis(force, values + 0.1 * np.random.default_rng(k).standard_normal((400, 2))) for k in range(40)]
+    apart = np.array([way.down[20] - way.up[20] for way in several])
+    spans = np.array([np.ptp(np.vstack([way.up, way.down]), axis=0) for way in several]).mean(axis=0)
+    np.testing.assert_allclose(np.mean([way.error for way in several], axis=0), apart.std(axis=0) / spans, rtol=0.35)
+    assert hysteresis(force, values + noise).share == pytest.approx([2 / 16, 0], abs=0.06)
     with pytest.raises(BadInput, match="goes up and down again"):
         hysteresis(force[:200], values[:200])
 

@@ -27,7 +27,7 @@ def _hysteresis(
     """Show how far readings on the way down of each press lie from those on its way up, at the same force.
 
     For presses that go up and down again over some seconds, with the rig's log that measured the force. The distance is
-    the largest one, over the span of the readings; lost is the area between both ways over that under the way up.
+    the largest one, over the span of the readings, with the standard error that noise gives it.
     Drift is taken out by a law of time alone: what the film remembers of presses is what is looked for.
     """
     from sensorgen.process.hysteresis import of_presses
@@ -53,10 +53,10 @@ def _lines(worked: "Processed", ways: "dict[float, Hysteresis]") -> Iterator[str
     tones = worked.recording.tones_hz.tolist()
     ends = sorted({0, len(tones) - 1})
     heads = [f"{part} {units.frequency_text(tones[k])}" for k in ends for part in _PARTS]
-    yield f"{'start [s]':>9} {'to [N]':>6}" + "".join(f" {head:>11} {'at [N]':>6} {'lost':>6}" for head in heads)
+    yield f"{'start [s]':>9} {'to [N]':>6}" + "".join(f" {head + ' ±':>15} {'at [N]':>6}" for head in heads)
     for at, way in ways.items():
         columns = [k + part * len(tones) for k in ends for part in (0, 1)]
-        said = (f" {way.share[c]:11.2%} {way.at_n[c]:6.2f} {way.lost[c]:6.2%}" for c in columns)
+        said = (f" {f'{way.share[c]:.2%} {way.error[c]:.2%}':>15} {way.at_n[c]:6.2f}" for c in columns)
         yield f"{at:9.2f} {way.force_n[-1]:6.2f}" + "".join(said)
 
 
@@ -65,7 +65,7 @@ def _data(start_s: float, way: "Hysteresis") -> dict[str, Any]:
     half = len(way.share) // 2
     return {"time_s": start_s, "force_n": [float(way.force_n[0]), float(way.force_n[-1])]} | {
         f"{name}_{part}": getattr(way, name)[k * half : (k + 1) * half].tolist()
-        for name in ("share", "at_n", "lost")
+        for name in ("share", "error", "at_n", "lost")
         for k, part in enumerate(("re", "im"))
     }
 

@@ -28,6 +28,12 @@ def remark() -> click.Option:
     return click.Option(["--remark"], metavar="TEXT", default="", help="Anything worth knowing, in your own words.")
 
 
+def ahead() -> click.Option:
+    """A prediction before the measurement."""
+    about = "Log first what the specimen's design is expected to measure, if the log does not have it."
+    return click.Option(["--predict"], is_flag=True, help=about)
+
+
 def corrects() -> click.Option:
     """A row that is to be corrected."""
     return click.Option(["--corrects"], metavar="NUMBER", type=int, help="Number of the row that this one corrects.")

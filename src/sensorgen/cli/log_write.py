@@ -10,8 +10,8 @@ import click
 
 from sensorgen.cli import show
 from sensorgen.cli.designs import DesignGroup
+from sensorgen.cli.log_words import ahead, columns_of, corrects, lcr_columns, made, opened, remark, rig_columns, where
 from sensorgen.cli.log_words import as_json as json_option
-from sensorgen.cli.log_words import columns_of, corrects, lcr_columns, made, opened, remark, rig_columns, where
 from sensorgen.cli.settings import pairs
 from sensorgen.cli.words import OneOf
 from sensorgen.errors import BadInput
@@ -35,6 +35,7 @@ def _multimeter(
     if meter["visa"] and (y_words or z_words):
         raise BadInput("--visa beside --y or --z; expected the meter's readings or words, not both")
     words.named(specimen)  # a wrong name is told before anybody measures
+    _ahead(specimen, file, wanted=how.pop("predict"), as_json=as_json)
     if meter["visa"]:
         y_words, z_words, how["instrument"] = _measured(**meter)
         how["source"] = meter["visa"]
@@ -45,6 +46,18 @@ def _multimeter(
         supersedes = _uid(log, Reading, corrects)
         new = log.add([words.reading(specimen, y_words, z_words, mega=mega, supersedes=supersedes, **how)])
         _say_logged(new, log, as_json=as_json)
+
+
+def _ahead(specimen: str, file: str | None, *, wanted: bool, as_json: bool) -> None:
+    """Log what is expected before the specimen is measured, and say so beside what is said of the reading."""
+    if not wanted:
+        return
+    from sensorgen.cli import log_text
+    from sensorgen.log import ahead
+
+    with opened(file, create=True) as log:
+        for entry in ahead.predict(log, specimen):
+            click.echo("logged " + "\n".join(log_text.of(entry)), err=as_json)
 
 
 def _asked_mega(**typed: str) -> bool:
@@ -131,7 +144,7 @@ def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, the
 
 def _bench(
     specimen: str, lcr_file: str, rig_file: str | None, remark: str, file: str | None, corrects: int | None, *,
-    columns: tuple[str, ...], rig_columns: tuple[str, ...], as_json: bool,
+    columns: tuple[str, ...], rig_columns: tuple[str, ...], predict: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Log a recording of one specimen, its files kept whole.
 
@@ -143,6 +156,7 @@ def _bench(
         "columns": columns_of(columns, "--column"),
         "rig_columns": columns_of(rig_columns, "--rig-column"),
     }
+    _ahead(specimen, file, wanted=predict, as_json=as_json)
     with opened(file, create=True) as log:
         new = bench.take(
             log, specimen, Path(lcr_file), Path(rig_file) if rig_file else None, **maps, remark=remark,
@@ -173,6 +187,7 @@ multimeter = made(
     click.Option(["--z", "z_words"], metavar="WORDS", default="", help="Resistance between the electrodes."),
     click.Option(["--baked/--unbaked"], default=None, help="Whether the specimen was baked before."),
     remark(),
+    ahead(),
     click.Option(["--measured-at"], metavar="WHEN", default="", help="When it was measured, in your own words."),
     corrects(),
     click.Option(["--visa"], metavar="ADDRESS", help="Read the meter there, as GPIB0::22::INSTR: first Y, then Z."),
@@ -200,6 +215,7 @@ bench = made(
     lcr_columns(),
     rig_columns(),
     remark(),
+    ahead(),
     corrects(),
     where(),
     json_option(),

@@ -34,16 +34,29 @@ def rows(path: Path, file: RawFile) -> Iterator[Entry]:
     batch = str(record.get("batch") or path.absolute().parent.name)
     yield file
     yield Batch(uid=file.uid, batch=batch, file=file.uid)
+    printed = _as_printed(record, str(path))
     pieces = _mapping(record.get("specimens"), f"{path}: specimens").items()
     found = (
         row
         for written, piece in pieces
-        for row in _of_piece(file.uid, written, _mapping(piece, f"{path}: specimen {written}"), str(path))
+        for row in _of_piece(file.uid, written, _mapping(piece, f"{path}: specimen {written}"), printed, str(path))
     )
     yield from dict.fromkeys(found)  # copies of one design share a prediction
 
 
-def _of_piece(batch: str, written: str, piece: Mapping[str, Any], where: str) -> Iterator[Entry]:
+def _as_printed(record: Mapping[str, Any], where: str) -> dict[str, dict[str, Any]]:
+    """What each slicer prints of each design, by the design and the slicer; none where the print was not read back."""
+    found: dict[str, dict[str, Any]] = {}
+    for slicer, used in _mapping(record.get("slicers") or {}, f"{where}: slicers").items():
+        printed = _mapping(used, f"{where}: slicer {slicer}").get("printed") or {}
+        for design_id, report in _mapping(printed, f"{where}: printed by {slicer}").items():
+            found.setdefault(design_id, {})[slicer] = report
+    return found
+
+
+def _of_piece(
+    batch: str, written: str, piece: Mapping[str, Any], printed: Mapping[str, Any], where: str
+) -> Iterator[Entry]:
     design_id, design = piece.get("design_id"), piece.get("design")
     if not isinstance(design_id, str) or not isinstance(design, str) or not design_id:
         raise BadInput(f"{where}: specimen {written}: design_id is {shown(design_id)}; expected text")
@@ -54,7 +67,9 @@ def _of_piece(batch: str, written: str, piece: Mapping[str, Any], where: str) ->
     uid = f"{batch} {specimen['specimen']}"
     yield Print(uid=uid, batch_uid=batch, design_id=design_id, design=design, **specimen)  # type: ignore[arg-type]
     if piece.get("expected"):
-        yield prediction(design_id, design, piece["expected"])
+        expected = _mapping(piece["expected"], f"{where}: specimen {written}: expected")
+        beside = {"printed": printed[design_id]} if design_id in printed else {}
+        yield prediction(design_id, design, expected | beside)
 
 
 def prediction(design_id: str, design: str, data: Mapping[str, Any]) -> Prediction:

@@ -148,6 +148,7 @@ def _writable(path: Path) -> bool:
 
 def _make(path: Path) -> None:
     """Make an empty log beside its place, and link it there unless somebody else was first."""
+    fresh = [folder for folder in path.parents if not folder.exists()]
     path.parent.mkdir(parents=True, exist_ok=True)
     sweep(path.parent)
     part = part_of(path)
@@ -157,7 +158,8 @@ def _make(path: Path) -> None:
             file.flush()
             os.fsync(file.fileno())
         _put(part, path)
-        _to_disk(path.parent)
+        for folder in (path.parent, *(made.parent for made in fresh)):
+            _to_disk(folder)
     finally:
         with suppress(OSError):
             part.unlink()

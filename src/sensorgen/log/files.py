@@ -111,7 +111,7 @@ def faults(folder: Path, files: Iterator[RawFile]) -> Iterator[str]:
 def _folders_to_disk(folder: Path) -> None:
     if os.name == "nt":
         return
-    for place in (folder, folder.parent):
+    for place in (folder, folder.parent, folder.parent.parent):  # each may have been made for this file
         handle = os.open(place, os.O_RDONLY)
         try:
             os.fsync(handle)

@@ -1,14 +1,13 @@
 """The log: readings, recordings and predictions of printed specimens, in one SQLite file that only grows."""
 
 import dataclasses
-import os
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
+from sensorgen import places
 from sensorgen.errors import BadInput, MissingValue, UnknownName
 from sensorgen.log import database, files
 from sensorgen.log.codec import CODECS
@@ -54,18 +53,7 @@ def place() -> Path:
 
     One for all folders that one works in, and never below ``out/``, which may be deleted.
     """
-    own = os.environ.get(PLACE)
-    return Path(own) if own else _system_place() / "sensorgen" / "log.db"
-
-
-def _system_place() -> Path:
-    """The folder for data: XDG's, Apple's or Microsoft's."""
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Application Support"
-    given = os.environ.get("XDG_DATA_HOME", "")
-    return Path(given) if Path(given).is_absolute() else Path.home() / ".local" / "share"
+    return places.data(PLACE, "log.db")
 
 
 class Log:

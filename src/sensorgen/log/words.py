@@ -6,6 +6,7 @@ import uuid
 from collections.abc import Iterator
 from functools import lru_cache
 
+from sensorgen.design import Design
 from sensorgen.errors import BadInput, SensorgenError
 from sensorgen.log.entries import SPECIMEN_COLUMNS, Reading
 from sensorgen.log.values import Resistances, read
@@ -121,13 +122,18 @@ def _blanks(y_ohm: tuple[float, ...], z_ohm: tuple[float, ...]) -> Iterator[str]
 
 def design_of_name(name: Name) -> tuple[str, str]:
     """Identity and name of the design that a specimen's name stands for, "" where it does not tell."""
+    design = design_like(name)
+    return (design.id(), design.name) if design else ("", "")
+
+
+def design_like(name: Name) -> Design | None:
+    """The design that a specimen's name stands for, None where it does not tell."""
     return _design(dataclasses.replace(name, iteration=None, replicate=None, place=""))
 
 
 @lru_cache(maxsize=256)
-def _design(name: Name) -> tuple[str, str]:
+def _design(name: Name) -> Design | None:
     try:
-        design = design_of(name)
+        return design_of(name)
     except SensorgenError:  # a film that no design may have
-        return "", ""
-    return (design.id(), design.name) if design else ("", "")
+        return None

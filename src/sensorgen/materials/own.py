@@ -2,8 +2,9 @@
 
 import os
 import re
-import sys
 from pathlib import Path
+
+from sensorgen import places
 
 PLACE = "SENSORGEN_MATERIALS"  # environment variable with another folder
 NAME = re.compile(r"[a-z0-9][a-z0-9.-]*")
@@ -11,18 +12,7 @@ NAME = re.compile(r"[a-z0-9][a-z0-9.-]*")
 
 def place() -> Path:
     """The folder: what SENSORGEN_MATERIALS says, or the system's place for a user's data."""
-    given = os.environ.get(PLACE)
-    return Path(given) if given else _system_place() / "sensorgen" / "materials"
-
-
-def _system_place() -> Path:
-    """The folder for data: XDG's, Apple's or Microsoft's."""
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Application Support"
-    given = os.environ.get("XDG_DATA_HOME", "")
-    return Path(given) if Path(given).is_absolute() else Path.home() / ".local" / "share"
+    return places.data(PLACE, "materials")
 
 
 def path(source: str) -> Path:

@@ -18,6 +18,8 @@ class Hysteresis(NamedTuple):
 
     share: Real
     """Largest distance of the two ways, over the span of the readings (m,) [-]."""
+    error: Real
+    """Standard error that noise gives the distance at one force; the largest of many is a few of it (m,) [-]."""
     at_n: Real
     """Force at which it is (m,) [N]."""
     lost: Real
@@ -61,7 +63,16 @@ def hysteresis(force_n: Real, values: Real) -> Hysteresis:
     columns = np.arange(values.shape[1])
     under = np.trapezoid(np.abs(up - up[0]), at, axis=0)
     lost = np.trapezoid(apart, at, axis=0) / np.where(under > 0, under, np.nan)
-    return Hysteresis(apart[where, columns] / span, at[where], lost, at, up, down)
+    error = np.hypot(
+        _error(force_n[: top + 1], values[: top + 1], at, up), _error(force_n[top:], values[top:], at, down)
+    )
+    return Hysteresis(apart[where, columns] / span, error / span, at[where], lost, at, up, down)
+
+
+def _error(force_n: Real, values: Real, at: Real, way: Real) -> Real:
+    """Standard error of a way at one force: the scatter about it, over the root of how many readings a mean has."""
+    through = np.column_stack([np.interp(force_n, at, column) for column in way.T])
+    return np.asarray((values - through).std(axis=0) / np.sqrt(max(len(values) / len(at), 1)))
 
 
 def _way(force_n: Real, values: Real, at: Real) -> Real:

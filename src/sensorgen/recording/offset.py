@@ -183,8 +183,9 @@ def _ratio(signal: Real, drift: Real, shapes: Real, left: Real) -> float:
     slow = np.hstack([drift, shapes[:, -len(_ANSWERS_S) :]])
     without = signal - slow @ _solved(slow, signal)
     at_once = shapes.shape[1] - len(_ANSWERS_S)
-    free = _independent(left) - slow.shape[1] - at_once
-    return float((without @ without) / max(left @ left, 1e-300) - 1) * free / at_once
+    free = float(_independent(left)) - slow.shape[1] - at_once
+    more = float(without @ without) / max(float(left @ left), 1e-300) - 1
+    return float(more * free / at_once)
 
 
 def _solved(model: Real, signal: Real) -> Real:
