@@ -95,7 +95,7 @@ def law_of(design: Design, answer: Answer, name: str = "", *, solve: bool = Fals
             return solved(design)
         except SensorgenError as error:
             return _as_plate(design, moduli, str(error))
-    return _as_plate(design, moduli, "ask for the law 'solved', which takes some seconds")
+    return _as_plate(design, moduli, "ask for the law 'solved', which takes a minute or two")
 
 
 def _plate(design: Design, moduli: Mapping[str, Taken], name: str) -> Law:
