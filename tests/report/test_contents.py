@@ -135,6 +135,7 @@ def test_a_specimen_counts_once_and_with_its_last_reading(tmp_path):
     assert any(text.startswith("1 of 2 specimens with both") for text in made.findings)
     assert "2 earlier readings count for nothing" in " ".join(w for s in made.sections for w in s.words)
     assert len(table(made, "specimens").rows) == 4
+    assert column(table(made, "yield_by_shape"), "specimens") == [2]
 
 
 def test_thousands_of_readings(tmp_path, monkeypatch):
