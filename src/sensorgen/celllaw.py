@@ -115,7 +115,7 @@ def law_of(design: Design, answer: Answer, name: str = "", *, solve: bool = Fals
             return solved(design, printed)
         except SensorgenError as error:
             return _as_plate(design, moduli, str(error))
-    return _as_plate(design, moduli, "ask for the law 'solved', which takes some seconds")
+    return _as_plate(design, moduli, "ask for the law 'solved', which takes a minute or two")
 
 
 def _stored(design: Design, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:

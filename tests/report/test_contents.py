@@ -15,8 +15,9 @@ import pytest
 from bench_files import FORMULA, HOSTILE
 from scipy import stats
 
+from sensorgen.comparison import of_iteration
 from sensorgen.log import Log, words
-from sensorgen.report import FORMATS, report, written
+from sensorgen.report import FORMATS, report, written, yields
 from sensorgen.report import page as page_of
 from sensorgen.report.figures import MOST_ROWS
 from sensorgen.report.pictures import files
@@ -102,6 +103,20 @@ def test_whether_groups_differ_is_asked_of_films_only(of_thesis, by_hand):
         assert "do not differ" in said_so
 
 
+@pytest.mark.parametrize(("shorted", "said"), [(6, "do not differ more"), (5, "differ (p")])
+def test_of_two_questions_each_has_to_be_twice_as_sure(shorted, said, tmp_path):
+    """6 and 5 of 10 against 12 of 12: p = 0.029 and 0.010, of which the first would do if only one thing were asked."""
+    with Log(tmp_path / "log.db", create=True) as log:
+        first = [words.reading(f"40 triX .1mm {k + 1}", "700", "30" if k < shorted else "OL") for k in range(10)]
+        log.add(first + [words.reading(f"40 triX .2mm {k + 1}", "700", "30") for k in range(12)])
+        found = of_iteration(log, 40)
+    chance = stats.fisher_exact([[shorted, 10 - shorted], [12, 0]]).pvalue
+    assert chance < 0.05
+    text = next(text for text in yields.findings(found) if text.startswith("By film"))
+    assert said in text
+    assert f"p = {chance:.2g}" in text
+
+
 def test_r_z_is_not_compared_where_the_electrodes_touch_as_drawn(of_thesis, by_hand):
     """One leak for all: ln of the meter's highest range and of the readings, without those of 0 ohm and of no film."""
     known = [z for y, z, name in by_hand if "mm" in name and z > 0 and 1 < y < 5e4]
@@ -120,6 +135,7 @@ def test_a_specimen_counts_once_and_with_its_last_reading(tmp_path):
     assert any(text.startswith("1 of 2 specimens with both") for text in made.findings)
     assert "2 earlier readings count for nothing" in " ".join(w for s in made.sections for w in s.words)
     assert len(table(made, "specimens").rows) == 4
+    assert column(table(made, "yield_by_shape"), "specimens") == [2]
 
 
 def test_thousands_of_readings(tmp_path, monkeypatch):
@@ -132,6 +148,9 @@ def test_thousands_of_readings(tmp_path, monkeypatch):
     charts = {chart.key: chart for chart in made.charts}
     assert [len(charts[key].y[0].names) for key in ("residuals", "resistance")] == [MOST_ROWS] * 2
     assert f"Not drawn: {1200 - MOST_ROWS}" in charts["residuals"].alt
+    drawn = [float(x) for t in charts["residuals"].choices[""] if t.kind == "points" for x in t.x]
+    every = column(table(made, "specimens"), "ratio")
+    assert (min(drawn), max(drawn)) == pytest.approx((min(every), max(every)))
     assert "400 of 1200" in " ".join(made.findings)
     page = Page(written(made, "html"))
     assert len(page.cells["specimens"]) == 50 + 1

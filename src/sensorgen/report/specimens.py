@@ -94,6 +94,6 @@ def words(found: Comparison) -> tuple[str, ...]:
         "The prediction of R_Y runs from the better electrode with all its cogs to the worse one without them: nobody "
         "wrote down which of the two was measured. A residual is ln(measured / middle of the prediction), of the least "
         "reading; the others show the spread.",
-        f"{origin}{late}.",
+        f"{origin}{late}." if found.predictions else "No specimen's name tells its design: nothing is predicted.",
         "A film that leaks lets a part of the current take the other electrode: R_Y then reads up to half as much.",
     )
