@@ -27,7 +27,7 @@ RESULTS = Path(__file__).parent / "results"
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 DEGREES = tuple(range(0, 91, 15))
 CONTACTS = (0.0, 1e-6, 1e-5, 1e-4)
-LENGTHS_MM = (100, 200, 400, 800, 1600)
+LENGTHS_MM = (100, 200, 400, 800, 1600, 10400)
 RHO, LINE_MM, LAYER_MM = 0.2, 0.4185, 0.1
 EPS = {"air": 1.00059, "x60": 4.68}
 COLOURS = {"etpu": "#303436", "x60": "#f2c14e"}
@@ -129,7 +129,7 @@ def draw_walls():
         at = 0.159652 if name == "as drawn" else per_m(scene)
         gap = 0.1 if name == "as drawn" else compared.gap_mm(scene)
         axes.set(xlim=(0, 2), ylim=(0, 1.2), aspect="equal")
-        axes.set_title(f"{name}: electrode gap {gap:g} mm, {at * 1e3:.1f} pF/m per period", fontsize=9, loc="left")
+        axes.set_title(f"{name}: gap {gap:g} mm, {at * 1e3:.1f} pF/m", fontsize=9, loc="left")
         axes.set_ylabel("z [mm]", fontsize=8)
         axes.tick_params(labelsize=7)
     panels[-1].set_xlabel("x [mm]", fontsize=8)
