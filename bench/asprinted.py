@@ -27,7 +27,7 @@ RESULTS = Path(__file__).parent / "results"
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 DEGREES = tuple(range(0, 91, 15))
 CONTACTS = (0.0, 1e-6, 1e-5, 1e-4)
-LENGTHS_MM = (100, 200, 400, 800, 1600)
+LENGTHS_MM = (100, 200, 400, 800, 1600, 10400)
 RHO, LINE_MM, LAYER_MM = 0.2, 0.4185, 0.1
 EPS = {"air": 1.00059, "x60": 4.68}
 COLOURS = {"etpu": "#303436", "x60": "#f2c14e"}
@@ -119,7 +119,7 @@ def draw_walls():
     scenes = {"as drawn": (one, 1.5)}
     for walls in RULES:
         scenes[walls] = (compared.cell(design, compared.estimated(design, walls).layers["mid-plane"])[0], 0.0)
-    figure, panels = plt.subplots(len(scenes), 1, figsize=(5.6, 9.2), layout="constrained")
+    figure, panels = plt.subplots(len(scenes), 1, figsize=(3.6, 9.2), layout="constrained")
     for axes, (name, (scene, start)) in zip(panels, scenes.items(), strict=True):
         for body in scene.bodies:
             for prism in body.prisms:
@@ -129,7 +129,7 @@ def draw_walls():
         at = 0.159652 if name == "as drawn" else per_m(scene)
         gap = 0.1 if name == "as drawn" else compared.gap_mm(scene)
         axes.set(xlim=(0, 2), ylim=(0, 1.2), aspect="equal")
-        axes.set_title(f"{name}: electrode gap {gap:g} mm, {at * 1e3:.1f} pF/m per period", fontsize=9, loc="left")
+        axes.set_title(f"{name}: gap {gap:g} mm, {at * 1e3:.1f} pF/m", fontsize=8, loc="left")
         axes.set_ylabel("z [mm]", fontsize=8)
         axes.tick_params(labelsize=7)
     panels[-1].set_xlabel("x [mm]", fontsize=8)

@@ -23,6 +23,7 @@ from sensorgen.slicing import alone, sliced
 HERE = Path(__file__).parent
 RESULTS = HERE / "results"
 SIZES = (10_000, 100_000, 300_000, 1_000_000, 2_000_000)
+ARCS = (100_000, 1_000_000)
 RUNS = 3
 TARGET_S, TARGET_MB, TARGET_SHARE = 10.0, 500.0, 0.15
 DESIGNS = ("23/trix-d0.1.yaml", "23/sqxy-d0.2.yaml")
@@ -57,6 +58,16 @@ def write(path, lines):
                     f"G1 X{-50 + k % 100:.3f} Y{-40 + 0.04 * k:.3f} E.0{1000 + k}\n" if k % 12 else ";WIDTH:0.44\n"
                 )
             count += 2009
+        file.write(TAIL)
+
+
+def write_arcs(path, arcs):
+    """A print of wide arcs, half circles of 80 mm to and fro."""
+    with path.open("w") as file:
+        file.write(f"{HEAD}T3\nG1 X80 Y0 Z0.1 F3000\n")
+        file.writelines(
+            f"G{3 - k % 2} X{-80 if k % 2 == 0 else 80} Y0 I{-80 if k % 2 == 0 else 80} E4\n" for k in range(arcs)
+        )
         file.write(TAIL)
 
 
@@ -96,7 +107,7 @@ def share(name, slicer):
     }  # fmt: skip
 
 
-def table(growth, shares):
+def table(growth, arcs, shares):
     yield "# G-code\n"
     yield f"Processor times on {platform.machine()}, Python {platform.python_version()}; medians of {RUNS}.\n"
     yield "| lines | check [s] | us per line | peak memory [MB] |"
@@ -104,6 +115,9 @@ def table(growth, shares):
     for row in growth:
         per_line = row["seconds"] / row["lines"] * 1e6
         yield f"| {row['lines']} | {row['seconds']:.2f} | {per_line:.2f} | {row['mb']:.0f} |"
+    for row in arcs:
+        per_line = row["seconds"] / row["lines"] * 1e6
+        yield f"| {row['lines']}, all wide arcs | {row['seconds']:.2f} | {per_line:.2f} | {row['mb']:.0f} |"
     yield f"\nTarget: 1 000 000 lines in {TARGET_S:g} s and {TARGET_MB:g} MB.\n"
     yield "| design | slicer | lines | slicer [s] | files and rewriting [s] | check [s] | rule 7 [s] | our share |"
     yield "|---|---|---|---|---|---|---|---|"
@@ -122,11 +136,17 @@ def main():
             path = Path(folder) / "a.gcode"
             write(path, size)
             growth.append(measured(path))
+        arcs = []
+        for size in ARCS:
+            write_arcs(path, size)
+            arcs.append(measured(path))
     shares = [share(name, slicer) for name in DESIGNS for slicer in ("prusa", "cura")]
-    text = "\n".join(table(growth, shares))
+    text = "\n".join(table(growth, arcs, shares))
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / "gcode.md").write_text(f"{text}\n", "utf-8")
-    (RESULTS / "gcode.json").write_text(json.dumps({"growth": growth, "shares": shares}, indent=1) + "\n", "utf-8")
+    (RESULTS / "gcode.json").write_text(
+        json.dumps({"growth": growth, "arcs": arcs, "shares": shares}, indent=1) + "\n", "utf-8"
+    )
     print(text)
 
 

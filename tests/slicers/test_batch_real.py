@@ -14,6 +14,8 @@ from sensorgen.batch import make, tab
 from sensorgen.batch.record import RECORD, differences
 from sensorgen.errors import SlicerFailed
 from sensorgen.gcode import paths
+from sensorgen.log import batches
+from sensorgen.log.entries import Prediction, RawFile
 from sensorgen.printer import load_printer
 from sensorgen.slicer import run
 from sensorgen.slicer.tower import tower
@@ -167,6 +169,28 @@ def stand_in(folder, monkeypatch, script):
     path.write_text(f"#!/bin/sh\n{script}\n")
     path.chmod(0o755)
     monkeypatch.setenv("PATH", f"{path.parent}:/usr/bin:/bin")
+
+
+def test_a_specimens_prediction_holds_it_as_drawn_and_as_printed(small):
+    for piece in small.record["specimens"].values():
+        drawn, printed = piece["expected"], piece["expected"]["printed"]
+        assert set(printed) == {"prusa", "cura"}
+        for slicer, found in printed.items():
+            whole = small.record["slicers"][slicer]["printed"][piece["design_id"]]
+            assert found["capacitance_f"] == whole["capacitance_f"]
+            assert found["electrode_gap_mm"]["printed"]
+            assert set(found["electrode_resistance_ohm"]["printed"]) == {"top", "bottom"}
+            assert drawn["capacitance_f"]["middle"] == pytest.approx(
+                whole["capacitance_f"]["drawn"]["middle"], rel=2e-3
+            )
+
+
+def test_the_log_keeps_both_predictions(small):
+    path = small.folder / RECORD
+    file = RawFile(uid="0" * 64, name=RECORD, size=path.stat().st_size)
+    kept = [json.loads(row.data) for row in batches.rows(path, file) if isinstance(row, Prediction)]
+    assert len(kept) == 2  # copies share one
+    assert all(set(data["printed"]) == {"prusa", "cura"} for data in kept)
 
 
 @pytest.mark.parametrize("slicer", ["prusa", "cura"])

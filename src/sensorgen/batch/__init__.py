@@ -13,7 +13,7 @@ from sensorgen.batch.pieces import Piece, pieces, shuffled, tools
 from sensorgen.batch.plan import Plan, load
 from sensorgen.build import json_bytes, versions
 from sensorgen.design import Design
-from sensorgen.errors import BadInput, Unprintable
+from sensorgen.errors import BadInput, OutOfRange, Unprintable
 from sensorgen.findings import Finding
 from sensorgen.predict import prediction
 from sensorgen.review import Review, Step, review
@@ -95,6 +95,8 @@ def arranged(path: Path) -> Arranged:
     ------
     BadInput
         The plan is wrong, or needs more than one plate.
+    OutOfRange
+        One of its specimens fits on no plate.
     """
     plan = load(path)
     found = shuffled(pieces(plan, path.parent), plan.seed)
@@ -102,7 +104,10 @@ def arranged(path: Path) -> Arranged:
     count = len(tools(piece.design for piece in found))
     here = room(first.machine, first.layers, count, plan.layout.spacing_mm, plan.layout.brim_mm)
     layout = packed if plan.layout.kind == "packed" else column(plan.layout.per_column)
-    plates = layout([_size(plan, piece) for piece in found], here)
+    try:
+        plates = layout([_size(plan, piece) for piece in found], here)
+    except OutOfRange as error:
+        raise error.within(str(path)) from None
     if len(plates) > 1:
         raise BadInput(
             f"{path}: {len(found)} specimens need {len(plates)} plates, {len(plates[0])} of them on the first "
@@ -215,7 +220,7 @@ def _record(
         "tools": loaded,
         "checklist": record.checklist(plan, loaded),
         "bake": [step.model_dump() for step in plan.bake],
-        "specimens": record.specimens(found.pieces, found.plate, predicted),
+        "specimens": record.specimens(found.pieces, found.plate, predicted, record.of_prints(sliced)),
         "designs": record.designs(found.designs),
         "slicers": dict(sliced),
         "versions": versions(),
