@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
-from sensorgen import expectations, planner
+from sensorgen import expectations
 from sensorgen.chart import cells
 from sensorgen.design import make
 from sensorgen.errors import SensorgenError

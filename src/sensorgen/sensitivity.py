@@ -74,7 +74,7 @@ def sensitivity(
     area gives way by its bulk modulus alone; over a width of 10 mm it is :func:`sensorgen.models.compression.bonded`.
     """
     given = sensor_of(design, "unconfined", accuracy=accuracy).sensor
-    how = solved(design, **HELD[law]).compression if isinstance(law, str) else law
+    how = solved(design, None, **HELD[law]).compression if isinstance(law, str) else law
     sensor = replace(given, compression=how)
     if resistivity_ohm_m is not None:
         sensor = replace(sensor, resistivity_ohm_m=(resistivity_ohm_m,) * 2)

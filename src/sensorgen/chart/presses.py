@@ -6,15 +6,15 @@ The error is the largest one over the loads, of how far the top comes down, or o
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen import design as designs
-from sensorgen import planner
 from sensorgen.chart.measured import Point, timed
+from sensorgen.errors import MissingValue
 from sensorgen.models import compression, fem2d, press2d, springs, thesis_cells, thesis_swept
+from sensorgen.models._press.mesh import netgen
 from sensorgen.models.press2d import Elastic, Fineness
 from sensorgen.scene import Fill, Scene
 from sensorgen.shapes import tri
@@ -89,7 +89,6 @@ def points(name: str, budget_s: float) -> list[Point]:
     budget_s : float
         A finer mesh is not tried where that would take longer, ten times the last one taken as a guess [s].
     """
-    planner.load_solver()
     film, what = STANDARD[name]
     known = CELLS[film]
     found = _down(known, budget_s) if what == _DOWN else _rise(known, budget_s)
@@ -120,8 +119,6 @@ def _rise(known: Known, budget_s: float) -> Found:
         yield f"compression: {name}", "", known.rest_pf_per_m * value, seconds
     by_hand = {"thesis-3.35-swept": _swept_formula, "thesis-3.1.2": _swept_field}
     for name, work in by_hand.items():
-        if work is _swept_field and not _has_solver():
-            continue
         value, seconds = timed(partial(work, known))
         yield name, "displacement given, ", 1e12 * (value[1:] - value[0]), seconds
     for said, pressed, seconds in _pressed(known, budget_s, _EPS):
@@ -143,9 +140,13 @@ def _scene(known: Known) -> Scene:
     return designs.make({"shape": "tri", "parameters": {"dielectric_mm": known.film_mm}}).in_use
 
 
-def _has_solver() -> bool:
-    """Whether finite elements in the plane, and their mesher, are installed."""
-    return find_spec(planner.SOLVER) is not None
+def _has_mesher() -> bool:
+    """Whether the mesher of cells that are pressed is installed; it is loaded then."""
+    try:
+        netgen()
+    except MissingValue:
+        return False
+    return True
 
 
 def _pressed(
@@ -154,7 +155,7 @@ def _pressed(
     """Finite elements from coarse to fine, where the whole load was reached."""
     cell = press2d.cell(_scene(known), known.params().period_mm)
     stress = [0.0, *known.stress_pa()]
-    for mesh in _MESHES if _has_solver() else ():
+    for mesh in _MESHES if _has_mesher() else ():
         found, seconds = timed(lambda mesh=mesh: press2d.press(cell, _SOLIDS, stress, permittivity, fineness=mesh))  # type: ignore[misc]
         if found.converged_pa == stress[-1]:
             yield f"triangles of {1e3 * mesh.apex_mm:g} µm at the apex, ", found, seconds
