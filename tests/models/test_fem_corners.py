@@ -52,6 +52,15 @@ def test_pieces_that_meet_at_a_point_have_an_exponent_each():
         assert sorted(parted.terminals.values()) == sorted(mesh.terminals.values())
 
 
+@pytest.mark.parametrize("mirror", [0, -1])
+def test_a_corner_from_electrode_to_mirror(mirror):
+    """pi / (2 w) in a mesh too, whichever side the mirror is at."""
+    mesh, eps = around([(1.1, 2.0)] * 2)
+    edges = list(mesh.terminals)
+    half = Triangles(mesh.points, mesh.triangles, mesh.regions, {e: "top" for e in edges if e != edges[mirror]})
+    assert exponents(half, eps)[0] == close(np.pi / 4.4, 1e-8)
+
+
 def test_flips_end_at_delaunays_triangles():
     """From those of the same points drawn out eight times; SciPy has both."""
     points = np.random.default_rng(2).random((60, 2))

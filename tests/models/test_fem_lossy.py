@@ -8,7 +8,8 @@ from sensorgen.errors import OutOfRange
 from sensorgen.interval import Disc
 from sensorgen.models import fem2d, fem3d
 from sensorgen.models._fem_lossy import Fields, disc, turned
-from sensorgen.scene import Body, box
+from sensorgen.scene import Body, Fill, box
+from sensorgen.shapes import tri
 from sensorgen.units import EPS0_F_PER_M
 
 BOTH = pytest.mark.parametrize("model", [fem2d, fem3d])
@@ -169,3 +170,11 @@ def test_a_cut_cell_holds_the_truth():
     found = fem2d.lossy(scene, LOSSY, 1e-4)
     assert found.holds(exact * EPS0_F_PER_M * MM)
     assert found.width() < 1e-4
+
+
+def test_a_cut_cell_scales_with_its_permittivities():
+    """A hundred times the permittivities: a hundred times the centre, and the radius, what the cut adds included."""
+    scene = tri.scene(tri.Params(length_mm=5.3, width_mm=1.0), Fill())
+    one, hundred = (fem2d.lossy(scene, {m: k * e for m, e in LOSSY.items()}, 1e-2) for k in (1, 100))
+    assert hundred.centre == close(100 * one.centre, 1e-9)
+    assert hundred.radius == close(100 * one.radius, 1e-6)

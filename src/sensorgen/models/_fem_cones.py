@@ -154,7 +154,8 @@ def _pairs(rims: Numbers, held: Numbers) -> Numbers:
 
 def _assembled(ids: Whole, signs: Real, matrices: Numbers) -> Numbers:
     """Sum of the triangles' energies; unknown 0 is none."""
-    return added(int(ids.max()) + 1, ids, signs[..., :, None] * matrices * signs[..., None, :])[1:, 1:]
+    signed = signs[..., :, None] * matrices * signs[..., None, :]
+    return added(int(ids.max()) + 1, [(ids, signed)])[1:, 1:]
 
 
 def _doubled(ring: Numbers, m: int) -> tuple[Numbers, Numbers]:

@@ -49,7 +49,8 @@ def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
     loops, mirrors = _groups(rim), _groups(walls)
     held: dict[int, int] = {}
     lifts: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    ends = _Ends(around, mesh.terminals, cones)
+    # a cut ends with an electrode to its left, lest it part a mirror's value
+    ends = {a for a, b in rim if a not in cones and _named((a, b)) in mesh.terminals}
     count = HELD
     for piece in _pieces(around):
         ground = min((mirrors[k] for k in piece if k in mirrors), default=-1)
@@ -59,7 +60,7 @@ def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
         zero = {k for k in piece if mirrors.get(k) == ground} or {min((piece & loops.keys()) - set(cones))}
         held |= dict.fromkeys(zero, 0)
         start = loops[min(zero)]
-        for path in _cuts(around, {k: loops[k] for k in piece if k in loops}, start, ends):
+        for path in _cuts(around, {k: loops[k] for k in piece if k in loops}, start, ends, cones):
             for number, corner in _beside(around, path):
                 lifts[number].append((corner, count))
             count += 1
@@ -99,41 +100,26 @@ def _pieces(around: dict[int, Fan]) -> Iterator[set[int]]:
         yield {k for k, n in name.items() if n == least}
 
 
-def _cuts(around: dict[int, Fan], loops: dict[int, int], start: int, ends: "_Ends") -> Iterator[list[int]]:
-    """For each loop of boundary but the first, points from it to another one, all inside but for the two ends."""
-    reached, before = {start}, {k: k for k in loops if loops[k] == start and ends.to(k)}
+def _cuts(
+    around: dict[int, Fan], loops: dict[int, int], start: int, ends: set[int], cones: Collection[int]
+) -> Iterator[list[int]]:
+    """For each loop of boundary but the first, points from it to another one, all inside but for both ends."""
+    reached, before = {start}, {k: k for k in loops if loops[k] == start and k in ends}
     todo = deque(before)
     while todo and len(reached) < len(set(loops.values())):
         here = todo.popleft()
         for spoke in _inner(around[here]):
-            if spoke in before or spoke in ends.cones:
+            if spoke in before or spoke in cones:
                 continue
             if spoke not in loops:
                 before[spoke] = here
                 todo.append(spoke)
-            elif loops[spoke] not in reached and ends.start(spoke):
+            elif loops[spoke] not in reached:
                 yield _path(before | {spoke: here}, spoke)
                 reached.add(loops[spoke])
-                new = [k for k in loops if loops[k] == loops[spoke] and ends.to(k)]
+                new = [k for k in loops if loops[k] == loops[spoke] and k in ends]
                 before |= {k: k for k in new}
                 todo += new
-
-
-@dataclass(frozen=True)
-class _Ends:
-    """Where a cut may begin and end: with an electrode to its left, and not at the corner of a cone."""
-
-    around: dict[int, Fan]
-    terminals: Collection[Edge]
-    cones: Collection[int]
-
-    def start(self, k: int) -> bool:
-        """Whether a cut may begin at a point."""
-        return k not in self.cones and _named((k, self.around[k].spokes[-1])) in self.terminals
-
-    def to(self, k: int) -> bool:
-        """Whether a cut may end at a point."""
-        return k not in self.cones and _named((k, self.around[k].spokes[0])) in self.terminals
 
 
 def _inner(fan: Fan) -> list[int]:

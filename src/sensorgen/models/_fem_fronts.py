@@ -4,7 +4,7 @@ A direct solve from the inside out, in dense algebra only. Matrices are positive
 real part that is after a turn: no pivots are looked for between blocks.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ Whole = NDArray[np.int64]
 Numbers = NDArray[Any]  # real or complex
 
 HELD = 2  # unknowns 0 and 1 are none: their values are 0 and 1
-_LEAF = 8  # blocks that are joined at once
+_LEAF = 12  # blocks that are joined at once
 
 
 @dataclass(frozen=True)
@@ -53,11 +53,14 @@ def eliminated(matrix: Numbers, kept: int) -> tuple[Numbers, Numbers]:
     return matrix[:kept, :kept] + mixed.T @ others, others
 
 
-def added(size: int, ids: Whole, matrices: Numbers) -> Numbers:
-    """Sum (size, size) of matrices (..., k, k) whose rows and columns are those of ``ids`` (..., k)."""
-    at = (ids[..., :, None] * size + ids[..., None, :]).ravel()
-    found = np.zeros(size * size, matrices.dtype)
-    np.add.at(found, at, matrices.ravel())
+def added(size: int, parts: Iterable[tuple[Whole, Numbers]]) -> Numbers:
+    """Sum (size, size) of matrices (..., k, k), each with the numbers (..., k) of its rows and columns."""
+    places, values = zip(
+        *(((at[..., :, None] * size + at[..., None, :]).ravel(), m.ravel()) for at, m in parts), strict=True
+    )
+    entries = np.concatenate(values)
+    found = np.zeros(size * size, entries.dtype)
+    np.add.at(found, np.concatenate(places), entries)
     return found.reshape(size, size)
 
 
@@ -98,6 +101,6 @@ def _tree(
 def _sum(blocks: list[_Joined]) -> _Joined:
     ids, at = np.unique(np.concatenate([b.ids for b in blocks]), return_inverse=True)
     places = np.split(at, np.cumsum([len(b.ids) for b in blocks])[:-1])
-    matrix = np.add.reduce([added(len(ids), place, b.matrix) for place, b in zip(places, blocks, strict=True)])
+    matrix = added(len(ids), zip(places, (b.matrix for b in blocks), strict=True))
     seen = np.bincount(at, np.concatenate([b.seen for b in blocks])).astype(np.int64)
     return _Joined(ids, matrix, seen)

@@ -34,7 +34,7 @@ WIDTH = 1e-4  # of the interval, where the caller does not say
 
 _ORDERS = (3, 20)  # of polynomials: the lowest and the highest
 _CORNER_SHARE = 0.01  # of the wanted width: what may stay unresolved at a corner
-_SLENDER = 2e-15  # of a triangle's slenderness: what its energy may lose in doubles
+_SLENDER = 1e-14  # of a triangle's slenderness: what its energy may lose in doubles
 _MOST_DOUBLINGS = 12  # of rings at a corner: 4096 of them
 _GAIN = 1.6  # by which an order lowers the width, in e-folds, as measured
 _STEP = 2  # of orders, where the field is complex
