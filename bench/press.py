@@ -84,7 +84,8 @@ def moved(name, materials, fineness, stresses=STRESSES):
     seconds = time.process_time() - start
     u = [np.interp(p, found.stress_pa, found.displacement_m, right=np.nan) * 1e6 for p in (1e4, 1e5)]
     said = "; ".join(found.faults)
-    return f"| {name} | {u[0]:.3f} | {u[1]:.3f} | {len(run.mesh.triangles)} | {seconds:.1f} | {said} |"
+    shown = [f"{v:.3f}" if np.isfinite(v) else "not reached" for v in u]
+    return f"| {name} | {shown[0]} | {shown[1]} | {len(run.mesh.triangles)} | {seconds:.1f} | {said} |"
 
 
 def mesh_table():
@@ -110,7 +111,7 @@ def method_tables():
     )
     for ax, name, values, stresses, used in studies:
         rows = []
-        yield f"\n## {name.capitalize()} (tri, film 0.1 mm, 100 kPa; used: {used})\n"
+        yield f"\n## {name[0].upper() + name[1:]} (tri, film 0.1 mm, 100 kPa, apex 3 um; used: {used})\n"
         yield f"| {name} | displacement [um] | rise of C [pF/m] | said |"
         yield "|---|---|---|---|"
         for value in values:
@@ -118,7 +119,7 @@ def method_tables():
                 press2d.penalty_pa = lambda _, value=value: value * 1e6
             else:
                 press2d._STEP = value * 1e3 / 6e6
-            found = once(tri()[1], solids(), stresses, Fineness(), EPS)
+            found = once(tri()[1], solids(), stresses, Fineness(3e-3), EPS)
             press2d.penalty_pa, press2d._STEP = penalty, step
             rows.append((value, found.displacement_m[-1] * 1e6, rise(found)[-1]))
             yield f"| {value:g} | {rows[-1][1]:.3f} | {rows[-1][2]:.2f} | {'; '.join(found.faults)} |"
@@ -128,6 +129,9 @@ def method_tables():
             ax.semilogx(x, 100 * (y / known[key][-1] - 1), "o-", ms=3, color=colour, label=label)
         ax.axvline(used, color=GREY, lw=0.8, ls=":")
         ax.axhspan(-1, 1, color="0.93", zorder=0)
+        marked = [v for v in values if ax is axes[1] or v != used]
+        ax.set_xticks(marked, [f"{v:g}" for v in marked])
+        ax.minorticks_off()
         ax.set(xlabel=name)
     axes[0].set(ylabel="off the reference at 100 kPa [%]")
     axes[0].legend(frameon=False, fontsize=8)
@@ -174,7 +178,7 @@ def moduli_table():
 
 
 def angles_table():
-    yield "\n## Angles, periods and films (E 6 MPa; film 0.1, period 2, hanging height 0.5, lower one 0.24 mm where not said)\n"
+    yield "\n## Angles, periods and films (E 6 MPa; else film 0.1, period 2, hanging height 0.5, lower one 0.24 mm)\n"
     yield RANGE_HEAD
     cases = (
         ("hanging 0.2, lower 0.1", {"hang_height_mm": 0.2, "lower_height_mm": 0.1}),
