@@ -171,6 +171,27 @@ def test_a_thinner_film_by_displacement_is_one_by_drawing():
     assert moved.middle() == pytest.approx(drawn.middle(), rel=4e-3)
 
 
+def test_bounds_from_the_factors_of_an_earlier_load_hold_those_of_new_ones(monkeypatch):
+    """Unfinished solutions are certified too: outside those that are solved anew, and how far is known."""
+    bricks = press3d.cell(rect(0.1)).cut(1, 0.3)
+    mesh = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
+    u = np.zeros((len(mesh.points_m), 3))
+    u[:, 2] = -20e-6 * np.clip((mesh.points_m[:, 2] - 0.3e-3) / 0.1e-3, 0, 1)
+    for small in (1e-2, 1e-7):
+        monkeypatch.setattr(brick_field, "_SMALL", small)
+        cell = brick_field.Field(mesh, EPS, Orders())
+        cell.capacitance(0 * u.ravel())
+        made = {name: kept.factors for name, kept in cell._earlier.items()}
+        for share in (0.5, 1.0, -1.0):
+            found = cell.capacitance(share * u.ravel())
+            monkeypatch.setattr(brick_field, "_SMALL", 1e-12)
+            new = brick_field.capacitance(mesh, share * u.ravel(), EPS, Orders())
+            monkeypatch.setattr(brick_field, "_SMALL", small)
+            assert new.lower * (1 - 2 * small) < found.lower <= new.lower * (1 + 1e-12)
+            assert new.upper * (1 - 1e-12) <= found.upper < new.upper * (1 + 2 * small)
+        assert all(kept.factors is made[name] for name, kept in cell._earlier.items())
+
+
 def test_where_a_plates_inner_places_go_does_not_matter():
     """The same plate mapped to itself in any way: its capacitance stays between the bounds, which close in."""
     planes = (np.linspace(0, 1, 4), np.linspace(0, 1, 4), (0, 0.1, 0.3, 0.5, 0.7, 0.8))
