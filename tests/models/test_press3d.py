@@ -303,6 +303,17 @@ def test_points_meet_the_nearest_face_at_the_same_place():
     assert met.slopes[1] == pytest.approx(slopes, rel=1e-9)
     level = np.einsum("kn,knd->kd", met.weights, moved[met.nodes])
     assert level[1] == pytest.approx([0, 0, met.gap_m[1]], abs=1e-15)
+    moved[above, 2] -= 0.15e-3  # within a side's length: slopes count
+    pairs = brick_touch.BrickFaces(mesh, sticks=True).project(moved, 1e6)
+    assert pairs.slip @ moved.ravel() == pytest.approx(0, abs=1e-15)
+    assert np.bincount(pairs.point)[np.unique(pairs.point)].tolist() == [2] * len(np.unique(pairs.point))
+    slid = moved + np.where(above, 0.0, 1e-7)[:, None] * [1, -1, 0]
+    again = brick_touch.BrickFaces(mesh, sticks=True).project(slid, 1e6)
+    both = np.isin(again.point, pairs.point), np.isin(pairs.point, again.point)
+    expected = (again.gap @ slid.ravel())[both[0]]
+    assert (pairs.gap @ slid.ravel())[both[1]] == pytest.approx(expected, rel=0, abs=2e-12)
+    assert np.abs(expected - (pairs.gap @ moved.ravel())[both[1]]).max() > 1e-9
+    assert np.abs(pairs.slip @ slid.ravel()) == pytest.approx(np.sqrt(2) * 1e-7, rel=1e-6)
 
 
 def test_gaps_are_runs_of_air_between_solids_along_each_axis():
