@@ -171,6 +171,27 @@ def test_a_thinner_film_by_displacement_is_one_by_drawing():
     assert moved.middle() == pytest.approx(drawn.middle(), rel=4e-3)
 
 
+def test_bounds_from_the_factors_of_an_earlier_load_hold_those_of_new_ones(monkeypatch):
+    """Unfinished solutions are certified too: outside those that are solved anew, and how far is known."""
+    bricks = press3d.cell(rect(0.1)).cut(1, 0.3)
+    mesh = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
+    u = np.zeros((len(mesh.points_m), 3))
+    u[:, 2] = -20e-6 * np.clip((mesh.points_m[:, 2] - 0.3e-3) / 0.1e-3, 0, 1)
+    for small in (1e-2, 1e-7):
+        monkeypatch.setattr(brick_field, "_SMALL", small)
+        cell = brick_field.Field(mesh, EPS, Orders())
+        cell.capacitance(0 * u.ravel())
+        made = {name: kept.factors for name, kept in cell._earlier.items()}
+        for share in (0.5, 1.0, -1.0):
+            found = cell.capacitance(share * u.ravel())
+            monkeypatch.setattr(brick_field, "_SMALL", 1e-12)
+            new = brick_field.capacitance(mesh, share * u.ravel(), EPS, Orders())
+            monkeypatch.setattr(brick_field, "_SMALL", small)
+            assert new.lower * (1 - 2 * small) < found.lower <= new.lower * (1 + 1e-12)
+            assert new.upper * (1 - 1e-12) <= found.upper < new.upper * (1 + 2 * small)
+        assert all(kept.factors is made[name] for name, kept in cell._earlier.items())
+
+
 def test_where_a_plates_inner_places_go_does_not_matter():
     """The same plate mapped to itself in any way: its capacitance stays between the bounds, which close in."""
     planes = (np.linspace(0, 1, 4), np.linspace(0, 1, 4), (0, 0.1, 0.3, 0.5, 0.7, 0.8))
@@ -282,6 +303,17 @@ def test_points_meet_the_nearest_face_at_the_same_place():
     assert met.slopes[1] == pytest.approx(slopes, rel=1e-9)
     level = np.einsum("kn,knd->kd", met.weights, moved[met.nodes])
     assert level[1] == pytest.approx([0, 0, met.gap_m[1]], abs=1e-15)
+    moved[above, 2] -= 0.15e-3  # within a side's length: slopes count
+    pairs = brick_touch.BrickFaces(mesh, sticks=True).project(moved, 1e6)
+    assert pairs.slip @ moved.ravel() == pytest.approx(0, abs=1e-15)
+    assert np.bincount(pairs.point)[np.unique(pairs.point)].tolist() == [2] * len(np.unique(pairs.point))
+    slid = moved + np.where(above, 0.0, 1e-7)[:, None] * [1, -1, 0]
+    again = brick_touch.BrickFaces(mesh, sticks=True).project(slid, 1e6)
+    both = np.isin(again.point, pairs.point), np.isin(pairs.point, again.point)
+    expected = (again.gap @ slid.ravel())[both[0]]
+    assert (pairs.gap @ slid.ravel())[both[1]] == pytest.approx(expected, rel=0, abs=2e-12)
+    assert np.abs(expected - (pairs.gap @ moved.ravel())[both[1]]).max() > 1e-9
+    assert np.abs(pairs.slip @ slid.ravel()) == pytest.approx(np.sqrt(2) * 1e-7, rel=1e-6)
 
 
 def test_gaps_are_runs_of_air_between_solids_along_each_axis():

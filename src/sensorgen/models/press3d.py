@@ -30,7 +30,8 @@ from sensorgen.models._press.support import Held
 from sensorgen.scene import Scene
 
 if TYPE_CHECKING:
-    from sensorgen.models._press.brick_element import BrickElements, BrickMesh
+    from sensorgen.models._press.brick_element import BrickElements
+    from sensorgen.models._press.brick_field import Field
     from sensorgen.models._press.brick_touch import BrickFaces
     from sensorgen.models._press.load import Problem, State
 
@@ -197,23 +198,23 @@ def _judged(found: Pressed, problem: "Problem", states: "list[State]", held: Hel
 def _with_fields(found: Pressed, run: _Run, permittivity: Mapping[str, float], orders: Orders) -> Pressed:
     """The same with the capacitance of the deformed boxes."""
     from sensorgen.models._press import brick_element
+    from sensorgen.models._press.brick_field import Field
 
     bricks = run.elements.mesh.bricks
     whole = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
-    return with_capacitances(found, [_field(whole, run, s, permittivity, orders) for s in run.states])
+    cell = Field(whole, permittivity, orders)
+    return with_capacitances(found, [_bounds(cell, run, s) for s in run.states])
 
 
-def _field(
-    whole: "BrickMesh", run: _Run, state: "State", permittivity: Mapping[str, float], orders: Orders
-) -> Interval | None:
+def _bounds(cell: "Field", run: _Run, state: "State") -> Interval | None:
     """Bounds of the capacitance; gaps that are shut are held open by a little."""
     from sensorgen.models._press import brick_air, brick_field
 
     moved = run.elements.all_nodes(state.u_m, state.inner)
     for share in _OPEN:
-        u = brick_air.extended(whole, run.elements.mesh, *run.faces.opened(moved, share))
+        u = brick_air.extended(cell.mesh, run.elements.mesh, *run.faces.opened(moved, share))
         try:
-            return brick_field.capacitance(whole, u, permittivity, orders)
+            return cell.capacitance(u)
         except brick_field.Folded:
             continue
     return None

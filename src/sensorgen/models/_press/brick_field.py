@@ -6,29 +6,34 @@ has too much energy. Thomson: any flux without sources has too little; its norma
 potentials on the faces (hybrid H(div)), and stays so when it is mapped.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import field as dataclass_field
+from functools import cache, cached_property
 from itertools import combinations_with_replacement, product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix, csr_matrix
 
 from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.interval import Interval
 from sensorgen.models._fem_boxes import Element, flux, potential
-from sensorgen.models._fem_dissection import Elements, least
 from sensorgen.models._press.brick_element import BrickMesh, cofactor, determinant, gradients
+from sensorgen.models._press.brick_factors import Factors, Order, factored, iterations, order_of
 from sensorgen.models._press.bricks import Bricks
 from sensorgen.units import EPS0_F_PER_M
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+Local = Callable[[Real, Real, int], tuple[Real, Real]]
 
 _ROUNDING = 1e-9
 _MORE = 3  # points of quadrature beyond the order: the tensor is no polynomial
 _CHUNK = 200  # bricks at once
+_SMALL = 1e-7  # of the energy, by which an unfinished solution may be off [-]
+_LIKE = 30.0  # times which tensors may have grown since factors were made [-]
 _AXES = range(3)
 
 
@@ -65,26 +70,122 @@ def capacitance(mesh: BrickMesh, u_m: Real, permittivity: Mapping[str, float], o
     BadInput
         An electrode does not cover the cell, nothing lies between them, or a displacement folds the air.
     """
-    bricks = mesh.bricks
-    ends = [np.isin(bricks.fill, _of(bricks, end)) for end in ("bottom", "top")]
-    field = _between(mesh, ends)
-    boxes = mesh.boxes[field]
-    eps = np.array([permittivity.get(r.material, np.nan) for r in bricks.regions])[mesh.region[field]]
-    moved = u_m.reshape(-1, 3)[mesh.nodes[field]] + mesh.points_m[mesh.nodes[field]]
-    area = float(np.prod([np.ptp(moved[..., axis]) for axis in (0, 1)]))
-    found = []
-    for kind, local, order in (
-        (_plain(flux(orders.flux)), _fluxes, orders.flux),
-        (potential(orders.potential), _potentials, orders.potential),
-    ):
-        energies = np.concatenate(
-            [local(moved[k : k + _CHUNK], eps[k : k + _CHUNK], order) for k in range(0, len(boxes), _CHUNK)]
-        )
-        found.append(_least(bricks, boxes, ends, kind, energies) / area)
-    lower, upper = found
-    if not 0 < lower <= upper * (1 + _ROUNDING):
-        raise BadInput(f"bounds in the wrong order, {lower} above {upper}: the solver failed on this cell")
-    return Interval(lower * (1 - _ROUNDING), upper * (1 + _ROUNDING)).times(EPS0_F_PER_M)
+    return Field(mesh, permittivity, orders).capacitance(u_m)
+
+
+@dataclass
+class _Earlier:
+    """What solving a system leaves for the next one that is like it: unknowns, factors, and its tensors."""
+
+    unknowns: Real
+    factors: Factors
+    tensors: Real
+
+
+@dataclass
+class Field:
+    """The field in a cell, load after load: factors of one serve for the next.
+
+    An approximate potential is still one, so that its energy still lies above; that of an approximate flux lies below
+    once what its residual could take away is subtracted. With factors K0 of an earlier K, whose tensors T0 are such
+    that T <= c T0 everywhere, this is c r' K0^-1 r at most; c <= the largest trace of T0^-1 T.
+    """
+
+    mesh: BrickMesh
+    permittivity: Mapping[str, float]
+    orders: Orders
+    _earlier: dict[str, _Earlier] = dataclass_field(default_factory=dict, repr=False)
+
+    @cached_property
+    def _ends(self) -> list[Mask]:
+        return [np.isin(self.mesh.bricks.fill, _of(self.mesh.bricks, end)) for end in ("bottom", "top")]
+
+    @cached_property
+    def _carrying(self) -> Mask:
+        return _between(self.mesh, self._ends)
+
+    @cached_property
+    def _systems(self) -> dict[str, "System"]:
+        kinds = {"flux": _plain(flux(self.orders.flux)), "potential": potential(self.orders.potential)}
+        boxes = self.mesh.boxes[self._carrying]
+        return {name: system_of(self.mesh.bricks, boxes, self._ends, kind) for name, kind in kinds.items()}
+
+    def capacitance(self, u_m: Real) -> Interval:
+        """Bounds at given displacements of all nodes (3n,), as :func:`capacitance` gives them."""
+        regions, nodes = self.mesh.bricks.regions, self.mesh.nodes[self._carrying]
+        eps = np.array([self.permittivity.get(r.material, np.nan) for r in regions])[self.mesh.region[self._carrying]]
+        moved = u_m.reshape(-1, 3)[nodes] + self.mesh.points_m[nodes]
+        area = float(np.prod([np.ptp(moved[..., axis]) for axis in (0, 1)]))
+        lower = self._bound("flux", moved, eps, _fluxes, self.orders.flux) / area
+        upper = self._bound("potential", moved, eps, _potentials, self.orders.potential) / area
+        if not 0 < lower <= upper * (1 + _ROUNDING):
+            raise BadInput(f"bounds in the wrong order, {lower} above {upper}: the solver failed on this cell")
+        return Interval(lower * (1 - _ROUNDING), upper * (1 + _ROUNDING)).times(EPS0_F_PER_M)
+
+    def _bound(self, name: str, moved: Real, eps: Real, local: "Local", order: int) -> float:
+        """Energy at 1 V: at least the least of potentials, at most the least of fluxes."""
+        parts = [local(moved[k : k + _CHUNK], eps[k : k + _CHUNK], order) for k in range(0, len(eps), _CHUNK)]
+        energies, tensors = (np.concatenate([part[k] for part in parts]) for k in range(2))
+        system, earlier = self._systems[name], self._earlier.get(name)
+        matrix, push, held = system.assembled(energies)
+        found = None
+        if earlier and (far := _apart(earlier.tensors, tensors)) < _LIKE:
+            found = _iterated(matrix, push, held, earlier, far)
+        if found is None:
+            factors = factored(matrix, system.order(matrix))
+            if factors is None:
+                raise BadInput("the field's equations are not positive: the solver failed on this cell")
+            earlier = self._earlier[name] = _Earlier(np.zeros_like(push), factors, tensors)
+            found = _iterated(matrix, push, held, earlier, 3.0)
+        if found is None or earlier is None:
+            raise BadInput("the field's equations could not be solved on this cell")
+        earlier.unknowns, energy, missing = found
+        return energy - (missing if name == "flux" else 0.0)
+
+
+def _apart(earlier: Real, now: Real) -> float:
+    """The largest trace of T0^-1 T."""
+    return float(np.trace(np.linalg.solve(earlier, now), axis1=-2, axis2=-1).max())
+
+
+def _iterated(
+    matrix: csr_matrix, push: Real, held: float, earlier: _Earlier, apart: float
+) -> tuple[Real, float, float] | None:
+    """Unknowns x that nearly make held + x' K x + 2 push' x least, this energy, and how much less it may be at most."""
+    residual = -push - matrix @ earlier.unknowns
+    for step, left, power in iterations(matrix, residual, earlier.factors):
+        x = earlier.unknowns + step
+        energy = held + float(push @ x - x @ left)
+        if apart * power < _SMALL * energy:
+            return x, energy, apart * power
+    return None
+
+
+@dataclass(frozen=True)
+class System:
+    """Unknowns that boxes share: which are free, as numbers (m, b), -1 for others; those at 1 V; and their places."""
+
+    number: Whole
+    one: Real
+    places: Whole
+
+    @cached_property
+    def _pattern(self) -> tuple[Whole, Whole]:
+        b = self.number.shape[1]
+        return np.repeat(self.number, b, axis=1).ravel(), np.tile(self.number, (1, b)).ravel()
+
+    def assembled(self, energies: Real) -> tuple[csr_matrix, Real, float]:
+        """Matrix of the free unknowns, what the top at 1 V pushes them with, and the energy if they were 0."""
+        rows, columns = self._pattern
+        kept, n = (rows >= 0) & (columns >= 0), len(self.places)
+        matrix = coo_matrix((energies.ravel()[kept], (rows[kept], columns[kept])), (n, n)).tocsr()
+        pushed, free = np.einsum("mij,mj->mi", energies, self.one), self.number >= 0
+        push: Real = np.bincount(self.number[free], pushed[free], n).astype(float)
+        return matrix, push, float((pushed * self.one).sum())
+
+    def order(self, matrix: csr_matrix) -> Order:
+        """Of elimination."""
+        return order_of(matrix, self.places)
 
 
 def _plain(kind: Element) -> Element:
@@ -116,14 +217,18 @@ def _between(mesh: BrickMesh, ends: list[Mask]) -> Mask:
     return np.asarray(inside[tuple(mesh.boxes.T)])
 
 
-def _least(bricks: Bricks, boxes: Whole, ends: list[Mask], kind: Element, energies: Real) -> float:
-    """Energy at 1 V of elements with given energies [m]."""
+def system_of(bricks: Bricks, boxes: Whole, ends: list[Mask], kind: Element) -> System:
+    """The unknowns of boxes between two electrodes."""
     count = np.array(bricks.fill.shape)
     keys = kind.keys(boxes, count)
-    held = np.full(keys.shape, np.nan)
-    for value, end in enumerate(ends):
-        held[np.isin(keys, kind.keys(np.argwhere(end), count))] = value
-    return float(least(Elements(boxes, keys, held, kind.one, lambda box: energies[box])).energy)
+    below, above = (np.isin(keys, kind.keys(np.argwhere(end), count)) for end in ends)
+    free = ~(below | above)
+    known, number = np.unique(keys[free], return_inverse=True)
+    numbers = np.full(keys.shape, -1)
+    numbers[free] = number
+    lattice = np.column_stack(np.unravel_index(known // 3, tuple(count * kind.pitch + 1)))
+    places = 2 * (lattice // kind.pitch) + (lattice % kind.pitch > 0)
+    return System(numbers, np.where(above, kind.one, 0.0), places)
 
 
 def _stretch(moved: Real, at: Real) -> tuple[Real, Real]:
@@ -135,12 +240,13 @@ def _stretch(moved: Real, at: Real) -> tuple[Real, Real]:
     return f, j
 
 
-def _potentials(moved: Real, eps: Real, order: int) -> Real:
-    """Energies of the shared unknowns of potentials (m, b, b)."""
+def _potentials(moved: Real, eps: Real, order: int) -> tuple[Real, Real]:
+    """Energies of the shared unknowns of potentials (m, b, b), and the tensors (m, points, 3, 3)."""
     at, weight, basis = _hats(order)
     f, j = _stretch(moved, at)
     cof = cofactor(f)
-    tensor = np.matmul(cof.transpose(0, 1, 3, 2), cof) * (weight * eps[:, None] / j)[..., None, None]
+    plain = np.matmul(cof.transpose(0, 1, 3, 2), cof) * (eps[:, None] / j)[..., None, None]
+    tensor = plain * weight[:, None, None]
     n = basis.shape[1]
     flat = basis.transpose(0, 2, 1).reshape(-1, n)
     energy = np.matmul(flat.T, np.matmul(tensor, basis.transpose(0, 2, 1)).reshape(len(eps), -1, n))
@@ -148,14 +254,15 @@ def _potentials(moved: Real, eps: Real, order: int) -> Real:
     outer, coupling, inner = (
         energy[:, a][:, :, b] for a, b in ((shared, shared), (~shared, shared), (~shared, ~shared))
     )
-    return np.asarray(outer - np.matmul(coupling.transpose(0, 2, 1), np.linalg.solve(inner, coupling)))
+    return outer - np.matmul(coupling.transpose(0, 2, 1), np.linalg.solve(inner, coupling)), plain
 
 
-def _fluxes(moved: Real, eps: Real, order: int) -> Real:
-    """Energies of the faces' potentials that the best flux without sources within has (m, b, b)."""
+def _fluxes(moved: Real, eps: Real, order: int) -> tuple[Real, Real]:
+    """Energies of the faces' potentials that the best flux without sources within has (m, b, b), and the tensors."""
     at, weight, parts, divergence, faces = _legendres(order)
     f, j = _stretch(moved, at)
-    tensor = np.matmul(f.transpose(0, 1, 3, 2), f) * (weight / (eps[:, None] * j))[..., None, None]
+    plain = np.matmul(f.transpose(0, 1, 3, 2), f) / (eps[:, None] * j)[..., None, None]
+    tensor = plain * weight[:, None, None]
     n = parts[0].shape[1]
     mass = np.empty((len(eps), 3 * n, 3 * n))
     for a, b in combinations_with_replacement(_AXES, 2):
@@ -167,7 +274,7 @@ def _fluxes(moved: Real, eps: Real, order: int) -> Real:
     k = len(faces)
     coupling = given[:, k:, :k]
     held = np.matmul(coupling.transpose(0, 2, 1), np.linalg.solve(given[:, k:, k:], coupling))
-    return np.asarray(given[:, :k, :k] - held)
+    return given[:, :k, :k] - held, plain
 
 
 def _shared(order: int) -> Mask:
