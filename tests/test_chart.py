@@ -24,6 +24,7 @@ from sensorgen import chart
 from sensorgen.chart import cells, exact, lines, presses
 from sensorgen.chart.cells import STANDARD
 from sensorgen.chart.measured import Point, with_front
+from sensorgen.errors import SensorgenError
 from sensorgen.interval import Interval
 from sensorgen.plots import chart as pictures
 
@@ -128,6 +129,17 @@ def test_rungs_end_where_nothing_is_gained(monkeypatch):
     assert len(list(cells._rungs(lambda wanted: Interval(0.9, 1.1), (), model, 1.0))) == 1
     assert len(list(cells._rungs(lambda wanted: Interval(1.0, 1.0), (), model, 1.0))) == 1
     assert [w for w, _, _ in cells._rungs(lambda: Interval(0.9, 1.1), (), object(), 1.0)] == [None]
+
+
+def test_rungs_go_on_where_the_first_one_fails(monkeypatch):
+    def work(wanted):
+        if wanted > 0.05 or wanted < 5e-3:
+            raise SensorgenError("the solver failed")
+        return Interval(1 - wanted / 4, 1 + wanted / 4)
+
+    monkeypatch.setattr(cells, "timed", lambda work: (work(), 1e-6))
+    model = type("Model", (), {"WIDTH": 1e-3})
+    assert [wanted for wanted, _, _ in cells._rungs(work, (), model, 1.0)] == pytest.approx([1e-2])
 
 
 @pytest.fixture(scope="module")

@@ -109,8 +109,11 @@ def _rungs(
         asked = wanted
         try:
             interval, seconds = timed(lambda asked=asked: work(*given, asked))  # type: ignore[misc]
-        except SensorgenError:
-            return  # doubles end here
+        except SensorgenError:  # doubles end here, or this order fails
+            if last < math.inf:
+                return
+            wanted /= 10
+            continue
         width = interval.width()
         if width >= last:
             return

@@ -40,7 +40,14 @@ def png(points: Sequence[Point]) -> bytes:
     ]  # fmt: skip
     keys.append(Line2D([], [], color="0.4", lw=1, ls="--", label="Pareto front"))
     panels[len(scenes)].legend(
-        handles=keys, loc="center", frameon=False, fontsize="small", title="filled: bounds; hollow: a formula alone"
+        handles=keys,
+        loc="center",
+        frameon=False,
+        fontsize="x-small",
+        ncols=2,
+        columnspacing=1.0,
+        handletextpad=0.2,
+        title="filled: bounds; hollow: none",
     )
     return written(figure)
 
