@@ -22,8 +22,9 @@ import made  # noqa: E402 - the truth is made as for the tests
 
 from sensorgen.card.fisher import bounds, slopes  # noqa: E402
 from sensorgen.invert import Estimator  # noqa: E402
-from sensorgen.plots import bench  # noqa: E402
-from sensorgen.process import drift, lowpass, presses, waveform  # noqa: E402
+from sensorgen.plots import bench, ways  # noqa: E402
+from sensorgen.process import drift, hysteresis, lowpass, presses, waveform  # noqa: E402
+from sensorgen.process.run import processed  # noqa: E402
 from sensorgen.recording import joined, read, rig  # noqa: E402
 from sensorgen.sensor import Sensor  # noqa: E402
 
@@ -215,8 +216,8 @@ LAWS = {
 def laws():
     """What drift leaves of force and position, law by law, over two bounds."""
     yield "\n## Laws of drift: root mean square errors of force and position over the Cramer-Rao bound\n"
-    yield "60 presses of 3 s. The first two columns of errors: over the bound of a sensor without drift. The last one: drift"
-    yield "taken out by the law chosen, then force, position and C fitted together, over the bound of these three.\n"
+    yield "60 presses of 3 s. The first two columns of errors: over the bound of a sensor without drift. The last one:"
+    yield "drift taken out, then force, position and C fitted together, over the bound of these three.\n"
     yield "| drift | pressed over before | law chosen | drift taken out | and C fitted beside |"
     yield "|---|---|---|---|---|"
     plan = made.presses(60, dwell_s=3.0, rest_s=3.0, seed=11)
@@ -315,10 +316,21 @@ def pictures(run, pairs):
     (PICTURES / "recordings-normalised.png").write_bytes(bench.normalised_differences(sets, made.TONES_HZ))
 
 
+def ways_picture():
+    """Slow presses on a film that answers within three seconds."""
+    plan = made.presses(5, seed=3, dwell_s=12, rest_s=6, least_n=2.0)
+    with tempfile.TemporaryDirectory() as folder:
+        run, _ = joined_run(Path(folder), plan, 7.25, 0.0, law=made.answering(0.01, 3.0), ramp_s=6.0)
+    found = hysteresis.of_presses(processed(run.recording, run, law="smooth"))
+    name = "synthetic film that answers within 3 s"
+    (PICTURES / "recordings-ways.png").write_bytes(ways.ways(found.ways, made.TONES_HZ, name))
+
+
 def main():
     lines = ["# Recordings\n", "Made by `bench/recordings.py`.\n"]
     for part in (import_table, offset_table, slow_table, filter_table, demodulation_table, truth, laws):
         lines += part()
+    ways_picture()
     text = "\n".join(lines) + "\n"
     (HERE / "results" / "recordings.md").write_text(text, "utf-8")
     print(text)

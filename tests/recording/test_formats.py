@@ -136,10 +136,32 @@ def test_a_run_that_stopped_half_way_keeps_what_is_whole(tmp_path):
     assert "10 samples at the end are not whole" in found.source.notes[0]
 
 
+@pytest.mark.parametrize(
+    ("name", "largest", "settings"),
+    [
+        ("sig_offset", 0.8, {}),  # volts, where the file says nothing of gains
+        ("sig_offset", 2.0 / 50, {"gain": 1, "scope_ranges": np.array([2, 3])}),
+        ("ref_offset", 0.8 * 5e-6, {"reference": 2, "scope_ranges": np.array([2, 3])}),  # amperes
+    ],
+)
+def test_ranges_are_those_of_the_inputs_behind_their_gains(tmp_path, name, largest, settings):
+    """The program writes the signal's volts over its gain, and the reference's times what its amplifier has."""
+    lived = made.run(made.presses(1), rate_hz=140)
+    at = np.arange(0, lived.time_s[-1], 0.01)
+    gains = {"gain_list": np.array([1, 50]), "reference_gain_list": np.array([1.0, -3.8e-4, -5e-6])}
+    for share, marked in ((0.98, False), (1.0, True)):
+        offsets = {"offset_time": at[None], "ref_offset": np.zeros((1, len(at))), "sig_offset": np.zeros((1, len(at)))}
+        offsets[name][0, 200:300] = -share * largest
+        tree = made.tree([lived.impedance_ohm], [lived.time_s], offsets=offsets)
+        own = made.settings(made.TONES_HZ, **settings) | {"calibration": gains if settings else {"none": 1.0}}
+        tree["settings"] = made.cell(own)
+        assert (save(tmp_path / "run.mat", tree), read(tmp_path / "run.mat").marks["clipped"].any())[1] == marked
+
+
 def test_an_input_beyond_its_range_marks_its_samples(tmp_path):
     at = np.linspace(0, 2, 60)
     offsets = {"offset_time": at[None], "ref_offset": np.zeros((1, 60), complex),
-               "sig_offset": np.where((at > 1) & (at < 1.5), 0.9 + 0j, 0.1)[None]}  # fmt: skip
+               "sig_offset": np.where((at > 1) & (at < 1.5), 0.9 + 0j, 0.1)[None] / 50}  # fmt: skip
     tree = made.tree([SHORT.impedance_ohm[BEFORE]], [SHORT.time_s[BEFORE]], offsets=offsets)
     found = read(save(tmp_path / "clipped.mat", tree))
     assert found.counts()["clipped"] == pytest.approx(0.5 * 140, abs=6)

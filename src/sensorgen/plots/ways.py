@@ -30,7 +30,7 @@ def ways(presses: Mapping[float, Hysteresis], tones_hz: Real, name: str) -> byte
     ends = sorted({0, count - 1})
     figure = Figure(figsize=(1.0 + 3.6 * len(ends), 5.6), dpi=100, layout="constrained")
     shown = name.replace("$", r"\$")
-    figure.suptitle(f"{shown}: up solid, down dashed", fontsize="medium")
+    figure.suptitle(f"{shown}: up solid, down dashed, a colour for each press", fontsize="medium")
     grid = figure.subplots(2, len(ends), squeeze=False, sharex=True)
     for part, (row, symbol) in enumerate(zip(grid, "RX", strict=True)):
         for axes, k in zip(row, ends, strict=True):

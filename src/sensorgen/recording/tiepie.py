@@ -4,7 +4,7 @@ What is a scalar, a vector, a cell or a struct array in the file depends on how 
 who wrote it: everything is laid out flat first.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from math import ceil
 from typing import Any
@@ -16,11 +16,13 @@ from sensorgen.recording import clock
 from sensorgen.recording.samples import Bools, Complex, Real, Recording, Source, blank, sifted
 
 WANTED = ("impedance_data", "impedance_time", "timestamps", "settings", "ref_offset", "sig_offset", "offset_time")
+_INPUTS = ("ref_offset", "sig_offset")
+_MARGIN = 0.99  # of a range, as the program itself has it
 _START_UP = 1.6  # of the demodulator, over its bandwidth
 _WANTED = "expected a recording of TiePieLCR: impedance_data with lockin1, impedance_time and settings.dem_freqs"
 
 Tree = Mapping[str, Any]
-_Offsets = tuple[Real, Sequence[Real]]
+_Offsets = tuple[Real, Mapping[str, Real]]
 
 
 def recordings(tree: Tree, source: Source) -> tuple[Recording, ...]:
@@ -181,36 +183,49 @@ def _starting(time_s: Real, rate: float, bandwidth_hz: float) -> Bools:
 
 
 def _offsets(tree: Tree, k: int, count: int) -> _Offsets:
-    """Time and mean voltages of the two inputs of a lock-in, where the file has them."""
+    """Time and means of the two inputs of a lock-in, where the file has them."""
     try:
         time = _rows(tree, "offset_time", count)[k]
-        found = [_rows(tree, name, count)[k] for name in ("ref_offset", "sig_offset")]
+        found = {name: _rows(tree, name, count)[k] for name in _INPUTS}
     except BadInput:
-        return np.empty(0), ()
-    return time, [values for values in found if len(values) == len(time) > 0]
+        return np.empty(0), {}
+    return time, {name: values for name, values in found.items() if len(values) == len(time) > 0}
 
 
 def _beyond(time_s: Real, offsets: _Offsets, settings: Tree) -> Bools:
-    """Where an input's mean voltage alone fills its range.
+    """Where an input's mean alone fills its range.
 
-    The file has no better sign of clipping: it keeps no waveforms.
+    The program sees clipping in its waveforms and shows it, but keeps neither in the file: a mean at the rail is all
+    that is left of it. What clips at both rails alike leaves none.
     """
     at, values = offsets
-    found = np.zeros(len(time_s), bool)
-    limit = _ranges(settings)
-    if limit is None or not values:
-        return found
+    found, limits = np.zeros(len(time_s), bool), _limits(settings)
     order = np.argsort(at, kind="stable")
-    for voltage in values:
-        found |= np.interp(time_s, at[order], np.abs(voltage)[order]) >= limit
+    for name in values.keys() & limits.keys():
+        found |= np.interp(time_s, at[order], np.abs(values[name])[order]) >= _MARGIN * limits[name]
     return found
 
 
-def _ranges(settings: Tree) -> float | None:
-    """The smallest range that an input was set to [V]."""
+def _limits(settings: Tree) -> dict[str, float]:
+    """The largest mean that each input can show, in the file's units; none where the file does not say.
+
+    The reference is written down as volts times what its amplifier has in amperes or coulombs per volt, the signal as
+    volts over the gain ahead of the input: the ranges are those of the inputs themselves.
+    """
     try:
         listed = _vector(settings["scope_range_list"], "scope_range_list")
-        chosen = _vector(settings["scope_ranges"], "scope_ranges").astype(int)
-        return float(listed[chosen].min())
+        reference, signal = listed[_vector(settings["scope_ranges"], "scope_ranges").astype(int)]
     except (BadInput, KeyError, IndexError, ValueError):
-        return None
+        return {}
+    scales = _gain(settings, "reference_gain_list", "reference"), _gain(settings, "gain_list", "gain")
+    return dict(zip(_INPUTS, (float(reference * scales[0]), float(signal / scales[1])), strict=True))
+
+
+def _gain(settings: Tree, listed: str, chosen: str) -> float:
+    """A gain by its number in the calibration's list; 1 where the file does not say."""
+    calibration = next(_structs(settings.get("calibration")), {})
+    try:
+        gain = abs(float(_vector(calibration[listed], listed)[int(_number(settings, chosen))]))
+    except (BadInput, KeyError, IndexError, ValueError):
+        return 1.0
+    return gain if gain > 0 else 1.0
