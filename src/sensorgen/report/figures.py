@@ -1,7 +1,7 @@
 """The figures of a report, from what was compared."""
 
 from collections import Counter
-from math import exp, isfinite
+from math import exp, inf, isfinite
 
 from sensorgen.comparison import Compared, Comparison
 from sensorgen.process.verdicts import ORDER, WORDS
@@ -117,12 +117,12 @@ def _short(found: Comparison) -> Chart | None:
                   text=[f"{r.reading.specimen}: {r.verdict.word}" for r in here],
                   colour=charts.BLUE if shape == "tri" else charts.ORANGE, symbol=_SHAPES.get(shape, "x"))
         )  # fmt: skip
-    zero = sum(r.verdict.rz_ohm == 0 for r in found.rows)
+    zero, overload = (sum(r.verdict.rz_ohm == value for r in found.rows) for value in (0, inf))
     return Chart(
         "shorts", "R_Z beside R_Y",
         f"Resistance between the electrodes over that along one, both logarithmic, for {len(rows)} of {every} "
         "readings. Below the solid line a bridge can read that; below the dashed one R_Z is of the order of R_Y. "
-        f"{zero} readings of 0 ohm have no place on the axis.",
+        f"{zero} readings of 0 ohm and {overload} of overload have no place on the axis.",
         {"": tuple(traces)}, Axis("R_Y [ohm]", log=True), (Axis("R_Z [ohm]", log=True),),
     )  # fmt: skip
 
