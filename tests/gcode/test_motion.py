@@ -191,6 +191,11 @@ def test_values_that_are_none_are_faults_and_no_places():
     assert np.isfinite(motion.rows).all()
 
 
+def test_foreign_letters_in_the_comment_of_a_move_are_told():
+    (fault,) = follow([R, "G1 X1 ; 210 \N{DEGREE SIGN}C", "G1 X2 ; 210 C"]).faults
+    assert (fault.number, fault.severe) == (2, False)
+
+
 def test_an_empty_file():
     motion = follow([])
     assert (len(motion.rows), motion.lines, motion.kind.column(0).tolist()) == (0, 0, [])
