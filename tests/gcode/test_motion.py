@@ -196,6 +196,11 @@ def test_foreign_letters_in_the_comment_of_a_move_are_told():
     assert (fault.number, fault.severe) == (2, False)
 
 
+def test_a_dwell_is_no_move():
+    motion = follow([R, "G1 X1", "G4 ", "G4 X9", "G1 X2"])
+    assert (motion.number.tolist(), [e.number for e in motion.events]) == ([2, 5], [1, 3, 4])
+
+
 def test_an_empty_file():
     motion = follow([])
     assert (len(motion.rows), motion.lines, motion.kind.column(0).tolist()) == (0, 0, [])
