@@ -201,6 +201,19 @@ def test_a_dwell_is_no_move():
     assert (motion.number.tolist(), [e.number for e in motion.events]) == ([2, 5], [1, 3, 4])
 
 
+def test_a_retraction_is_made_good_in_parts():
+    motion = follow(
+        [R, "G1 X1 E-3", "G1 X2 E1", "G1 X3 E-.5", "G1 X4 E2", "G1 X5 E1", "G1 X6 E1", "G1 X7 E-1", "G1 X8 E2"]
+    )
+    assert motion.extruded_mm.tolist() == [0, 0, 0, 0, 0.5, 1, 0, 1]
+
+
+def test_a_place_is_named_also_where_places_are_relative():
+    motion = follow([R, "G1 X7", "G91", "G92 X5", "G1 X1", "G28 X", "G1 X2", "G90", "G1 X3"])
+    assert motion.end_mm[:, 0].tolist() == [7, 6, 2, 3]
+    assert motion.start_mm[:, 0].tolist() == [0, 5, 0, 2]
+
+
 def test_an_empty_file():
     motion = follow([])
     assert (len(motion.rows), motion.lines, motion.kind.column(0).tolist()) == (0, 0, [])
