@@ -191,6 +191,29 @@ def test_values_that_are_none_are_faults_and_no_places():
     assert np.isfinite(motion.rows).all()
 
 
+def test_foreign_letters_in_the_comment_of_a_move_are_told():
+    (fault,) = follow([R, "G1 X1 ; 210 \N{DEGREE SIGN}C", "G1 X2 ; 210 C"]).faults
+    assert (fault.number, fault.severe) == (2, False)
+
+
+def test_a_dwell_is_no_move():
+    motion = follow([R, "G1 X1", "G4 ", "G4 X9", "G1 X2"])
+    assert (motion.number.tolist(), [e.number for e in motion.events]) == ([2, 5], [1, 3, 4])
+
+
+def test_a_retraction_is_made_good_in_parts():
+    motion = follow(
+        [R, "G1 X1 E-3", "G1 X2 E1", "G1 X3 E-.5", "G1 X4 E2", "G1 X5 E1", "G1 X6 E1", "G1 X7 E-1", "G1 X8 E2"]
+    )
+    assert motion.extruded_mm.tolist() == [0, 0, 0, 0, 0.5, 1, 0, 1]
+
+
+def test_a_place_is_named_also_where_places_are_relative():
+    motion = follow([R, "G1 X7", "G91", "G92 X5", "G1 X1", "G28 X", "G1 X2", "G90", "G1 X3"])
+    assert motion.end_mm[:, 0].tolist() == [7, 6, 2, 3]
+    assert motion.start_mm[:, 0].tolist() == [0, 5, 0, 2]
+
+
 def test_an_empty_file():
     motion = follow([])
     assert (len(motion.rows), motion.lines, motion.kind.column(0).tolist()) == (0, 0, [])

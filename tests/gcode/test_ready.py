@@ -250,3 +250,10 @@ def test_tools_are_renumbered_also_where_temperatures_need_no_tool():
 def test_what_cannot_be_put_into_words_is_refused(text, said):
     with pytest.raises(BadInput, match=said):
         made(text)
+
+
+def test_the_move_before_which_the_first_tool_is_taken_stays():
+    text = "T2\nM104 S210\nG28\nM83\nG1 X1 F60\nG1 X2 E1\nM106 S255\nG1 X3 E1\n"
+    lines = made(text).splitlines()
+    assert [line for line in lines if line.startswith("G1 ")] == ["G1 X1 F60", "G1 X2 E1", "G1 X3 E1"]
+    assert lines.index("T3") == lines.index("G1 X1 F60") - 2
