@@ -220,6 +220,12 @@ def test_what_is_known_of_presses(monkeypatch):
     assert "off by -" in rise["thesis-3.1.2"].said
 
 
+def test_the_worst_load_of_a_press_counts():
+    found = presses._point("s", "m", "", np.array([1.0, 2.6, 3.3]), (1.0, 2.0, 3.0), 1e-3, 1.0)
+    assert found.error == pytest.approx(0.3)
+    assert "+30.00%" in found.said
+
+
 def test_without_the_mesher_cheap_laws_are_left(monkeypatch):
     monkeypatch.setitem(sys.modules, "netgen.geom2d", None)
     found = {
