@@ -17,7 +17,7 @@ from sensorgen.predict import TONES_HZ
 from sensorgen.sensitivity import HELD, Sensitivity, sensitivity
 
 FORCE_N, RHO_OHM_M = 6.0, 0.135
-RECT_MESH = 1.022  # rise in the limit of fine meshes over that of the default mesh: docs/press.md
+RECT_MESH = 1.022  # rise in the limit of fine meshes over that of the default mesh: docs/press3d.md
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "sensitivity.png"
 DESIGNS = {
     "plate": {"shape": "reference"},

@@ -13,6 +13,7 @@ PAGES = (
     ["slice"], ["slice", "tri"], ["gcode"], ["gcode", "check"], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
     ["predict"], ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["invert"], ["sheet"], ["stack"],
     ["bench"], ["bench", "plan"], ["bench", "plan", "tri"], ["bench", "show"],
+    ["bench", "hysteresis"], ["bench", "sets"], ["bench", "live"],
     ["log"], *(["log", w] for w in ("multimeter", "import", "bench", "predict", "list", "show", "export", "verify")),
     ["report"], ["fit"], ["thesis"], ["list"], ["schema"], ["completion"],
 )  # fmt: skip

@@ -1,6 +1,6 @@
 """Recordings of the log, brought to where a prediction can be held against them: rest, presses, differences."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ from sensorgen.log import BenchRun, Log
 from sensorgen.log.bench import reopened
 from sensorgen.process import presses
 from sensorgen.process.run import Processed, processed
+from sensorgen.recording import joined_all
 from sensorgen.recording.rig import RigLog
 from sensorgen.recording.samples import Complex, Real, Recording
 
@@ -71,18 +72,20 @@ def runs(log: Log, iteration: int, left_out: list[tuple[str, str]]) -> Iterator[
 
 def _of_entry(log: Log, entry: BenchRun) -> Iterator[Run]:
     found, pressed = reopened(log, entry)
-    for one in found:
-        yield _brought(entry, *_worked_up(one, pressed))
+    beside, without = _beside(found, pressed)
+    for one in beside:
+        yield _brought(entry, one, without)
 
 
-def _worked_up(one: Recording, pressed: RigLog | None) -> tuple[Processed, str]:
-    """A recording with the rig's log, or without if they cannot be joined; and why it is without."""
+def _beside(found: Sequence[Recording], pressed: RigLog | None) -> tuple[list[Processed], str]:
+    """All lock-ins of a recording, each with the rig's log, or without if they cannot be joined; and why without."""
     if pressed is None:
-        return processed(one), "no log of the rig: force and position are not known"
+        return [processed(one) for one in found], "no log of the rig: force and position are not known"
     try:
-        return processed(one, pressed), ""
+        joined = joined_all(found, pressed)
+        return [processed(one, with_rig) for one, with_rig in zip(found, joined, strict=True)], ""
     except SensorgenError as error:
-        return processed(one), f"not joined with the rig's log: {error}"
+        return [processed(one) for one in found], f"not joined with the rig's log: {error}"
 
 
 def _brought(entry: BenchRun, done: Processed, without: str) -> Run:
