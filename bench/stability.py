@@ -101,7 +101,7 @@ def iterates(matrix: csr_array, into: np.ndarray, one: float, scale: np.ndarray,
 
 def slivers() -> None:
     """Error and width as the lower triangles grow to meet the hanging ones, and the air becomes a sliver."""
-    air = np.geomspace(0.4, 1e-4, 12)
+    air = np.geomspace(0.4, 1e-6, 18)
     ours, even = [], []
     for apart in air:
         scene = tri.scene(
