@@ -1,9 +1,11 @@
 """``sensorgen compress``: words in, curves out."""
 
+import io
 import json
 import sys
 from functools import partial
 
+import click
 import pytest
 
 needs_mesher = pytest.mark.skipif("not __import__('importlib').util.find_spec('netgen')", reason="needs NGSolve")
@@ -169,3 +171,16 @@ def test_what_is_not_to_be_trusted_is_said_with_exit_code_1(run, monkeypatch):
     found = run("compress", "reference", "--stress", "5")
     assert found.code == 1
     assert "not to be trusted: converged up to 5 of 100 kPa" in found.line
+
+
+def test_the_bar_goes_on_where_a_cell_is_pressed_again_on_another_mesh(monkeypatch):
+    from sensorgen.cli import compress_command
+
+    shown = []
+    bar = click.progressbar(length=4, file=io.StringIO())
+    monkeypatch.setattr(click, "progressbar", lambda **_: bar)
+    with compress_command._bar((0.0, 10.0, 20.0, 30.0)) as step:
+        for reached_pa in (0.0, 1e4, 0.0, 1e4, 2e4, 3e4):
+            step(reached_pa)
+            shown.append(bar.pos)
+    assert shown == [1, 2, 2, 2, 3, 4]

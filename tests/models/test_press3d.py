@@ -247,14 +247,14 @@ def test_stairs_as_boxes_are_stairs_as_a_cross_section(lift):
 
 
 def test_feet_that_stick_are_stiffer_by_as_much_as_in_a_cross_section():
-    """By how much sticking stiffens is known far better than the displacement, whose error is the mesh's."""
+    """By how much sticking stiffens, against a fine mesh of the plane model: its first one is 4 % off in that."""
     scene, stress = stairs(0.3, lift=0.02), [0.0, 1e4, 2e4, 5e4]
     moved = {}
     for contact in ("frictionless", "stick"):
         held = Held(contact=contact)
-        flat = press2d.press(press2d.cell(scene, 2.0), solids(), stress, EPS, held)
+        flat = press2d.press(press2d.cell(scene, 2.0), solids(), stress, EPS, held, press2d.Fineness().finer())
         solid = press3d.press(press3d.cell(scene), solids(), stress, EPS, held, Pieces(2, 0.4))
-        assert solid.faults == ()
+        assert flat.faults == solid.faults == ()
         assert abs(solid.imbalance[-1]) < 2e-3
         moved[contact] = flat, solid
     less = [moved["stick"][k].displacement_m[1:] / moved["frictionless"][k].displacement_m[1:] - 1 for k in range(2)]

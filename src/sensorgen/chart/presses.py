@@ -27,7 +27,7 @@ _SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
 _WIDTH_M = 10e-3  # of the sensor, for a film that is bonded
 
 # Coarse to fine: sizes at the apex, at corners and far from both, and how they grow.
-_MESHES = (Fineness(2.8e-3, 0.2, 0.4, 1.0), Fineness(7e-4, 0.1, 0.3, 0.5), Fineness())
+_MESHES = (Fineness(2.8e-3, 0.2, 0.4, 1.0), Fineness(1.4e-3, 0.1, 0.3, 0.7), Fineness())
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,7 @@ def _bar(stresses: tuple[float, ...]) -> Iterator[Callable[[float], None]]:
         length=len(stresses), file=sys.stderr, hidden=not sys.stderr.isatty(), label="pressing"
     ) as bar:
         bar.render_progress()
-        yield lambda reached_pa: bar.update(sum(1e3 * kpa <= reached_pa for kpa in stresses) - bar.pos)
+        yield lambda reached_pa: bar.update(max(sum(1e3 * kpa <= reached_pa for kpa in stresses) - bar.pos, 0))
 
 
 command = DesignGroup(

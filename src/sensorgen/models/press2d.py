@@ -43,7 +43,7 @@ __all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "curve_
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
 _FIELD_GROWTH = 0.5  # of the triangles of the capacitance's mesh, per distance [-]
 _MISFIT = 1e-3  # of a solid's area: gaps that were closed in the wrong place change more [-]
-_NARROW = 2e-3  # a bracket of the capacitance wider than this is a poor mesh [-]
+_NARROW = 5e-3  # a bracket of the capacitance wider than this is a poor mesh [-]
 _COARSER = (3, 9)  # times the size of the triangles at an apex, where the finer ones do not converge [-]
 
 Real = NDArray[np.float64]

@@ -16,6 +16,7 @@ from scipy.sparse.linalg import splu
 
 from sensorgen.errors import OutOfRange
 from sensorgen.interval import Interval
+from sensorgen.models._press import rings
 from sensorgen.models._press.cell import AIR, OUTSIDE, Cell, Edge
 from sensorgen.models._press.mesh import Mesh, Net, Unmeshed, Whole, of_triangles, triangulated
 from sensorgen.models._press.wedge import Wedge, fan, wedges
@@ -51,7 +52,7 @@ def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float,
         The mesher gave up, left a hole, or the bounds are in the wrong order, which no sound mesh can do.
     """
     air = next((k + 1 for k, r in enumerate(cell.regions) if r.material == AIR), OUTSIDE)
-    mesh = _meshed(cell.edges, air, coarse_mm, growth)
+    mesh = _meshed(cell, air, coarse_mm, growth)
     terminal = np.array([r.terminal for r in cell.regions])[mesh.region - 1]
     ends = [_nodes(mesh, terminal == end) for end in ("bottom", "top")]
     if (ends[0] & ends[1]).any():
@@ -68,8 +69,9 @@ def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float,
     return Interval(lower, upper).times(EPS0_F_PER_M)
 
 
-def _meshed(edges: Edges, air: int, coarse_mm: float, growth: float) -> Mesh:
-    """Mesh everything but the thin ends of the air, which are filled with triangles of their own."""
+def _meshed(cell: Cell, air: int, coarse_mm: float, growth: float) -> Mesh:
+    """Mesh everything but the thin ends of the air, which are filled with triangles of their own; rings at corners."""
+    edges = cell.edges
     cut, thin = dict(edges), wedges(edges, air) if air != OUTSIDE else []
     for number, wedge in enumerate(thin, 1):
         for p, q in (*pairwise(wedge.first), *pairwise(wedge.second[::-1])):
@@ -82,7 +84,9 @@ def _meshed(edges: Edges, air: int, coarse_mm: float, growth: float) -> Mesh:
     new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
     corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])
     _refuse_holes(edges, net.points_m[corners])
-    return of_triangles(net.points_m, corners, np.concatenate([net.region, np.full(len(new), air)]))
+    region = np.concatenate([net.region, np.full(len(new), air)])
+    tips = [_nearest(net.points_m, place) for place in rings.corners(edges, cell.left_mm, cell.right_mm)]
+    return of_triangles(*rings.ringed(net.points_m, corners, region, tips))
 
 
 def _refuse_crossings(edges: Real) -> None:

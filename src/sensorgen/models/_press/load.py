@@ -84,7 +84,6 @@ class State:
     u_m: Real
     inner: Inner
     pairs: Pairs
-    stuck: Pairs | None = None
     cuts: int = 0
 
 
@@ -272,8 +271,7 @@ class Problem:
             return None
         stuck = self._stuck(first) if self.stick else None
         fresh = self.project(first.u_m, stuck)
-        second = self.newton(first, pressure_pa, fresh, _ENOUGH)
-        return replace(second, stuck=stuck) if second else None
+        return self.newton(first, pressure_pa, fresh, _ENOUGH)
 
     def _stuck(self, state: State) -> Pairs:
         return contact.stuck(state.pairs, self.gaps(state.pairs, state.u_m) < 0)
