@@ -29,7 +29,7 @@ class Quilt:
 
     @classmethod
     def random(cls, seed: int) -> "Quilt":
-        """Up to six columns of up to five layers; a film between 1e-3 and 0.5 mm; islands of electrode in every other."""
+        """Up to six columns of up to five layers, a film of 1e-3 to 0.5 mm; islands of electrode in every other."""
         random = np.random.default_rng(seed)
         columns, layers = random.integers(1, 7), random.integers(1, 6)
         x = np.concatenate([[0.0], np.cumsum(random.uniform(0.1, 0.8, columns))])
@@ -63,7 +63,9 @@ class Quilt:
 
     def mirrored(self) -> "Quilt":
         """Left for right."""
-        return replace(self, x_mm=(self.x_mm[-1] - self.x_mm[::-1]).round(6), z_mm=self.z_mm[::-1], fill=self.fill[::-1])
+        return replace(
+            self, x_mm=(self.x_mm[-1] - self.x_mm[::-1]).round(6), z_mm=self.z_mm[::-1], fill=self.fill[::-1]
+        )
 
     def swapped(self) -> "Quilt":
         """Upside down, with its ends named anew."""
@@ -108,7 +110,7 @@ def by_adaptive_elements(quilt: Quilt, weight: dict[str, complex], unknowns: int
         x[held[1]] = 1.0
         x = skfem.solve(*skfem.condense(matrix, x=x, D=np.union1d(*held)))
         found.append(complex(x @ matrix @ x))
-        if basis.N > unknowns:
+        if unknowns < basis.N:
             return found
         sides = [skfem.InteriorFacetBasis(mesh, skfem.ElementTriP2(), side=s) for s in (0, 1)]
         parts = {f"u{k + 1}": side.interpolate(x) for k, side in enumerate(sides)}
