@@ -228,6 +228,13 @@ def test_thin_films_down_to_a_nanometre(film_mm):
     assert thinner.lower > found.upper
 
 
+def test_too_thin_for_its_length_is_told():
+    """A tenth of a nanometre of air along 10 cm: triangles that doubles cannot tell from lines."""
+    thin = plates(Body("x", "x60", (box(0, 100, 0, 1, 0.2, 1.2 - 1.1e-7),)), length_mm=100.0)
+    with pytest.raises(_fem_bounds.Unsolved, match="too thin"):
+        fem2d.capacitance(thin, EPS, 1e-4)
+
+
 @pytest.mark.parametrize("film_mm", [1e-3, 3e-5])
 def test_slanted_films_cost_no_digits(film_mm):
     """Films along slopes, whose columns are nearly exact: doubles once lost 4e-8 of the lower bound at 3e-5 mm.
