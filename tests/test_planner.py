@@ -268,14 +268,15 @@ def test_a_sensor_that_is_cut_amid_a_cell_needs_twice_the_digits(fake):
     assert expectations.expected("mid", cut, 1e-5)[0] == pytest.approx(1e-4)  # no more
 
 
-def test_a_solver_that_fails_on_a_scene_leaves_it_to_the_others(fake):
-    from sensorgen.models._fem_bounds import Unsolved
+@pytest.mark.parametrize("error", ["Unsolved", "CrossedBounds"])
+def test_a_solver_that_fails_on_a_scene_leaves_it_to_the_others(fake, error):
+    from sensorgen.models import _fem_bounds
 
     fake.add("cheap", 1, 0.4)
     fake.add("weak", 2, 1e-6)
 
     def fails(scene, permittivity, width):
-        raise Unsolved("too slender")
+        raise getattr(_fem_bounds, error)("too slender")
 
     fake.models["weak"].capacitance = fails
     found = capacitance(PLATE, EPS, 1e-3)

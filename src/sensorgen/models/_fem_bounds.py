@@ -77,9 +77,13 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
     ------
     CrossedBounds
         The lower bound lies above the upper one by more than rounding.
+    Unsolved
+        The lower bound is not above 0.
     """
     below, above = found.lower, found.upper
-    if not 0 < below <= above * (1 + found.rounding):
+    if not (below > 0 and np.isfinite(above)):
+        raise Unsolved(f"doubles do not solve this scene: its lower bound is {below:.3g}, its upper one {above:.3g}")
+    if below > above * (1 + found.rounding):
         raise CrossedBounds(
             f"lower bound {below:.12g} above upper bound {above:.12g}: the solver failed on this scene; report it, "
             "and use --model columns meanwhile"

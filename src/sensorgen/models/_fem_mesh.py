@@ -61,10 +61,12 @@ class Cones:
         return np.minimum(a, b) * len(self.triangles.points) + np.maximum(a, b)
 
     def slenderness(self) -> float:
-        """Of the most slender triangle: its longest side squared over twice its area [-]."""
+        """Of the most slender triangle: its longest side squared over twice its area; or infinite, without one [-]."""
         corners = self.triangles.points[self.corners]
         sides = np.roll(corners, -1, axis=1) - corners
         area = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
+        if area.min() <= 0:
+            return np.inf
         return float(((sides**2).sum(axis=2).max(axis=1) / area).max())
 
     def elements(self) -> int:

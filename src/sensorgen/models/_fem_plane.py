@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from sensorgen.models._fem_cones import ring_corners
-from sensorgen.models._fem_fronts import HELD, Numbers
+from sensorgen.models._fem_fronts import HELD, Numbers, Whole
 from sensorgen.models._fem_mesh import Cones
 from sensorgen.models._fem_polynomials import Real, condensed, crossed
 from sensorgen.models._fem_problem import Field, Problem
@@ -36,12 +36,12 @@ class Plane:
         """The best potential, 0 V at the bottom and 1 V at the top; ``weight`` (n,) of each triangle."""
         ends = self.mesh.triangles.terminals
         held = {point: int(name == "top") for edge, name in ends.items() for point in edge}
-        return self._problem(weight, held, set(ends), {}, HELD).solved()
+        return self._grounded(self._problem(weight, held, set(ends), {}, HELD).solved())
 
     def stream(self, weight: Numbers) -> Field:
         """The function whose curl is the flux at which twice what flows into the top, less its energy, is most."""
         flow = self.mesh.flow
-        return self._problem(weight, flow.held, flow.walls, flow.lifts, flow.count).solved(flow)
+        return self._grounded(self._problem(weight, flow.held, flow.walls, flow.lifts, flow.count).solved(flow))
 
     def energies(self, f: Field, g: Field) -> Numbers:
         """Integral of grad f . grad g over each triangle of the mesh."""
@@ -54,6 +54,18 @@ class Plane:
 
     def _problem(self, weight: Numbers, *held: Any) -> Problem:
         return Problem(self.mesh, self.order, self._plain_energy, self._cone_energies, weight, *held)
+
+    def _grounded(self, f: Field) -> Field:
+        """Less the value at one end of each triangle's shortest side.
+
+        A constant has no energy, but rounding times 1e10 is some; both ends have about the same value.
+        """
+        plain, *others = (_at_shortest(shapes) for shapes in self._shapes)
+        cones = [
+            (_less(rings, ring.reshape(-1, 2)), _less(tips, tip))
+            for (rings, tips), ring, tip in zip(f.cones, others[::2], others[1::2], strict=True)
+        ]
+        return Field(_less(f.plain, plain), cones)
 
     def _over(self, f: Field, g: Field, plain: Real, cones: Sequence[tuple[Real, Real]]) -> Numbers:
         found = np.zeros(len(self.mesh.corners), np.result_type(f.plain, g.plain))
@@ -76,13 +88,34 @@ class Plane:
 
     @cached_property
     def _matrices(self) -> list[Real]:
+        found = condensed(np.concatenate(self._shapes), self.order)
+        return np.split(found, np.cumsum([len(s) for s in self._shapes])[:-1])
+
+    @cached_property
+    def _shapes(self) -> list[Real]:
+        """Corners (n, 3, 2) of the plain triangles, then of one ring and of the tips at each singular corner."""
         points = self.mesh.triangles.points
         shapes = [points[self.mesh.corners[self.mesh.plain]]]
         for corner, fan in self.mesh.fans.items():
             away = points[[*fan.spokes, fan.spokes[0]]] - points[corner]
             tips = np.stack([0 * away[:-1], away[:-1], away[1:]], axis=1)[: len(fan.members)]
             shapes += [ring_corners(tips), tips]
-        return np.split(condensed(np.concatenate(shapes), self.order), np.cumsum([len(s) for s in shapes])[:-1])
+        return shapes
+
+
+def _at_shortest(corners: Real) -> Whole:
+    """Number of the corner at which each triangle's shortest side starts."""
+    sides = np.roll(corners, -1, axis=1) - corners
+    found: Whole = (sides**2).sum(axis=-1).argmin(axis=-1)
+    return found
+
+
+def _less(values: Numbers, corner: Whole) -> Numbers:
+    """Values on triangles (..., k) less the one at a corner of each."""
+    place = np.broadcast_to(corner, values.shape[:-1])[..., None]
+    found: Numbers = values.copy()
+    found[..., :3] -= np.take_along_axis(values, place, axis=-1)
+    return found
 
 
 def _product(f: Numbers, matrix: Numbers, g: Numbers) -> Numbers:

@@ -25,10 +25,15 @@ def condensed(corners: Real, order: int) -> Real:
     -------
     (n, 3 * order, 3 * order) array
         For values at the corners, then the modes 2 to ``order`` of each side in turn (integrated Legendre polynomials).
+
+    Notes
+    -----
+    The slopes along the three sides, weighted with the opposite angles' cotangents: what hardly changes along the
+    short side of a slender triangle then has no large terms that cancel.
     """
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    u, v, w = (corners[:, b] - corners[:, a] for a, b in ((0, 1), (0, 2), (1, 2)))
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    metric = np.stack([(v * v).sum(1), -(u * v).sum(1), (u * u).sum(1)]) / area
+    metric = np.stack([(v * w).sum(1), -(u * w).sum(1), (u * v).sum(1)]) / area
     full = np.tensordot(metric, _reference(order), axes=(0, 0))
     n = 3 * order
     if full.shape[1] == n:
@@ -39,7 +44,7 @@ def condensed(corners: Real, order: int) -> Real:
 
 @cache
 def _reference(order: int) -> Real:
-    """Integrals of products of the derivatives along x and x, x and y (both ways), y and y; on the corner (0, 1)^2.
+    """Integrals of products of the derivatives along x, along y and along y - x; on the corner (0, 1)^2.
 
     Inner polynomials are made orthonormal to each other, and the sides' to them, for a triangle of equal sides.
     """
@@ -50,15 +55,14 @@ def _reference(order: int) -> Real:
     root = np.sqrt(np.outer(weight * (1 - at), weight).ravel())
     along = np.array([f[1:] * root for f in _functions(x, y, order)])
     a, b = along[:, 0], along[:, 1]
-    xy = a @ b.T
-    found = np.stack([a @ a.T, xy + xy.T, b @ b.T])
+    found = np.stack([f @ f.T for f in (a, b, b - a)])
     n = 3 * order
-    even = found[0] - found[1] / 2 + found[2]
+    even = found.sum(axis=0) / 2
     change = np.eye(len(even))
     if len(even) > n:
         root = np.linalg.inv(np.linalg.cholesky(even[n:, n:]))
         change[n:, n:] = root
-        change[:n, n:] = -even[:n, n:] @ root.T @ root
+        change[3:n, n:] = -even[3:n, n:] @ root.T @ root  # straight functions are orthogonal to the inner ones
     return np.asarray(change @ found @ change.T)
 
 

@@ -117,7 +117,7 @@ class Problem:
         unknowns = least([*blocks, self._rise(flow)] if flow else blocks, self._unknowns[0])
         inside = [cone.inside(rim.values(unknowns)) for cone, rim in zip(cones, rims, strict=True)]
         on_plain = np.array([share.values(unknowns) for share in plain])
-        return Field(_grounded(on_plain), [(_grounded(rings), _grounded(tips)) for rings, tips in inside])
+        return Field(on_plain, inside)
 
     @cached_property
     def _unknowns(self) -> tuple[int, Whole, Whole]:
@@ -184,9 +184,3 @@ class Problem:
         matrix = np.zeros((len(where) + 1,) * 2)
         matrix[0, 1:] = matrix[1:, 0] = -rise[where]
         return Block(np.concatenate([[1], where]), matrix, self.mesh.triangles.points[ends[:, 0]].mean(axis=0))
-
-
-def _grounded(values: Numbers) -> Numbers:
-    """Less the value at a triangle's first corner: a constant has no energy, but rounding times 1e10 is some."""
-    values[..., :3] -= values[..., :1].copy()
-    return values

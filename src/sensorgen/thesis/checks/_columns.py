@@ -60,6 +60,6 @@ def exact_f_per_m2(shape: str) -> float:
     eps = {taken.material: taken.value for taken in planner.permittivities(made)}
     found = planner.capacitance(made.in_use, eps, _ACCURACY)
     if not found.reached():
-        raise MissingValue(f"no solver here comes as near as {_ACCURACY:g}: pip install 'sensorgen[fem]'")
+        raise MissingValue(f"no model here comes as near as {_ACCURACY:g}: {'; '.join(found.refused)}")
     area = made.params.length_mm * made.params.width_mm * M_PER_MM**2
     return (found.capacitance_f.lower + found.capacitance_f.upper) / 2 / area

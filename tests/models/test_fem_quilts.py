@@ -1,0 +1,72 @@
+"""Cross-sections that nobody drew: random patches, between two bounds by adaptive elements of scikit-fem."""
+
+import numpy as np
+import pytest
+from quilts import ENDS, Quilt, by_adaptive_elements
+
+from sensorgen.models import fem2d
+from sensorgen.units import EPS0_F_PER_M
+
+UNKNOWNS = 1500  # where scikit-fem's two bounds are 1e-4 to 2e-2 apart
+PER_MM = 1e3 / EPS0_F_PER_M  # of a sensor 1 mm deep
+
+
+def permittivity(seed: int, decades: float = 1.5) -> dict[str, float]:
+    x60, pva = 10 ** np.random.default_rng(seed).uniform(0, decades, 2)
+    return {"air": 1.0, "x60": float(x60), "pva": float(pva)}
+
+
+def overlap(a, b) -> bool:
+    return a.lower <= b.upper and b.lower <= a.upper
+
+
+@pytest.mark.parametrize("seed", [0, 2, 4, 8, 22])
+def test_two_bounds_of_another_program_hold_both_of_ours(seed):
+    """Each of its bounds is a potential between two ends; where no electrode is an island, the mirrors are such."""
+    quilt, eps = Quilt.random(seed), permittivity(seed)
+    found = fem2d.capacitance(quilt.scene(), eps, 1e-6).times(PER_MM)
+    above = by_adaptive_elements(quilt, eps, UNKNOWNS)[-1].real
+    below = 1 / by_adaptive_elements(quilt, {m: 1 / e for m, e in eps.items()}, UNKNOWNS, ("left", "right"))[-1].real
+    assert found.width() <= 1e-6
+    assert below < found.lower < found.upper < above < below * 1.03
+
+
+@pytest.mark.parametrize("seed", [1, 17])
+def test_islands_are_met_from_above(seed):
+    quilt, eps = Quilt.random(seed), permittivity(seed)
+    energies = np.real(by_adaptive_elements(quilt, eps, 2 * UNKNOWNS))
+    found = fem2d.capacitance(quilt.scene(), eps, 1e-6).times(PER_MM)
+    assert set(quilt.fill[:, 1:-1].ravel()) & set(ENDS)
+    assert found.width() <= 1e-6
+    assert found.upper < energies[-1] < found.upper * 1.03
+    assert energies[-1] - found.upper < 2 * (energies[-4] - energies[-1])
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_losses_agree(seed):
+    """Complex elements have no bounds: they come nearer with every mesh, and stay about as far as their last gain."""
+    quilt, tangents = Quilt.random(seed), {"air": 0.0, "x60": 0.3, "pva": 2.0}
+    eps = {m: e * (1 - 1j * tangents[m]) for m, e in permittivity(seed).items()}
+    energies = np.array(by_adaptive_elements(quilt, eps, 2 * UNKNOWNS))
+    found = fem2d.lossy(quilt.scene(), eps, 1e-5).times(PER_MM)
+    off = abs(energies - found.centre)
+    assert found.width() <= 1e-5
+    assert off[-1] < 5e-3 * abs(found.centre)
+    assert off[-1] < found.radius + 2 * abs(energies[-4] - energies[-1])
+
+
+@pytest.mark.parametrize("seed", [30, 32, 34, 35, 36, 37])
+def test_symmetries(seed):
+    """Left for right, upside down, three times the permittivity, and the losses' own solver: all hold one value."""
+    quilt, eps = Quilt.random(seed), permittivity(seed, 3.0)
+    scene = quilt.scene()
+    if fem2d.unfit(scene):
+        assert "touch" in fem2d.unfit(scene)
+        return
+    found = fem2d.capacitance(scene, eps, 1e-4)
+    real = fem2d.lossy(scene, {m: complex(e) for m, e in eps.items()}, 1e-4)
+    assert found.width() <= 1e-4
+    assert overlap(found, fem2d.capacitance(quilt.mirrored().scene(), eps, 3e-6))
+    assert overlap(found, fem2d.capacitance(quilt.swapped().scene(), eps, 1e-5))
+    assert overlap(found, fem2d.capacitance(scene, {m: 3 * e for m, e in eps.items()}, 1e-6).times(1 / 3))
+    assert found.lower - real.radius <= real.centre.real <= found.upper + real.radius
