@@ -3,10 +3,10 @@
 import pytest
 
 from sensorgen import materials
-from sensorgen.compressed import _permittivity, _solids
+from sensorgen.compressed import _solids
 from sensorgen.design import make
 from sensorgen.errors import BadInput, OutOfRange, UnknownName
-from sensorgen.planner import unloaded
+from sensorgen.planner import permittivities, unloaded
 from sensorgen.predict import prediction
 from sensorgen.sensing import sensor_of
 from sensorgen.stacked.designs import stacked
@@ -65,9 +65,10 @@ def test_stiffness_and_force_go_together():
 def test_compression_of_cells_gets_them():
     x60 = {"youngs_modulus_pa": 3e6, "poisson_ratio": 0.45, "relative_permittivity": 3.0}
     own = design({"x60": x60, "air": {"relative_permittivity": 2.0}}, "tri")
-    assert (_solids(own)["x60"].youngs_modulus_pa, _solids(own)["x60"].poisson_ratio) == (3e6, 0.45)
-    assert _solids(own)["etpu"].youngs_modulus_pa == 22e6
-    assert _permittivity(own) == {"x60": 3.0, "air": 2.0}
+    solids = _solids(own, own.in_use)
+    assert (solids["x60"].youngs_modulus_pa, solids["x60"].poisson_ratio) == (3e6, 0.45)
+    assert solids["etpu"].youngs_modulus_pa == 22e6
+    assert {t.material: t.value for t in permittivities(own)} == {"x60": 3.0, "air": 2.0}
 
 
 def test_the_halves_of_a_double_sensor_get_them():

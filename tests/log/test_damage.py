@@ -180,4 +180,4 @@ def test_a_raw_file_is_on_the_disk_before_it_has_its_name(log, tmp_path, monkeyp
     monkeypatch.setattr(os, "fsync", fsync)
     monkeypatch.setattr(Path, "replace", rename)
     files.keep(log.files, tmp_path / "a.csv")
-    assert steps == ["file", "name", "folder", "folder"]
+    assert steps == ["file", "name", "folder", "folder", "folder"]  # two digits, raw files, the log's own
