@@ -268,21 +268,35 @@ def test_a_sensor_that_is_cut_amid_a_cell_needs_twice_the_digits(fake):
     assert expectations.expected("mid", cut, 1e-5)[0] == pytest.approx(1e-4)  # no more
 
 
-@pytest.mark.parametrize("error", ["Unsolved", "CrossedBounds"])
-def test_a_solver_that_fails_on_a_scene_leaves_it_to_the_others(fake, error):
+@pytest.fixture
+def failing(fake):
+    """A cheap model that is not near enough, and a nearer one that raises."""
     from sensorgen.models import _fem_bounds
 
-    fake.add("cheap", 1, 0.4)
-    fake.add("weak", 2, 1e-6)
+    def raising(error):
+        def fails(scene, permittivity, width):
+            raise getattr(_fem_bounds, error)("too slender")
 
-    def fails(scene, permittivity, width):
-        raise getattr(_fem_bounds, error)("too slender")
+        fake.add("cheap", 1, 0.4)
+        fake.add("weak", 2, 1e-6)
+        fake.models["weak"].capacitance = fails
+        return _fem_bounds
 
-    fake.models["weak"].capacitance = fails
+    return raising
+
+
+def test_a_solver_that_fails_on_a_scene_leaves_it_to_the_others(failing):
+    failing("Unsolved")
     found = capacitance(PLATE, EPS, 1e-3)
     assert (found.model, found.reached()) == ("cheap", False)
     assert found.refused == ("weak: too slender",)
     assert planner.is_known(PLATE, EPS, 1e-3)
+
+
+def test_bounds_that_cross_stop_everything(failing):
+    with pytest.raises(failing("CrossedBounds").CrossedBounds):
+        capacitance(PLATE, EPS, 1e-3)
+    assert not planner.is_known(PLATE, EPS, 1e-3)
 
 
 def test_a_real_plate_is_exact_without_any_solver():

@@ -238,7 +238,7 @@ def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, f
 
 
 def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str) -> Answer:
-    from sensorgen.models._fem_bounds import CrossedBounds, Unsolved
+    from sensorgen.models._fem_bounds import Unsolved
 
     overlaps = overlap(scene)
     if overlaps:
@@ -257,7 +257,7 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
             continue
         try:
             found, seconds = _timed(candidate.model, kind, scene, permittivity, width)
-        except (CrossedBounds, Unsolved) as error:  # the others answer as well as they can
+        except Unsolved as error:  # the others answer as well as they can
             refused.append(f"{candidate.model}: {error}")
             plan.append(replace(candidate, passed_over=str(error)))
             continue
