@@ -1,5 +1,6 @@
 """Cells that are solved on demand: what is asked, what is kept, and what is said where it does not work."""
 
+import math
 import sys
 from dataclasses import replace
 from functools import partial
@@ -12,6 +13,7 @@ from sensorgen.design import make
 from sensorgen.errors import SensorgenError
 from sensorgen.interval import Interval
 from sensorgen.models import compression
+from sensorgen.planned import Press, carried_out, drawn, outlined
 from sensorgen.planner import Answer
 
 GAPS = Answer("columns", Interval(1e-10, 2e-10), ())
@@ -44,7 +46,7 @@ def test_a_stiffer_plate_bears_more():
 def test_a_prototype_is_known_and_nothing_is_solved(monkeypatch):
     monkeypatch.setitem(sys.modules, "sensorgen.models.press2d", None)
     for name in ("", "solved"):
-        law = law_of(make({"shape": "tri"}), GAPS, name, solve=True)
+        law = law_of(make({"shape": "tri"}), GAPS, name)
         assert (law.compression.name, law.doubts, law.bounded) == ("solved", (), True)
     low, high = (c.ratio[-1] for c in law.others)
     assert (low - 1) / (law.compression.ratio[-1] - 1) == pytest.approx(0.994)
@@ -58,9 +60,9 @@ def test_a_cell_of_boxes_is_solved_in_three_dimensions(monkeypatch):
 
     monkeypatch.setattr(press3d, "Pieces", partial(press3d.Pieces, 2))
     monkeypatch.setattr(celllaw, "STRESS_PA", (0.0, 6e4))
-    drawn = make({"shape": "rect", "parameters": {"dielectric_mm": 0.1, "lower_height_mm": 0.30001}})
-    assert "ask for the law 'solved'" in law_of(drawn, GAPS).doubts[0]
-    law = law_of(drawn, GAPS, solve=True)
+    cell = make({"shape": "rect", "parameters": {"dielectric_mm": 0.1, "lower_height_mm": 0.30001}})
+    assert "ask for the law 'solved'" in law_of(cell, GAPS).doubts[0]
+    law = law_of(cell, GAPS, "solved")
     stored = law_of(make({"shape": "rect", "parameters": {"dielectric_mm": 0.1}}), GAPS)
     assert (law.compression.name, law.doubts, stored.doubts, stored.bounded) == ("solved", (), (), True)
     rise = [c.compression.thinning(np.asarray(6e4))[0] for c in (law, stored)]
@@ -76,9 +78,11 @@ def test_without_the_solver_a_plate_stands_in_and_that_is_said(monkeypatch):
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(SensorgenError, match="pip install"):
         law_of(make(OTHER), GAPS, "solved")
-    law = law_of(make(OTHER), GAPS, solve=True)
-    assert not law.bounded
-    assert "pip install" in law.doubts[0]
+    design, press = make(OTHER), Press((1e3,), 1.0, 0.05)
+    sensed, plan = carried_out(outlined(design, drawn(design), press, 1e-2))
+    assert not sensed.law.bounded
+    assert "pip install" in sensed.doubts[-1]
+    assert plan.width == math.inf
 
 
 def test_a_curve_ends_where_the_capacitance_is_no_longer_known(monkeypatch):
@@ -106,14 +110,14 @@ def test_an_unknown_cell_is_solved_once(monkeypatch):
     pytest.importorskip("netgen", reason="solves a cell: pip install sensorgen[fem]")
     from sensorgen.models import press2d
 
-    drawn = make({"shape": "tri", "parameters": {"period_mm": 2.00001}})
-    law = law_of(drawn, GAPS, "solved")
+    cell = make({"shape": "tri", "parameters": {"period_mm": 2.00001}})
+    law = law_of(cell, GAPS, "solved")
     stored = compression.solved("tri", vars(make({"shape": "tri"}).params), {"x60": 6e6, "etpu": 22e6})
     at = np.array([1e4, 3e4, 6e4, 1e5])
     rise, expected = (1 / (1 - c.thinning(at)[0]) - 1 for c in (law.compression, stored))
     within = (law.others[1].ratio[-1] - 1) / (law.compression.ratio[-1] - 1) - 1
-    assert 0.00599 <= within < 0.02
+    assert 0.00599 <= within < 0.03
     assert rise == pytest.approx(expected, rel=0.006 + within)
     assert {t.quantity for t in law.taken} == {"youngs_modulus_pa", "poisson_ratio"}
-    monkeypatch.setattr(press2d, "press", None)
-    assert law_of(drawn, GAPS, solve=True).compression == law.compression
+    monkeypatch.setattr(press2d, "press", lambda *_, **__: pytest.fail("pressed again"))
+    assert law_of(cell, GAPS, "solved").compression == law.compression

@@ -3,7 +3,7 @@
 import pytest
 
 from sensorgen import materials
-from sensorgen.compressed import _solids
+from sensorgen.celllaw import elastic
 from sensorgen.design import make
 from sensorgen.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.planner import permittivities, unloaded
@@ -65,7 +65,7 @@ def test_stiffness_and_force_go_together():
 def test_compression_of_cells_gets_them():
     x60 = {"youngs_modulus_pa": 3e6, "poisson_ratio": 0.45, "relative_permittivity": 3.0}
     own = design({"x60": x60, "air": {"relative_permittivity": 2.0}}, "tri")
-    solids = _solids(own, own.in_use)
+    solids = elastic(own, own.in_use)
     assert (solids["x60"].youngs_modulus_pa, solids["x60"].poisson_ratio) == (3e6, 0.45)
     assert solids["etpu"].youngs_modulus_pa == 22e6
     assert {t.material: t.value for t in permittivities(own)} == {"x60": 3.0, "air": 2.0}

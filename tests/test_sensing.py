@@ -102,15 +102,3 @@ def test_a_cell_that_says_no_displacement_is_no_bed():
 def test_a_modulus_that_no_source_gives_is_missing():
     with pytest.raises(MissingValue):
         sensed("tri", materials={"film": "pla"})
-
-
-def test_only_who_asks_for_an_accuracy_waits_for_an_unknown_cell(monkeypatch):
-    from sensorgen import celllaw
-
-    def solver(*_):
-        raise BadInput("solved in vain")
-
-    monkeypatch.setattr(celllaw, "solved", solver)
-    design = make({"shape": "tri", "parameters": {"period_mm": 2.5}})
-    assert "in vain" not in sensor_of(design).doubts[0]
-    assert "in vain" in sensor_of(design, accuracy=10.0).doubts[0]

@@ -81,7 +81,7 @@ def budget(
     ``total`` adds all terms, as if each were at its worst: bounds do not average out. It is None where a term has no
     bound, and that term is the largest.
     """
-    seen = _Seen(sensed.sensor, np.asarray(frequency_hz, float), force_n, position_m)
+    seen = Seen(sensed.sensor, frequency_hz, force_n, position_m)
     terms = [*_models(sensed, seen), *_materials(design, sensed, seen)]
     sums = {m: sum(t.size(m) for t in terms) for m in MEASURES}
     return {
@@ -104,11 +104,26 @@ def _verdict(terms: Sequence[Term], accuracy: float) -> dict[str, Any]:
     }
 
 
-class _Seen:
-    """A press as it is predicted, to hold other predictions against."""
+class Seen:
+    """A press as it is predicted, to hold other predictions against.
 
-    def __init__(self, sensor: Sensor, frequency_hz: Real, force_n: float, position_m: float) -> None:
-        self._press = frequency_hz, force_n, position_m
+    Parameters
+    ----------
+    sensor : Sensor
+        That is pressed.
+    frequency_hz : sequence of float
+        Tones [Hz].
+    force_n, position_m : float
+        The press [N], [m].
+
+    Raises
+    ------
+    OutOfRange
+        A press that the sensor cannot take.
+    """
+
+    def __init__(self, sensor: Sensor, frequency_hz: Sequence[float], force_n: float, position_m: float) -> None:
+        self._press = np.asarray(frequency_hz, float), force_n, position_m
         self._z, self._slope = self._read(sensor)
 
     def _read(self, sensor: Sensor) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
@@ -136,7 +151,7 @@ def _apart(one: NDArray[Any], other: NDArray[Any]) -> float:
         return float(np.max(np.where(one == other, 0.0, np.abs(one - other) / np.abs(other)), initial=0.0))
 
 
-def _models(sensed: Sensed, seen: _Seen) -> Iterator[Term]:
+def _models(sensed: Sensed, seen: Seen) -> Iterator[Term]:
     sensor, law, bounds = sensed.sensor, sensed.law, sensed.unloaded.answer.capacitance_f
     middle = sensor.capacitance_f_per_m / bounds.middle()
     ends = [replace(sensor, capacitance_f_per_m=middle * end) for end in (bounds.lower, bounds.upper)]
@@ -158,7 +173,7 @@ def _models(sensed: Sensed, seen: _Seen) -> Iterator[Term]:
     yield Term("tip", f"pressure spread like {', '.join(s.profile for s in spread)}", seen.change(*spread))
 
 
-def _materials(design: Design, sensed: Sensed, seen: _Seen) -> Iterator[Term]:
+def _materials(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:
     """One term for each value that sources disagree on."""
     sensor = sensed.sensor
     tracks = [_range(*design.slot(f"{end}_electrode"), "resistivity_ohm_m") for end in ("top", "bottom")]
@@ -169,7 +184,7 @@ def _materials(design: Design, sensed: Sensed, seen: _Seen) -> Iterator[Term]:
     yield from _permittivity(design, sensed, seen)
 
 
-def _stiffness(design: Design, sensed: Sensed, seen: _Seen) -> Iterator[Term]:
+def _stiffness(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:
     """All moduli at once: a cell gives way between what it would if all changed as much as those that change most."""
     sensor, used = sensed.sensor, design.used()
     softest, stiffest, said = inf, 0.0, []
@@ -185,7 +200,7 @@ def _stiffness(design: Design, sensed: Sensed, seen: _Seen) -> Iterator[Term]:
         yield Term("stiffness", ", ".join(said) + beyond, found)
 
 
-def _permittivity(design: Design, sensed: Sensed, seen: _Seen) -> Iterator[Term]:
+def _permittivity(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:
     """What other permittivities make of the capacitance, by the cheapest model, whose error mostly cancels."""
     known = {t.material: t for t in permittivities(design)}
     values = {name: t.value for name, t in known.items()}

@@ -18,9 +18,8 @@ PLACE = "SENSORGEN_CACHE"  # environment variable with another folder
 _SOURCES = (
     "models",
     "cells.py",
-    "celllaw.py",
-    "compressed.py",
     "interval.py",
+    "pressing.py",
     "scene.py",
     "sections.py",
     "units.py",

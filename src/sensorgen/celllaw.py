@@ -5,45 +5,27 @@ all where it is a prototype's as drawn; any other one, as a printed cell, is sol
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
-from functools import partial
-from hashlib import sha256
+from dataclasses import dataclass, replace
 from itertools import takewhile
-from json import dumps
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from sensorgen import cached
 from sensorgen.design import Design
-from sensorgen.errors import OutOfRange, SensorgenError, UnknownName
+from sensorgen.errors import OutOfRange, UnknownName
 from sensorgen.models import compression
 from sensorgen.models.compression import Compression, Curve
 from sensorgen.planner import Answer, Taken, is_plate, permittivities
+from sensorgen.pressing import FINEST, Case, Piece, Rung, drawn, model_of, pressed, rungs
 from sensorgen.scene import Scene
 from sensorgen.units import M_PER_MM
 
 if TYPE_CHECKING:
-    from sensorgen.models.press2d import Fineness, Pressed
-    from sensorgen.models.press3d import Pieces
+    from sensorgen.models.press2d import Elastic, Pressed
 
 LAWS = ("unconfined", "bonded", "solved")
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)))  # 6 N on a tip of 10 x 10 mm are 60 kPa
-_LEAST = 0.006  # of the rise: what mesh levels, penalties and a second discretisation agree to at best
 _LANDING = f"feet land at no force to speak of: what C rises by up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
 _SAME_RATIO = 1e-3  # of Poisson: 0.4999 and 0.5 make the same cell, 0.45 one that gives way by 11 % more
-_COARSER = 1.5  # mesh that a solution is compared with, by its edges
-
-
-@dataclass(frozen=True)
-class Piece:
-    """What is pressed of a sensor: a scene with its support gone, and the period of its pattern, if it has one [mm]."""
-
-    scene: Scene
-    period_mm: float | None
-
-
-def drawn(design: Design) -> Piece:
-    """The whole sensor as drawn."""
-    return Piece(design.in_use, getattr(design.params, "period_mm", None))
+_LIKE = {"press2d": "tri", "press3d": "rect"}  # prototypes that other cells are expected to be like
 
 
 @dataclass(frozen=True)
@@ -74,8 +56,8 @@ class Law:
     bounded: bool = True
 
 
-def law_of(design: Design, answer: Answer, name: str = "", *, solve: bool = False, printed: Piece | None = None) -> Law:
-    """The law of compression of a design.
+def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | None = None) -> Law:
+    """The law of compression of a design, as well as it is known at once; for "solved", in a minute or two.
 
     Parameters
     ----------
@@ -85,8 +67,6 @@ def law_of(design: Design, answer: Answer, name: str = "", *, solve: bool = Fals
         Its unloaded capacitance.
     name : str
         One of ``LAWS``, or "" for the best that is known.
-    solve : bool
-        Whether "" may take seconds to solve a cell that is not known.
     printed : Piece, optional
         What is printed of it; as drawn where not given.
 
@@ -104,18 +84,58 @@ def law_of(design: Design, answer: Answer, name: str = "", *, solve: bool = Fals
         return _plate(design, moduli, name, printed or drawn(design))
     if name == "bonded":
         raise OutOfRange(f"the law 'bonded' speaks of a solid plate; {design.shape} has gaps: expected 'unconfined'")
-    stiff = {n: t.value for n, t in moduli.items()}
-    known = None if printed else _stored(design, stiff)
+    known = None if printed else _stored(design, {n: t.value for n, t in moduli.items()})
     if known and name != "unconfined":
         return _cell(known, moduli)
     if name == "solved":
         return solved(design, printed)
-    if solve and not name:
-        try:
-            return solved(design, printed)
-        except SensorgenError as error:
-            return _as_plate(design, moduli, str(error))
     return _as_plate(design, moduli, "ask for the law 'solved', which takes a minute or two")
+
+
+@dataclass(frozen=True)
+class Option:
+    """A law that could be had.
+
+    Attributes
+    ----------
+    name : str
+        How it is found.
+    seconds : float
+        That it should take [s].
+    expected : Law
+        What it should be like, for what its error is worth.
+    find : function
+        The law itself; raises as :func:`solved`.
+    """
+
+    name: str
+    seconds: float
+    expected: Law
+    find: Callable[[], Law]
+
+
+def options(design: Design, answer: Answer, name: str = "", *, printed: Piece | None = None) -> list[Option]:
+    """The laws that could be had of a design, the cheapest first; parameters and errors as of :func:`law_of`."""
+    at_once = law_of(design, answer, "" if name == "solved" else name, printed=printed)
+    known = Option(at_once.compression.name, 0.0, at_once, lambda: at_once)
+    if at_once.bounded or name == "unconfined":
+        return [known]
+    piece = printed or drawn(design)
+    model = model_of(piece)
+    return [known, *(_option(design, printed, rung) for rung in rungs(piece, model, len(STRESS_PA) - 1))]
+
+
+def _option(design: Design, printed: Piece | None, rung: Rung) -> Option:
+    """A mesh of the cell; until it is solved, it is taken to rise as the nearest prototype does."""
+    law = _cell(expected(design, rung), values(design, "youngs_modulus_pa"))
+    return Option(rung.name, rung.seconds, law, lambda: solved(design, printed, rung.level))
+
+
+def expected(design: Design, rung: Rung) -> Curve:
+    """What a mesh of an unknown cell should find: the curve of the prototype that it is nearest to."""
+    modulus_pa = values(design, "youngs_modulus_pa")[film(design)].value
+    like = compression.prototype(_LIKE[rung.model]).stiffer(modulus_pa / compression.PROTOTYPE_PA)
+    return replace(like, within=rung.rise)
 
 
 def _stored(design: Design, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
@@ -154,8 +174,8 @@ def _cell(found: Curve, moduli: Mapping[str, Taken], doubts: tuple[str, ...] = (
     return Law(found, tuple(moduli.values()), doubts, others, held)
 
 
-def solved(design: Design, printed: Piece | None = None, **held: str) -> Law:
-    """The law of a cell by finite elements, or from the cache.
+def solved(design: Design, printed: Piece | None = None, level: int = FINEST, **held: str) -> Law:
+    """The law of a cell by finite elements on one mesh, held against the next coarser one.
 
     Parameters
     ----------
@@ -163,6 +183,8 @@ def solved(design: Design, printed: Piece | None = None, **held: str) -> Law:
         As drawn.
     printed : Piece, optional
         What is printed of it; as drawn where not given.
+    level : int
+        Of the mesh, as of :func:`sensorgen.pressing.pressed`.
     **held : str
         How it is held and touched, as of :class:`sensorgen.models._press.support.Held`.
 
@@ -171,60 +193,33 @@ def solved(design: Design, printed: Piece | None = None, **held: str) -> Law:
     MissingValue, BadInput, OutOfRange
         No modulus or Poisson's ratio, no NGSolve; a cell that is no prism; a solution that is not to be trusted.
     """
+    from sensorgen.models.press2d import Held, curve_of
+
     moduli, ratios = values(design, "youngs_modulus_pa"), values(design, "poisson_ratio")
-    eps = {t.material: t.value for t in permittivities(design)}
-    solids = {name: (moduli[name].value, ratios[name].value) for name in moduli}
-    refuse_crushing(STRESS_PA[-1], {name: t.value for name, t in moduli.items()})
     piece = printed or drawn(design)
-    cell = sha256(dumps(asdict(piece), sort_keys=True).encode()).hexdigest()
-    question = {"what": "compression", "cell": cell, "solids": solids, "permittivity": eps, "held": held}
-    found = cached.answer(question | {"stress_pa": STRESS_PA}, lambda: _pressed(piece, solids, eps, held))
-    doubts = tuple(found["doubts"])
-    if found["stress_pa"][-1] < STRESS_PA[-1]:
-        doubts = (*doubts, f"the solution of the cell ended at {found['stress_pa'][-1] / 1e3:.3g} kPa")
-    curve = compression.curve("solved", found["source"], found["stress_pa"], found["ratio"])
-    held_else = compression.held_of(found["of"])
-    curve = replace(curve, within=found["within"], held=held_else, moved_m=found["moved_m"])
+    model = model_of(piece)
+    eps = {t.material: t.value for t in permittivities(design)}
+    case = Case(piece, model, elastic(design, piece.scene), eps, Held(**held))
+    found = _as_far(case, level)
+    curve = curve_of(found)
+    other = curve_of(pressed(case, curve.stress_pa, level - 1))
+    rises = zip(curve.ratio[1:], other.ratio[1:], strict=False)
+    least = next(rung.rise for rung in rungs(piece, model, 1) if rung.level == level)
+    curve = replace(
+        curve,
+        within=max(least, *(abs((b - 1) / (a - 1) - 1) for a, b in rises)),
+        held=compression.prototype(_LIKE[model]).held,
+        moved_m=float(found.displacement_m[-1]) - found.fall_m,
+    )
+    doubts = (*found.doubts, *([_LANDING] if found.fall_m else []), *_short(curve))
     return _cell(curve, {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, doubts)
 
 
-def refuse_crushing(stress_pa: float, youngs_modulus_pa: Mapping[str, float]) -> None:
-    """Refuse a stress above the least modulus [Pa], by material: it would be reached in no time that anyone waits."""
-    softest = min(youngs_modulus_pa, key=lambda name: youngs_modulus_pa[name])
-    if stress_pa > youngs_modulus_pa[softest]:
-        raise OutOfRange(
-            f"{stress_pa / 1e3:g} kPa on {softest} of {youngs_modulus_pa[softest] / 1e3:g} kPa (Young's modulus): "
-            "expected a stress up to the least modulus"
-        )
-
-
-def _pressed(
-    piece: Piece, solids: Mapping[str, tuple[float, float]], eps: Mapping[str, float], given: Mapping[str, str]
-) -> dict[str, Any]:
-    """The curve of a cell on two meshes, as plain data; as far as it converged and its capacitance is known."""
-    from sensorgen.models import press2d, press3d
-
-    elastic = {name: press2d.Elastic(*pair) for name, pair in solids.items()}
-    held, stress = press2d.Held(**given), list(STRESS_PA)
-    flat = press2d.unfit(piece.scene) is None or press3d.unfit(piece.scene) is not None
-    press, coarse = _flat(piece) if flat else _boxes(piece)
-    found = press(elastic, stress, eps, held)
-    if 0 < _reach_pa(found) < stress[-1]:
-        stress = [p for p in stress if p <= _reach_pa(found)]
-        found = press(elastic, stress, eps, held)
-    curve = press2d.curve_of(found)
-    other = press2d.curve_of(press(elastic, stress, eps, held, coarse))
-    rises = zip(curve.ratio[1:], other.ratio[1:], strict=False)
-    within = max(abs((b - 1) / (a - 1) - 1) for a, b in rises)
-    return {
-        "source": curve.source,
-        "stress_pa": curve.stress_pa,
-        "ratio": curve.ratio,
-        "within": max(within, _LEAST),
-        "of": "tri" if flat else "rect",
-        "moved_m": float(found.displacement_m[-1]) - found.fall_m,
-        "doubts": [*found.doubts, *([_LANDING] if found.fall_m else [])],
-    }
+def _as_far(case: Case, level: int) -> "Pressed":
+    """A case pressed as far as it converges and its capacitance is known."""
+    found = pressed(case, STRESS_PA, level)
+    reach = _reach_pa(found)
+    return pressed(case, [p for p in STRESS_PA if p <= reach], level) if 0 < reach < STRESS_PA[-1] else found
 
 
 def _reach_pa(found: "Pressed") -> float:
@@ -233,20 +228,21 @@ def _reach_pa(found: "Pressed") -> float:
     return max((p for p, _ in takewhile(lambda pair: pair[1] is not None, pairs)), default=0.0)
 
 
-def _flat(piece: Piece) -> tuple[Callable[..., "Pressed"], "Fineness"]:
-    """How to press a cross-section, and a coarser mesh."""
-    from sensorgen.models import press2d
-
-    cell, fine = press2d.cell(piece.scene, piece.period_mm), press2d.Fineness()
-    coarse = replace(fine, corner_mm=_COARSER * fine.corner_mm, coarse_mm=_COARSER * fine.coarse_mm)
-    return partial(press2d.press, cell), coarse
+def _short(curve: Curve) -> list[str]:
+    last = curve.stress_pa[-1]
+    return [f"the solution of the cell ended at {last / 1e3:.3g} kPa"] if last < STRESS_PA[-1] else []
 
 
-def _boxes(piece: Piece) -> tuple[Callable[..., "Pressed"], "Pieces"]:
-    """How to press a scene of boxes, and a coarser mesh."""
-    from sensorgen.models import press3d
+def elastic(design: Design, scene: Scene) -> "dict[str, Elastic]":
+    """How each material of a scene gives way."""
+    from sensorgen.models.press2d import Elastic
 
-    return partial(press3d.press, press3d.cell(piece.scene)), press3d.Pieces().coarser()
+    used = design.used()
+    loaded = {name: design.material(name) for name in sorted({body.material for body in scene.bodies})}
+    return {
+        name: Elastic(m.value("youngs_modulus_pa", used[name]).value, m.value("poisson_ratio", used[name]).value)
+        for name, m in loaded.items()
+    }
 
 
 def film(design: Design) -> str:

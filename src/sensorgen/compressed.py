@@ -1,62 +1,87 @@
 """How a design's cell gives way under stress, as plain data: what ``sensorgen compress`` answers."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import takewhile
+from math import inf
 from typing import Any
 
-from sensorgen import cached
+import numpy as np
+
 from sensorgen.asprinted.compared import Printed
 from sensorgen.asprinted.pressed import piece as printed_piece
 from sensorgen.asprinted.pressed import width_by
-from sensorgen.celllaw import Piece, drawn, refuse_crushing
+from sensorgen.celllaw import elastic, expected
 from sensorgen.design import Design
 from sensorgen.errors import BadInput, OutOfRange
-from sensorgen.models import press2d, press3d, springs
-from sensorgen.models.press2d import Elastic, Fineness, Held
-from sensorgen.models.press3d import Pieces
+from sensorgen.interval import Interval
+from sensorgen.models import press2d, springs
+from sensorgen.models.press2d import Held, Pressed
+from sensorgen.plan import Candidate, Level, Plan, cheapest, plain, walked
 from sensorgen.planner import permittivities
+from sensorgen.pressing import FINEST, MODELS, Case, Piece, Rung, drawn, pressed, rungs, unfit
 from sensorgen.scene import Scene
 
-__all__ = ["MODELS", "Held", "answer", "stresses_kpa"]
+__all__ = ["ALL", "Asked", "Held", "answer", "planned", "stresses_kpa"]
 
 Data = dict[str, Any]
-MODELS = ("press2d", "press3d", "springs")
+Step = Callable[[float], None]
+Told = tuple[Pressed, tuple[float, ...]]
+ALL = (*MODELS, "springs")
 
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _OF_OUTLINES = "of the capacitance of the deformed outlines as computed; the outlines' own error is not in them"
+_OF_ALL = (
+    "of the capacitance of the deformed outlines, moved apart by what the next coarser mesh differs by: an estimate"
+)
+_NO_C = "springs know no capacitance"
+_MEASURE = "bounds of C apart, at the worst stress"
+_BRACKET = {"press2d": 3.4e-4, "press3d": 2e-3}  # how far the outlines' own bounds are apart, on prototypes [-]
 
 
-def answer(
-    design: Design,
-    stress_kpa: Sequence[float],
-    held: Held,
-    model: str = "",
-    *,
-    check_mesh: bool = False,
-    keep: bool = True,
-    step: Callable[[float], None] | None = None,
-    printed: Printed | None = None,
-) -> Data:
+@dataclass(frozen=True)
+class Asked:
+    """What is asked about a press.
+
+    Attributes
+    ----------
+    stress_kpa : tuple of float
+        Rising, 0 first [kPa].
+    held : Held
+        Base, period, top and contact.
+    model : str
+        One of ``ALL``, or "" for the first that can speak of the scene.
+    accuracy : float
+        How far the bounds of the capacitance may be apart at every stress, relative to their middle, the outlines' own
+        error in them; where infinite, the usual mesh is taken, and its error not told [-].
+    check_mesh : bool
+        Hold the displacement against the next coarser mesh.
+    keep : bool
+        Take what is known from before, and keep what is new.
+    """
+
+    stress_kpa: tuple[float, ...]
+    held: Held
+    model: str = ""
+    accuracy: float = inf
+    check_mesh: bool = False
+    keep: bool = True
+
+
+def answer(design: Design, asked: Asked, *, printed: Printed | None = None, step: Step | None = None) -> Data:
     """Displacement and bounds of the capacitance per area over stress.
 
     Parameters
     ----------
     design : Design
         Its support is taken to be gone.
-    stress_kpa : sequence of float
-        Rising, 0 first [kPa].
-    held : Held
-        Base, period, top and contact.
-    model : str
-        One of ``MODELS``, or "" for the first that can speak of the scene.
-    check_mesh : bool
-        Solve on a finer mesh too, and compare.
-    keep : bool
-        Take an answer that is known from before, and keep a new one.
-    step : callable, optional
-        Told every stress that is reached [Pa].
+    asked : Asked
+        Stresses, how it is held, and how near.
     printed : Printed, optional
         What is printed of it, to be pressed in place of the drawing.
+    step : callable, optional
+        Told every stress that is reached [Pa].
 
     Raises
     ------
@@ -64,54 +89,121 @@ def answer(
         A modulus, a Poisson's ratio or a permittivity that no source gives, or no mesher.
     BadInput, OutOfRange
         As :func:`sensorgen.models.press2d.press`; other electrodes than two, sides that a bonded base holds, a
-        stress above the least modulus.
+        stress above the least modulus; an accuracy of springs, or one that is not above 0.
     """
-    piece = printed_piece(design, printed) if printed else drawn(design)
-    found = _answer(design, piece, stress_kpa, held, model, check_mesh=check_mesh, keep=keep, step=step)
-    return found | {"printed": width_by(printed)} if printed else found
+    piece = _piece(design, printed)
+    by = {"printed": width_by(printed)} if printed else {}
+    if asked.accuracy < inf:
+        return _as_near(design, piece, asked, step) | by
+    if _model(piece, asked) == "springs":
+        return _springs(design, piece.scene, asked) | by
+    case = _case(design, piece, asked)
+    found = _pressed(case, asked, FINEST, step)
+    if asked.check_mesh:
+        found = press2d.compared(found, _pressed(case, asked, FINEST + 1, step))
+    return _plain(found, case) | by
 
 
-def _answer(
-    design: Design,
-    piece: Piece,
-    stress_kpa: Sequence[float],
-    held: Held,
-    model: str,
-    *,
-    check_mesh: bool,
-    keep: bool,
-    step: Callable[[float], None] | None,
-) -> Data:
-    solids = _solids(design, piece.scene)
-    asked = [_PA_PER_KPA * kpa for kpa in stress_kpa]
-    name = model or next(m for m, refuses in _UNFIT.items() if not refuses(piece.scene))
-    if name == "springs":
-        return _springs(piece.scene, solids, asked)
-    _refuse_unpressable(piece.scene, held)
-    refuse_crushing(asked[-1], {name: solid.youngs_modulus_pa for name, solid in solids.items()})
-    permittivity = {t.material: t.value for t in permittivities(design)}
-    press, cell = _PRESSED[name](piece)
+def planned(design: Design, asked: Asked, printed: Printed | None = None) -> Plan:
+    """What an accuracy takes, before anything is pressed; parameters and errors as of :func:`answer`."""
+    return _planned(design, _piece(design, printed), asked)
 
-    def work() -> Data:
-        found: press2d.Pressed = press(solids, asked, permittivity, held, step=step)
-        if check_mesh:
-            finer = (Pieces() if name == "press3d" else Fineness()).finer()
-            found = press2d.compared(found, press(solids, asked, permittivity, held, finer, step=step))
-        return _plain(found, name, held)
 
-    if not keep:
-        return work()
-    question = {
-        "compress": cell,
-        "model": name,
-        "solids": {name: [s.youngs_modulus_pa, s.poisson_ratio] for name, s in solids.items()},
-        "permittivity": permittivity,
-        "stress_pa": asked,
-        "held": vars(held),
-        "check_mesh": check_mesh,
+def _piece(design: Design, printed: Printed | None) -> Piece:
+    return printed_piece(design, printed) if printed else drawn(design)
+
+
+def _planned(design: Design, piece: Piece, asked: Asked) -> Plan:
+    if not asked.accuracy > 0:
+        raise OutOfRange(f"an accuracy of {asked.accuracy:g}; expected a number above 0, as 1e-2")
+    model = _model(piece, asked)
+    if model == "springs":
+        why = "--model springs" if asked.model else unfit(piece, MODELS[0])
+        raise BadInput(f"an accuracy of C, and {why}: {_NO_C}; leave out --accuracy")
+    others = [Candidate(name, passed_over=_reason(piece, name, asked.model)) for name in ALL if name != model]
+    meshes = [_candidate(design, asked, rung) for rung in _rungs(piece, model, asked)]
+    candidates = (*others, *meshes)
+    level = Level(
+        "compression", _MEASURE, asked.accuracy, candidates, cheapest(candidates, asked.accuracy)
+    )  # fmt: skip
+    return Plan(asked.accuracy, f"C up to {asked.stress_kpa[-1]:g} kPa", (level,))
+
+
+def _model(piece: Piece, asked: Asked) -> str:
+    return asked.model or next((name for name in MODELS if not unfit(piece, name)), "springs")
+
+
+def _rungs(piece: Piece, model: str, asked: Asked) -> list[Rung]:
+    return rungs(piece, model, len(asked.stress_kpa) - 1)
+
+
+def _reason(piece: Piece, name: str, forced: str) -> str:
+    if forced:
+        return f"--model {forced}"
+    return _NO_C if name == "springs" else unfit(piece, name) or "the model before it speaks of the cell"
+
+
+def _candidate(design: Design, asked: Asked, rung: Rung) -> Candidate:
+    """A mesh, as near as it should come where the cell rises like a prototype."""
+    curve = expected(design, rung)
+    share = float(curve.thinning(np.minimum(asked.stress_kpa[-1] * _PA_PER_KPA, curve.stress_pa[-1]))[0])
+    return Candidate(rung.name, _BRACKET[rung.model] + 2 * rung.rise * share, rung.seconds)
+
+
+def _as_near(design: Design, piece: Piece, asked: Asked, step: Step | None) -> Data:
+    """The first mesh that is near enough, from the one on that should be; the nearest where none is."""
+    plan = _planned(design, piece, asked)
+    case = _case(design, piece, asked)
+    find = {rung.name: partial(_told, case, asked, rung, step) for rung in _rungs(piece, case.model, asked)}
+    (found, off), level = walked(plan.levels[0], find, lambda answer: _width(*answer))
+    data = _plain(_widened(found, off), case) | {"bounds": _OF_ALL}
+    return data | {
+        "accuracy": asked.accuracy,
+        "relative_width": _width(found, off) if _width(found, off) < inf else None,
+        "reached": _width(found, off) <= asked.accuracy,
+        "plan": plain(replace(plan, levels=(level,))),
     }
-    known: Data = cached.answer(question, work)
-    return known
+
+
+def _told(case: Case, asked: Asked, rung: Rung, step: Step | None) -> Told:
+    """A case on one mesh, and the share by which each capacitance may be off for it [-]."""
+    fine, coarse = (_pressed(case, asked, level, step) for level in (rung.level, rung.level - 1))
+    rises, others = (_rises(found) for found in (fine, coarse))
+    off = [max(rung.rise * a, abs(a - b)) / (1 + a) for a, b in zip(rises, others, strict=False)]
+    return fine, tuple(off)
+
+
+def _rises(found: Pressed) -> list[float]:
+    """By how much each capacitance is above the first, as far as they are known [-]."""
+    known = [c.middle() for c in takewhile(bool, found.capacitance_f_per_m2) if c]
+    return [c / known[0] - 1 for c in known]
+
+
+def _widened(found: Pressed, off: Sequence[float]) -> Pressed:
+    """The same, its bounds moved apart by a share of their middle; none where no share is known."""
+    bounds = (
+        Interval(c.lower - share * c.middle(), c.upper + share * c.middle()) if c else None
+        for c, share in zip(found.capacitance_f_per_m2, off, strict=False)
+    )
+    missing = (None,) * (len(found.capacitance_f_per_m2) - len(off))
+    return replace(found, capacitance_f_per_m2=(*bounds, *missing))
+
+
+def _width(found: Pressed, off: Sequence[float]) -> float:
+    """How far the widened bounds are apart at worst; infinite where one is not known, or not to be trusted [-]."""
+    widened = _widened(found, off).capacitance_f_per_m2
+    return max((c.width() if c else inf for c in widened), default=inf) if not found.faults else inf
+
+
+def _case(design: Design, piece: Piece, asked: Asked) -> Case:
+    _refuse_unpressable(piece.scene, asked.held)
+    permittivity = {t.material: t.value for t in permittivities(design)}
+    return Case(piece, _model(piece, asked), elastic(design, piece.scene), permittivity, asked.held)
+
+
+def _pressed(case: Case, asked: Asked, level: int, step: Step | None) -> Pressed:
+    stress_pa = [_PA_PER_KPA * kpa for kpa in asked.stress_kpa]
+    return pressed(case, stress_pa, level, keep=asked.keep, step=step)
 
 
 def _refuse_unpressable(scene: Scene, held: Held) -> None:
@@ -126,38 +218,11 @@ def _refuse_unpressable(scene: Scene, held: Held) -> None:
         raise BadInput("sides that give way over a base that is bonded cannot: expected base 'sliding' with them")
 
 
-def _in_2d(piece: Piece) -> tuple[Callable[..., press2d.Pressed], str]:
-    cell = press2d.cell(piece.scene, piece.period_mm)
-    return partial(press2d.press, cell), repr(cell)
-
-
-def _in_3d(piece: Piece) -> tuple[Callable[..., press2d.Pressed], str]:
-    cell = press3d.cell(piece.scene)
-    return partial(press3d.press, cell), cell.written()
-
-
-_PRESSED = {"press2d": _in_2d, "press3d": _in_3d}
-_UNFIT: dict[str, Callable[[Scene], str | None]] = {
-    "press2d": press2d.unfit,
-    "press3d": press3d.unfit,
-    "springs": lambda _: None,
-}
-
-
-def _solids(design: Design, scene: Scene) -> dict[str, Elastic]:
-    used = design.used()
-    loaded = {name: design.material(name) for name in sorted({body.material for body in scene.bodies})}
-    return {
-        name: Elastic(m.value("youngs_modulus_pa", used[name]).value, m.value("poisson_ratio", used[name]).value)
-        for name, m in loaded.items()
-    }
-
-
-def _plain(found: press2d.Pressed, model: str, held: Held) -> Data:
+def _plain(found: Pressed, case: Case) -> Data:
     bounds = found.capacitance_f_per_m2
     return {
-        "model": model,
-        "held": dict(vars(held)),
+        "model": case.model,
+        "held": dict(vars(case.held)),
         "stress_kpa": [p / _PA_PER_KPA for p in found.stress_pa.tolist()],
         "displacement_um": [d * _UM_PER_M for d in found.displacement_m.tolist()],
         "lower_f_per_m2": [c.lower if c else None for c in bounds],
@@ -169,22 +234,22 @@ def _plain(found: press2d.Pressed, model: str, held: Held) -> Data:
     }
 
 
-def _springs(scene: Scene, solids: Mapping[str, Elastic], stress_pa: Sequence[float]) -> Data:
+def _springs(design: Design, scene: Scene, asked: Asked) -> Data:
     """What springs of columns know: a displacement, and no capacitance."""
     why = press2d.unfit(scene)
-    plane = why is None
+    plane, solids, stress_kpa = why is None, elastic(design, scene), list(asked.stress_kpa)
     moduli = {name: s.youngs_modulus_pa / ((1 - s.poisson_ratio**2) if plane else 1.0) for name, s in solids.items()}
-    moved = springs.displacement_m(scene, moduli, stress_pa)
+    moved = springs.displacement_m(scene, moduli, [_PA_PER_KPA * p for p in stress_kpa])
     boxes = all(prism.is_box() for body in scene.bodies for prism in body.prisms)
     said = "at most this, at small strain under a stiff plate" if boxes else "a guess: columns that know no neighbours"
     return {
         "model": "springs",
         "held": {"top": "rigid"},
-        "stress_kpa": [p / _PA_PER_KPA for p in stress_pa],
+        "stress_kpa": stress_kpa,
         "displacement_um": (moved * _UM_PER_M).tolist(),
-        "lower_f_per_m2": [None] * len(stress_pa),
-        "upper_f_per_m2": [None] * len(stress_pa),
-        "converged_kpa": stress_pa[-1] / _PA_PER_KPA,
+        "lower_f_per_m2": [None] * len(stress_kpa),
+        "upper_f_per_m2": [None] * len(stress_kpa),
+        "converged_kpa": stress_kpa[-1],
         "faults": [],
         "doubts": [f"displacement: {said}", "no capacitance: springs do not know outlines", *([why] if why else [])],
         "bounds": "none",

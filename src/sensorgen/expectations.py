@@ -59,15 +59,20 @@ def expected(model: str, scene: Scene, width: float) -> tuple[float | None, floa
     In a sensor that is cut amid a cell the energy of its own length counts, whose bounds are apart by the root of the
     cell's.
     """
-    found = measured().get(model)
-    if found is None:
+    if model not in measured():
         return None, None
-    size = _size(scene, found.counted) if width < inf else None
+    found = points(model, scene if width < inf else None)
+    enough = [point for point in found if point[0] <= width]
+    return min(enough, key=lambda p: p[1]) if enough else min(found)
+
+
+def points(model: str, scene: Scene | None) -> list[tuple[float, float]]:
+    """All widths that a model reached [-], each with its time [s], scaled to a scene if one is given."""
+    found = measured()[model]
+    size = _size(scene, found.counted) if scene else None
     root = 0.5 if size and size.is_cut else 1.0
     times = (size.parts / found.parts) ** found.power if size else 1.0
-    points = [(reached**root, seconds * times) for reached, seconds in found.points]
-    enough = [point for point in points if point[0] <= width]
-    return min(enough, key=lambda p: p[1]) if enough else min(points)
+    return [(reached**root, seconds * times) for reached, seconds in found.points]
 
 
 @cache
@@ -96,6 +101,11 @@ def _bands(scene: Scene) -> Size:
     return Size(sum(len(s.bands) for s in found.slices), len(set(found.shares)) > 1)
 
 
+def _pieces(scene: Scene) -> Size:
+    """The same of a cell that is pressed by itself."""
+    return _bands(scene)._replace(is_cut=False)
+
+
 def _boxes(scene: Scene) -> Size:
     """Boxes between the electrodes."""
     from sensorgen.models._fem_bricks import grid
@@ -103,4 +113,4 @@ def _boxes(scene: Scene) -> Size:
     return Size(int((grid(scene).fill > 1).sum()), is_cut=False)
 
 
-COUNTED: dict[str, Callable[[Scene], Size]] = {"bands": _bands, "boxes": _boxes}
+COUNTED: dict[str, Callable[[Scene], Size]] = {"bands": _bands, "pieces": _pieces, "boxes": _boxes}

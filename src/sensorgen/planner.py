@@ -18,6 +18,7 @@ from sensorgen.design import Design
 from sensorgen.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.expectations import expected
 from sensorgen.interval import Disc, Interval
+from sensorgen.plan import Candidate
 from sensorgen.scene import Scene
 from sensorgen.sections import overlap
 
@@ -32,35 +33,6 @@ class Unpredictable(SensorgenError):
 
 class Contradiction(SensorgenError):
     """Two models whose bounds exclude each other: a fault, and no result."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A model in a plan: what was expected of it, and what came of it.
-
-    Attributes
-    ----------
-    model : str
-        Its name.
-    expected_width, expected_seconds : float or None
-        Width of the bounds relative to their middle [-], and time [s], scaled from the scene that it was measured on;
-        None where it never was.
-    passed_over : str
-        Why it was not asked, or "".
-    width, seconds : float or None
-        What it gave, and how long it took, its imports left out.
-    """
-
-    model: str
-    expected_width: float | None = None
-    expected_seconds: float | None = None
-    passed_over: str = ""
-    width: float | None = None
-    seconds: float | None = None
-
-    def reach(self) -> float:
-        """Expected width; 0 where nothing is known, so that it is tried."""
-        return self.expected_width or 0.0
 
 
 @dataclass(frozen=True)

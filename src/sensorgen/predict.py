@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sensorgen import planned
 from sensorgen.budget import budget
 from sensorgen.card import FORCE_N, card
 from sensorgen.design import Design
@@ -18,8 +19,10 @@ from sensorgen.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.interval import Interval
 from sensorgen.losses import Lost, lost
 from sensorgen.models import line
+from sensorgen.plan import Plan, plain
+from sensorgen.planned import Press
 from sensorgen.planner import Unloaded, Unpredictable, unloaded
-from sensorgen.sensing import TIP_M, Sensed, sensor_of
+from sensorgen.sensing import TIP_M, Sensed
 from sensorgen.sensor import UNIFORM, Sensor
 from sensorgen.units import M_PER_MM, frequency_text
 
@@ -31,6 +34,7 @@ _ASSUMED = "the cell was not solved, and is taken to give way as a solid plate"
 FORCES_N = tuple(k / 10 for k in range(61))  # up to the thesis's 6 N
 
 Complex = NDArray[np.complex128]
+Data = dict[str, Any]
 
 
 def prediction(
@@ -50,7 +54,7 @@ def prediction(
         Law of compression, length of the tip [m], how its pressure is spread and its radius [m], as of
         :func:`sensorgen.sensing.sensor_of`, for the card and the error budget.
     accuracy : float
-        Wanted of abs(Z), relative [-]; the capacitance is bounded as nearly, and an unknown cell solved.
+        Wanted of abs(Z), relative [-]: each level is worked out as nearly as that takes.
     noise : float
         Standard deviation of Re Z and of Im Z, each, as a share of abs(Z), for the card [-].
     judged : bool
@@ -60,8 +64,11 @@ def prediction(
     -----
     A scene that no model can speak of, as a short, or a material without a value has a reason in place of numbers.
     """
+    tip: Data = {"tip_m": tip_m, "profile": profile, "radius_m": radius_m}
+    press = middle(design, frequency_hz)
     try:
-        found, gone = unloaded(design, accuracy), lost(design)
+        sensed, plan, why = _sensed(design, press, accuracy, law, tip) if judged else (None, None, None)
+        found, gone = sensed.unloaded if sensed else unloaded(design, accuracy), lost(design)
     except (Unpredictable, MissingValue) as error:
         return {"capacitance_f": None, "reason": str(error)}
     area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
@@ -74,7 +81,9 @@ def prediction(
         "capacitance_per_area_f_per_m2": _bounds(found.answer.capacitance_f.times(1 / area)),
         "electrode_resistance_ohm": resistance,
         **_line(sum(resistance.values()), found.answer.capacitance_f, gone, frequency_hz),
-        **(_pressed(design, found, frequency_hz, (law, tip_m, profile, radius_m), accuracy, noise) if judged else {}),
+        **(_judged(design, sensed, press, accuracy, noise) if sensed else {}),
+        **(_unjudged(why) if why else {}),
+        **({"plan": plain(plan)} if plan else {}),
         "values": [vars(t) for t in (*found.taken, *gone.taken)],
         "assumptions": [
             "ideal electrodes and no fringe at the sensor's edge for the capacitance",
@@ -96,35 +105,24 @@ def _lossless(gone: Lost) -> str:
     )
 
 
-def _pressed(
-    design: Design,
-    found: Unloaded,
-    frequency_hz: Sequence[float],
-    press: tuple[str, float, str, float | None],
-    accuracy: float,
-    noise: float,
-) -> dict[str, Any]:
-    """What can be judged of a press of ``FORCE_N`` in the middle, or why nothing can."""
-    law, tip_m, profile, radius_m = press
+def middle(design: Design, frequency_hz: Sequence[float]) -> Press:
+    """The press that an unpressed prediction is judged by: ``FORCE_N`` in the middle."""
+    return Press(tuple(frequency_hz), FORCE_N, float(design.params.length_mm) * M_PER_MM / 2)
+
+
+def _sensed(
+    design: Design, press: Press, accuracy: float, law: str, tip: Data
+) -> tuple[Sensed | None, Plan | None, SensorgenError | None]:
+    """The sensor, how it was planned where an accuracy is wanted; or why there is none."""
     try:
-        sensed = sensor_of(
-            design, law, tip_m, profile=profile, radius_m=radius_m, accuracy=accuracy, known=found
-        )  # fmt: skip
+        return *planned.sensed(design, planned.drawn(design, **tip), press, accuracy, law), None
     except SensorgenError as error:
-        return _unjudged(error)
-    return _judged(design, sensed, frequency_hz, (FORCE_N, sensed.sensor.length_m / 2), accuracy, noise)
+        return None, None, error
 
 
-def _judged(
-    design: Design,
-    sensed: Sensed,
-    frequency_hz: Sequence[float],
-    press: tuple[float, float],
-    accuracy: float,
-    noise: float,
-) -> dict[str, Any]:
-    """Identifiability card and error budget of a press (force [N], position [m]); or why there are none."""
-    law, (force_n, position_m) = sensed.law, press
+def _judged(design: Design, sensed: Sensed, press: Press, accuracy: float, noise: float) -> Data:
+    """Identifiability card and error budget of a press; or why there are none."""
+    law = sensed.law
     stiffest = (
         replace(sensed.sensor, compression=law.others[0])
         if law.compression.name == "unconfined" and law.bounded
@@ -132,19 +130,19 @@ def _judged(
     )
     try:
         made = card(
-            sensed.sensor, frequency_hz, noise, force_n=force_n or FORCE_N, position_m=position_m, stiffest=stiffest,
-            assumed="" if law.bounded else _ASSUMED,
+            sensed.sensor, press.frequency_hz, noise, force_n=press.force_n or FORCE_N, position_m=press.position_m,
+            stiffest=stiffest, assumed="" if law.bounded else _ASSUMED,
         )  # fmt: skip
         doubts = [] if stiffest else list(sensed.doubts)  # the stiffest law says it in numbers
         return {
             "identifiability": made | {"doubts": doubts},
-            "budget": budget(design, sensed, frequency_hz, force_n, position_m, accuracy),
+            "budget": budget(design, sensed, press.frequency_hz, press.force_n, press.position_m, accuracy),
         }
     except SensorgenError as error:
         return _unjudged(error)
 
 
-def _unjudged(error: SensorgenError) -> dict[str, Any]:
+def _unjudged(error: SensorgenError) -> Data:
     return {"identifiability": {"verdict": None, "reason": str(error)}, "budget": None}
 
 
@@ -264,6 +262,7 @@ def presses(
     position_mm: Sequence[float],
     accuracy: float = inf,
     noise: float = NOISE,
+    plan: Plan | None = None,
 ) -> dict[str, Any]:
     """Impedance over tone, force and position, and what it rests on, as plain data.
 
@@ -279,6 +278,8 @@ def presses(
         Wanted of abs(Z), relative, for the error budget of the largest force at the middle position [-].
     noise : float
         As of :func:`prediction`, for the card of that press [-].
+    plan : Plan
+        How the sensor came to be as near as wanted.
 
     Returns
     -------
@@ -304,9 +305,8 @@ def presses(
         "profile": sensor.profile,
         "contact_mm": float(sensor.contact_m(force_n[-1])[0]) / M_PER_MM,
         "noise": noise,
-        **_judged(
-            design, sensed, frequency_hz, (force_n[-1], float(position_m[len(position_m) // 2])), accuracy, noise
-        ),
+        **_judged(design, sensed, hardest(frequency_hz, force_n, position_mm), accuracy, noise),
+        **({"plan": plain(plan)} if plan else {}),
         "doubts": [*sensed.doubts, *([beyond] if beyond else [])],
         "values": [vars(t) for t in sensed.taken],
         "axes": ["frequency_hz", "force_n", "position_mm"],
@@ -316,6 +316,11 @@ def presses(
         "re_ohm": z.real.tolist(),
         "im_ohm": z.imag.tolist(),
     }
+
+
+def hardest(frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float]) -> Press:
+    """The press that others are judged by: the largest force at the middle position."""
+    return Press(tuple(frequency_hz), force_n[-1], position_mm[len(position_mm) // 2] * M_PER_MM)
 
 
 def check_size(most: int, *axes: Sequence[float]) -> None:

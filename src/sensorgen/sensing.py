@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from math import inf
 
-from sensorgen.celllaw import Law, Piece, drawn, film, gap_m, law_of, values
+from sensorgen.celllaw import Law, film, gap_m, law_of, values
 from sensorgen.design import Design
 from sensorgen.errors import BadInput
 from sensorgen.losses import Lost, lost
 from sensorgen.models import pressure
 from sensorgen.planner import Taken, Unloaded, unloaded
+from sensorgen.pressing import Piece, drawn
 from sensorgen.sensor import UNIFORM, Sensor
 from sensorgen.units import M_PER_MM
 
@@ -54,7 +55,7 @@ class Sensed:
 
 
 def sensor_of(
-    design: Design, law: str = "", tip_m: float = TIP_M, *, profile: str = UNIFORM, radius_m: float | None = None,
+    design: Design, law: str | Law = "", tip_m: float = TIP_M, *, profile: str = UNIFORM, radius_m: float | None = None,
     accuracy: float = inf, known: Unloaded | None = None, printed: Piece | None = None,
 ) -> Sensed:  # fmt: skip
     """The sensor that a design makes, for the line and all that rests on it.
@@ -63,8 +64,8 @@ def sensor_of(
     ----------
     design : Design
         As drawn.
-    law : str
-        Of compression: one of :data:`sensorgen.celllaw.LAWS`, or "" for the best that is known.
+    law : str or Law
+        Of compression: one of :data:`sensorgen.celllaw.LAWS`, or "" for the best that is known at once; or itself.
     tip_m : float
         Length of the tip along the sensor [m].
     profile : str
@@ -72,7 +73,7 @@ def sensor_of(
     radius_m : float, optional
         Of a hard round tip, whose contact grows with the force up to ``tip_m``; all of it touches if not given [m].
     accuracy : float
-        Wanted of the capacitance, relative [-]; where one is, a cell that is not known is solved too.
+        Wanted of the capacitance, relative [-].
     known : Unloaded
         What :func:`sensorgen.planner.unloaded` says to that accuracy, if it is at hand.
     printed : Piece
@@ -89,7 +90,7 @@ def sensor_of(
     """
     found, p = known or unloaded(design, accuracy), design.params
     gone = lost(design)
-    how = law_of(design, found.answer, law, solve=accuracy < inf, printed=printed)
+    how = law if isinstance(law, Law) else law_of(design, found.answer, law, printed=printed)
     piece = printed or drawn(design)
     sensor = Sensor(
         length_m=p.length_mm * M_PER_MM,

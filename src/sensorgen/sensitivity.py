@@ -1,6 +1,7 @@
 """What a microstructure is worth: how a press changes a sensor's capacitance, beside a plate held in the same way."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from sensorgen.design import Design
 from sensorgen.models.compression import Compression
 from sensorgen.sensing import sensor_of
 
-HELD = {"free": {"base": "sliding", "period": "free"}, "bonded": {}}
+HELD: dict[str, dict[str, Any]] = {"free": {"base": "sliding", "period": "free"}, "bonded": {}}
 NOISE = 1e-3
 
 
@@ -74,7 +75,7 @@ def sensitivity(
     area gives way by its bulk modulus alone; over a width of 10 mm it is :func:`sensorgen.models.compression.bonded`.
     """
     given = sensor_of(design, "unconfined", accuracy=accuracy).sensor
-    how = solved(design, None, **HELD[law]).compression if isinstance(law, str) else law
+    how = solved(design, **HELD[law]).compression if isinstance(law, str) else law
     sensor = replace(given, compression=how)
     if resistivity_ohm_m is not None:
         sensor = replace(sensor, resistivity_ohm_m=(resistivity_ohm_m,) * 2)

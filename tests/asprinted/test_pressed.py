@@ -8,6 +8,7 @@ import pytest
 
 from sensorgen import celllaw, compressed
 from sensorgen.asprinted import compared, pressed
+from sensorgen.compressed import Asked
 from sensorgen.errors import SensorgenError
 from sensorgen.models import press2d, press3d
 from sensorgen.models.press2d import Elastic, Fineness, Held
@@ -57,7 +58,7 @@ def built(widths, film=0.1):
 
 
 def answered(design, printed, *kpa, **more):
-    return compressed.answer(design, (0.0, *kpa), Held(), printed=printed, **more)
+    return compressed.answer(design, Asked((0.0, *kpa), Held()), printed=printed, **more)
 
 
 @needs_mesher
@@ -82,7 +83,7 @@ def test_a_printed_cell_gives_way_like_one_built_by_hand(walls, fall_um):
 def test_a_foot_of_a_lines_width_is_stiffer_than_a_sharp_one():
     """At 10 kPa as drawn 6.13 um, by other programs; on feet of 0.34 mm less than a third of it."""
     design = small()
-    drawn = compressed.answer(design, (0.0, 10.0), Held())
+    drawn = compressed.answer(design, Asked((0.0, 10.0), Held()))
     found = answered(design, compared.estimated(design), 10.0)
     assert drawn["displacement_um"][1] == pytest.approx(6.13, rel=0.02)
     assert found["displacement_um"][1] < drawn["displacement_um"][1] / 3
@@ -94,7 +95,7 @@ def test_the_printed_sensor_has_the_law_of_its_own_cell():
     """Its rise is what compressing the print says, and its capacitance lies between all widths of a line."""
     design = small()
     printed = compared.estimated(design)
-    sensed = pressed.sensor_of(design, printed)
+    sensed = pressed.sensor_of(design, printed, "solved")
     found = answered(design, printed, 10.0, 20.0)
     middle = (np.array(found["lower_f_per_m2"]) + np.array(found["upper_f_per_m2"])) / 2
     thinning, _ = sensed.sensor.compression.thinning(np.array([1e4, 2e4]))
@@ -111,17 +112,17 @@ def test_the_printed_sensor_has_the_law_of_its_own_cell():
 @needs_mesher
 def test_feet_that_land_are_told_of():
     design = small(parameters={"dielectric_mm": 0.2})
-    sensed = pressed.sensor_of(design, compared.estimated(design, "classic"))
+    sensed = pressed.sensor_of(design, compared.estimated(design, "classic"), "solved")
     assert any("mostly their fall" in doubt for doubt in sensed.doubts)
     assert sensed.sensor.compression.ratio[1] > 1.9  # the cog stands on the film where 0.1 mm of air was
 
 
 def test_crossed_strips_are_pressed_in_three_dimensions(monkeypatch):
     """On one brick per box: printed strips of 0.68 mm in place of 0.70 give way a little more than drawn."""
-    monkeypatch.setattr(press3d, "press", partial(press3d.press, fineness=press3d.Pieces(1)))
+    monkeypatch.setattr(press3d, "Pieces", partial(press3d.Pieces, 1))
     design = small("rect")
     printed = compared.estimated(design)
-    found, drawn = answered(design, printed, 100.0), compressed.answer(design, (0.0, 100.0), Held())
+    found, drawn = answered(design, printed, 100.0), compressed.answer(design, Asked((0.0, 100.0), Held()))
     assert (found["model"], found["faults"]) == ("press3d", [])
     assert 1.0 < found["displacement_um"][1] / drawn["displacement_um"][1] < 1.15
     assert found["lower_f_per_m2"][0] * 4e-6 < 0.79334e-12 < found["upper_f_per_m2"][0] * 4e-6  # found by hand

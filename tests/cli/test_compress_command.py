@@ -85,7 +85,7 @@ def test_boxes_are_pressed_in_three_dimensions(run, monkeypatch):
     """On one brick per box: within 8 % of the solution, and below the bound of springs."""
     from sensorgen.models import press3d
 
-    monkeypatch.setattr(press3d, "press", partial(press3d.press, fineness=press3d.Pieces(1)))
+    monkeypatch.setattr(press3d, "Pieces", partial(press3d.Pieces, 1))
     found = json.loads(run("compress", "rect", "--dielectric", "0.1", "--stress", "100", "--json").out)
     assert (found["model"], found["converged_kpa"], found["faults"]) == ("press3d", 100.0, [])
     assert found["displacement_um"][1] == pytest.approx(6.56, rel=0.08)
@@ -184,3 +184,51 @@ def test_the_bar_goes_on_where_a_cell_is_pressed_again_on_another_mesh(monkeypat
             step(reached_pa)
             shown.append(bar.pos)
     assert shown == [1, 2, 2, 2, 3, 4]
+
+
+PLATE_1 = ("compress", "reference", "--stress", "100", "--accuracy")
+
+
+@needs_mesher
+def test_a_plan_and_what_came_of_it(run):
+    said = run(*PLATE_1, "1e-2", "--explain")
+    assert said.code == 0
+    plan, _, rest = said.out.partition("measured")
+    assert "plan for an accuracy of 0.01 of C up to 100 kPa" in plan
+    assert "  > press2d, 2 x as coarse    within 0.01 in about" in plan
+    assert "springs know no capacitance" in plan
+    came = next(line for line in rest.splitlines() if line.startswith("  > press2d, 2 x as coarse"))
+    assert float(came.split()[6]) <= 1e-2
+    assert "all levels together" not in rest
+    assert "wanted" in rest
+    found = json.loads(run(*PLATE_1, "1e-2", "--json").out)
+    assert (found["reached"], found["accuracy"]) == (True, 1e-2)
+    chosen = found["plan"]["levels"][0]
+    assert (chosen["name"], chosen["chosen"]) == ("compression", "press2d, 2 x as coarse")
+    width = [2 * (b - a) / (b + a) for a, b in zip(found["lower_f_per_m2"], found["upper_f_per_m2"], strict=True)]
+    assert max(width) == pytest.approx(found["relative_width"])
+    assert max(width) <= 1e-2
+    assert "an estimate" in found["bounds"]
+
+
+@needs_mesher
+def test_an_accuracy_below_what_is_possible_says_the_best(run):
+    said = run(*PLATE_1, "1e-12")
+    assert said.code == 1
+    assert "an accuracy of 1e-12 was not reached; the best is" in said.err
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--explain"], "--explain without --accuracy"),
+        (["--accuracy", "1e-2", "--explain", "--json"], "--json is not; it holds the plan too"),
+        (["--accuracy", "1e-2", "--check-mesh"], "at once"),
+        (["--accuracy", "0"], "above 0"),
+        (["--accuracy", "1e-2", "--model", "springs"], "springs know no capacitance; leave out --accuracy"),
+    ],
+)
+def test_an_accuracy_that_makes_no_sense(run, words, expected):
+    said = run("compress", "tri", *words)
+    assert said.code == 2
+    assert expected in said.line

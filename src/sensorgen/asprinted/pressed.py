@@ -5,10 +5,11 @@ from dataclasses import replace
 from sensorgen import planner, sensing
 from sensorgen.asprinted import compared
 from sensorgen.asprinted.compared import Printed
-from sensorgen.celllaw import Piece, drawn
+from sensorgen.celllaw import Law
 from sensorgen.design import Design
 from sensorgen.interval import Interval
 from sensorgen.planner import Unloaded, Unpredictable
+from sensorgen.pressing import Piece, drawn
 from sensorgen.sections import sections
 from sensorgen.sensing import Sensed
 from sensorgen.sensor import UNIFORM
@@ -64,19 +65,19 @@ def unloaded(design: Design, printed: Printed, accuracy: float = compared.ACCURA
 
 
 def sensor_of(
-    design: Design, printed: Printed, law: str = "", tip_m: float = sensing.TIP_M, *,
-    profile: str = UNIFORM, radius_m: float | None = None, accuracy: float = compared.ACCURACY,
+    design: Design, printed: Printed, law: str | Law = "", tip_m: float = sensing.TIP_M, *,
+    profile: str = UNIFORM, radius_m: float | None = None, known: Unloaded | None = None,
 ) -> Sensed:  # fmt: skip
-    """The sensor that is printed, its cell solved.
+    """The sensor that is printed.
 
     Parameters
     ----------
     design, printed : Design, Printed
         As of :func:`piece`.
-    law, tip_m, profile, radius_m : str, float, str, float
+    law, tip_m, profile, radius_m : str or Law, float, str, float
         As of :func:`sensorgen.sensing.sensor_of`; lengths in [m].
-    accuracy : float
-        As of :func:`unloaded` [-].
+    known : Unloaded
+        What :func:`unloaded` says, if it is at hand.
 
     Raises
     ------
@@ -86,8 +87,8 @@ def sensor_of(
         As :func:`sensorgen.sensing.sensor_of`.
     """
     found = sensing.sensor_of(
-        design, law, tip_m, profile=profile, radius_m=radius_m, accuracy=accuracy,
-        known=unloaded(design, printed, accuracy), printed=piece(design, printed),
+        design, law, tip_m, profile=profile, radius_m=radius_m, known=known or unloaded(design, printed),
+        printed=piece(design, printed),
     )  # fmt: skip
     return replace(
         found, caveats=(f"as printed: {width_by(printed)}", _SOLID, *([_LOSSES] if found.lost.taken else []))

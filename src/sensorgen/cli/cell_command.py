@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, cell_text, settings, show
+from sensorgen.cli import FOUND_ERRORS, cell_text, plan_text, settings, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Ratio, Values, one
 from sensorgen.errors import BadInput, UnknownName
@@ -165,7 +165,7 @@ def _print_plan(design: "Design", asked: "Asked") -> None:
     click.echo(f"plan for an accuracy of {asked.width:g}")
     lossy = bool(losses.set_losses(design))
     for c in planner.weighed(design.in_use, asked.width, asked.model, lossy):
-        click.echo(f"  {c.model:10}{cell_text.expectation(vars(c), asked.width):32}{c.passed_over}".rstrip())
+        click.echo(f"  {c.model:10}{plan_text.expectation(vars(c), asked.width):32}{c.passed_over}".rstrip())
     click.echo("  the first that does is taken; what is asked in any case costs next to nothing")
 
 

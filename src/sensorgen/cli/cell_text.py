@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from sensorgen.cli import show
+from sensorgen.cli import plan_text, show
 
 Data = dict[str, Any]
 
@@ -57,21 +57,7 @@ def _loss(data: Data) -> Iterator[str]:
 def measured(plan: Iterable[Data]) -> Iterator[str]:
     """What each model of a plan gave, or why it was not asked."""
     for c in plan:
-        came = f"{c['width']:.2g} in {_seconds(c['seconds'])}" if c["seconds"] is not None else "not asked"
-        yield f"{c['model']:10}{came:32}{c['passed_over']}".rstrip()
-
-
-def expectation(candidate: Data, wanted: float) -> str:
-    """What is expected of a model."""
-    width, seconds = candidate["expected_width"], candidate["expected_seconds"]
-    if width is None:
-        return "in any case"
-    reach = f"within {wanted:g}" if width <= wanted else f"about {width:.2g}"
-    return f"{reach} in about {_seconds(seconds)}"
-
-
-def _seconds(value: float) -> str:
-    return show.si(float(f"{value:.2g}"), "s")
+        yield f"{c['model']:10}{plan_text.came(c):32}{c['passed_over']}".rstrip()
 
 
 def table(key: str, rows: Sequence[Data]) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator, Sequence
+from functools import partial
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,13 +10,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sensorgen import units
-from sensorgen.cli import FOUND_ERRORS, asprinted_text, budget_text, card_text, show
+from sensorgen.cli import FOUND_ERRORS, asprinted_text, budget_text, card_text, plan_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Length, OneOf, Ratio, Share, Values, proper
 from sensorgen.errors import BadInput
+from sensorgen.plan import plain
 
 if TYPE_CHECKING:
     from sensorgen.design import Design
+    from sensorgen.plan import Plan
+    from sensorgen.planned import Makers, Outline, Press
     from sensorgen.sensing import Sensed
 
 _PRESSING = ("pressing the printed cell",)
@@ -55,8 +59,9 @@ OWN: list[click.Parameter] = [
     ),
     click.Option(
         ["--accuracy"], type=Ratio(), default=None,
-        help="Wanted of |Z|, as 1e-3: bounds the capacitance as nearly, solves an unknown cell, says what misses it.",
+        help="Wanted of |Z|, as 1e-3: cell, compression and line by the cheapest models that together come as near.",
     ),
+    click.Option(["--explain"], is_flag=True, help="With --accuracy: print the plan, and what came of it."),
     *asprinted_text.printed_options(
         "Hold what is printed against what is drawn; with presses, predict them of what is printed, its cell solved."
     ),
@@ -82,44 +87,68 @@ def _work(
     **how: Any,
 ) -> int:
     asprinted_text.refuse_strays(as_printed=how["as_printed"], slicer=how["slicer"], walls=how["walls"])
-    _refuse_two(how)
+    _refuse_two(how, accuracy)
     proper("--noise", noise)
     pressed = bool(force_n or position_mm or how["as_csv"] or how["plot"])
     tip: dict[str, Any] = {
-        "law": compression or "",
         "profile": profile,
         "radius_m": None if radius_mm is None else radius_mm * units.M_PER_MM,
         **({} if tip_mm is None else {"tip_m": tip_mm * units.M_PER_MM}),
     }
     if how["as_printed"] and not pressed:
-        _refuse_strangers((frequency_hz, tip_mm, radius_mm, compression))
+        _refuse_strangers((frequency_hz, tip_mm, radius_mm, compression), explain=how["explain"])
         return _as_printed(design, accuracy, how)
-    from sensorgen.predict import FORCES_N, TONES_HZ, positions_mm, prediction
+    from sensorgen import planned
+    from sensorgen.predict import FORCES_N, TONES_HZ, hardest, middle, positions_mm, prediction
 
-    tones, wanted = frequency_hz or TONES_HZ, accuracy or inf
+    tones, wanted, law = frequency_hz or TONES_HZ, accuracy or inf, compression or ""
     if not pressed:
-        predicted = prediction(design, tones, accuracy=wanted, noise=noise, **tip)
+        if how["explain"]:
+            _explain(planned.outlined(design, planned.drawn(design, **tip), middle(design, tones), wanted, law))
+        predicted = prediction(design, tones, law, accuracy=wanted, noise=noise, **tip)
         if compression or tip_mm is not None or radius_mm is not None:
             _refuse_unjudged(predicted)
-        _deliver(_unpressed(predicted, as_json=how["as_json"]), how["output"])
+        _deliver(_unpressed(predicted, how), how["output"])
         return _verdict(predicted, accuracy)
     axes = tones, force_n or FORCES_N, position_mm or positions_mm(design)
-    _pressed(design, _sensed(design, accuracy, tip, how), axes, (wanted, noise), how)
-    return 0
+    made = _made(design, (accuracy, law, tip), hardest(*axes), how)
+    return _verdict(_pressed(design, made, axes, (wanted, noise), how), accuracy)
 
 
-def _sensed(design: "Design", accuracy: float | None, tip: dict[str, Any], how: dict[str, Any]) -> "Sensed":
-    """The sensor as drawn, or as printed."""
+def _made(
+    design: "Design", asked: tuple[float | None, str, dict[str, Any]], press: "Press", how: dict[str, Any]
+) -> "tuple[Sensed, Plan | None]":
+    """The sensor as drawn, or as printed; and how it was planned."""
+    from sensorgen import planned
+
+    accuracy, law, tip = asked
     if not how["as_printed"]:
-        from sensorgen.sensing import sensor_of
-
-        return sensor_of(design, accuracy=accuracy or inf, **tip)
+        return _carried_out(design, planned.drawn(design, **tip), press, accuracy or inf, law, how)
     from sensorgen.asprinted import compared, pressed
 
     printed = asprinted_text.printed(design, how["slicer"], how["walls"])
+    makers = planned.Makers(
+        partial(pressed.unloaded, design, printed),
+        lambda law, known: pressed.sensor_of(design, printed, law, known=known, **tip),
+        pressed.piece(design, printed),
+    )
     with show.progress(_PRESSING) as step:
         step(_PRESSING[0])
-        return pressed.sensor_of(design, printed, accuracy=accuracy or compared.ACCURACY, **tip)
+        return _carried_out(design, makers, press, accuracy or compared.ACCURACY, law, how)
+
+
+def _carried_out(
+    design: "Design", makers: "Makers", press: "Press", accuracy: float, law: str, how: dict[str, Any]
+) -> "tuple[Sensed, Plan | None]":
+    from sensorgen import planned
+
+    if how["explain"]:
+        _explain(planned.outlined(design, makers, press, accuracy, law))
+    return planned.sensed(design, makers, press, accuracy, law)
+
+
+def _explain(outline: "Outline") -> None:
+    click.echo("".join(f"{line}\n" for line in plan_text.planned(plain(outline.plan))))
 
 
 def _as_printed(design: "Design", accuracy: float | None, how: dict[str, Any]) -> int:
@@ -134,9 +163,9 @@ def _as_printed(design: "Design", accuracy: float | None, how: dict[str, Any]) -
     return FOUND_ERRORS if any(f["severity"] == "error" and not f["waiver"] for f in found["findings"]) else 0
 
 
-def _refuse_strangers(pressing: Sequence[object]) -> None:
+def _refuse_strangers(pressing: Sequence[object], *, explain: bool) -> None:
     """Without a press, what is printed is told of the sensor at rest."""
-    if any(given is not None for given in pressing):
+    if explain or any(given is not None for given in pressing):
         raise BadInput(
             "--as-printed without a press speaks of the sensor at rest; expected --force or --position with tones, a "
             "tip or a law of compression"
@@ -151,30 +180,46 @@ def _refuse_unjudged(predicted: dict[str, Any]) -> None:
 
 
 def _verdict(predicted: dict[str, Any], accuracy: float | None) -> int:
-    """0, or 1 and a word where the capacitance is not known as well as wanted."""
-    if accuracy is None or predicted["capacitance_f"] is None or predicted["relative_width"] <= accuracy:
+    """0, or 1 and a word where abs(Z), or the capacitance where no press could be judged, is not as near as wanted."""
+    if accuracy is None or predicted.get("capacitance_f", True) is None:
         return 0
-    why = "".join(f"; {reason}" for reason in predicted["refused"])
+    plan = predicted.get("plan")
+    best = plan["width"] if plan else predicted["relative_width"]
+    if best is not None and best <= accuracy:
+        return 0
+    said = "nobody knows how near it is" if best is None else f"the best is {best:.2g}"
+    parts = (*(plan_text.shares(plan) if plan else ()), *predicted.get("refused", ()))
     click.echo(
-        f"sensorgen: an accuracy of {accuracy:g} was not reached; the best is {predicted['relative_width']:.2g}{why}",
+        f"sensorgen: an accuracy of {accuracy:g} was not reached; {said}{''.join(f'; {part}' for part in parts)}",
         err=True,
     )
     return FOUND_ERRORS
 
 
-def _refuse_two(how: dict[str, Any]) -> None:
+def _refuse_two(how: dict[str, Any], accuracy: float | None) -> None:
     given = [f"--{name.removeprefix('as_')}" for name in ("as_json", "as_csv", "plot") if how[name]]
-    given += ["--output"] if how["output"] and how["plot"] else []
+    given += ["--output"] if how["output"] and (how["plot"] or how["explain"]) else []
     if len(given) > 1:
         raise BadInput(f"{' and '.join(given)} at once; expected one of them")
+    if how["explain"] and accuracy is None:
+        raise BadInput("--explain without --accuracy: there is no plan; expected an accuracy, as --accuracy 1e-3")
+    if how["explain"] and given:
+        raise BadInput(f"--explain is for people, and {given[0]} is not; --json holds the plan too")
 
 
-def _unpressed(predicted: dict[str, Any], *, as_json: bool) -> Iterator[str]:
+def _unpressed(predicted: dict[str, Any], how: dict[str, Any]) -> Iterator[str]:
     """The prediction without a press, the identifiability card, and the error budget."""
-    if as_json:
+    if how["as_json"]:
         yield show.json_text(predicted)
     else:
-        yield from (f"{line}\n" for line in (*show.prediction_lines(predicted), *_judgement(predicted)))
+        lines = (*_measured(predicted, how), *show.prediction_lines(predicted), *_judgement(predicted))
+        yield from (f"{line}\n" for line in lines)
+
+
+def _measured(predicted: dict[str, Any], how: dict[str, Any]) -> Iterator[str]:
+    """What came of the plan, where that is asked for."""
+    if how["explain"] and "plan" in predicted:
+        yield from (*plan_text.measured(predicted["plan"]), "")
 
 
 def _judgement(predicted: dict[str, Any]) -> Iterator[str]:
@@ -184,7 +229,11 @@ def _judgement(predicted: dict[str, Any]) -> Iterator[str]:
         yield from ("", *budget_text.lines(predicted["budget"]))
 
 
-def _pressed(design: "Design", sensed: "Sensed", axes: Axes, wanted: tuple[float, float], how: dict[str, Any]) -> None:
+def _pressed(
+    design: "Design", made: "tuple[Sensed, Plan | None]", axes: Axes, wanted: tuple[float, float], how: dict[str, Any]
+) -> dict[str, Any]:
+    """Print what presses do, and say as much of it as decides the exit code."""
+    sensed, plan = made
     from sensorgen.predict import csv_blocks, moves, presses
 
     if how["plot"]:
@@ -192,9 +241,11 @@ def _pressed(design: "Design", sensed: "Sensed", axes: Axes, wanted: tuple[float
     elif how["as_csv"]:
         _deliver(csv_blocks(sensed.sensor, *axes), how["output"], len(axes[1]) * len(axes[2]))
     else:
-        predicted = presses(design, sensed, *axes, *wanted)
-        text = (f"{line}\n" for line in (*show.presses(predicted, moves(predicted)), *_judgement(predicted)))
+        predicted = presses(design, sensed, *axes, *wanted, plan)
+        lines = (*_measured(predicted, how), *show.presses(predicted, moves(predicted)), *_judgement(predicted))
+        text = (f"{line}\n" for line in lines)
         _deliver(show.json_lines(predicted) if how["as_json"] else text, how["output"])
+    return {"plan": plain(plan)} if plan else {}
 
 
 def _plot(sensed: "Sensed", axes: Axes, folder: Path) -> None:

@@ -18,6 +18,7 @@ from sensorgen.errors import MissingValue, OutOfRange
 SOURCE = "Thesis Eq. B.49; Gent and Lindley (1959) for the bonded plate; solved cells as their file says"
 COST = 0
 
+PROTOTYPE_PA = 6e6  # Young's modulus of the films of the cells that were solved once and for all [Pa]
 SOLVED_RATIO = 0.4999  # Poisson's ratio of all materials of the cells that were solved once and for all [-]
 REACH = 3.0  # how far beyond its last stress a curve is extended by its last slope, as a factor [-]
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
@@ -243,17 +244,21 @@ def solved(shape: str, parameters: Mapping[str, Any], youngs_modulus_pa: Mapping
         factors = [youngs_modulus_pa.get(name, 0.0) / modulus for name, modulus in moduli.items()]
         same = all(abs(parameters.get(k, np.inf) / v - 1) < _SAME for k, v in cell["parameters"].items())
         if cell["shape"] == shape and same and min(factors) > 0 and max(factors) / min(factors) - 1 < _SAME:
-            stress = [kpa * _PA_PER_KPA * factors[0] for kpa in cell["stress_kpa"]]
-            ratio = [1 + percent / 100 for percent in cell["rise_percent"]]
-            found = curve("solved", cell["source"], stress, ratio)
-            moved_m = cell["displacement_um"] / _UM_PER_M
-            return replace(found, within=cell["within"], held=tuple(cell["held"].values()), moved_m=moved_m)
+            return _curve(cell, factors[0])
     return None
 
 
-def held_of(shape: str) -> tuple[float, ...]:
-    """Shares by which the rise of a shape's first solved cell differs when it is held or touched otherwise [-]."""
-    return next(tuple(cell["held"].values()) for cell in _cells()["cells"] if cell["shape"] == shape)
+def prototype(shape: str) -> Curve:
+    """The first solved curve of a shape, of films of ``PROTOTYPE_PA``: what a cell like it can be expected to do."""
+    return _curve(next(cell for cell in _cells()["cells"] if cell["shape"] == shape), 1.0)
+
+
+def _curve(cell: Mapping[str, Any], stiffer: float) -> Curve:
+    """A solved cell's curve, its materials that many times as stiff."""
+    stress = [kpa * _PA_PER_KPA * stiffer for kpa in cell["stress_kpa"]]
+    found = curve("solved", cell["source"], stress, [1 + percent / 100 for percent in cell["rise_percent"]])
+    moved_m = cell["displacement_um"] / _UM_PER_M
+    return replace(found, within=cell["within"], held=tuple(cell["held"].values()), moved_m=moved_m)
 
 
 @cache

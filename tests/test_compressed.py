@@ -1,0 +1,65 @@
+"""Cells pressed as near as asked: the bounds hold what other programs found, by the coarsest mesh that will do."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sensorgen import compressed
+from sensorgen.compressed import Asked, Held
+from sensorgen.design import make
+from sensorgen.interval import Interval
+
+KNOWN = json.loads((Path(__file__).parent / "reference" / "contact.json").read_text())
+LOADS = (0, 2, 6, 10)  # of the reference's, a tenth of its kPa
+needs_mesher = pytest.mark.skipif("not __import__('importlib').util.find_spec('netgen')", reason="needs NGSolve")
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(monkeypatch, tmp_path):
+    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / "cache"))
+
+
+def pressed(film, accuracy):
+    design = make({"shape": "tri", "parameters": {"dielectric_mm": film}})
+    stress = tuple(KNOWN[f"tri_d{film}"]["p_kPa"][k] for k in LOADS)
+    return compressed.answer(design, Asked(stress, Held(), accuracy=accuracy))
+
+
+@needs_mesher
+@pytest.mark.parametrize(("film", "accuracy"), [(0.1, 5e-2), (0.2, 5e-2), (0.1, 1e-2)])
+def test_the_bounds_hold_the_reference_at_every_load(film, accuracy):
+    found = pressed(film, accuracy)
+    known = KNOWN[f"tri_d{film}"]
+    assert found["reached"]
+    for k, low, high in zip(LOADS, found["lower_f_per_m2"], found["upper_f_per_m2"], strict=True):
+        truth = known["C0_exact_pF_per_m"] + known["dC_pF_per_m"][k]
+        assert 2e9 * low < truth < 2e9 * high  # pF per metre of depth and period of 2 mm
+        assert 2 * (high - low) / (high + low) <= found["relative_width"] <= accuracy
+    level = found["plan"]["levels"][0]
+    assert (level["chosen"] == "press2d") is (accuracy < 2e-2)
+
+
+@needs_mesher
+def test_what_is_below_the_reach_of_all_meshes_is_told_with_the_best():
+    found = pressed(0.2, 1e-5)
+    assert not found["reached"]
+    assert 1e-4 < found["relative_width"] < 1e-2
+    asked = [c["model"] for c in found["plan"]["levels"][0]["candidates"] if c["seconds"] is not None]
+    assert asked == ["press2d"]
+
+
+def test_one_that_ends_early_is_not_reached(monkeypatch):
+    """No bound is known above the load that it ended at, so no accuracy either."""
+    from sensorgen.models.press2d import Pressed
+
+    def ends_early(case, stress_pa, level, **_):
+        bounds = (Interval(1.0, 1.0001), Interval(1.1, 1.1001))
+        moved = np.array([0.0, 1e-6])
+        return Pressed(np.array(stress_pa[:2]), moved, bounds, (), moved, moved, moved, 0.0, ("converged up to 20",))
+
+    monkeypatch.setattr(compressed, "pressed", ends_early)
+    found = pressed(0.1, 5e-2)
+    assert (found["reached"], found["relative_width"], found["converged_kpa"]) == (False, None, 20.0)
+    assert found["lower_f_per_m2"][1] < 1.1 < found["upper_f_per_m2"][1]

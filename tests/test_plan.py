@@ -1,0 +1,81 @@
+"""Who is asked, in which order, and what is told of it."""
+
+import math
+
+import pytest
+
+from sensorgen.errors import BadInput, SensorgenError
+from sensorgen.plan import Candidate, Level, Plan, cheapest, plain, walked
+
+RUNGS = (Candidate("none", passed_over="it knows no gaps"), Candidate("coarse", 0.1, 1.0), Candidate("fine", 0.01, 5.0))
+
+
+def level(allowed, *, candidates=RUNGS):
+    return Level("compression", "|Z| off by", allowed, candidates, cheapest(candidates, allowed))
+
+
+class Models:
+    """Answers by name, an error where that is the answer; remembers who was asked."""
+
+    def __init__(self, **answers):
+        self.asked = []
+        self.find = {name: lambda name=name, answer=answer: self._say(name, answer) for name, answer in answers.items()}
+
+    def _say(self, name, answer):
+        self.asked.append(name)
+        if isinstance(answer, SensorgenError):
+            raise answer
+        return answer
+
+
+@pytest.mark.parametrize(("allowed", "chosen"), [(0.5, "coarse"), (0.1, "coarse"), (0.05, "fine"), (1e-4, "fine")])
+def test_the_first_that_should_do_is_chosen_or_the_one_that_should_come_nearest(allowed, chosen):
+    assert level(allowed).chosen == chosen
+
+
+def test_one_that_was_never_measured_is_tried_and_one_that_cannot_speak_is_not():
+    assert cheapest((Candidate("new"), *RUNGS), 1e-9) == "new"
+    assert cheapest(RUNGS[:1], 1.0) == ""
+
+
+def test_it_ends_with_the_first_that_is_near_enough():
+    models = Models(coarse=0.08, fine=0.004)
+    found, came = walked(level(0.2), models.find, float)
+    assert (found, models.asked, came.chosen) == (0.08, ["coarse"], "coarse")
+    assert [c.width for c in came.candidates] == [None, 0.08, None]
+    assert came.candidates[1].seconds >= 0
+
+
+def test_an_expectation_that_does_not_hold_costs_one_more():
+    models = Models(coarse=0.3, fine=0.004)
+    found, came = walked(level(0.2), models.find, float)
+    assert (found, models.asked, came.chosen) == (0.004, ["coarse", "fine"], "fine")
+
+
+def test_the_nearest_is_taken_where_none_is_near_enough():
+    """Here the finer mesh does worse, as meshes may."""
+    models = Models(coarse=0.02, fine=0.03)
+    found, came = walked(level(0.015, candidates=(*RUNGS[:2], Candidate("fine", 0.2, 5.0))), models.find, float)
+    assert (found, models.asked, came.chosen) == (0.02, ["coarse", "fine"], "coarse")
+
+
+def test_coarser_ones_are_asked_where_finer_ones_fail():
+    models = Models(coarse=0.08, fine=BadInput("does not converge"))
+    found, came = walked(level(0.05), models.find, float)
+    assert (found, models.asked) == (0.08, ["fine", "coarse"])
+    assert came.candidates[2].passed_over == "does not converge"
+
+
+def test_what_the_last_one_said_is_raised_where_none_can_answer():
+    models = Models(coarse=BadInput("no mesh"), fine=BadInput("no memory"))
+    with pytest.raises(BadInput, match="no mesh"):
+        walked(level(0.05), models.find, float)
+
+
+def test_what_nobody_knows_is_no_number_in_plain_data():
+    candidates = (Candidate("a", math.inf, 0.0, width=math.inf), Candidate("b", 0.1, 1.0, width=0.2))
+    data = plain(Plan(0.1, "C", (level(0.1, candidates=candidates),), math.inf))
+    assert data["width"] is None
+    first, second = data["levels"][0]["candidates"]
+    assert (first["expected_width"], first["width"]) == (None, None)
+    assert (second["expected_width"], second["width"]) == (0.1, 0.2)

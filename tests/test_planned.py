@@ -1,0 +1,122 @@
+"""Predictions as near as asked: what is planned, what it comes to, and whether the truth is within it."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sensorgen import celllaw, planned
+from sensorgen.design import make
+from sensorgen.errors import OutOfRange
+from sensorgen.planned import Press
+
+TONES = (1.1e3, 99.7e3)
+PRESS = Press(TONES, 6.0, 0.05)
+needs_mesher = pytest.mark.skipif("not __import__('importlib').util.find_spec('netgen')", reason="needs NGSolve")
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(monkeypatch, tmp_path):
+    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / "cache"))
+
+
+def tri(dielectric_mm):
+    return make({"shape": "tri", "parameters": {"dielectric_mm": dielectric_mm}})
+
+
+def worked_out(design, accuracy, press=PRESS, law="", **tip):
+    return planned.sensed(design, planned.drawn(design, **tip), press, accuracy, law)
+
+
+def chosen(plan):
+    return {level.name: level.chosen for level in plan.levels}
+
+
+def off(one, other, press=PRESS):
+    """Relative difference of abs(Z) of two sensors at the worst tone."""
+    z, of = (abs(s.impedance(np.asarray(press.frequency_hz), press.force_n, press.position_m)) for s in (one, other))
+    return float(max(abs(z / of - 1)))
+
+
+def test_nothing_is_planned_where_nothing_is_asked_for():
+    sensed, plan = worked_out(tri(0.1), math.inf)
+    assert plan is None
+    assert sensed.unloaded.answer.model == "columns"
+
+
+def test_the_cheapest_of_each_level_is_taken_and_the_whole_holds_the_truth():
+    """Of a prototype, whose law is stored: against the capacitance to 1e-7."""
+    exact, _ = worked_out(tri(0.1), 1e-7)
+    for accuracy, model in ((2.0, "columns"), (1e-2, "fem2d"), (2e-4, "fem2d")):
+        sensed, plan = worked_out(tri(0.1), accuracy)
+        assert chosen(plan) == {"cell": model, "compression": "solved", "line": "line, 1 section"}
+        assert off(sensed.sensor, exact.sensor) <= plan.width <= accuracy
+    assert [level.name for level in plan.levels] == ["cell", "compression", "line"]
+
+
+@needs_mesher
+def test_an_unknown_cell_is_pressed_no_more_finely_than_it_takes(monkeypatch):
+    """The film of 0.15 mm on the coarsest mesh, against the finest: nearer than claimed."""
+    monkeypatch.setattr(celllaw, "STRESS_PA", (0.0, 2e4, 4e4, 6e4))
+    rough, plan = worked_out(tri(0.15), 1e-2)
+    assert chosen(plan)["compression"] == "press2d, 4 x as coarse"
+    fine = replace(rough.sensor, compression=celllaw.solved(tri(0.15)).compression)
+    claimed = next(c.width for c in plan.levels[1].candidates if c.model == "press2d, 4 x as coarse")
+    assert 1e-6 < off(rough.sensor, fine) < claimed < 1e-2 / 2
+    assert plan.width < 1e-2
+
+
+def test_a_plate_is_known_no_better_than_how_it_is_held():
+    """At a low tone all is C: under the tip it rises by s/(1 - s), free or bonded."""
+    press = Press((1.0,), 6.0, 0.05)
+    _, plan = worked_out(make({"shape": "reference"}), 1e-5, press)
+    share, stress = 0.1, 6.0 / 1e-4
+    free, tied = (1 - stress / 6e6, 1 - stress / (6e6 * 4 / 3 * (1 + (10 / 1.2) ** 2)))
+    z = [1 / (1 - share + share / s) for s in (free, tied)]
+    assert plan.width == pytest.approx(z[1] / z[0] - 1, rel=1e-6)
+    assert chosen(plan) == {"cell": "columns", "compression": "unconfined", "line": "line, 1 section"}
+
+
+@pytest.mark.parametrize("accuracy", [1e-4, 1e-6])
+def test_a_round_tip_has_as_many_sections_as_it_takes(accuracy):
+    sensed, plan = worked_out(tri(0.1), accuracy, profile="parabola")
+    fine = replace(sensed.sensor, pieces=2048)
+    line = plan.levels[-1]
+    claimed = next(c.width for c in line.candidates if c.model == line.chosen)
+    assert off(sensed.sensor, fine) == pytest.approx(claimed, rel=0.1)
+    assert claimed <= line.allowed
+    assert line.chosen == f"line, {sensed.sensor.pieces} sections"
+    coarser = [c.width for c in line.candidates if c.model != line.chosen]
+    assert all(width > line.allowed for width in coarser)
+
+
+def test_without_force_nothing_has_to_give_way():
+    _, plan = worked_out(tri(0.15), 1e-3, Press(TONES, 0.0, 0.05))
+    assert chosen(plan)["compression"] == "unconfined"
+    assert plan.width <= 1e-3
+
+
+def test_a_law_that_is_asked_for_is_taken_whatever_its_error():
+    sensed, plan = worked_out(tri(0.1), 1e-3, law="unconfined")
+    assert (sensed.law.compression.name, plan.width) == ("unconfined", math.inf)
+
+
+def test_the_outline_says_what_is_expected_and_asks_nothing_dear(monkeypatch):
+    from sensorgen.models import fem2d, press2d
+
+    for model in (fem2d, press2d):
+        monkeypatch.setattr(model, "press" if model is press2d else "capacitance", None)
+    outline = planned.outlined(tri(0.15), planned.drawn(tri(0.15)), PRESS, 1e-2)
+    cell, compression, line = outline.plan.levels
+    assert (cell.chosen, compression.chosen, line.chosen) == ("fem2d", "press2d, 4 x as coarse", "line, 1 section")
+    assert compression.candidates[0].expected_width == math.inf
+    widths = [c.expected_width for c in compression.candidates[1:]]
+    assert widths == sorted(widths, reverse=True)
+    assert outline.plan.width is None
+
+
+@pytest.mark.parametrize("accuracy", [0.0, -1.0, math.nan])
+def test_an_accuracy_is_above_0(accuracy):
+    with pytest.raises(OutOfRange, match="above 0"):
+        planned.outlined(tri(0.1), planned.drawn(tri(0.1)), PRESS, accuracy)
