@@ -47,7 +47,7 @@ def test_what_is_below_the_reach_of_all_meshes_is_told_with_the_best():
     assert not found["reached"]
     assert 1e-4 < found["relative_width"] < 1e-2
     asked = [c["model"] for c in found["plan"]["levels"][0]["candidates"] if c["seconds"] is not None]
-    assert asked == ["press2d"]
+    assert asked == ["press2d, mesh x 0.5"]
 
 
 def test_one_that_ends_early_is_not_reached(monkeypatch):

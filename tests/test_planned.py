@@ -60,9 +60,9 @@ def test_an_unknown_cell_is_pressed_no_more_finely_than_it_takes(monkeypatch):
     """The film of 0.15 mm on the coarsest mesh, against the finest: nearer than claimed."""
     monkeypatch.setattr(celllaw, "STRESS_PA", (0.0, 2e4, 4e4, 6e4))
     rough, plan = worked_out(tri(0.15), 1e-2)
-    assert chosen(plan)["compression"] == "press2d, 4 x as coarse"
+    assert chosen(plan)["compression"] == "press2d, mesh x 1.5"
     fine = replace(rough.sensor, compression=celllaw.solved(tri(0.15)).compression)
-    claimed = next(c.width for c in plan.levels[1].candidates if c.model == "press2d, 4 x as coarse")
+    claimed = next(c.width for c in plan.levels[1].candidates if c.model == "press2d, mesh x 1.5")
     assert 1e-6 < off(rough.sensor, fine) < claimed < 1e-2 / 2
     assert plan.width < 1e-2
 
@@ -109,7 +109,7 @@ def test_the_outline_says_what_is_expected_and_asks_nothing_dear(monkeypatch):
         monkeypatch.setattr(model, "press" if model is press2d else "capacitance", None)
     outline = planned.outlined(tri(0.15), planned.drawn(tri(0.15)), PRESS, 1e-2)
     cell, compression, line = outline.plan.levels
-    assert (cell.chosen, compression.chosen, line.chosen) == ("fem2d", "press2d, 4 x as coarse", "line, 1 section")
+    assert (cell.chosen, compression.chosen, line.chosen) == ("fem2d", "press2d, mesh x 1.5", "line, 1 section")
     assert compression.candidates[0].expected_width == math.inf
     widths = [c.expected_width for c in compression.candidates[1:]]
     assert widths == sorted(widths, reverse=True)

@@ -14,7 +14,7 @@ from sensorgen.errors import OutOfRange, UnknownName
 from sensorgen.models import compression
 from sensorgen.models.compression import Compression, Curve
 from sensorgen.planner import Answer, Taken, is_plate, permittivities
-from sensorgen.pressing import FINEST, Case, Piece, Rung, drawn, model_of, pressed, rungs
+from sensorgen.pressing import USUAL, Case, Piece, Rung, drawn, model_of, pressed, rungs
 from sensorgen.scene import Scene
 from sensorgen.units import M_PER_MM
 
@@ -174,7 +174,7 @@ def _cell(found: Curve, moduli: Mapping[str, Taken], doubts: tuple[str, ...] = (
     return Law(found, tuple(moduli.values()), doubts, others, held)
 
 
-def solved(design: Design, printed: Piece | None = None, level: int = FINEST, **held: str) -> Law:
+def solved(design: Design, printed: Piece | None = None, level: int = USUAL, **held: str) -> Law:
     """The law of a cell by finite elements on one mesh, held against the next coarser one.
 
     Parameters

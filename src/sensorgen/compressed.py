@@ -20,7 +20,7 @@ from sensorgen.models import press2d, springs
 from sensorgen.models.press2d import Held, Pressed
 from sensorgen.plan import Candidate, Level, Plan, cheapest, plain, walked
 from sensorgen.planner import permittivities
-from sensorgen.pressing import FINEST, MODELS, Case, Piece, Rung, drawn, pressed, rungs, unfit
+from sensorgen.pressing import MODELS, USUAL, Case, Piece, Rung, drawn, pressed, rungs, unfit
 from sensorgen.scene import Scene
 
 __all__ = ["ALL", "Asked", "Held", "answer", "planned", "stresses_kpa"]
@@ -98,9 +98,9 @@ def answer(design: Design, asked: Asked, *, printed: Printed | None = None, step
     if _model(piece, asked) == "springs":
         return _springs(design, piece.scene, asked) | by
     case = _case(design, piece, asked)
-    found = _pressed(case, asked, FINEST, step)
+    found = _pressed(case, asked, USUAL, step)
     if asked.check_mesh:
-        found = press2d.compared(found, _pressed(case, asked, FINEST + 1, step))
+        found = press2d.compared(found, _pressed(case, asked, USUAL + 1, step))
     return _plain(found, case) | by
 
 

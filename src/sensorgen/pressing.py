@@ -1,4 +1,4 @@
-"""A piece of a sensor under pressure by finite elements, on meshes each half as coarse as the one before.
+"""A piece of a sensor under pressure by finite elements, on a ladder of meshes each finer than the one before.
 
 What a mesh is worth is told by the next coarser one: solutions are kept, so that a finer answer costs one mesh more.
 """
@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from sensorgen.models.press3d import Pieces
 
 MODELS = ("press2d", "press3d")
-FINEST = 0  # level of the usual mesh; those below it are coarser
+USUAL = 0  # level of the mesh that is taken where nothing is said; those below it are coarser
+COARSEST = -2  # level that others are held against only
+_TIMES = {-2: 2.0, -1: 1.5, USUAL: 1.0, 1: 0.7, 2: 0.5}  # size of triangles by level, over the usual one [-]
 _ARRAYS = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
 _MEASURED_LOADS = 11  # under which expected times were measured, besides the one of 0
 
@@ -74,9 +76,9 @@ class Rung:
     Attributes
     ----------
     name, model : str
-        The model, and how much coarser than usual its mesh is; the model alone.
+        The model, and how much finer or coarser than usual its mesh is; the model alone.
     level : int
-        ``FINEST``, or below it.
+        0 for the usual mesh, above it finer.
     rise : float
         Share by which the rise of the capacitance should be off [-].
     seconds : float
@@ -118,31 +120,31 @@ def rungs(piece: Piece, model: str, loads: int) -> list[Rung]:
     share = loads / _MEASURED_LOADS
     return [
         Rung(_name(model, level), model, level, rise, (seconds + before) * share)
-        for level, ((_, before), (rise, seconds)) in enumerate(pairwise(points), FINEST + 2 - len(points))
+        for level, ((_, before), (rise, seconds)) in enumerate(pairwise(points), COARSEST + 1)
     ]
 
 
 def _name(model: str, level: int) -> str:
-    return model if level == FINEST else f"{model}, {_coarser(model, level)}"
-
-
-def _coarser(model: str, level: int) -> str:
-    return f"{2**-level} x as coarse" if model == "press2d" else f"{-level} piece{'s' * (level < -1)} less"
+    """How a mesh is called: triangles by their size over the usual one, bricks by how many a box is cut into."""
+    if level == USUAL:
+        return model
+    if model == "press2d":
+        return f"press2d, mesh x {_TIMES[level]:g}"
+    return f"{model}, {level:+d} piece{'s' * (abs(level) > 1)}"
 
 
 def fineness(model: str, level: int) -> "Fineness | Pieces":
-    """The mesh of a level: lengths double with each one down, or boxes have one piece less along each axis."""
+    """The mesh of a level: triangles of another size, or boxes of more or fewer pieces along each axis."""
     from sensorgen.models import press2d, press3d
 
     if model == "press3d":
         pieces = press3d.Pieces()
         return replace(pieces, pieces=pieces.pieces + level)
-    mesh = press2d.Fineness()
-    return replace(mesh, **{key: getattr(mesh, key) * 2.0**-level for key in ("apex_mm", "corner_mm", "coarse_mm")})
+    return press2d.Fineness().scaled(_TIMES[level])
 
 
 def pressed(
-    case: Case, stress_pa: Sequence[float], level: int = FINEST, *, keep: bool = True,
+    case: Case, stress_pa: Sequence[float], level: int = USUAL, *, keep: bool = True,
     step: Callable[[float], None] | None = None,
 ) -> "Pressed":  # fmt: skip
     """A case under rising pressure on one mesh, or what is known of it from before; without the deformed outlines.

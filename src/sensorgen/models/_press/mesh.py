@@ -17,6 +17,7 @@ Whole = NDArray[np.int64]
 Run = tuple[int, int]
 
 _SAME = 1e-9  # of the cell's size: places nearer than this are one
+_LEAST_APEX_MM = 1e-3
 _SIDES = ((0, 1), (1, 2), (2, 0))
 
 
@@ -113,9 +114,14 @@ class Fineness:
     coarse_mm: float = 0.15
     growth: float = 0.5
 
+    def scaled(self, factor: float) -> "Fineness":
+        """Every length and the growth times a factor; but triangles of less than 1 um at an apex fold sooner."""
+        apex = max(factor * self.apex_mm, min(self.apex_mm, _LEAST_APEX_MM))
+        return Fineness(apex, *(factor * value for value in (self.corner_mm, self.coarse_mm, self.growth)))
+
     def finer(self) -> "Fineness":
-        """The next level: every length and the growth halved."""
-        return Fineness(*(value / 2 for value in (self.apex_mm, self.corner_mm, self.coarse_mm, self.growth)))
+        """The next level."""
+        return self.scaled(1 / 2)
 
 
 def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
