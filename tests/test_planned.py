@@ -91,6 +91,12 @@ def test_a_round_tip_has_as_many_sections_as_it_takes(accuracy):
     assert all(width > line.allowed for width in coarser)
 
 
+def test_a_flat_tip_is_one_section_and_others_are_still_cut():
+    """The budget holds it against round ones, whose pressure differs."""
+    sensed, _ = worked_out(tri(0.1), 1e-2)
+    assert off(replace(sensed.sensor, profile="parabola"), sensed.sensor) > 1e-5
+
+
 def test_without_force_nothing_has_to_give_way():
     _, plan = worked_out(tri(0.15), 1e-3, Press(TONES, 0.0, 0.05))
     assert chosen(plan)["compression"] == "unconfined"

@@ -23,6 +23,7 @@ from sensorgen.sensor import UNIFORM, Sensor
 
 MEASURES = ("magnitude", "re", "im", "by_force")
 MODELS = ("cell", "compression", "boundary", "line", "tip")  # the other terms are materials
+_NEAR = 1.01  # ratio of stiffnesses that need not be told apart
 _RICHARDSON = 4 / 3  # of what halving changes, where errors fall by four
 
 Shares = dict[str, float]
@@ -39,15 +40,18 @@ class Term:
         Which, and in words what was moved where.
     shares : dict of str to float, or None
         Largest relative change of each of ``MEASURES`` [-]; None where nobody knows.
+    at_least : bool
+        Whether the change may be larger: a press at one end is beyond what the models bear.
     """
 
     name: str
     what: str
     shares: Shares | None
+    at_least: bool = False
 
     def size(self, measure: str) -> float:
-        """Its share, infinite where nobody knows."""
-        return inf if self.shares is None else self.shares[measure]
+        """Its share, infinite where nobody knows how large it may be."""
+        return inf if self.shares is None or self.at_least else self.shares[measure]
 
 
 def budget(
@@ -78,16 +82,18 @@ def budget(
 
     Notes
     -----
-    ``total`` adds all terms, as if each were at its worst: bounds do not average out. It is None where a term has no
-    bound, and that term is the largest.
+    ``total`` adds all terms, as if each were at its worst: bounds do not average out. It is None where a term is not
+    known at all, and may be more where one is ``at_least``; such a term is the largest.
     """
     seen = Seen(sensed.sensor, frequency_hz, force_n, position_m)
     terms = [*_models(sensed, seen), *_materials(design, sensed, seen)]
-    sums = {m: sum(t.size(m) for t in terms) for m in MEASURES}
+    unknown = any(t.shares is None for t in terms)
+    sums = {m: None if unknown else sum((t.shares or {})[m] for t in terms) for m in MEASURES}
     return {
         "press": {"force_n": force_n, "position_m": position_m},
         "terms": [vars(t) for t in terms],
-        "total": {m: value if value < inf else None for m, value in sums.items()},
+        "total": sums,
+        "at_least": any(t.at_least for t in terms),
         "largest": {m: max(terms, key=lambda t: t.size(m)).name for m in MEASURES},
         "accuracy": _verdict(terms, accuracy) if accuracy < inf else None,
     }
@@ -194,10 +200,23 @@ def _stiffness(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:
             softest, stiffest = min(softest, low / taken.value), max(stiffest, high / taken.value)
             said.append(f"{taken.material} {low / 1e6:g} to {high / 1e6:g} MPa")
     if softest < stiffest:
-        law = sensor.compression
-        found = seen.change(*(replace(sensor, compression=law.stiffer(factor)) for factor in (softest, stiffest)))
-        beyond = "" if found else ": at the soft end the press is beyond the law of compression"
-        yield Term("stiffness", ", ".join(said) + beyond, found)
+        borne = _borne(sensor, softest, seen)
+        ends = [replace(sensor, compression=sensor.compression.stiffer(factor)) for factor in (borne, stiffest)]
+        beyond = f": below {borne:.2g} of it the press is beyond the law of compression" if borne > softest else ""
+        yield Term("stiffness", ", ".join(said) + beyond, seen.change(*ends), at_least=borne > softest)
+
+
+def _borne(sensor: Sensor, softest: float, seen: Seen) -> float:
+    """The share of the stiffness from which on a press can be borne: ``softest``, or a per cent above what cannot."""
+    law = sensor.compression
+    low, high = softest, 1.0
+    if seen.change(replace(sensor, compression=law.stiffer(low))):
+        return low
+    while high / low > _NEAR:
+        middle = (low * high) ** 0.5
+        bearable = seen.change(replace(sensor, compression=law.stiffer(middle)))
+        low, high = (low, middle) if bearable else (middle, high)
+    return high
 
 
 def _permittivity(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:

@@ -159,9 +159,15 @@ def carried_out(outline: Outline) -> tuple[Sensed, Plan]:
     spent += _width(compression)
     sensed = outline.makers.sensed(_told(law, compression), known)
     line = _line(sensed.sensor, press, _left(plan.accuracy - spent, line), line)
-    sensed = replace(sensed, sensor=replace(sensed.sensor, pieces=_NAMES[line.chosen]))
     levels = (_asked(cell, known.answer), compression, line)
-    return sensed, replace(plan, levels=levels, width=spent + _width(line))
+    return _cut(sensed, _NAMES[line.chosen]), replace(plan, levels=levels, width=spent + _width(line))
+
+
+def _cut(sensed: Sensed, sections: int) -> Sensed:
+    """With the tip in that many sections; what a flat one would be cut into if it were another is left as it is."""
+    if sensed.sensor.profile == UNIFORM:
+        return sensed
+    return replace(sensed, sensor=replace(sensed.sensor, pieces=sections))
 
 
 def _left(accuracy: float, level: Level) -> float:

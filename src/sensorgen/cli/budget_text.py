@@ -14,8 +14,8 @@ def lines(found: Mapping[str, Any]) -> Iterator[str]:
     yield f"error budget at {press['force_n']:g} N and {press['position_m'] * 1e3:g} mm, at the worst tone:"
     yield f"{'':22}" + "".join(f"{name:>11}" for name in HEADS.values())
     for term in found["terms"]:
-        yield f"  {term['name']:20}" + _row(term["shares"] or dict.fromkeys(HEADS))
-    yield f"  {'all at their worst':20}" + _row(found["total"])
+        yield f"  {term['name']:20}" + _row(term["shares"] or dict.fromkeys(HEADS), at_least=term["at_least"])
+    yield f"  {'all at their worst':20}" + _row(found["total"], at_least=found["at_least"])
     largest = found["largest"]
     what = {term["name"]: term["what"] for term in found["terms"]}
     named = list(dict.fromkeys(largest.values()))
@@ -29,15 +29,15 @@ def _measures(largest: Mapping[str, str], name: str) -> str:
     return ", ".join(HEADS[m] for m, value in largest.items() if value == name)
 
 
-def _row(shares: Mapping[str, float | None]) -> str:
-    return "".join(f"{_percent(shares[m]):>11}" for m in HEADS)
+def _row(shares: Mapping[str, float | None], *, at_least: bool) -> str:
+    return "".join(f"{_percent(shares[m], '>' * at_least):>11}" for m in HEADS)
 
 
-def _percent(share: float | None) -> str:
+def _percent(share: float | None, before: str) -> str:
     if share is None:
         return "unknown"
     percent = 100 * share
-    return f"{percent:.0f} %" if percent >= 99.5 else f"{percent:.2g} %"
+    return f"{before}{percent:.0f} %" if percent >= 99.5 else f"{before}{percent:.2g} %"
 
 
 def _verdict(asked: Mapping[str, Any]) -> str:

@@ -2,8 +2,8 @@
 
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from sensorgen.planned import Makers, Outline, Press
     from sensorgen.sensing import Sensed
 
-_PRESSING = ("pressing the printed cell",)
+ACCURACY = 1e-2  # that is tried where none is asked for: a share of what materials are known to
+_WORK = ("cell, compression and line",)
 Axes = tuple[Sequence[float], Sequence[float], Sequence[float]]
 
 OWN: list[click.Parameter] = [
@@ -59,9 +60,10 @@ OWN: list[click.Parameter] = [
     ),
     click.Option(
         ["--accuracy"], type=Ratio(), default=None,
-        help="Wanted of |Z|, as 1e-3: cell, compression and line by the cheapest models that together come as near.",
+        help="Wanted of |Z|: cell, compression and line by the cheapest models that together come as near. Exit code 1 "
+        f"where they do not; if not given, {ACCURACY:g} is tried.",
     ),
-    click.Option(["--explain"], is_flag=True, help="With --accuracy: print the plan, and what came of it."),
+    click.Option(["--explain"], is_flag=True, help="Print the plan, and what came of it."),
     *asprinted_text.printed_options(
         "Hold what is printed against what is drawn; with presses, predict them of what is printed, its cell solved."
     ),
@@ -87,7 +89,7 @@ def _work(
     **how: Any,
 ) -> int:
     asprinted_text.refuse_strays(as_printed=how["as_printed"], slicer=how["slicer"], walls=how["walls"])
-    _refuse_two(how, accuracy)
+    _refuse_two(how)
     proper("--noise", noise)
     pressed = bool(force_n or position_mm or how["as_csv"] or how["plot"])
     tip: dict[str, Any] = {
@@ -101,30 +103,31 @@ def _work(
     from sensorgen import planned
     from sensorgen.predict import FORCES_N, TONES_HZ, hardest, middle, positions_mm, prediction
 
-    tones, wanted, law = frequency_hz or TONES_HZ, accuracy or inf, compression or ""
+    tones, wanted, law = frequency_hz or TONES_HZ, accuracy or ACCURACY, compression or ""
     if not pressed:
         if how["explain"]:
             _explain(planned.outlined(design, planned.drawn(design, **tip), middle(design, tones), wanted, law))
-        predicted = prediction(design, tones, law, accuracy=wanted, noise=noise, **tip)
+        with _working():
+            predicted = prediction(design, tones, law, accuracy=wanted, noise=noise, **tip)
         if compression or tip_mm is not None or radius_mm is not None:
             _refuse_unjudged(predicted)
         _deliver(_unpressed(predicted, how), how["output"])
         return _verdict(predicted, accuracy)
     axes = tones, force_n or FORCES_N, position_mm or positions_mm(design)
-    made = _made(design, (accuracy, law, tip), hardest(*axes), how)
+    made = _made(design, (wanted, law, tip), hardest(*axes), how)
     return _verdict(_pressed(design, made, axes, (wanted, noise), how), accuracy)
 
 
 def _made(
-    design: "Design", asked: tuple[float | None, str, dict[str, Any]], press: "Press", how: dict[str, Any]
+    design: "Design", asked: tuple[float, str, dict[str, Any]], press: "Press", how: dict[str, Any]
 ) -> "tuple[Sensed, Plan | None]":
     """The sensor as drawn, or as printed; and how it was planned."""
     from sensorgen import planned
 
     accuracy, law, tip = asked
     if not how["as_printed"]:
-        return _carried_out(design, planned.drawn(design, **tip), press, accuracy or inf, law, how)
-    from sensorgen.asprinted import compared, pressed
+        return _carried_out(design, planned.drawn(design, **tip), press, accuracy, law, how)
+    from sensorgen.asprinted import pressed
 
     printed = asprinted_text.printed(design, how["slicer"], how["walls"])
     makers = planned.Makers(
@@ -132,9 +135,7 @@ def _made(
         lambda law, known: pressed.sensor_of(design, printed, law, known=known, **tip),
         pressed.piece(design, printed),
     )
-    with show.progress(_PRESSING) as step:
-        step(_PRESSING[0])
-        return _carried_out(design, makers, press, accuracy or compared.ACCURACY, law, how)
+    return _carried_out(design, makers, press, accuracy, law, how)
 
 
 def _carried_out(
@@ -144,7 +145,16 @@ def _carried_out(
 
     if how["explain"]:
         _explain(planned.outlined(design, makers, press, accuracy, law))
-    return planned.sensed(design, makers, press, accuracy, law)
+    with _working():
+        return planned.sensed(design, makers, press, accuracy, law)
+
+
+@contextmanager
+def _working() -> Iterator[None]:
+    """Say that something is being worked out, which may take seconds."""
+    with show.progress(_WORK) as step:
+        step(_WORK[0])
+        yield
 
 
 def _explain(outline: "Outline") -> None:
@@ -196,13 +206,11 @@ def _verdict(predicted: dict[str, Any], accuracy: float | None) -> int:
     return FOUND_ERRORS
 
 
-def _refuse_two(how: dict[str, Any], accuracy: float | None) -> None:
+def _refuse_two(how: dict[str, Any]) -> None:
     given = [f"--{name.removeprefix('as_')}" for name in ("as_json", "as_csv", "plot") if how[name]]
     given += ["--output"] if how["output"] and (how["plot"] or how["explain"]) else []
     if len(given) > 1:
         raise BadInput(f"{' and '.join(given)} at once; expected one of them")
-    if how["explain"] and accuracy is None:
-        raise BadInput("--explain without --accuracy: there is no plan; expected an accuracy, as --accuracy 1e-3")
     if how["explain"] and given:
         raise BadInput(f"--explain is for people, and {given[0]} is not; --json holds the plan too")
 
