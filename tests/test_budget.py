@@ -89,12 +89,18 @@ def test_a_cell_taken_for_a_plate_has_no_bound_and_that_is_the_largest_term():
     assert any("unknown" in text for text in lines(got))
 
 
-def test_a_press_beyond_the_law_at_its_soft_end_is_not_bounded():
-    """At 1 MPa 60 kPa are what 360 kPa are at 6 MPa: three times the last solved point and more."""
+def test_a_press_beyond_the_law_at_its_soft_end_is_bounded_from_below():
+    """At 1 MPa 60 kPa are what 360 kPa are at 6 MPa: three times the last solved point and more; at 1.2 MPa, 300."""
     got = found("tri")
     term = next(t for t in got["terms"] if t["name"] == "stiffness")
-    assert term["shares"] is None
+    sensor = sensor_of(make({"shape": "tri"})).sensor
+    here, harder = (abs(sensor.impedance(np.array(TONES), force, 0.05)) for force in (6.0, 29.9))
+    assert term["shares"]["magnitude"] == pytest.approx(max(1 - harder / here), rel=0.02)
+    assert (term["at_least"], got["at_least"]) == (True, True)
     assert "beyond the law" in term["what"]
+    assert set(got["largest"].values()) == {"stiffness"}
+    row = next(line for line in lines(got) if line.startswith("  stiffness"))
+    assert row.count(">") == 4
     assert shares(found("tri", force=3.0), "stiffness")["by_force"] > 0.5
 
 
