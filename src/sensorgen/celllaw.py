@@ -89,7 +89,7 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
         return _cell(known, moduli)
     if name == "solved":
         return solved(design, printed)
-    return _as_plate(design, moduli, "ask for the law 'solved', which takes a minute or two")
+    return _as_plate(design, moduli, "ask for the law 'solved', which takes from seconds to a minute")
 
 
 @dataclass(frozen=True)
@@ -116,13 +116,14 @@ class Option:
 
 def options(design: Design, answer: Answer, name: str = "", *, printed: Piece | None = None) -> list[Option]:
     """The laws that could be had of a design, the cheapest first; parameters and errors as of :func:`law_of`."""
-    at_once = law_of(design, answer, "" if name == "solved" else name, printed=printed)
+    asked = name == "solved" and not is_plate(answer)
+    at_once = law_of(design, answer, "" if asked else name, printed=printed)
     known = Option(at_once.compression.name, 0.0, at_once, lambda: at_once)
     if at_once.bounded or name == "unconfined":
         return [known]
     piece = printed or drawn(design)
-    model = model_of(piece)
-    return [known, *(_option(design, printed, rung) for rung in rungs(piece, model, len(STRESS_PA) - 1))]
+    meshes = rungs(piece, model_of(piece), len(STRESS_PA) - 1)
+    return [*([] if asked else [known]), *(_option(design, printed, rung) for rung in meshes)]
 
 
 def _option(design: Design, printed: Piece | None, rung: Rung) -> Option:

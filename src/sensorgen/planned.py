@@ -12,6 +12,7 @@ from math import inf
 from typing import Any
 
 from sensorgen.budget import Seen
+from sensorgen.card import FORCE_N
 from sensorgen.celllaw import Law, Option, options
 from sensorgen.design import Design
 from sensorgen.errors import OutOfRange
@@ -20,7 +21,10 @@ from sensorgen.planner import Answer, Unloaded, unloaded, weighed
 from sensorgen.pressing import Piece
 from sensorgen.sensing import Sensed, sensor_of
 from sensorgen.sensor import UNIFORM, Sensor
+from sensorgen.units import M_PER_MM
 
+ACCURACY = 1e-2  # that is tried where none is asked for: a share of what materials are known to
+_TONES_HZ = (1e3, 1e5)  # between which errors of abs(Z) are looked for there
 SECTIONS = (4, 8, 16, 32, 64, 128, 256)  # that a tip whose pressure is not uniform may be cut into
 _NAMES = {f"line, {n} section{'s' * (n > 1)}": n for n in (1, *SECTIONS)}
 _RICHARDSON = 4 / 3  # of what halving a section changes, where errors fall by four
@@ -55,6 +59,10 @@ class Makers:
     unloaded: Callable[[float], Unloaded]
     sensed: Callable[[str | Law, Unloaded], Sensed]
     printed: Piece | None = None
+
+    def rough(self, law: str) -> Sensed:
+        """The sensor by what costs next to nothing."""
+        return self.sensed("" if law == "solved" else law, self.unloaded(inf))
 
 
 @dataclass(frozen=True)
@@ -97,6 +105,39 @@ def sensed(
     return carried_out(outlined(design, makers, press, accuracy, law))
 
 
+def usual(design: Design, law: str = "", **tip: Any) -> Sensed:
+    """The sensor to ``ACCURACY`` at a press in its middle, where nobody asks for another; as near as it comes to that.
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    law : str
+        As of :func:`outlined`.
+    **tip
+        As of :func:`sensorgen.sensing.sensor_of`.
+
+    Raises
+    ------
+    SensorgenError
+        As :func:`outlined`.
+    """
+    makers = drawn(design, **tip)
+    press = Press(_TONES_HZ, FORCE_N, design.params.length_mm * M_PER_MM / 2)
+    if _bears(makers.rough(law).sensor, press):
+        return sensed(design, makers, press, ACCURACY, law)[0]
+    return makers.sensed(law, makers.unloaded(ACCURACY))
+
+
+def _bears(sensor: Sensor, press: Press) -> bool:
+    """Whether a sensor can take a press."""
+    try:
+        Seen(sensor, press.frequency_hz, press.force_n, press.position_m)
+    except OutOfRange:
+        return False
+    return True
+
+
 def outlined(design: Design, makers: Makers, press: Press, accuracy: float, law: str = "") -> Outline:
     """What an accuracy takes: by models that cost next to nothing, and by what the others are expected to do.
 
@@ -116,17 +157,17 @@ def outlined(design: Design, makers: Makers, press: Press, accuracy: float, law:
     Raises
     ------
     OutOfRange
-        An accuracy that is not above 0.
+        An accuracy that is not above 0; a press that the sensor cannot take.
     Unpredictable, MissingValue, UnknownName, BadInput
         As :func:`sensorgen.sensing.sensor_of`.
     """
     if not accuracy > 0:
         raise OutOfRange(f"an accuracy of {accuracy:g}; expected a number above 0, as 1e-3")
-    rough = makers.sensed("" if law == "solved" else law, makers.unloaded(inf))
+    rough = makers.rough(law)
     sensor = rough.sensor
     line = _expected(_line(sensor, press, accuracy / 3))
     share = (accuracy - min(_reach(line), accuracy / 3)) / 2
-    by_capacitance = _off(sensor, press, _thicker(sensor, 1 + _NUDGE)) / _NUDGE
+    by_capacitance = _by_capacitance(sensor, press)
 
     def laws(known: Answer) -> list[Option]:
         return options(design, known, law, printed=makers.printed)
@@ -173,6 +214,13 @@ def _cut(sensed: Sensed, sections: int) -> Sensed:
 def _left(accuracy: float, level: Level) -> float:
     """What the levels before left over; where that is nothing, no more is worth while than was planned."""
     return accuracy if accuracy > 0 else level.allowed
+
+
+def _by_capacitance(sensor: Sensor, press: Press) -> float:
+    """Relative change of abs(Z) over that of the capacitance [-]."""
+    seen = Seen(sensor, press.frequency_hz, press.force_n, press.position_m)
+    found = seen.change(_thicker(sensor, 1 + _NUDGE))
+    return found["magnitude"] / _NUDGE if found else 1.0
 
 
 def _thicker(sensor: Sensor, factor: float) -> Sensor:

@@ -147,7 +147,7 @@ def test_the_card_is_of_the_greatest_press_and_the_noise_asked_for(run):
 
 
 def test_the_verdict_on_a_cell_that_nobody_solved_says_so(run):
-    found = json.loads(run("predict", "tri", "--dielectric", "0.15", "--json").out)["identifiability"]
+    found = json.loads(run("predict", "tri", "--compression", "unconfined", "--json").out)["identifiability"]
     assert found["verdict"].startswith(
         "not known, as the cell was not solved, and is taken to give way as a solid plate;"
     )

@@ -95,9 +95,9 @@ def _estimator(
 ) -> "tuple[Estimator, tuple[str, ...]]":
     """The estimator for this design, and what to doubt about its sensor."""
     from sensorgen.invert import FORCE_LIMIT_N, Estimator
-    from sensorgen.sensing import sensor_of
+    from sensorgen.planned import usual
 
-    sensed = sensor_of(design, compression or "", tip_mm * units.M_PER_MM)
+    sensed = usual(design, compression or "", tip_m=tip_mm * units.M_PER_MM)
     limit = FORCE_LIMIT_N if force_limit_n is None else force_limit_n
     return Estimator(sensed.sensor, source.frequency_hz, noise, _prior(prior), limit), sensed.doubts
 

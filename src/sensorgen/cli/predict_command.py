@@ -19,10 +19,9 @@ from sensorgen.plan import plain
 if TYPE_CHECKING:
     from sensorgen.design import Design
     from sensorgen.plan import Plan
-    from sensorgen.planned import Makers, Outline, Press
+    from sensorgen.planned import Makers, Outline
     from sensorgen.sensing import Sensed
 
-ACCURACY = 1e-2  # that is tried where none is asked for: a share of what materials are known to
 _WORK = ("cell, compression and line",)
 Axes = tuple[Sequence[float], Sequence[float], Sequence[float]]
 
@@ -61,7 +60,7 @@ OWN: list[click.Parameter] = [
     click.Option(
         ["--accuracy"], type=Ratio(), default=None,
         help="Wanted of |Z|: cell, compression and line by the cheapest models that together come as near. Exit code 1 "
-        f"where they do not; if not given, {ACCURACY:g} is tried.",
+        "where they do not; if not given, 1e-2 is tried.",
     ),
     click.Option(["--explain"], is_flag=True, help="Print the plan, and what came of it."),
     *asprinted_text.printed_options(
@@ -90,6 +89,7 @@ def _work(
 ) -> int:
     asprinted_text.refuse_strays(as_printed=how["as_printed"], slicer=how["slicer"], walls=how["walls"])
     _refuse_two(how)
+    how["planned"] = bool(accuracy or how["explain"])  # what nobody asked for is not told
     proper("--noise", noise)
     pressed = bool(force_n or position_mm or how["as_csv"] or how["plot"])
     tip: dict[str, Any] = {
@@ -101,32 +101,33 @@ def _work(
         _refuse_strangers((frequency_hz, tip_mm, radius_mm, compression), explain=how["explain"])
         return _as_printed(design, accuracy, how)
     from sensorgen import planned
-    from sensorgen.predict import FORCES_N, TONES_HZ, hardest, middle, positions_mm, prediction
+    from sensorgen.predict import FORCES_N, TONES_HZ, middle, positions_mm, prediction
 
-    tones, wanted, law = frequency_hz or TONES_HZ, accuracy or ACCURACY, compression or ""
+    tones, wanted, law = frequency_hz or TONES_HZ, accuracy or planned.ACCURACY, compression or ""
     if not pressed:
         if how["explain"]:
             _explain(planned.outlined(design, planned.drawn(design, **tip), middle(design, tones), wanted, law))
         with _working():
             predicted = prediction(design, tones, law, accuracy=wanted, noise=noise, **tip)
+        predicted = predicted if how["planned"] else {key: predicted[key] for key in predicted if key != "plan"}
         if compression or tip_mm is not None or radius_mm is not None:
             _refuse_unjudged(predicted)
         _deliver(_unpressed(predicted, how), how["output"])
         return _verdict(predicted, accuracy)
     axes = tones, force_n or FORCES_N, position_mm or positions_mm(design)
-    made = _made(design, (wanted, law, tip), hardest(*axes), how)
+    made = _made(design, (wanted, law, tip), axes, how)
     return _verdict(_pressed(design, made, axes, (wanted, noise), how), accuracy)
 
 
 def _made(
-    design: "Design", asked: tuple[float, str, dict[str, Any]], press: "Press", how: dict[str, Any]
+    design: "Design", asked: tuple[float, str, dict[str, Any]], axes: Axes, how: dict[str, Any]
 ) -> "tuple[Sensed, Plan | None]":
     """The sensor as drawn, or as printed; and how it was planned."""
     from sensorgen import planned
 
     accuracy, law, tip = asked
     if not how["as_printed"]:
-        return _carried_out(design, planned.drawn(design, **tip), press, accuracy, law, how)
+        return _carried_out(design, planned.drawn(design, **tip), axes, (accuracy, law), how)
     from sensorgen.asprinted import pressed
 
     printed = asprinted_text.printed(design, how["slicer"], how["walls"])
@@ -135,18 +136,22 @@ def _made(
         lambda law, known: pressed.sensor_of(design, printed, law, known=known, **tip),
         pressed.piece(design, printed),
     )
-    return _carried_out(design, makers, press, accuracy, law, how)
+    return _carried_out(design, makers, axes, (accuracy, law), how)
 
 
 def _carried_out(
-    design: "Design", makers: "Makers", press: "Press", accuracy: float, law: str, how: dict[str, Any]
+    design: "Design", makers: "Makers", axes: Axes, asked: tuple[float, str], how: dict[str, Any]
 ) -> "tuple[Sensed, Plan | None]":
     from sensorgen import planned
+    from sensorgen.predict import check_presses, hardest
 
+    outline = partial(planned.outlined, design, makers, hardest(*axes), *asked)
+    _, force_n, position_mm = axes
+    check_presses(makers.rough(asked[1]).sensor, force_n, [x * units.M_PER_MM for x in position_mm])
     if how["explain"]:
-        _explain(planned.outlined(design, makers, press, accuracy, law))
+        _explain(outline())
     with _working():
-        return planned.sensed(design, makers, press, accuracy, law)
+        return planned.carried_out(outline())
 
 
 @contextmanager
@@ -249,7 +254,7 @@ def _pressed(
     elif how["as_csv"]:
         _deliver(csv_blocks(sensed.sensor, *axes), how["output"], len(axes[1]) * len(axes[2]))
     else:
-        predicted = presses(design, sensed, *axes, *wanted, plan)
+        predicted = presses(design, sensed, *axes, *wanted, plan if how["planned"] else None)
         lines = (*_measured(predicted, how), *show.presses(predicted, moves(predicted)), *_judgement(predicted))
         text = (f"{line}\n" for line in lines)
         _deliver(show.json_lines(predicted) if how["as_json"] else text, how["output"])

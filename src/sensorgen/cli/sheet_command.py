@@ -80,12 +80,12 @@ def _work(
     plot: Path | None,
 ) -> int:  # fmt: skip
     from sensorgen.models.sheet import impedance
+    from sensorgen.planned import usual
     from sensorgen.predict import TONES_HZ
-    from sensorgen.sensing import sensor_of
 
     force_n, tip_mm, tones = one("--force", force), one("--tip", tip), frequencies or TONES_HZ
     proper("--noise", noise)
-    sensed = sensor_of(design, compression or "")
+    sensed = usual(design, compression or "")
     film = _sheet(sensed.sensor)
     press, per_newton = _press(sensed.sensor, tip_mm * units.M_PER_MM, force_n)
     ports = _ports(film, contacts, pads)
