@@ -116,4 +116,4 @@ def _whole(found: Fields, turn: Turned) -> Iterator[tuple[complex, float]]:
 
 def _grown(centre: complex, off: float, rounding: float) -> Disc:
     """A disc with room for rounding."""
-    return Disc(complex(centre), float(off + rounding * abs(centre)))
+    return Disc(complex(centre), float(off + max(rounding, ROUNDING) * abs(centre)))
