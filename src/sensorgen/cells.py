@@ -8,6 +8,7 @@ no fringe arises there; a section without such planes is continued by its own mi
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -86,6 +87,7 @@ class Cell:
     shares: tuple[float, ...]
 
 
+@lru_cache(maxsize=8)
 def cell(section: Section, height_mm: float) -> Cell:
     """The smallest piece of a section that mirrors at its own two sides continue to the whole.
 

@@ -115,6 +115,30 @@ def plates(*bodies: Body, gap_mm: float = 0.7, size: tuple[float, float] = (4.0,
     return Scene((low, *bodies, high), (*size, 0.6 + gap_mm))
 
 
+def test_columns_side_by_side_each_count_as_wide_and_of_what_they_are():
+    """Posts from plate to plate, some alike: C = eps0 sum of w eps / h, whatever stands beside what."""
+    posts = [("x60", 0.0, 0.5), ("pva", 0.5, 1.0), ("x60", 1.0, 1.75), ("x60", 2.25, 2.75), ("pva", 3.0, 3.5)]
+    bodies = [Body(name, name, (box(a, b, 0, 2, 0.3, 1.0),)) for name, a, b in posts]
+    found = capacitance(plates(*bodies), EPS | {"pva": 3.0})
+    exact = EPS0_F_PER_M * 2 * (1.75 * 4.68 + 1.0 * 3.0 + 1.25 * EPS["air"]) / 0.7 * MM
+    assert (found.lower, found.upper) == close((exact, exact), 1e-12)
+
+
+@pytest.mark.parametrize("end_mm", [4.0, 14.0])
+def test_stairs_in_a_row_hold_as_much_as_one_each(end_mm):
+    """Where columns' own potentials jump, that of straight triangles repeats as the stairs do."""
+    found, one = capacitance(stair_row(end_mm), EPS), capacitance(stair_row(2.0), EPS)
+    assert (found.lower, found.upper) == close((one.lower * end_mm / 2, one.upper * end_mm / 2), 1e-11)
+
+
+def stair_row(end_mm: float) -> Scene:
+    """Two steps of dielectric that hang from the upper plate, in periods of 2 mm."""
+    starts = range(0, int(end_mm), 2)
+    wide = [box(x + 0.2, x + 1.8, 0, 1, 0.7, 1.0) for x in starts]
+    narrow = [box(x + 0.5, x + 1.5, 0, 1, 0.4, 0.7) for x in starts]
+    return plates(Body("stairs", "x60", (*wide, *narrow)), size=(end_mm, 1.0))
+
+
 RIDGE = Body("ridge", "x60", (Prism("y", ((0, 0.3), (4, 0.3), (1, 0.9)), 0.0, 2.0),))
 
 
