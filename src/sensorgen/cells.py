@@ -58,6 +58,8 @@ class Slice:
 
     def between(self, left_mm: float, right_mm: float) -> "Slice":
         """The part between two places within it [mm]."""
+        if (left_mm, right_mm) == (self.left_mm, self.right_mm):
+            return self
         ends = (self.lines_mm(left_mm), self.lines_mm(right_mm))
         floor = self.bands[0].bottom_mm[0]
         bands, below = [], (floor, floor)

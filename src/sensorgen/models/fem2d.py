@@ -17,9 +17,9 @@ from sensorgen.interval import Disc, Interval
 from sensorgen.models import _fem_bounds as fem
 from sensorgen.models._fem_cones import RATIO
 from sensorgen.models._fem_corners import exponents
+from sensorgen.models._fem_fronts import Numbers
 from sensorgen.models._fem_grading import graded
 from sensorgen.models._fem_lossy import Fields, Turned, disc, turned
-from sensorgen.models._fem_fronts import Numbers
 from sensorgen.models._fem_mesh import Cones
 from sensorgen.models._fem_plane import Plane
 from sensorgen.models._fem_problem import Field
