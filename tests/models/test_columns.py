@@ -14,6 +14,7 @@ from cell_scenes import stairs
 from scipy.integrate import quad
 
 from sensorgen.cells import cell
+from sensorgen.models import fem2d
 from sensorgen.models._fem_triangles import triangles
 from sensorgen.models._straight import energy as straight
 from sensorgen.models.columns import _mean_min, capacitance, unfit
@@ -122,6 +123,22 @@ def test_columns_side_by_side_each_count_as_wide_and_of_what_they_are():
     found = capacitance(plates(*bodies), EPS | {"pva": 3.0})
     exact = EPS0_F_PER_M * 2 * (1.75 * 4.68 + 1.0 * 3.0 + 1.25 * EPS["air"]) / 0.7 * MM
     assert (found.lower, found.upper) == close((exact, exact), 1e-12)
+
+
+def test_posts_of_one_width_and_two_heights():
+    """The lower bound counts each by its own height: eps0 sum of w / s."""
+    heights = {(0.5, 1.0): 0.2, (1.5, 2.0): 0.5, (2.5, 3.0): 0.2}
+    posts = [box(a, b, 0, 2, 0.3, 0.3 + height) for (a, b), height in heights.items()]
+    per_width = [0.5 / (h / 4.68 + (0.7 - h) / EPS["air"]) for h in heights.values()]
+    exact = EPS0_F_PER_M * 2 * (sum(per_width) + 2.5 * EPS["air"] / 0.7) * MM
+    assert capacitance(plates(Body("posts", "x60", tuple(posts))), EPS).lower == close(exact, 1e-12)
+
+
+def test_one_jump_anywhere_forbids_the_columns_own_potential():
+    """A ridge whose columns' potentials meet, then a post whose own do not meet the air's: finite elements tell."""
+    ridge = Prism("y", ((0.0, 0.3), (1.5, 0.3), (0.75, 0.4)), 0.0, 2.0)
+    scene = plates(Body("x", "x60", (ridge, box(2.0, 3.0, 0, 2, 0.3, 0.9))))
+    assert capacitance(scene, EPS | {"x60": 50.0}).upper > fem2d.capacitance(scene, EPS | {"x60": 50.0}, 1e-4).lower
 
 
 @pytest.mark.parametrize("end_mm", [4.0, 14.0])
