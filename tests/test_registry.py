@@ -58,6 +58,6 @@ def test_modules_are_found_by_what_they_define(tmp_path):
     (tmp_path / "two.py").write_text("# def answer(\nraise ImportError\n\n\ndef answer(\n    word): ...\n")
     (tmp_path / "_three.py").write_text("def answer(): ...\n")
     package = type("Package", (), {"__path__": [str(tmp_path)]})
-    assert registry.defining(package, "answer") == ["two"]
-    assert registry.defining(package, "answ") == []
-    assert registry.defining(models, "capacitance") == ["columns", "fem2d", "fem3d"]
+    assert registry.defining(package, "answer") == ("two",)
+    assert registry.defining(package, "answ") == ()
+    assert registry.defining(models, "capacitance") == ("columns", "fem2d", "fem3d")

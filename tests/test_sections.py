@@ -1,11 +1,12 @@
 """Sections and columns: together they are the scene."""
 
-from itertools import pairwise
+from itertools import combinations, pairwise
 
+import numpy as np
 import pytest
 
 from sensorgen.scene import Body, Fill, Prism, Scene, area_mm2, box
-from sensorgen.sections import columns, sections
+from sensorgen.sections import alike, columns, sections
 from sensorgen.shapes import rect, reference, tri
 
 SCENES = {
@@ -111,3 +112,25 @@ def test_slants_both_ways_have_no_constant_section():
     both = Scene(tuple(ridges), (4, 4, 1))
     with pytest.raises(ValueError, match="constant cross-sections"):
         sections(both)
+
+
+def test_columns_are_alike_that_are_as_wide_with_the_same_at_the_same_heights(scene):
+    """Each pair compared, by what differs between them."""
+    for section in sections(scene):
+        for (a, first), (b, second) in combinations(zip(columns(section), alike(section), strict=True), 2):
+            assert (first == second) == (difference(a, b) < 1e-9)
+
+
+def difference(a, b) -> float:
+    """Largest of their widths' and heights'; infinite where bodies differ."""
+    if [layer.body.name for layer in a.layers] != [layer.body.name for layer in b.layers]:
+        return np.inf
+    sizes = [
+        (c.right_mm - c.left_mm, *(v for layer in c.layers for v in (*layer.bottom_mm, *layer.top_mm))) for c in (a, b)
+    ]
+    return float(np.abs(np.subtract(*sizes)).max())
+
+
+def test_a_long_sensor_has_no_more_looks_than_its_period():
+    long, one = (sections(tri.scene(tri.Params(length_mm=x, width_mm=1.0), Fill()))[0] for x in (200.0, 2.0))
+    assert len(set(alike(long))) == len(set(alike(one))) == len(columns(one)) == len(columns(long)) / 100

@@ -8,6 +8,7 @@ no fringe arises there; a section without such planes is continued by its own mi
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -57,6 +58,8 @@ class Slice:
 
     def between(self, left_mm: float, right_mm: float) -> "Slice":
         """The part between two places within it [mm]."""
+        if (left_mm, right_mm) == (self.left_mm, self.right_mm):
+            return self
         ends = (self.lines_mm(left_mm), self.lines_mm(right_mm))
         floor = self.bands[0].bottom_mm[0]
         bands, below = [], (floor, floor)
@@ -86,6 +89,7 @@ class Cell:
     shares: tuple[float, ...]
 
 
+@lru_cache(maxsize=8)
 def cell(section: Section, height_mm: float) -> Cell:
     """The smallest piece of a section that mirrors at its own two sides continue to the whole.
 

@@ -1,6 +1,7 @@
 """Names to things: what stands in a folder is known by its file name, and loaded when it is used."""
 
 import importlib
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -13,11 +14,12 @@ def names(package: ModuleType) -> list[str]:
     return sorted(p.stem for p in folder.glob("*.py") if not p.stem.startswith("_"))
 
 
-def defining(package: ModuleType, function: str) -> list[str]:
+@cache
+def defining(package: ModuleType, function: str) -> tuple[str, ...]:
     """Names of the modules that define a function, found in their text without loading any."""
     folder, start = Path(next(iter(package.__path__))), f"def {function}("
     texts = ((name, (folder / f"{name}.py").read_text("utf-8")) for name in names(package))
-    return [name for name, text in texts if any(line.startswith(start) for line in text.splitlines())]
+    return tuple(name for name, text in texts if f"\n{start}" in text)
 
 
 def load(package: ModuleType, name: str) -> ModuleType:

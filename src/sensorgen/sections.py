@@ -3,14 +3,15 @@
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
-from sensorgen.scene import PLANE, Body, Outline, Point, Prism, Scene
+from sensorgen.scene import PLANE, Body, Outline, Point, Prism, Scene, rounded
 
 ROUNDING_MM = 1e-9  # edges nearer than this are one edge, reached by different sums
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # one object for one section: its columns are cut once
 class Section:
     """A cross-section that the sensor has over some depth.
 
@@ -42,6 +43,11 @@ def sections(scene: Scene) -> list[Section]:
     ValueError
         Some outline is slanted in plan, or slants run both ways: no vertical cut is constant over a depth.
     """
+    return list(_fewest(scene))
+
+
+@lru_cache(maxsize=8)
+def _fewest(scene: Scene) -> list[Section]:
     normals = [n for n in "yx" if all(p.axis == n or p.is_box() for b in scene.bodies for p in b.prisms)]
     if not normals:
         raise ValueError("no direction in which this scene is made of constant cross-sections")
@@ -99,6 +105,23 @@ class Column:
 
 def columns(section: Section) -> list[Column]:
     """Cut a section into columns, from left to right; layers from bottom to top."""
+    return list(_columns(section))
+
+
+@lru_cache(maxsize=8)
+def alike(section: Section) -> list[int]:
+    """Of each column, the number of the first that looks like it: as wide, of the same bodies at the same heights."""
+    firsts: dict[object, int] = {}
+    return [firsts.setdefault(_look(column), k) for k, column in enumerate(_columns(section))]
+
+
+def _look(column: Column) -> object:
+    lines = ((layer.body.name, *map(rounded, (*layer.bottom_mm, *layer.top_mm))) for layer in column.layers)
+    return rounded(column.right_mm - column.left_mm), *lines
+
+
+@lru_cache(maxsize=8)
+def _columns(section: Section) -> list[Column]:
     cuts = sorted({u for _, outline in section.regions for u, _ in outline})
     edges: list[list[tuple[Point, int]]] = [[] for _ in cuts[1:]]
     for number, (_, outline) in enumerate(section.regions):

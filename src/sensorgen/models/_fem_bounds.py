@@ -24,7 +24,7 @@ class Unsolved(SensorgenError):
     """A mesh so slender that doubles do not solve it."""
 
 
-ROUNDING = 1e-9  # relative: what doubles may lose in a solve, by which both bounds are moved outwards
+ROUNDING = 1e-9  # relative: what edges nearer than a nanometre's thousandth lose; both bounds are moved outwards by it
 
 
 @dataclass(frozen=True)
@@ -40,14 +40,14 @@ class Energies:
     unknowns : int
         That the larger of the two systems couples.
     rounding : float
-        Share by which doubles may be off [-].
+        Share by which doubles may be off, where it was estimated; an answer allows for ``ROUNDING`` at least [-].
     """
 
     lower: float
     upper: float
     part: float
     unknowns: int
-    rounding: float = ROUNDING
+    rounding: float = 0.0
 
 
 def third_electrode(scene: Scene) -> str | None:
@@ -80,16 +80,17 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
     Unsolved
         The lower bound is not above 0.
     """
-    below, above = found.lower, found.upper
+    below, above, rounding = found.lower, found.upper, max(found.rounding, ROUNDING)
     if not (below > 0 and np.isfinite(above)):
         raise Unsolved(f"doubles do not solve this scene: its lower bound is {below:.3g}, its upper one {above:.3g}")
-    if below > above * (1 + found.rounding):
+    if below > above * (1 + rounding):
         raise CrossedBounds(
             f"lower bound {below:.12g} above upper bound {above:.12g}: the solver failed on this scene; report it, "
             "and use --model columns meanwhile"
         )
     least, most = min(shares), max(shares)
-    part, off = np.sqrt(found.part), np.sqrt((most - least) * max(above - below, 0.0))
+    apart = above - below + found.rounding * (above + below)
+    part, off = np.sqrt(found.part), np.sqrt((most - least) * max(apart, 0.0))
     lower = least * below + max(part - off, 0.0) ** 2
     upper = least * above + (part + off) ** 2
-    return Interval(float(min(lower, upper) * (1 - found.rounding)), float(upper * (1 + found.rounding)))
+    return Interval(float(min(lower, upper) * (1 - rounding)), float(upper * (1 + rounding)))

@@ -77,7 +77,7 @@ class Fields:
     unknowns : int
         That the larger of the two systems couples.
     rounding : float
-        Share by which doubles may be off [-].
+        Share by which doubles may be off, where it was estimated; an answer allows for ``ROUNDING`` at least [-].
     """
 
     lower: complex
@@ -86,7 +86,7 @@ class Fields:
     size: float
     apart: float
     unknowns: int
-    rounding: float = ROUNDING
+    rounding: float = 0.0
 
 
 def disc(found: Fields, turn: Turned, shares: Sequence[float]) -> Disc:
@@ -116,4 +116,4 @@ def _whole(found: Fields, turn: Turned) -> Iterator[tuple[complex, float]]:
 
 def _grown(centre: complex, off: float, rounding: float) -> Disc:
     """A disc with room for rounding."""
-    return Disc(complex(centre), float(off + rounding * abs(centre)))
+    return Disc(complex(centre), float(off + max(rounding, ROUNDING) * abs(centre)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from sensorgen.models._fem_cuts import Flow, flow
 from sensorgen.models._fem_fans import Fan, fans
-from sensorgen.models._fem_fronts import Whole
+from sensorgen.models._fem_fronts import Numbers, Whole
 from sensorgen.models._fem_triangles import Triangles
 
 
@@ -60,14 +60,19 @@ class Cones:
         """One number for each side, by its ends."""
         return np.minimum(a, b) * len(self.triangles.points) + np.maximum(a, b)
 
-    def slenderness(self) -> float:
-        """Of the most slender triangle: its longest side squared over twice its area; or infinite, without one [-]."""
+    def areas(self) -> Numbers:
+        """Of all triangles, twice; 0 or less where doubles tell no triangle [mm2]."""
+        a, b, c = self.triangles.points[self.corners].transpose(1, 2, 0)
+        return np.asarray((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0])
+
+    def thinness(self) -> Numbers:
+        """How many times the share by which its corners' coordinates are off each triangle's area is [-].
+
+        A micrometre of height, a metre up or along a slope that is a metre long, makes it a million.
+        """
         corners = self.triangles.points[self.corners]
-        sides = np.roll(corners, -1, axis=1) - corners
-        area = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
-        if area.min() <= 0:
-            return np.inf
-        return float(((sides**2).sum(axis=2).max(axis=1) / area).max())
+        farthest, along = abs(corners).max(axis=1), np.ptp(corners, axis=1)
+        return np.asarray((farthest * along[:, ::-1]).sum(axis=1) / self.areas())
 
     def elements(self) -> int:
         """Triangles, those in rings each for itself."""

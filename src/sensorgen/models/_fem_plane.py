@@ -52,6 +52,16 @@ class Plane:
         same = crossed(self.order)
         return self._over(f, g, same, [(same, same)] * len(f.cones))
 
+    def energy_terms(self, f: Field) -> Numbers:
+        """Moduli of all terms that :meth:`energies` of ``f`` and its conjugate adds, over each triangle."""
+        size, cones = f.moduli(), [(abs(rings), abs(tips)) for rings, tips in self._cone_energies]
+        return self._over(size, size, abs(self._plain_energy), cones)
+
+    def crossing_terms(self, f: Field, g: Field) -> Numbers:
+        """Moduli of all terms that :meth:`crossings` adds, over each triangle."""
+        size = abs(crossed(self.order))
+        return self._over(f.moduli(), g.moduli(), size, [(size, size)] * len(f.cones))
+
     def _problem(self, weight: Numbers, *held: Any) -> Problem:
         return Problem(self.mesh, self.order, self._plain_energy, self._cone_energies, weight, *held)
 

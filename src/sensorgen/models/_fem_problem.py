@@ -33,6 +33,10 @@ class Field:
         """Its complex conjugate."""
         return Field(self.plain.conj(), [(rings.conj(), tips.conj()) for rings, tips in self.cones])
 
+    def moduli(self) -> "Field":
+        """The moduli of its values."""
+        return Field(abs(self.plain), [(abs(rings), abs(tips)) for rings, tips in self.cones])
+
 
 Jumps = list[tuple[int, int]]
 

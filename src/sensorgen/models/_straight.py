@@ -4,28 +4,27 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sensorgen.cells import Cell, section_slices
+from sensorgen.cells import cell
 from sensorgen.models._fem_triangles import triangles
 from sensorgen.sections import Section
 
 
 def energy(section: Section, height_mm: float, permittivity: Mapping[str, float]) -> float:
-    """Least energy of such potentials at 1 V, per depth and over eps0 [-]; the sensor's ends are mirrors.
+    """Least energy of such potentials at 1 V, per depth and over eps0 [-], the same in each repeating cell.
 
     Raises
     ------
     ValueError
         The electrodes touch, none lies opposite the other, or the field between them would leave the sensor.
     """
-    slices = section_slices(section, height_mm)
-    mesh = triangles(Cell(tuple(slices), (1.0,) * len(slices)))
+    mesh = triangles(cell(section, height_mm))
     corners = np.array(mesh.triangles)
     used, corners = np.unique(corners, return_inverse=True)
     corners = corners.reshape(-1, 3)
     points = mesh.points[used][corners]
     sides = np.roll(points, -1, axis=1) - np.roll(points, -2, axis=1)
     twice = np.abs(np.linalg.det(sides[:, :2]))
-    eps = np.array([permittivity[material] for material, _ in mesh.regions])
+    eps = np.array([permittivity[material] * share for material, share in mesh.regions])
     stiffness = np.zeros((len(used),) * 2)
     parts = (eps / (2 * twice))[:, None, None] * (sides @ sides.transpose(0, 2, 1))
     np.add.at(stiffness, (corners[:, :, None], corners[:, None, :]), parts)

@@ -5,7 +5,8 @@ capacitance from below. Any potential that is right on the electrodes bounds it 
 the columns' own potential where it has no jumps, and a potential that rises within the narrowest gap only.
 """
 
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from sensorgen.interval import Interval
 from sensorgen.models._straight import energy as straight
 from sensorgen.scene import Scene
-from sensorgen.sections import Column, Layer, sections
+from sensorgen.sections import Column, Layer, Section, alike, sections
 from sensorgen.sections import columns as cut_columns
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
@@ -32,10 +33,9 @@ def unfit(scene: Scene) -> str | None:
     if len({body.terminal for body in scene.bodies} - {""}) > 2:
         return "more than two electrodes: sensorgen stack speaks of them"
     try:
-        cells = [cell for section in sections(scene) for cell in cut_columns(section)]
+        gaps = [_gap(column) for section in sections(scene) for column in _distinct(section).values()]
     except ValueError as error:
         return str(error)
-    gaps = [_gap(cell) for cell in cells]
     if any(gap is None for gap in gaps):
         return "an electrode does not cover the whole sensor"
     if min(min(g.thickness_mm()) for g in gaps if g is not None) <= 0:
@@ -77,15 +77,16 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
         The bounds have crossed, which no geometry can make them do.
     """
     lower = trial = slab = 0.0
-    found = [(section, [_stack(c, permittivity) for c in cut_columns(section)]) for section in sections(scene)]
-    narrowest = min(stack.gap_mm() for _, stacks in found for stack in stacks)
-    for section, stacks in found:
-        below = sum(s.upright() for s in stacks)
+    found = [(section, _Row.of(section, permittivity)) for section in sections(scene)]
+    distinct = [stack for _, row in found for stack in row.stacks.values()]
+    narrowest = min(stack.gap_mm() for stack in distinct)
+    for section, row in found:
+        below = row.total(_Stack.upright)
         lower += section.depth_mm * below
-        trial += section.depth_mm * (below + sum(s.sideways() for s in stacks))
-        slab += section.depth_mm * sum(s.within(narrowest) for s in stacks)
-    smooth = len(found) == 1 and all(_meet(a, b) for a, b in pairwise(found[0][1]))
-    flat = np.ptp([s.heights_mm[0] for _, stacks in found for s in stacks]) == 0
+        trial += section.depth_mm * (below + row.total(_Stack.sideways))
+        slab += section.depth_mm * row.total(lambda stack: stack.within(narrowest))
+    smooth = len(found) == 1 and found[0][1].is_smooth()
+    flat = np.ptp([stack.heights_mm[0] for stack in distinct]) == 0
     tries = [energy for energy, fits in ((slab, flat), (trial, smooth)) if fits]
     if not tries or (len(found) == 1 and not smooth):
         tries.append(found[0][0].depth_mm * straight(found[0][0], scene.size_mm[2], permittivity))
@@ -170,6 +171,32 @@ class _Stack:
         """Heights of the interfaces at one side [mm], and the column potential there [V]."""
         q = self.reduced_mm()[:, side]
         return self.heights_mm[:, side], q / q[-1]
+
+
+@dataclass(frozen=True)
+class _Row:
+    """The stacks of a section, those that look alike once: ``names`` tells which stands where, from left to right."""
+
+    names: list[int]
+    stacks: dict[int, _Stack]
+
+    @classmethod
+    def of(cls, section: Section, permittivity: Mapping[str, float]) -> "_Row":
+        return cls(alike(section), {name: _stack(c, permittivity) for name, c in _distinct(section).items()})
+
+    def total(self, energy: Callable[[_Stack], float]) -> float:
+        """Sum of an energy over all stacks."""
+        return sum(times * energy(self.stacks[name]) for name, times in Counter(self.names).items())
+
+    def is_smooth(self) -> bool:
+        """Whether the columns' own potentials agree along all lines between them."""
+        return all(_meet(self.stacks[a], self.stacks[b]) for a, b in set(pairwise(self.names)))
+
+
+def _distinct(section: Section) -> dict[int, Column]:
+    """The columns of a section, the first of each look, by their number."""
+    every = cut_columns(section)
+    return {k: every[k] for k in dict.fromkeys(alike(section))}
 
 
 def _mean_min(ends: NDArray[np.float64], limit: float) -> float:

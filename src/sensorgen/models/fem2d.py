@@ -17,6 +17,7 @@ from sensorgen.interval import Disc, Interval
 from sensorgen.models import _fem_bounds as fem
 from sensorgen.models._fem_cones import RATIO
 from sensorgen.models._fem_corners import exponents
+from sensorgen.models._fem_fronts import Numbers
 from sensorgen.models._fem_grading import graded
 from sensorgen.models._fem_lossy import Fields, Turned, disc, turned
 from sensorgen.models._fem_mesh import Cones
@@ -34,7 +35,7 @@ WIDTH = 1e-4  # of the interval, where the caller does not say
 
 _ORDERS = (3, 20)  # of polynomials: the lowest and the highest
 _CORNER_SHARE = 0.01  # of the wanted width: what may stay unresolved at a corner
-_SLENDER = 1e-14  # of a triangle's slenderness: what its energy may lose in doubles
+_LOST = 32 * 2.0**-53  # of the moduli of all terms of a sum: what doubles lose of it; up to 4 roundings, measured
 _MOST_DOUBLINGS = 12  # of rings at a corner: 4096 of them
 _GAIN = 1.6  # by which an order lowers the width, in e-folds, as measured
 _STEP = 2  # of orders, where the field is complex
@@ -197,14 +198,15 @@ def _disc(mesh: Cones, permittivity: Mapping[str, complex], turn: Turned, order:
     energy, square = eps * plane.energies(u, u), plane.energies(u, u.conj()).real
     mixed = (eps * plane.crossings(u, psi.conj())).real
     apart = (abs(eps) ** 2 * square + plane.energies(psi, psi.conj()).real - 2 * mixed) / rho
+    off = _rounding(plane, abs(eps), rho, u, psi)
     found = Fields(
         lower=_thomson(plane, eps, u, psi),
         energy=energy.sum(),
         part=weight @ energy,
         size=float(weight @ (rho * square)),
-        apart=max(float(apart.sum()), 0.0),
+        apart=max(float(apart.sum()), 0.0) + off,
         unknowns=plane.unknowns,
-        rounding=_rounding(mesh),
+        rounding=off / abs(energy.sum()),
     )
     return disc(found, turn, [share for _, share in mesh.triangles.regions])
 
@@ -224,7 +226,7 @@ def _graded(coarse: Triangles, permittivity: Mapping[str, float], width: float) 
     rings = {corner: np.log(_CORNER_SHARE * width) / (2 * value * np.log(RATIO)) for corner, value in found.items()}
     doublings = {c: int(np.clip(np.ceil(np.log2(max(n, 1.0))), 0, _MOST_DOUBLINGS)) for c, n in rings.items()}
     mesh = Cones(graded(coarse, found), doublings)
-    if mesh.slenderness() == np.inf:
+    if mesh.areas().min() <= 0:
         raise fem.Unsolved("a piece of the scene is too thin for its length: doubles tell no such triangles")
     return mesh
 
@@ -234,8 +236,9 @@ def _solved(mesh: Cones, permittivity: Mapping[str, float], order: int) -> tuple
     eps, weight = _by_triangle(mesh, permittivity)
     u, psi = _fields(plane, eps)
     energy = eps * plane.energies(u, u)
-    lower = _best_multiple(plane, eps, u, psi)
-    found = fem.Energies(lower, float(energy.sum()), float(weight @ energy), plane.unknowns, _rounding(mesh))
+    upper, lower = float(energy.sum()), _best_multiple(plane, eps, u, psi)
+    off = _rounding(plane, abs(eps), eps, u, psi) / upper
+    found = fem.Energies(lower, upper, float(weight @ energy), plane.unknowns, off)
     return fem.whole(found, [share for _, share in mesh.triangles.regions]), found.unknowns
 
 
@@ -257,8 +260,15 @@ def _best_multiple(plane: Plane, eps: NDArray[Any], u: Field, psi: Field) -> flo
     return float(plane.crossings(u, psi).sum() ** 2 / (plane.energies(psi, psi) / eps).sum())
 
 
-def _rounding(mesh: Cones) -> float:
-    return max(fem.ROUNDING, _SLENDER * mesh.slenderness())
+def _rounding(plane: Plane, eps: Numbers, rho: Numbers, u: Field, psi: Field) -> float:
+    r"""How far :math:`\int |\varepsilon \nabla u - D|^2 / \rho` may be off, and each of its three parts with it.
+
+    However badly a system was solved, its potential and its flux bound the capacitance: all that doubles can spoil is
+    what these two are worth, by the roundings of each term, and of the triangles' corners.
+    """
+    terms = eps**2 * plane.energy_terms(u) + plane.energy_terms(psi) + 2 * eps * plane.crossing_terms(u, psi)
+    sizes = eps**2 * plane.energies(u, u.conj()).real + plane.energies(psi, psi.conj()).real
+    return _LOST * float(((terms + plane.mesh.thinness() * sizes) / rho).sum())
 
 
 def _by_triangle(mesh: Cones, values: Mapping[str, complex]) -> tuple[NDArray[Any], NDArray[np.float64]]:
