@@ -149,6 +149,8 @@ def test_ends_that_lose_as_the_cross_section_has_them():
     flat, deep = fem2d.lossy(feet((0.45, 6.0)), lossy, 1e-4), fem3d.lossy(feet((0.45, 6.0)), lossy, 4e-3)
     assert abs(flat.centre - deep.centre) < flat.radius + deep.radius
     assert deep.width() < 4e-3
+    plain, bounds = (ask(feet((0.45, 6.0)), EPS, 4e-3) for ask in (fem3d.lossy, fem3d.capacitance))
+    assert plain.centre.real + plain.radius == close(bounds.upper, 1e-7)
 
 
 def test_two_pieces_that_were_cut_apart_add_up():
@@ -206,6 +208,13 @@ def test_what_both_fields_cannot_make_is_the_difference_of_their_energies():
     load = (pair.flux.shares - pair.flux.shares.min())[:, None] * pair.flux.answers(level)
     drives = (pair.flux.pushed(load), pair.potential.pushed(load @ pair.seen))
     dual, primal = (-least(driven.elements).energy for driven in drives)
+    for driven in drives:  # forces are in balance, at 0 V on both electrodes: what leaves a box enters its neighbour
+        elements, found = driven.elements, driven.solved()
+        keys, at = np.unique(elements.keys, return_inverse=True)
+        left = np.bincount(at.ravel(), (elements.load - driven.answers(found)).ravel())
+        free = np.isin(keys, elements.keys[np.isnan(elements.held)])
+        assert np.abs(left[free]).max() < 1e-9 * np.abs(load).max()
+        assert (found[~np.isnan(elements.held)] == 0).all()
     assert unmet == close(dual - primal, 1e-6)
     assert 0 < unmet < 0.2 * dual
     assert energy > 0
