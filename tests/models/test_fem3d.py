@@ -11,9 +11,12 @@ import pytest
 from cell_scenes import EPS, MM, cut_slabs, plates, rect_cell, stairs, tri_cell
 
 from sensorgen.errors import OutOfRange
+from sensorgen.interval import Interval
 from sensorgen.models import columns, fem3d
 from sensorgen.models._fem_boxes import flux, potential
 from sensorgen.models._fem_bricks import grid, layered
+from sensorgen.models._fem_dissection import least
+from sensorgen.models._fem_pair import Pair, boxes_of, whole
 from sensorgen.scene import Body, Fill, Scene, box
 from sensorgen.shapes import rect
 from sensorgen.units import EPS0_F_PER_M
@@ -110,12 +113,111 @@ def test_layers_stand_where_dielectrics_meet_at_a_corner():
     assert planes[2][2] > planes[0][2]
 
 
-def test_a_sensor_that_ends_amid_a_cell():
-    """2.5 x 2 cells hold half a cell of columns more than 2 x 2; the interval is wide, and right."""
-    cut = next(fem3d.steps(rect.scene(rect.Params(length_mm=5.0, width_mm=4.0), Fill()), EPS)).interval
-    one = CELLS["rect"][1]["C_F"]
-    assert 4 * one < cut.upper
-    assert cut.lower < 6 * one
+def feet(x: tuple[float, float], y: tuple[float, float] | None = None) -> Scene:
+    """Feet of an electrode over a film, 0.8 of 2 mm wide and, if cut along y too, as deep, seen through a window."""
+
+    def seen(window: tuple[float, float]) -> list[tuple[float, float]]:
+        low, high = window
+        ends = [(max(k + 0.6, low) - low, min(k + 1.4, high) - low) for k in range(-2, int(high) + 2, 2)]
+        return [(a, b) for a, b in ends if b - a > 1e-9]
+
+    length, deep = x[1] - x[0], y[1] - y[0] if y else 1.0
+    posts = [box(*a, *b, 0.5, 0.8) for a in seen(x) for b in (seen(y) if y else [(0.0, deep)])]
+    whole = (0, length, 0, deep)
+    bodies = (
+        Body("low", "etpu", (box(*whole, 0, 0.3),), "bottom"),
+        Body("film", "x60", (box(*whole, 0.3, 0.4),)),
+        Body("top", "etpu", (*posts, box(*whole, 0.8, 1.0)), "top"),
+    )
+    return Scene(bodies, (length, deep, 1.0))
+
+
+@pytest.mark.parametrize("ends", [(0.0, 4.45), (0.45, 6.0), (0.0, 4.8), (0.8, 6.0)])
+def test_a_sensor_that_ends_amid_a_cell_as_the_cross_section_has_it(ends):
+    """An independent program on the same scene: where the end cuts a foot, and where it cuts the air beside it."""
+    from sensorgen.models import fem2d
+
+    flat, deep = fem2d.capacitance(feet(ends), EPS, 1e-5), next(fem3d.steps(feet(ends), EPS)).interval
+    assert deep.lower < flat.lower < flat.upper < deep.upper
+    assert deep.width() < 3e-3
+
+
+def test_ends_that_lose_as_the_cross_section_has_them():
+    from sensorgen.models import fem2d
+
+    lossy = {"x60": 4.68 * (1 - 0.1j), "air": 1.00059}
+    flat, deep = fem2d.lossy(feet((0.45, 6.0)), lossy, 1e-4), fem3d.lossy(feet((0.45, 6.0)), lossy, 4e-3)
+    assert abs(flat.centre - deep.centre) < flat.radius + deep.radius
+    assert deep.width() < 4e-3
+    plain, bounds = (ask(feet((0.45, 6.0)), EPS, 4e-3) for ask in (fem3d.lossy, fem3d.capacitance))
+    assert plain.centre.real + plain.radius == close(bounds.upper, 1e-7)
+
+
+def test_two_pieces_that_were_cut_apart_add_up():
+    """Along x at a foot; both are cut along y as well, where they hold 4.45 mm."""
+    deep = (0.0, 4.45)
+    parts = [next(fem3d.steps(feet(x, deep), EPS)).interval for x in ((0.0, 4.45), (4.45, 10.0))]
+    whole = next(fem3d.steps(feet((0.0, 10.0), deep), EPS)).interval
+    lower, upper = (sum(getattr(p, end) for p in parts) for end in ("lower", "upper"))
+    assert max(lower, whole.lower) < min(upper, whole.upper)
+    assert all(p.width() < 8e-3 for p in (*parts, whole))
+    assert (lower + upper) / 2 == close(whole.middle(), 1e-3)
+
+
+def test_ends_of_rect_cost_as_little_as_whole_cells(rungs):
+    """4.3 x 4 mm: the energy of the part alone would be known to a few percent."""
+    scene = rect.scene(rect.Params(length_mm=4.3, width_mm=4.0, dielectric_mm=0.2), Fill())
+    cut = next(fem3d.steps(scene, EPS))
+    assert cut.interval.width() < 1.5 * rungs[0.2][0].interval.width()
+    found = columns.capacitance(scene, EPS)
+    assert found.lower < cut.interval.lower < cut.interval.upper < found.upper
+
+
+@pytest.mark.parametrize("least", [0.0, 1.0, 4.0])
+def test_a_part_lies_where_any_flux_so_near_has_it(least):
+    """Fluxes of a few numbers, without a second pair of fields: the worst is met."""
+    rng = np.random.default_rng(1)
+    shares, exact = np.array([least, least + 1, least + 3.0]), rng.normal(size=3)
+    for off in (0.01, 0.3, 2.0):
+        seen = []
+        for way in (*rng.normal(size=(200, 3)), (shares - least) * exact, -(shares - least) * exact):
+            missing = off * way / np.linalg.norm(way) * rng.uniform(0.9, 1)
+            near = exact - missing
+            cell = Interval(float(near @ near), float(near @ near) + off**2)
+            unmet = float((((shares - least) * near) ** 2).sum())
+            bounds = whole(cell, float((shares - least) @ near**2), unmet, shares)
+            # the flux is the best of its kind: what it misses is at right angles to it
+            truth = least * float(near @ near + missing @ missing) + float((shares - least) @ exact**2)
+            assert bounds.lower <= truth <= bounds.upper
+            seen.append(max(truth - bounds.lower, bounds.upper - truth) / (bounds.upper - bounds.lower))
+        assert max(seen) > 0.8
+
+
+def test_what_both_fields_cannot_make_is_the_difference_of_their_energies():
+    """Prager and Synge: of a potential and a flux that one force drives."""
+    scene = feet((0.0, 4.45))
+    coarse = grid(scene)
+    pair = Pair.of(
+        layered(coarse, [0, 0, *(EPS[n] for n in coarse.names[2:])], 1),
+        [0, 0, *(EPS[n] for n in coarse.names[2:])],
+        3,
+        2,
+    )
+    level = pair.flux.solved()
+    energy, unmet = pair.part(level, pair.flux.eps)
+    load = (pair.flux.shares - pair.flux.shares.min())[:, None] * pair.flux.answers(level)
+    drives = (pair.flux.pushed(load), pair.potential.pushed(load @ pair.seen))
+    dual, primal = (-least(driven.elements).energy for driven in drives)
+    for driven in drives:  # forces are in balance, at 0 V on both electrodes: what leaves a box enters its neighbour
+        elements, found = driven.elements, driven.solved()
+        keys, at = np.unique(elements.keys, return_inverse=True)
+        left = np.bincount(at.ravel(), (elements.load - driven.answers(found)).ravel())
+        free = np.isin(keys, elements.keys[np.isnan(elements.held)])
+        assert np.abs(left[free]).max() < 1e-9 * np.abs(load).max()
+        assert (found[~np.isnan(elements.held)] == 0).all()
+    assert unmet == close(dual - primal, 1e-6)
+    assert 0 < unmet < 0.2 * dual
+    assert energy > 0
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])
@@ -164,9 +266,9 @@ def test_elimination_is_the_dense_solution():
         values[at[on]] = ones[on] * code
     free = np.isnan(values)
     values[free] = np.linalg.solve(whole[free][:, free], -whole[free][:, ~free] @ values[~free])
-    found, _, unknowns = fem3d._least(fine, [0, 0, 1.00059, 4.68], kind)
-    assert found == close(values @ whole @ values, 1e-10)
-    assert unknowns == free.sum()
+    boxes = boxes_of(fine, [0, 0, 1.00059, 4.68], kind)
+    assert least(boxes.elements).energy == close(values @ whole @ values, 1e-10)
+    assert boxes.unknowns() == free.sum()
 
 
 def test_scikit_fem_comes_from_above_and_near(rungs):

@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix
 
 from sensorgen.design import make
 from sensorgen.errors import BadInput, OutOfRange
-from sensorgen.models import fem3d, press2d, press3d, springs
+from sensorgen.models import fem2d, fem3d, press2d, press3d, springs
 from sensorgen.models._press import (
     brick_air,
     brick_element,
@@ -228,6 +228,24 @@ def stairs(*widths, lift=0.0, film=0.1):
         Body("top_electrode", "etpu", (box(0, 4, 0, deep, roof, roof + 0.3),), "top"),
     )
     return Scene(bodies, (4.0, deep, roof + 0.3))
+
+
+@pytest.mark.parametrize("slid_mm", [0.02, -0.02])
+def test_a_foot_that_has_landed_and_widened_is_one_drawn_so(slid_mm):
+    """Most of a brick's half sideways, onto a film that stays: the field of the drawn foot, by another solver."""
+    bricks = press3d.cell(stairs(0.2, lift=0.02)).cut(3, 0.3)
+    whole, solid = (brick_element.mesh_of(bricks, w) for w in (np.ones(bricks.fill.shape, bool), bricks.fill > 0))
+    x, _, z = solid.points_m.T * 1e3
+    above = z > 0.41
+    moved = np.zeros_like(solid.points_m)
+    moved[above, 0] = 1e-3 * np.interp(x[above], [0.5, 0.7, 1.5], [0.0, slid_mm, 0.0])
+    moved[above, 2] = -2e-5
+    u = brick_air.extended(whole, solid, *brick_touch.BrickFaces(solid).opened(moved, 1e-4))
+    found = brick_field.capacitance(whole, u, EPS, Orders())
+    drawn = fem2d.capacitance(stairs(0.2 + slid_mm), EPS, 1e-5).times(1 / 32e-6)
+    assert found.width() < 2e-3
+    assert found.lower < drawn.upper * (1 + 1e-4)
+    assert drawn.lower < found.upper * (1 + 1e-4)
 
 
 @pytest.mark.parametrize("lift", [0.0, 0.02])

@@ -33,6 +33,8 @@ class Elements:
         The unknowns of a potential of 1.
     energy : callable
         From a box's number to its (b, b) matrix.
+    load : (n, b) array, optional
+        Forces on the unknowns, in place of a top at 1 V.
     """
 
     boxes: Ints
@@ -40,6 +42,7 @@ class Elements:
     held: NDArray[np.float64]
     one: NDArray[np.float64]
     energy: Callable[[int], Matrix]
+    load: Matrix | None = None
 
 
 @dataclass
@@ -113,6 +116,9 @@ class _Dissection:
         if top.any():
             keep = np.column_stack([np.eye(len(top))[:, free], top])
             keys, energy = np.append(keys, TOP), keep.T @ energy @ keep
+        elif self.elements.load is not None:
+            push = -self.elements.load[box][free, None]
+            keys, energy = np.append(keys, TOP), np.block([[energy, push], [push.T, np.zeros((1, 1))]])
         return _Front(keys, np.ones_like(keys), 0, energy)
 
     def _halves(self, block: Ints) -> tuple[Ints, Ints]:
@@ -166,8 +172,3 @@ def unknowns_of(elements: Elements, values: dict[int, Any]) -> Matrix:
     free = np.isnan(elements.held)
     found[free] = [values[k] for k in elements.keys[free].tolist()]
     return found
-
-
-def energies_of(elements: Elements, unknowns: Matrix) -> NDArray[Any]:
-    """Energy of each box at given unknowns, (n,)."""
-    return np.array([here @ elements.energy(box) @ here for box, here in enumerate(unknowns)])

@@ -5,18 +5,17 @@ boxes all matrices are known in closed form, and elimination from the inside out
 docs/cells.md.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.interval import Disc, Interval
 from sensorgen.models import _fem_bounds as fem
-from sensorgen.models._fem_boxes import Element, flux, potential, traces
-from sensorgen.models._fem_bricks import Grid, grid, layered
-from sensorgen.models._fem_dissection import Elements, energies_of, least, unknowns_of
+from sensorgen.models._fem_bricks import grid, layered
+from sensorgen.models._fem_dissection import least, unknowns_of
 from sensorgen.models._fem_lossy import Fields, Turned, disc, turned
+from sensorgen.models._fem_pair import Pair, whole
 from sensorgen.scene import Scene
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
@@ -102,14 +101,23 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     coarse = grid(scene)
     values = [0.0, 0.0, *(permittivity[name] for name in coarse.names[2:])]
     for layers, order, flux_order in _RUNGS:
-        fine = layered(coarse, values, layers)
-        upper, part, shared = _least(fine, values, potential(order))
-        lower, _, faces = _least(fine, values, flux(flux_order))
-        found = fem.Energies(lower, upper, part, max(shared, faces))
-        interval = fem.whole(found, fine.shares.ravel().tolist()).times(EPS0_F_PER_M * M_PER_MM)
-        yield Step(layers, order, flux_order, int((fine.fill > 1).sum()), found.unknowns, interval)
+        pair = Pair.of(layered(coarse, values, layers), values, order, flux_order)
+        interval = _bounds(pair).times(EPS0_F_PER_M * M_PER_MM)
+        yield Step(layers, order, flux_order, len(pair.flux.eps), pair.unknowns(), interval)
         if interval.width() <= width:
             return
+
+
+def _bounds(pair: Pair) -> Interval:
+    """Energy at 1 V over eps0 of all that the sensor holds, cut cells among it [mm]."""
+    shares, rho = pair.flux.shares, np.real(pair.flux.eps)
+    upper = least(pair.potential.elements).energy
+    flux = least(pair.flux.elements, keep=bool(np.ptp(shares)))
+    cell = fem.whole(fem.Energies(flux.energy, upper, 0.0, pair.unknowns()), [1.0])
+    if not flux.steps:
+        return cell.times(float(shares.min()))
+    part, unmet = pair.part(unknowns_of(pair.flux.elements, flux.values()), rho)
+    return whole(cell, float(part), unmet, shares)
 
 
 def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDTH) -> Disc:
@@ -140,74 +148,19 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     turn = turned(values[2:])
     found = []
     for layers, order, flux_order in _RUNGS:
-        fine = layered(coarse, [abs(v) for v in values], layers)
-        found.append(disc(_fields(fine, values, turn, order, flux_order), turn, fine.shares.ravel().tolist()))
+        pair = Pair.of(layered(coarse, [abs(v) for v in values], layers), values, order, flux_order)
+        found.append(disc(_fields(pair, turn), turn, pair.flux.shares.tolist()))
         if found[-1].width() <= width:
             break
     return min(found, key=Disc.width).times(EPS0_F_PER_M * M_PER_MM)
 
 
-def _least(fine: Grid, values: Sequence[float], kind: Element) -> tuple[float, float, int]:
-    """Energy at 1 V over eps0, its part in columns that occur more often than others, and the unknowns."""
-    boxes = _boxes(fine, values, kind)
-    solved = least(boxes.elements, keep=bool(boxes.more.any()))
-    part = (
-        boxes.more @ energies_of(boxes.elements, unknowns_of(boxes.elements, solved.values())) if solved.steps else 0.0
-    )
-    return float(solved.energy), float(part), boxes.unknowns()
-
-
-def _fields(fine: Grid, values: Sequence[complex], turn: Turned, order: int, flux_order: int) -> Fields:
-    r"""Potential and flux, and how far they are apart, :math:`\int |\varepsilon \nabla u - D|^2 / \rho`."""
-    upper, lower = (_boxes(fine, values, kind) for kind in (potential(order), flux(flux_order)))
-    solved = [least(boxes.elements, keep=True) for boxes in (upper, lower)]
-    u, level = (unknowns_of(b.elements, s.values()) for b, s in zip((upper, lower), solved, strict=True))
-    seen = traces(order, flux_order)
-    squares, apart = np.empty(len(u)), np.empty(len(u))
-    for box, (here, there) in enumerate(zip(u, level, strict=True)):
-        into, out = upper.shape(box) @ here, lower.shape(box) @ there
-        squares[box] = (here.conj() @ into).real
-        apart[box] = squares[box] - 2 * ((seen @ here) @ out.conj()).real + (there.conj() @ out).real
-    rho = np.array([turn.weight[eps] for eps in upper.eps.tolist()])
-    energies = energies_of(upper.elements, u)
-    return Fields(
-        solved[1].energy, energies.sum(), upper.more @ energies, float(upper.more @ (rho * squares)),
-        max(float((abs(upper.eps) ** 2 / rho) @ apart), 0.0), max(upper.unknowns(), lower.unknowns()),
-    )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class _Boxes:
-    """All boxes between the electrodes as elements of one kind.
-
-    ``eps`` (n,), relative permittivity; ``more`` (n,), how often each occurs beyond the least; ``shape`` gives the
-    matrix of a box for a permittivity of 1.
-    """
-
-    elements: Elements
-    eps: NDArray[np.float64 | np.complex128]
-    more: NDArray[np.float64]
-    shape: Callable[[int], NDArray[np.float64]]
-
-    def unknowns(self) -> int:
-        """How many the boxes share."""
-        return len(np.unique(self.elements.keys[np.isnan(self.elements.held)]))
-
-
-def _boxes(fine: Grid, values: Sequence[complex], kind: Element) -> _Boxes:
-    boxes = np.argwhere(fine.fill > 1)
-    count = np.array(fine.fill.shape)
-    keys = kind.keys(boxes, count)
-    held = np.full(keys.shape, np.nan)
-    for code, value in ((0, 0.0), (1, 1.0)):
-        held[np.isin(keys, kind.keys(np.argwhere(fine.fill == code), count))] = value
-    eps = np.array(values)[fine.fill[tuple(boxes.T)]]
-    edges = np.column_stack([np.diff(p)[boxes[:, axis]] for axis, p in enumerate(fine.planes_mm)])
-    scales = edges.prod(1)[:, None] / (2 * edges**2)
-
-    def shape(box: int) -> NDArray[np.float64]:
-        return kind.condensed(scales[box])
-
-    elements = Elements(boxes, keys, held, kind.one, lambda box: eps[box] * shape(box))
-    more = fine.shares[boxes[:, 0], boxes[:, 1]] - fine.shares.min()
-    return _Boxes(elements, eps, more, shape)
+def _fields(pair: Pair, turn: Turned) -> Fields:
+    """Potential and flux of a cell; the part, and how sure it is, by its flux."""
+    u, level = pair.potential.solved(), pair.flux.solved()
+    rho = np.array([turn.weight[eps] for eps in pair.flux.eps.tolist()])
+    upper, lower = ((x * boxes.answers(x)).sum() for x, boxes in ((u, pair.potential), (level, pair.flux)))
+    part, unmet = pair.part(level, rho)
+    most = float(np.ptp(pair.flux.shares))
+    size = unmet / most if most else 0.0
+    return Fields(lower, upper, part, size, pair.apart(u, level, rho), pair.unknowns())

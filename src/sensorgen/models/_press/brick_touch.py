@@ -75,6 +75,25 @@ def _bulged(gap: Real, nodes: Whole, least: float) -> Real:
     return found.reshape(-1, 9)
 
 
+def _spread(slide: Real, faces: Whole) -> Real:
+    """Slides of nodes (n, 3), those amid edges and faces (k, 9) that do not slide by the mean of their ends.
+
+    Where the corner of a face slides alone, its parabola would turn back.
+    """
+    found, lattice = slide.copy(), faces.reshape(-1, 3, 3)
+    ends = [0, 2]
+    corners = lattice[:, ends][:, :, ends]
+    between = (
+        (lattice[:, 1, ends], lattice[:, ends].transpose(1, 0, 2)[..., ends]),
+        (lattice[:, ends, 1], lattice[..., ends].transpose(2, 0, 1)[..., ends]),
+        (lattice[:, 1, 1], corners.reshape(-1, 4).T),
+    )
+    for middle, around in between:
+        still = (slide[middle] == 0).all(axis=-1)
+        found[middle[still]] = slide[around].mean(axis=0)[still]
+    return found
+
+
 def _rows(weights: Real, nodes: Whole, axis: int, size: int) -> csr_matrix:
     """Rows (k, size) of weights of one component of nodes."""
     starts = np.arange(len(nodes) + 1) * nodes.shape[1]
@@ -164,7 +183,9 @@ class BrickFaces:
             slide[..., axis] = 0.0
             last = np.argsort(-(drawn * width), axis=None)  # a node at a corner has two gaps: the thinner one counts
             found[far.ravel()[last], axis] += ((gap - drawn) * width).ravel()[last]
-            found[near.ravel()[last]] = (moved[near] + slide).reshape(-1, 3)[last]
+            slid = np.zeros_like(moved)
+            slid[near.ravel()[last]] = slide.reshape(-1, 3)[last]
+            found += _spread(slid, near)
             thin = (gap < _THIN).any(axis=1)
             columns.append((axis, near[thin].ravel(), far[thin].ravel()))
         return found, columns
