@@ -269,12 +269,15 @@ class Problem:
             first = self.newton(state, pressure_pa, state.pairs, _NEARLY) if before else None
         if first is None:
             return None
-        stuck = self._stuck(first) if self.stick else None
-        fresh = self.project(first.u_m, stuck)
-        return self.newton(first, pressure_pa, fresh, _ENOUGH)
+        return self.newton(first, pressure_pa, self._anew(first), _ENOUGH)
 
-    def _stuck(self, state: State) -> Pairs:
-        return contact.stuck(state.pairs, self.gaps(state.pairs, state.u_m) < 0)
+    def _anew(self, state: State) -> Pairs:
+        """Contact partners as they are now; where it sticks, what has touched keeps its own and what touches gets one."""
+        if not self.stick:
+            return self.project(state.u_m)
+        held = state.pairs.sticks & (self.gaps(state.pairs, state.u_m) < 0)
+        fresh = self.project(state.u_m, contact.some(state.pairs, held))
+        return replace(fresh, sticks=fresh.sticks | (self.gaps(fresh, state.u_m) < 0))
 
 
 def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) -> Iterator[State]:
