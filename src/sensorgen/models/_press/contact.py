@@ -24,6 +24,7 @@ _UPRIGHT = 1e-6  # faces whose normal is nearer to level than this neither look 
 _PASS = 0.5  # share of the penalty that each of two faces brings [-]
 _IMAGE = 2.0  # a mirror's penalty over that of two faces: half the gap, and one of two bodies [-]
 _THIN = 0.5  # of a body's thickness: deeper than this is rather its other side [-]
+_EACH = ("stiffness_pa", "length_m", "point", "sticks", "slid_m")
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ class Pairs:
         Which quadrature point it is.
     sticks : (k,) array
         Whether it touched before, and holds fast.
+    slid_m : (k,) array
+        How far the partner had moved sideways when they touched [m].
     """
 
     gap: csr_matrix
@@ -51,6 +54,7 @@ class Pairs:
     length_m: Real
     point: Whole
     sticks: Mask
+    slid_m: Real
 
 
 @dataclass(frozen=True)
@@ -139,7 +143,7 @@ class Faces:
     def _pairs(self, gap: csr_matrix, slip: csr_matrix, point: Whole, penalty_pa: float, first: int = 0) -> Pairs:
         weight = penalty_pa * rays.WEIGHTS[point % len(rays.POINTS)]
         length = self._length[point // len(rays.POINTS)]
-        return Pairs(gap, slip, weight, length, first + point, np.zeros(len(point), bool))
+        return Pairs(gap, slip, weight, length, first + point, np.zeros(len(point), bool), np.zeros(len(point)))
 
 
 def faces_of(mesh: Mesh) -> Faces:
@@ -149,16 +153,12 @@ def faces_of(mesh: Mesh) -> Faces:
 
 def _joined(parts: list[Pairs]) -> Pairs:
     gap, slip = (vstack([getattr(p, key) for p in parts]).tocsr() for key in ("gap", "slip"))
-    rest = (
-        np.concatenate([getattr(p, key) for p in parts]) for key in ("stiffness_pa", "length_m", "point", "sticks")
-    )
-    return Pairs(gap, slip, *rest)
+    return Pairs(gap, slip, *(np.concatenate([getattr(p, key) for p in parts]) for key in _EACH))
 
 
 def some(pairs: Pairs, which: Mask) -> Pairs:
     """A part of them."""
-    rest = (getattr(pairs, key)[which] for key in ("stiffness_pa", "length_m", "point", "sticks"))
-    return Pairs(pairs.gap[which], pairs.slip[which], *rest)
+    return Pairs(pairs.gap[which], pairs.slip[which], *(getattr(pairs, key)[which] for key in _EACH))
 
 
 def carrying(pairs: Pairs, loose: Mask, dimension: int) -> Pairs:

@@ -173,6 +173,10 @@ class Problem:
         """Gap of each pair [m]."""
         return np.asarray(pairs.gap @ self.places(u).ravel())
 
+    def slips(self, pairs: Pairs, u: Real) -> Real:
+        """How far the partner of each pair has moved sideways since they hold fast [m]."""
+        return np.asarray(pairs.slip @ self.places(u).ravel() - pairs.slid_m)
+
     @cached_property
     def _pattern(self) -> tuple[csr_matrix, Whole, Whole]:
         """The elements' stiffness on the free displacements, empty; which entries of theirs it has, and where."""
@@ -193,7 +197,7 @@ class Problem:
         force, stiffness = pairs.gap.T @ (k * gap), across.T @ diags(k) @ across
         if self.stick:
             k, across = pairs.stiffness_pa * pairs.sticks, pairs.slip @ self.free
-            force = force + pairs.slip.T @ (k * (pairs.slip @ self.places(u).ravel()))
+            force = force + pairs.slip.T @ (k * self.slips(pairs, u))
             stiffness = stiffness + across.T @ diags(k) @ across
         return force, stiffness
 
@@ -201,7 +205,7 @@ class Problem:
         """Energy in the penalty, per depth [J/m]."""
         k = state.pairs.stiffness_pa
         gap = self.gaps(state.pairs, state.u_m)
-        slip = state.pairs.slip @ self.places(state.u_m).ravel() * state.pairs.sticks
+        slip = self.slips(state.pairs, state.u_m) * state.pairs.sticks
         return float(0.5 * (k * ((gap < 0) * gap**2 + slip**2)).sum())
 
     def residual(self, u: Real, inner: Inner, pairs: Pairs, pressure_pa: float) -> tuple[Real, csr_matrix, Tangent]:
@@ -269,15 +273,17 @@ class Problem:
             first = self.newton(state, pressure_pa, state.pairs, _NEARLY) if before else None
         if first is None:
             return None
-        return self.newton(first, pressure_pa, self._anew(first), _ENOUGH)
+        held = self._held(state.u_m, first) if self.stick else None
+        return self.newton(first, pressure_pa, self.project(first.u_m, held), _ENOUGH)
 
-    def _anew(self, state: State) -> Pairs:
-        """Contact partners as they are now; where it sticks, what has touched keeps its own and what touches gets one."""
-        if not self.stick:
-            return self.project(state.u_m)
-        held = state.pairs.sticks & (self.gaps(state.pairs, state.u_m) < 0)
-        fresh = self.project(state.u_m, contact.some(state.pairs, held))
-        return replace(fresh, sticks=fresh.sticks | (self.gaps(fresh, state.u_m) < 0))
+    def _held(self, before: Real, state: State) -> Pairs:
+        """What touches now and holds fast from where it first did, between the places before and those now."""
+        pairs = state.pairs
+        gaps, slips = ([rows @ self.places(u).ravel() for u in (before, state.u_m)] for rows in (pairs.gap, pairs.slip))
+        touched = gaps[1] < 0
+        share = np.clip(gaps[0] / np.where(touched, gaps[0] - gaps[1], np.inf), 0.0, 1.0)
+        since = slips[0] + np.where(gaps[0] > 0, share, 0.0) * (slips[1] - slips[0])
+        return contact.some(replace(pairs, slid_m=np.where(pairs.sticks, pairs.slid_m, since), sticks=touched), touched)
 
 
 def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) -> Iterator[State]:
