@@ -106,6 +106,18 @@ class Faces:
             return _joined(made)
         return _joined([*(some(p, ~np.isin(p.point, kept.point)) for p in made), kept])
 
+    def crossed(self, places_m: Real, share: float) -> bool:
+        """Whether a face is in two solids at once, or beyond a mirror, deeper than a share of its side."""
+        here, along = self._rays(places_m)
+        looks = rays.outwards(along)
+        inside = here - (share * self._depth)[:, None] * looks
+        x = self.mesh.points_m[:, 0]
+        ends = places_m[np.where(looks[:, 0] > 0, x.argmax(), x.argmin()), 0]
+        beyond = (ends - inside[:, 0]) * looks[:, 0] < 0
+        a, b, middle = places_m[self.mesh.rim].transpose(1, 0, 2)
+        found = rays.turns(inside, np.concatenate([a, middle]), np.concatenate([middle, b]))
+        return bool((beyond | (found > 1)).any())
+
     def _met(self, places_m: Real, here: Real, along: Real, penalty_pa: float) -> Pairs:
         """Points whose partner is on another side."""
         point, side, s = rays.hit(here, along, places_m[self.sides], self._depth)

@@ -107,6 +107,8 @@ class Problem:
         What has touched sticks.
     solver : callable
         Of the linear systems.
+    sound : callable, optional
+        Whether places of the nodes may be: a step that ends elsewhere is cut.
     """
 
     elements: Solid
@@ -116,6 +118,7 @@ class Problem:
     penalty_pa: float
     stick: bool = False
     solver: Solver = by_lu
+    sound: Callable[[Real], bool] | None = None
 
     @property
     def dimension(self) -> int:
@@ -274,7 +277,8 @@ class Problem:
         if first is None:
             return None
         held = self._held(state.u_m, first) if self.stick else None
-        return self.newton(first, pressure_pa, self.project(first.u_m, held), _ENOUGH)
+        found = self.newton(first, pressure_pa, self.project(first.u_m, held), _ENOUGH)
+        return found if found and (self.sound is None or self.sound(self.places(found.u_m))) else None
 
     def _held(self, before: Real, state: State) -> Pairs:
         """What touches now and holds fast from where it first did, between the places before and those now."""

@@ -64,3 +64,13 @@ def _meet(across: Real) -> tuple[Real, NDArray[np.bool_]]:
     below = c1 + np.copysign(root, c1)
     s = -2 * c0 / np.where(below == 0, np.inf, below)
     return np.clip(s, 0.0, 1.0), (s >= -_REACH) & (s <= 1 + _REACH)
+
+
+def turns(here: Real, starts: Real, ends: Real) -> Whole:
+    """How often closed outlines of straight pieces (m, 2) run anticlockwise around points (k, 2)."""
+    x = here[:, :1]
+    (x0, y0), (x1, y1) = starts.T, ends.T
+    sign = np.where(x1 < x0, 1, -1) * ((np.minimum(x0, x1) <= x) & (x < np.maximum(x0, x1)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        above = y0 + (x - x0) * (y1 - y0) / (x1 - x0) > here[:, 1:]
+    return np.asarray((sign * above).sum(axis=1))
