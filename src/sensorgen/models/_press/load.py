@@ -23,6 +23,8 @@ _ENOUGH = 1e-6  # residual over load
 _NEARLY = 1e-3  # the same before the contact partners are looked for anew
 _STILL = 1e-10  # a step so much shorter than the way is rounding: nu near 1/2 turns it into forces
 _MOST_STEPS = 15
+_MOST_TURNS = 6  # of looking for partners anew within one load step
+_SETTLED = 0.02  # over the length of a side: depths that old and new partners see, where the partners stay [-]
 _LEAST_J = 0.05  # a step may not squeeze a triangle below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
 _MOST_CUTS = 4  # failed load steps in all before a cell is given up
@@ -270,15 +272,29 @@ class Problem:
         return state if inside_out else replace(state, u_m=u, inner=inner)
 
     def stepped(self, state: State, pressure_pa: float, before: State | None = None) -> State | None:
-        """Press on to a pressure: solve, look for the partners anew, and solve again."""
+        """Press on to a pressure: solve, look for the partners anew, and solve again, until they stay."""
         first = self.newton(self.ahead(state, before or state, pressure_pa), pressure_pa, state.pairs, _NEARLY)
         if first is None:
             first = self.newton(state, pressure_pa, state.pairs, _NEARLY) if before else None
         if first is None:
             return None
         held = self._held(state.u_m, first) if self.stick else None
-        found = self.newton(first, pressure_pa, self.project(first.u_m, held), _ENOUGH)
-        return found if found and (self.sound is None or self.sound(self.places(found.u_m))) else None
+        found, pairs = first, self.project(first.u_m, held)
+        for _ in range(_MOST_TURNS):
+            again = self.newton(found, pressure_pa, pairs, _ENOUGH)
+            if again is None:
+                return None
+            found, used, pairs = again, pairs, self.project(again.u_m, held)
+            if self._apart(used, pairs, found.u_m) < _SETTLED:
+                return found if self.sound is None or self.sound(self.places(found.u_m)) else None
+        return None
+
+    def _apart(self, one: Pairs, other: Pairs, u: Real) -> float:
+        """By how much the depths differ that two choices of partners see, over the length of a side [-]."""
+        depths = np.zeros((2, 1 + max(p.point.max(initial=0) for p in (one, other))))
+        for depth, pairs in zip(depths, (one, other), strict=True):
+            depth[pairs.point] = np.maximum(-self.gaps(pairs, u), 0.0) / pairs.length_m
+        return float(np.ptp(depths, axis=0).max())
 
     def _held(self, before: Real, state: State) -> Pairs:
         """What touches now and holds fast from where it first did, between the places before and those now."""
