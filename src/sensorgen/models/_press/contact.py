@@ -19,7 +19,7 @@ Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-_HALF = 0.5  # of the weights of the upper nodes, which add up to 1 where all are loose [-]
+_STEEP = 0.3  # cosine of a face's slope, below which nothing rests on it [-]
 _UPRIGHT = 1e-6  # faces whose normal is nearer to level than this neither look up nor down [-]
 _PASS = 0.5  # share of the penalty that each of two faces brings [-]
 _IMAGE = 2.0  # a mirror's penalty over that of two faces: half the gap, and one of two bodies [-]
@@ -173,7 +173,10 @@ def some(pairs: Pairs, which: Mask) -> Pairs:
     return Pairs(pairs.gap[which], pairs.slip[which], *(getattr(pairs, key)[which] for key in _EACH))
 
 
-def carrying(pairs: Pairs, loose: Mask, dimension: int) -> Pairs:
-    """The pairs between a loose piece above and one below that is held; ``loose`` says it of each node."""
+def carrying(pairs: Pairs, loose: Mask, dimension: int) -> tuple[Pairs, Real]:
+    """The pairs between a loose piece above and one below that is held, and by how much a gap shuts as it falls [-].
+
+    ``loose`` says it of each node.
+    """
     share = np.asarray(pairs.gap[:, dimension - 1 :: dimension] @ loose.astype(float))
-    return some(pairs, share > _HALF)
+    return some(pairs, share > _STEEP), share[share > _STEEP]

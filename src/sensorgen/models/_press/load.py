@@ -24,7 +24,7 @@ _NEARLY = 1e-3  # the same before the contact partners are looked for anew
 _STILL = 1e-10  # a step so much shorter than the way is rounding: nu near 1/2 turns it into forces
 _MOST_STEPS = 15
 _MOST_TURNS = 6  # of looking for partners anew within one load step
-_SETTLED = 0.02  # over the length of a side: depths that old and new partners see, where the partners stay [-]
+_SETTLED = 0.05  # over the length of a side: depths that old and new partners see, where the partners stay [-]
 _LEAST_J = 0.05  # a step may not squeeze a triangle below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
 _MOST_CUTS = 4  # failed load steps in all before a cell is given up
@@ -138,21 +138,25 @@ class Problem:
         It sinks in as far as the penalty needs to carry a pressure, because a contact that only just touches has no
         stiffness to begin with.
         """
-        pairs = contact.carrying(state.pairs, self.loose, self.dimension)
+        pairs, drop = self._below(state)
         if not pairs.point.size:
             return state
-        gap = self.gaps(pairs, state.u_m)
-        first = gap < gap.min() + _FLAT * pairs.length_m
+        first = drop < drop.min() + _FLAT * pairs.length_m
         sunk = pressure_pa * np.abs(self.load).sum() / pairs.stiffness_pa[first].sum()
         u = state.u_m.copy()
-        fall = gap.min() + min(sunk, _DEEPEST * pairs.length_m[first].min())
+        fall = drop.min() + min(sunk, _DEEPEST * pairs.length_m[first].min())
         u[self.dimension - 1 :: self.dimension] -= self.loose * fall
         return replace(state, u_m=u, pairs=self.project(u))
 
     def fall_m(self, state: State) -> float:
         """How far the top comes down before anything carries it [m]."""
-        pairs = contact.carrying(state.pairs, self.loose, self.dimension)
-        return float(self.gaps(pairs, state.u_m).min()) if pairs.point.size else 0.0
+        _, drop = self._below(state)
+        return float(drop.min()) if drop.size else 0.0
+
+    def _below(self, state: State) -> tuple[Pairs, Real]:
+        """Pairs of loose pieces and what is below them, and how far those may fall until each touches [m]."""
+        pairs, share = contact.carrying(state.pairs, self.loose, self.dimension)
+        return pairs, self.gaps(pairs, state.u_m) / share
 
     @cached_property
     def loose(self) -> NDArray[np.bool_]:
