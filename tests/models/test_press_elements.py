@@ -10,7 +10,7 @@ from sensorgen.models._press.mesh import of_triangles
 
 
 def none(mesh):
-    return Faces(mesh, np.empty((0, 3), int), np.empty((0, 3), int))
+    return Faces(mesh, np.empty((0, 3), int))
 
 
 def grid(nx, ny, wide=1.0, high=1.0, bend=0.0, shape=None):

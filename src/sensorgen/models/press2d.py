@@ -16,6 +16,7 @@ from sensorgen.interval import Interval
 from sensorgen.models._press.cell import AIR, Cell, cell_of
 from sensorgen.models._press.mesh import Fineness, Mesh, Unmeshed, mesh_of
 from sensorgen.models._press.pressed import (
+    DEEPEST,
     Elastic,
     Pressed,
     check,
@@ -140,6 +141,7 @@ def _solved(
         support.top_load(mesh),
         penalty_pa(softest),
         held.contact == "stick",
+        sound=lambda places_m: not faces.crossed(places_m, DEEPEST),
     )
     found, states = reached(problem, stress_pa, _STEP * softest, step, SOURCE)
     if not cell.mirrored:

@@ -103,11 +103,11 @@ def _rows(weights: Real, nodes: Whole, axis: int, size: int) -> csr_matrix:
 def joined(parts: list[Pairs], size: int) -> Pairs:
     """Pairs of several kinds as one."""
     gap, slip = (vstack([csr_matrix((0, size)), *(getattr(p, k) for p in parts)]).tocsr() for k in ("gap", "slip"))
-    stiff, long, which, held = (
+    stiff, long, which, held, slid = (
         np.concatenate([np.empty(0), *(getattr(p, k) for p in parts)])
-        for k in ("stiffness_pa", "length_m", "point", "sticks")
+        for k in ("stiffness_pa", "length_m", "point", "sticks", "slid_m")
     )
-    return Pairs(gap, slip, stiff, long, which.astype(np.int64), held.astype(bool))
+    return Pairs(gap, slip, stiff, long, which.astype(np.int64), held.astype(bool), slid)
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ class BrickFaces:
         n = len(slips)
         stiff, long, which = np.tile(stiffness[here] / n, n), np.tile(side[here], n), np.tile(points[here], n)
         both = vstack([gap] * n).tocsr(), vstack(slips).tocsr()
-        return Pairs(*both, stiff, long, which, np.zeros(n * len(here), bool))
+        return Pairs(*both, stiff, long, which, np.zeros(n * len(here), bool), np.zeros(n * len(here)))
 
     @cached_property
     def _sides(self) -> tuple[Whole, Whole, Real]:

@@ -23,6 +23,8 @@ _ENOUGH = 1e-6  # residual over load
 _NEARLY = 1e-3  # the same before the contact partners are looked for anew
 _STILL = 1e-10  # a step so much shorter than the way is rounding: nu near 1/2 turns it into forces
 _MOST_STEPS = 15
+_MOST_TURNS = 6  # of looking for partners anew within one load step
+_SETTLED = 0.05  # over the length of a side: depths that old and new partners see, where the partners stay [-]
 _LEAST_J = 0.05  # a step may not squeeze a triangle below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
 _MOST_CUTS = 4  # failed load steps in all before a cell is given up
@@ -107,6 +109,8 @@ class Problem:
         What has touched sticks.
     solver : callable
         Of the linear systems.
+    sound : callable, optional
+        Whether places of the nodes may be: a step that ends elsewhere is cut.
     """
 
     elements: Solid
@@ -116,6 +120,7 @@ class Problem:
     penalty_pa: float
     stick: bool = False
     solver: Solver = by_lu
+    sound: Callable[[Real], bool] | None = None
 
     @property
     def dimension(self) -> int:
@@ -133,21 +138,25 @@ class Problem:
         It sinks in as far as the penalty needs to carry a pressure, because a contact that only just touches has no
         stiffness to begin with.
         """
-        pairs = contact.carrying(state.pairs, self.loose, self.dimension)
+        pairs, drop = self._below(state)
         if not pairs.point.size:
             return state
-        gap = self.gaps(pairs, state.u_m)
-        first = gap < gap.min() + _FLAT * pairs.length_m
+        first = drop < drop.min() + _FLAT * pairs.length_m
         sunk = pressure_pa * np.abs(self.load).sum() / pairs.stiffness_pa[first].sum()
         u = state.u_m.copy()
-        fall = gap.min() + min(sunk, _DEEPEST * pairs.length_m[first].min())
+        fall = drop.min() + min(sunk, _DEEPEST * pairs.length_m[first].min())
         u[self.dimension - 1 :: self.dimension] -= self.loose * fall
         return replace(state, u_m=u, pairs=self.project(u))
 
     def fall_m(self, state: State) -> float:
         """How far the top comes down before anything carries it [m]."""
-        pairs = contact.carrying(state.pairs, self.loose, self.dimension)
-        return float(self.gaps(pairs, state.u_m).min()) if pairs.point.size else 0.0
+        _, drop = self._below(state)
+        return float(drop.min()) if drop.size else 0.0
+
+    def _below(self, state: State) -> tuple[Pairs, Real]:
+        """Pairs of loose pieces and what is below them, and how far those may fall until each touches [m]."""
+        pairs, share = contact.carrying(state.pairs, self.loose, self.dimension)
+        return pairs, self.gaps(pairs, state.u_m) / share
 
     @cached_property
     def loose(self) -> NDArray[np.bool_]:
@@ -173,6 +182,10 @@ class Problem:
         """Gap of each pair [m]."""
         return np.asarray(pairs.gap @ self.places(u).ravel())
 
+    def slips(self, pairs: Pairs, u: Real) -> Real:
+        """How far the partner of each pair has moved sideways since they hold fast [m]."""
+        return np.asarray(pairs.slip @ self.places(u).ravel() - pairs.slid_m)
+
     @cached_property
     def _pattern(self) -> tuple[csr_matrix, Whole, Whole]:
         """The elements' stiffness on the free displacements, empty; which entries of theirs it has, and where."""
@@ -193,7 +206,7 @@ class Problem:
         force, stiffness = pairs.gap.T @ (k * gap), across.T @ diags(k) @ across
         if self.stick:
             k, across = pairs.stiffness_pa * pairs.sticks, pairs.slip @ self.free
-            force = force + pairs.slip.T @ (k * (pairs.slip @ self.places(u).ravel()))
+            force = force + pairs.slip.T @ (k * self.slips(pairs, u))
             stiffness = stiffness + across.T @ diags(k) @ across
         return force, stiffness
 
@@ -201,7 +214,7 @@ class Problem:
         """Energy in the penalty, per depth [J/m]."""
         k = state.pairs.stiffness_pa
         gap = self.gaps(state.pairs, state.u_m)
-        slip = state.pairs.slip @ self.places(state.u_m).ravel() * state.pairs.sticks
+        slip = self.slips(state.pairs, state.u_m) * state.pairs.sticks
         return float(0.5 * (k * ((gap < 0) * gap**2 + slip**2)).sum())
 
     def residual(self, u: Real, inner: Inner, pairs: Pairs, pressure_pa: float) -> tuple[Real, csr_matrix, Tangent]:
@@ -263,18 +276,38 @@ class Problem:
         return state if inside_out else replace(state, u_m=u, inner=inner)
 
     def stepped(self, state: State, pressure_pa: float, before: State | None = None) -> State | None:
-        """Press on to a pressure: solve, look for the partners anew, and solve again."""
+        """Press on to a pressure: solve, look for the partners anew, and solve again, until they stay."""
         first = self.newton(self.ahead(state, before or state, pressure_pa), pressure_pa, state.pairs, _NEARLY)
         if first is None:
             first = self.newton(state, pressure_pa, state.pairs, _NEARLY) if before else None
         if first is None:
             return None
-        stuck = self._stuck(first) if self.stick else None
-        fresh = self.project(first.u_m, stuck)
-        return self.newton(first, pressure_pa, fresh, _ENOUGH)
+        held = self._held(state.u_m, first) if self.stick else None
+        found, pairs = first, self.project(first.u_m, held)
+        for _ in range(_MOST_TURNS):
+            again = self.newton(found, pressure_pa, pairs, _ENOUGH)
+            if again is None:
+                return None
+            found, used, pairs = again, pairs, self.project(again.u_m, held)
+            if self._apart(used, pairs, found.u_m) < _SETTLED:
+                return found if self.sound is None or self.sound(self.places(found.u_m)) else None
+        return None
 
-    def _stuck(self, state: State) -> Pairs:
-        return contact.stuck(state.pairs, self.gaps(state.pairs, state.u_m) < 0)
+    def _apart(self, one: Pairs, other: Pairs, u: Real) -> float:
+        """By how much the depths differ that two choices of partners see, over the length of a side [-]."""
+        depths = np.zeros((2, 1 + max(p.point.max(initial=0) for p in (one, other))))
+        for depth, pairs in zip(depths, (one, other), strict=True):
+            depth[pairs.point] = np.maximum(-self.gaps(pairs, u), 0.0) / pairs.length_m
+        return float(np.ptp(depths, axis=0).max())
+
+    def _held(self, before: Real, state: State) -> Pairs:
+        """What touches now and holds fast from where it first did, between the places before and those now."""
+        pairs = state.pairs
+        gaps, slips = ([rows @ self.places(u).ravel() for u in (before, state.u_m)] for rows in (pairs.gap, pairs.slip))
+        touched = gaps[1] < 0
+        share = np.clip(gaps[0] / np.where(touched, gaps[0] - gaps[1], np.inf), 0.0, 1.0)
+        since = slips[0] + np.where(gaps[0] > 0, share, 0.0) * (slips[1] - slips[0])
+        return contact.some(replace(pairs, slid_m=np.where(pairs.sticks, pairs.slid_m, since), sticks=touched), touched)
 
 
 def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) -> Iterator[State]:

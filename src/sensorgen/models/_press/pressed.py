@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _PENALTY = 60.0  # over the least Young's modulus of a solid [-]
 _LEAST_VOLUME = 0.2  # J below which an element says nothing any more [-]
-_DEEPEST = 0.3  # penetration over the side it happens on [-]
+DEEPEST = 0.3  # penetration over the side it happens on [-]
 _BALANCE = 0.01  # by which work and energy may differ [-]
 _LEVELS = 0.01  # by which two meshes may differ [-]
 
@@ -187,7 +187,7 @@ def _faults(stress: Real, asked: Sequence[float], volume: Real, depth: Real, imb
     said = {
         f"converged up to {stress[-1] / 1e3:.4g} of {asked[-1] / 1e3:.4g} kPa": stress[-1] < asked[-1] * (1 - 1e-9),
         f"a triangle is squeezed to {volume.min():.2g} of its volume": volume.min() < _LEAST_VOLUME,
-        f"faces run into each other by {depth.max():.2g} of a side": depth.max() > _DEEPEST,
+        f"faces run into each other by {depth.max():.2g} of a side": depth.max() > DEEPEST,
         f"work and energy differ by {imbalance[-1]:.1%}": abs(imbalance[-1]) > _BALANCE,
     }
     return [words for words, holds in said.items() if holds]

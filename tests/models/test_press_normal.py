@@ -1,0 +1,164 @@
+"""Contact along the normals: upright faces, undercuts, a closing gap within one solid, and the mirrors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sensorgen.design import make
+from sensorgen.scene import Body, Prism, Scene, rectangle
+from sensorgen.sections import columns, sections
+
+pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
+from sensorgen.models import press2d
+from sensorgen.models._press import cell as cells
+from sensorgen.models._press import contact
+from sensorgen.models.press2d import Elastic, Fineness, Held
+
+SOFT = {"x60": Elastic(1e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
+BASE = 0.3
+
+
+def cell_of(high, left, right, *outlines):
+    """Outlines of X60 between plates of eTPU 0.3 mm thick, ``high`` apart; mirrors at the ends."""
+    wide, top = 4.0, BASE + high
+    bodies = (
+        Body("bottom_electrode", "etpu", (Prism("y", rectangle(0, wide, 0, BASE), 0.0, 10.0),), "bottom"),
+        Body("shape", "x60", tuple(Prism("y", tuple(o), 0.0, 10.0) for o in outlines)),
+        Body("top_electrode", "etpu", (Prism("y", rectangle(0, wide, top, top + 0.3), 0.0, 10.0),), "top"),
+    )
+    return cells._cell(columns(sections(Scene(bodies, (wide, 10.0, top + 0.3)))[0]), left, right, mirrored=True)
+
+
+def box(left, right, low, high):
+    return rectangle(left, right, BASE + low, BASE + high)
+
+
+def pillars(gap, count):
+    """Half a pillar 0.45 mm wide and 0.5 high before a mirror, or two halves ``gap`` apart."""
+    period = 0.45 + gap
+    bars = [box(k * period + gap / 2, (k + 1) * period - gap / 2, 0, 0.5) for k in range(3)]
+    return cell_of(0.5, 0.5 * period, (0.5 + count / 2) * period, *bars)
+
+
+def solved(cell, stresses, held=None):
+    return press2d._solved(cell, SOFT, stresses, held or Held(), Fineness(), lambda _: None)
+
+
+STRESSES = np.linspace(0, 4e5, 9)
+
+
+@pytest.fixture(scope="module")
+def mirrored():
+    return solved(pillars(0.05, 1), STRESSES)[0]
+
+
+def test_two_pillars_that_bulge_into_each_other_are_one_before_a_mirror(mirrored):
+    both, _ = solved(pillars(0.05, 2), STRESSES)
+    assert (mirrored.faults, both.faults) == ((), ())
+    assert both.displacement_m[1:] == pytest.approx(mirrored.displacement_m[1:], rel=0.01)  # the meshes differ
+
+
+def test_pillars_that_meet_are_stiffer_than_free_ones(mirrored):
+    """Rubber that keeps its volume and has nowhere to go hardly gives way; free pillars go on as they began."""
+    free, _ = solved(pillars(0.3, 1), STRESSES)
+    met, alone = (np.diff(f.displacement_m) / np.diff(f.stress_pa) for f in (mirrored, free))
+    assert met[-1] < 0.15 * met[0]
+    assert alone[-1] > 0.5 * alone[0]
+
+
+def test_faces_that_run_through_each_other_are_caught(monkeypatch):
+    """Made blind to each other: the curve ends where the pillars would enter one another."""
+    project = contact.Faces.project
+
+    def blind(self, places_m, penalty_pa, kept=None):
+        pairs = project(self, places_m, penalty_pa, kept)
+        return contact.some(pairs, np.zeros(len(pairs.point), bool))
+
+    monkeypatch.setattr(contact.Faces, "project", blind)
+    for count in (1, 2):
+        found, _ = solved(pillars(0.05, count), STRESSES)
+        assert found.faults[0].startswith("converged up to")
+        assert found.converged_pa < 4e5  # they touch at 120 kPa
+
+
+def forces(run, state):
+    """Of the contact on each node (n, 2) [N/m], and where the nodes are."""
+    force, _ = run.problem._touching(state.pairs, state.u_m)
+    return force.reshape(-1, 2), run.problem.places(state.u_m)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_dovetail_is_held_on_its_undercut_flank(turned):
+    """Two trapezia that hook under each other: forces and moments of the contact cancel, also drawn the other way."""
+    foot = [(0, 0), (0.45, 0), (0.25, 0.5), (0, 0.5)]
+    hook = [(0.5, 0), (0.7, 0), (0.7, 0.5), (0.3, 0.5)]
+    drawn = [[(0.7 - x if turned else x, BASE + y) for x, y in shape] for shape in (foot, hook)]
+    found, run = solved(cell_of(0.5, 0, 0.7, *(d[::-1] if turned else d for d in drawn)), np.linspace(0, 2e5, 6))
+    assert found.faults == ()
+    assert found.displacement_m[-1] * 1e6 == pytest.approx(33.4, rel=0.005)
+    force, places = forces(run, run.states[-1])
+    total = np.abs(force).sum()
+    assert total > 90
+    assert force.sum(axis=0) == pytest.approx([0, 0], abs=1e-12 * total)
+    moment = places[:, 0] * force[:, 1] - places[:, 1] * force[:, 0]
+    assert moment.sum() == pytest.approx(0, abs=1e-4 * total * 0.5e-3)
+
+
+def slope(drop, gap=1e-3):
+    """A block cut along a slope, its upper part ``gap`` above the lower one, between mirrors."""
+    left, right = BASE + 0.4, BASE + 0.4 - drop
+    lower = [(0, BASE), (0.7, BASE), (0.7, right), (0, left)]
+    upper = [(0, left + gap), (0.7, right + gap), (0.7, BASE + 0.6), (0, BASE + 0.6)]
+    return cell_of(0.6, 0, 0.7, lower, upper)
+
+
+@pytest.mark.parametrize("drop", [0.0, 0.2, 0.4])
+def test_a_sloping_joint_hands_an_even_pressure_on(drop):
+    """Patch test: what keeps its volume between fixed walls bears p everywhere, whatever the joint's slope."""
+    stresses = [0.0, 1e4, 1e5]
+    found, run = solved(slope(drop), stresses)
+    assert found.faults == ()
+    assert found.fall_m == pytest.approx(1e-6, rel=1e-6)  # straight down, on a slope too
+    pressure = -run.states[-1].inner.pressure[:, 0]
+    assert pressure == pytest.approx(np.full(len(pressure), 1e5), rel=0.01)
+
+
+def test_a_sloping_joint_that_sticks_is_none():
+    """At nu = 0.3 the joint bears shear: held fast it gives way as the whole block does, loose it slides."""
+    solids = {"x60": Elastic(1e6, 0.3), "etpu": Elastic(22e6, 0.3)}
+    whole = cell_of(0.6, 0, 0.7, box(0, 0.7, 0, 0.6))
+    one = press2d.press(whole, solids, [0.0, 1e4, 2e4]).displacement_m
+    held, loose = (
+        press2d.press(slope(0.4), solids, [0.0, 1e4, 2e4], None, Held(contact=kind)).displacement_m
+        for kind in ("stick", "frictionless")
+    )
+    assert np.diff(held)[1] == pytest.approx(np.diff(one)[1], rel=0.02)
+    assert np.diff(loose)[1] > 1.05 * np.diff(one)[1]
+
+
+def test_the_energy_of_the_contact_is_that_of_its_forces():
+    """Gap and slip: the energy's differences along a motion are the forces' work."""
+    _, run = solved(slope(0.4), [0.0, 1e4], Held(contact="stick"))
+    problem, state = run.problem, run.states[-1]
+    assert state.pairs.sticks.any()
+    ways = np.random.default_rng(1).normal(size=(2, len(state.u_m)))
+    state, motion = replace(state, u_m=state.u_m + 1e-8 * ways[0]), 1e-13 * ways[1]
+    there = [replace(state, u_m=state.u_m + share * motion) for share in (-1, 0, 1)]
+    before, _, after = (problem.contact_energy(s) for s in there)
+    force, _ = problem._touching(state.pairs, state.u_m)
+    slid = problem.slips(state.pairs, state.u_m) * state.pairs.sticks
+    assert (state.pairs.stiffness_pa * slid**2).sum() > 0.1 * problem.contact_energy(state)
+    assert (after - before) / 2 == pytest.approx(force @ motion, rel=1e-5)
+
+
+def test_steps_of_any_length_stick_alike():
+    """What touches within a load step holds where it first did: one step or four, 3 % apart."""
+    drawn = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})
+    solids = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
+    cell = press2d.cell(drawn.in_use, drawn.params.period_mm)
+    moved = [
+        press2d.press(cell, solids, np.linspace(0, 1e4, n + 1), None, Held(contact="stick")).displacement_m[-1]
+        for n in (1, 4)
+    ]
+    assert moved[0] == pytest.approx(moved[1], rel=0.03)
