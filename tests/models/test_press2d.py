@@ -150,7 +150,7 @@ def test_coarser_triangles_take_over_where_finer_ones_fail(monkeypatch):
 
 def test_outlines_that_are_closed_in_the_wrong_place_do_not_pass(monkeypatch):
     """Gaps up to a third of a side taken for shut: solids gain area, and the answer has no capacitance and a fault."""
-    monkeypatch.setattr(deformed, "CLOSED", (1.5,))
+    monkeypatch.setattr(deformed, "_CLOSED", 1.5)
     monkeypatch.setattr(deformed, "_BETWEEN", 1.5)
     found = press2d.press(tri(), solids(), [0.0, 1e4], EPS, fineness=Fineness(1.4e-3, 0.1, 0.2))
     assert found.capacitance_f_per_m2[1] is None

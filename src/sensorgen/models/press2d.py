@@ -44,7 +44,6 @@ __all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "curve_
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
 _FIELD_GROWTH = 0.5  # of the triangles of the capacitance's mesh, per distance [-]
 _MISFIT = 1e-3  # of a solid's area: gaps that were closed in the wrong place change more [-]
-_NARROW = 5e-3  # a bracket of the capacitance wider than this is a poor mesh [-]
 _COARSER = (3, 9)  # times the size of the triangles at an apex, where the finer ones do not converge [-]
 
 Real = NDArray[np.float64]
@@ -157,23 +156,15 @@ def _with_fields(found: Pressed, cell: Cell, run: _Run, permittivity: Mapping[st
 
 
 def _field(cell: Cell, run: _Run, u_m: Real, permittivity: Mapping[str, float]) -> tuple[Interval | None, Cell]:
-    """Capacitance and outlines of a deformed cell; gaps are closed a little more or less where a mesh fails."""
+    """Capacitance and outlines of a deformed cell; None where no sound mesh of them was found."""
     from sensorgen.models._press import deformed, field
 
-    best: tuple[Interval | None, Cell] = (None, cell)
-    for closed in deformed.CLOSED:
-        outline = deformed.deformed(cell, run.mesh, run.faces, u_m, closed)
-        try:
-            _refuse_misfit(deformed.misfit(outline, run.mesh, u_m))
-            found = field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH)
-        except Unmeshed:
-            best = best if best[0] else (None, outline)
-            continue
-        if best[0] is None or found.width() < best[0].width():
-            best = found, outline
-        if found.width() < _NARROW:
-            break
-    return best
+    outline = deformed.deformed(cell, run.mesh, run.faces, u_m)
+    try:
+        _refuse_misfit(deformed.misfit(outline, run.mesh, u_m))
+        return field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH), outline
+    except Unmeshed:
+        return None, outline
 
 
 def _refuse_misfit(share: float) -> None:

@@ -17,26 +17,23 @@ Whole = NDArray[np.int64]
 Run = tuple[int, int]
 Sides = dict[Run, tuple[int, int]]
 
-CLOSED = (5e-3, 1e-2, 2.5e-3, 2e-2, 4e-2)  # gaps less than this share of their side are none: to be tried in turn [-]
+_CLOSED = 5e-3  # gaps less than this share of their side are none [-]
 _ROUND = [0, 3, 1, 4, 2, 5]  # the nodes of a triangle, in turn
 _BETWEEN = 0.3  # and less than this share where both ends of the side touch [-]
 
 
-def deformed(cell: Cell, mesh: Mesh, faces: Faces, u_m: Real, closed: float) -> Cell:
-    """The cell at given displacements (2n) [m]; the sides of gaps become two straight pieces each.
-
-    Gaps less than ``closed`` of the length of their side are none.
-    """
+def deformed(cell: Cell, mesh: Mesh, faces: Faces, u_m: Real) -> Cell:
+    """The cell at given displacements (2n) [m]; the sides of gaps become two straight pieces each."""
     places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
     found = _edges(cell, mesh)
     if u_m.any():
-        found = _closed(found, _air(cell), places, faces, mesh.points_m, closed)
+        found = _closed(found, _air(cell), places, faces, mesh.points_m)
     edges = {}
     for (a, b), sides in found.items():
         p, q = (tuple(np.round(places[k], 9).tolist()) for k in (a, b))
         if sides[0] != sides[1] and p != q:
             edges[(p, q) if p < q else (q, p)] = sides if p < q else sides[::-1]
-    return replace(cell, edges=edges, right_mm=max(q[0] for _, q in edges))
+    return replace(cell, edges=edges, right_mm=float(np.round(places[mesh.points_m[:, 0].argmax(), 0], 9)))
 
 
 def misfit(cell: Cell, mesh: Mesh, u_m: Real) -> float:
@@ -63,19 +60,21 @@ def _air(cell: Cell) -> int:
 
 
 def _edges(cell: Cell, mesh: Mesh) -> Sides:
-    """Sides between different regions, those of gaps halved: (node, node) to the regions on their left and right."""
+    """Sides between different regions: (node, node) to the regions on their left and right; halved but at walls."""
     found: Sides = {}
+    air, walls = _air(cell), _walls(mesh)
     for k in range(3):
-        runs = mesh.triangles[:, [k, (k + 1) % 3]]
-        for (a, b), region in zip(runs.tolist(), mesh.region.tolist(), strict=True):
-            if (b, a) in found:
-                found[b, a] = (found[b, a][0], region)
-            else:
-                found[a, b] = (region, OUTSIDE)
-    air = _air(cell)
+        for (a, m, b), region in zip(
+            mesh.triangles[:, [k, k + 3, (k + 1) % 3]].tolist(), mesh.region.tolist(), strict=True
+        ):
+            for p, q in ((a, b),) if m in walls else ((a, m), (m, b)):
+                if (q, p) in found:
+                    found[q, p] = (found[q, p][0], region)
+                else:
+                    found[p, q] = (region, OUTSIDE)
     for a, b, m in mesh.rim[~at_border(mesh)].tolist():
-        region, _ = found.pop((a, b))
-        found[a, m] = found[m, b] = (region, air)
+        for run in ((a, m), (m, b)):
+            found[run] = (found[run][0], air)
     nodes = {tuple(np.round(p / M_PER_MM, 9).tolist()): k for k, p in enumerate(mesh.points_m)}
     for (p, q), sides in cell.edges.items():
         if air != OUTSIDE and set(sides) == {air, OUTSIDE}:
@@ -83,16 +82,22 @@ def _edges(cell: Cell, mesh: Mesh) -> Sides:
     return {run: sides for run, sides in found.items() if sides[0] != sides[1]}
 
 
-def _closed(edges: Sides, air: int, places: Real, faces: Faces, drawn: Real, closed: float) -> Sides:
+def _walls(mesh: Mesh) -> set[int]:
+    """Middles of the sides on the left and right end of the cell."""
+    x, middles = mesh.points_m[:, 0], mesh.rim[:, 2]
+    return set(middles[np.isin(x[middles], (x.min(), x.max()))].tolist())
+
+
+def _closed(edges: Sides, air: int, places: Real, faces: Faces, drawn: Real) -> Sides:
     """Edges with the upper faces laid along the lower ones where they touch; corners in ``places`` may move a bit."""
     lower, upper = (_runs(side) for side in (faces.lower, faces.upper))
     if not (lower and upper):
         return edges
-    instead = _touching(places, lower, upper, closed)
+    instead = _touching(places, lower, upper)
     for corner in _corners(drawn, upper) & set(instead):
         places[instead[corner]] = places[corner]  # the point below moves to the corner of an upper face
     found: Sides = {}
-    ways = dict(zip(upper, _ways(places, lower, upper, instead, closed), strict=True))
+    ways = dict(zip(upper, _ways(places, lower, upper, instead), strict=True))
     for run, sides in edges.items():
         for a, b in pairwise(ways.get(run) or [instead.get(k, k) for k in run]):
             if a != b:
@@ -102,7 +107,7 @@ def _closed(edges: Sides, air: int, places: Real, faces: Faces, drawn: Real, clo
     return found
 
 
-def _touching(places: Real, lower: list[Run], upper: list[Run], closed: float) -> dict[int, int]:
+def _touching(places: Real, lower: list[Run], upper: list[Run]) -> dict[int, int]:
     """Points of the upper faces that touch a lower one, each with the nearest point of that."""
     points = np.array(sorted({k for run in upper for k in run}))
     ends = np.array(lower)
@@ -110,7 +115,7 @@ def _touching(places: Real, lower: list[Run], upper: list[Run], closed: float) -
     share = (p[..., 0] - a[:, 0]) / (b - a)[:, 0]
     size = np.hypot(*(b - a).T)
     height = p[..., 1] - (a[:, 1] + share * (b - a)[:, 1])
-    near = (share >= 0) & (share <= 1) & (height < closed * size) & (height > -size)
+    near = (share >= 0) & (share <= 1) & (height < _CLOSED * size) & (height > -size)
     distance = np.where(near, np.abs(height), np.inf)
     rows, best = np.arange(len(points)), distance.argmin(axis=1)
     nearest = ends[best, (share[rows, best] > 0.5).astype(int)]
@@ -118,9 +123,7 @@ def _touching(places: Real, lower: list[Run], upper: list[Run], closed: float) -
     return dict(zip(points[hit].tolist(), nearest[hit].tolist(), strict=True))
 
 
-def _ways(
-    places: Real, lower: list[Run], upper: list[Run], instead: dict[int, int], closed: float
-) -> Iterator[list[int]]:
+def _ways(places: Real, lower: list[Run], upper: list[Run], instead: dict[int, int]) -> Iterator[list[int]]:
     """For each run of an upper face its way over the points of lower faces that touch it."""
     points = np.array(sorted({k for run in lower for k in run}))
     p = places[points]
@@ -130,7 +133,7 @@ def _ways(
         if xa == xb:
             yield [a, b]
             continue
-        limit = _BETWEEN if a != run[0] and b != run[1] else closed
+        limit = _BETWEEN if a != run[0] and b != run[1] else _CLOSED
         size = float(np.hypot(xb - xa, yb - ya))
         gap = ya + (p[:, 0] - xa) * (yb - ya) / (xb - xa) - p[:, 1]
         inside = (p[:, 0] > min(xa, xb)) & (p[:, 0] < max(xa, xb)) & (gap < limit * size) & (gap > -size)

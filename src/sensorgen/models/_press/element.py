@@ -40,6 +40,9 @@ def gradients(xi: Real, eta: Real) -> Real:
 
 _GRADIENTS = gradients(*_POINTS.T)
 _PRESSURES = np.column_stack([np.ones(len(_POINTS)), _POINTS - 1 / 3])  # constant, and two slopes without mean
+_PRODUCTS = (_PRESSURES[:, :, None] * _PRESSURES[:, None]).reshape(-1, 9)
+_UNMOVED = np.array([1.0, 0.0, 0.0, 1.0])
+_ALTERNATING = np.array([1.0, -1.0, -1.0, 1.0])  # signs of a cofactor
 
 
 @dataclass(frozen=True)
@@ -128,21 +131,34 @@ class Elements:
         return self.mesh.points_m
 
     @cached_property
-    def _geometry(self) -> tuple[Real, Real]:
-        """Gradients of the seven functions (m, points, 7, 2) [1/m], and weights (m, points) [m2]."""
+    def _geometry(self) -> tuple[Real, Real, Real]:
+        """Slopes of the seven functions along x and y (m, 7, points) [1/m], and weights (m, points) [m2]."""
         a, b, c = (self.mesh.points_m[self.mesh.triangles[:, k]] for k in range(3))
         jacobian = np.stack([b - a, c - a], axis=2)
-        inverse = np.linalg.inv(jacobian)
-        return np.einsum("qnk,mki->mqni", _GRADIENTS, inverse), np.linalg.det(jacobian)[:, None] * _WEIGHTS
+        x, y = np.einsum("qnk,mki->imnq", _GRADIENTS, np.linalg.inv(jacobian))
+        return np.ascontiguousarray(x), np.ascontiguousarray(y), np.linalg.det(jacobian)[:, None] * _WEIGHTS
 
     @cached_property
-    def _strains(self) -> tuple[Real, Real]:
-        """How F's entries (11, 12, 21, 22), and those of its cofactor, depend on the 14 displacements."""
-        g, _ = self._geometry
-        b = np.zeros((*g.shape[:2], 4, 14))
-        b[:, :, 0, 0::2], b[:, :, 1, 0::2] = g[..., 0], g[..., 1]
-        b[:, :, 2, 1::2], b[:, :, 3, 1::2] = g[..., 0], g[..., 1]
-        return b, b[:, :, ::-1] * np.array([1.0, -1.0, -1.0, 1.0])[:, None]
+    def _soft(self) -> Real:
+        """Second derivatives of mu/2 F : F, to displacements of one direction (m, 7, 7) [Pa]."""
+        x, y, w = self._geometry
+        weight = (w * self.law.mu_pa[:, None])[:, None]
+        return np.asarray(np.matmul(weight * x, x.transpose(0, 2, 1)) + np.matmul(weight * y, y.transpose(0, 2, 1)))
+
+    @cached_property
+    def _turning(self) -> Real:
+        """Second derivatives of J, to one displacement sideways and one up (m, points, 49) [1/m2]."""
+        x, y = (slopes.swapaxes(1, 2) for slopes in self._geometry[:2])
+        mixed = x[..., :, None] * y[..., None, :]
+        return np.asarray((mixed - mixed.swapaxes(2, 3)).reshape(*x.shape[:2], 49))
+
+    def _rates(self, t: Real) -> Real:
+        """Of T : F to the 14 displacements (m, 14, points), for entries 11, 12, 21, 22 of T (m, points, 4)."""
+        x, y, _ = self._geometry
+        found = np.empty((len(x), 7, 2, x.shape[2]))
+        for row in range(2):
+            found[:, :, row] = t[:, None, :, 2 * row] * x + t[:, None, :, 2 * row + 1] * y
+        return found.reshape(len(x), 14, -1)
 
     def start(self) -> Inner:
         """Unloaded."""
@@ -151,9 +167,10 @@ class Elements:
 
     def deformation(self, u: Real, inner: Inner) -> Real:
         """Entries 11, 12, 21, 22 of F at each quadrature point (m, points, 4)."""
-        local = np.concatenate([u[self.freedoms], inner.bubble], axis=1)
-        found: Real = np.matmul(self._strains[0].reshape(len(local), -1, 14), local[:, :, None])
-        return np.asarray(found.reshape(len(local), -1, 4) + np.array([1.0, 0.0, 0.0, 1.0]))
+        x, y, _ = self._geometry
+        local = np.concatenate([u[self.freedoms], inner.bubble], axis=1).reshape(-1, 7, 2).transpose(0, 2, 1)
+        found = np.stack([np.matmul(local, x), np.matmul(local, y)], axis=-1)
+        return np.asarray(found.transpose(0, 2, 1, 3).reshape(len(x), -1, 4) + _UNMOVED)
 
     def volume_ratio(self, u: Real, inner: Inner) -> Real:
         """J at each quadrature point (m, points)."""
@@ -167,7 +184,7 @@ class Elements:
 
     def energy_j_per_m(self, u: Real, inner: Inner) -> float:
         """Energy stored, per depth [J/m]."""
-        f, (_, weights) = self.deformation(u, inner), self._geometry
+        f, (_, _, weights) = self.deformation(u, inner), self._geometry
         j = f[..., 0] * f[..., 3] - f[..., 1] * f[..., 2]
         p = inner.pressure @ _PRESSURES.T
         shape = self.law.mu_pa[:, None] * (0.5 * ((f**2).sum(-1) - 2) - np.log(j))
@@ -179,23 +196,27 @@ class Elements:
 
     def full(self, u: Real, inner: Inner) -> tuple[Real, Real]:
         """Residual (m, 17) and its derivative before the inner unknowns are condensed."""
-        f, (_, w), (b, c) = self.deformation(u, inner), self._geometry, self._strains
-        m, q = w.shape
-        cofactor = f[..., ::-1] * np.array([1.0, -1.0, -1.0, 1.0])
+        f, (_, _, w) = self.deformation(u, inner), self._geometry
+        m = len(w)
+        cofactor = f[..., ::-1] * _ALTERNATING
         j = f[..., 0] * f[..., 3] - f[..., 1] * f[..., 2]
         mu, p = self.law.mu_pa[:, None], inner.pressure @ _PRESSURES.T
-        along = np.matmul(cofactor[:, :, None, :], b)[:, :, 0]  # dJ to the displacements (m, points, 14)
+        along = self._rates(cofactor)
         stress = (w * mu)[..., None] * f + (w * (p - mu / j))[..., None] * cofactor
-        turned = (w * mu)[..., None, None] * b + (w * (p - mu / j))[..., None, None] * c
-        stiffness = np.matmul(b.reshape(m, 4 * q, 14).transpose(0, 2, 1), turned.reshape(m, 4 * q, 14))
-        stiffness += np.matmul((along * (w * mu / j**2)[..., None]).transpose(0, 2, 1), along)
-        coupling = np.matmul((along * w[..., None]).transpose(0, 2, 1), _PRESSURES)
-        mass = np.einsum("mq,qi,qk->mik", w, _PRESSURES, _PRESSURES)
+        stiffness = np.matmul(along * (w * mu / j**2)[:, None], along.transpose(0, 2, 1)).reshape(m, 7, 2, 7, 2)
+        stiffness[:, :, 0, :, 0] += self._soft
+        stiffness[:, :, 1, :, 1] += self._soft
+        turned = np.matmul((w * (p - mu / j))[:, None], self._turning).reshape(m, 7, 7)
+        stiffness[:, :, 0, :, 1] += turned
+        stiffness[:, :, 1, :, 0] -= turned
+        coupling = np.matmul(along * w[:, None], _PRESSURES)
+        mass = (w @ _PRODUCTS).reshape(m, 3, 3)
         yielding = self.law.yielding_per_pa[:, None]
         matrix = np.zeros((m, 17, 17))
-        matrix[:, :14, :14], matrix[:, :14, 14:], matrix[:, 14:, :14] = stiffness, coupling, coupling.transpose(0, 2, 1)
+        matrix[:, :14, :14] = stiffness.reshape(m, 14, 14)
+        matrix[:, :14, 14:], matrix[:, 14:, :14] = coupling, coupling.transpose(0, 2, 1)
         matrix[:, 14:, 14:] = -mass * np.maximum(yielding, 1 / (_STIFF * mu))[..., None]
         residual = np.empty((m, 17))
-        residual[:, :14] = np.matmul(stress.reshape(m, 1, 4 * q), b.reshape(m, 4 * q, 14))[:, 0]
+        residual[:, :14] = self._rates(stress).sum(axis=2)
         residual[:, 14:] = (w * (j - 1)) @ _PRESSURES - yielding * np.einsum("mik,mk->mi", mass, inner.pressure)
         return residual, matrix

@@ -7,6 +7,7 @@ with 1/eps, its values given on the sides of the cell in place of the electrodes
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,8 @@ from sensorgen.errors import OutOfRange
 from sensorgen.interval import Interval
 from sensorgen.models._press import rings
 from sensorgen.models._press.cell import AIR, OUTSIDE, Cell, Edge
-from sensorgen.models._press.mesh import Mesh, Net, Unmeshed, Whole, of_triangles, triangulated
-from sensorgen.models._press.wedge import Wedge, fan, wedges
-from sensorgen.scene import Point
+from sensorgen.models._press.mesh import Mesh, Net, Unmeshed, Whole, nearest, of_triangles, triangulated
+from sensorgen.models._press.wedge import Wedge, filled, wedges
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
 Real = NDArray[np.float64]
@@ -28,6 +28,14 @@ Mask = NDArray[np.bool_]
 Edges = Mapping[Edge, tuple[int, int]]
 
 _ROUNDING = 1e-9
+_SYMMETRIC: dict[str, Any] = {
+    "permc_spec": "MMD_AT_PLUS_A",
+    "diag_pivot_thresh": 0.0,
+    "options": {"SymmetricMode": True},
+    "relax": 1,  # columns one by one: so sparse a factor has no panels worth their room
+    "panel_size": 1,
+}
+_RINGS = 6
 _HOLE = 1e-6  # area that a mesh may miss, as a share
 _MIDS = np.array([[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])  # middles of the sides: exact to degree 2
 
@@ -79,14 +87,22 @@ def _meshed(cell: Cell, air: int, coarse_mm: float, growth: float) -> Mesh:
             cut[key] = (-number, cut[key][1]) if place == 0 else (cut[key][0], -number)
         if wedge.first[-1] != wedge.second[-1]:
             cut[wedge.first[-1], wedge.second[-1]] = (-number, air)
+    _refuse_outside(cell)
     _refuse_crossings(np.array([edge for edge, sides in edges.items() if air in sides]).reshape(-1, 2, 2))
-    net = triangulated(cut, coarse_mm, growth)
+    net = triangulated(cut, coarse_mm, growth, rounds=1)
     new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
     corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])
     _refuse_holes(edges, net.points_m[corners])
     region = np.concatenate([net.region, np.full(len(new), air)])
-    tips = [_nearest(net.points_m, place) for place in rings.corners(edges, cell.left_mm, cell.right_mm)]
-    return of_triangles(*rings.ringed(net.points_m, corners, region, tips))
+    tips = [nearest(net.points_m, place) for place in rings.corners(edges, cell.left_mm, cell.right_mm)]
+    return of_triangles(*rings.ringed(net.points_m, corners, region, tips, _RINGS))
+
+
+def _refuse_outside(cell: Cell) -> None:
+    """Faces that fold through a wall of the cell, which is a mirror, run into their own image."""
+    places, room = [x for edge in cell.edges for x, _ in edge], _ROUNDING * cell.width_mm()
+    if min(places) < cell.left_mm - room or max(places) > cell.right_mm + room:
+        raise Unmeshed("the deformed outlines run through the mirrors")
 
 
 def _refuse_crossings(edges: Real) -> None:
@@ -124,22 +140,17 @@ def _filling(net: Net, number: int, wedge: Wedge) -> Iterator[tuple[int, int, in
     for a, b in net.marked[-number]:
         beside.setdefault(a, []).append(b)
         beside.setdefault(b, []).append(a)
-    tip, start, ahead = (_nearest(net.points_m, p) for p in (wedge.first[0], wedge.first[-1], wedge.first[1]))
+    tip, ahead = (nearest(net.points_m, p) for p in wedge.first[:2])
     ring = [tip, min(beside[tip], key=lambda k: _turn(net.points_m, tip, k, ahead))]
     while ring[-1] != tip:
         ring.append(next(k for k in beside[ring[-1]] if k != ring[-2]))
-    turn = ring.index(start)
-    yield from fan(ring[: turn + 1], ring[::-1][: len(ring) - 1 - turn], places)
+    yield from filled(ring[:-1], places)
 
 
 def _turn(points: Real, tip: int, a: int, b: int) -> float:
     """How far two ways from a tip are from one way, as 1 - cos."""
     u, v = points[a] - points[tip], points[b] - points[tip]
     return float(1 - u @ v / np.sqrt((u @ u) * (v @ v)))
-
-
-def _nearest(points_m: Real, place: Point) -> int:
-    return int(np.hypot(*(points_m - np.array(place) * M_PER_MM).T).argmin())
 
 
 def _nodes(mesh: Mesh, which: Mask) -> Mask:
@@ -169,7 +180,7 @@ def _energy(points: Real, triangles: Whole, weight: Real, zero: Mask, one: Mask)
     v = one.astype(float)
     free = used & ~zero & ~one
     inner = matrix[free][:, free].tocsc()
-    solver = splu(inner, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    solver = splu(inner, **_SYMMETRIC)
     v[free] = solver.solve(-(matrix @ v)[free])
     return float(v @ (matrix @ v))
 

@@ -35,6 +35,8 @@ _SYMMETRIC: dict[str, Any] = {
     "permc_spec": "MMD_AT_PLUS_A",
     "diag_pivot_thresh": 1e-3,
     "options": {"SymmetricMode": True},
+    "relax": 1,  # columns one by one: so sparse a factor has no panels worth their room
+    "panel_size": 1,
 }
 
 

@@ -1,4 +1,4 @@
-"""Triangles of six nodes in a cell's solid parts, fine where two of them meet in one point."""
+"""Triangles of six nodes in a cell's solid parts, fine at notches and where two of them meet in one point."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.errors import BadInput, MissingValue
+from sensorgen.models._press import rings
 from sensorgen.models._press.cell import OUTSIDE, Cell, Edge
 from sensorgen.scene import Point
 from sensorgen.units import M_PER_MM
@@ -18,6 +19,7 @@ Run = tuple[int, int]
 
 _SAME = 1e-9  # of the cell's size: places nearer than this are one
 _LEAST_APEX_MM = 1e-3
+_RINGS = 4  # around a notch
 _SIDES = ((0, 1), (1, 2), (2, 0))
 
 
@@ -144,11 +146,15 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
         if open_sides != (OUTSIDE, OUTSIDE):
             pieces |= dict.fromkeys(pairwise(places), open_sides)
     net = triangulated(pieces, fineness.coarse_mm, fineness.growth)
-    return of_triangles(net.points_m, net.corners, net.region)
+    tips = [nearest(net.points_m, place) for place in rings.notches(cell)]
+    return of_triangles(*rings.ringed(net.points_m, net.corners, net.region, tips, _RINGS))
 
 
-def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth: float) -> Net:
-    """Mesh what edges with a region to their left and right enclose; regions from 0 down are left open."""
+def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth: float, rounds: int = 3) -> Net:
+    """Mesh what edges with a region to their left and right enclose; regions from 0 down are left open.
+
+    ``rounds`` is how often the mesher betters its triangles.
+    """
     geometry = netgen()()
     numbers: dict[Point, int] = {}
     for (a, b), (left, right) in edges.items():
@@ -158,7 +164,7 @@ def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth
         domains = {"leftdomain": max(left, 0), "rightdomain": max(right, 0)}
         geometry.Append(["line", numbers[a], numbers[b]], **domains)
     try:
-        made = geometry.GenerateMesh(maxh=coarse_mm, grading=growth)
+        made = geometry.GenerateMesh(maxh=coarse_mm, grading=growth, optsteps2d=rounds)
     except Exception as error:  # the mesher's own kind of exception, known only where it is installed
         raise Unmeshed(f"these outlines cannot be meshed ({error}): do bodies overlap, or leave slivers?") from None
     elements, sides = made.Elements2D().NumPy(), made.Elements1D().NumPy()
@@ -170,6 +176,11 @@ def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth
             marked.setdefault(behind[number - 1], []).append((a, b))
     corners = elements["nodes"][:, :3].astype(np.int64) - 1
     return Net(points, corners, elements["index"].astype(np.int64), marked)
+
+
+def nearest(points_m: Real, place_mm: Point) -> int:
+    """The point that is nearest to a place."""
+    return int(np.hypot(*(points_m - np.array(place_mm) * M_PER_MM).T).argmin())
 
 
 def cuts(length_mm: float, first_mm: float, last_mm: float, fineness: Fineness) -> list[float]:

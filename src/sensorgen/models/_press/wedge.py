@@ -4,11 +4,14 @@ A mesher asks for triangles as small as the air is thin; second-order triangles 
 """
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import atan2, hypot, pi
 
+import numpy as np
+
+from sensorgen.models._fem_flips import flipped
 from sensorgen.models._press.cell import Edge
 from sensorgen.scene import Point
 
@@ -83,15 +86,27 @@ def _far(a: Point, b: Point) -> float:
     return hypot(a[0] - b[0], a[1] - b[1])
 
 
-def fan(first: Sequence[int], second: Sequence[int], places: Sequence[Point]) -> Iterator[tuple[int, int, int]]:
-    """Triangles between two runs of nodes that begin in one, anticlockwise; always the shorter way across."""
-    i, j, last = 1, 0, len(first) - 1
-    while i < last or j + 1 < len(second):
-        on_first = _far(places[first[i + 1]], places[second[j]]) if i < last else float("inf")
-        on_second = _far(places[first[i]], places[second[j + 1]]) if j + 1 < len(second) else float("inf")
-        if on_first < on_second:
-            yield first[i], first[i + 1], second[j]
-            i += 1
-        else:
-            yield first[i], second[j + 1], second[j]
-            j += 1
+def filled(ring: Sequence[int], places: Sequence[Point]) -> list[tuple[int, int, int]]:
+    """Triangles of a simple polygon, anticlockwise; its corners may lie on a line. Ears cut off, and edges flipped."""
+    left, ears = list(ring), []
+    while len(left) > 2:
+        k = max(range(len(left)), key=lambda k: _bluntness(left, k, places))
+        ears.append((left[k - 1], left[k], left[(k + 1) % len(left)]))
+        del left[k]
+    return flipped(np.array(places), ears, [0] * len(ears))
+
+
+def _bluntness(ring: Sequence[int], k: int, places: Sequence[Point]) -> float:
+    """Of the ear at a corner: its area over its longest side squared; -1 where another corner lies in it."""
+    names = ring[k - 1], ring[k], ring[(k + 1) % len(ring)]
+    a, b, c = (places[n] for n in names)
+    if any(
+        min(_area(a, b, p), _area(b, c, p), _area(c, a, p)) >= 0 for p in (places[n] for n in ring if n not in names)
+    ):
+        return -1.0
+    return _area(a, b, c) / max(_far(a, b), _far(b, c), _far(c, a)) ** 2
+
+
+def _area(a: Point, b: Point, c: Point) -> float:
+    """Twice that of a triangle, above 0 where it turns left."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
