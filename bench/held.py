@@ -30,7 +30,6 @@ COGS = {
     "narrowest": (0.0, 0.1, 0.2, 0.3, 0.4),
     "middle": (0.05, 0.15, 0.25, 0.35, 0.45),
     "widest": (0.1, 0.2, 0.3, 0.4, 0.5),
-    "narrowest, a foot 0.25 mm wide": (0.125, 0.1, 0.2, 0.3, 0.4),
 }
 LOWER = {"one": (0.3958,), "two": (0.375, 0.125)}  # of the film's own feet: those of 0.24 mm, or rounded to 0.2 mm
 
@@ -126,11 +125,9 @@ def print_staircases() -> None:
 
 def readings() -> Iterator[tuple[str, str, str, str, float]]:
     """Whether the cog touches, its widths, the film's feet, how the cell is held, and Poisson's ratio."""
-    *drawn, foot = COGS
-    nearest = [("0.2 mm short", "narrowest", "one"), ("touches", foot, "one")]
-    nearest += [("touches", "widest", low) for low in LOWER]
-    every = [("0.2 mm short", name, low) for name in drawn for low in LOWER]
-    every += [("touches", name, low) for name in ("middle", "widest", foot) for low in LOWER]
+    every = [("0.2 mm short", name, low) for name in COGS for low in LOWER]
+    every += [("touches", name, low) for name in ("middle", "widest") for low in LOWER]
+    nearest = [("0.2 mm short", "narrowest", "one"), ("touches", "widest", "one"), ("touches", "widest", "two")]
     yield from ((*reading, held, RATIO) for reading in every for held in ("bonded", "free"))
     yield from ((*reading, "bonded", ratio) for ratio in (0.49, 0.47, 0.45) for reading in nearest)
 

@@ -332,7 +332,7 @@ def test_cooks_membrane_converges():
         patch.setattr(membrane, "_CELLS", (4, 8, 16))
         found = [p.error for p in membrane.points("Cook's membrane", 1e9)]
     assert found[0] == pytest.approx(0.041, abs=1e-3)
-    assert all(a > 3 * b for a, b in pairwise(found))
+    assert all(3 * b < a < 5 * b for a, b in pairwise(found))  # its corners are singular
     assert len(membrane.points("Cook's membrane", 0.0)) == 1
 
 
