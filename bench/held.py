@@ -3,7 +3,7 @@
 Run with NGSolve installed: python bench/held.py
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from sensorgen.asprinted import compared, pressed
 from sensorgen.asprinted.rules import RULES
@@ -15,6 +15,7 @@ from sensorgen.scene import Body, Prism, Scene, rectangle
 from sensorgen.sensing import sensor_of
 
 STRESS_PA = [0.0, 1e5]
+RATIO = 0.4999  # of Poisson
 FREE = Held(base="sliding", period="free")
 OTHERWISE = {
     "faces that stick": Held(contact="stick"),
@@ -33,9 +34,9 @@ COGS = {
 LOWER = {"one": (0.3958,), "two": (0.375, 0.125)}  # of the film's own feet: those of 0.24 mm, or rounded to 0.2 mm
 
 
-def solids(etpu_ratio: float = 0.4999) -> dict[str, Elastic]:
+def solids(etpu_ratio: float = RATIO, x60_ratio: float = RATIO) -> dict[str, Elastic]:
     """X60 and PI-eTPU."""
-    return {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, etpu_ratio)}
+    return {"x60": Elastic(6e6, x60_ratio), "etpu": Elastic(22e6, etpu_ratio)}
 
 
 def tri(film_mm: float) -> Design:
@@ -44,9 +45,11 @@ def tri(film_mm: float) -> Design:
     return make({"shape": "tri", "parameters": {"dielectric_mm": film_mm} | size})
 
 
-def pressed_cell(scene: Scene, held: Held | None = None, etpu_ratio: float = 0.4999) -> press2d.Pressed:
+def pressed_cell(
+    scene: Scene, held: Held | None = None, etpu_ratio: float = RATIO, x60_ratio: float = RATIO
+) -> press2d.Pressed:
     """A cell at up to 100 kPa."""
-    return press2d.press(press2d.cell(scene, PERIOD_MM), solids(etpu_ratio), STRESS_PA, EPS, held)
+    return press2d.press(press2d.cell(scene, PERIOD_MM), solids(etpu_ratio, x60_ratio), STRESS_PA, EPS, held)
 
 
 def answer(found: press2d.Pressed) -> tuple[float, float, float]:
@@ -109,25 +112,24 @@ def staircase(cog: Sequence[float], lower: Sequence[float]) -> Scene:
 
 def print_staircases() -> None:
     """Readings of a staircase whose X60 feet all touch, the cog's with them or 0.2 mm short of the film."""
-    head = (
-        "cog",
-        "half widths",
-        "feet on the film",
-        "held",
-        "displacement [um]",
-        "C at 0 [pF/m]",
-        "C at 100 kPa [pF/m]",
-        "rise",
-    )
+    head = ("cog", "half widths", "feet on the film", "held", "nu", "displacement [um]", "C at 0 [pF/m]",
+            "C at 100 kPa [pF/m]", "rise")  # fmt: skip
     print(row(*head), row(*["---"] * len(head)), sep="\n")
-    readings = [("0.2 mm short", name, low) for name in COGS for low in LOWER]
-    readings += [("touches", name, low) for name in ("middle", "widest") for low in LOWER]
-    for touch, name, low in readings:
+    for touch, name, low, held, ratio in readings():
         cog = COGS[name] if touch == "touches" else (0.0, 0.0, *COGS[name][2:])
-        for held, choice in (("bonded", Held()), ("free", FREE)):
-            moved, before, after = answer(pressed_cell(staircase(cog, LOWER[low]), choice))
-            numbers = f"{moved:.1f}", f"{before:.1f}", f"{after:.1f}", f"{100 * (after / before - 1):.1f} %"
-            print(row(touch, name, low, held, *numbers), flush=True)
+        choice = FREE if held == "free" else Held()
+        moved, before, after = answer(pressed_cell(staircase(cog, LOWER[low]), choice, ratio, ratio))
+        numbers = f"{moved:.1f}", f"{before:.1f}", f"{after:.1f}", f"{100 * (after / before - 1):.1f} %"
+        print(row(touch, name, low, held, f"{ratio:g}", *numbers), flush=True)
+
+
+def readings() -> Iterator[tuple[str, str, str, str, float]]:
+    """Whether the cog touches, its widths, the film's feet, how the cell is held, and Poisson's ratio."""
+    every = [("0.2 mm short", name, low) for name in COGS for low in LOWER]
+    every += [("touches", name, low) for name in ("middle", "widest") for low in LOWER]
+    nearest = [("0.2 mm short", "narrowest", "one"), ("touches", "widest", "one"), ("touches", "widest", "two")]
+    yield from ((*reading, held, RATIO) for reading in every for held in ("bonded", "free"))
+    yield from ((*reading, "bonded", ratio) for ratio in (0.49, 0.47, 0.45) for reading in nearest)
 
 
 def print_tips() -> None:

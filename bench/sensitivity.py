@@ -7,6 +7,7 @@ what is solved is kept (SENSORGEN_CACHE), so that the next one takes seconds.
 """
 
 from itertools import product
+from math import floor, log10
 from pathlib import Path
 
 from sensorgen.celllaw import solved
@@ -68,14 +69,29 @@ def table(found: list[tuple[str, str, Compression, Sensitivity]]) -> str:
     for name, held, _, s in found:
         times = s.per_newton / plates[held]
         lines.append(
-            f"| {name} | {held} | {s.capacitance_f * 1e12:.1f} | {_percent(s.rise)} | {_percent(s.per_newton)} | "
-            f"{times:.3g} | {s.sigma_force_n:.3g} | {s.sigma_position_m * 1e3:.3g} |"
+            f"| {name} | {held} | {_three(s.capacitance_f * 1e12)} | {_percent(s.rise)} | {_percent(s.per_newton)} | "
+            f"{_three(times)} | {_three(s.sigma_force_n)} | {_three(s.sigma_position_m * 1e3)} |"
         )
     return "\n".join(lines)
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.3g} %"
+    return f"{_three(100 * share)} %"
+
+
+def _three(value: float) -> str:
+    """Three digits, thousands apart."""
+    digits = max(0, 2 - floor(log10(value)))
+    return f"{round(value, 2 - floor(log10(value))):,.{digits}f}".replace(",", " ")
+
+
+def stored() -> str:
+    """What the curve of tri with 0.1 mm gives that `predict` takes, beside the table's."""
+    design = make(DESIGNS["tri, 0.1 mm"])
+    known = compression.solved(design.shape, vars(design.params), {"x60": 6e6, "etpu": 22e6})
+    assert known
+    seen = sensitivity(design, known, TONES_HZ, FORCE_N, resistivity_ohm_m=RHO_OHM_M)
+    return f"stored curve of tri, 0.1 mm: {_three(seen.sigma_force_n)} N, {_three(seen.sigma_position_m * 1e3)} mm"
 
 
 def draw(found: list[tuple[str, str, Compression, Sensitivity]]) -> None:
@@ -112,5 +128,5 @@ def draw(found: list[tuple[str, str, Compression, Sensitivity]]) -> None:
 
 if __name__ == "__main__":
     everything = rows()
-    print(table(everything))
+    print(table(everything), stored(), sep="\n\n")
     draw(everything)

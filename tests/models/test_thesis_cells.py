@@ -172,7 +172,7 @@ def test_what_has_no_value_is_refused():
     with pytest.raises(OutOfRange, match="pressed"):
         thesis_cells.bulging_f_per_m2(rect.Params(), 4.68, 5.0)
     with pytest.raises(OutOfRange, match="film"):
-        thesis_cells.film_only_f_per_m2(p, 4.68)
+        thesis_cells.NAMED["thesis-film-only"].value_f_per_m2(p, 4.68)
     with pytest.raises(OutOfRange, match="air"):
         thesis_swept.turned(tri.Params(), 0.6)
     for cell, at in ((tri.Params(), "0.379"), (rect.Params(), "0.18")):

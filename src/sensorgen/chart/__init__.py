@@ -3,13 +3,15 @@
 Times are the processor's, imports left out, so that a busy machine shows nearly what an idle one does.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from types import ModuleType
 
-from sensorgen.chart import cells, lines, presses
-from sensorgen.chart.measured import Point, with_front
+from sensorgen import models, registry
+from sensorgen.chart import blocks, cells, lines, membrane, networks, presses, readback, rounds
+from sensorgen.chart.measured import Point, Silent, with_front
 
-_KINDS = (cells, presses, lines)
-SCENES = tuple(name for kind in _KINDS for name in kind.STANDARD)
+KINDS = (cells, presses, blocks, membrane, rounds, lines, readback, networks)
+SCENES = tuple(name for kind in KINDS for name in kind.STANDARD)
 
 
 def points(scenes: Sequence[str], budget_s: float, started: Callable[[str], None]) -> list[Point]:
@@ -27,6 +29,36 @@ def points(scenes: Sequence[str], budget_s: float, started: Callable[[str], None
     found = []
     for name in scenes:
         started(name)
-        kind = next(kind for kind in _KINDS if name in kind.STANDARD)
-        found += with_front(kind.points(name, budget_s))
+        found += with_front(kind_of(name).points(name, budget_s))
     return found
+
+
+def silent(scenes: Sequence[str], found: Sequence[Point]) -> list[Silent]:
+    """Models that gave nothing, scene by scene, and why.
+
+    Parameters
+    ----------
+    scenes : sequence of str
+        Of ``SCENES``.
+    found : sequence of Point
+        What the others gave there.
+    """
+    return [one for name in scenes for one in _silent(name, [p for p in found if p.scene == name])]
+
+
+def kind_of(scene: str) -> ModuleType:
+    """The module that measures a scene."""
+    return next(kind for kind in KINDS if scene in kind.STANDARD)
+
+
+def _silent(scene: str, found: Sequence[Point]) -> Iterator[Silent]:
+    spoke, kind = {p.model.partition(":")[0] for p in found}, kind_of(scene)
+    refused = kind.unfit(scene)
+    for name in registry.names(models):
+        if name not in spoke:
+            yield Silent(scene, name, refused.get(name) or f"{_about(name)} Not {kind.ASKED}.")
+
+
+def _about(name: str) -> str:
+    """What a model speaks of."""
+    return (registry.load(models, name).__doc__ or "").strip().partition("\n")[0]

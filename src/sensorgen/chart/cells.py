@@ -16,6 +16,7 @@ from sensorgen.models import thesis_cells
 from sensorgen.scene import Scene
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
+ASKED = "the capacitance of a cell at rest"
 _LEAST_WIDTH = 1e-9  # that is asked of a model
 _DEARER = 10.0  # by how much the next accuracy may cost more than the last
 
@@ -86,6 +87,14 @@ def points(name: str, budget_s: float) -> list[Point]:
     return [*_formulas(name, standard), *_bounds(name, standard, budget_s)]
 
 
+def unfit(name: str) -> dict[str, str]:
+    """Why models of capacitance cannot speak of a scene."""
+    scene = STANDARD[name]().scene
+    said = {model: module.unfit(scene) for model, module in planner.capacitance_models().items()}
+    only = "it has formulas of tri and rect alone"
+    return {model: why for model, why in said.items() if why} | {"thesis_cells": only}
+
+
 def _bounds(name: str, standard: Standard, budget_s: float) -> Iterator[Point]:
     """Every model with bounds, from coarse to fine."""
     area = standard.scene.size_mm[0] * standard.scene.size_mm[1] * M_PER_MM**2
@@ -129,7 +138,8 @@ def _formulas(name: str, standard: Standard) -> Iterator[Point]:
         if standard.shape in law.shapes:
             given = standard.params, standard.permittivity["x60"]
             value, seconds = timed(partial(law.value_f_per_m2, *given))
-            yield point(name, model, Interval(value, value), standard, seconds, bounded=False)
+            label = f"thesis_cells: {model.removeprefix('thesis-')}"
+            yield point(name, label, Interval(value, value), standard, seconds, bounded=False)
 
 
 def point(

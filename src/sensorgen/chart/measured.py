@@ -1,4 +1,4 @@
-"""What a model gave, and how long it took; and which of them nothing beats."""
+"""What a model gave, and how long it took; which of them nothing beats; and which had nothing to say."""
 
 import math
 import time
@@ -8,6 +8,9 @@ from typing import Any
 
 _QUICK_S = 0.3  # runs shorter than this are repeated, and the median counts
 _REPEATS = 5
+_AGAIN_S = 1.0  # a first run shorter than this is repeated, in case it had to import
+
+DIGITS = 2.0**-53  # no error is less than this
 
 
 @dataclass(frozen=True)
@@ -17,7 +20,7 @@ class Point:
     Attributes
     ----------
     scene, model : str
-        Names.
+        Names; a model's begins with its own, and goes on after a colon where it has several ways.
     error : float
         Relative distance from what is known, of the bound that is further off; no less than the reference's own [-].
     seconds : float
@@ -46,14 +49,23 @@ class Point:
     front: bool = False
 
 
+@dataclass(frozen=True)
+class Silent:
+    """A model that gave nothing on a scene, and why."""
+
+    scene: str
+    model: str
+    why: str
+
+
 def timed(work: Callable[[], Any]) -> tuple[Any, float]:
     """What some work gives, and the processor's time for it: the median of several runs of quick work [s]."""
     taken: list[float] = []
-    while len(taken) < _REPEATS and sum(taken) < _QUICK_S:
+    while len(taken) < _REPEATS and sum(taken) < (_AGAIN_S if len(taken) == 1 else _QUICK_S):
         start = time.process_time()
         found = work()
         taken.append(time.process_time() - start)
-    return found, sorted(taken)[len(taken) // 2]
+    return found, sorted(taken)[(len(taken) - 1) // 2]
 
 
 def with_front(found: Sequence[Point]) -> list[Point]:

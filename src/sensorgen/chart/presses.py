@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sensorgen import design as designs
 from sensorgen.chart.measured import Point, timed
 from sensorgen.errors import MissingValue
-from sensorgen.models import compression, fem2d, press2d, springs, thesis_cells, thesis_swept
+from sensorgen.models import compression, fem2d, press2d, press3d, springs, thesis_cells, thesis_swept
 from sensorgen.models._press.mesh import netgen
 from sensorgen.models.press2d import Elastic, Fineness
 from sensorgen.scene import Fill, Scene
@@ -24,7 +24,10 @@ Real = NDArray[np.float64]
 
 _EPS = {"x60": 4.68, "air": 1.00059}
 _SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
+ASKED = "how a cell gives way"
 _WIDTH_M = 10e-3  # of the sensor, for a film that is bonded
+
+_MISSING = "the mesher is not installed (extra fem), or the load was not reached"
 
 # Coarse to fine: sizes at the apex, at corners and far from both, and how they grow.
 _MESHES = (Fineness(2.8e-3, 0.2, 0.4, 1.0), Fineness(1.4e-3, 0.1, 0.3, 0.7), Fineness())
@@ -97,6 +100,15 @@ def points(name: str, budget_s: float) -> list[Point]:
     return [_point(name, model, said, value, expected, floor, seconds) for model, said, value, seconds in found]
 
 
+def unfit(name: str) -> dict[str, str]:
+    """Why models of compression cannot speak of a scene."""
+    film, what = STANDARD[name]
+    said = {"press3d": press3d.unfit(_scene(CELLS[film])) or "", "press2d": _MISSING}
+    if what == _DOWN:
+        return said | {"thesis_swept": "the displacement is what it is given"}
+    return said | {"springs": "it has a displacement and no capacitance"}
+
+
 Found = Iterator[tuple[str, str, Real, float]]
 
 
@@ -117,7 +129,7 @@ def _rise(known: Known, budget_s: float) -> Found:
     for name, law in _laws(known).items():
         value, seconds = timed(lambda law=law: 1 / (1 - law.thinning(known.stress_pa())[0]) - 1)  # type: ignore[misc]
         yield f"compression: {name}", "", known.rest_pf_per_m * value, seconds
-    by_hand = {"thesis-3.35-swept": _swept_formula, "thesis-3.1.2": _swept_field}
+    by_hand = {"thesis_swept: formula 3.35": _swept_formula, "thesis_swept: field": _swept_field}
     for name, work in by_hand.items():
         value, seconds = timed(partial(work, known))
         yield name, "displacement given, ", 1e12 * (value[1:] - value[0]), seconds
@@ -140,7 +152,7 @@ def _scene(known: Known) -> Scene:
     return designs.make({"shape": "tri", "parameters": {"dielectric_mm": known.film_mm}}).in_use
 
 
-def _has_mesher() -> bool:
+def has_mesher() -> bool:
     """Whether the mesher of cells that are pressed is installed; it is loaded then."""
     try:
         netgen()
@@ -155,7 +167,7 @@ def _pressed(
     """Finite elements from coarse to fine, where the whole load was reached."""
     cell = press2d.cell(_scene(known), known.params().period_mm)
     stress = [0.0, *known.stress_pa()]
-    for mesh in _MESHES if _has_mesher() else ():
+    for mesh in _MESHES if has_mesher() else ():
         found, seconds = timed(lambda mesh=mesh: press2d.press(cell, _SOLIDS, stress, permittivity, fineness=mesh))  # type: ignore[misc]
         if found.converged_pa == stress[-1]:
             yield f"triangles of {1e3 * mesh.apex_mm:g} µm at the apex, ", found, seconds

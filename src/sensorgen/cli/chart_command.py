@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -24,11 +24,11 @@ FILES = ("chart.csv", "chart.png", "chart.html")
 @click.option("--output", "-o", default="out/chart", show_default=True, metavar="DIR", help="Folder of the files.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was measured as JSON, too.")
 def command(scene: tuple[str, ...], budget: float, output: str, as_json: bool) -> None:
-    """Measure every model of capacitance, and of the line, on every standard scene.
+    """Measure every model on every standard scene.
 
     Writes processor time against error, with the Pareto front marked: chart.png, chart.html to ask with the mouse,
-    and chart.csv. The scenes are cells and lines whose capacitance or impedance is known
-    from elsewhere.
+    and chart.csv, which also says why a model is silent on a scene. The scenes are cells at rest and pressed, blocks,
+    lines, sheets, stacks and printed tracks of which the answer is known from elsewhere.
     """
     from sensorgen import chart
     from sensorgen.plots.libraries import needed
@@ -40,19 +40,20 @@ def command(scene: tuple[str, ...], budget: float, output: str, as_json: bool) -
     names = scene or chart.SCENES
     with show.progress(names) as step:
         points = chart.points(names, budget, step)
-    _write(Path(output), points)
+    rows = [vars(one) for one in (*points, *chart.silent(names, points))]
+    _write(Path(output), points, rows)
     if as_json:
-        show.as_json([vars(p) for p in points])
+        show.as_json(rows)
     else:
         for name in FILES:
             click.echo(str(Path(output) / name))
 
 
-def _write(folder: Path, points: Sequence["Point"]) -> None:
+def _write(folder: Path, points: Sequence["Point"], rows: Sequence[dict[str, Any]]) -> None:
     from sensorgen import store
     from sensorgen.plots import chart
 
-    files = dict(zip(FILES, (_csv(points).encode(), chart.png(points), chart.html(points).encode()), strict=True))
+    files = dict(zip(FILES, (_csv(rows).encode(), chart.png(points), chart.html(points).encode()), strict=True))
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -61,12 +62,12 @@ def _write(folder: Path, points: Sequence["Point"]) -> None:
         store.replace(folder / name, content)
 
 
-def _csv(points: Sequence["Point"]) -> str:
+def _csv(rows: Sequence[dict[str, Any]]) -> str:
     import csv
     import io
 
     text = io.StringIO()
-    table = csv.DictWriter(text, list(vars(points[0])), lineterminator="\n")
+    table = csv.DictWriter(text, list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n")
     table.writeheader()
-    table.writerows(vars(p) for p in points)
+    table.writerows(rows)
     return text.getvalue()

@@ -172,38 +172,13 @@ def bulging_f_per_m2(p: rect.Params, eps_r: float, press_mm: float = 0.0, printe
     return strips_f_per_m2(p, eps_r) + 8 / 16 * (term(press_mm) - (0.0 if printed else term(0.0)))
 
 
-def film_only_f_per_m2(p: tri.Params | rect.Params, eps_r: float) -> float:
-    """Capacitance per area if the film alone counted, as though a plate lay on it [F/m2].
-
-    Parameters
-    ----------
-    p : tri.Params or rect.Params
-        Sizes.
-    eps_r : float
-        Relative permittivity of the film [-].
-
-    Raises
-    ------
-    OutOfRange
-        The film has no thickness.
-    """
+def _film_only_f_per_m2(p: tri.Params | rect.Params, eps_r: float) -> float:
+    """Capacitance per area if the film alone counted, as though a plate lay on it [F/m2]."""
     return EPS0_F_PER_M * eps_r / _film_m(p)
 
 
-def swept_f_per_m2(p: Any, eps_r: float, press_mm: float, formula: Callable[..., float]) -> float:
-    """What a formula gives for the sizes that 3.1.2 makes of a pressed cell, per area of the sensor at rest [F/m2].
-
-    Parameters
-    ----------
-    p : tri.Params or rect.Params
-        Sizes at rest.
-    eps_r : float
-        Relative permittivity of film and solids [-].
-    press_mm : float
-        By how much the top has come down [mm].
-    formula : callable
-        Of sizes and permittivity, per area of its own period [F/m2].
-    """
+def _swept(p: Any, eps_r: float, press_mm: float, formula: Callable[..., float]) -> float:
+    """What a formula gives for the sizes that 3.1.2 makes of a pressed cell, per area of the sensor at rest [F/m2]."""
     q = thesis_swept.swept(p, press_mm)
     return formula(q, eps_r) * thesis_swept.stretch(p, q)
 
@@ -234,13 +209,13 @@ class Named:
 _OWN_WIDTHS = partial(strips_f_per_m2, even=False)
 
 NAMED = {
-    "thesis-film-only": Named(("tri", "rect"), film_only_f_per_m2),
+    "thesis-film-only": Named(("tri", "rect"), _film_only_f_per_m2),
     "thesis-3.35": Named(("tri",), triangles_f_per_m2),
     "thesis-3.34-printed": Named(("tri",), partial(triangles_f_per_m2, printed=True)),
-    "thesis-3.35-swept": Named(("tri",), partial(swept_f_per_m2, formula=triangles_f_per_m2), pressed=True),
+    "thesis-3.35-swept": Named(("tri",), partial(_swept, formula=triangles_f_per_m2), pressed=True),
     "thesis-3.49": Named(("rect",), strips_f_per_m2),
     "thesis-3.49-own-widths": Named(("rect",), _OWN_WIDTHS),
-    "thesis-3.49-swept": Named(("rect",), partial(swept_f_per_m2, formula=_OWN_WIDTHS), pressed=True),
+    "thesis-3.49-swept": Named(("rect",), partial(_swept, formula=_OWN_WIDTHS), pressed=True),
     "thesis-3.55": Named(("rect",), bulging_f_per_m2, pressed=True),
     "thesis-3.55-corrected": Named(("rect",), partial(bulging_f_per_m2, printed=False), pressed=True),
 }
