@@ -5,8 +5,10 @@ import pytest
 
 from sensorgen.asprinted.rectilinear import plate
 from sensorgen.errors import OutOfRange
+from sensorgen.models import _traxel_links as links
 from sensorgen.models import traxels
 from sensorgen.models._traxel_lines import Lines
+from sensorgen.models._traxel_nodes import Nodes
 
 RHO, W, H = 0.2, 0.42e-3, 0.1e-3
 ENDS = (-9e-3, 9e-3)
@@ -97,6 +99,31 @@ def test_contacts_can_only_add():
 def test_a_mirrored_plate_is_the_same_plate():
     one, other = (plate(20.0, 9.24, W * 1e3, H * 1e3, [a, a + 90]) for a in (30, 150))
     assert ratio(one, 1e-5) == pytest.approx(ratio(other, 1e-5), rel=0.01)
+
+
+def test_a_piece_counts_the_same_wherever_it_stands_in_the_file():
+    """After very many others that touch nothing: what is left of a number's digits still tells its nodes apart."""
+    plated, n = plate(20.0, 5.0, W * 1e3, H * 1e3, [0, 90]), 100_000
+    aside = np.stack([np.zeros(n), 1.0 + 1e-3 * np.arange(n)], axis=1)
+    both = Lines(
+        np.concatenate([aside, plated.start_m]), np.concatenate([aside + [1e-3, 0.0], plated.end_m]),
+        np.append(np.full(n, W), plated.width_m), np.append(np.full(n, H), plated.height_m),
+        np.append(np.zeros(n, np.int64), plated.layer), np.append(np.zeros(n, bool), plated.joined),
+    )  # fmt: skip
+    assert ratio(both, 1e-5, area=1e-6) == pytest.approx(ratio(plated, 1e-5, area=1e-6), rel=1e-8)
+
+
+@pytest.mark.parametrize("degrees", [0, 30, 90])
+def test_contacts_join_places_near_their_own_nodes(degrees):
+    """A turn of the infill beside a long wall touches it along a few widths, not along half of the wall."""
+    lines = plate(200.0, 5.0, W * 1e3, H * 1e3, [degrees, degrees + 90])
+    pairs = links.near(lines)
+    crossed = links.crossings(lines, pairs)
+    nodes = Nodes.of(lines, crossed.places())
+    found = links.gathered(lines, nodes, pairs, crossed)
+    ends = nodes.place_m[found.node[:, :2]]
+    beyond = -found.weight[:, :2].min(axis=1) * np.hypot(*(ends[:, 1] - ends[:, 0]).T)  # of the nearer node
+    assert beyond[found.contacts > 0].max() < 4 * W
 
 
 @pytest.mark.parametrize(

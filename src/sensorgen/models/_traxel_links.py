@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 _PARALLEL = np.cos(np.radians(20.0))
 _REACH = 1.3  # lines whose middles are further apart than this many mean widths do not touch
+_BEVEL = _REACH * _PARALLEL / np.sqrt(1 - _PARALLEL**2)  # neighbours end no further apart, in widths, on one wall
 _LONG = 5.0  # widths; shorter stretches are turns of infill
 _STACKED = 0.25  # parallel lines lie on each other when their middles differ by less, in mean widths
 
@@ -264,8 +265,9 @@ class _Ends:
         start = ((lines.start_m[j] - lines.start_m[i]) * way[i]).sum(1)
         back = (way[i] * way[j]).sum(1) < 0
         end = start + np.where(back, -length[j], length[j])
-        low = _reach((0.0, self.room[0, i]), (-np.minimum(start, end), self.room[np.where(back, 1, 0), j]))
-        high = _reach((length[i], self.room[1, i]), (np.maximum(start, end), self.room[np.where(back, 0, 1), j]))
+        apart = _BEVEL * (lines.width_m[i] + lines.width_m[j]) / 2
+        low = _reach((0.0, self.room[0, i]), (-np.minimum(start, end), self.room[np.where(back, 1, 0), j]), apart)
+        high = _reach((length[i], self.room[1, i]), (np.maximum(start, end), self.room[np.where(back, 0, 1), j]), apart)
         bridge = lines.width_m[np.minimum(i + 1, len(lines) - 1)] / self.sines[1, i]
         return -low, high - np.where(self._bridged(i, j), bridge, 0.0)
 
@@ -276,14 +278,16 @@ class _Ends:
         return np.asarray((j == i + 2) & joined[np.minimum(i + 1, last)] & joined[np.minimum(i + 2, last)])
 
 
-def _reach(one: tuple[float | Floats, Floats], other: tuple[float | Floats, Floats]) -> Floats:
+def _reach(one: tuple[float | Floats, Floats], other: tuple[float | Floats, Floats], apart: Floats) -> Floats:
     """How far two neighbours touch, of where each ends and what room it has there.
 
-    Where both end on a wall, to where the line between them meets it; else to the end of the shorter one.
+    Where both end on one wall, thus not far apart, to where the line between them meets it; else to the end of the
+    shorter one.
     """
     (a, room_a), (b, room_b) = one, other
     shorter = np.where(np.less(a, b), a + room_a, b + room_b)
-    return np.where((room_a > 0) & (room_b > 0), (a + room_a + b + room_b) / 2, shorter)
+    one_wall = (room_a > 0) & (room_b > 0) & (np.abs(a - b) < apart)
+    return np.where(one_wall, (a + room_a + b + room_b) / 2, shorter)
 
 
 def _walls(lines: Lines, pairs: tuple[Ints, Ints]) -> tuple[Ints, Ints, Ints, Floats, Floats, Floats]:

@@ -47,7 +47,7 @@ class Nodes:
 
     def weights(self, piece: Ints, share: Floats) -> tuple[Ints, Floats]:
         """The two nodes that a place lies between, (m, 2), and its weight on each; beyond a piece's ends too."""
-        inside = 2.0 * piece + np.clip(share, 1e-12, 1.0 - 1e-12)
+        inside = 2.0 * piece + np.clip(share, _SAME / 2, 1.0 - _SAME / 2)
         after = np.searchsorted(self.key, inside)
         low, high = self.key[after - 1], self.key[after]
         t = (2.0 * piece + share - low) / (high - low)
