@@ -106,7 +106,7 @@ def test_a_piece_counts_the_same_wherever_it_stands_in_the_file():
     plated, n = plate(20.0, 5.0, W * 1e3, H * 1e3, [0, 90]), 100_000
     aside = np.stack([np.zeros(n), 1.0 + 1e-3 * np.arange(n)], axis=1)
     both = Lines(
-        np.concatenate([aside, plated.start_m]), np.concatenate([aside + [1e-3, 0.0], plated.end_m]),
+        np.concatenate([aside, plated.start_m]), np.concatenate([aside + np.array([1e-3, 0.0]), plated.end_m]),
         np.append(np.full(n, W), plated.width_m), np.append(np.full(n, H), plated.height_m),
         np.append(np.zeros(n, np.int64), plated.layer), np.append(np.zeros(n, bool), plated.joined),
     )  # fmt: skip
@@ -121,9 +121,10 @@ def test_contacts_join_places_near_their_own_nodes(degrees):
     crossed = links.crossings(lines, pairs)
     nodes = Nodes.of(lines, crossed.places())
     found = links.gathered(lines, nodes, pairs, crossed)
-    ends = nodes.place_m[found.node[:, :2]]
-    beyond = -found.weight[:, :2].min(axis=1) * np.hypot(*(ends[:, 1] - ends[:, 0]).T)  # of the nearer node
-    assert beyond[found.contacts > 0].max() < 4 * W
+    for side, sign in ((slice(0, 2), 1), (slice(2, 4), -1)):
+        ends = nodes.place_m[found.node[:, side]]
+        beyond = -(sign * found.weight[:, side]).min(axis=1) * np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+        assert beyond[found.contacts > 0].max() < 4 * W
 
 
 @pytest.mark.parametrize(
