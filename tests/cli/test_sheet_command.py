@@ -1,12 +1,14 @@
 """``sensorgen sheet``: words in, bounds out."""
 
 import json
+import re
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from sensorgen.cli import show
+from sensorgen.cli import sheet_text, show
 
 WORDS = ("sheet", "reference", "--size", "60x60", "--frequencies", "100kHz,1MHz")
 
@@ -129,3 +131,19 @@ def test_wrong_words_are_one_line(run, words, say):
     said = run(*WORDS, *words)
     assert said.code == 2
     assert say in said.line
+
+
+@pytest.mark.parametrize(
+    ("length_m", "words"),
+    [
+        (0.0123456, "12.3 mm"), (0.99949, "999 mm"), (0.99951, "1 m"), (6.96, "6.96 m"), (8949.0, "8.95 km"),
+        (999_999.0, "1 Mm"), (3e9, "> 1 Mm"), (float("inf"), "none"),
+    ],
+)  # fmt: skip
+def test_columns_stay_apart_whatever_the_errors(length_m, words):
+    found = SimpleNamespace(
+        sigma=lambda: np.array([[[2e12, length_m, length_m]]]), frequency_hz=np.array([1e5]),
+        best_tones=lambda: np.array([0]), located=lambda: 1.0,
+    )  # fmt: skip
+    row = re.split("  +", sheet_text._row("two-edges", found))
+    assert row == ["two-edges", "> 1 MN", words, words, "100%", "100 kHz"]

@@ -5,8 +5,10 @@ import pytest
 
 from sensorgen.asprinted.rectilinear import plate
 from sensorgen.errors import OutOfRange
+from sensorgen.models import _traxel_links as links
 from sensorgen.models import traxels
 from sensorgen.models._traxel_lines import Lines
+from sensorgen.models._traxel_nodes import Nodes
 
 RHO, W, H = 0.2, 0.42e-3, 0.1e-3
 ENDS = (-9e-3, 9e-3)
@@ -99,6 +101,32 @@ def test_a_mirrored_plate_is_the_same_plate():
     assert ratio(one, 1e-5) == pytest.approx(ratio(other, 1e-5), rel=0.01)
 
 
+def test_a_piece_counts_the_same_wherever_it_stands_in_the_file():
+    """After very many others that touch nothing: what is left of a number's digits still tells its nodes apart."""
+    plated, n = plate(20.0, 5.0, W * 1e3, H * 1e3, [0, 90]), 100_000
+    aside = np.stack([np.zeros(n), 1.0 + 1e-3 * np.arange(n)], axis=1)
+    both = Lines(
+        np.concatenate([aside, plated.start_m]), np.concatenate([aside + np.array([1e-3, 0.0]), plated.end_m]),
+        np.append(np.full(n, W), plated.width_m), np.append(np.full(n, H), plated.height_m),
+        np.append(np.zeros(n, np.int64), plated.layer), np.append(np.zeros(n, bool), plated.joined),
+    )  # fmt: skip
+    assert ratio(both, 1e-5, area=1e-6) == pytest.approx(ratio(plated, 1e-5, area=1e-6), rel=1e-8)
+
+
+@pytest.mark.parametrize("degrees", [0, 30, 90])
+def test_contacts_join_places_near_their_own_nodes(degrees):
+    """A turn of the infill beside a long wall touches it along a few widths, not along half of the wall."""
+    lines = plate(200.0, 5.0, W * 1e3, H * 1e3, [degrees, degrees + 90])
+    pairs = links.near(lines)
+    crossed = links.crossings(lines, pairs)
+    nodes = Nodes.of(lines, crossed.places())
+    found = links.gathered(lines, nodes, pairs, crossed)
+    for side, sign in ((slice(0, 2), 1), (slice(2, 4), -1)):
+        ends = nodes.place_m[found.node[:, side]]
+        beyond = -(sign * found.weight[:, side]).min(axis=1) * np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+        assert beyond[found.contacts > 0].max() < 4 * W
+
+
 @pytest.mark.parametrize(
     ("rho", "contact", "ends", "area", "word"),
     [
@@ -119,3 +147,17 @@ def test_nonsense_is_refused(rho, contact, ends, area, word):
 def test_lines_that_do_not_meet_conduct_nothing():
     with pytest.raises(OutOfRange, match="no line conducts"):
         ratio(strips(12, "y"), np.inf, (-2e-3, 2e-3))
+
+
+@pytest.mark.parametrize("angles", [(90, 0), (30, 120, 75)])
+def test_no_pieces_that_touch_are_overlooked(angles):
+    """Every pair of pieces, of one layer or of neighbouring ones, whose middles come within a width and a third."""
+    lines = plate(5.0, 4.0, W * 1e3, H * 1e3, angles)
+    share = np.linspace(0, 1, 60)[:, None]
+    points = lines.start_m[:, None] + share * (lines.end_m - lines.start_m)[:, None]
+    found = set(zip(*(side.tolist() for side in links.near(lines)), strict=True))
+    for a in range(len(lines)):
+        for b in range(a + 1, len(lines)):
+            if abs(lines.layer[a] - lines.layer[b]) <= 1 and (a, b) not in found:
+                gap = points[a][:, None] - points[b][None]
+                assert np.hypot(*gap.T).min() > 1.3 * W, (a, b)

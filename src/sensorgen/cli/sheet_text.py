@@ -11,13 +11,14 @@ if TYPE_CHECKING:
 
 WIDTH = 80
 MM_PER_M = 1e3
+BOUNDLESS = 1e6  # N or m: a larger error tells nothing more
 
 
 def lines(film: "Sheet", press: "Patch", bounds: Mapping[str, "Bounds"], given: Mapping[str, Any]) -> Iterator[str]:
     """Sheet, press and a table of bounds, in lines of at most ``WIDTH`` columns."""
     yield from _about(film, press, bounds, given)
     yield ""
-    yield f"{'contacts':10}{'sigma F':>11}{'sigma x':>10}{'sigma y':>10}{'located':>9}  tones that tell most"
+    yield f"{'contacts':10} {'sigma F':>10} {'sigma x':>9} {'sigma y':>9} {'located':>8}  tones that tell most"
     for name, found in bounds.items():
         yield _row(name, found)
     yield ""
@@ -55,8 +56,7 @@ def _row(name: str, found: "Bounds") -> str:
 
     force, x, y = (float(np.median(found.sigma()[..., k])) for k in range(3))
     best = ", ".join(si(float(found.frequency_hz[k]), "Hz") for k in found.best_tones()[:2])
-    newton = f"{force:.3g} N" if np.isfinite(force) else "none"
-    return f"{name:10}{newton:>11}{_mm(x):>10}{_mm(y):>10}{found.located():9.0%}  {best}"
+    return f"{name:10} {_short(force, 'N'):>10} {_mm(x):>9} {_mm(y):>9} {found.located():8.0%}  {best}"
 
 
 def _paragraph(head: str, text: str, indent: int = 17) -> list[str]:
@@ -64,9 +64,14 @@ def _paragraph(head: str, text: str, indent: int = 17) -> list[str]:
 
 
 def _mm(value_m: float) -> str:
-    if not value_m < float("inf"):
+    return f"{value_m * MM_PER_M:.3g} mm" if value_m * MM_PER_M < MM_PER_M - 0.5 else _short(value_m, "m")
+
+
+def _short(value: float, unit: str) -> str:
+    """A value in at most nine characters."""
+    if not value < float("inf"):
         return "none"
-    return f"{value_m * MM_PER_M:.3g} mm" if value_m < 1 else f"{value_m:.3g} m"
+    return si(float(f"{value:.3g}"), unit) if value < BOUNDLESS else f"> {si(BOUNDLESS, unit)}"
 
 
 def plain(film: "Sheet", press: "Patch", contacts: Mapping[str, Any]) -> dict[str, Any]:

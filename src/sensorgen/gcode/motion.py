@@ -1,6 +1,6 @@
 """Where the nozzle goes and what it extrudes: a file read once, and all its moves followed at once, in columns."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -53,13 +53,10 @@ class _Steps:
     def motion(self) -> Motion:
         """The file as moves in columns."""
         said = self.said
-        absolute = self._held(said.relative, 0.0) == 0
-        end = np.column_stack([_state(self.words[axis], absolute | ~self.moves) for axis in "XYZ"])
-        filament = self._filament()
-        extruded = _extruded(filament, self._held(said.tools, NO_TOOL))
-        rows = np.column_stack([_before(end), end, extruded, filament, self._feed(), self.place >> SHIFT])
-        rows = rows if self.moves.all() else rows[self.moves]
-        far = ~(np.abs(rows[:, :9]) < MOST_MM).all(axis=1)
+        rows = np.empty((np.count_nonzero(self.moves), 10))
+        for k, column in enumerate(self._columns()):
+            rows[:, k] = column if len(column) == len(rows) else column[self.moves]
+        far = ~np.all([np.abs(rows[:, k]) < MOST_MM for k in range(9)], axis=0)
         rows[far, :9] = np.clip(rows[far, :9], -MOST_MM, MOST_MM)
         faults = [Fault(int(number), "a number beyond all measure") for number in rows[far, 9][:1]]
         back = self.moves & (self.code < 2) & ~np.isnan(self.words["R"])
@@ -71,6 +68,19 @@ class _Steps:
             self._track(said.absolute_e), sorted([*said.faults, *faults, *wrong], key=lambda fault: fault.number),
             said.lines, said.maker,
         )  # fmt: skip
+
+    def _columns(self) -> Iterator[Floats]:
+        """Columns of ``Motion.rows``, for each step; one by one, since a million moves take room."""
+        sets = (self._held(self.said.relative, 0.0) == 0) | ~self.moves
+        for axis in "XYZ":
+            yield _before(_state(self.words[axis], sets))
+        for axis in "XYZ":
+            yield _state(self.words[axis], sets)
+        filament = self._filament()
+        yield _extruded(filament, self._held(self.said.tools, NO_TOOL))
+        yield filament
+        yield self._feed()
+        yield (self.place >> SHIFT).astype(np.float64)
 
     def _held(self, holding: Holding, before: float) -> Floats:
         """What holds for each step."""
@@ -92,14 +102,15 @@ class _Steps:
         code = self.code[self.moves]
         row = np.flatnonzero((code == 2) | (code == 3))
         start, end, clockwise = rows[row, 0:3], rows[row, 3:6], code[row] == 2
-        i, j, radius = (self.words[letter][self.moves][row] for letter in "IJR")
+        step = np.flatnonzero(self.moves)[row]
+        i, j, radius = (self.words[letter][step] for letter in "IJR")
         offset = np.where(np.isnan(i) & np.isnan(j), np.nan, np.nan_to_num([i, j])).T
         centre = np.where(
             np.isnan(radius)[:, None],
             _fitting(start[:, :2] + offset, start, end),
             centres_of_radius(start[:, :2], end[:, :2], radius, clockwise),
         )
-        centre[self._held(self.said.level, 1.0)[self.moves][row] == 0] = np.nan
+        centre[self._held(self.said.level, 1.0)[step] == 0] = np.nan
         fits = ~np.isnan(centre).any(axis=1)
         faults = [
             Fault(int(rows[k, 9]), f"G{int(code[k])} without a centre that fits; taken as a straight line")

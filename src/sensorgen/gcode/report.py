@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sensorgen import materials
 from sensorgen.errors import MissingValue, UnknownName
@@ -72,9 +73,7 @@ def report(motion: Motion, machine: Printer, loaded: dict[int, str] | None = Non
     """
     printed = motion.extruded_mm > 0
     across = printed & (motion.length_mm > 0)
-    low, high = (side[across] for side in motion.box_mm())
     taken = [change.tool for change in motion.changes if change.tool != NO_TOOL]
-    box = (tuple(low.min(axis=0).tolist()), tuple(high.max(axis=0).tolist())) if len(low) else None
     return Report(
         lines=motion.lines,
         moves=len(motion.rows),
@@ -82,7 +81,7 @@ def report(motion: Motion, machine: Printer, loaded: dict[int, str] | None = Non
         time_s=float(seconds(motion, machine.max_speed_mm_s).sum()) + _dwells(motion),
         tools=_tools(motion, machine, usual(machine) | (loaded or {})),
         tool_changes=sum(a != b for a, b in pairwise(taken)),
-        box_mm=box,
+        box_mm=_box_mm(motion, across) if across.any() else None,
     )
 
 
@@ -91,6 +90,12 @@ def usual(machine: Printer) -> dict[int, str]:
     named = list(machine.default_tools.items())
     tools = [tool for _, tool in named]
     return {tool: material for material, tool in named if tools.count(tool) == 1}
+
+
+def _box_mm(motion: Motion, printed: NDArray[np.bool_]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Lowest and highest place of some moves, axis by axis: a copy of all places would take much room [mm]."""
+    low, high = motion.box_mm()
+    return tuple(float(low[printed, k].min()) for k in range(3)), tuple(float(high[printed, k].max()) for k in range(3))
 
 
 def _dwells(motion: Motion) -> float:

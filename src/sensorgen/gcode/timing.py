@@ -26,7 +26,7 @@ def seconds(motion: Motion, fastest: MaxSpeed) -> Floats:
     filament = np.abs(motion.filament_mm)
     across, up = motion.across_mm, np.abs(motion.rows[:, 5] - motion.rows[:, 2])
     way = np.hypot(across, up)
-    asked = np.where(way > 0, way, filament) / np.maximum(motion.feed_mm_min / 60, 1e-3)
-    limits = (across / fastest.xy, up / fastest.z, filament / fastest.extruder)
-    longest: Floats = np.maximum.reduce([asked, *limits])
+    longest: Floats = np.where(way > 0, way, filament) / np.maximum(motion.feed_mm_min / 60, 1e-3)
+    for length, limit in ((across, fastest.xy), (up, fastest.z), (filament, fastest.extruder)):
+        np.maximum(longest, length / limit, out=longest)
     return longest

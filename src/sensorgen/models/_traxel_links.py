@@ -1,7 +1,7 @@
 """The resistors of a network of lines: along each line, and across every contact."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 _PARALLEL = np.cos(np.radians(20.0))
 _REACH = 1.3  # lines whose middles are further apart than this many mean widths do not touch
+_BEVEL = _REACH * _PARALLEL / np.sqrt(1 - _PARALLEL**2)  # neighbours end no further apart, in widths, on one wall
 _LONG = 5.0  # widths; shorter stretches are turns of infill
 _STACKED = 0.25  # parallel lines lie on each other when their middles differ by less, in mean widths
 
@@ -55,12 +56,14 @@ class Links:
         nodes : int
             How many there are [-].
         """
-        from scipy.sparse import csr_array, diags_array
+        from scipy.sparse import csr_array
 
         used = self.weight != 0
         ends = np.append(0, np.cumsum(used.sum(axis=1)))
         voltages = csr_array((self.weight[used], self.node[used], ends), shape=(len(self.node), nodes))
-        matrix = csr_array(voltages.T @ diags_array(conductance_s) @ voltages)
+        currents = voltages.copy()
+        currents.data *= np.repeat(conductance_s, np.diff(ends))
+        matrix = csr_array(voltages.T.tocsr() @ currents)
         matrix.eliminate_zeros()
         return matrix
 
@@ -103,16 +106,18 @@ def near(lines: Lines) -> tuple[Ints, Ints]:
     layer = lines.layer[piece] - lines.layer.min()
     key = (layer * wide + cell[:, 0]) * high + cell[:, 1]
     held = _distinct(key * len(lines) + piece)  # sorted by square
-    square, inside = held // len(lines), held % len(lines)
+    within, inside = held // len(lines), held % len(lines)
+    begin = np.flatnonzero(np.append(True, np.diff(within) != 0))
+    square, begin, fill = within[begin], np.append(begin, len(held)), np.diff(begin, append=len(held))
     found = []
-    shifts = [(dx * high + dy, 0) for dx in (-1, 0, 1) for dy in (-1, 0, 1)]
-    for shift, up in [*shifts, *((s, wide * high) for s, _ in shifts)]:
-        low, top = (np.searchsorted(square, square + shift + up, side) for side in ("left", "right"))
-        n = top - low
+    # Squares in a column follow each other: of one layer the next half of those around, of the layer above all of them.
+    for first, last in [(0, 1), *((n * high - 1, n * high + 1) for n in (1, wide - 1, wide, wide + 1))]:
+        low, top = np.searchsorted(square, square + first), np.searchsorted(square, square + last, "right")
+        low, n = np.repeat(begin[low], fill), np.repeat(begin[top] - begin[low], fill)
         a = np.repeat(inside, n)
-        b = inside[np.arange(n.sum()) - np.repeat(np.cumsum(n) - n, n) + np.repeat(low, n)]
-        rising = a < b if not up else a != b
-        found.append(_distinct(np.minimum(a, b)[rising] * len(lines) + np.maximum(a, b)[rising]))
+        b = inside[np.arange(n.sum()) - np.repeat(np.cumsum(n) - n - low, n)]
+        apart = a != b
+        found.append(_distinct(np.minimum(a, b)[apart] * len(lines) + np.maximum(a, b)[apart]))
     pairs = _distinct(np.concatenate(found))
     return pairs // len(lines), pairs % len(lines)
 
@@ -141,25 +146,36 @@ def crossings(lines: Lines, pairs: tuple[Ints, Ints]) -> Crossings:
 def gathered(lines: Lines, nodes: Nodes, pairs: tuple[Ints, Ints], crossed: Crossings) -> Links:
     """All resistors."""
     ends = _Ends(lines, pairs)
+    neighbours = _alongside(lines, pairs, same_layer=True)
     kinds = [
-        _along(lines, nodes, pairs), _over(lines, nodes, crossed), _beside(lines, nodes, pairs, ends),
-        _stacked(lines, nodes, pairs), ends.links(nodes),
+        _along(lines, nodes, neighbours), _over(lines, nodes, crossed), _beside(lines, nodes, neighbours, ends),
+        _stacked(lines, nodes, _alongside(lines, pairs, same_layer=False)), ends.links(nodes),
     ]  # fmt: skip
     return Links(*(np.concatenate([getattr(k, name) for k in kinds]) for name in Links.__dataclass_fields__))
 
 
-def _along(lines: Lines, nodes: Nodes, pairs: tuple[Ints, Ints]) -> Links:
+class _Alongside(NamedTuple):
+    """Parallel pairs with a common stretch: both pieces, their distance, and the stretch along the first [m]."""
+
+    one: Ints
+    other: Ints
+    away_m: Floats
+    low_m: Floats
+    high_m: Floats
+
+
+def _along(lines: Lines, nodes: Nodes, neighbours: _Alongside) -> Links:
     piece, a, b = nodes.steps()
     length = (nodes.key[b] - nodes.key[a]) * lines.length_m()[piece]
     node = np.stack([nodes.number[a], nodes.number[b]] * 2, axis=1)
     weight = np.tile([1.0, -1.0, 0.0, 0.0], (len(piece), 1))
-    area = (_own_width_m(lines, pairs) * lines.height_m)[piece]
+    area = (_own_width_m(lines, neighbours) * lines.height_m)[piece]
     return Links(node, weight, area, length, np.zeros(len(piece)))
 
 
-def _own_width_m(lines: Lines, pairs: tuple[Ints, Ints]) -> Floats:
+def _own_width_m(lines: Lines, neighbours: _Alongside) -> Floats:
     """Width of each piece without half of what long neighbours overlap: one place conducts once [m]."""
-    i, j, away, low, high = _alongside(lines, pairs, same_layer=True)
+    i, j, away, low, high = neighbours
     mean, stretch = (lines.width_m[i] + lines.width_m[j]) / 2, high - low
     over = np.where((stretch > _LONG * mean) & (away > _STACKED * mean), np.maximum(mean - away, 0.0), 0.0)
     lost = np.zeros(len(lines))
@@ -174,12 +190,12 @@ def _over(lines: Lines, nodes: Nodes, c: Crossings) -> Links:
     return Links.between(nodes, (c.one, c.share_one), (c.other, c.share_other), area, path)
 
 
-def _beside(lines: Lines, nodes: Nodes, pairs: tuple[Ints, Ints], ends: "_Ends") -> Links:
+def _beside(lines: Lines, nodes: Nodes, neighbours: _Alongside, ends: "_Ends") -> Links:
     """Lines of one layer that run side by side."""
-    i, j, away, low, high = _alongside(lines, pairs, same_layer=True)
+    i, j, away, _, _ = neighbours
     mean = (lines.width_m[i] + lines.width_m[j]) / 2
     fits = (away > _STACKED * mean) & (away < _REACH * mean)
-    i, j, away, low, high = i[fits], j[fits], away[fits], low[fits], high[fits]
+    i, j, away = i[fits], j[fits], away[fits]
     low, high = ends.widened(i, j)
     fits = high > low
     i, j, away, low, high = i[fits], j[fits], away[fits], low[fits], high[fits]
@@ -187,30 +203,28 @@ def _beside(lines: Lines, nodes: Nodes, pairs: tuple[Ints, Ints], ends: "_Ends")
     return _distributed(lines, nodes, (i, j), (low, high), height, away)
 
 
-def _stacked(lines: Lines, nodes: Nodes, pairs: tuple[Ints, Ints]) -> Links:
+def _stacked(lines: Lines, nodes: Nodes, above: _Alongside) -> Links:
     """Lines of neighbouring layers that run on each other."""
-    i, j, away, low, high = _alongside(lines, pairs, same_layer=False)
+    i, j, away, low, high = above
     fits = away < _STACKED * (lines.width_m[i] + lines.width_m[j]) / 2
     i, j, away, low, high = i[fits], j[fits], away[fits], low[fits], high[fits]
     wide = (lines.width_m[i] + lines.width_m[j]) / 2 - away
     return _distributed(lines, nodes, (i, j), (low, high), wide, (lines.height_m[i] + lines.height_m[j]) / 2)
 
 
-def _alongside(
-    lines: Lines, pairs: tuple[Ints, Ints], *, same_layer: bool
-) -> tuple[Ints, Ints, Floats, Floats, Floats]:
-    """Parallel pairs with a common stretch: their distance, and the stretch along the first [m]."""
+def _alongside(lines: Lines, pairs: tuple[Ints, Ints], *, same_layer: bool) -> _Alongside:
+    """Parallel pairs with a common stretch."""
     i, j = pairs
     way = lines.direction()
     fits = (lines.layer[i] == lines.layer[j]) == same_layer
-    fits &= np.abs((way[i] * way[j]).sum(1)) > _PARALLEL
+    fits &= np.abs(_dot(way[i], way[j])) > _PARALLEL
     i, j = i[fits], j[fits]
-    ends = np.stack([((p[j] - lines.start_m[i]) * way[i]).sum(1) for p in (lines.start_m, lines.end_m)])
+    ends = np.stack([_dot(p[j] - lines.start_m[i], way[i]) for p in (lines.start_m, lines.end_m)])
     low, high = np.maximum(ends.min(0), 0.0), np.minimum(ends.max(0), lines.length_m()[i])
     middle = lines.start_m[i] + way[i] * ((low + high) / 2)[:, None] - lines.start_m[j]
     away = np.abs(_cross(way[j], middle))
     fits = high > low
-    return i[fits], j[fits], away[fits], low[fits], high[fits]
+    return _Alongside(i[fits], j[fits], away[fits], low[fits], high[fits])
 
 
 def _distributed(
@@ -220,8 +234,8 @@ def _distributed(
     i, j = pair
     low, high = stretch
     length, way = lines.length_m(), lines.direction()
-    towards = (way[i] * way[j]).sum(1)
-    start = ((lines.start_m[j] - lines.start_m[i]) * way[i]).sum(1)  # of j, along i
+    towards = _dot(way[i], way[j])
+    start = _dot(lines.start_m[j] - lines.start_m[i], way[i])  # of j, along i
     of_j = np.sort(np.stack([(low - start) / towards, (high - start) / towards]) / length[j], axis=0)
     qi, si = nodes.within(i, low / length[i], high / length[i])
     qj, sj = nodes.within(j, *of_j)
@@ -261,11 +275,12 @@ class _Ends:
         """Where neighbours i and j touch, along i: up to the wall, or to the piece that joins both there."""
         lines, length = self.lines, self.lines.length_m()
         way = lines.direction()
-        start = ((lines.start_m[j] - lines.start_m[i]) * way[i]).sum(1)
-        back = (way[i] * way[j]).sum(1) < 0
+        start = _dot(lines.start_m[j] - lines.start_m[i], way[i])
+        back = _dot(way[i], way[j]) < 0
         end = start + np.where(back, -length[j], length[j])
-        low = _reach((0.0, self.room[0, i]), (-np.minimum(start, end), self.room[np.where(back, 1, 0), j]))
-        high = _reach((length[i], self.room[1, i]), (np.maximum(start, end), self.room[np.where(back, 0, 1), j]))
+        apart = _BEVEL * (lines.width_m[i] + lines.width_m[j]) / 2
+        low = _reach((0.0, self.room[0, i]), (-np.minimum(start, end), self.room[np.where(back, 1, 0), j]), apart)
+        high = _reach((length[i], self.room[1, i]), (np.maximum(start, end), self.room[np.where(back, 0, 1), j]), apart)
         bridge = lines.width_m[np.minimum(i + 1, len(lines) - 1)] / self.sines[1, i]
         return -low, high - np.where(self._bridged(i, j), bridge, 0.0)
 
@@ -276,31 +291,35 @@ class _Ends:
         return np.asarray((j == i + 2) & joined[np.minimum(i + 1, last)] & joined[np.minimum(i + 2, last)])
 
 
-def _reach(one: tuple[float | Floats, Floats], other: tuple[float | Floats, Floats]) -> Floats:
+def _reach(one: tuple[float | Floats, Floats], other: tuple[float | Floats, Floats], apart: Floats) -> Floats:
     """How far two neighbours touch, of where each ends and what room it has there.
 
-    Where both end on a wall, to where the line between them meets it; else to the end of the shorter one.
+    Where both end on one wall, thus not far apart, to where the line between them meets it; else to the end of the
+    shorter one.
     """
     (a, room_a), (b, room_b) = one, other
     shorter = np.where(np.less(a, b), a + room_a, b + room_b)
-    return np.where((room_a > 0) & (room_b > 0), (a + room_a + b + room_b) / 2, shorter)
+    one_wall = (room_a > 0) & (room_b > 0) & (np.abs(a - b) < apart)
+    return np.where(one_wall, (a + room_a + b + room_b) / 2, shorter)
 
 
 def _walls(lines: Lines, pairs: tuple[Ints, Ints]) -> tuple[Ints, Ints, Ints, Floats, Floats, Floats]:
     """For each end of a piece the nearest line across it: piece, end (0 or 1), wall, share, distance [m] and sine."""
     a, b = pairs
     way, length = lines.direction(), lines.length_m()
-    fits = (lines.layer[a] == lines.layer[b]) & (np.abs((way[a] * way[b]).sum(1)) < _PARALLEL)
+    fits = (lines.layer[a] == lines.layer[b]) & ~_chained(lines, a, b)
+    a, b = a[fits], b[fits]
+    steep = np.abs(_dot(way[a], way[b])) < _PARALLEL
+    a, b = a[steep], b[steep]
+    mean, sine = (lines.width_m[a] + lines.width_m[b]) / 2, np.abs(_cross(way[a], way[b]))
     found = []
-    for i, j in ((a[fits], b[fits]), (b[fits], a[fits])):
+    for i, j in ((a, b), (b, a)):
         for side, at in ((0, lines.start_m), (1, lines.end_m)):
-            foot = ((at[i] - lines.start_m[j]) * way[j]).sum(1)
-            away = np.abs(_cross(way[j], at[i] - lines.start_m[j]))
-            mean = (lines.width_m[i] + lines.width_m[j]) / 2
+            gap = at[i] - lines.start_m[j]
+            foot, away = _dot(gap, way[j]), np.abs(_cross(way[j], gap))
             touch = (foot >= 0) & (foot <= length[j]) & (away < 1.1 * mean) & (away > _STACKED * mean)
-            touch &= ~_chained(lines, i, j)
-            sine = np.abs(_cross(way[i], way[j]))
-            found.append(np.stack([i, np.full_like(i, side), j, foot / length[j], away, sine])[:, touch])
+            ends = i[touch], np.full(touch.sum(), side), j[touch], (foot / length[j])[touch], away[touch], sine[touch]
+            found.append(np.stack(ends))
     every = np.concatenate(found, axis=1)
     every = every[:, np.lexsort((every[4], every[1], every[0]))]
     first = np.append(True, (np.diff(every[0]) != 0) | (np.diff(every[1]) != 0))[: every.shape[1]]
@@ -312,6 +331,10 @@ def _chained(lines: Lines, i: Ints, j: Ints) -> NDArray[np.bool_]:
     """Whether two pieces meet at a joint."""
     high = np.maximum(i, j)
     return np.asarray((np.abs(i - j) == 1) & lines.joined[high])
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1])
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

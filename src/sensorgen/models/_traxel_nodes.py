@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from sensorgen.models._traxel_lines import Floats, Ints, Lines
 
 _SAME = 1e-6  # shares of a piece's length nearer than this are one node
+_SAME_M = 1e-9  # places nearer than this are one, but for rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,7 @@ class Nodes:
 
     def weights(self, piece: Ints, share: Floats) -> tuple[Ints, Floats]:
         """The two nodes that a place lies between, (m, 2), and its weight on each; beyond a piece's ends too."""
-        inside = 2.0 * piece + np.clip(share, 1e-12, 1.0 - 1e-12)
+        inside = 2.0 * piece + np.clip(share, _SAME / 2, 1.0 - _SAME / 2)
         after = np.searchsorted(self.key, inside)
         low, high = self.key[after - 1], self.key[after]
         t = (2.0 * piece + share - low) / (high - low)
@@ -70,8 +71,10 @@ class Nodes:
 
 
 def interleaved(query: Ints, at: Floats) -> tuple[Ints, Floats, NDArray[np.float64]]:
-    """Sorted places of each query and the length that each stands for (trapezoid rule)."""
+    """Sorted places of each query, each once, and the length that each stands for (trapezoid rule)."""
     order = np.lexsort((at, query))
     query, at = query[order], at[order]
+    apart = np.append(True, (np.diff(query) != 0) | (np.diff(at) > _SAME_M))[: len(at)]
+    query, at = query[apart], at[apart]
     step = np.where(np.diff(query) == 0, np.diff(at), 0.0)
     return query, at, (np.append(step, 0.0) + np.append(0.0, step))[: len(at)] / 2

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from sensorgen.errors import OutOfRange
 from sensorgen.models import _traxel_links as links
+from sensorgen.models._traxel_band import product
 from sensorgen.models._traxel_lines import Lines
 from sensorgen.models._traxel_nodes import Nodes
 
@@ -94,7 +95,6 @@ def _current(
 ) -> tuple[float, int]:
     """Current along x in a mean field of 1 V/m [A], and the unknowns that it took."""
     from scipy.sparse.csgraph import connected_components
-    from scipy.sparse.linalg import splu
 
     x = nodes.place_m[:, 0]
     left, right = x <= ends_m[0], x >= ends_m[1]
@@ -103,12 +103,9 @@ def _current(
     matrix = found.matrix(conductance, len(x))
     _, part = connected_components(matrix, directed=False)
     free = ~(left | right) & np.isin(part, part[left | right])
-    u = np.where(free, 0.0, x)
+    leaving = matrix @ x  # were the field the same everywhere
+    current = float(leaving[right].sum())
     if free.any():
-        where = np.flatnonzero(free)
-        inner = matrix[where][:, where].tocsc()
-        solver = splu(  # columns one by one: so sparse a factor has no panels worth their room
-            inner, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, options={"SymmetricMode": True}
-        )
-        u[where] = solver.solve(-(matrix @ np.where(left | right, x, 0.0))[where])
-    return float((matrix @ u)[right].sum()), int(free.sum())
+        inner = np.flatnonzero(free)
+        current -= product(matrix[inner][:, inner], (matrix @ right.astype(float))[inner], leaving[inner])
+    return current, int(free.sum())

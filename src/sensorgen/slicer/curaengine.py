@@ -10,6 +10,7 @@ import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from string import Template
 
@@ -57,12 +58,12 @@ def engine_settings(printer: Printer, quality: Quality, loads: Mapping[int, Load
     common = cura.of_all(printer, quality, used)
     tools = {}
     for index, r in used.items():
-        profile = _read(files[f"{own}_{cura.material_id(r)}.inst.cfg"], "values")
+        profile = _sections(files[f"{own}_{cura.material_id(r)}.inst.cfg"])["values"]
         tools[index] = profile | _engine("tool", cura.of_tool(printer, quality, r)) | {"extruder_nr": str(index)}
     return EngineSettings(
         printer=printer.name,
         files={path: text for path, text in files.items() if path.startswith(("definitions/", "extruders/"))},
-        common=_read(files[f"{own}_global.inst.cfg"], "values") | _engine("all", common),
+        common=_sections(files[f"{own}_global.inst.cfg"])["values"] | _engine("all", common),
         tools=tools,
         unused={i: _engine("unused", common) for i in range(len(printer.tool_numbers)) if i not in used},
     )
@@ -140,11 +141,12 @@ def _given(values: Mapping[str, str]) -> list[str]:
 
 
 def _engine(section: str, names: Mapping[str, str]) -> dict[str, str]:
-    template = Template((folder() / "cura" / "engine.ini").read_text("utf-8"))
-    return _read(template.safe_substitute(names), section)
+    said = _sections((folder() / "cura" / "engine.ini").read_text("utf-8"))[section]
+    return {key: Template(value).safe_substitute(names) for key, value in said.items()}
 
 
-def _read(text: str, section: str) -> dict[str, str]:
+@lru_cache(maxsize=16)
+def _sections(text: str) -> dict[str, dict[str, str]]:
     parser = configparser.ConfigParser(interpolation=None)
     parser.read_string(text)
-    return dict(parser[section])
+    return {name: dict(section) for name, section in parser.items()}

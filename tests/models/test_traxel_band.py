@@ -1,0 +1,58 @@
+"""Elimination along a band against dense solves."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array, diags_array
+
+from sensorgen.errors import OutOfRange
+from sensorgen.models import _traxel_band
+
+
+def network(n, reach, seed=1):
+    """Random resistors between nodes up to some apart, numbered at random, each with a little one to earth."""
+    rng = np.random.default_rng(seed)
+    a = np.concatenate([rng.integers(0, n - reach, 4 * n), np.arange(n - 1)])
+    b = np.concatenate([a[: 4 * n] + rng.integers(1, reach + 1, 4 * n), np.arange(1, n)])
+    matrix = np.zeros((n, n))
+    np.add.at(matrix, (a, b), -rng.uniform(0.1, 1.0, len(a)))
+    matrix += matrix.T
+    matrix[np.diag_indices(n)] = 1e-3 - matrix.sum(axis=1)
+    order = rng.permutation(n)
+    return matrix[order][:, order], rng.normal(size=(2, n))
+
+
+@pytest.mark.parametrize(("n", "reach"), [(3, 1), (40, 7), (600, 3), (600, 40)])
+@pytest.mark.parametrize("stretch", [16, 4096])
+def test_a_product_is_that_of_a_dense_solve(n, reach, stretch, monkeypatch):
+    monkeypatch.setattr(_traxel_band, "_STRETCH", stretch)
+    matrix, (one, other) = network(n, reach)
+    found = _traxel_band.product(csr_array(matrix), one, other)
+    assert found == pytest.approx(one @ np.linalg.solve(matrix, other), rel=1e-10)
+
+
+def test_a_wide_band_has_the_same_product(monkeypatch):
+    matrix, (one, other) = network(200, 9)
+    monkeypatch.setattr(_traxel_band, "_WIDEST", 4)
+    found = _traxel_band.product(csr_array(matrix), one, other)
+    assert found == pytest.approx(one @ np.linalg.solve(matrix, other), rel=1e-10)
+
+
+def test_nodes_on_their_own():
+    found = _traxel_band.product(
+        csr_array(diags_array(np.array([2.0, 4.0, 8.0]))), np.ones(3), np.array([1.0, 2.0, 3.0])
+    )
+    assert found == pytest.approx(0.5 + 0.5 + 0.375)
+
+
+def test_a_chain_of_ten_thousand_is_a_divider():
+    """Unit resistors in series, both ends held: a current of 1 in at node k makes k (n - k) / n volts there."""
+    n, k = 10_000, 3000
+    matrix = diags_array([-np.ones(n - 2), np.full(n - 1, 2.0), -np.ones(n - 2)], offsets=[-1, 0, 1])
+    at = np.zeros(n - 1)
+    at[k - 1] = 1.0
+    assert _traxel_band.product(csr_array(matrix), at, at) == pytest.approx(k * (n - k) / n, rel=1e-9)
+
+
+def test_what_hangs_together_by_nothing_is_refused():
+    with pytest.raises(OutOfRange, match="next to nothing"):
+        _traxel_band.product(csr_array(np.array([[1.0, -1.0], [-1.0, 1.0]])), np.ones(2), np.ones(2))
