@@ -1,5 +1,7 @@
 """Light to start: what each command loads, seen in fresh interpreters."""
 
+import os
+
 import pytest
 
 HEAVY = ("numpy", "pydantic", "yaml", "build123d", "trimesh", "OCP", "manifold3d")
@@ -40,3 +42,15 @@ def test_modules_that_are_not_loaded(real, words, never):
     loaded = said.out.rpartition("loaded: ")[2].split()
     assert "click" in loaded
     assert not set(never) & set(loaded)
+
+
+def test_no_other_package_has_a_say_in_how_designs_are_read(real, monkeypatch, tmp_path):
+    """Pydantic would look through all that is installed for plugins; here is one."""
+    (tmp_path / "meddler.py").write_text("plugin = None\n")
+    (tmp_path / "meddler-1.0.dist-info").mkdir()
+    (tmp_path / "meddler-1.0.dist-info" / "METADATA").write_text("Name: meddler\nVersion: 1.0\n")
+    (tmp_path / "meddler-1.0.dist-info" / "entry_points.txt").write_text("[pydantic]\nmeddler = meddler:plugin\n")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, (str(tmp_path), os.environ.get("PYTHONPATH")))))
+    said = real("check", "tri", before=LOADED)
+    assert said.code == 0
+    assert {"pydantic"} == {"pydantic", "meddler"} & set(said.out.rpartition("loaded: ")[2].split())

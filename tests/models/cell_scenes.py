@@ -4,6 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from sensorgen.models import fem2d
+from sensorgen.models._fem_mesh import Cones
 from sensorgen.scene import Body, Fill, Prism, Scene, box
 from sensorgen.shapes import rect, tri
 from sensorgen.units import EPS0_F_PER_M
@@ -34,6 +36,22 @@ def plates(*bodies: Body, gap_mm: float = 1.0, length_mm: float = 2.0) -> Scene:
         Body("high", "etpu", (box(0, length_mm, 0, 1, top, top + 0.2),), "top"),
     )
     return Scene((ends[0], *bodies, ends[1]), (length_mm, 1.0, top + 0.2))
+
+
+def bars(name: str, terminal: str, *boxes: tuple[float, float, float, float]) -> Body:
+    """Conductors from x to x and from z to z."""
+    return Body(name, "etpu", tuple(box(x0, x1, 0, 1, z0, z1) for x0, x1, z0, z1 in boxes), terminal)
+
+
+def slab() -> Body:
+    """A layer of dielectric on the lower plate."""
+    return Body("slab", "x60", (box(0, 2, 0, 1, 0.2, 0.45),))
+
+
+def few_rings(scene: Scene, doublings: int = 1) -> Cones:
+    """A mesh with rings so few that they can be written out."""
+    mesh = fem2d._graded(fem2d._triangles(scene)[1], EPS, 1e-3)
+    return Cones(mesh.triangles, dict.fromkeys(mesh.doublings, doublings))
 
 
 def cut_slabs() -> tuple[Scene, float]:

@@ -6,13 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cell_scenes import EPS, MM, bumps, plates, prism, stairs, tri_cell
+from cell_scenes import EPS, MM, bars, bumps, few_rings, plates, prism, slab, stairs, tri_cell
 from numpy.polynomial import legendre
 
 from sensorgen.models import fem2d, fem3d
 from sensorgen.models._fem_cones import Cone, Layout, ring_corners
 from sensorgen.models._fem_fronts import Block, least
-from sensorgen.models._fem_mesh import Cones
 from sensorgen.models._fem_plane import Plane
 from sensorgen.models._fem_polynomials import SIDES, condensed, crossed
 from sensorgen.scene import Body, Scene, box
@@ -23,12 +22,7 @@ def close(expected, rel: float):
     return pytest.approx(expected, rel=rel, abs=0)
 
 
-def bars(name: str, terminal: str, *boxes: tuple[float, float, float, float]) -> Body:
-    """Conductors from x to x and from z to z."""
-    return Body(name, "etpu", tuple(box(x0, x1, 0, 1, z0, z1) for x0, x1, z0, z1 in boxes), terminal)
-
-
-SLAB = Body("slab", "x60", (box(0, 2, 0, 1, 0.2, 0.45),))
+SLAB = slab()
 ISLANDS = {
     "one": plates(SLAB, bars("i", "top", (0.5, 0.9, 0.5, 0.8), (1.3, 1.5, 0.6, 0.7))),
     "of both": plates(SLAB, bars("i", "bottom", (0.3, 0.8, 0.8, 1.0)), bars("j", "top", (1.2, 1.7, 0.5, 0.7))),
@@ -73,12 +67,6 @@ CLOSED = Scene(
 )  # all around no mirror, and no corner to the left whose field is smooth
 
 
-def of_few_rings(scene: Scene, doublings: int = 1) -> Cones:
-    """Few enough to be written out."""
-    mesh = fem2d._graded(fem2d._triangles(scene)[1], EPS, 1e-3)
-    return Cones(mesh.triangles, dict.fromkeys(mesh.doublings, doublings))
-
-
 @pytest.mark.parametrize(
     ("scene", "order", "doublings"),
     [
@@ -98,7 +86,7 @@ def test_ngsolve_has_the_same_bounds_on_the_same_triangles(scene, order, doublin
     pytest.importorskip("ngsolve", reason="the independent program: pip install 'sensorgen[fem]'")
     import ngsolve_cells
 
-    mesh = of_few_rings(scene, doublings)
+    mesh = few_rings(scene, doublings)
     cells = mesh.triangles.regions[0][1]
     ours = fem2d._solved(mesh, EPS, order)[0].times(1 / cells)
     assert {share for _, share in mesh.triangles.regions} == {cells}
@@ -314,7 +302,7 @@ def test_it_needs_numpy_only():
 
 def test_both_functions_tell_one_flux():
     """What flows into the top is 1 V times the flux, over every triangle; for any two functions of the right ends."""
-    plane = Plane(of_few_rings(ISLANDS["in a row"]), 4)
+    plane = Plane(few_rings(ISLANDS["in a row"]), 4)
     eps, _ = fem2d._by_triangle(plane.mesh, EPS)
     u, psi = plane.potential(eps), plane.stream(1 / eps)
     rough = plane.potential(np.ones_like(eps))
