@@ -222,7 +222,8 @@ def test_a_parameter_that_is_a_word_stands_in_the_name(cogs, parameters, name):
         (((0, 0), (1, 1), (1, 0), (0, 1)), "encloses nothing"),  # two triangles, one the other way round
         (((0, 0), (1, 0), (1, 1), (0, 1), (0, 0)), "has the same corner twice in a row"),
         (((0, 0), (1, 0), (1, 0), (1, 1)), "has the same corner twice in a row"),
-        (((0, 0), (0, 1), (1, 1), (1, 0)), "runs clockwise"),
+        (((0, 0), (float("nan"), 0), (1, 1)), "has a corner that is nowhere"),
+        (((0, 0), (1, 0), (1, float("inf"))), "has a corner that is nowhere"),
     ],
 )
 def test_an_outline_that_encloses_nothing_is_refused_wherever_a_scene_is_made(cogs, monkeypatch, corners, said):

@@ -6,6 +6,7 @@ disagree about the sensor. x runs along the sensor, y across it, z up; the corne
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from math import isfinite
 
 from sensorgen.errors import BadInput
 
@@ -27,14 +28,14 @@ class Prism:
     axis : str
         "x", "y" or "z".
     outline : tuple of (float, float)
-        Corners, counter-clockwise in the plane ``PLANE[axis]`` [mm].
+        Corners in the plane ``PLANE[axis]`` [mm]; given either way round, kept counter-clockwise.
     start_mm, end_mm : float
         Where the extrusion starts and ends on its axis [mm].
 
     Raises
     ------
     BadInput
-        The outline is open, encloses nothing, or runs clockwise.
+        The outline is open, or encloses nothing.
     """
 
     axis: str
@@ -43,13 +44,14 @@ class Prism:
     end_mm: float
 
     def __post_init__(self) -> None:
-        """Refuse outlines that no body can have."""
+        """Refuse outlines that no body can have, and turn those that run clockwise."""
         reason = _no_outline(self.outline)
         if reason:
             raise BadInput(
-                f"an outline {reason}: {_told(self.outline)}; expected at least three corners around an area, "
-                "counter-clockwise, each corner once"
+                f"an outline {reason}: {_told(self.outline)}; expected at least three corners around an area, each once"
             )
+        if area_mm2(self.outline) < 0:
+            object.__setattr__(self, "outline", self.outline[::-1])
 
     def span(self, axis: str) -> Point:
         """Lowest and highest coordinate along an axis [mm]."""
@@ -214,9 +216,9 @@ def _no_outline(outline: Outline) -> str:
     if any(a == b for a, b in zip(outline, outline[1:] + outline[:1], strict=True)):
         return "has the same corner twice in a row"
     area = area_mm2(outline)
-    if abs(area) < SLIVER_MM**2:
-        return "encloses nothing"
-    return "runs clockwise" if area < 0 else ""
+    if not isfinite(area):
+        return "has a corner that is nowhere"
+    return "encloses nothing" if abs(area) < SLIVER_MM**2 else ""
 
 
 def _told(outline: Outline) -> str:
