@@ -14,6 +14,7 @@ from cell_scenes import stairs
 from scipy.integrate import quad
 
 from sensorgen.cells import cell
+from sensorgen.models import fem2d
 from sensorgen.models._fem_triangles import triangles
 from sensorgen.models._straight import energy as straight
 from sensorgen.models.columns import _mean_min, capacitance, unfit
@@ -124,6 +125,22 @@ def test_columns_side_by_side_each_count_as_wide_and_of_what_they_are():
     assert (found.lower, found.upper) == close((exact, exact), 1e-12)
 
 
+def test_posts_of_one_width_and_two_heights():
+    """The lower bound counts each by its own height: eps0 sum of w / s."""
+    heights = {(0.5, 1.0): 0.2, (1.5, 2.0): 0.5, (2.5, 3.0): 0.2}
+    posts = [box(a, b, 0, 2, 0.3, 0.3 + height) for (a, b), height in heights.items()]
+    per_width = [0.5 / (h / 4.68 + (0.7 - h) / EPS["air"]) for h in heights.values()]
+    exact = EPS0_F_PER_M * 2 * (sum(per_width) + 2.5 * EPS["air"] / 0.7) * MM
+    assert capacitance(plates(Body("posts", "x60", tuple(posts))), EPS).lower == close(exact, 1e-12)
+
+
+def test_one_jump_anywhere_forbids_the_columns_own_potential():
+    """A ridge whose columns' potentials meet, then a post whose own do not meet the air's: finite elements tell."""
+    ridge = Prism("y", ((0.0, 0.3), (1.5, 0.3), (0.75, 0.4)), 0.0, 2.0)
+    scene = plates(Body("x", "x60", (ridge, box(2.0, 3.0, 0, 2, 0.3, 0.9))))
+    assert capacitance(scene, EPS | {"x60": 50.0}).upper > fem2d.capacitance(scene, EPS | {"x60": 50.0}, 1e-4).lower
+
+
 @pytest.mark.parametrize("end_mm", [4.0, 14.0])
 def test_stairs_in_a_row_hold_as_much_as_one_each(end_mm):
     """Where columns' own potentials jump, that of straight triangles repeats as the stairs do."""
@@ -131,11 +148,18 @@ def test_stairs_in_a_row_hold_as_much_as_one_each(end_mm):
     assert (found.lower, found.upper) == close((one.lower * end_mm / 2, one.upper * end_mm / 2), 1e-11)
 
 
+def test_stairs_that_the_sensors_end_cuts_count_with_what_is_left_of_them():
+    """7.3 mm hold a period more than 5.3 mm, but for the best potential, which depends on what occurs how often."""
+    long, short, one = (capacitance(stair_row(end_mm), EPS) for end_mm in (7.3, 5.3, 2.0))
+    assert long.upper - short.upper == close(one.upper, 1e-2)
+    assert short.upper == close(2.65 * one.upper, 0.05)
+
+
 def stair_row(end_mm: float) -> Scene:
     """Two steps of dielectric that hang from the upper plate, in periods of 2 mm."""
-    starts = range(0, int(end_mm), 2)
-    wide = [box(x + 0.2, x + 1.8, 0, 1, 0.7, 1.0) for x in starts]
-    narrow = [box(x + 0.5, x + 1.5, 0, 1, 0.4, 0.7) for x in starts]
+    starts = np.arange(0.0, end_mm - 0.5, 2.0)
+    wide = [box(x + 0.2, min(x + 1.8, end_mm), 0, 1, 0.7, 1.0) for x in starts]
+    narrow = [box(x + 0.5, min(x + 1.5, end_mm), 0, 1, 0.4, 0.7) for x in starts]
     return plates(Body("stairs", "x60", (*wide, *narrow)), size=(end_mm, 1.0))
 
 

@@ -5,7 +5,7 @@ from functools import cache
 import mpmath as mp
 import numpy as np
 import pytest
-from cell_scenes import EPS, MM, plates, prism, tri_cell
+from cell_scenes import EPS, MM, cut_slabs, plates, prism, tri_cell
 
 from sensorgen.models import _fem_bounds, columns, fem2d
 from sensorgen.models._fem_mesh import Cones
@@ -169,6 +169,17 @@ def test_a_cut_cell_allows_for_what_two_bounds_may_hide():
         above, below = (field @ field) * (1 - 0.4 * lost), (exact @ exact) * (1 + 0.4 * lost)
         found = _fem_bounds.whole(_fem_bounds.Energies(below, above, (shares - 3) @ field**2, 1, lost), shares.tolist())
         assert found.lower < shares @ exact**2 < found.upper
+
+
+def test_a_disc_of_a_cut_cell_is_as_wide_as_its_bounds():
+    """Slabs from plate to plate are solved exactly: all that is left is the root of what doubles may hide."""
+    scene, _ = cut_slabs()
+    bounds, disc = (
+        fem2d.capacitance(scene, EPS, 1e-6),
+        fem2d.lossy(scene, {m: complex(e) for m, e in EPS.items()}, 1e-6),
+    )
+    assert bounds.width() < 1e-6
+    assert 0.5 * bounds.width() < disc.width() < 2 * bounds.width()
 
 
 def test_a_triangle_of_everyday_loses_nothing():

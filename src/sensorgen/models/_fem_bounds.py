@@ -40,14 +40,14 @@ class Energies:
     unknowns : int
         That the larger of the two systems couples.
     rounding : float
-        Share by which doubles may be off; never counted as less than ``ROUNDING`` in what is answered [-].
+        Share by which doubles may be off, where it was estimated; an answer allows for ``ROUNDING`` at least [-].
     """
 
     lower: float
     upper: float
     part: float
     unknowns: int
-    rounding: float = ROUNDING
+    rounding: float = 0.0
 
 
 def third_electrode(scene: Scene) -> str | None:

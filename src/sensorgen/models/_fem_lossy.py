@@ -77,7 +77,7 @@ class Fields:
     unknowns : int
         That the larger of the two systems couples.
     rounding : float
-        Share by which doubles may be off [-].
+        Share by which doubles may be off, where it was estimated; an answer allows for ``ROUNDING`` at least [-].
     """
 
     lower: complex
@@ -86,7 +86,7 @@ class Fields:
     size: float
     apart: float
     unknowns: int
-    rounding: float = ROUNDING
+    rounding: float = 0.0
 
 
 def disc(found: Fields, turn: Turned, shares: Sequence[float]) -> Disc:

@@ -1,0 +1,138 @@
+"""Cross-sections that textbooks know, with open floors, drawn by few or many corners."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from cell_scenes import MM, prism
+from scipy.special import ellipk
+
+from sensorgen.models import fem2d
+from sensorgen.scene import Body, Scene, box
+from sensorgen.units import EPS0_F_PER_M
+
+VACUUM = {"air": 1.0}
+
+
+def close(expected: float, rel: float):
+    return pytest.approx(expected, rel=rel, abs=0)
+
+
+def coaxial_quarter(corners: int) -> Scene:
+    """The upper quarter of a coaxial line of radii 1 and 2, between mirrors at 0 and 45 degrees turned to x:
+    see test.
+    """
+    angle = np.linspace(np.pi / 2, 0, corners + 1)
+    inner, outer = [(np.cos(a), np.sin(a)) for a in angle], [(2 * np.cos(a), 2 * np.sin(a)) for a in angle]
+    low = prism((0, 0), (1, 0), *inner[::-1][1:-1], (0, 1))
+    high = prism((2, 0), (2.2, 0), (2.2, 2.2), (0, 2.2), (0, 2), *outer[1:-1])
+    return Scene((Body("low", "etpu", (low,), "bottom"), Body("high", "etpu", (high,), "top")), (2.2, 1.0, 2.2))
+
+
+def test_a_coaxial_line_is_met_with_the_square_of_its_corners(monkeypatch):
+    """C = 2 pi eps0 / ln 2; twice as many corners err by a quarter or less: what both circles lose partly cancels."""
+    monkeypatch.setattr(fem2d.fem, "third_electrode", lambda scene: None)
+    monkeypatch.setattr("sensorgen.models.fem2d.triangles", lambda cell: _closed_below(cell))
+    exact = np.pi / 2 * EPS0_F_PER_M / np.log(2) * MM
+    errors = []
+    for corners in (3, 6, 12):
+        found = fem2d.capacitance(coaxial_quarter(corners), VACUUM, 1e-5)
+        assert found.width() < 1e-5
+        errors.append(found.middle() / exact - 1)
+    assert abs(errors[2]) < 4e-3
+    rates = [a / b for a, b in pairwise(errors)]
+    assert min(rates) > 4
+
+
+def _closed_below(cell):
+    """Triangles of a scene whose floor is a mirror: where no electrode lies on the floor, by intent here."""
+    from sensorgen.models import _fem_triangles
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(_fem_triangles, "_refuse_open", lambda *_: None)
+        return _fem_triangles.triangles(cell)
+
+
+def test_a_strip_between_plates():
+    """Stripline of no thickness: C = 4 eps0 K(k)/K(k'), k = tanh(pi w / (2 b)); half of it, above the strip's plane.
+
+    Strip of width 1 at one height with two plates 1 apart: upper half between a mirror plane (beside the strip) and the
+    plate. The strip as floor's electrode, the mirror beside it as an open floor.
+    """
+    w, b, end = 1.0, 1.0, 4.0
+    strip = Body("low", "etpu", (box(end - w / 2, end + w / 2, 0, 1, 0, 0.1),), "bottom")
+    plate = Body("high", "etpu", (box(0, 2 * end, 0, 1, 0.1 + b / 2, 0.2 + b / 2),), "top")
+    sides = box(0, end - w / 2, 0, 1, 0, 0.1), box(end + w / 2, 2 * end, 0, 1, 0, 0.1)
+    gap = Body("wall", "wall", sides)  # hardly any permittivity: a mirror, up to 1e-9
+    scene = Scene((strip, gap, plate), (2 * end, 1.0, 0.2 + b / 2))
+    found = _open_floor(scene, {"air": 1.0, "wall": 1e-9}, 1e-6)
+    k = np.tanh(np.pi * w / (2 * b))
+    exact = 4 * EPS0_F_PER_M * ellipk(k**2) / ellipk(1 - k**2) / 2 * MM  # the upper half of the line
+    assert found.width() < 1e-6
+    assert found.middle() == close(exact, 1e-6)
+
+
+def _open_floor(scene, permittivity, width):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sensorgen.models.fem2d.triangles", _closed_below)
+        return fem2d.capacitance(scene, permittivity, width)
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
+def test_interdigital_strips_on_a_half_space(share):
+    """Fingers that fill a share of their plane: C = eps0 K(k)/K(k') from one finger to the plane half way to the next,
+    k = sin(pi share / 2) (Igreja and Dias 2004), so half of it from finger to finger.
+
+    Between two fingers' middles the upper half space; its lid, 4 pitches up, carries e^-25 of the field.
+    """
+    edge = 2.0 * share / 2
+    low = Body("low", "etpu", (box(0, edge, 0, 1, 0, 0.1),), "bottom")
+    high = Body("high", "etpu", (box(2 - edge, 2, 0, 1, 0, 0.1),), "top")
+    gap = Body("wall", "wall", (box(edge, 2 - edge, 0, 1, 0, 0.1),))
+    found = _open_floor(Scene((low, gap, high), (2.0, 1.0, 8.1)), {"air": 1.0, "wall": 1e-10}, 1e-6)
+    k = np.sin(np.pi * share / 2)
+    assert found.middle() == close(EPS0_F_PER_M * ellipk(k**2) / ellipk(1 - k**2) / 2 * MM, 2e-6)
+
+
+def eccentric_half(corners: int, apart: float) -> Scene:
+    """The upper half of a line of radii 1 and 2 whose axes are apart, on a mirror through both."""
+    inner, outer = ([(r * np.cos(a), r * np.sin(a)) for a in np.linspace(np.pi, 0, corners + 1)] for r in (1, 2))
+    low = prism(*((x + apart + 2.2, z if 0 < k < corners else 0.0) for k, (x, z) in enumerate(inner)))
+    arc = [(x + 2.2, z if 0 < k < corners else 0.0) for k, (x, z) in enumerate(outer)]
+    high = prism((0, 0), *arc, (4.4, 0), (4.4, 2.2), (0, 2.2))
+    bodies = Body("low", "etpu", (_neat(low),), "bottom"), Body("high", "etpu", (_neat(high),), "top")
+    return Scene(bodies, (4.4, 1.0, 2.2))
+
+
+@pytest.mark.parametrize("apart", [0.3, 0.7])
+def test_eccentric_cylinders_are_met_with_the_square_of_their_corners(apart):
+    """C = 2 pi eps0 / acosh((a^2 + b^2 - e^2) / (2 a b)), a = 1, b = 2; half of it above the mirror."""
+    exact = np.pi * EPS0_F_PER_M / np.arccosh((5 - apart**2) / 4) * MM
+    errors = []
+    for corners in (8, 16):
+        found = _open_floor(eccentric_half(corners, apart), VACUUM, 1e-5)
+        assert found.width() < 1e-5
+        errors.append(found.middle() / exact - 1)
+    assert abs(errors[1]) < 4e-3
+    assert errors[0] / errors[1] > 3.9
+
+
+def test_confocal_ellipses():
+    """Between confocal ellipses C = 2 pi eps0 / (mu2 - mu1); drawn by curves over x it is a quarter of that."""
+    hyper = lambda mu, nu: (np.cosh(mu) * np.cos(nu), np.sinh(mu) * np.sin(nu))  # noqa: E731
+    errors = []
+    for corners in (6, 12):
+        nu = np.linspace(0, np.pi / 2, corners + 1)
+        inner, outer = hyper(0.4, nu), hyper(1.0, nu)
+        low = prism((0, 0), *zip(*inner, strict=True))
+        high = prism((1.7, 0), (1.7, 1.4), (0, 1.4), *list(zip(*outer, strict=True))[::-1])
+        scene = Scene((Body("l", "e", (_neat(low),), "bottom"), Body("h", "e", (_neat(high),), "top")), (1.7, 1.0, 1.4))
+        found = _open_floor(scene, VACUUM, 1e-5)
+        errors.append(found.middle() / (np.pi / 2 / 0.6 * EPS0_F_PER_M * MM) - 1)
+    assert abs(errors[1]) < 8e-3
+    assert errors[0] / errors[1] > 4
+
+
+def _neat(p):
+    return replace(p, outline=tuple((round(u, 12), round(v, 12)) for u, v in p.outline))
