@@ -4,6 +4,7 @@ from collections import defaultdict
 
 import pytest
 
+from sensorgen import cells
 from sensorgen.cells import Cell, cell
 from sensorgen.scene import Body, Fill, Prism, Scene, box
 from sensorgen.sections import ROUNDING_MM, sections
@@ -137,3 +138,27 @@ def test_outlines_that_overlap_are_refused(depth_mm):
     assert depth_mm > ROUNDING_MM
     with pytest.raises(ValueError, match="overlap"):
         found(Scene((*over.bodies[:2], lid, over.bodies[-1]), over.size_mm))
+
+
+def steps(periods: int) -> Scene:
+    """Three steps a period, which look another way from the other side: no place of the row is a mirror."""
+    heights = ((0.0, 0.2, 0.3), (0.2, 0.5, 0.5), (0.5, 0.8, 0.7))
+    return ridges(periods, *((k + a, k + b, h, "x60") for k in range(periods) for a, b, h in heights))
+
+
+def test_a_row_without_mirrors_is_solved_as_a_whole():
+    found_here = found(steps(6))
+    assert width_mm(found_here) == pytest.approx(6.0)
+    assert set(found_here.shares) == {1.0}
+
+
+def test_a_row_without_mirrors_is_looked_at_once_for_each_place(monkeypatch):
+    """Not once for each pair of places: 50 periods took 14 s."""
+    looked = []
+    repeats = cells._repeats
+    monkeypatch.setattr(cells, "_repeats", lambda *given: looked.append(given[1:]) or repeats(*given))
+    section = sections(steps(12))[0]
+    found_here = cells.mirrored(cells.section_slices(section, HEIGHT_MM))
+    places = cells._candidates(list(found_here.slices))
+    assert len(found_here.slices) == 12 * 4
+    assert len(looked) < len(places)

@@ -1,11 +1,16 @@
 """Designs: what they take, what identifies them, and what they are called."""
 
+import dataclasses
+from types import SimpleNamespace
+
 import pytest
 
 from sensorgen import design, printer
 from sensorgen.design import make, name_of
 from sensorgen.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.findings import Finding
+from sensorgen.scene import Envelope, Prism
+from sensorgen.shapes import reference
 
 
 def tri(**more):
@@ -171,3 +176,58 @@ def test_every_error_is_ours():
     for data, *_ in BAD:
         with pytest.raises(SensorgenError):
             make(data)
+
+
+@dataclasses.dataclass(frozen=True)
+class Cogs(Envelope):
+    """Parameters of a shape that somebody adds: two of them words."""
+
+    form: str = dataclasses.field(default="dome", metadata={"help": "Form.", "choices": ("dome", "half round", "hook")})
+    foot: str = dataclasses.field(default="none", metadata={"help": "Foot.", "choices": ("none", "hook")})
+    corners: int = dataclasses.field(default=16, metadata={"help": "Corners.", "range": (3, 400)})
+
+
+@pytest.fixture
+def cogs(monkeypatch):
+    """A shape whose parameters are words too."""
+
+    def scene(p, fill):
+        return reference.scene(reference.Params(length_mm=p.length_mm, width_mm=p.width_mm), fill)
+
+    plugin, known = SimpleNamespace(Params=Cogs, scene=scene), design.shape
+    monkeypatch.setattr(design, "shape", lambda name: plugin if name == "cogs" else known(name))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "name"),
+    [
+        ({}, "cogs"),
+        ({"form": "dome"}, "cogs"),
+        ({"form": "hook"}, "cogs-form-hook"),
+        ({"foot": "hook"}, "cogs-foot-hook"),
+        ({"form": "half round", "length_mm": 50}, "cogs-length50-form-half-round"),
+        ({"corners": 8}, "cogs-corners8"),
+    ],
+)
+def test_a_parameter_that_is_a_word_stands_in_the_name(cogs, parameters, name):
+    assert make({"shape": "cogs", "parameters": parameters}).name == name
+
+
+@pytest.mark.parametrize(
+    ("corners", "said"),
+    [
+        ((), "of 0 corners is open: none;"),
+        (((0, 0), (1, 0)), "of 2 corners is open: \\(0, 0\\), \\(1, 0\\);"),
+        (((0, 0), (1, 0), (2, 0)), "encloses nothing"),
+        (((0, 0), (1, 1), (1, 0), (0, 1)), "encloses nothing"),  # two triangles, one the other way round
+        (((0, 0), (1, 0), (1, 1), (0, 1), (0, 0)), "has the same corner twice in a row"),
+        (((0, 0), (1, 0), (1, 0), (1, 1)), "has the same corner twice in a row"),
+        (((0, 0), (float("nan"), 0), (1, 1)), "has a corner that is nowhere"),
+        (((0, 0), (1, 0), (1, float("inf"))), "has a corner that is nowhere"),
+    ],
+)
+def test_an_outline_that_encloses_nothing_is_refused_wherever_a_scene_is_made(cogs, monkeypatch, corners, said):
+    """A design file names its shape; whatever that shape draws is looked at before any model is asked."""
+    monkeypatch.setattr(design.shape("cogs"), "scene", lambda p, fill: Prism("y", corners, 0.0, 1.0))
+    with pytest.raises(BadInput, match=rf"^there: an outline {said}.* expected at least three corners"):
+        make({"shape": "cogs"}, "there")

@@ -1,5 +1,6 @@
 """Values of the user's own: they go before every source's, everywhere, and are told as such."""
 
+import numpy as np
 import pytest
 
 from sensorgen import materials
@@ -86,9 +87,10 @@ def test_the_halves_of_a_double_sensor_get_them():
         (
             {"x60": {"relative_permittivity": 0.0}},
             OutOfRange,
-            "relative_permittivity of x60 is 0; expected a number above",
+            "relative_permittivity of x60 is 0; expected 1e-09 to",
         ),
-        ({"x60": {"relative_permittivity": -1.0}}, OutOfRange, "is -1; expected a number above 0"),
+        ({"x60": {"relative_permittivity": -1.0}}, OutOfRange, "is -1; expected 1e-09 to 1e"),
+        ({"x60": {"youngs_modulus_pa": 0.0}}, OutOfRange, "is 0; expected a number above 0"),
         ({"x60": {"youngs_modulus_pa": float("nan")}}, OutOfRange, "is nan"),
         ({"x60": {"youngs_modulus_pa": float("inf")}}, OutOfRange, "is inf"),
         ({"x60": {"poisson_ratio": 0.51}}, OutOfRange, "poisson_ratio of x60 is 0.51; expected -1 to 0.5"),
@@ -104,3 +106,20 @@ def test_what_no_material_can_have(values, error, said):
 @pytest.mark.parametrize("nu", [0.5, 0.4999, 0.0, -1.0])
 def test_limits_of_nu(nu):
     assert design({"x60": {"poisson_ratio": nu}}).material("x60").value("poisson_ratio").value == nu
+
+
+@pytest.mark.parametrize("value", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("shape", ["tri", "rect"])
+def test_the_bounds_hold_over_the_whole_range_of_permittivities(shape, value):
+    """More permittivity never makes less capacitance, nor less of its bounds."""
+    found = unloaded(design({"x60": {"relative_permittivity": value}}, shape)).answer.capacitance_f
+    more = unloaded(design({"x60": {"relative_permittivity": min(2 * value, 1e9)}}, shape)).answer.capacitance_f
+    assert 0 < found.lower <= found.upper < np.inf
+    assert found.lower <= more.lower
+    assert found.upper <= more.upper
+
+
+@pytest.mark.parametrize("value", [0.99e-9, 1.01e9, 1e16, 1e308, float("inf"), float("nan"), 0.0, -1.0])
+def test_a_permittivity_beyond_sense_is_refused(value):
+    with pytest.raises(OutOfRange, match=r"relative_permittivity of x60 is .*; expected 1e-09 to 1e.09"):
+        design({"x60": {"relative_permittivity": value}}, "tri")

@@ -206,7 +206,7 @@ def test_an_answer_to_a_named_model_of_any_width_can_be_kept(fake):
     assert capacitance(PLATE, EPS, model="dear") == replace(first, known=True)
 
 
-BOWTIE = ((0, 0.3), (10, 0.3), (0, 0.9), (10, 0.9))
+BOWTIE = ((0, 0.3), (10, 0.3), (2, 0.6), (10, 0.9))
 
 
 @pytest.mark.parametrize(

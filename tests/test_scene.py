@@ -240,3 +240,11 @@ def test_a_scene_leaves_out_empty_bodies():
 def test_a_body_is_found_by_its_name():
     scene = Scene((Body("film", "x60", (box(0, 1, 0, 1, 0, 1),)),), (1, 1, 1))
     assert scene.body("film").volume_mm3() == 1
+
+
+@pytest.mark.parametrize("axis", "xyz")
+def test_an_outline_may_be_told_either_way_round(axis):
+    way = ((0.0, 0.0), (2.0, 0.0), (0.5, 1.0))
+    there, back = Prism(axis, way, 3.0, 3.5), Prism(axis, way[::-1], 3.0, 3.5)
+    assert there.outline == back.outline == way
+    assert there.volume_mm3() == back.volume_mm3() == 0.5

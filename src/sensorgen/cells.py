@@ -8,7 +8,7 @@ no fringe arises there; a section without such planes is continued by its own mi
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -118,9 +118,12 @@ def mirrored(slices: list[Slice]) -> Cell:
     whole = _straightened(slices)
     places = _candidates(whole)
     end = whole[-1].right_mm
+    is_mirror = cache(partial(_is_mirror, whole))
     for fits in (_is_even, _has_room):
         for low, high in _pairs(places, end):
-            if fits(low - places[0], high - low, end - places[0]) and _repeats(whole, low, high):
+            if not fits(low - places[0], high - low, end - places[0]) or not (is_mirror(low) and is_mirror(high)):
+                continue
+            if _repeats(whole, low, high):
                 return _cell(whole, low, high)
     return Cell(tuple(whole), (1.0,) * len(whole))
 
@@ -215,6 +218,12 @@ def _pairs(places: list[float], end_mm: float) -> Iterator[Point]:
         order = np.argsort(apart[fits], kind="stable")
         yield from ((places[a], places[b]) for a, b in zip(i[fits][order], j[fits][order], strict=True))
         reach *= 2
+
+
+def _is_mirror(slices: list[Slice], at: float) -> bool:
+    """Whether a place mirrors what lies to both its sides, as far as the nearer end reaches."""
+    reach = min(at - slices[0].left_mm, slices[-1].right_mm - at)
+    return reach <= ROUNDING_MM or _repeats(_cut(slices, at - reach, at + reach), at, at + reach)
 
 
 def _repeats(slices: list[Slice], low: float, high: float) -> bool:

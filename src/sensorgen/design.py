@@ -375,10 +375,10 @@ def name_of(design: Design) -> str:
     for key, field in known.items():
         value = getattr(params, key)
         if key not in said and value != field.default:
-            parts.append(f"{key.removesuffix('_mm').replace('_', '-')}{value:.10g}")
+            parts.append(key.removesuffix("_mm").replace("_", "-") + _said(value))
     default = Design(shape=design.shape)
     for given, usual in ((design.quality, default.quality), (design.printer, default.printer)):
-        parts.append("" if given == usual else re.sub("[^A-Za-z0-9._]+", "-", Path(given).stem).strip(".-_"))
+        parts.append("" if given == usual else _plain(Path(given).stem))
     if design.orientation != default.orientation:
         parts.append("upside-down")
     said_if_set = {"material_values"} if design.material_values else set()
@@ -387,6 +387,16 @@ def name_of(design: Design) -> str:
         parts.append(_digest(others))
     whole = "-".join(filter(None, parts))
     return whole if len(whole) <= 100 else f"{whole[:90].rstrip('.-_')}-{_digest(whole)}"
+
+
+def _said(value: float | str) -> str:
+    """A parameter's value as a part of a name."""
+    return f"-{_plain(value)}" if isinstance(value, str) else f"{value:.10g}"
+
+
+def _plain(word: str) -> str:
+    """A word as a part of a file's name."""
+    return re.sub("[^A-Za-z0-9._]+", "-", word).strip(".-_")
 
 
 def _digest(data: object) -> str:

@@ -6,6 +6,9 @@ disagree about the sensor. x runs along the sensor, y across it, z up; the corne
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from math import isfinite
+
+from sensorgen.errors import BadInput
 
 Point = tuple[float, float]
 Outline = tuple[Point, ...]
@@ -13,6 +16,7 @@ Outline = tuple[Point, ...]
 AXES = "xyz"
 PLANE = {"x": ("y", "z"), "y": ("x", "z"), "z": ("x", "y")}  # the two axes of an outline, by prism axis
 SLIVER_MM = 1e-6  # a nanometre: narrower pieces are rounding, not geometry, and the CAD kernel refuses them from 1e-7
+_TOLD = 5  # corners of an outline that an error shows
 
 
 @dataclass(frozen=True)
@@ -24,15 +28,30 @@ class Prism:
     axis : str
         "x", "y" or "z".
     outline : tuple of (float, float)
-        Corners, counter-clockwise in the plane ``PLANE[axis]`` [mm].
+        Corners in the plane ``PLANE[axis]`` [mm]; given either way round, kept counter-clockwise.
     start_mm, end_mm : float
         Where the extrusion starts and ends on its axis [mm].
+
+    Raises
+    ------
+    BadInput
+        The outline is open, or encloses nothing.
     """
 
     axis: str
     outline: Outline
     start_mm: float
     end_mm: float
+
+    def __post_init__(self) -> None:
+        """Refuse outlines that no body can have, and turn those that run clockwise."""
+        reason = _no_outline(self.outline)
+        if reason:
+            raise BadInput(
+                f"an outline {reason}: {_told(self.outline)}; expected at least three corners around an area, each once"
+            )
+        if area_mm2(self.outline) < 0:
+            object.__setattr__(self, "outline", self.outline[::-1])
 
     def span(self, axis: str) -> Point:
         """Lowest and highest coordinate along an axis [mm]."""
@@ -188,6 +207,24 @@ def area_mm2(outline: Iterable[Point]) -> float:
     u0, v0 = points[0]
     turn = zip(points, points[1:] + points[:1], strict=True)
     return sum((a[0] - u0) * (b[1] - v0) - (b[0] - u0) * (a[1] - v0) for a, b in turn) / 2.0
+
+
+def _no_outline(outline: Outline) -> str:
+    """Why corners are no outline, or ""."""
+    if len(outline) < 3:
+        return f"of {len(outline)} corners is open"
+    if any(a == b for a, b in zip(outline, outline[1:] + outline[:1], strict=True)):
+        return "has the same corner twice in a row"
+    area = area_mm2(outline)
+    if not isfinite(area):
+        return "has a corner that is nowhere"
+    return "encloses nothing" if abs(area) < SLIVER_MM**2 else ""
+
+
+def _told(outline: Outline) -> str:
+    """The first corners of an outline, in words [mm]."""
+    some = ", ".join(f"({u:.6g}, {v:.6g})" for u, v in outline[:_TOLD])
+    return some + (", ..." if len(outline) > _TOLD else "") or "none"
 
 
 def clipped(outline: Iterable[Point], end_mm: float) -> Outline:

@@ -67,11 +67,20 @@ def test_a_sweep_has_the_losses_too(run):
     assert float(high["loss_lower_f_per_m2"]) / float(low["loss_lower_f_per_m2"]) == pytest.approx(2, rel=1e-2)
 
 
+def test_a_loss_may_be_swept_from_0(run):
+    said = run("cell", "reference", "--sweep", "loss_x60=0,0.02", "--jobs", 1, "--csv", "--accuracy", "1e-5")
+    none, some = ({k: float(row[f"{k}_f_per_m2"]) for k in ("loss_lower", "loss_upper", "lower")}
+                  for row in csv.DictReader(io.StringIO(said.out)))  # fmt: skip
+    assert none["loss_lower"] <= 0 <= none["loss_upper"] < 1e-5 * none["lower"]
+    assert some["loss_lower"] / some["lower"] == pytest.approx(0.02, rel=1e-4)
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (("--set", "resistivity_x60=1e6"), "--frequency 1.1kHz"),
-        (("--set", "loss_x60=-0.1"), "expected a number above 0"),
+        (("--set", "loss_x60=-0.1"), "expected 0 to 1e+06"),
+        (("--set", "loss_x60=1e7"), "expected 0 to 1e+06"),
         (("--set", "loss_x60=0.1", "--model", "columns"), "it knows no losses"),
         (("--set", "loss_x60=0.1", "--model", "thesis-3.35"), "knows no losses"),
         (("--set", "loss_x60=0.1", "--frequency", "1kHz,2kHz"), "expected one"),

@@ -344,6 +344,13 @@ def half_covered() -> Scene:
     return Scene((low, high), (4, 2, 1.3))
 
 
+def interlocked() -> Scene:
+    """Posts of both electrodes beside each other, higher than the gap between their tips."""
+    posts = [Body("post", "etpu", (box(0, 1, 0, 1, 0.3, 0.8),), "bottom"),
+             Body("tooth", "etpu", (box(2, 3, 1, 2, 0.5, 1.0),), "top")]  # fmt: skip
+    return plates(*posts)
+
+
 @pytest.mark.parametrize(
     ("scene", "reason"),
     [
@@ -351,8 +358,11 @@ def half_covered() -> Scene:
         (rect_cell(0.0), "touch"),
         (half_covered(), "does not cover"),
         (tri_cell(0.1).turned_over(), "does not cover"),  # the bottom terminal is above
-        (plates(Body("step", "etpu", (box(0, 1, 0, 1, 0.3, 0.4),), "bottom")), "not flat"),
-        (plates(Body("wedge", "x60", (Prism("z", ((0, 0), (1, 0), (0, 1)), 0.3, 0.5),))), "constant cross-sections"),
+        (interlocked(), "reach into each other"),
+        (
+            plates(RIDGE, Body("wedge", "x60", (Prism("z", ((0, 0), (1, 0), (0, 1)), 0.9, 1.0),))),
+            "slanted in elevation",
+        ),
     ],
 )
 def test_it_says_what_it_cannot_speak_of(scene, reason):

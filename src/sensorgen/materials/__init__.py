@@ -21,7 +21,11 @@ from sensorgen.records import Strict, checked
 
 FILM_LEAK = "leak_s_per_m2"  # leak of a film per area; a matter of how it was printed: no source that ships gives one
 SET = "set by the user"  # source of a value that stands in a design itself
-_RANGES = {"poisson_ratio": (-1.0, 0.5)}  # both ends belong to it; anything else is above 0
+_RANGES = {  # both ends belong to it; anything else is above 0
+    "poisson_ratio": (-1.0, 0.5),
+    "relative_permittivity": (1e-9, 1e9),  # far beyond any material; ratios of such values are still numbers
+    "loss_tangent": (0.0, 1e6),
+}
 
 
 class Value(Strict):

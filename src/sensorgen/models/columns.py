@@ -2,22 +2,24 @@
 
 Flux that may only run straight up is admissible for Thomson's principle, so the columns in parallel bound the
 capacitance from below. Any potential that is right on the electrodes bounds it from above (Dirichlet): we try
-the columns' own potential where it has no jumps, and a potential that rises within the narrowest gap only.
+the columns' own potential where it has no jumps, and the best potential that depends on the height alone.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
+from math import inf
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.interval import Interval
 from sensorgen.models._straight import energy as straight
+from sensorgen.planview import Part, parts
 from sensorgen.scene import Scene
-from sensorgen.sections import Column, Layer, Section, alike, sections
-from sensorgen.sections import columns as cut_columns
+from sensorgen.sections import ROUNDING_MM, Column, Layer, sections
 from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
 SOURCE = "Thesis 3.2.1 and 3.2.2, Eqs. 3.10 to 3.49, corrected; Dirichlet's and Thomson's principles"
@@ -33,15 +35,16 @@ def unfit(scene: Scene) -> str | None:
     if len({body.terminal for body in scene.bodies} - {""}) > 2:
         return "more than two electrodes: sensorgen stack speaks of them"
     try:
-        gaps = [_gap(column) for section in sections(scene) for column in _distinct(section).values()]
+        gaps = [_gap(column) for part in parts(scene) for column in _distinct(part).values()]
     except ValueError as error:
         return str(error)
     if any(gap is None for gap in gaps):
         return "an electrode does not cover the whole sensor"
     if min(min(g.thickness_mm()) for g in gaps if g is not None) <= 0:
         return "the electrodes touch: the capacitance grows without bound"
-    if len(sections(scene)) > 1 and len({z for g in gaps if g is not None for z in g.bottom_mm}) > 1:
-        return "the bottom electrode is not flat, nor is the scene one cross-section"
+    floor, roof = max(max(g.bottom_mm) for g in gaps if g), min(min(g.top_mm) for g in gaps if g)
+    if floor >= roof and not _is_one_section(scene):
+        return "the electrodes reach into each other, and the scene is no single cross-section"
     return None
 
 
@@ -52,8 +55,9 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
 
     .. math:: C_{upper} = \varepsilon_0 \int \varepsilon_r |\nabla u|^2 dV
 
-    with the column potential u, rising by dz / (s eps) in each layer; or u = z / g up to the narrowest gap g; or, where
-    neither is continuous, the best u that is straight on each of the section's triangles: whichever is least.
+    with the column potential u, rising by dz / (s eps) in each layer, where it is continuous; or the best u(z), which
+    rises between the highest place of the lower electrode and the lowest of the upper one; or, for one section, the
+    best u that is straight on each of its triangles: whichever is least.
 
     Parameters
     ----------
@@ -76,24 +80,41 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
     ArithmeticError
         The bounds have crossed, which no geometry can make them do.
     """
-    lower = trial = slab = 0.0
-    found = [(section, _Row.of(section, permittivity)) for section in sections(scene)]
-    distinct = [stack for _, row in found for stack in row.stacks.values()]
-    narrowest = min(stack.gap_mm() for stack in distinct)
-    for section, row in found:
-        below = row.total(_Stack.upright)
-        lower += section.depth_mm * below
-        trial += section.depth_mm * (below + row.total(_Stack.sideways))
-        slab += section.depth_mm * row.total(lambda stack: stack.within(narrowest))
-    smooth = len(found) == 1 and found[0][1].is_smooth()
-    flat = np.ptp([stack.heights_mm[0] for stack in distinct]) == 0
-    tries = [energy for energy, fits in ((slab, flat), (trial, smooth)) if fits]
-    if not tries or (len(found) == 1 and not smooth):
-        tries.append(found[0][0].depth_mm * straight(found[0][0], scene.size_mm[2], permittivity))
+    rows = [_Row.of(part, permittivity) for part in parts(scene)]
+    lower = sum(row.total(_Stack.upright) for row in rows)
+    tries = [_level(rows)]
+    smooth = len(rows) == 1 and rows[0].is_smooth()
+    if smooth:
+        tries.append(lower + rows[0].total(_Stack.sideways))
+    elif _is_one_section(scene):
+        (section,) = sections(scene)
+        tries.append(section.depth_mm * straight(section, scene.size_mm[2], permittivity))
     upper = min(tries)
     if upper < lower * (1 - _ROUNDING):
         raise ArithmeticError(f"bounds in the wrong order, {lower} above {upper}: this is a fault of the model")
     return Interval(lower, max(lower, upper)).times(EPS0_F_PER_M * M_PER_MM)
+
+
+def _is_one_section(scene: Scene) -> bool:
+    found = parts(scene)
+    return len(found) == 1 and not found[0].in_plan
+
+
+def _level(rows: Sequence["_Row"]) -> float:
+    r"""Energy of the best potential that depends on the height alone, over eps0 [mm]; infinite where there is none.
+
+    .. math:: C = \varepsilon_0 \left(\sum_k \frac{t_k^2}{\int_k \varepsilon_r dV}\right)^{-1}
+
+    over slabs k of thickness t between the heights at which an interface begins or ends: in each, u rises evenly.
+    """
+    stacks = [stack for row in rows for stack in row.stacks.values()]
+    floor, roof = max(s.heights_mm[0].max() for s in stacks), min(s.heights_mm[-1].min() for s in stacks)
+    if floor >= roof:
+        return inf
+    heights = np.unique(np.concatenate([s.heights_mm.ravel() for s in stacks]).clip(floor, roof))
+    levels = heights[np.append(np.diff(heights) > ROUNDING_MM, True)]
+    masses = sum(row.total(lambda stack: stack.between(levels)) for row in rows)
+    return float(1 / (np.diff(levels) ** 2 / masses).sum())
 
 
 @dataclass(frozen=True)
@@ -134,10 +155,6 @@ class _Stack:
         steps = np.diff(self.heights_mm, axis=0) / self.eps[:, None]
         return np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
 
-    def gap_mm(self) -> float:
-        """Smallest distance of the electrodes [mm]."""
-        return float((self.heights_mm[-1] - self.heights_mm[0]).min())
-
     def upright(self) -> float:
         """Capacitance of vertical flux per depth, over eps0 [-]: the integral of dx / s, s linear in x."""
         left, right = self.reduced_mm()[-1]
@@ -162,10 +179,10 @@ class _Stack:
         energy = eps * (steady**2 * t - steady * rising * t**2 + rising**2 * t**3 / 3)
         return float(self.width_mm * (energy.sum(0) @ weight))
 
-    def within(self, gap_mm: float) -> float:
-        """Energy of a potential that rises evenly within ``gap_mm`` above the bottom, per depth and over eps0 [-]."""
-        areas = [self.width_mm * _mean_min(h, gap_mm) for h in (self.heights_mm - self.heights_mm[0])]
-        return float(np.diff(areas) @ self.eps / gap_mm**2)
+    def between(self, levels_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Area times permittivity between every two neighbouring levels, from the first to the last [mm2]."""
+        areas = np.array([np.diff(_mean_min(line, levels_mm)) for line in self.heights_mm])
+        return self.width_mm * (self.eps @ np.diff(areas, axis=0))
 
     def potential(self, side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Heights of the interfaces at one side [mm], and the column potential there [V]."""
@@ -175,39 +192,38 @@ class _Stack:
 
 @dataclass(frozen=True)
 class _Row:
-    """The stacks of a section, those that look alike once: ``names`` tells which stands where, from left to right."""
+    """The stacks of a part, those that look alike once: ``names`` tells which stands where."""
 
-    names: list[int]
+    depth_mm: float
+    names: tuple[int, ...]
     stacks: dict[int, _Stack]
+    in_plan: bool
 
     @classmethod
-    def of(cls, section: Section, permittivity: Mapping[str, float]) -> "_Row":
-        return cls(alike(section), {name: _stack(c, permittivity) for name, c in _distinct(section).items()})
+    def of(cls, part: Part, permittivity: Mapping[str, float]) -> "_Row":
+        stacks = {name: _stack(c, permittivity) for name, c in _distinct(part).items()}
+        return cls(part.depth_mm, part.looks, stacks, part.in_plan)
 
-    def total(self, energy: Callable[[_Stack], float]) -> float:
-        """Sum of an energy over all stacks."""
-        return sum(times * energy(self.stacks[name]) for name, times in Counter(self.names).items())
+    def total(self, energy: Callable[[_Stack], Any]) -> Any:
+        """Sum of an energy per depth over all stacks, times the depth."""
+        return self.depth_mm * sum(times * energy(self.stacks[name]) for name, times in Counter(self.names).items())
 
     def is_smooth(self) -> bool:
         """Whether the columns' own potentials agree along all lines between them."""
-        return all(_meet(self.stacks[a], self.stacks[b]) for a, b in set(pairwise(self.names)))
+        pairs = combinations(self.stacks, 2) if self.in_plan else set(pairwise(self.names))
+        return all(_meet(self.stacks[a], self.stacks[b]) for a, b in pairs)
 
 
-def _distinct(section: Section) -> dict[int, Column]:
-    """The columns of a section, the first of each look, by their number."""
-    every = cut_columns(section)
-    return {k: every[k] for k in dict.fromkeys(alike(section))}
+def _distinct(part: Part) -> dict[int, Column]:
+    """The columns of a part, the first of each look, by their number."""
+    return {k: part.columns[k] for k in dict.fromkeys(part.looks)}
 
 
-def _mean_min(ends: NDArray[np.float64], limit: float) -> float:
-    """Mean of min(h, limit) for h running straight between two values."""
-    low, high = sorted(float(e) for e in ends)
-    if high <= limit:
-        return (low + high) / 2
-    if low >= limit:
-        return limit
-    share = (limit - low) / (high - low)
-    return share * (low + limit) / 2 + (1 - share) * limit
+def _mean_min(ends: NDArray[np.float64], limits: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean of min(h, limit) for h running straight between two values, for each limit."""
+    low, high = ends.min(), ends.max()
+    within = np.clip(limits, low, high)
+    return np.minimum(limits, within) - ((within - low) ** 2 / (2 * (high - low)) if high > low else 0.0)
 
 
 def _graded(left: float, right: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

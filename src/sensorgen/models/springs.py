@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.errors import OutOfRange
+from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.planview import Part, parts
 from sensorgen.scene import Scene
-from sensorgen.sections import columns, sections
 from sensorgen.units import M_PER_MM
 
 SOURCE = "Hooke's law, column by column; plane strain, E / (1 - nu^2)"
@@ -23,7 +23,7 @@ Real = NDArray[np.float64]
 
 
 def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Sequence[float]) -> Real:
-    r"""How far a stiff plate on a prismatic scene comes down.
+    r"""How far a stiff plate on a scene comes down.
 
     .. math:: \sigma = \frac{1}{L} \int \frac{\max(\delta - g, 0)}{\sum_k t_k / M_k} dx
 
@@ -32,7 +32,7 @@ def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Seq
     Parameters
     ----------
     scene : Scene
-        Prismatic, its support gone.
+        That has columns, its support gone.
     modulus_pa : mapping of str to float
         M of each material, as E / (1 - nu^2) [Pa].
     stress_pa : sequence of float
@@ -45,6 +45,8 @@ def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Seq
 
     Raises
     ------
+    BadInput
+        No column of the scene has layers of one height.
     OutOfRange
         A stress is below 0, or would press a column flat.
 
@@ -71,12 +73,19 @@ def _stress(moved: Real, gap: Real, yielding: Real, width: Real) -> Real:
     return np.asarray(share @ width / width.sum())
 
 
+def _parts(scene: Scene) -> list[Part]:
+    try:
+        return parts(scene)
+    except ValueError as error:
+        raise BadInput(f"no springs of columns: {error}") from None
+
+
 def _columns(scene: Scene, modulus_pa: Mapping[str, float]) -> tuple[Real, Real, Real, float]:
     """Gap [m], yielding t / M [m/Pa] and width [m] at places in all columns, and the least sum of thicknesses [m]."""
     share = _PLACES
     rows = []
-    for section in sections(scene):
-        for column in columns(section):
+    for part in _parts(scene):
+        for column in part.columns:
             bottoms, tops = (
                 np.array([getattr(layer, key) for layer in column.layers]) @ np.array([1 - share, share])
                 for key in ("bottom_mm", "top_mm")
@@ -84,7 +93,7 @@ def _columns(scene: Scene, modulus_pa: Mapping[str, float]) -> tuple[Real, Real,
             solid = tops - bottoms
             gap = np.maximum(bottoms[1:] - tops[:-1], 0.0).sum(axis=0)
             moduli = np.array([modulus_pa[layer.body.material] for layer in column.layers])
-            weight = np.full(len(share), (column.right_mm - column.left_mm) * section.depth_mm)
+            weight = np.full(len(share), (column.right_mm - column.left_mm) * part.depth_mm)
             rows.append(np.array([gap, (solid / moduli[:, None]).sum(axis=0), weight, solid.sum(axis=0)]))
     gap, yielding, weight, solid = np.concatenate(rows, axis=1)
     return gap * M_PER_MM, yielding * M_PER_MM, weight, float((gap + solid).min() * M_PER_MM)
