@@ -105,12 +105,7 @@ def cell(section: Section, height_mm: float) -> Cell:
     ValueError
         Outlines overlap, or an outline is open.
     """
-    return mirrored(section_slices(section, height_mm))
-
-
-def section_slices(section: Section, height_mm: float) -> list[Slice]:
-    """The whole section in strips, air included; raises ValueError where outlines overlap."""
-    return [_slice(c, height_mm) for c in columns(section)]
+    return mirrored([_slice(column, height_mm) for column in columns(section)])
 
 
 def mirrored(slices: list[Slice]) -> Cell:
