@@ -34,9 +34,7 @@ def registered(monkeypatch):
 
 
 def table(force=FORCE, position=POSITION, extra=()):
-    z = usual(make(PLAIN)).sensor.impedance(
-        np.array(list(TONES.values())), force[:, None], position[:, None] * 1e-3
-    )
+    z = usual(make(PLAIN)).sensor.impedance(np.array(list(TONES.values())), force[:, None], position[:, None] * 1e-3)
     names = [f"{part}_ohm_{tone}" for tone in TONES for part in ("re", "im")]
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
