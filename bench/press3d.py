@@ -28,8 +28,15 @@ EPS = {"x60": 4.68, "air": 1.00059}
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
 LOADS = (0.0, 5e4, 1e5)
 FEET = (0.0, 1e4, 2e4, 5e4, 1e5)
+NARROW = tuple(np.linspace(0.0, 3e5, 7).tolist())
 RECT_M2 = 4e-6  # of a whole cell of rect
-SHRINK = 0.4  # of pieces towards planes of the cog [-]
+BOUNDS = ("lower_f_per_m2", "upper_f_per_m2")
+HELD = {  # base, period, top
+    "bonded": ("bonded", "fixed", "even"),
+    "bonded, stiff top": ("bonded", "fixed", "rigid"),
+    "base sliding": ("sliding", "fixed", "even"),
+    "base sliding, sides free": ("sliding", "free", "even"),
+}
 COLOURS = {"x60": "#0072b2", "etpu": "0.45"}
 
 
@@ -92,11 +99,21 @@ def strips(film_mm, pieces, loads, base="bonded", period="fixed", top="even"):
 
 @kept
 def feet(name, contact, pieces):
-    """A cog pressed by bricks, or by the plane model for no pieces."""
+    """A cog pressed by bricks, or by the plane model on a fine mesh for no pieces."""
     held = Held(contact=contact)
     if not pieces:
-        return press2d.press(press2d.cell(SCENES[name], 2.0), SOLIDS, FEET, EPS, held)
-    return press3d.press(press3d.cell(SCENES[name]), SOLIDS, FEET, EPS, held, Pieces(pieces, SHRINK))
+        finest = press2d.Fineness().finer().finer()
+        return press2d.press(press2d.cell(SCENES[name], 2.0), SOLIDS, FEET, EPS, held, finest)
+    return press3d.press(press3d.cell(SCENES[name]), SOLIDS, FEET, EPS, held, Pieces(pieces))
+
+
+@kept
+def narrow(pieces):
+    """Rect with gaps of 0.02 mm, its strips 0.98 mm wide, X60 of 1 MPa: its gaps close."""
+    widths = {"air_width_mm": 0.02, "etpu_width_mm": 0.98, "x60_width_mm": 0.98}
+    cell = press3d.cell(make({"shape": "rect", "parameters": {"dielectric_mm": 0.1} | widths}).in_use)
+    soft = SOLIDS | {"x60": Elastic(1e6, 0.4999)}
+    return press3d.press(cell, soft, list(NARROW), EPS, Held(), Pieces(pieces))
 
 
 def rises(data, side):
@@ -117,30 +134,39 @@ def mesh_table():
         solid = int((rect(film).fill > 0).sum())
         found = {n: strips(film, n, len(LOADS)) for n in (2, 3, 4)}
         for n, data in found.items():
-            rise = [f"{rises(data, side)[-1]:.3%}" for side in ("lower_f_per_m2", "upper_f_per_m2")]
-            bounds = [f"{data[side][0] * RECT_M2 * 1e12:.4f}" for side in ("lower_f_per_m2", "upper_f_per_m2")]
+            rise = [f"{rises(data, side)[-1]:.3%}" for side in BOUNDS]
+            bounds = [f"{data[side][0] * RECT_M2 * 1e12:.4f}" for side in BOUNDS]
             yield (
                 f"| {film} | {n} | {solid * n**3} | {data['displacement_um'][-1]:.3f} | {', '.join(rise)} "
                 f"| {' to '.join(bounds)} | {data['seconds']:.0f} |"
             )
         moved = limit(*(d["displacement_um"][-1] for d in found.values()))
-        ends = [limit(*(rises(d, side)[-1] for d in found.values())) for side in ("lower_f_per_m2", "upper_f_per_m2")]
+        ends = [limit(*(rises(d, side)[-1] for d in found.values())) for side in BOUNDS]
         yield f"| {film} | limit | | {moved:.3f} | {ends[0]:.3%}, {ends[1]:.3%} | | |"
 
 
 def held_table():
-    yield "\n## Rect, film 0.1 mm, 2 pieces, 100 kPa: how it is held\n"
-    yield "| held | displacement [um] | rise of C |"
+    yield "\n## Rect, 100 kPa: how it is held\n"
+    yield "| film [mm] | held | pieces | displacement [um] | rise of C | over bonded |"
+    yield "|---|---|---|---|---|---|"
+    for film, pieces in ((0.1, 2), (0.1, 3), (0.2, 2)):
+        bonded = None
+        for name, held in HELD.items():
+            data = strips(film, pieces, len(LOADS), *held)
+            rise = np.mean([rises(data, side)[-1] for side in BOUNDS])
+            bonded = bonded or rise
+            moved = f"{data['displacement_um'][-1]:.2f}"
+            yield f"| {film} | {name} | {pieces} | {moved} | {rise:.3%} | {rise / bonded - 1:+.1%} |"
+
+
+def narrow_table():
+    yield "\n## Rect with gaps of 0.02 mm, X60 of 1 MPa, 2 pieces\n"
+    yield "| stress [kPa] | displacement [um] | rise of C |"
     yield "|---|---|---|"
-    for name, held in {
-        "bonded": ("bonded", "fixed", "even"),
-        "bonded, stiff top": ("bonded", "fixed", "rigid"),
-        "base sliding": ("sliding", "fixed", "even"),
-        "base sliding, sides free": ("sliding", "free", "even"),
-    }.items():
-        data = strips(0.1, 2, len(LOADS), *held)
-        rise = np.mean([rises(data, side)[-1] for side in ("lower_f_per_m2", "upper_f_per_m2")])
-        yield f"| {name} | {data['displacement_um'][-1]:.2f} | {rise:.3%} |"
+    data = narrow(2)
+    grown = middles(data) / middles(data)[0] - 1
+    for stress, moved, rise in list(zip(NARROW, data["displacement_um"], grown, strict=True))[1:]:
+        yield f"| {stress / 1e3:g} | {moved:.2f} | {said(rise, '.2%')} |"
 
 
 def middles(data):
@@ -155,8 +181,8 @@ def feet_table():
     solved = (
         ("cog", "frictionless", 2),
         ("cog", "frictionless", 3),
-        ("block", "frictionless", 2),
-        ("block", "stick", 2),
+        ("block", "frictionless", 3),
+        ("block", "stick", 3),
     )
     for name, contact, pieces in solved:
         plane, data = feet(name, contact, 0), feet(name, contact, pieces)
@@ -168,7 +194,7 @@ def feet_table():
                 f"| {said(c * 1e9, '.3f')} | {said(c / flat - 1, '+.2%')} |"
             )
     yield "\nSticking lowers the block by, at each stress (bricks, plane model):\n"
-    for pieces in (2, 0):
+    for pieces in (3, 0):
         slips, sticks = (
             np.array(feet("block", how, pieces)["displacement_um"][1:]) for how in ("frictionless", "stick")
         )
@@ -214,9 +240,9 @@ def picture(name, cell, stress, pieces, enlarged):
 
 def main():
     lines = ["# Boxes under pressure", "", "Made by `bench/press3d.py`.", ""]
-    picture("feet", press3d.cell(SCENES["cog"]), FEET, Pieces(2, SHRINK), 1)
+    picture("feet", press3d.cell(SCENES["cog"]), FEET, Pieces(2), 1)
     picture("rect", rect(), (0.0, 1e5), Pieces(2), 10)
-    for table in (mesh_table, feet_table, held_table):
+    for table in (mesh_table, feet_table, held_table, narrow_table):
         lines += table()
     (HERE / "results" / "press3d.md").write_text("\n".join(lines) + "\n")
 
