@@ -90,17 +90,25 @@ def _resistances(found: Comparison) -> Iterator[Kind]:
 
 
 def _along(middles: Sequence[float]) -> Model:
-    return lambda parameter, value: np.log(
-        [along_ohm(r * (value if parameter == "rho" else 1.0), value if parameter == "leak" else 0.0) for r in middles]
-    ).astype(complex)
+    return _of_electrodes(
+        middles,
+        lambda ohm, parameter, value: along_ohm(
+            ohm * (value if parameter == "rho" else 1.0), value if parameter == "leak" else 0.0
+        ),
+    )
 
 
 def _across(middles: Sequence[float]) -> Model:
-    def model(parameter: str, value: float) -> Complex:
-        leak = value if parameter == "leak" else 0.0
-        return np.log([min(across_ohm(r, leak), INTACT_OHM) for r in middles]).astype(complex)
+    return _of_electrodes(
+        middles,
+        lambda ohm, parameter, value: min(across_ohm(ohm, value if parameter == "leak" else 0.0), INTACT_OHM),
+    )
 
-    return model
+
+def _of_electrodes(middles: Sequence[float], law: Callable[[float, str, float], float]) -> Model:
+    """What a law makes of all electrodes, once for those that are alike: many readings are of few designs."""
+    distinct, of = np.unique(middles, return_inverse=True)
+    return lambda parameter, value: np.log([complex(law(ohm, parameter, value)) for ohm in distinct.tolist()])[of]
 
 
 def _impedances(found: Comparison, recorded: Sequence[Run]) -> Iterator[Kind]:
