@@ -276,7 +276,7 @@ class Problem:
         return state if inside_out else replace(state, u_m=u, inner=inner)
 
     def stepped(self, state: State, pressure_pa: float, before: State | None = None) -> State | None:
-        """Press on to a pressure: solve, look for the partners anew and solve again, until they stay or often enough."""
+        """Press on to a pressure: solve, look for partners anew and solve again, until they stay or often enough."""
         first = self.newton(self.ahead(state, before or state, pressure_pa), pressure_pa, state.pairs, _NEARLY)
         if first is None:
             first = self.newton(state, pressure_pa, state.pairs, _NEARLY) if before else None
