@@ -16,8 +16,11 @@ from matplotlib import pyplot as plt
 
 from sensorgen.design import make
 from sensorgen.models import press2d, springs
+from sensorgen.models._press import cell as cells
 from sensorgen.models.compression import bonded
 from sensorgen.models.press2d import Elastic, Fineness, Held
+from sensorgen.scene import Body, Prism, Scene, rectangle
+from sensorgen.sections import columns, sections
 
 HERE = Path(__file__).parent
 PICTURES = HERE.parent / "docs" / "pictures"
@@ -321,9 +324,76 @@ def shapes_picture():
     figure.savefig(PICTURES / "press-shapes.png", dpi=130)
 
 
+def between_plates(high, left, right, *outlines):
+    """Outlines of X60 between plates of eTPU 0.3 mm thick, ``high`` mm apart; mirrors at the ends."""
+    wide, top = 4.0, 0.3 + high
+    bodies = (
+        Body("bottom_electrode", "etpu", (Prism("y", rectangle(0, wide, 0, 0.3), 0.0, 10.0),), "bottom"),
+        Body("shape", "x60", tuple(Prism("y", tuple(o), 0.0, 10.0) for o in outlines)),
+        Body("top_electrode", "etpu", (Prism("y", rectangle(0, wide, top, top + 0.3), 0.0, 10.0),), "top"),
+    )
+    return cells._cell(columns(sections(Scene(bodies, (wide, 10.0, top + 0.3)))[0]), left, right, mirrored=True)
+
+
+def pillars(gap, count, high=0.5):
+    """Half a pillar 0.45 mm wide before a mirror, or two halves ``gap`` apart."""
+    period = 0.45 + gap
+    bars = [rectangle(k * period + gap / 2, (k + 1) * period - gap / 2, 0.3, 0.3 + high) for k in range(3)]
+    return between_plates(high, 0.5 * period, (0.5 + count / 2) * period, *bars)
+
+
+def mushroom():
+    """Half a stem with a brim, whose underside comes down on a post."""
+    parts = ((0, 0.25, 0, 0.4), (0, 0.6, 0.4, 0.6), (0.45, 0.8, 0, 0.35))
+    halves = [rectangle(a, b, 0.3 + c, 0.3 + d) for a, b, c, d in parts]
+    return between_plates(0.6, 0.0, 1.0, *halves)
+
+
+def upright_table():
+    """Pillars that bulge into each other, and the picture of these and of a mushroom."""
+    stress = np.linspace(0, 4e5, 9)
+    yield "\n## Upright faces (pillars of X60, E 1 MPa, 0.45 mm wide, 0.5 high and 0.05 apart, bonded)\n"
+    yield "| stress [kPa] | two pillars [um] | one before a mirror [um] | finer mesh [um] | 0.3 mm apart [um] |"
+    yield "|---|---|---|---|---|"
+    cases = ((pillars(0.05, 2), Fineness()), (pillars(0.05, 1), Fineness()), (pillars(0.05, 1), Fineness().finer()))
+    solved = [press2d._solved(c, solids(x60=1e6), stress, Held(), f, lambda _: None) for c, f in cases]
+    apart = once(pillars(0.3, 1), solids(x60=1e6), stress, Fineness())
+    for k in range(1, len(stress)):
+        moved = [f.displacement_m[k] * 1e6 for f in (*(found for found, _ in solved), apart)]
+        yield f"| {stress[k] / 1e3:g} | " + " | ".join(f"{u:.2f}" for u in moved) + " |"
+    brim = press2d._solved(mushroom(), solids(x60=1e6), np.linspace(0, 1.6e5, 9), Held(), Fineness(), lambda _: None)
+    figure, axes = plt.subplots(1, 4, figsize=(9, 3.9), layout="constrained", sharey=True)
+    for ax, (run, k) in zip(axes, ((solved[0][1], 2), (solved[0][1], -1), (brim[1], 2), (brim[1], -1)), strict=True):
+        draw_pressed(ax, run, run.states[k])
+    axes[0].set(ylabel="height [mm]")
+    figure.savefig(PICTURES / "press-upright.png", dpi=130)
+
+
+def draw_pressed(ax, run, state):
+    """Triangles as they lie, the softest solid blue, faces orange."""
+    places = run.problem.places(state.u_m) * 1e3
+    softest = run.problem.elements.law.mu_pa.min()
+    rubber = run.problem.elements.law.mu_pa == softest
+    for corners, soft in zip(run.mesh.triangles[:, [0, 3, 1, 4, 2, 5]], rubber, strict=True):
+        ax.fill(*places[corners].T, fc="#cfe3f5" if soft else "0.9", ec="0.7", lw=0.2)
+    for side in run.faces.sides[:, [0, 2, 1]]:
+        ax.plot(*places[side].T, color=ORANGE, lw=1)
+    ax.set(aspect="equal", xlabel="x [mm]", title=f"{state.pressure_pa / 1e3:g} kPa")
+    ax.locator_params(axis="x", nbins=3)
+
+
 def main():
     lines = ["# Cells under pressure", "", "Made by `bench/press.py`.", ""]
-    for table in (reference_table, mesh_table, method_tables, moduli_table, angles_table, far_table, rungs_table):
+    for table in (
+        reference_table,
+        mesh_table,
+        method_tables,
+        moduli_table,
+        angles_table,
+        upright_table,
+        far_table,
+        rungs_table,
+    ):
         lines += table()
     (HERE / "results" / "press.md").write_text("\n".join(lines) + "\n")
     for picture in (locking_picture, shapes_picture):

@@ -23,7 +23,7 @@ _ENOUGH = 1e-6  # residual over load
 _NEARLY = 1e-3  # the same before the contact partners are looked for anew
 _STILL = 1e-10  # a step so much shorter than the way is rounding: nu near 1/2 turns it into forces
 _MOST_STEPS = 15
-_MOST_TURNS = 6  # of looking for partners anew within one load step
+_MOST_TURNS = 4  # of looking for partners anew within one load step
 _SETTLED = 0.05  # over the length of a side: depths that old and new partners see, where the partners stay [-]
 _LEAST_J = 0.05  # a step may not squeeze a triangle below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
@@ -278,7 +278,7 @@ class Problem:
         return state if inside_out else replace(state, u_m=u, inner=inner)
 
     def stepped(self, state: State, pressure_pa: float, before: State | None = None) -> State | None:
-        """Press on to a pressure: solve, look for the partners anew, and solve again, until they stay."""
+        """Press on to a pressure: solve, look for partners anew and solve again, until they stay or often enough."""
         first = self.newton(self.ahead(state, before or state, pressure_pa), pressure_pa, state.pairs, _NEARLY)
         if first is None:
             first = self.newton(state, pressure_pa, state.pairs, _NEARLY) if before else None
@@ -290,10 +290,10 @@ class Problem:
             again = self.newton(found, pressure_pa, pairs, _ENOUGH)
             if again is None:
                 return None
-            found, used, pairs = again, pairs, self.project(again.u_m, held)
-            if self._apart(used, pairs, found.u_m) < _SETTLED:
-                return found if self.sound is None or self.sound(self.places(found.u_m)) else None
-        return None
+            found, pairs = again, self.project(again.u_m, held)
+            if self._apart(found.pairs, pairs, found.u_m) < _SETTLED:
+                break
+        return found if self.sound is None or self.sound(self.places(found.u_m)) else None
 
     def _apart(self, one: Pairs, other: Pairs, u: Real) -> float:
         """By how much the depths differ that two choices of partners see, over the length of a side [-]."""
