@@ -41,7 +41,7 @@ COST = 2
 __all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "curve_of", "press", "unfit"]
 
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
-_FIELD_GROWTH = 0.5  # of the triangles of the capacitance's mesh, per distance [-]
+_FIELD_GROWTH = 0.2  # of the triangles of the capacitance's mesh, per distance [-]
 _MISFIT = 1e-3  # of a solid's area: gaps that were closed in the wrong place change more [-]
 _COARSER = (3, 9)  # times the size of the triangles at an apex, where the finer ones do not converge [-]
 
