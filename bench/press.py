@@ -19,7 +19,7 @@ from sensorgen.models import press2d, springs
 from sensorgen.models._press import cell as cells
 from sensorgen.models.compression import bonded
 from sensorgen.models.press2d import Elastic, Fineness, Held
-from sensorgen.scene import Body, Prism, Scene, rectangle
+from sensorgen.scene import Body, Prism, Scene, box, rectangle
 from sensorgen.sections import columns, sections
 
 HERE = Path(__file__).parent
@@ -102,6 +102,79 @@ def mesh_table():
     for growth in (0.35, 0.25):
         yield moved(f"growth {growth:g}", solids(), Fineness(growth=growth))
     yield moved("finer in all but the apex", solids(), Fineness(1e-3, 0.025, 0.075, 0.25))
+
+
+def stairs(lift_mm=0.0):
+    """Feet of two printed layers on a film of 0.1 mm; lifted they fall onto it and slip."""
+    bars = [
+        box(c - w, c + w, 0, 8, 0.4 + lift_mm + z, 0.5 + lift_mm + z)
+        for c in (0.5, 2.5)
+        for w, z in ((0.2, 0.0), (0.3, 0.1))
+    ]
+    roof = 0.6 + lift_mm
+    bodies = (
+        Body("bottom_electrode", "etpu", (box(0, 4, 0, 8, 0, 0.3),), "bottom"),
+        Body("film", "x60", (box(0, 4, 0, 8, 0.3, 0.4),)),
+        Body("feet", "x60", tuple(bars)),
+        Body("top_electrode", "etpu", (box(0, 4, 0, 8, roof, roof + 0.3),), "top"),
+    )
+    return press2d.cell(Scene(bodies, (4.0, 8.0, roof + 0.3)), 2.0)
+
+
+CELLS = {
+    "tri, film 0.1 mm": lambda: tri(0.1)[1],
+    "tri, film 0.2 mm": lambda: tri(0.2)[1],
+    "stairs, bonded": stairs,
+    "stairs, loose": lambda: stairs(0.02),
+}
+
+
+def off(found, other):
+    """Largest difference in displacement, less the fall, and in the rise of C, at the loads that both know."""
+    n = min(len(found.stress_pa), len(other.stress_pa))
+    u = [(f.displacement_m[1:n] - f.fall_m) for f in (found, other)]
+    c = [rise(f)[1:n] for f in (found, other)]
+    known = np.isfinite(c[0] / c[1])
+    return np.abs(u[0] / u[1] - 1).max(), np.abs(c[0] / c[1] - 1)[known].max(), int(known.sum())
+
+
+def fineness_table():
+    """Errors over the fineness, against the finest."""
+    yield "\n## Fineness (10 loads to 100 kPa; off at most, against 0.35 times the sizes)\n"
+    yield "| cell | sizes times | displacement off by | rise of C off by | loads with C | seconds | said |"
+    yield "|---|---|---|---|---|---|---|"
+    for name, made in CELLS.items():
+        finest = once(made(), solids(), STRESSES, Fineness().scaled(0.35), EPS)
+        for factor in (3, 2, 1.5, 1, 0.7, 0.5):
+            start = time.process_time()
+            found = once(made(), solids(), STRESSES, Fineness().scaled(factor), EPS)
+            seconds = time.process_time() - start
+            u, c, known = off(found, finest)
+            yield f"| {name} | {factor} | {u:.2%} | {c:.2%} | {known} | {seconds:.1f} | {'; '.join(found.faults)} |"
+
+
+def choices_table():
+    """What is not the mesh: penalty, step and apex, each varied."""
+    penalty, step = press2d.penalty_pa, press2d._STEP
+    yield "\n## What is not the mesh (used: penalty 60 E, steps 10 kPa, apex 1 um)\n"
+    yield "| cell | varied | displacement changes by at most | rise of C by at most | said |"
+    yield "|---|---|---|---|---|"
+    for name, made in CELLS.items():
+        used = once(made(), solids(), STRESSES, Fineness(), EPS)
+        for factor in (0.5, 2):
+            press2d.penalty_pa = lambda softest_pa, factor=factor: factor * penalty(softest_pa)
+            yield changed_row(name, f"penalty {60 * factor:g} E", made(), used, Fineness())
+            press2d.penalty_pa, press2d._STEP = penalty, step * factor / 4
+            yield changed_row(name, f"steps {10 * factor:g} kPa", made(), used, Fineness())
+            press2d._STEP = step
+            if name.startswith("tri"):
+                yield changed_row(name, f"apex {factor:g} um", made(), used, Fineness(factor * 1e-3))
+
+
+def changed_row(name, varied, cell, used, fineness):
+    found = once(cell, solids(), STRESSES, fineness, EPS)
+    u, c, _ = off(found, used)
+    return f"| {name} | {varied} | {u:.2%} | {c:.2%} | {'; '.join(found.faults)} |"
 
 
 def method_tables():
@@ -385,14 +458,8 @@ def draw_pressed(ax, run, state):
 def main():
     lines = ["# Cells under pressure", "", "Made by `bench/press.py`.", ""]
     for table in (
-        reference_table,
-        mesh_table,
-        method_tables,
-        moduli_table,
-        angles_table,
-        upright_table,
-        far_table,
-        rungs_table,
+        *(reference_table, mesh_table, fineness_table, choices_table, method_tables),
+        *(moduli_table, angles_table, upright_table, far_table, rungs_table),
     ):
         lines += table()
     (HERE / "results" / "press.md").write_text("\n".join(lines) + "\n")

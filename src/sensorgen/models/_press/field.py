@@ -89,7 +89,7 @@ def _meshed(cell: Cell, air: int, coarse_mm: float, growth: float) -> Mesh:
             cut[wedge.first[-1], wedge.second[-1]] = (-number, air)
     _refuse_outside(cell)
     _refuse_crossings(np.array([edge for edge, sides in edges.items() if air in sides]).reshape(-1, 2, 2))
-    net = triangulated(cut, coarse_mm, growth, rounds=1)
+    net = triangulated(cut, coarse_mm, growth, quick=True)
     new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
     corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])
     _refuse_holes(edges, net.points_m[corners])
