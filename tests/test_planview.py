@@ -116,7 +116,10 @@ def test_boxes_whose_sides_are_told_otherwise_are_the_same_boxes():
 
 
 def test_what_lies_beyond_the_sensor_or_under_nothing_is_told():
-    (part,) = parts(replace(scene(upright("pillar", regular(8, 0.5, (4.0, 1.5)), 0.3, 1.0)), size_mm=(5.0, 3.0, 2.0)))
+    amid, beyond = (
+        upright(n, regular(8, 0.5, at), 0.3, 1.0) for n, at in (("pillar", (4.0, 1.5)), ("far", (2.0, 4.0)))
+    )
+    (part,) = parts(replace(scene(amid, beyond), size_mm=(5.0, 3.0, 2.0)))
     looks = {tuple(layer.body.name for layer in c.layers): c.right_mm for c in part.columns}
     assert looks["pillar",] == pytest.approx(looks["floor", "pillar"], rel=1e-10)
     assert looks[()] == pytest.approx(3.0 - looks["pillar",], rel=1e-10)

@@ -154,6 +154,13 @@ def test_springs_of_pillars_give_way_by_what_stands():
     assert moved.tolist() == close([0.0, exact], 1e-9)
 
 
+def test_springs_of_a_box_told_as_a_polygon_are_the_same_springs():
+    """From sections of two depths, and from the plan."""
+    scenes = pillars(square(0.2)), pillars(with_one_corner_more(square(0.2)))
+    boxes, told = (displacement_m(scene, {"x60": 6e6, "etpu": 12e6}, [1e2, 1e3]) for scene in scenes)
+    assert told.tolist() == close(boxes.tolist(), 1e-12)
+
+
 def test_springs_of_what_has_no_columns_say_so():
     wedge = Body("wedge", "x60", (Prism("y", ((0.0, 0.5), (0.2, 0.5), (0.1, 0.8)), 0.0, 2.0),))
     scene = pillars(regular(8, 0.8))

@@ -8,7 +8,7 @@ the columns' own potential where it has no jumps, and the best potential that de
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import pairwise
 from math import inf
 from typing import Any
 
@@ -197,12 +197,11 @@ class _Row:
     depth_mm: float
     names: tuple[int, ...]
     stacks: dict[int, _Stack]
-    in_plan: bool
 
     @classmethod
     def of(cls, part: Part, permittivity: Mapping[str, float]) -> "_Row":
         stacks = {name: _stack(c, permittivity) for name, c in _distinct(part).items()}
-        return cls(part.depth_mm, part.looks, stacks, part.in_plan)
+        return cls(part.depth_mm, part.looks, stacks)
 
     def total(self, energy: Callable[[_Stack], Any]) -> Any:
         """Sum of an energy per depth over all stacks, times the depth."""
@@ -210,8 +209,7 @@ class _Row:
 
     def is_smooth(self) -> bool:
         """Whether the columns' own potentials agree along all lines between them."""
-        pairs = combinations(self.stacks, 2) if self.in_plan else set(pairwise(self.names))
-        return all(_meet(self.stacks[a], self.stacks[b]) for a, b in pairs)
+        return all(_meet(self.stacks[a], self.stacks[b]) for a, b in set(pairwise(self.names)))
 
 
 def _distinct(part: Part) -> dict[int, Column]:
