@@ -44,7 +44,7 @@ __all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "curve_
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
 _FIELD_GROWTH = 0.2  # of the triangles of the capacitance's mesh, per distance [-]
 _MISFIT = 1e-3  # of a solid's area: gaps that were closed in the wrong place change more [-]
-_TRIES = ((1, 0.5), (3, 1.0), (9, 1.0))  # times the triangles at an apex and the load steps, where those fail [-]
+_COARSER = (3, 9)  # times the size of the triangles at an apex, where the finer ones do not converge [-]
 
 Real = NDArray[np.float64]
 
@@ -88,14 +88,13 @@ def press(
     check(stress_pa, held)
     told = step or (lambda _: None)
     first, _ = best, run = _solved(cell, solids, stress_pa, held, fineness, told)
-    for coarser, shorter in _TRIES:
+    for factor in _COARSER:
         if not best.faults:
             break
-        tried = replace(fineness, apex_mm=coarser * fineness.apex_mm)
-        again, other = _solved(cell, solids, stress_pa, held, tried, told, _STEP * shorter)
+        coarser = replace(fineness, apex_mm=factor * fineness.apex_mm)
+        again, other = _solved(cell, solids, stress_pa, held, coarser, told)
         if (again.converged_pa, -len(again.faults)) > (best.converged_pa, -len(best.faults)):
-            said = (_coarsened(first, again, tried),) if coarser > 1 else ()
-            best, run = replace(again, doubts=(*again.doubts, *said)), other
+            best, run = replace(again, doubts=(*again.doubts, _coarsened(first, again, coarser))), other
     return _with_fields(best, cell, run, permittivity) if permittivity else best
 
 
@@ -124,7 +123,6 @@ def _solved(
     held: Held,
     fineness: Fineness,
     step: Callable[[float], None],
-    longest: float | None = None,
 ) -> tuple[Pressed, _Run]:
     from sensorgen.models._press import contact, element, load, support
 
@@ -144,7 +142,7 @@ def _solved(
         held.contact == "stick",
         sound=lambda places_m: not faces.crossed(places_m, DEEPEST),
     )
-    found, states = reached(problem, stress_pa, (longest or _STEP) * softest, step, SOURCE)
+    found, states = reached(problem, stress_pa, _STEP * softest, step, SOURCE)
     if not cell.mirrored:
         said = "mirrors stand at both ends of the period, though it is not its own mirror image"
         found = replace(found, doubts=(said, *found.doubts))
