@@ -13,6 +13,7 @@ from sensorgen.cli.sheet_command import _press
 from sensorgen.design import make
 from sensorgen.errors import OutOfRange, UnknownName
 from sensorgen.invert.forward import Forward
+from sensorgen.invert.scalar import Scalar
 from sensorgen.materials import own
 from sensorgen.models import compression, line
 from sensorgen.models.pressure import bed, hertz
@@ -124,8 +125,12 @@ def test_all_that_presses_says_the_same():
     """The way back's own forward model, a stack of one film, and a sheet's patch."""
     sensor = replace(PLATE, piezoresistance_per_pa=(K, -K / 4))
     for position in (0.002, 0.05):
-        found = Forward(sensor, TONES).log_impedance(np.array([3.0]), np.array([position]))
-        assert np.exp(found[0]) == pytest.approx(sensor.impedance(TONE, 3.0, position), rel=1e-13)
+        forward, z = Forward(sensor, TONES), sensor.impedance(TONE, 3.0, position)
+        many = np.exp(forward.log_impedance(np.array([3.0]), np.array([position])))[0]
+        one = np.exp(Scalar(forward).log_impedance(3.0, position))
+        for found in (many, one):
+            assert found.real == pytest.approx(z.real, rel=1e-10)
+            assert found.imag == pytest.approx(z.imag, rel=1e-12)
     pressed = stack_of([sensor]).tracks
     assert [track.piezoresistance_per_pa for track in pressed] == [-K / 4, K]  # from the bottom
     patch, per_newton = _press(sensor, 0.005, 2.0)
@@ -201,6 +206,9 @@ def test_the_budget_has_what_sources_disagree_on(top, bottom, ends):
     for measure, part in {"magnitude": np.abs, "re": np.real, "im": np.imag}.items():
         assert found[measure] == pytest.approx(max(abs(part(z(e)) / part(ref) - 1).max() for e in ends), rel=1e-8)
     assert "1/Pa" in terms["piezoresistance"]["what"]
+    sure = design(K, materials=named)  # the user's own value is not doubted
+    terms = budget(sure, sensor_of(sure), TONES, 6.0, 0.05)["terms"]
+    assert "piezoresistance" not in {term["name"] for term in terms}
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
