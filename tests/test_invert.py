@@ -34,7 +34,7 @@ SENSORS = {
     "5 ohm m, tones to 1 MHz": (tri(5.0), TONES * 10),
 }
 EVERYTHING = dataclasses.replace(
-    tri(2.0), tan_delta=0.02, leak_s_per_m=1e-6, piezoresistance_per_n=(0.02, -0.01), far_end=5e4,
+    tri(2.0), tan_delta=0.02, leak_s_per_m=1e-6, piezoresistance_per_pa=(2.4e-6, -1.2e-6), far_end=5e4,
     electrode_m=(3e-4, 5e-4), tip_m=0.012,
 )  # fmt: skip
 # the thesis's plate, Table 3.1, with the mean resistivity of Table C.1

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from sensorgen.design import Design
 from sensorgen.errors import OutOfRange
-from sensorgen.materials import SET, Material
+from sensorgen.materials import PIEZORESISTANCE, SET, Material
 from sensorgen.models.pressure import PROFILES
-from sensorgen.planner import capacitance, permittivities
-from sensorgen.sensing import Sensed
+from sensorgen.planner import Taken, capacitance, permittivities
+from sensorgen.sensing import ENDS, Sensed, piezoresistance
 from sensorgen.sensor import UNIFORM, Sensor
 
 MEASURES = ("magnitude", "re", "im", "by_force")
@@ -182,12 +182,24 @@ def _models(sensed: Sensed, seen: Seen) -> Iterator[Term]:
 def _materials(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:
     """One term for each value that sources disagree on."""
     sensor = sensed.sensor
-    tracks = [_range(*design.slot(f"{end}_electrode"), "resistivity_ohm_m") for end in ("top", "bottom")]
+    tracks = [_range(*design.slot(f"{end}_electrode"), "resistivity_ohm_m") for end in ENDS]
     if any(low < high for low, high in tracks):
         ends = [replace(sensor, resistivity_ohm_m=(a, b)) for a, b in zip(*tracks, strict=True)]
         yield Term("resistivity", f"of the electrodes, {_said(tracks)} ohm m", seen.change(*ends))
+    yield from _piezoresistance(design, sensed, seen)
     yield from _stiffness(design, sensed, seen)
     yield from _permittivity(design, sensed, seen)
+
+
+def _piezoresistance(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:
+    """None where nobody says; a material of which only one of a design's sources speaks may have it in both places."""
+    taken, tracks = piezoresistance(design), []
+    for end in ENDS:
+        material, _ = design.slot(f"{end}_electrode")
+        tracks.append(_among(material, taken.get(end, Taken(material.name, PIEZORESISTANCE, 0.0, ""))))
+    if any(low < high for low, high in tracks):
+        ends = [replace(sensed.sensor, piezoresistance_per_pa=(a, b)) for a, b in zip(*tracks, strict=True)]
+        yield Term("piezoresistance", f"of the electrodes, {_said(tracks)} 1/Pa", seen.change(*ends))
 
 
 def _stiffness(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:
@@ -239,8 +251,13 @@ def _permittivity(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:
 
 def _range(material: Material, source: str, quantity: str) -> tuple[float, float]:
     """Lowest and highest of what its sources say; the user's own value is not doubted."""
-    taken = material.value(quantity, source)
-    plausible = [v.value for v in material.properties[quantity] if not v.implausible]
+    value = material.value(quantity, source)
+    return _among(material, Taken(material.name, quantity, value.value, value.source))
+
+
+def _among(material: Material, taken: Taken) -> tuple[float, float]:
+    """Lowest and highest of a value that is taken and of what all sources say."""
+    plausible = [v.value for v in material.properties.get(taken.quantity, []) if not v.implausible]
     if taken.source == SET:
         plausible = []
     return min([taken.value, *plausible]), max([taken.value, *plausible])

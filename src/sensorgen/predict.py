@@ -21,8 +21,8 @@ from sensorgen.losses import Lost, lost
 from sensorgen.models import line
 from sensorgen.plan import Plan, plain
 from sensorgen.planned import Press
-from sensorgen.planner import Unloaded, Unpredictable, unloaded
-from sensorgen.sensing import TIP_M, Sensed
+from sensorgen.planner import Taken, Unloaded, Unpredictable, unloaded
+from sensorgen.sensing import ENDS, TIP_M, Sensed, piezoresistance
 from sensorgen.sensor import UNIFORM, Sensor
 from sensorgen.units import M_PER_MM, frequency_text
 
@@ -71,6 +71,7 @@ def prediction(
         found, gone = sensed.unloaded if sensed else unloaded(design, accuracy), lost(design)
     except (Unpredictable, MissingValue) as error:
         return {"capacitance_f": None, "reason": str(error)}
+    rises = piezoresistance(design)
     area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
     resistance = _resistance_ohm(design, found)
     return {
@@ -84,13 +85,13 @@ def prediction(
         **(_judged(design, sensed, press, accuracy, noise) if sensed else {}),
         **(_unjudged(why) if why else {}),
         **({"plan": plain(plan)} if plan else {}),
-        "values": [vars(t) for t in (*found.taken, *gone.taken)],
+        "values": [vars(t) for t in (*found.taken, *rises.values(), *gone.taken)],
         "assumptions": [
             "ideal electrodes and no fringe at the sensor's edge for the capacitance",
             "electrode resistance of the plates alone: cogs can only lower it",
             _lossless(gone),
             *gone.doubts,
-            "resistivity under the tip as elsewhere: no source says how it moves with pressure",
+            _pressed(rises),
             "unloaded, as drawn",
         ],
     }
@@ -103,6 +104,18 @@ def _lossless(gone: Lost) -> str:
         if said
         else "no dielectric loss and no leak: the sources give none"
     )
+
+
+def _pressed(rises: Mapping[str, Taken]) -> str:
+    if not rises:
+        return "resistivity under the tip as elsewhere: no source says how it moves with pressure"
+    said = [
+        f"{rises[end].value:g} 1/Pa ({end} electrode, {rises[end].material}, {rises[end].source})"
+        if end in rises
+        else f"not ({end} electrode, no source)"
+        for end in ENDS
+    ]
+    return f"resistivity rises in proportion to the pressure under the tip: {', '.join(said)}"
 
 
 def middle(design: Design, frequency_hz: Sequence[float]) -> Press:
@@ -242,7 +255,9 @@ def check_presses(sensor: Sensor, force_n: ArrayLike, position_m: ArrayLike) -> 
 def _refusal(sensor: Sensor, force_n: float, position_m: float) -> str:
     """Why a press has no answer, "" if it has one."""
     try:
-        sensor.compression.thinning(sensor.stress_pa(force_n, position_m))
+        stress = sensor.stress_pa(force_n, position_m)
+        sensor.compression.thinning(stress)
+        sensor.check_tracks(stress)
     except OutOfRange as error:
         return str(error).partition(": press less")[0]
     return ""

@@ -5,8 +5,9 @@ from math import inf
 
 from sensorgen.celllaw import Law, film, gap_m, law_of, values
 from sensorgen.design import Design
-from sensorgen.errors import BadInput
+from sensorgen.errors import BadInput, MissingValue
 from sensorgen.losses import Lost, lost
+from sensorgen.materials import PIEZORESISTANCE
 from sensorgen.models import pressure
 from sensorgen.planner import Taken, Unloaded, unloaded
 from sensorgen.pressing import Piece, drawn
@@ -14,6 +15,7 @@ from sensorgen.sensor import UNIFORM, Sensor
 from sensorgen.units import M_PER_MM
 
 TIP_M = 0.01  # thesis, Table C.1: L_press
+ENDS = ("top", "bottom")
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,8 @@ class Sensed:
         What its dielectrics lose, as far as the design sets it.
     piece : Piece
         What of it is pressed: as drawn, or as printed.
+    piezoresistance : tuple of Taken
+        How its electrodes' resistivity moves with pressure; empty where nobody says.
     caveats : tuple of str
         What else to know of it.
     """
@@ -41,12 +45,13 @@ class Sensed:
     law: Law
     lost: Lost
     piece: Piece
+    piezoresistance: tuple[Taken, ...] = ()
     caveats: tuple[str, ...] = ()
 
     @property
     def taken(self) -> tuple[Taken, ...]:
         """Material values."""
-        return (*self.unloaded.taken, *self.lost.taken, *self.law.taken)
+        return (*self.unloaded.taken, *self.piezoresistance, *self.lost.taken, *self.law.taken)
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -89,7 +94,7 @@ def sensor_of(
         A radius of a flat tip.
     """
     found, p = known or unloaded(design, accuracy), design.params
-    gone = lost(design)
+    gone, rises = lost(design), piezoresistance(design)
     how = law if isinstance(law, Law) else law_of(design, found.answer, law, printed=printed)
     piece = printed or drawn(design)
     sensor = Sensor(
@@ -104,8 +109,30 @@ def sensor_of(
         contact=None if radius_m is None else _contact(design, how, piece, profile, radius_m),
         tan_delta=gone.tan_delta,
         leak_s_per_m=gone.leak_s / (p.length_mm * M_PER_MM),
+        piezoresistance_per_pa=(_of("top", rises), _of("bottom", rises)),
     )
-    return Sensed(sensor, found, how, gone, piece)
+    return Sensed(sensor, found, how, gone, piece, tuple(rises.values()))
+
+
+def piezoresistance(design: Design) -> dict[str, Taken]:
+    """How resistivity moves with pressure [1/Pa], of the ``ENDS`` whose electrode a value is known for.
+
+    No source that ships gives one: where neither the design nor a source of the user's own does, resistivity is taken
+    to be under the tip as elsewhere.
+    """
+    found = {}
+    for end in ENDS:
+        material, source = design.slot(f"{end}_electrode")
+        try:
+            value = material.value(PIEZORESISTANCE, source)
+        except MissingValue:
+            continue
+        found[end] = Taken(material.name, PIEZORESISTANCE, value.value, value.source)
+    return found
+
+
+def _of(end: str, rises: dict[str, Taken]) -> float:
+    return rises[end].value if end in rises else 0.0
 
 
 def _contact(design: Design, how: Law, piece: Piece, profile: str, radius_m: float) -> pressure.Contact:

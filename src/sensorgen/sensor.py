@@ -70,9 +70,8 @@ class Sensor:
         Loss tangent of the film [-].
     leak_s_per_m : float
         Leak through the film per length, the same under the tip [S/m].
-    piezoresistance_per_n : (float, float)
-        Relative rise of the top and the bottom resistivity under the tip per force, S_n, in proportion to the pressure
-        where that is not uniform [1/N].
+    piezoresistance_per_pa : (float, float)
+        Relative rise of the top and the bottom resistivity per pressure under the tip, of either sign [1/Pa].
     far_end : str or float
         "open", "short", or a resistor [ohm].
     """
@@ -89,7 +88,7 @@ class Sensor:
     pieces: int = PIECES
     tan_delta: float = 0.0
     leak_s_per_m: float = 0.0
-    piezoresistance_per_n: tuple[float, float] = (0.0, 0.0)
+    piezoresistance_per_pa: tuple[float, float] = (0.0, 0.0)
     far_end: str | float = "open"
 
     def __post_init__(self) -> None:
@@ -104,8 +103,7 @@ class Sensor:
 
     def resistance_ohm(self) -> float:
         """Both electrodes together, end to end [ohm]."""
-        per_m = (rho / (h * self.width_m) for rho, h in zip(self.resistivity_ohm_m, self.electrode_m, strict=True))
-        return sum(per_m) * self.length_m
+        return self.track_ohm_per_m()[0] * self.length_m
 
     def capacitance_f(self) -> float:
         """Unloaded, between the electrodes [F]."""
@@ -151,6 +149,22 @@ class Sensor:
             return force / (self.width_m * self.patch(position_m).length_m)
         return self._tip(force, position_m).highest_pa()
 
+    def check_tracks(self, stress_pa: Real) -> None:
+        """Refuse pressures that the electrodes' piezoresistance does not reach to.
+
+        Raises
+        ------
+        OutOfRange
+            The resistivity under the tip would be negative.
+        """
+        for rise in self.piezoresistance_per_pa:
+            at = np.asarray(rise * stress_pa)
+            if rise and at.min(initial=0.0) < -1:
+                raise OutOfRange(
+                    f"the resistivity under the tip would be negative ({rise:g} 1/Pa at {at.min() / rise * 1e-3:.3g} "
+                    "kPa): press less, or set a piezoresistance nearer to 0"
+                )
+
     def line_inputs(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> dict[str, Any]:
         """Inputs of :func:`sensorgen.models.line.impedance` for presses of a uniform tip on this sensor.
 
@@ -164,7 +178,11 @@ class Sensor:
         Raises
         ------
         OutOfRange
-            As :meth:`patch` and the law of compression; a tip whose pressure is not uniform.
+            As :meth:`patch`, :meth:`check_tracks` and the law of compression; a tip whose pressure is not uniform.
+
+        Notes
+        -----
+        The line's S_n, per force (thesis, Eq. B.50), is the piezoresistance over the area that the tip rests on.
         """
         if self.profile != UNIFORM:
             raise OutOfRange(
@@ -172,16 +190,17 @@ class Sensor:
             )
         patch, stress = self.patch(position_m), self.stress_pa(force_n, position_m)
         thinning, slope = self.compression.thinning(stress)
+        self.check_tracks(stress)
         with np.errstate(divide="ignore", invalid="ignore"):
             secant = np.where(thinning == 0, 1 / slope, stress / thinning)
-        return self._tracks() | {
+        return self._tracks(self.width_m * patch.length_m) | {
             "f_Hz": frequency_hz, "F_N": force_n, "E_Pa": secant,
             "x_p_left_edge_m": patch.left_m, "L_p_m": patch.length_m,
         }  # fmt: skip
 
-    def _tracks(self) -> dict[str, Any]:
+    def _tracks(self, area_m2: Real) -> dict[str, Any]:
         (top_m, bottom_m), (top, bottom) = self.electrode_m, self.resistivity_ohm_m
-        s_top, s_bottom = self.piezoresistance_per_n
+        s_top, s_bottom = (rise / area_m2 if rise else 0.0 for rise in self.piezoresistance_per_pa)
         return {
             "L_m": self.length_m, "W_m": self.width_m, "H_top_m": top_m, "H_bottom_m": bottom_m, "rho_top_ohm_m": top,
             "rho_bottom_ohm_m": bottom, "d_m": EPS0_F_PER_M * self.width_m / self.capacitance_f_per_m, "eps_r": 1.0,
@@ -204,18 +223,23 @@ class Sensor:
             self.contact_m(force_n),
         )  # fmt: skip
 
-    def _track(self) -> line_tip.Track:
+    def track_ohm_per_m(self) -> tuple[float, float]:
+        """Both electrodes together, per length: not pressed [ohm/m], and what each pascal adds [ohm/m/Pa]."""
         per_m = [rho / (h * self.width_m) for rho, h in zip(self.resistivity_ohm_m, self.electrode_m, strict=True)]
-        rise = sum(r * s for r, s in zip(per_m, self.piezoresistance_per_n, strict=True))
+        return sum(per_m), sum(r * rise for r, rise in zip(per_m, self.piezoresistance_per_pa, strict=True))
+
+    def _track(self) -> line_tip.Track:
         return line_tip.Track(
-            self.length_m, sum(per_m), rise, self.capacitance_f_per_m, self.tan_delta, self.leak_s_per_m, self.far_end
-        )
+            self.length_m, *self.track_ohm_per_m(), self.capacitance_f_per_m, self.tan_delta, self.leak_s_per_m,
+            self.far_end,
+        )  # fmt: skip
 
     def impedance(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> Complex:
         """Impedance at the contacts [ohm], in the broadcast shape; parameters and errors as :meth:`line_inputs`."""
         if self.profile == UNIFORM:
             return line.impedance(**self.line_inputs(frequency_hz, force_n, position_m))
         tip = self._tip(np.asarray(force_n, float), position_m)
+        self.check_tracks(tip.highest_pa())
         return line_tip.impedance(self._track(), tip, self.compression, np.asarray(frequency_hz, float))
 
     def response(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> Response:
@@ -226,6 +250,7 @@ class Sensor:
         if self.profile == UNIFORM:
             return self._uniform_response(frequency_hz, force_n, position_m)
         tip = self._tip(np.asarray(force_n, float), position_m)
+        self.check_tracks(tip.highest_pa())
         found = line_tip.response(self._track(), tip, self.compression, np.asarray(frequency_hz, float))
         return Response(*found)
 
@@ -233,11 +258,12 @@ class Sensor:
         r"""Of one patch, whose film has the secant modulus E = p/s, with thinning s(p) and p = F/(W l).
 
         The line knows the derivative at constant E; what is missing is (E s' - 1) of the film's part of it, which -E/F
-        times the derivative by E is.
+        times the derivative by E is. Likewise at constant S_n, which falls as a longer patch spreads the pressure.
         """
         inputs, patch = self.line_inputs(frequency_hz, force_n, position_m), self.patch(position_m)
         moves = bool(np.any(patch.length_slope))
-        of = ("F_N", "x_p_left_edge_m", "E_Pa", *(["L_p_m"] if moves else []))
+        soft = [name for name in ("S_n_top_per_N", "S_n_bottom_per_N") if np.any(inputs[name])]
+        of = ("F_N", "x_p_left_edge_m", "E_Pa", *(["L_p_m", *soft] if moves else []))
         z, by = line.sensitivities(of=of, **inputs)
         force, secant = np.asarray(force_n, float), inputs["E_Pa"]
         excess = secant * self.compression.thinning(self.stress_pa(force, position_m))[1] - 1
@@ -245,5 +271,6 @@ class Sensor:
         by_position = by["x_p_left_edge_m"] * patch.left_slope
         if moves:
             by_length = by["L_p_m"] + by["E_Pa"] * (excess * secant / patch.length_m)
+            by_length = by_length - sum(by[name] * inputs[name] for name in soft) / patch.length_m
             by_position = by_position + by_length * patch.length_slope
         return Response(z, by_force, by_position)

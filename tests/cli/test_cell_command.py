@@ -336,6 +336,7 @@ def test_wrong_words(run, words, said):
         ("nu_x60=0.45", "poisson_ratio", 0.45),
         ("rho_x60=1e9", "resistivity_ohm_m", 1e9),
         ("density_x60=1100", "density_kg_m3", 1100),
+        ("piezoresistance_x60=-2e-6", "piezoresistance_per_pa", -2e-6),
         ("material_values.x60.poisson_ratio=0.3", "poisson_ratio", 0.3),
     ],
 )

@@ -32,6 +32,19 @@ def rows_of(text):
     return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(io.StringIO(text))]
 
 
+def test_piezoresistance_in_words_reaches_the_line(run):
+    """S_n is k over the pressed area, 1 cm2."""
+    said = run(
+        "predict", "reference", "--set", "piezoresistance_etpu=2e-6", "--force", "6", "--position", "50", "--json"
+    )
+    data, press = json.loads(said.out), {"F_N": 6.0, "L_p_m": 0.01, "x_p_left_edge_m": 0.045}
+    for f, re, im in zip(data["frequency_hz"], data["re_ohm"], data["im_ohm"], strict=True):
+        z = complex(line.impedance(**PLATE, **press, f_Hz=f, S_n_top_per_N=0.02, S_n_bottom_per_N=0.02))
+        assert (re[0][0], im[0][0]) == close(z)
+    own = {"material": "etpu", "quantity": "piezoresistance_per_pa", "value": 2e-6, "source": "set by the user"}
+    assert own in data["values"]
+
+
 def test_csv_against_the_line(run):
     said = run("predict", "reference", *PRESSES, "--csv")
     assert (said.code, said.err) == (0, "")

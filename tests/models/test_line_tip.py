@@ -16,7 +16,7 @@ from sensorgen.units import EPS0_F_PER_M
 PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), EPS0_F_PER_M * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))
 SOFT = replace(
     PLATE, compression=compression.curve("soft", "made up", [0, 2e4, 5e4, 1e5], [1, 1.1, 1.2, 1.3]),
-    piezoresistance_per_n=(0.01, -0.02), tan_delta=0.01, leak_s_per_m=1e-9,
+    piezoresistance_per_pa=(1e-6, -2e-6), tan_delta=0.01, leak_s_per_m=1e-9,
 )  # fmt: skip
 TONE = np.array(TONES)
 PLACES = [0.0, 0.002, 0.0048, 0.03, 0.0976, 0.1]  # of the tip's centre; its half is 5 mm
@@ -37,8 +37,8 @@ def by_hand(sensor, force, position, f):
         a, b = (mp(left) - mp(low)) / mp(sensor.tip_m), (mp(right) - mp(low)) / mp(sensor.tip_m)
         r = [mp(rho) / (mp(h) * mp(w)) for rho, h in zip(sensor.resistivity_ohm_m, sensor.electrode_m, strict=True)]
 
-        def section(length, weight, thinning):
-            rise = [1 + mp(s) * force * weight for s in sensor.piezoresistance_per_n]
+        def section(length, stress, thinning):
+            rise = [1 + mp(k) * stress for k in sensor.piezoresistance_per_pa]
             c = mp(sensor.capacitance_f_per_m) / (1 - thinning)
             y = sensor.leak_s_per_m + (mp(sensor.tan_delta) + 1j) * 2 * mpmath.pi * mp(f) * c
             return matrix(sum(x * k for x, k in zip(r, rise, strict=True)), y, length)
@@ -51,7 +51,7 @@ def by_hand(sensor, force, position, f):
             length = (mp(right) - mp(left)) * (t1 - t0)
             stress = float(force * borne / (w * length))
             thinning = mp(float(sensor.compression.thinning(np.asarray(stress))[0]))
-            whole = whole * section(length, borne / (t1 - t0), thinning)
+            whole = whole * section(length, force * borne / (w * length), thinning)
         whole = whole * section(mp(sensor.length_m) - mp(right), 0, mp(0))
         return complex(terminated(whole, sensor.far_end))
 
@@ -77,7 +77,7 @@ def test_pieces_of_even_pressure_are_one_patch(sensor, count):
         one[0], rel=1e-14
     )
     for found, expected in zip(many, one, strict=True):
-        assert found.real == pytest.approx(expected.real, rel=1e-9, abs=1e-12)
+        assert found.real == pytest.approx(expected.real, rel=1e-7, abs=1e-12)  # up to 50 times below the whole
         assert found.imag == pytest.approx(expected.imag, rel=1e-9, abs=1e-12)
 
 
@@ -98,7 +98,7 @@ def test_slopes_against_differences(profile, position, force, far_end):
     for part in (np.real, np.imag):
         assert part(found.by_force_ohm_per_n) == pytest.approx(part(by(2e-3, lambda h: (force + h, inside))), rel=2e-6)
         assert part(found.by_position_ohm_per_m) == pytest.approx(
-            part(by(1e-4, lambda h: (force, inside + h))), rel=1e-3, abs=1e-3
+            part(by(2.5e-5, lambda h: (force, inside + h))), rel=1e-4, abs=1e-3
         )
 
 
@@ -135,7 +135,7 @@ def test_spread_raises_the_capacitance_of_a_plate():
 
 def test_turned_around_it_is_the_same_from_the_other_side():
     """A line open at both ends has the same capacitance whichever side the tip presses."""
-    sensor = replace(SOFT, profile="hertz", piezoresistance_per_n=(0.0, 0.0), resistivity_ohm_m=(0.0, 0.0))
+    sensor = replace(SOFT, profile="hertz", piezoresistance_per_pa=(0.0, 0.0), resistivity_ohm_m=(0.0, 0.0))
     assert complex(sensor.impedance(1e3, 2.0, 0.003)) == pytest.approx(
         complex(sensor.impedance(1e3, 2.0, 0.097)), rel=1e-12
     )
@@ -162,8 +162,11 @@ def test_what_an_uneven_tip_cannot():
         sensor.line_inputs(1e3, 1.0, 0.05)
     with pytest.raises(OutOfRange, match="electrodes touch"):
         sensor.impedance(1e3, 500.0, 0.05)  # 5 MPa on average, 6.4 in the middle
-    with pytest.raises(OutOfRange, match="negative"):
-        replace(sensor, piezoresistance_per_n=(-0.5, -0.5)).impedance(1e3, 1.9, 0.05)  # only in the middle
+    soft = replace(sensor, piezoresistance_per_pa=(0.0, -5e-5))
+    assert soft.impedance(1e3, 1.5, 0.05).real > 0  # 15 kPa on average, 19 in the middle
+    for ask in (soft.impedance, soft.response):
+        with pytest.raises(OutOfRange, match=r"resistivity .* negative \(-5e-05 1/Pa at 24 kPa\): press less"):
+            ask(1e3, 1.9, 0.05)  # only in the middle
     with pytest.raises(OutOfRange, match="no derivative"):
         sensor.response(0.0, 1.0, 0.05)
 

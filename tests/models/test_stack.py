@@ -278,7 +278,7 @@ def test_it_refuses_ports_that_are_none(upper, lower):
 
 FIRM, SOFT = unconfined(6e6), unconfined(1e6)
 DOUBLE = Stack(
-    0.1, 0.01, (Track(45e3, 1e-3), Track(20e3), Track(30e3, 2e-3)),
+    0.1, 0.01, (Track(45e3, 1e-7), Track(20e3), Track(30e3, 2e-7)),
     (Film(6.9e-10, FIRM.thinning), Film(8e-10, SOFT.thinning, 0.01, 1e-9)),
 )  # fmt: skip
 
@@ -290,7 +290,7 @@ def pressed(f, force, left, tip=0.01, grown=(0, 0)):
     away, under, loose, tight = [], [], [], []
     for track in DOUBLE.tracks:
         away.append(mpmath.mpf(track.r_ohm_per_m))
-        under.append(away[-1] * (1 + mpmath.mpf(track.piezoresistance_per_n) * force))
+        under.append(away[-1] * (1 + mpmath.mpf(track.piezoresistance_per_pa) * force / (width * tip)))
     for film, modulus, by in zip(DOUBLE.films, (6e6, 1e6), grown, strict=True):
         turned = mpmath.mpc(film.tan_delta, 1) * omega * mpmath.mpf(film.capacitance_f_per_m) * mpmath.exp(by)
         loose.append(film.leak_s_per_m + turned)
@@ -337,7 +337,7 @@ def test_the_derivative_by_drift_is_exact(f, which):
 def test_without_a_change_of_characteristic_impedance_there_is_no_trace_of_position():
     """Strain 1/2 and tracks of twice the resistance: R and Y both double, R / Y stays."""
     films = tuple(Film(c, FIRM.thinning) for c in (6.9e-10, 3e-10))
-    twin = Stack(0.1, 0.01, tuple(Track(r, 1 / 300.0) for r in (4e4, 2e4, 3e4)), films)
+    twin = Stack(0.1, 0.01, tuple(Track(r, 1 / 3e6) for r in (4e4, 2e4, 3e4)), films)
     found = twin.response(1e6, Press(300.0, 0.03, 0.01))
     assert (found.by_position_ohm_per_m == 0).all()
     assert (found.by_force_ohm_per_n != 0).all()

@@ -162,8 +162,10 @@ def _press(sensor: "Sensor", tip_m: float, force_n: float) -> tuple["Patch", dic
             "a smaller --tip or a wider sensor, as with --size 100x100 (`sensorgen predict` speaks of strips)"
         )
     area = tip_m**2
-    thinning, slope = (float(value) for value in sensor.compression.thinning(np.asarray(force_n / area)))
-    rises = sensor.piezoresistance_per_n
+    stress = np.asarray(force_n / area)
+    thinning, slope = (float(value) for value in sensor.compression.thinning(stress))
+    sensor.check_tracks(stress)
+    rises = [rise / area for rise in sensor.piezoresistance_per_pa]
     factor = 1 / (1 - thinning)
     top, bottom = (1 + rise * force_n for rise in rises)
     per_newton = {"capacitance_factor": factor**2 * slope / area}

@@ -25,8 +25,8 @@ class Forward:
         Tones [Hz].
     susceptance, loose : (n_tones,) array
         Per length, unpressed: omega C', and the whole admittance of the film [S/m].
-    track, track_per_newton : float
-        Resistance of both electrodes per length, and how it rises under the tip [ohm/m], [ohm/m/N].
+    track, track_per_pascal : float
+        Resistance of both electrodes per length, and how it rises under the tip [ohm/m], [ohm/m/Pa].
 
     Examples
     --------
@@ -42,11 +42,7 @@ class Forward:
         self.sensor, self.frequency_hz = sensor, tones(frequency_hz)
         self.susceptance: Real = 2 * np.pi * self.frequency_hz * sensor.capacitance_f_per_m
         self.loose = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * self.susceptance
-        tracks = [
-            rho / (h * sensor.width_m) for rho, h in zip(sensor.resistivity_ohm_m, sensor.electrode_m, strict=True)
-        ]
-        self.track = sum(tracks)
-        self.track_per_newton = sum(t * s for t, s in zip(tracks, sensor.piezoresistance_per_n, strict=True))
+        self.track, self.track_per_pascal = sensor.track_ohm_per_m()
 
     def log_impedance(self, force_n: Real, position_m: Real) -> Complex:
         """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.line_inputs`.
@@ -55,9 +51,10 @@ class Forward:
         """
         sensor, force = self.sensor, force_n[:, None]
         patch = sensor.patch(position_m[:, None])
-        thinning, _ = sensor.compression.thinning(force / (sensor.width_m * patch.length_m))
+        stress = force / (sensor.width_m * patch.length_m)
+        thinning, _ = sensor.compression.thinning(stress)
         pressed = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * (self.susceptance / (1 - thinning))
-        under = self.track + force * self.track_per_newton
+        under = self.track + stress * self.track_per_pascal
         right = np.maximum(sensor.length_m - patch.left_m - patch.length_m, 0.0)
         return np.log(
             line.cascade(

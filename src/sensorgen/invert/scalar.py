@@ -32,22 +32,20 @@ class Scalar:
         self._sensor = forward.sensor
         self._susceptance = forward.susceptance.tolist()
         self._loose = forward.loose.tolist()
-        self._track = forward.track, forward.track_per_newton
+        self._track = forward.track, forward.track_per_pascal
         far_ohm = complex(line.cascade([0.0], [0.0], [0.0], self._sensor.far_end))  # of no line: what lies behind it
         self._load = None if cmath.isinf(far_ohm) else far_ohm
 
     def log_impedance(self, force_n: float, position_m: float) -> list[complex]:
         """Natural logarithm of Z/ohm, tone by tone; errors as :meth:`Sensor.line_inputs`."""
-        sensor, (track, per_newton) = self._sensor, self._track
+        sensor, (track, per_pascal) = self._sensor, self._track
         left = max(position_m - sensor.tip_m / 2, 0.0)
         end = min(position_m + sensor.tip_m / 2, sensor.length_m)
-        stress = np.asarray(force_n / (sensor.width_m * (end - left)))
-        stiffer = (sensor.tan_delta + 1j) / (1 - float(sensor.compression.thinning(stress)[0]))
+        stress = force_n / (sensor.width_m * (end - left))
+        stiffer = (sensor.tan_delta + 1j) / (1 - float(sensor.compression.thinning(np.asarray(stress))[0]))
         pressed = [sensor.leak_s_per_m + stiffer * b for b in self._susceptance]
         right = sensor.length_m - end, self._loose, track
-        return self._from_far_end(
-            right, (end - left, pressed, track + force_n * per_newton), (left, self._loose, track)
-        )
+        return self._from_far_end(right, (end - left, pressed, track + stress * per_pascal), (left, self._loose, track))
 
     def _from_far_end(self, *sections: Section) -> list[complex]:
         """As :meth:`Forward._from_far_end`."""

@@ -9,7 +9,7 @@ none of them never sees them, so that its identity does not hang on who looks at
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib import resources
-from math import inf
+from math import inf, isinf
 from typing import Annotated
 
 from pydantic import Field
@@ -20,11 +20,13 @@ from sensorgen.materials import own
 from sensorgen.records import Strict, checked
 
 FILM_LEAK = "leak_s_per_m2"  # leak of a film per area; a matter of how it was printed: no source that ships gives one
+PIEZORESISTANCE = "piezoresistance_per_pa"  # relative rise of an electrode's resistivity with pressure: none either
 SET = "set by the user"  # source of a value that stands in a design itself
-_RANGES = {  # both ends belong to it; anything else is above 0
+_RANGES = {  # finite ends belong to it; anything else is above 0
     "poisson_ratio": (-1.0, 0.5),
     "relative_permittivity": (1e-9, 1e9),  # far beyond any material; ratios of such values are still numbers
     "loss_tangent": (0.0, 1e6),
+    PIEZORESISTANCE: (-inf, inf),
 }
 
 
@@ -138,9 +140,15 @@ def check_own(name: str, values: Mapping[str, float]) -> None:
         if quantity not in quantities():
             raise UnknownName(f"quantity of {name}", quantity, quantities())
         low, high = _RANGES.get(quantity, (0.0, inf))
-        if not low <= value <= high or (value in (0.0, inf) and quantity not in _RANGES):
-            expected = f"{low:g} to {high:g}" if quantity in _RANGES else "a number above 0"
-            raise OutOfRange(f"{quantity} of {name} is {value:g}; expected {expected}")
+        if not low <= value <= high or isinf(value) or (value == 0 and quantity not in _RANGES):
+            raise OutOfRange(f"{quantity} of {name} is {value:g}; expected {_said(low, high, 'a number above 0')}")
+
+
+def _said(low: float, high: float, unsigned: str) -> str:
+    """What numbers a quantity can be, in words."""
+    if high < inf:
+        return f"{low:g} to {high:g}"
+    return unsigned if low == 0 else "a finite number"
 
 
 def load(name: str, sources: Iterable[str] = ()) -> Material:
@@ -202,8 +210,8 @@ def _check_values(name: str, values: Mapping[str, float]) -> None:
     _shipped(name)
     for quantity, value in values.items():
         low, high = _RANGES.get(quantity, (0.0, inf))
-        if not low <= value <= high or value in (-inf, inf):
-            raise OutOfRange(f"{quantity} of {name} is {value:g}; expected a number from {low:g} on")
+        if not low <= value <= high or isinf(value):
+            raise OutOfRange(f"{quantity} of {name} is {value:g}; expected {_said(low, high, 'a number from 0 on')}")
 
 
 @cache

@@ -30,8 +30,8 @@ class Track:
         Of the line [m].
     r_ohm_per_m : float
         Both tracks together [ohm/m].
-    rise_ohm_per_m_per_n : float
-        What the force on a tip adds under it, on average [ohm/m/N].
+    rise_ohm_per_m_per_pa : float
+        What pressure adds to both tracks together [ohm/m/Pa].
     capacitance_f_per_m : float
         Of the film [F/m].
     tan_delta, leak_s_per_m : float
@@ -42,7 +42,7 @@ class Track:
 
     length_m: float
     r_ohm_per_m: float
-    rise_ohm_per_m_per_n: float
+    rise_ohm_per_m_per_pa: float
     capacitance_f_per_m: float
     tan_delta: float
     leak_s_per_m: float
@@ -231,8 +231,9 @@ def _pieces(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> lis
     found = []
     for k, share in enumerate(tip.pieces.length):
         weight = tip.pieces.pressure[..., k]
-        thinning, slope = law.thinning(np.asarray(weight * mean))
-        rise = track.rise_ohm_per_m_per_n * (weight * tip.force_n)
+        stress = np.asarray(weight * mean)
+        thinning, slope = law.thinning(stress)
+        rise = track.rise_ohm_per_m_per_pa * stress
         thinned = film * (thinning / (1 - thinning))
         by_stress = film * (slope / (1 - thinning) ** 2)
         found.append(
@@ -252,8 +253,5 @@ def _matter(track: Track, tip: Tip, k: int, by_stress: Complex, motion: Motion, 
     """How resistance and admittance of a piece change as the tip moves, or as the force grows."""
     weight, moved, mean = tip.pieces.pressure[..., k], motion.pressure[..., k], tip.mean_pa()
     grown = newtons / (tip.width_m * tip.length_m) - mean * (motion.length / tip.length_m)
-    by_weight = moved * tip.force_n + weight * newtons
-    return (
-        np.asarray(track.rise_ohm_per_m_per_n * by_weight),
-        np.asarray(by_stress * (moved * mean + weight * grown)),
-    )
+    stress = moved * mean + weight * grown
+    return np.asarray(track.rise_ohm_per_m_per_pa * stress), np.asarray(by_stress * stress)

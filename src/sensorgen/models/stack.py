@@ -125,10 +125,10 @@ def port(upper: int, lower: int, films: int) -> Real:
 
 
 class Track(NamedTuple):
-    """An electrode: resistance per length [ohm/m], and its relative rise under the tip per force [1/N]."""
+    """An electrode: resistance per length [ohm/m], and its relative rise per pressure under the tip [1/Pa]."""
 
     r_ohm_per_m: float
-    piezoresistance_per_n: float = 0.0
+    piezoresistance_per_pa: float = 0.0
 
 
 class Film(NamedTuple):
@@ -268,11 +268,10 @@ class Stack:
 
     def _changes(self, omega: Real, press: Press) -> tuple[list[Any], list[Any]]:
         """What pressing adds to each track and each film, exactly 0 without force."""
-        force = np.asarray(press.force_n, float)
-        stress = force / (self.width_m * np.asarray(press.length_m, float))
+        stress = np.asarray(press.force_n, float) / (self.width_m * np.asarray(press.length_m, float))
         thinner = [film.thinning(stress)[0] for film in self.films]
         denser = [_turned(film, omega) * (s / (1 - s)) for film, s in zip(self.films, thinner, strict=True)]
-        return [track.r_ohm_per_m * track.piezoresistance_per_n * force for track in self.tracks], denser
+        return [track.r_ohm_per_m * track.piezoresistance_per_pa * stress for track in self.tracks], denser
 
     def response(self, frequency_hz: ArrayLike, press: Press) -> Response:
         r"""Impedance matrix and its exact derivatives.
@@ -327,7 +326,7 @@ class Stack:
     def _by_force(self, omega: Real, press: Press) -> tuple[Matrix, Matrix]:
         """How R and Y under the tip rise per newton."""
         area = self.width_m * np.asarray(press.length_m, float)
-        rise = [np.asarray(track.r_ohm_per_m * track.piezoresistance_per_n) for track in self.tracks]
+        rise = [track.r_ohm_per_m * track.piezoresistance_per_pa / area for track in self.tracks]
         stress = np.asarray(press.force_n, float) / area
         thinner = [film.thinning(stress) for film in self.films]
         slopes = [

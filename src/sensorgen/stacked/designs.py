@@ -93,7 +93,7 @@ def stack_of(sensors: Sequence[Sensor]) -> Stack:
 
 def _track(sensor: Sensor, end: int) -> Track:
     section = sensor.electrode_m[end] * sensor.width_m
-    return Track(sensor.resistivity_ohm_m[end] / section, sensor.piezoresistance_per_n[end])
+    return Track(sensor.resistivity_ohm_m[end] / section, sensor.piezoresistance_per_pa[end])
 
 
 def press_at(found: Stacked, force_n: float, position_m: float | None) -> Press:
