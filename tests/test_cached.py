@@ -145,3 +145,21 @@ def test_writers_at_once():
     files = entries()
     assert len(files) == 7
     assert all(json.loads(f.read_text())["answer"] for f in files)
+
+
+def test_what_is_held_back_is_for_another_to_keep():
+    with cached.held_back() as new:
+        assert cached.answer(QUESTION, lambda: 3) == 3
+    assert (new, entries()) == ([(QUESTION, 3)], [])
+    cached.keep(*new[0])
+    with cached.held_back() as new:
+        assert cached.answer(QUESTION, never) == 3
+    assert new == []
+
+
+def test_where_only_what_is_known_counts_nothing_is_worked_out():
+    with pytest.raises(cached.Unknown), cached.only_known():
+        cached.answer(QUESTION, never)
+    cached.answer(QUESTION, lambda: 3)
+    with cached.only_known():
+        assert cached.answer(QUESTION, never) == 3

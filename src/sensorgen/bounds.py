@@ -1,21 +1,16 @@
 """The capacitance of designs between bounds, one design or many: what ``sensorgen cell`` answers, as plain data."""
 
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sensorgen import losses, planner
 from sensorgen.design import Design
-from sensorgen.errors import SensorgenError
 from sensorgen.planner import Answer, Unpredictable
+from sensorgen.processes import in_parallel, said
 from sensorgen.scene import Scene
 from sensorgen.units import M_PER_MM
-
-if TYPE_CHECKING:
-    from concurrent.futures import ProcessPoolExecutor
 
 
 @dataclass(frozen=True)
@@ -63,7 +58,7 @@ def answer(design: Design, asked: Asked) -> dict[str, Any]:
 def answers(designs: Sequence[Design], asked: Asked, jobs: int, done: Callable[[], None]) -> list[dict[str, Any]]:
     """The same for many designs, those that are not known from before in several processes.
 
-    A design that no model can speak of has a reason in place of numbers.
+    A design that no model can speak of, or at which one fails, has a reason in place of numbers.
 
     Parameters
     ----------
@@ -93,7 +88,7 @@ def answers(designs: Sequence[Design], asked: Asked, jobs: int, done: Callable[[
         found[k] = _said(*inputs[k])
         done()
     anew = replace(asked, keep=False)  # this process alone writes: the others may be ended at any moment
-    for k, result in _in_parallel([(*inputs[k][:2], anew) for k in missing], jobs):
+    for k, result in in_parallel(_said, [(*inputs[k][:2], anew) for k in missing], jobs):
         scene, eps, _ = inputs[missing[k]]
         if asked.keep and isinstance(result, Answer):
             planner.remember(scene, eps, asked.model, result)
@@ -108,51 +103,7 @@ def _solved(scene: Scene, permittivity: dict[str, complex], asked: Asked) -> Ans
 
 def _said(scene: Scene, permittivity: dict[str, complex], asked: Asked) -> Answer | str:
     """The answer, or why there is none."""
-    try:
-        return _solved(scene, permittivity, asked)
-    except Unpredictable as error:
-        return str(error)
-
-
-def _in_parallel(inputs: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[tuple[int, Answer | str]]:
-    """Number and answer of each, as they come."""
-    if min(jobs, len(inputs)) < 2:
-        yield from ((k, _said(*each)) for k, each in enumerate(inputs))
-        return
-    from concurrent.futures import Future, as_completed
-    from concurrent.futures.process import BrokenProcessPool
-
-    with _pool(min(jobs, len(inputs))) as pool:
-        numbers: dict[Future[Answer | str], int] = {pool.submit(_said, *each): k for k, each in enumerate(inputs)}
-        try:
-            for future in as_completed(numbers):
-                yield numbers[future], future.result()
-        except BrokenProcessPool:
-            raise SensorgenError(
-                "a process ended before its answer, as when the memory is full: ask for less accuracy, or --jobs 1"
-            ) from None
-
-
-@contextmanager
-def _pool(jobs: int) -> Iterator["ProcessPoolExecutor"]:
-    """Fresh processes, so that solver and CAD kernel never meet in one; ended at once if anything goes wrong."""
-    import multiprocessing
-    from concurrent.futures import ProcessPoolExecutor
-
-    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _quietly)
-    try:
-        yield pool
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for process in multiprocessing.active_children():
-            process.terminate()
-        raise
-    pool.shutdown()
-
-
-def _quietly() -> None:
-    """End without a word on Ctrl-C."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    return said(_solved, scene, permittivity, asked, refused=(Unpredictable,))
 
 
 def _permittivity(design: Design, asked: Asked) -> dict[str, complex]:

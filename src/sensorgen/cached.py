@@ -5,7 +5,9 @@ a new version of either asks anew. Deleting the folder costs time only.
 """
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -26,6 +28,13 @@ _SOURCES = (
 )  # what decides an answer
 
 JSON = Any  # None, bool, int, float, str, and lists and string-keyed dicts of these
+
+_HELD_BACK: ContextVar[list[tuple[Mapping[str, JSON], JSON]] | None] = ContextVar("_HELD_BACK", default=None)
+_ONLY_KNOWN: ContextVar[bool] = ContextVar("_ONLY_KNOWN", default=False)
+
+
+class Unknown(BaseException):
+    """Nothing is known of a question, and nothing may be worked out: no error, so that it passes who catches those."""
 
 
 def answer(question: Mapping[str, JSON], work: Callable[[], JSON]) -> JSON:
@@ -49,9 +58,32 @@ def answer(question: Mapping[str, JSON], work: Callable[[], JSON]) -> JSON:
     """
     found = known(question)
     if found is None:
+        if _ONLY_KNOWN.get():
+            raise Unknown
         found = work()
         keep(question, found)
     return found
+
+
+@contextmanager
+def only_known() -> Iterator[None]:
+    """Within it :func:`answer` works nothing out: it raises Unknown instead."""
+    before = _ONLY_KNOWN.set(True)
+    try:
+        yield
+    finally:
+        _ONLY_KNOWN.reset(before)
+
+
+@contextmanager
+def held_back() -> Iterator[list[tuple[Mapping[str, JSON], JSON]]]:
+    """Questions and answers that would be kept, for another process to keep: one that may be ended writes nothing."""
+    entries: list[tuple[Mapping[str, JSON], JSON]] = []
+    before = _HELD_BACK.set(entries)
+    try:
+        yield entries
+    finally:
+        _HELD_BACK.reset(before)
 
 
 def known(question: Mapping[str, JSON]) -> JSON | None:
@@ -66,6 +98,10 @@ def known(question: Mapping[str, JSON]) -> JSON | None:
 
 def keep(question: Mapping[str, JSON], found: JSON) -> None:
     """Store the answer to a question, in place of what was there."""
+    held = _HELD_BACK.get()
+    if held is not None:
+        held.append((question, found))
+        return
     file = _file(question)
     entry = {"question": question, "answer": found, "sha256": _digest(found)}
     try:

@@ -9,14 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from sensorgen import bounds, guesses
 from sensorgen.asprinted.compared import Printed
 from sensorgen.asprinted.pressed import piece as printed_piece
 from sensorgen.asprinted.pressed import width_by
 from sensorgen.celllaw import elastic, expected
 from sensorgen.design import Design
-from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.errors import BadInput, NotInstalled, OutOfRange
 from sensorgen.interval import Interval
-from sensorgen.models import press2d, springs
+from sensorgen.models import press2d
 from sensorgen.models.press2d import Held, Pressed
 from sensorgen.plan import Candidate, Level, Plan, cheapest, plain, walked
 from sensorgen.planner import permittivities
@@ -28,14 +29,15 @@ __all__ = ["ALL", "Asked", "Held", "answer", "planned", "stresses_kpa"]
 Data = dict[str, Any]
 Step = Callable[[float], None]
 Told = tuple[Pressed, tuple[float, ...]]
-ALL = (*MODELS, "springs")
+ALL = (*MODELS, *guesses.MODELS)
 
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _OF_OUTLINES = "of the capacitance of the deformed outlines as computed; the outlines' own error is not in them"
 _OF_ALL = (
     "of the capacitance of the deformed outlines, moved apart by what the next coarser mesh differs by: an estimate"
 )
-_NO_C = "springs know no capacitance"
+_NO_C = "displacement alone, no capacitance"
+_AT_REST = 1e-3  # how far bounds may be apart where nothing presses and nothing else is known, as in ``sensorgen cell``
 _MEASURE = "bounds of C apart, at the worst stress"
 _BRACKET = {"press2d": 3.4e-4, "press3d": 2e-3}  # how far the outlines' own bounds are apart, on prototypes [-]
 
@@ -86,22 +88,32 @@ def answer(design: Design, asked: Asked, *, printed: Printed | None = None, step
     Raises
     ------
     MissingValue
-        A modulus, a Poisson's ratio or a permittivity that no source gives, or no mesher.
+        A modulus, a Poisson's ratio or a permittivity that no source gives, or no mesher
+        where ``asked`` names a model that needs it (NotInstalled); else springs answer.
     BadInput, OutOfRange
         As :func:`sensorgen.models.press2d.press`; other electrodes than two, sides that a bonded base holds, a
         stress above the least modulus; an accuracy of springs, or one that is not above 0.
     """
     piece = _piece(design, printed)
     by = {"printed": width_by(printed)} if printed else {}
+    try:
+        return _answer(design, piece, asked, step) | by
+    except NotInstalled as error:
+        if asked.model:
+            raise
+        return _unsolved(design, piece, asked, str(error)) | (by or _at_rest(design, asked))
+
+
+def _answer(design: Design, piece: Piece, asked: Asked, step: Step | None) -> Data:
     if asked.accuracy < inf:
-        return _as_near(design, piece, asked, step) | by
-    if _model(piece, asked) == "springs":
-        return _springs(design, piece.scene, asked) | by
+        return _as_near(design, piece, asked, step)
+    if _model(piece, asked) in guesses.MODELS:
+        return _guess(design, piece, asked)
     case = _case(design, piece, asked)
     found = _pressed(case, asked, USUAL, step)
     if asked.check_mesh:
         found = press2d.compared(found, _pressed(case, asked, USUAL + 1, step))
-    return _plain(found, case) | by
+    return _plain(found, case)
 
 
 def planned(design: Design, asked: Asked, printed: Printed | None = None) -> Plan:
@@ -117,9 +129,9 @@ def _planned(design: Design, piece: Piece, asked: Asked) -> Plan:
     if not asked.accuracy > 0:
         raise OutOfRange(f"an accuracy of {asked.accuracy:g}; expected a number above 0, as 1e-2")
     model = _model(piece, asked)
-    if model == "springs":
-        why = "--model springs" if asked.model else unfit(piece, MODELS[0])
-        raise BadInput(f"an accuracy of C, and {why}: {_NO_C}; leave out --accuracy")
+    if model in guesses.MODELS:
+        why = f"--model {model}" if asked.model else unfit(piece, MODELS[0])
+        raise BadInput(f"an accuracy of C, and {why}: {model} tells {_NO_C}; leave out --accuracy")
     others = [Candidate(name, passed_over=_reason(piece, name, asked.model)) for name in ALL if name != model]
     meshes = [_candidate(design, asked, rung) for rung in _rungs(piece, model, asked)]
     candidates = (*others, *meshes)
@@ -130,7 +142,7 @@ def _planned(design: Design, piece: Piece, asked: Asked) -> Plan:
 
 
 def _model(piece: Piece, asked: Asked) -> str:
-    return asked.model or next((name for name in MODELS if not unfit(piece, name)), "springs")
+    return asked.model or next((name for name in MODELS if not unfit(piece, name)), guesses.FIRST)
 
 
 def _rungs(piece: Piece, model: str, asked: Asked) -> list[Rung]:
@@ -140,7 +152,7 @@ def _rungs(piece: Piece, model: str, asked: Asked) -> list[Rung]:
 def _reason(piece: Piece, name: str, forced: str) -> str:
     if forced:
         return f"--model {forced}"
-    return _NO_C if name == "springs" else unfit(piece, name) or "the model before it speaks of the cell"
+    return _NO_C if name in guesses.MODELS else unfit(piece, name) or "the model before it speaks of the cell"
 
 
 def _candidate(design: Design, asked: Asked, rung: Rung) -> Candidate:
@@ -234,26 +246,48 @@ def _plain(found: Pressed, case: Case) -> Data:
     }
 
 
-def _springs(design: Design, scene: Scene, asked: Asked) -> Data:
-    """What springs of columns know: a displacement, and no capacitance."""
-    why = press2d.unfit(scene)
-    plane, solids, stress_kpa = why is None, elastic(design, scene), list(asked.stress_kpa)
-    moduli = {name: s.youngs_modulus_pa / ((1 - s.poisson_ratio**2) if plane else 1.0) for name, s in solids.items()}
-    moved = springs.displacement_m(scene, moduli, [_PA_PER_KPA * p for p in stress_kpa])
-    boxes = all(prism.is_box() for body in scene.bodies for prism in body.prisms)
-    said = "at most this, at small strain under a stiff plate" if boxes else "a guess: columns that know no neighbours"
+def _guess(design: Design, piece: Piece, asked: Asked) -> Data:
+    """What a law knows that solves no field: a displacement, and no capacitance."""
+    name, unknown = _model(piece, asked), [None] * len(asked.stress_kpa)
+    found = guesses.MODELS[name](design, piece, [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
     return {
-        "model": "springs",
-        "held": {"top": "rigid"},
-        "stress_kpa": stress_kpa,
-        "displacement_um": (moved * _UM_PER_M).tolist(),
-        "lower_f_per_m2": [None] * len(stress_kpa),
-        "upper_f_per_m2": [None] * len(stress_kpa),
-        "converged_kpa": stress_kpa[-1],
+        "model": name,
+        "held": found.held,
+        "stress_kpa": list(asked.stress_kpa),
+        "displacement_um": (found.displacement_m * _UM_PER_M).tolist(),
+        "lower_f_per_m2": unknown,
+        "upper_f_per_m2": unknown,
+        "converged_kpa": asked.stress_kpa[-1],
         "faults": [],
-        "doubts": [f"displacement: {said}", "no capacitance: springs do not know outlines", *([why] if why else [])],
+        "doubts": list(found.doubts),
         "bounds": "none",
     }
+
+
+def _unsolved(design: Design, piece: Piece, asked: Asked, why: str) -> Data:
+    """What is known where no field can be solved for want of a library: a guess, and no accuracy."""
+    data = _guess(design, piece, replace(asked, model=guesses.FIRST))
+    data["doubts"] += [f"not solved: {why}"]
+    if asked.accuracy == inf:
+        return data
+    plan = _planned(design, piece, asked)
+    levels = tuple(_unasked(level, why) for level in plan.levels)
+    missed = {"accuracy": asked.accuracy, "relative_width": None, "reached": False}
+    return data | missed | {"plan": plain(replace(plan, levels=levels))}
+
+
+def _unasked(level: Level, why: str) -> Level:
+    return replace(
+        level, chosen="", candidates=tuple(replace(c, passed_over=c.passed_over or why) for c in level.candidates)
+    )
+
+
+def _at_rest(design: Design, asked: Asked) -> Data:
+    """What is known of the capacitance as drawn before anything presses, which takes no mesher."""
+    found = bounds.answer(design, bounds.Asked(_AT_REST, keep=asked.keep))
+    unknown = [None] * (len(asked.stress_kpa) - 1)
+    ends = {key: [found[key], *unknown] for key in ("lower_f_per_m2", "upper_f_per_m2")}
+    return ends | {"bounds": f"of the capacitance at rest, as drawn, by {found['model']}; none under stress"}
 
 
 def stresses_kpa(found: Sequence[float]) -> tuple[float, ...]:

@@ -38,6 +38,10 @@ class MissingValue(SensorgenError):
     """A value that no source gives."""
 
 
+class NotInstalled(MissingValue):
+    """A library that an extra of sensorgen brings; the message says how."""
+
+
 class Unprintable(SensorgenError):
     """A design whose checks found errors; ``findings`` holds all of them."""
 

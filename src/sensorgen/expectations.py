@@ -56,7 +56,7 @@ def expected(model: str, scene: Scene, width: float) -> tuple[float | None, floa
 
     Notes
     -----
-    In a cross-section that is cut amid a cell the energy of its own length counts, whose bounds are apart by the root of
+    In a cross-section that is cut amid a cell the energy of its own length counts; its bounds are apart by the root of
     the cell's.
     """
     if model not in measured():

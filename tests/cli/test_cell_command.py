@@ -242,6 +242,22 @@ def test_a_point_without_an_answer_leaves_the_others(run):
     assert "trix-d0 has no answer" in said.line
 
 
+def test_a_point_at_which_a_model_fails_leaves_the_others(run, monkeypatch):
+    solved = fem2d.capacitance
+
+    def fails(scene, permittivity, width):
+        if permittivity["x60"] == 3:
+            raise ArithmeticError("no pivot")
+        return solved(scene, permittivity, width)
+
+    monkeypatch.setattr(fem2d, "capacitance", fails)
+    said = run("cell", "tri", "--sweep", "eps_x60=2,3,4", "--json", "--jobs", "1")
+    found = json.loads(said.out)
+    assert (said.code, [entry["model"] for entry in found]) == (1, ["fem2d", None, "fem2d"])
+    assert found[1]["reason"].startswith("ArithmeticError: no pivot")
+    assert "ArithmeticError: no pivot" in said.line
+
+
 def test_a_file_is_written_whole(run, contents, tmp_path):
     assert run("cell", "reference", "--json", "-o", "answer.json").out == "answer.json\n"
     assert list(contents(tmp_path)) == ["answer.json"]

@@ -1,12 +1,16 @@
 """``sensorgen compress``: words in, curves out."""
 
+import csv
 import io
 import json
 import sys
 from functools import partial
 
 import click
+import numpy as np
 import pytest
+
+from sensorgen.models._fem_bounds import CrossedBounds
 
 needs_mesher = pytest.mark.skipif("not __import__('importlib').util.find_spec('netgen')", reason="needs NGSolve")
 PLATE = ("compress", "reference", "--stress", "100", "--json")
@@ -147,13 +151,52 @@ def test_a_print_is_pressed_in_place_of_the_drawing(run):
     assert found["printed"] == "estimate from mid-planes, cura walls, lines by mid-plane"
 
 
-def test_without_the_mesher_it_says_how_to_install_it(run, monkeypatch):
-    for name in [n for n in sys.modules if n.partition(".")[0] == "netgen"]:
-        monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "netgen", None)
-    found = run("compress", "tri", "--stress", "10")
-    assert found.code == 2
-    assert "pip install 'sensorgen[fem]'" in found.line
+@pytest.fixture
+def no_mesher(monkeypatch):
+    """Nothing that NGSolve brings can be imported."""
+    for name in ("netgen", *(n for n in sys.modules if n.partition(".")[0] == "netgen")):
+        monkeypatch.setitem(sys.modules, name, None)
+
+
+INSTALL = "pip install 'sensorgen[fem]'"
+
+
+def test_without_the_mesher_it_answers_with_what_it_has(run, no_mesher):
+    """Springs for the displacement; at rest the bounds of ``cell``, which need none, hold the reference."""
+    said = run("compress", "tri", "--dielectric", "0.1", "--stress", "10", "--json")
+    found = json.loads(said.out)
+    assert (said.code, said.err, found["model"], found["faults"]) == (0, "", "springs", [])
+    assert found["displacement_um"] == pytest.approx([0.0, 18.49], rel=1e-3)  # docs/press.md, cheap rungs
+    (low, _), (high, none) = found["lower_f_per_m2"], found["upper_f_per_m2"]
+    assert low * 2e9 < 159.65204 < high * 2e9
+    assert none is None
+    assert INSTALL in found["doubts"][-1]
+    assert INSTALL in run("compress", "tri", "--stress", "10").out
+
+
+def test_without_the_mesher_a_model_that_was_named_and_an_accuracy_are_not_met(run, no_mesher):
+    for more in ((), ("--sweep", "dielectric_mm=0.1,0.2", "--jobs", "1")):
+        said = run("compress", "tri", "--stress", "10", "--model", "press2d", *more)
+        assert (said.code, said.out) == (2, "")
+        assert INSTALL in said.line
+    said = run("compress", "tri", "--stress", "10", "--accuracy", "1e-2", "--explain")
+    assert (said.code, "> " in said.out.partition("measured")[2]) == (1, False)
+    assert said.out.count(INSTALL) > 1
+    assert "an accuracy of 0.01 was not reached; nobody knows how near it is" in said.line
+
+
+def test_laws_of_a_plate(run):
+    """B.49: thickness times stress over E. Bonded: Gent and Lindley, 93.9 times as stiff where it is 10 x 0.6 mm."""
+    moved = {
+        law: json.loads(run(*PLATE, "--model", law, "--set", "youngs_modulus_x60=3e6").out)["displacement_um"]
+        for law in ("unconfined", "bonded")
+    }
+    assert moved["unconfined"] == pytest.approx([0.0, 600 * 1e5 / 3e6])
+    assert moved["bonded"] == pytest.approx([0.0, 600 * 1e5 / 3e6 / 93.9], rel=1e-3)
+    for law in moved:
+        assert "speaks of a solid plate of one material, tri is none" in run("compress", "tri", "--model", law).line
+    soft = run(*PLATE, "--model", "unconfined", "--set", "youngs_modulus_x60=5e4")
+    assert "100 kPa on x60 of 50 kPa" in soft.line
 
 
 @needs_mesher
@@ -196,7 +239,7 @@ def test_a_plan_and_what_came_of_it(run):
     plan, _, rest = said.out.partition("measured")
     assert "plan for an accuracy of 0.01 of C up to 100 kPa" in plan
     assert "  > press2d, mesh x 1.5       within 0.01 in about" in plan
-    assert "springs know no capacitance" in plan
+    assert "displacement alone, no capacitance" in plan
     came = next(line for line in rest.splitlines() if line.startswith("  > press2d, mesh x 1.5"))
     assert float(came.split()[5]) <= 1e-2
     assert "all levels together" not in rest
@@ -222,10 +265,13 @@ def test_an_accuracy_below_what_is_possible_says_the_best(run):
     ("words", "expected"),
     [
         (["--explain"], "--explain without --accuracy"),
-        (["--accuracy", "1e-2", "--explain", "--json"], "--json is not; it holds the plan too"),
+        (["--accuracy", "1e-2", "--explain", "--json"], "--json holds the plan too"),
         (["--accuracy", "1e-2", "--check-mesh"], "at once"),
         (["--accuracy", "0"], "above 0"),
-        (["--accuracy", "1e-2", "--model", "springs"], "springs know no capacitance; leave out --accuracy"),
+        (
+            ["--accuracy", "1e-2", "--model", "springs"],
+            "springs tells displacement alone, no capacitance; leave out --accuracy",
+        ),
     ],
 )
 def test_an_accuracy_that_makes_no_sense(run, words, expected):
@@ -240,3 +286,122 @@ def test_loads_of_next_to_nothing(run):
     found = json.loads(run("compress", "tri", "--stress", "1e-6,1e-4", "--json").out)
     assert found["converged_kpa"] == 1e-4
     assert found["displacement_um"][2] == pytest.approx(100 * found["displacement_um"][1], rel=0.02)
+
+
+MODULI = ("compress", "reference", "--stress", "50,100", "--sweep", "youngs_modulus_x60=1e4,3e6,6e6", "--jobs", "1")
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Moduli of X60 that a stub of press2d was asked about: the film gives way by 600 um times stress over E."""
+    from sensorgen.interval import Interval
+    from sensorgen.models import press2d
+
+    moduli = []
+
+    def press(cell, solids, stress_pa, permittivity, held, mesh, step=None):
+        modulus = solids["x60"].youngs_modulus_pa
+        moduli.append(modulus)
+        if modulus == 7e6:
+            raise ZeroDivisionError("no pivot")
+        if modulus == 8e6:
+            raise CrossedBounds("lower bound above")
+        p = np.asarray(stress_pa)
+        bounds = tuple(Interval(c, 1.001 * c) for c in (1e-8 * (1 + p / modulus)).tolist())
+        faults = ("faces run into each other",) if modulus == 9e6 else ()
+        return press2d.Pressed(p, 6e-4 * p / modulus, bounds, (), p, p, p, 0.0, faults)
+
+    monkeypatch.setattr(press2d, "press", press)
+    return moduli
+
+
+def test_a_sweep_solves_only_what_is_not_known(run, asked):
+    """The middle point is too soft for its load: a reason in place of numbers, and exit code 1."""
+    said = run(*MODULI, "--json")
+    soft, *rest = json.loads(said.out)
+    assert (said.code, soft["model"], asked) == (1, None, [3e6, 6e6])
+    assert "100 kPa on x60 of 10 kPa" in soft["reason"]
+    assert said.line == f"sensorgen: {soft['design']}: no answer: {soft['reason']}"
+    for row, modulus in zip(rest, (3e6, 6e6), strict=True):
+        assert row["youngs_modulus_x60"] == modulus
+        assert row["displacement_um"] == pytest.approx([600 * p / modulus for p in (0, 5e4, 1e5)])
+    alone = json.loads(run(*PLATE[:2], "--stress", "50,100", "--set", "youngs_modulus_x60=6e6", "--json").out)
+    assert rest[1] == alone | {key: rest[1][key] for key in ("youngs_modulus_x60", "design")}
+    longer = json.loads(run(*MODULI, "--json", "--sweep", "youngs_modulus_x60=3e6,5e6,6e6").out)
+    assert asked == [3e6, 6e6, 5e6]
+    assert longer[::2] == rest
+    run(*MODULI, "--no-cache", "--sweep", "youngs_modulus_x60=3e6,5e6")
+    assert asked[3:] == [3e6, 5e6]
+
+
+def test_a_sweep_as_csv_and_table(run, asked):
+    rows = list(csv.DictReader(io.StringIO(run(*MODULI, "--csv").out)))
+    assert [row["youngs_modulus_x60"] for row in rows] == ["10000.0", *["3000000.0"] * 3, *["6000000.0"] * 3]
+    assert "100 kPa on x60" in rows[0]["reason"]
+    assert (rows[0]["stress_kpa"], rows[0]["model"]) == ("", "")
+    assert [float(row["stress_kpa"]) for row in rows[1:4]] == [0, 50, 100]
+    assert float(rows[3]["displacement_um"]) == pytest.approx(20)
+    assert float(rows[3]["lower_f_per_m2"]) == pytest.approx(1e-8 * (1 + 1 / 30), abs=0)
+    assert (rows[3]["model"], rows[3]["converged_kpa"], rows[3]["reason"]) == ("press2d", "100.0", "")
+    table = run(*MODULI).out.splitlines()
+    assert len(table) == 9
+    assert "no answer: 100 kPa on x60" in table[1]
+    assert table[8] == (
+        "press2d: base bonded, period fixed, top even, contact frictionless (youngs_modulus_x60 3000000.0, 6000000.0)"
+    )
+    assert table[4].split() == ["3000000.0", "100", "20", "10333.33", "to", "10343.67"]
+
+
+def test_a_point_at_which_a_model_fails_leaves_the_others(run, asked):
+    said = run(*MODULI, "--sweep", "youngs_modulus_x60=6e6,7e6,9e6", "--csv")
+    rows = list(csv.DictReader(io.StringIO(said.out)))
+    assert [row["reason"] for row in rows[:3]] == [""] * 3
+    assert rows[3]["reason"].startswith("ZeroDivisionError: no pivot")
+    assert [row["reason"] for row in rows[4:]] == ["faces run into each other"] * 3
+    assert (said.code, "ZeroDivisionError: no pivot" in said.line, "(2 of 3 like this)" in said.line) == (1, True, True)
+    assert (
+        "fault: faces run into each other (youngs_modulus_x60 9000000.0)"
+        in run(*MODULI, "--sweep", "youngs_modulus_x60=6e6,9e6").out
+    )
+    assert asked == [6e6, 7e6, 9e6]
+
+
+def test_bounds_that_cross_stop_a_sweep_and_what_was_solved_is_known(run, asked):
+    said = run(*MODULI, "--sweep", "youngs_modulus_x60=6e6,8e6,9e6")
+    assert (said.code, said.out, "lower bound above" in said.line) == (2, "", True)
+    run(*MODULI, "--sweep", "youngs_modulus_x60=6e6,9e6")
+    assert asked == [6e6, 8e6, 9e6]
+
+
+@needs_mesher
+def test_a_sweep_in_processes_is_what_each_point_is_alone(run):
+    words = ("compress", "reference", "--stress", "100", "--json")
+    rows = json.loads(run(*words, "--sweep", "eps_x60=2.34,4.68", "--jobs", "2").out)
+    assert [row["lower_f_per_m2"][0] * 4e-6 for row in rows] == pytest.approx(
+        [0.27625066e-12 / 2, 0.27625066e-12], rel=1e-6, abs=0
+    )
+    for row in rows:
+        alone = json.loads(run(*words, "--set", f"eps_x60={row['eps_x60']}").out)
+        assert alone == {key: row[key] for key in alone}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--accuracy", "1e-2", "--explain"], "one design; --json holds the plan too"),
+        (["--plot", "a.png"], "--plot draws one design"),
+        (["--json", "--csv"], "--json and --csv at once"),
+        (["--model", "press4d"], "press2d"),
+        (["--stress", "0"], "expected a stress above 0"),
+        (["--sweep", "dielectric_mm=99"], "dielectric_mm=99.0: dielectric_mm is 99"),
+        (["--jobs", "0"], "--jobs"),
+    ],
+)
+def test_a_sweep_that_makes_no_sense(run, words, said):
+    found = run("compress", "tri", "--sweep", "dielectric_mm=0.1,0.2", *words)
+    assert (found.code, found.out) == (2, "")
+    assert said in found.line
+
+
+def test_csv_is_for_sweeps(run):
+    assert "--csv is for a sweep" in run("compress", "tri", "--csv").line

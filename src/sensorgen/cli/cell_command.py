@@ -1,15 +1,12 @@
 """``sensorgen cell``: capacitance per area between bounds as near as asked, for one design or along a sweep."""
 
-import os
-import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, cell_text, plan_text, settings, show
+from sensorgen.cli import FOUND_ERRORS, cell_text, plan_text, settings, show, sweeps
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Ratio, Values, one
 from sensorgen.errors import BadInput, UnknownName
@@ -41,14 +38,7 @@ OWN: list[click.Parameter] = [
     ),
     click.Option(["--explain"], is_flag=True, help="Print the plan, and what came of it."),
     click.Option(["--no-cache"], is_flag=True, help="Solve anew, and keep nothing."),
-    click.Option(
-        ["--sweep"], metavar="KEY=VALUES",
-        help="Answer for each value of one setting: dielectric_mm=0.05:0.2:0.05, or eps_x60=3,4,5.",
-    ),
-    click.Option(
-        ["--jobs"], type=click.IntRange(1, 64), default=None, metavar="N",
-        help="Processes at once in a sweep; one for each core if not given.",
-    ),
+    *sweeps.options(),
     click.Option(["--json", "as_json"], is_flag=True, help="Print as JSON."),
     click.Option(["--csv", "as_csv"], is_flag=True, help="Print a sweep as CSV."),
     click.Option(["--output", "-o"], metavar="FILE", help="File to write instead of the terminal."),
@@ -69,7 +59,7 @@ def _work(
         return _formula(key, points, asked, press_mm, how)
     if press_mm:
         raise BadInput("--press is for formulas, as --model thesis-3.1.2; solved, under a stress: sensorgen compress")
-    return _many(key, points, asked, jobs or os.cpu_count() or 1, how) if sweep else _one(design, asked, how)
+    return _many(key, points, asked, sweeps.at_once(jobs), how) if sweep else _one(design, asked, how)
 
 
 def _refuse_pairs(how: Data, *, many: bool) -> None:
@@ -95,13 +85,14 @@ def _one(design: "Design", asked: "Asked", how: Data) -> int:
 def _many(key: str, points: Points, asked: "Asked", jobs: int, how: Data) -> int:
     from sensorgen import bounds
 
-    with _bar(len(points)) as done:
+    with sweeps.bar(len(points)) as done:
         found = bounds.answers([design for _, design in points], asked, jobs, done)
     rows = [{key: value} | data for (value, _), data in zip(points, found, strict=True)]
     if how["as_json"]:
         _deliver([show.json_text(rows)], how["output"])
     else:
-        _deliver(cell_text.rows_csv(key, rows) if how["as_csv"] else cell_text.table(key, rows), how["output"])
+        csv = how["as_csv"]
+        _deliver([sweeps.rows_csv(key, rows, cell_text.COLUMNS)] if csv else cell_text.table(key, rows), how["output"])
     return _verdict(found)
 
 
@@ -131,7 +122,7 @@ def _formula_rows(key: str, rows: Sequence[Data], model: str, how: Data) -> Iter
     if how["as_json"]:
         return [show.json_text(rows)]
     if how["as_csv"]:
-        return cell_text.rows_csv(key, rows, cell_text.OF_FORMULAS)
+        return [sweeps.rows_csv(key, rows, cell_text.OF_FORMULAS)]
     return cell_text.formula_table(key, rows, model)
 
 
@@ -167,14 +158,6 @@ def _print_plan(design: "Design", asked: "Asked") -> None:
     for c in planner.weighed(design.in_use, asked.width, asked.model, lossy):
         click.echo(f"  {c.model:10}{plan_text.expectation(vars(c), asked.width):32}{c.passed_over}".rstrip())
     click.echo("  the first that does is taken; what is asked in any case costs next to nothing")
-
-
-@contextmanager
-def _bar(length: int) -> Iterator[Callable[[], None]]:
-    """A progress bar on the terminal, only for a person."""
-    with click.progressbar(length=length, file=sys.stderr, hidden=not sys.stderr.isatty(), label="solving") as bar:
-        bar.render_progress()
-        yield lambda: bar.update(1)
 
 
 def _deliver(pieces: Iterable[str], output: str | None) -> None:

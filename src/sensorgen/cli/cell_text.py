@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from sensorgen.cli import plan_text, show
+from sensorgen.cli import plan_text, show, sweeps
 
 Data = dict[str, Any]
 
@@ -65,24 +65,12 @@ def table(key: str, rows: Sequence[Data]) -> Iterator[str]:
     yield f"{key:>16}  {'lower [F/m2]':>16}  {'upper [F/m2]':>16}  {'apart by':>9}  {'seconds':>8}  model\n"
     for row in rows:
         if row["model"] is None:
-            yield f"{cell(row[key]):>16}  no answer: {row['reason']}\n"
+            yield f"{sweeps.cell(row[key]):>16}  no answer: {row['reason']}\n"
         else:
             yield (
-                f"{cell(row[key]):>16}  {row['lower_f_per_m2']:16.9g}  {row['upper_f_per_m2']:16.9g}  "
+                f"{sweeps.cell(row[key]):>16}  {row['lower_f_per_m2']:16.9g}  {row['upper_f_per_m2']:16.9g}  "
                 f"{row['relative_width']:9.2g}  {row['seconds']:8.2g}  {row['model']}\n"
             )
-
-
-def rows_csv(key: str, rows: Sequence[Data], columns: Sequence[str] = COLUMNS) -> Iterator[str]:
-    """A sweep as CSV."""
-    import csv
-    import io
-
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow([key, *columns])
-    table.writerows([cell(row[key]), *(cell(row.get(name)) for name in columns)] for row in rows)
-    yield text.getvalue()
 
 
 def formula_table(key: str, rows: Sequence[Data], model: str) -> Iterator[str]:
@@ -90,7 +78,7 @@ def formula_table(key: str, rows: Sequence[Data], model: str) -> Iterator[str]:
     yield f"{key:>16}  {f'{model} [F/m2]':>24}  without bounds\n"
     for row in rows:
         why = "" if row["model"] else row["reason"]
-        yield f"{cell(row[key]):>16}  {cell(row['value_f_per_m2']):>24}  {why}".rstrip() + "\n"
+        yield f"{sweeps.cell(row[key]):>16}  {sweeps.cell(row['value_f_per_m2']):>24}  {why}".rstrip() + "\n"
 
 
 def formula_lines(data: Data) -> Iterator[str]:
@@ -98,10 +86,3 @@ def formula_lines(data: Data) -> Iterator[str]:
     pressed = f", pressed by {data['press_mm']:g} mm" if data["press_mm"] is not None else ""
     yield f"{data['design']}: {data['value_f_per_m2']:.10g} F/m2 by {data['model']}{pressed}\n"
     yield f"{data['reason']}\n"
-
-
-def cell(value: Any) -> str:
-    """One value of a table."""
-    if isinstance(value, float):
-        return repr(value)
-    return "" if value is None else str(value).lower() if isinstance(value, bool) else str(value)

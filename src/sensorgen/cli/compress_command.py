@@ -1,8 +1,9 @@
 """``sensorgen compress``: how a cell gives way under stress, and what that does to its capacitance."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,14 +11,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sensorgen import units
-from sensorgen.cli import FOUND_ERRORS, asprinted_text, plan_text, show
+from sensorgen.cli import FOUND_ERRORS, asprinted_text, compress_text, plan_text, settings, show, sweeps
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf, Ratio, Values
 from sensorgen.errors import BadInput
 from sensorgen.plan import plain
 
 if TYPE_CHECKING:
+    from sensorgen.asprinted.compared import Printed
+    from sensorgen.compressed import Asked
     from sensorgen.design import Design
+    from sensorgen.swept import Point
 
 Data = dict[str, Any]
 
@@ -36,8 +40,9 @@ OWN: list[click.Parameter] = [
     _choice("--top", "top", ["even", "rigid"], "Even pressure, or a stiff plate."),
     _choice("--contact", "contact", ["frictionless", "stick"], "What faces do that touch."),
     click.Option(
-        ["--model"], type=OneOf(["press2d", "press3d", "springs"]), default=None,
-        help="Finite elements of a cross-section or of boxes, or springs of columns; the first that fits if not given.",
+        ["--model"], type=OneOf(["press2d", "press3d", "springs", "unconfined", "bonded"]), default=None,
+        help="Finite elements of a cross-section or of boxes, springs of columns, or laws of a plate, free to give way "
+        "sideways (B.49) or bonded; the first that fits if not given.",
     ),
     click.Option(
         ["--accuracy"], type=Ratio(), default=None,
@@ -47,49 +52,84 @@ OWN: list[click.Parameter] = [
     *asprinted_text.printed_options("Press what is printed in place of what is drawn; feet that were lost hang free."),
     click.Option(["--check-mesh"], is_flag=True, help="Solve on a finer mesh too, and compare."),
     click.Option(["--no-cache"], is_flag=True, help="Solve anew, and keep nothing."),
+    *sweeps.options(),
     click.Option(["--plot"], metavar="FILE.png", help="Draw displacement and capacitance over stress."),
     click.Option(["--json", "as_json"], is_flag=True, help="Print the curve as JSON."),
+    click.Option(["--csv", "as_csv"], is_flag=True, help="Print a sweep as CSV."),
 ]  # fmt: skip
 
 
 def _work(
     design: "Design", *, stress: tuple[float, ...], model: str | None, accuracy: float | None, check_mesh: bool,
-    no_cache: bool, as_printed: bool, slicer: str | None, walls: str | None, explain: bool, plot: str | None,
-    as_json: bool, **held: str,
+    no_cache: bool, as_printed: bool, slicer: str | None, walls: str | None, sweep: str | None, jobs: int | None,
+    **how: Any,
 ) -> int:  # fmt: skip
     from sensorgen import compressed
 
     asprinted_text.refuse_strays(as_printed=as_printed, slicer=slicer, walls=walls)
-    _refuse_pairs(accuracy, check_mesh=check_mesh, explain=explain, as_json=as_json)
-    _refuse_plot(plot)
-    stresses = compressed.stresses_kpa(stress)
+    _refuse_pairs(accuracy, how, check_mesh=check_mesh, swept=bool(sweep))
+    _refuse_plot(how["plot"])
+    held = compressed.Held(**{f.name: how[f.name] for f in fields(compressed.Held)})
     asked = compressed.Asked(
-        stresses, compressed.Held(**held), model or "", accuracy or inf, check_mesh=check_mesh, keep=not no_cache
+        compressed.stresses_kpa(stress), held, model or "", accuracy or inf, check_mesh=check_mesh, keep=not no_cache
     )
-    print_of = asprinted_text.printed(design, slicer, walls) if as_printed else None
-    if explain:
-        click.echo("\n".join(plan_text.planned(plain(compressed.planned(design, asked, print_of)))) + "\n")
-    with _bar(stresses) as step:
-        data = compressed.answer(design, asked, printed=print_of, step=step)
-    if plot:
+    key, designs = settings.sweep(sweep, design) if sweep else ("", [("", design)])
+    points = [(each, asprinted_text.printed(each, slicer, walls) if as_printed else None) for _, each in designs]
+    if sweep:
+        return _many(key, [value for value, _ in designs], points, asked, sweeps.at_once(jobs), how)
+    return _one(*points[0], asked, how)
+
+
+def _one(design: "Design", printed: "Printed | None", asked: "Asked", how: Data) -> int:
+    from sensorgen import compressed
+
+    if how["explain"]:
+        click.echo("\n".join(plan_text.planned(plain(compressed.planned(design, asked, printed)))) + "\n")
+    with _bar(asked.stress_kpa) as step:
+        data = compressed.answer(design, asked, printed=printed, step=step)
+    if how["plot"]:
         from sensorgen import store
         from sensorgen.plots import compression
 
-        store.replace(Path(plot), compression.png(data))
-    if as_json:
+        store.replace(Path(how["plot"]), compression.png(data))
+    if how["as_json"]:
         show.as_json(data)
     else:
-        _table(data, explain=explain)
+        click.echo("\n".join(compress_text.lines(data, explain=how["explain"])))
     return _verdict(data)
 
 
-def _refuse_pairs(accuracy: float | None, *, check_mesh: bool, explain: bool, as_json: bool) -> None:
+def _many(key: str, values: Sequence[Any], points: "Sequence[Point]", asked: "Asked", jobs: int, how: Data) -> int:
+    from sensorgen import swept
+
+    with sweeps.bar(len(points)) as done:
+        found = swept.answers(points, asked, jobs, done)
+    rows = [
+        {key: value, "design": design.name} | ({"model": None, "reason": data} if isinstance(data, str) else data)
+        for value, (design, _), data in zip(values, points, found, strict=True)
+    ]
+    if how["as_json"]:
+        show.as_json(rows)
+    elif how["as_csv"]:
+        click.echo(sweeps.rows_csv(key, compress_text.loads(rows), compress_text.COLUMNS), nl=False)
+    else:
+        click.echo("\n".join(compress_text.table(key, rows)))
+    return _verdicts(rows)
+
+
+def _refuse_pairs(accuracy: float | None, how: Data, *, check_mesh: bool, swept: bool) -> None:
     if accuracy is not None and check_mesh:
         raise BadInput("--accuracy and --check-mesh at once; the first checks the mesh too, expected one of them")
-    if explain and accuracy is None:
+    if how["explain"] and (swept or how["as_json"]):
+        raise BadInput("--explain is for people, and one design; --json holds the plan too")
+    if how["explain"] and accuracy is None:
         raise BadInput("--explain without --accuracy: there is no plan; expected an accuracy, as --accuracy 1e-2")
-    if explain and as_json:
-        raise BadInput("--explain is for people, and --json is not; it holds the plan too")
+    if how["as_json"] and how["as_csv"]:
+        raise BadInput("--json and --csv at once; expected one of them")
+    if how["as_csv"] and not swept:
+        raise BadInput("--csv is for a sweep, as --sweep dielectric_mm=0.05:0.2:0.05; expected --json")
+    if how["plot"] and swept:
+        raise BadInput("--plot draws one design; expected --csv or --json with --sweep")
 
 
 def _refuse_plot(plot: str | None) -> None:
@@ -105,32 +145,32 @@ def _refuse_plot(plot: str | None) -> None:
 
 def _verdict(data: Data) -> int:
     """0 where every check held, and every accuracy was reached; else what did not, and 1."""
-    for fault in data["faults"]:
-        click.echo(f"sensorgen: not to be trusted: {fault}", err=True)
-    if data.get("reached", True):
-        return FOUND_ERRORS if data["faults"] else 0
-    best = data["relative_width"]
-    said = "nobody knows how near it is" if best is None else f"the best is {best:.2g}"
-    click.echo(f"sensorgen: an accuracy of {data['accuracy']:g} was not reached; {said}", err=True)
+    wrong = _wrong(data)
+    for message in wrong:
+        click.echo(f"sensorgen: {message}", err=True)
+    return FOUND_ERRORS if wrong else 0
+
+
+def _verdicts(rows: Sequence[Data]) -> int:
+    """The same along a sweep: what is wrong with the first, and with how many."""
+    wrong = [(row["design"], message) for row in rows for message in _wrong(row)[:1]]
+    if not wrong:
+        return 0
+    more = f" ({len(wrong)} of {len(rows)} like this)" if len(wrong) > 1 else ""
+    click.echo(f"sensorgen: {wrong[0][0]}: {wrong[0][1]}{more}", err=True)
     return FOUND_ERRORS
 
 
-def _table(data: Data, *, explain: bool) -> None:
-    if explain:
-        click.echo("\n".join(plan_text.measured(data["plan"])) + "\n")
-    click.echo(f"{'stress [kPa]':>12}  {'displacement [um]':>17}  capacitance [pF/m2]")
-    rows = zip(*(data[k] for k in ("stress_kpa", "displacement_um", "lower_f_per_m2", "upper_f_per_m2")), strict=True)
-    for stress, moved, lower, upper in rows:
-        bounds = f"{lower * 1e12:.7g} to {upper * 1e12:.7g}" if lower is not None else "not known"
-        click.echo(f"{stress:12.4g}  {moved:17.4g}  {bounds}")
-    if "accuracy" in data and data["relative_width"] is not None:
-        click.echo(f"bounds apart by {data['relative_width']:.2g} at worst, {data['accuracy']:g} wanted")
-    held = ", ".join(f"{key} {value}" for key, value in data["held"].items())
-    click.echo(f"{data['model']}, converged up to {data['converged_kpa']:.4g} kPa; {held}")
-    if "printed" in data:
-        click.echo(f"as printed: {data['printed']}")
-    for doubt in data["doubts"]:
-        click.echo(f"doubt: {doubt}")
+def _wrong(data: Data) -> list[str]:
+    """Why an answer is not what was asked for."""
+    if data["model"] is None:
+        return [f"no answer: {data['reason']}"]
+    wrong = [f"not to be trusted: {fault}" for fault in data["faults"]]
+    if data.get("reached", True):
+        return wrong
+    best = data["relative_width"]
+    said = "nobody knows how near it is" if best is None else f"the best is {best:.2g}"
+    return [*wrong, f"an accuracy of {data['accuracy']:g} was not reached; {said}"]
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.errors import BadInput, MissingValue
+from sensorgen.errors import BadInput, NotInstalled
 from sensorgen.models._press import rings
 from sensorgen.models._press.cell import OUTSIDE, Cell, Edge
 from sensorgen.scene import Point
@@ -95,11 +95,11 @@ def pinches(cell: Cell) -> set[Point]:
 
 
 def netgen() -> type:
-    """The 2D mesher; raises MissingValue where it is not installed."""
+    """The 2D mesher; raises NotInstalled where it is not installed."""
     try:
         from netgen.geom2d import SplineGeometry
     except ImportError:
-        raise MissingValue("meshes need NGSolve: pip install 'sensorgen[fem]'") from None
+        raise NotInstalled("meshes need NGSolve: pip install 'sensorgen[fem]'") from None
     found: type = SplineGeometry
     return found
 

@@ -1,0 +1,57 @@
+"""The words of a sweep, the same for every command that has one, and its progress bar."""
+
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import click
+
+Data = dict[str, Any]
+
+
+def options() -> list[click.Parameter]:
+    """``--sweep`` and ``--jobs``."""
+    return [
+        click.Option(
+            ["--sweep"], metavar="KEY=VALUES",
+            help="Answer for each value of one setting: dielectric_mm=0.05:0.2:0.05, or eps_x60=3,4,5.",
+        ),
+        click.Option(
+            ["--jobs"], type=click.IntRange(1, 64), default=None, metavar="N",
+            help="Processes at once in a sweep; one for each core if not given.",
+        ),
+    ]  # fmt: skip
+
+
+def at_once(jobs: int | None) -> int:
+    """How many processes, where nobody says."""
+    return jobs or os.cpu_count() or 1
+
+
+@contextmanager
+def bar(length: int) -> Iterator[Callable[[], None]]:
+    """A progress bar on the terminal, only for a person."""
+    with click.progressbar(length=length, file=sys.stderr, hidden=not sys.stderr.isatty(), label="solving") as shown:
+        shown.render_progress()
+        yield lambda: shown.update(1)
+
+
+def rows_csv(key: str, rows: Iterable[Data], columns: Sequence[str]) -> str:
+    """Rows with the value of the sweep before them, as CSV."""
+    import csv
+    import io
+
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow([key, *columns])
+    table.writerows([cell(row[key]), *(cell(row.get(name)) for name in columns)] for row in rows)
+    return text.getvalue()
+
+
+def cell(value: Any) -> str:
+    """One value of a table."""
+    if isinstance(value, float):
+        return repr(value)
+    return "" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
