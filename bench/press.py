@@ -165,7 +165,6 @@ def choices_table():
             press2d.penalty_pa = lambda softest_pa, factor=factor: factor * penalty(softest_pa)
             yield changed_row(name, f"penalty {60 * factor:g} E", made(), used, Fineness())
             press2d.penalty_pa, press2d._STEP = penalty, step * factor / 4
-            yield changed_row(name, f"steps {10 * factor:g} kPa", made(), used, Fineness())
             press2d._STEP = step
             if name.startswith("tri"):
                 yield changed_row(name, f"apex {factor:g} um", made(), used, Fineness(factor * 1e-3))

@@ -135,8 +135,8 @@ def _option(design: Design, printed: Piece | None, rung: Rung) -> Option:
 def expected(design: Design, rung: Rung) -> Curve:
     """What a mesh of an unknown cell should find: the curve of the prototype that it is nearest to."""
     modulus_pa = values(design, "youngs_modulus_pa")[film(design)].value
-    like = compression.prototype(_LIKE[rung.model]).stiffer(modulus_pa / compression.PROTOTYPE_PA)
-    return replace(like, within=rung.rise)
+    stiffer = max(modulus_pa / compression.PROTOTYPE_PA, 1 / compression.REACH)  # softer ones could not be extended
+    return replace(compression.prototype(_LIKE[rung.model]).stiffer(stiffer), within=rung.rise)
 
 
 def _stored(design: Design, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
