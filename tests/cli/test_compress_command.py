@@ -195,7 +195,7 @@ def test_laws_of_a_plate(run):
     assert moved["bonded"] == pytest.approx([0.0, 600 * 1e5 / 3e6 / 93.9], rel=1e-3)
     for law in moved:
         assert "speaks of a solid plate of one material, tri is none" in run("compress", "tri", "--model", law).line
-    two = ("--isolation", "0.2", "--material", "isolation=etpu", "--set", "eps_etpu=4")
+    two = ("--isolation", "0.2", "--material", "isolation=pla", "--set", "eps_pla=4")
     assert "reference is none" in run(*PLATE, "--model", "bonded", *two).line
     soft = run(*PLATE, "--model", "unconfined", "--set", "youngs_modulus_x60=5e4")
     assert "100 kPa on x60 of 50 kPa" in soft.line
