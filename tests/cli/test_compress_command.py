@@ -195,6 +195,8 @@ def test_laws_of_a_plate(run):
     assert moved["bonded"] == pytest.approx([0.0, 600 * 1e5 / 3e6 / 93.9], rel=1e-3)
     for law in moved:
         assert "speaks of a solid plate of one material, tri is none" in run("compress", "tri", "--model", law).line
+    two = ("--isolation", "0.2", "--material", "isolation=pla", "--set", "eps_pla=4")
+    assert "reference is none" in run(*PLATE, "--model", "bonded", *two).line
     soft = run(*PLATE, "--model", "unconfined", "--set", "youngs_modulus_x60=5e4")
     assert "100 kPa on x60 of 50 kPa" in soft.line
 
@@ -315,8 +317,14 @@ def asked(monkeypatch):
     return moduli
 
 
-def test_a_sweep_solves_only_what_is_not_known(run, asked):
-    """The middle point is too soft for its load: a reason in place of numbers, and exit code 1."""
+def test_a_sweep_solves_only_what_is_not_known(run, asked, monkeypatch):
+    """The first point is too soft for its load: a reason in place of numbers, and exit code 1."""
+    from sensorgen import swept
+
+    handed, in_parallel = [], swept.in_parallel
+    monkeypatch.setattr(
+        swept, "in_parallel", lambda w, points, n: handed.append(len(points)) or in_parallel(w, points, n)
+    )
     said = run(*MODULI, "--json")
     soft, *rest = json.loads(said.out)
     assert (said.code, soft["model"], asked) == (1, None, [3e6, 6e6])
@@ -332,6 +340,7 @@ def test_a_sweep_solves_only_what_is_not_known(run, asked):
     assert longer[::2] == rest
     run(*MODULI, "--no-cache", "--sweep", "youngs_modulus_x60=3e6,5e6")
     assert asked[3:] == [3e6, 5e6]
+    assert handed == [2, 1, 2]
 
 
 def test_a_sweep_as_csv_and_table(run, asked):
@@ -374,15 +383,18 @@ def test_bounds_that_cross_stop_a_sweep_and_what_was_solved_is_known(run, asked)
 
 
 @needs_mesher
-def test_a_sweep_in_processes_is_what_each_point_is_alone(run):
+def test_a_sweep_in_processes_is_what_each_point_is_alone(run, asked, monkeypatch):
+    """The stub is of this process alone, which solves nothing."""
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
     words = ("compress", "reference", "--stress", "100", "--json")
-    rows = json.loads(run(*words, "--sweep", "eps_x60=2.34,4.68", "--jobs", "2").out)
+    rows = json.loads(run(*words, "--sweep", "eps_x60=2.34,4.68").out)
     assert [row["lower_f_per_m2"][0] * 4e-6 for row in rows] == pytest.approx(
         [0.27625066e-12 / 2, 0.27625066e-12], rel=1e-6, abs=0
     )
     for row in rows:
         alone = json.loads(run(*words, "--set", f"eps_x60={row['eps_x60']}").out)
         assert alone == {key: row[key] for key in alone}
+    assert asked == []
 
 
 @pytest.mark.parametrize(
