@@ -11,7 +11,7 @@ from sensorgen.errors import BadInput, OutOfRange
 
 pytest.importorskip("netgen")
 from sensorgen.models import press2d
-from sensorgen.models._press import deformed, load, pressed
+from sensorgen.models._press import closing, deformed, load, pressed
 from sensorgen.models.press2d import Fineness, Held
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "contact.json").read_text())
@@ -155,8 +155,8 @@ def test_coarser_triangles_take_over_where_finer_ones_fail(monkeypatch):
 
 def test_outlines_that_are_closed_in_the_wrong_place_do_not_pass(monkeypatch):
     """Gaps up to a third of a side taken for shut: solids gain area, and the answer has no capacitance and a fault."""
-    monkeypatch.setattr(deformed, "_CLOSED", 1.5)
-    monkeypatch.setattr(deformed, "_BETWEEN", 1.5)
+    monkeypatch.setattr(closing, "_CLOSED", 1.5)
+    monkeypatch.setattr(closing, "_BETWEEN", 1.5)
     found = press2d.press(tri(), solids(), [0.0, 1e4], EPS, fineness=Fineness(1.4e-3, 0.1, 0.2))
     assert found.capacitance_f_per_m2[1] is None
     assert "could not be meshed" in found.faults[-1]

@@ -20,7 +20,6 @@ Whole = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 _STEEP = 0.3  # cosine of a face's slope, below which nothing rests on it [-]
-_UPRIGHT = 1e-6  # faces whose normal is nearer to level than this neither look up nor down [-]
 _PASS = 0.5  # share of the penalty that each of two faces brings [-]
 _IMAGE = 2.0  # a mirror's penalty over that of two faces: half the gap, and one of two bodies [-]
 _THIN = 0.5  # of a body's thickness: deeper than this is rather its other side [-]
@@ -65,19 +64,9 @@ class Faces:
     sides: Whole
 
     @property
-    def lower(self) -> Whole:
-        """Those that look up as drawn."""
-        return self.sides[self._across > _UPRIGHT]
-
-    @property
-    def upper(self) -> Whole:
-        """Those that look down as drawn."""
-        return self.sides[self._across < -_UPRIGHT]
-
-    @cached_property
-    def _across(self) -> Real:
-        a, b = (self.mesh.points_m[self.sides[:, k]] for k in range(2))
-        return np.asarray((a[:, 0] - b[:, 0]) / self._length)  # the solid lies left of a side
+    def halves(self) -> Whole:
+        """From end to middle and on to the other end, (2k, 2)."""
+        return np.concatenate([self.sides[:, [0, 2]], self.sides[:, [2, 1]]])
 
     @cached_property
     def _length(self) -> Real:
@@ -93,6 +82,11 @@ class Faces:
         place, _ = rays.at(1 - s, self.mesh.points_m[self.sides[side]])
         found[back] = np.minimum(found[back], _THIN * np.hypot(*(place - here[back]).T))
         return found
+
+    @cached_property
+    def depth_m(self) -> Real:
+        """How deep another solid's points may be in each side's [m]."""
+        return np.asarray(self._depth.reshape(-1, len(rays.POINTS)).min(axis=1))
 
     def _rays(self, places_m: Real) -> tuple[Real, Real]:
         sides = np.repeat(places_m[self.sides], len(rays.POINTS), axis=0)
