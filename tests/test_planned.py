@@ -103,6 +103,14 @@ def test_without_force_nothing_has_to_give_way():
     assert plan.width <= 1e-3
 
 
+def test_bounds_far_apart_are_felt_most_at_the_lower_one():
+    """At a low tone abs(Z) goes with 1/C: half of a large width would say too little."""
+    sensed, plan = worked_out(tri(0.1), 2.0, Press((1.0,), 0.0, 0.05))
+    bounds = sensed.unloaded.answer.capacitance_f
+    assert bounds.width() > 0.3
+    assert plan.width == pytest.approx(bounds.middle() / bounds.lower - 1, rel=1e-6)
+
+
 def test_a_law_that_is_asked_for_is_taken_whatever_its_error():
     sensed, plan = worked_out(tri(0.1), 1e-3, law="unconfined")
     assert (sensed.law.compression.name, plan.width) == ("unconfined", math.inf)

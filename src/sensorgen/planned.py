@@ -189,9 +189,9 @@ def carried_out(outline: Outline) -> tuple[Sensed, Plan]:
     plan, press = outline.plan, outline.press
     cell, compression, line = plan.levels
     known = outline.makers.unloaded(cell.allowed)
-    spent = outline.by_capacitance * known.answer.width() / 2
-    rough = outline.rough.sensor
-    sensor = _thicker(rough, known.answer.capacitance_f.middle() / rough.capacitance_f())
+    rough, bounds = outline.rough.sensor, known.answer.capacitance_f
+    sensor = _thicker(rough, bounds.middle() / rough.capacitance_f())
+    spent = _off(sensor, press, *(_thicker(sensor, end / bounds.middle()) for end in (bounds.lower, bounds.upper)))
     law, compression = walked(
         replace(compression, allowed=_left(plan.accuracy - spent - _reach(line), compression)),
         {option.name: option.find for option in outline.options(known.answer)},
