@@ -56,8 +56,8 @@ def expected(model: str, scene: Scene, width: float) -> tuple[float | None, floa
 
     Notes
     -----
-    In a sensor that is cut amid a cell the energy of its own length counts, whose bounds are apart by the root of the
-    cell's.
+    In a cross-section that is cut amid a cell the energy of its own length counts, whose bounds are apart by the root of
+    the cell's.
     """
     if model not in measured():
         return None, None

@@ -13,9 +13,10 @@ import numpy as np
 
 from sensorgen import cached, expectations
 from sensorgen.design import Design
-from sensorgen.errors import OutOfRange
+from sensorgen.errors import BadInput, OutOfRange
 from sensorgen.interval import Interval
 from sensorgen.scene import Scene
+from sensorgen.sections import overlap
 
 if TYPE_CHECKING:
     from sensorgen.models.press2d import Elastic, Fineness, Held, Pressed
@@ -166,8 +167,11 @@ def pressed(
     ------
     MissingValue, BadInput, OutOfRange
         As :func:`sensorgen.models.press2d.press` and :func:`sensorgen.models.press3d.press`; a stress above the least
-        modulus.
+        modulus; bodies that overlap.
     """
+    overlaps = overlap(case.piece.scene)
+    if overlaps:
+        raise BadInput(f"{overlaps}; expected each place to belong to one body")
     refuse_crushing(stress_pa[-1], {name: solid.youngs_modulus_pa for name, solid in case.solids.items()})
     mesh, stress = fineness(case.model, level), list(stress_pa)
     press, cell = _press(case)

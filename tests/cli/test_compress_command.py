@@ -232,3 +232,11 @@ def test_an_accuracy_that_makes_no_sense(run, words, expected):
     said = run("compress", "tri", *words)
     assert said.code == 2
     assert expected in said.line
+
+
+@needs_mesher
+def test_loads_of_next_to_nothing(run):
+    """Linear from a thousandth of a pascal on, where rounding is as large as the load."""
+    found = json.loads(run("compress", "tri", "--stress", "1e-6,1e-4", "--json").out)
+    assert found["converged_kpa"] == 1e-4
+    assert found["displacement_um"][2] == pytest.approx(100 * found["displacement_um"][1], rel=0.02)

@@ -59,10 +59,15 @@ def test_the_reference_curve_at_every_load(film):
 def test_choices_of_the_boundary(name, held, nu):
     found = press2d.press(tri(), solids(nu), STRESSES, held=held)
     assert found.faults == ()
-    early = 2 if name == "stick" else 0  # what sticks depends on the load steps, the other program's too
+    early = 1 if name == "stick" else 0  # there the file is above what gives way without friction, which cannot be
     known = VARIANTS[f"{name}_d0.1"]["uy_um"]
     assert found.displacement_m[1 + early :] * 1e6 == pytest.approx(known[1 + early :], rel=0.015)
-    assert found.displacement_m[1:] * 1e6 == pytest.approx(known[1:], rel=0.04)
+    assert found.displacement_m[1:] * 1e6 == pytest.approx(known[1:], rel=0.02)
+
+
+def test_sticking_depends_little_on_the_loads_asked_for():
+    few, many = (press2d.press(tri(), solids(), s, held=Held(contact="stick")) for s in ([0, 2e4], STRESSES[:3]))
+    assert few.displacement_m[-1] == pytest.approx(many.displacement_m[-1], rel=1e-6)
 
 
 def test_exactly_incompressible_is_the_limit():

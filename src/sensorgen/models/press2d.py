@@ -42,6 +42,7 @@ COST = 2
 __all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "curve_of", "press", "unfit"]
 
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
+_STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid when they touched counts [-]
 _FIELD_GROWTH = 0.2  # of the triangles of the capacitance's mesh, per distance [-]
 _MISFIT = 1e-3  # of a solid's area: gaps that were closed in the wrong place change more [-]
 _COARSER = (3, 9)  # times the size of the triangles at an apex, where the finer ones do not converge [-]
@@ -142,7 +143,8 @@ def _solved(
         held.contact == "stick",
         sound=lambda places_m: not faces.crossed(places_m, DEEPEST),
     )
-    found, states = reached(problem, stress_pa, _STEP * softest, step, SOURCE)
+    longest = softest * (_STICKING_STEP if problem.stick else _STEP)
+    found, states = reached(problem, stress_pa, longest, step, SOURCE)
     if not cell.mirrored:
         said = "mirrors stand at both ends of the period, though it is not its own mirror image"
         found = replace(found, doubts=(said, *found.doubts))

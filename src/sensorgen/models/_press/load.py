@@ -20,6 +20,7 @@ Whole = NDArray[np.int64]
 Solver = Callable[[csr_matrix, Real], Real | None]
 
 _ENOUGH = 1e-6  # residual over load
+_LEAST = 1e-7  # of the penalty: pressures below it are lost in the rounding of rubber that keeps its volume [-]
 _NEARLY = 1e-3  # the same before the contact partners are looked for anew
 _STILL = 1e-10  # a step so much shorter than the way is rounding: nu near 1/2 turns it into forces
 _MOST_STEPS = 15
@@ -236,7 +237,7 @@ class Problem:
         ``enough`` is the residual to reach, over the load [-].
         """
         u, inner = state.u_m, state.inner
-        scale = max(pressure_pa, 1.0) * np.abs(self.free.T @ self.load).max()
+        scale = max(pressure_pa, _LEAST * self.penalty_pa) * np.abs(self.free.T @ self.load).max()
         for _ in range(_MOST_STEPS):
             residual, stiffness, local = self.residual(u, inner, pairs, pressure_pa)
             if not np.isfinite(residual).all():
