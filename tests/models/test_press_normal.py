@@ -15,6 +15,8 @@ from sensorgen.models._press import cell as cells
 from sensorgen.models._press import contact
 from sensorgen.models.press2d import Elastic, Fineness, Held
 
+EPS = {"x60": 4.68, "etpu": 5.0, "air": 1.00059}
+EPS0 = 8.8541878e-12
 SOFT = {"x60": Elastic(1e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
 BASE = 0.3
 
@@ -45,17 +47,29 @@ def solved(cell, stresses, held=None):
     return press2d._solved(cell, SOFT, stresses, held or Held(), Fineness(), lambda _: None)
 
 
+def with_field(cell, stresses, solids=SOFT, fineness=None):
+    """Capacitances of a cell [F/m2], all of which have to be known; and its displacements [m]."""
+    found = press2d.press(cell, solids, stresses, EPS, fineness=fineness)
+    assert found.faults == ()
+    assert max(c.width() for c in found.capacitance_f_per_m2) < 1e-3
+    return np.array([c.middle() for c in found.capacitance_f_per_m2]), np.array(found.displacement_m)
+
+
 STRESSES = np.linspace(0, 4e5, 9)
 
 
 @pytest.fixture(scope="module")
 def mirrored():
-    return solved(pillars(0.05, 1), STRESSES)[0]
+    return press2d.press(pillars(0.05, 1), SOFT, STRESSES, EPS)
 
 
 def test_two_pillars_that_bulge_into_each_other_are_one_before_a_mirror(mirrored):
-    both, _ = solved(pillars(0.05, 2), STRESSES)
+    both = press2d.press(pillars(0.05, 2), SOFT, STRESSES, EPS)
     assert (mirrored.faults, both.faults) == ((), ())
+    one, two = (np.array([c.middle() for c in f.capacitance_f_per_m2]) for f in (mirrored, both))
+    assert two == pytest.approx(one, rel=1e-3, abs=0)
+    assert np.diff(two).min() > 0
+    assert max(c.width() for f in (mirrored, both) for c in f.capacitance_f_per_m2) < 2e-5
     assert both.displacement_m[1:] == pytest.approx(mirrored.displacement_m[1:], rel=0.01)  # the meshes differ
 
 
@@ -80,6 +94,26 @@ def test_faces_that_run_through_each_other_are_caught(monkeypatch):
         found, _ = solved(pillars(0.05, count), STRESSES)
         assert found.faults[0].startswith("converged up to")
         assert found.converged_pa < 4e5  # they touch at 120 kPa
+
+
+def test_the_capacitance_is_continuous_where_pillars_meet(mirrored):
+    """Loads 3 kPa apart from 120 kPa on, where they meet: C goes on rising, never by a step."""
+    stresses = np.concatenate([np.linspace(0, 1.14e5, 5), np.arange(1.17e5, 1.51e5, 3e3)])
+    middle, _ = with_field(pillars(0.05, 1), stresses)
+    rises = np.diff(middle[5:])
+    assert (rises[1:] / rises[:-1]).min() > 0.6
+    assert (rises[1:] / rises[:-1]).max() < 1.1
+    assert rises[-1] < 0.7 * rises[0]  # slower once they have met
+    assert middle[-1] == pytest.approx(mirrored.capacitance_f_per_m2[3].middle(), rel=1e-4, abs=0)
+
+
+def test_an_upright_gap_that_is_shut_is_none():
+    """Two blocks between mirrors that fill what is between the plates when pressed: the capacitance of one film."""
+    blocks = box(0, 0.346, 0, 0.3), box(0.35, 0.7, 0, 0.3)
+    (open_, *shut), moved = with_field(cell_of(0.3, 0, 0.7, *blocks), [0.0, 5e4, 1e5])
+    film = EPS["x60"] * EPS0 / (0.3e-3 - moved)
+    assert shut == pytest.approx(film[1:], rel=1e-3, abs=0)
+    assert open_ < film[0]
 
 
 def forces(run, state):
@@ -120,9 +154,12 @@ def test_a_sloping_joint_hands_an_even_pressure_on(drop):
     Only the little triangles in the corners at the joint's ends differ by more than 1 %.
     """
     stresses = [0.0, 1e4, 1e5]
-    found, run = solved(slope(drop), stresses)
+    cell = slope(drop)
+    found, run = solved(cell, stresses)
     assert found.faults == ()
     assert found.fall_m == pytest.approx(1e-6, rel=1e-6)  # straight down, on a slope too
+    filled, _ = press2d._field(cell, run, run.states[-1].u_m, EPS)
+    assert filled.middle() == pytest.approx(EPS["x60"] * EPS0 / (0.6e-3 - found.displacement_m[-1]), rel=1e-4, abs=0)
     off = np.abs(-run.states[-1].inner.pressure[:, 0] / 1e5 - 1)
     corners = run.mesh.points_m[run.mesh.triangles[:, :3]]
     sides = corners[:, 1:] - corners[:, :1]
@@ -169,3 +206,12 @@ def test_steps_of_any_length_stick_alike():
         for n in (1, 4)
     ]
     assert moved[0] == pytest.approx(moved[1], rel=0.03)
+
+
+def test_feet_that_bulge_have_a_capacitance_on_a_fine_mesh():
+    """Layers of feet whose sides roll onto the film and under the next layer; half the sizes are 0.1 % apart."""
+    feet = [box(0.3, 0.7, 0.1, 0.2), box(0.2, 0.8, 0.2, 0.3)]
+    cell = cell_of(0.3, 0, 1.0, box(0, 1.0, 0, 0.1), *feet)
+    (coarse, _), (fine, _) = (with_field(cell, STRESSES[::2] / 4, fineness=Fineness().scaled(f)) for f in (1, 0.5))
+    assert np.diff(fine).min() > 0
+    assert coarse == pytest.approx(fine, rel=3e-3, abs=0)
