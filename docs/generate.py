@@ -11,7 +11,8 @@ PICTURES = {"trix-d0.2": ["tri"], "sqxy-d0.2": ["rect"], "trix-upside-down": ["t
 PAGES = (
     [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"],
     ["slice"], ["slice", "tri"], ["gcode"], ["gcode", "check"], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
-    ["predict"], ["predict", "tri"], ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["compress", "tri"], ["invert"], ["sheet"], ["stack"],
+    ["predict"], ["predict", "tri"], ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["compress", "tri"],
+    ["invert"], ["sheet"], ["stack"],
     ["bench"], ["bench", "plan"], ["bench", "plan", "tri"], ["bench", "show"],
     ["bench", "hysteresis"], ["bench", "sets"], ["bench", "live"],
     ["log"], *(["log", w] for w in ("multimeter", "import", "bench", "predict", "list", "show", "export", "verify")),
