@@ -88,7 +88,7 @@ def _meshed(cell: Cell, air: int, coarse_mm: float, growth: float) -> Mesh:
         if wedge.first[-1] != wedge.second[-1]:
             cut[wedge.first[-1], wedge.second[-1]] = (-number, air)
     _refuse_outside(cell)
-    _refuse_crossings(np.array([edge for edge, sides in edges.items() if air in sides]).reshape(-1, 2, 2))
+    _refuse_crossings(np.array(list(edges)).reshape(-1, 2, 2))
     net = triangulated(cut, coarse_mm, growth, quick=True)
     new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
     corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])
@@ -106,7 +106,7 @@ def _refuse_outside(cell: Cell) -> None:
 
 
 def _refuse_crossings(edges: Real) -> None:
-    """Faces of air (k, 2, 2) that cross each other would keep the mesher busy for ever."""
+    """Edges (k, 2, 2) that cross each other would keep the mesher busy for ever, or end the process."""
     a, b = edges[:, None, 0], edges[:, None, 1]
     c, d = edges[None, :, 0], edges[None, :, 1]
     apart = _side(a, b, c) * _side(a, b, d) < 0
