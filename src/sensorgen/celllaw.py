@@ -25,6 +25,7 @@ LAWS = ("unconfined", "bonded", "solved")
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)))  # 6 N on a tip of 10 x 10 mm are 60 kPa
 _LANDING = f"feet land at no force to speak of: what C rises by up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
 _SAME_RATIO = 1e-3  # of Poisson: 0.4999 and 0.5 make the same cell, 0.45 one that gives way by 11 % more
+_ONSET = 0.25  # share by which a curve's onset is off at most, on films of 0.02 to 0.2 mm from 0.5 kPa on
 _LIKE = {"press2d": "tri", "press3d": "rect"}  # prototypes that other cells are expected to be like
 
 
@@ -169,8 +170,8 @@ def _as_plate(design: Design, moduli: Mapping[str, Taken], why: str) -> Law:
 
 
 def _cell(found: Curve, moduli: Mapping[str, Taken], doubts: tuple[str, ...] = ()) -> Law:
-    """A solved cell: its rise known to a share, and what other ways to hold it would make of it."""
-    others = tuple(found.rising(1 + sign * found.within) for sign in (-1, 1))
+    """A solved cell: rise and onset known to a share, and what other ways to hold it would make of it."""
+    others = tuple(replace(found.rising(1 + sign * found.within), onset=1 + sign * _ONSET) for sign in (-1, 1))
     held = tuple(found.rising(1 + change) for change in found.held)
     return Law(found, tuple(moduli.values()), doubts, others, held)
 
