@@ -14,7 +14,7 @@ from sensorgen.errors import OutOfRange, UnknownName
 from sensorgen.models import compression
 from sensorgen.models.compression import Compression, Curve
 from sensorgen.planner import Answer, Taken, is_plate, permittivities
-from sensorgen.pressing import USUAL, Case, Piece, Rung, drawn, model_of, pressed, rungs
+from sensorgen.pressing import SAFETY, USUAL, Case, Piece, Rung, drawn, model_of, pressed, rungs
 from sensorgen.scene import Scene
 from sensorgen.units import M_PER_MM
 
@@ -209,7 +209,7 @@ def solved(design: Design, printed: Piece | None = None, level: int = USUAL, **h
     least = next(rung.rise for rung in rungs(piece, model, 1) if rung.level == level)
     curve = replace(
         curve,
-        within=max(least, *(abs((b - 1) / (a - 1) - 1) for a, b in rises)),
+        within=max(least, *(SAFETY * abs((b - 1) / (a - 1) - 1) for a, b in rises)),
         held=compression.prototype(_LIKE[model]).held,
         moved_m=float(found.displacement_m[-1]) - found.fall_m,
     )
