@@ -66,6 +66,25 @@ def test_coarser_ones_are_asked_where_finer_ones_fail():
     assert came.candidates[2].passed_over == "does not converge"
 
 
+def test_coarser_ones_are_not_asked_where_a_finer_one_answers_though_not_near_enough():
+    models = Models(coarse=0.08, fine=0.06)
+    assert walked(level(0.05), models.find, float)[0] == 0.06
+    assert models.asked == ["fine"]
+
+
+def test_what_is_just_near_enough_will_do():
+    models = Models(coarse=0.2, fine=0.004)
+    assert walked(level(0.2), models.find, float)[0] == 0.2
+    assert models.asked == ["coarse"]
+
+
+def test_of_coarser_ones_the_finest_is_asked_first():
+    models = Models(coarse=0.08, fine=0.06, finest=BadInput("does not converge"))
+    candidates = (*RUNGS, Candidate("finest", 0.001, 9.0))
+    assert walked(level(0.002, candidates=candidates), models.find, float)[0] == 0.06
+    assert models.asked == ["finest", "fine"]
+
+
 def test_what_the_last_one_said_is_raised_where_none_can_answer():
     models = Models(coarse=BadInput("no mesh"), fine=BadInput("no memory"))
     with pytest.raises(BadInput, match="no mesh"):

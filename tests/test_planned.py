@@ -134,3 +134,21 @@ def test_the_outline_says_what_is_expected_and_asks_nothing_dear(monkeypatch):
 def test_an_accuracy_is_above_0(accuracy):
     with pytest.raises(OutOfRange, match="above 0"):
         planned.outlined(tri(0.1), planned.drawn(tri(0.1)), PRESS, accuracy)
+
+
+@needs_mesher
+@pytest.mark.parametrize("force_n", [0.1, 0.2, 0.5])
+def test_a_light_press_below_the_first_stress_of_a_curve_is_within_what_is_claimed(force_n):
+    """A contact grows from nothing: the stored curve begins at 10 kPa, the same cell is solved at 1, 2 and 5."""
+    from sensorgen.models.press2d import Held, curve_of
+    from sensorgen.pressing import Case, drawn, pressed
+
+    design = tri(0.1)
+    press = Press((1.0,), force_n, 0.05)
+    sensed, plan = worked_out(design, 1e-3, press)
+    piece = drawn(design)
+    eps = {t.material: t.value for t in sensed.taken if t.quantity == "relative_permittivity"}
+    case = Case(piece, "press2d", celllaw.elastic(design, piece.scene), eps, Held())
+    fine = curve_of(pressed(case, (0.0, 1e3, 2e3, 5e3)))
+    claimed = next(c.width for c in plan.levels[1].candidates if c.model == "solved")
+    assert off(sensed.sensor, replace(sensed.sensor, compression=fine), press) < claimed < 1e-3

@@ -14,7 +14,7 @@ from sensorgen.errors import OutOfRange, UnknownName
 from sensorgen.models import compression
 from sensorgen.models.compression import Compression, Curve
 from sensorgen.planner import Answer, Taken, is_plate, permittivities
-from sensorgen.pressing import USUAL, Case, Piece, Rung, drawn, model_of, pressed, rungs
+from sensorgen.pressing import SAFETY, USUAL, Case, Piece, Rung, drawn, model_of, pressed, rungs
 from sensorgen.scene import Scene
 from sensorgen.units import M_PER_MM
 
@@ -25,6 +25,7 @@ LAWS = ("unconfined", "bonded", "solved")
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)))  # 6 N on a tip of 10 x 10 mm are 60 kPa
 _LANDING = f"feet land at no force to speak of: what C rises by up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
 _SAME_RATIO = 1e-3  # of Poisson: 0.4999 and 0.5 make the same cell, 0.45 one that gives way by 11 % more
+_ONSET = 0.25  # share by which a curve's onset is off at most, on films of 0.02 to 0.2 mm from 0.5 kPa on
 _LIKE = {"press2d": "tri", "press3d": "rect"}  # prototypes that other cells are expected to be like
 
 
@@ -169,8 +170,8 @@ def _as_plate(design: Design, moduli: Mapping[str, Taken], why: str) -> Law:
 
 
 def _cell(found: Curve, moduli: Mapping[str, Taken], doubts: tuple[str, ...] = ()) -> Law:
-    """A solved cell: its rise known to a share, and what other ways to hold it would make of it."""
-    others = tuple(found.rising(1 + sign * found.within) for sign in (-1, 1))
+    """A solved cell: rise and onset known to a share, and what other ways to hold it would make of it."""
+    others = tuple(replace(found.rising(1 + sign * found.within), onset=1 + sign * _ONSET) for sign in (-1, 1))
     held = tuple(found.rising(1 + change) for change in found.held)
     return Law(found, tuple(moduli.values()), doubts, others, held)
 
@@ -208,7 +209,7 @@ def solved(design: Design, printed: Piece | None = None, level: int = USUAL, **h
     least = next(rung.rise for rung in rungs(piece, model, 1) if rung.level == level)
     curve = replace(
         curve,
-        within=max(least, *(abs((b - 1) / (a - 1) - 1) for a, b in rises)),
+        within=max(least, *(SAFETY * abs((b - 1) / (a - 1) - 1) for a, b in rises)),
         held=compression.prototype(_LIKE[model]).held,
         moved_m=float(found.displacement_m[-1]) - found.fall_m,
     )

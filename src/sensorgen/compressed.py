@@ -21,7 +21,7 @@ from sensorgen.models import press2d
 from sensorgen.models.press2d import Held, Pressed
 from sensorgen.plan import Candidate, Level, Plan, cheapest, plain, walked
 from sensorgen.planner import permittivities
-from sensorgen.pressing import MODELS, USUAL, Case, Piece, Rung, drawn, pressed, rungs, unfit
+from sensorgen.pressing import MODELS, SAFETY, USUAL, Case, Piece, Rung, drawn, pressed, rungs, unfit
 from sensorgen.scene import Scene
 
 __all__ = ["ALL", "Asked", "Held", "answer", "planned", "stresses_kpa"]
@@ -181,7 +181,7 @@ def _told(case: Case, asked: Asked, rung: Rung, step: Step | None) -> Told:
     """A case on one mesh, and the share by which each capacitance may be off for it [-]."""
     fine, coarse = (_pressed(case, asked, level, step) for level in (rung.level, rung.level - 1))
     rises, others = (_rises(found) for found in (fine, coarse))
-    off = [max(rung.rise * a, abs(a - b)) / (1 + a) for a, b in zip(rises, others, strict=False)]
+    off = [max(rung.rise * a, SAFETY * abs(a - b)) / (1 + a) for a, b in zip(rises, others, strict=False)]
     return fine, tuple(off)
 
 

@@ -1,5 +1,7 @@
 """How films give way: against SciPy's interpolation, published stiffness factors, and the solved cells' own points."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
@@ -30,10 +32,23 @@ def test_a_free_plate_obeys_hooke():
 def test_curves_run_through_their_points_and_as_pchip_between(film):
     law = tri(dielectric_mm=film)
     oracle = PchipInterpolator(law.stress_pa, law.ratio)
-    at = np.linspace(0, 1e5, 1234)
+    at = np.linspace(1.001e4, 1e5, 1234)  # a contact begins otherwise, below the first point
     thinning, slope = law.thinning(at)
     assert 1 / (1 - thinning) == pytest.approx(oracle(at), rel=1e-13)
     assert slope == pytest.approx(oracle(at, 1) / oracle(at) ** 2, rel=1e-9)
+
+
+@pytest.mark.parametrize("power", [0.5, 0.75, 1.0])
+def test_a_curve_begins_with_the_power_of_the_stress_that_its_points_follow(power):
+    at = np.geomspace(700, 9e3, 50)
+    points = np.arange(11) * 1e4
+    law = compression.curve("contact", "made up", points, 1 + 0.07 * (points / 1e4) ** power)
+    thinning, slope = law.thinning(at)
+    rise = 0.07 * (at / 1e4) ** power
+    assert thinning / (1 - thinning) == pytest.approx(rise, rel=0.22)  # a cubic alone: 66 and 41 % less
+    assert slope * (1 + rise) ** 2 == pytest.approx(power * rise / at, rel=0.35)
+    steeper, _ = replace(law, onset=1.25).thinning(at)
+    assert (steeper > thinning).all() == (power < 1)
 
 
 @pytest.mark.parametrize(

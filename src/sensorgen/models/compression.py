@@ -23,6 +23,7 @@ SOLVED_RATIO = 0.4999  # Poisson's ratio of all materials of the cells that were
 REACH = 3.0  # how far beyond its last stress a curve is extended by its last slope, as a factor [-]
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _SAME = 1e-6  # relative difference up to which two parameters are one
+_EARLY = np.array([1 / 16, 1 / 4])  # of the first stress, where a curve that begins with a power of it is held
 
 Real = NDArray[np.float64]
 
@@ -84,6 +85,8 @@ class Curve:
         Shares by which the rise differs for the same cell held or touched otherwise [-].
     moved_m : float or None
         How far the top has come down at the last stress [m]; None where nobody says.
+    onset : float
+        How much further below 1 the power of the stress is with which it begins than it seems, as a factor [-].
 
     Examples
     --------
@@ -100,6 +103,7 @@ class Curve:
     within: float = 0.0
     held: tuple[float, ...] = ()
     moved_m: float | None = None
+    onset: float = 1.0
 
     def thinning(self, stress_pa: Real) -> tuple[Real, Real]:
         """Thinning [-] and its derivative [1/Pa]; raises OutOfRange for a pull and far beyond the last point."""
@@ -144,9 +148,24 @@ class Curve:
     @cached_property
     def _cubics(self) -> tuple[Real, ...]:
         """Stress where each piece begins, its length, and its coefficients in the share of that length."""
-        p, g, m = (np.asarray(values) for values in (self.stress_pa, self.ratio, self.slope_per_pa))
-        h, rise = np.diff(p), np.diff(g)
-        return p[:-1], h, g[:-1] - 1, h * m[:-1], 3 * rise - h * (2 * m[:-1] + m[1:]), h * (m[:-1] + m[1:]) - 2 * rise
+        p, r, m = self._knots()
+        h, rise = np.diff(p), np.diff(r)
+        return p[:-1], h, r[:-1], h * m[:-1], 3 * rise - h * (2 * m[:-1] + m[1:]), h * (m[:-1] + m[1:]) - 2 * rise
+
+    def _knots(self) -> tuple[Real, Real, Real]:
+        """Stresses [Pa], rises [-] and slopes [1/Pa] between which cubics lie.
+
+        Where the points bend down from the first on, a contact grows from nothing: up to there the rise goes with a
+        power of the stress, which a cubic by itself would begin too flat.
+        """
+        p, r, m = np.asarray(self.stress_pa), np.asarray(self.ratio) - 1, np.asarray(self.slope_per_pa)
+        power = 1 - self.onset * (1 - m[1] * p[1] / r[1])
+        if not 0 < power < 1:
+            return p, r, m
+        early, begun = p[1] * _EARLY, r[1] * _EARLY**power
+        slope = power * begun / early
+        first = (2 - power) * begun[0] / early[0]  # a parabola to the first of them
+        return np.insert(p, 1, early), np.insert(r, 1, begun), np.concatenate([[first], slope, m[1:]])
 
     def _rise(self, at: Real) -> tuple[Real, Real]:
         """C'/C'(0) - 1, which keeps its digits where little presses, and its derivative [1/Pa]."""
