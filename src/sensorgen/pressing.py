@@ -5,7 +5,8 @@ What a mesh is worth is told by the next coarser one: solutions are kept, so tha
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from functools import partial
+from functools import lru_cache, partial
+from importlib import import_module
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -94,11 +95,11 @@ class Rung:
     seconds: float
 
 
+@lru_cache(maxsize=16)
 def unfit(piece: Piece, model: str) -> str | None:
     """Why a model cannot speak of a piece, or None."""
-    from sensorgen.models import press2d, press3d
-
-    return {"press2d": press2d.unfit, "press3d": press3d.unfit}[model](piece.scene)
+    said: str | None = import_module(f"sensorgen.models.{model}").unfit(piece.scene)
+    return said
 
 
 def model_of(piece: Piece) -> str:

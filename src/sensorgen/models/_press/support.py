@@ -1,12 +1,15 @@
 """How a cell is held and loaded: which displacements are fixed or equal, and the pressure on its top."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
 from sensorgen.models._press.mesh import Mesh
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 Real = NDArray[np.float64]
 
@@ -45,7 +48,7 @@ CHOICES = {
 
 def free_of(
     points_m: Real, held: Held, spans_m: Real | None = None, used: NDArray[np.bool_] | None = None
-) -> csr_matrix:
+) -> "csr_matrix":
     """Displacements (x, y of each node, or x, y, z) from the free ones, as a sparse matrix of ones.
 
     Parameters
@@ -59,6 +62,8 @@ def free_of(
     used : (n,) array, optional
         Nodes that elements share; others do not move. All where not given.
     """
+    from scipy.sparse import csr_matrix
+
     nodes, d = points_m.shape
     spans = np.column_stack([points_m.min(axis=0), points_m.max(axis=0)]) if spans_m is None else spans_m
     near = _SAME * np.ptp(spans[0])
