@@ -7,7 +7,7 @@ import pytest
 from sensorgen import cells
 from sensorgen.cells import Cell, cell
 from sensorgen.scene import Body, Fill, Prism, Scene, box
-from sensorgen.sections import ROUNDING_MM, sections
+from sensorgen.sections import ROUNDING_MM, columns, sections
 from sensorgen.shapes import reference, tri
 
 HEIGHT_MM = 1.4
@@ -158,7 +158,7 @@ def test_a_row_without_mirrors_is_looked_at_once_for_each_place(monkeypatch):
     repeats = cells._repeats
     monkeypatch.setattr(cells, "_repeats", lambda *given: looked.append(given[1:]) or repeats(*given))
     section = sections(steps(12))[0]
-    found_here = cells.mirrored(cells.section_slices(section, HEIGHT_MM))
+    found_here = cells.mirrored([cells._slice(column, HEIGHT_MM) for column in columns(section)])
     places = cells._candidates(list(found_here.slices))
     assert len(found_here.slices) == 12 * 4
     assert len(looked) < len(places)
