@@ -85,7 +85,7 @@ def test_pieces_of_even_pressure_are_one_patch(sensor, count):
 @pytest.mark.parametrize("position", PLACES)
 @pytest.mark.parametrize(("force", "far_end"), [(0.5, "open"), (2.0, "open"), (2.0, "short"), (2.0, 5e4)])
 def test_slopes_against_differences(profile, position, force, far_end):
-    """By Richardson's rule from two steps, short beside the places where a law's slope bends; at the ends from inside."""
+    """By Richardson's rule from two short steps, as a law's slope bends at its points; at the very ends from inside."""
     sensor, inside = replace(SOFT, profile=profile, far_end=far_end), min(max(position, 1e-3), 0.099)
 
     def by(step, move):
