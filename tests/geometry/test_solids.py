@@ -170,17 +170,10 @@ def test_a_misplaced_y_prism_is_noticed(kernel: ModuleType, monkeypatch: pytest.
     assert "centre" in faults(body, solids.part(body))
 
 
-@pytest.mark.parametrize(
-    "outline",
-    [
-        pytest.param(((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (1.0, -1.0), (0.0, 1.0)), id="crosses-itself"),
-        pytest.param(((0.0, 0.0), (1e-8, 0.0), (1e-8, 1.0), (0.0, 1.0)), id="too-thin"),
-    ],
-)
 @pytest.mark.parametrize("axis", "xyz")
-def test_what_cannot_be_made_is_named(
-    kernel: ModuleType, axis: str, outline: tuple[tuple[float, float], ...], tmp_path: Path
-) -> None:
+def test_what_cannot_be_made_is_named(kernel: ModuleType, axis: str, tmp_path: Path) -> None:
+    """Too thin for the kernel; what encloses nothing is no prism at all."""
+    outline = ((0.0, 0.0), (1e-8, 0.0), (1e-8, 1.0), (0.0, 1.0))
     good = box(0, 1, 0, 1, 0, 1)
     body = Body("cog", "etpu", (good, Prism(axis, outline, 4.0, 5.0)))
     words = rf"cannot make cog \(etpu\), prism 2 of 2, \d corners along {axis} at .*{axis} 4 to 5"
