@@ -13,15 +13,23 @@ from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
-from sensorgen import expectations
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen import celllaw, expectations, pressing
 from sensorgen.chart import cells
-from sensorgen.design import make
+from sensorgen.design import Design, make
 from sensorgen.errors import SensorgenError
+from sensorgen.models import compression, press2d
 from sensorgen.scene import Body, Scene, box
 
+Real = NDArray[np.float64]
 HERE = Path(__file__).parent
 FILE = HERE.parent / "src" / "sensorgen" / "models" / expectations.FILE
 EPS = {"x60": 4.68, "air": 1.00059}
+PRESSED = {"press2d": [("tri", 0.1), ("tri", 0.2)], "press3d": [("rect", 0.1)]}  # the first is timed
+STRESS_PA = [1e4 * k for k in range(11)]
+FINEST = 0.35  # size of triangles over the usual one, whose own error is a tenth of a per cent
 BUDGET_S = 60.0  # a model is not asked for more where that would take longer
 
 
@@ -68,11 +76,51 @@ def anew() -> Iterator[str]:
         scene = cells.STANDARD[entry.scene]().scene
         yield f"{model}:\n  scene: {entry.scene}\n  counted: {entry.counted}"
         yield f"  parts: {expectations.COUNTED[entry.counted](scene).parts}\n  power: {entry.power}\n  points:"
-        for point in cells.points(entry.scene, BUDGET_S):
-            if point.model == model:
-                width = 2 * (point.upper_f_per_m2 - point.lower_f_per_m2)
-                width /= point.upper_f_per_m2 + point.lower_f_per_m2
-                yield f"    - [{width:.2g}, {point.seconds:.2g}]"
+        found = pressed(model) if model in pressing.MODELS else bounded(model, entry.scene)
+        yield from (f"    - [{width:.2g}, {seconds:.2g}]" for width, seconds in found)
+
+
+def bounded(model: str, scene: str) -> Iterator[tuple[float, float]]:
+    """Widths of a model's bounds, each with its time."""
+    for point in cells.points(scene, BUDGET_S):
+        if point.model == model:
+            width = 2 * (point.upper_f_per_m2 - point.lower_f_per_m2)
+            yield width / (point.upper_f_per_m2 + point.lower_f_per_m2), point.seconds
+
+
+def pressed(model: str) -> Iterator[tuple[float, float]]:
+    """How far the rise of C is off at most, mesh by mesh from the coarsest on, with the time of the first cell."""
+    cases = [case(make({"shape": name, "parameters": {"dielectric_mm": film}})) for name, film in PRESSED[model]]
+    truths = [truth(model, *pair) for pair in zip(cases, PRESSED[model], strict=True)]
+    for level in range(pressing.COARSEST, pressing.COARSEST + len(expectations.measured()[model].points)):
+        times, off = [], []
+        for one, exact in zip(cases, truths, strict=True):
+            start = time.process_time()
+            found = pressing.pressed(one, STRESS_PA, level, keep=False)
+            times.append(time.process_time() - start)
+            off.append(np.abs(rises(found) / exact - 1).max())
+        yield max(off), times[0]
+
+
+def case(design: Design) -> pressing.Case:
+    piece = pressing.drawn(design)
+    return pressing.Case(piece, pressing.model_of(piece), celllaw.elastic(design, piece.scene), EPS, press2d.Held())
+
+
+def truth(model: str, one: pressing.Case, of: tuple[str, float]) -> Real:
+    """The rise on the finest mesh that is affordable in the plane; of boxes, where their meshes lead."""
+    if model == "press2d":
+        cell = press2d.cell(one.piece.scene, one.piece.period_mm)
+        return rises(press2d.press(cell, one.solids, STRESS_PA, EPS, one.held, press2d.Fineness().scaled(FINEST)))
+    shape, film = of
+    parameters = vars(make({"shape": shape, "parameters": {"dielectric_mm": film}}).params)
+    moduli = {name: solid.youngs_modulus_pa for name, solid in one.solids.items()}
+    return np.asarray(compression.solved(shape, parameters, moduli).ratio[1:]) - 1
+
+
+def rises(found: press2d.Pressed) -> Real:
+    known = np.array([c.middle() for c in found.capacitance_f_per_m2])
+    return known[1:] / known[0] - 1
 
 
 def held_against_others() -> Iterator[str]:
