@@ -15,12 +15,12 @@ import numpy as np
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-from sensorgen import slicing
 from sensorgen.asprinted import compared
 from sensorgen.asprinted.rectilinear import plate
 from sensorgen.asprinted.rules import RULES
-from sensorgen.design import make
-from sensorgen.gcode import paths
+from sensorgen.design.design import make
+from sensorgen.export import slicing
+from sensorgen.export.gcode import paths
 from sensorgen.models import fem2d, traxels
 
 RESULTS = Path(__file__).parent / "results"

@@ -11,9 +11,9 @@ from pathlib import Path
 
 START = time.process_time()
 
-from sensorgen.batch import STEPS, make  # noqa: E402 - timed
-from sensorgen.batch.layout import packed, room  # noqa: E402
-from sensorgen.printer import load_printer, load_quality  # noqa: E402
+from sensorgen.design.printer import load_printer, load_quality  # noqa: E402
+from sensorgen.workflows.batch import STEPS, make  # noqa: E402 - timed
+from sensorgen.workflows.batch.layout import packed, room  # noqa: E402
 
 IMPORTS_S = time.process_time() - START
 HERE = Path(__file__).parent

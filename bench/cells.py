@@ -17,10 +17,10 @@ import numpy as np
 import skfem
 from skfem.helpers import dot, grad
 
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.design.shapes import rect, tri
 from sensorgen.models import columns, fem2d, fem3d, thesis_cells
-from sensorgen.scene import Fill, Scene
-from sensorgen.shapes import rect, tri
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.scene.scene import Fill, Scene
 
 HERE = Path(__file__).parent
 CELLS = json.loads((HERE.parent / "tests" / "reference" / "cells.json").read_text("utf-8"))

@@ -18,14 +18,14 @@ from skfem.helpers import dot, grad
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-from sensorgen.cells import cell
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.design.shapes import tri
 from sensorgen.models import columns, fem2d
-from sensorgen.models._fem_mesh import Cones
-from sensorgen.models._fem_plane import Plane
-from sensorgen.scene import Body, Fill, Scene, box
-from sensorgen.sections import sections
-from sensorgen.shapes import tri
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.scene.scene import Body, Fill, Scene, box
+from sensorgen.scene.sections import sections
+from sensorgen.scene.unit_cell import cell
+from sensorgen.solvers.electrostatics.mesh import Cones
+from sensorgen.solvers.electrostatics.plane import Plane
 
 HERE = Path(__file__).parent
 PICTURES = HERE.parent / "docs" / "pictures"

@@ -16,12 +16,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen import celllaw, expectations, pressing
-from sensorgen.chart import cells
-from sensorgen.design import Design, make
-from sensorgen.errors import SensorgenError
+from sensorgen.core.errors import SensorgenError
+from sensorgen.design.design import Design, make
 from sensorgen.models import compression, press2d
-from sensorgen.scene import Body, Scene, box
+from sensorgen.models import compression_law as celllaw
+from sensorgen.models import mesh_ladder as pressing
+from sensorgen.prediction import cost_model as expectations
+from sensorgen.scene.scene import Body, Scene, box
+from sensorgen.verification.chart import cells
 
 Real = NDArray[np.float64]
 HERE = Path(__file__).parent

@@ -20,9 +20,9 @@ MEGABYTE = 1024  # in kilobytes, as the system counts them
 
 def solved(layers: int, order: int) -> dict[str, float]:
     """One mesh, and what it took."""
+    from sensorgen.design.shapes import rect
     from sensorgen.models import fem3d
-    from sensorgen.scene import Fill
-    from sensorgen.shapes import rect
+    from sensorgen.scene.scene import Fill
 
     fem3d._RUNGS = ((layers, order, order - 1),)
     scene = rect.scene(rect.Params(length_mm=2.0, width_mm=2.0, dielectric_mm=0.1), Fill())

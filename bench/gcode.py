@@ -14,11 +14,11 @@ import tempfile
 import time
 from pathlib import Path
 
-from sensorgen import design
 from sensorgen.asprinted.tally import rule7
-from sensorgen.gcode.check import check
-from sensorgen.review import review
-from sensorgen.slicing import alone, sliced
+from sensorgen.checks.review import review
+from sensorgen.design import design
+from sensorgen.export.gcode.check import check
+from sensorgen.export.slicing import alone, sliced
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "results"

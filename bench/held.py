@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 
 from sensorgen.asprinted import compared, pressed
 from sensorgen.asprinted.rules import RULES
-from sensorgen.design import Design, make
-from sensorgen.errors import OutOfRange
+from sensorgen.core.errors import OutOfRange
+from sensorgen.design.design import Design, make
 from sensorgen.models import press2d
 from sensorgen.models.press2d import Elastic, Held
-from sensorgen.scene import Body, Prism, Scene, rectangle
-from sensorgen.sensing import sensor_of
+from sensorgen.prediction.sensor_of_design import sensor_of
+from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 
 STRESS_PA = [0.0, 1e5]
 RATIO = 0.4999  # of Poisson

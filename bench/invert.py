@@ -17,11 +17,11 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy is loaded
 import numpy as np
 from scipy.optimize import least_squares
 
-from sensorgen.design import make
-from sensorgen.invert import Estimator, Prior, Status
+from sensorgen.design.design import make
 from sensorgen.models import line_fit
-from sensorgen.predict import TONES_HZ
-from sensorgen.sensing import sensor_of
+from sensorgen.prediction.inverse import Estimator, Prior, Status
+from sensorgen.prediction.prediction import TONES_HZ
+from sensorgen.prediction.sensor_of_design import sensor_of
 
 RESULTS = Path(__file__).parent / "results"
 TONES = np.array(TONES_HZ)

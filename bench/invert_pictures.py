@@ -9,10 +9,10 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
-from sensorgen.design import make
-from sensorgen.invert import Estimator, Prior, Status
-from sensorgen.predict import TONES_HZ
-from sensorgen.sensing import sensor_of
+from sensorgen.design.design import make
+from sensorgen.prediction.inverse import Estimator, Prior, Status
+from sensorgen.prediction.prediction import TONES_HZ
+from sensorgen.prediction.sensor_of_design import sensor_of
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

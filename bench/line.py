@@ -33,9 +33,9 @@ sys.path.insert(0, str(HERE.parent / "tests" / "models"))
 
 from line_cases import PLATE, TONES, cases, exact, off  # noqa: E402
 
-from sensorgen.errors import OutOfRange  # noqa: E402
+from sensorgen.core.errors import OutOfRange  # noqa: E402
 from sensorgen.models import line, line_abcd, line_closed, line_ladder  # noqa: E402
-from sensorgen.models._line_inputs import read  # noqa: E402
+from sensorgen.solvers.line.inputs import read  # noqa: E402
 
 ROUNDS = 7
 Inputs = dict[str, Any]

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 import scipy.io
 
-from sensorgen.log import Log
-from sensorgen.log.words import reading
+from sensorgen.measure.log import Log
+from sensorgen.measure.log.words import reading
 
 HERE = Path(__file__).parent
 TESTS = HERE.parent / "tests" / "log"

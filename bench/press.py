@@ -14,13 +14,13 @@ import numpy as np
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-from sensorgen.design import make
+from sensorgen.design.design import make
 from sensorgen.models import press2d, springs
-from sensorgen.models._press import cell as cells
 from sensorgen.models.compression import bonded
 from sensorgen.models.press2d import Elastic, Fineness, Held
-from sensorgen.scene import Body, Prism, Scene, box, rectangle
-from sensorgen.sections import columns, sections
+from sensorgen.scene.scene import Body, Prism, Scene, box, rectangle
+from sensorgen.scene.sections import columns, sections
+from sensorgen.solvers.contact import cell as cells
 
 HERE = Path(__file__).parent
 PICTURES = HERE.parent / "docs" / "pictures"

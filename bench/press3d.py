@@ -15,11 +15,11 @@ mpl.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.collections import LineCollection
 
-from sensorgen.design import make
+from sensorgen.design.design import make
 from sensorgen.models import press2d, press3d
-from sensorgen.models._press import brick_element
 from sensorgen.models.press3d import Elastic, Held, Pieces
-from sensorgen.scene import Body, Scene, box
+from sensorgen.scene.scene import Body, Scene, box
+from sensorgen.solvers.contact import brick_element
 
 HERE = Path(__file__).parent
 PICTURES = HERE.parent / "docs" / "pictures"

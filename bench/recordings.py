@@ -20,13 +20,13 @@ sys.path.insert(0, str(HERE.parent / "tests" / "recording"))
 
 import made  # noqa: E402 - the truth is made as for the tests
 
-from sensorgen.card.fisher import bounds, slopes  # noqa: E402
-from sensorgen.invert import Estimator  # noqa: E402
-from sensorgen.plots import bench, ways  # noqa: E402
-from sensorgen.process import drift, hysteresis, lowpass, presses, waveform  # noqa: E402
-from sensorgen.process.run import processed  # noqa: E402
-from sensorgen.recording import joined, read, rig  # noqa: E402
-from sensorgen.sensor import Sensor  # noqa: E402
+from sensorgen.analysis.plots import bench, ways  # noqa: E402
+from sensorgen.measure.recording import joined, read, rig  # noqa: E402
+from sensorgen.measure.signal import drift, hysteresis, lowpass, presses, waveform  # noqa: E402
+from sensorgen.measure.signal.run import processed  # noqa: E402
+from sensorgen.models.sensor import Sensor  # noqa: E402
+from sensorgen.prediction.identifiability.fisher import bounds, slopes  # noqa: E402
+from sensorgen.prediction.inverse import Estimator  # noqa: E402
 
 SAMPLES = 1_000_000
 NOISE, RATE = 1e-3, 140.0

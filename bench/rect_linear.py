@@ -9,7 +9,7 @@ gaps of this cell stay open far beyond the stresses that a finger makes.
 
 from typing import Any
 
-from sensorgen.design import Design
+from sensorgen.design.design import Design
 
 AIR_PA = 1.0  # of the stand-in for air, some 1e-7 of the film's
 _CONDUCTOR = 1e6  # relative permittivity that stands for one

@@ -13,9 +13,9 @@ sys.path[:0] = [str(Path(__file__).parents[1] / "tests" / name) for name in ("re
 
 import bench_files  # noqa: E402 - it is among the tests
 
-from sensorgen.log import Log, bench, words  # noqa: E402
-from sensorgen.report import report, written  # noqa: E402
-from sensorgen.specimen import design_of, parse  # noqa: E402
+from sensorgen.analysis.report import report, written  # noqa: E402
+from sensorgen.design.specimen_name import design_of, parse  # noqa: E402
+from sensorgen.measure.log import Log, bench, words  # noqa: E402
 
 RATE_HZ, PERIOD_S, NAME = 140.0, 20.0, "23 triX .1mm"
 

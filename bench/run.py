@@ -68,7 +68,7 @@ from sensorgen.geometry import meshes
 from sensorgen.scene import Fill
 import importlib
 shape, length, width = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
-module = importlib.import_module("sensorgen.shapes." + shape)
+module = importlib.import_module("sensorgen.design.shapes." + shape)
 times = []
 for _ in range(3):
     start = time.perf_counter()
@@ -141,9 +141,9 @@ def against_union() -> list[dict[str, object]]:
     """Our grid mesh against manifold3d's union of the same boxes, rect 20 x 20 cells."""
     import manifold3d
 
-    from sensorgen.geometry import meshes
-    from sensorgen.scene import Fill
-    from sensorgen.shapes import rect
+    from sensorgen.design.shapes import rect
+    from sensorgen.scene.geometry import meshes
+    from sensorgen.scene.scene import Fill
 
     body = rect.scene(rect.Params(length_mm=40, width_mm=40), Fill()).body("top_electrode_with_cogs")
 
@@ -167,9 +167,10 @@ def against_union() -> list[dict[str, object]]:
 
 def models() -> list[dict[str, object]]:
     """Time and error of the capacitance bounds against reference values (tests/reference)."""
-    from sensorgen import registry, shapes
+    from sensorgen.core import plugins as registry
+    from sensorgen.design import shapes
     from sensorgen.models import columns
-    from sensorgen.scene import Fill
+    from sensorgen.scene.scene import Fill
 
     eps = {"x60": 4.68, "air": 1.00059}
     # Whole-sensor values of 100 x 10 mm from cells solved by adaptive finite elements with two-sided bounds.

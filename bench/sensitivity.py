@@ -10,12 +10,12 @@ from itertools import product
 from math import floor, log10
 from pathlib import Path
 
-from sensorgen.celllaw import solved
-from sensorgen.design import Design, make
+from sensorgen.design.design import Design, make
 from sensorgen.models import compression
 from sensorgen.models.compression import Compression
-from sensorgen.predict import TONES_HZ
-from sensorgen.sensitivity import HELD, Sensitivity, sensitivity
+from sensorgen.models.compression_law import solved
+from sensorgen.prediction.prediction import TONES_HZ
+from sensorgen.prediction.sensitivity import HELD, Sensitivity, sensitivity
 
 FORCE_N, RHO_OHM_M = 6.0, 0.135
 RECT_MESH = 1.022  # rise in the limit of fine meshes over that of the default mesh: docs/press3d.md

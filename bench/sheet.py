@@ -15,9 +15,9 @@ import numpy as np
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
+from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line
 from sensorgen.models.sheet import BY, Contact, Patch, Sheet, impedance, solve
-from sensorgen.units import EPS0_F_PER_M
 
 RESULTS = Path(__file__).parent / "results"
 CELLS = (10, 20, 40, 80)

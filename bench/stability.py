@@ -13,10 +13,10 @@ from press import solids
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import splu
 
+from sensorgen.design.shapes import rect, tri
 from sensorgen.models import fem2d, fem3d, press2d, press3d, springs
 from sensorgen.models.compression import bonded
-from sensorgen.scene import Body, Fill, Scene, box
-from sensorgen.shapes import rect, tri
+from sensorgen.scene.scene import Body, Fill, Scene, box
 
 M_PER_MM = 1e-3
 NU = 0.4999

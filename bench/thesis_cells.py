@@ -9,9 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from sensorgen.design.shapes import rect, tri
 from sensorgen.models import fem2d, fem3d, thesis_cells, thesis_swept
-from sensorgen.scene import Fill
-from sensorgen.shapes import rect, tri
+from sensorgen.scene.scene import Fill
 
 HERE = Path(__file__).parent
 PICTURE = HERE.parent / "docs" / "pictures" / "cells-thesis.png"

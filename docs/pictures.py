@@ -7,16 +7,16 @@ import numpy as np
 from generate import DOCS, sensorgen
 from matplotlib.figure import Figure
 
-from sensorgen.design import make
+from sensorgen.analysis.plots import sheet
+from sensorgen.analysis.plots.card import figure
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.design.design import make
 from sensorgen.models.sheet import Patch, Sheet, contact_sets, localise
 from sensorgen.models.stack import Body
-from sensorgen.plots import sheet
-from sensorgen.plots.card import figure
-from sensorgen.predict import TONES_HZ
-from sensorgen.sensing import sensor_of
-from sensorgen.stacked.designs import press_at, stacked
-from sensorgen.stacked.touching import WIRINGS, Touching
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.prediction.double_layer.designs import press_at, stacked
+from sensorgen.prediction.double_layer.touching import WIRINGS, Touching
+from sensorgen.prediction.prediction import TONES_HZ
+from sensorgen.prediction.sensor_of_design import sensor_of
 
 PICTURES = DOCS / "pictures"
 SENSORS = {

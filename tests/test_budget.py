@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from sensorgen.budget import MODELS, budget
 from sensorgen.cli.budget_text import lines
-from sensorgen.design import make
+from sensorgen.design.design import make
 from sensorgen.models import line
-from sensorgen.sensing import sensor_of
+from sensorgen.prediction.error_budget import MODELS, budget
+from sensorgen.prediction.sensor_of_design import sensor_of
 
 TONES = (1.1e3, 99.7e3)
 PLATE = {
@@ -148,8 +148,8 @@ def test_the_text_says_whether_it_is_met(accuracy, said):
 
 
 def test_what_no_source_can_mean_does_not_count():
-    from sensorgen.budget import _range
-    from sensorgen.materials import Value, load
+    from sensorgen.design.materials import Value, load
+    from sensorgen.prediction.error_budget import _range
 
     values = [
         Value(value=v, source=s, default=s == "a", implausible=s == "b") for v, s in ((2, "a"), (9, "b"), (3, "c"))

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen import catalogue, design
-from sensorgen.build import build
-from sensorgen.errors import Unprintable
-from sensorgen.threemf import FAMILIES
+from sensorgen.cli import catalogue
+from sensorgen.core.errors import Unprintable
+from sensorgen.design import design
+from sensorgen.export.threemf import FAMILIES
+from sensorgen.workflows.build import build
 
 DESIGNS = Path(__file__).parents[1] / "designs"
 PRINTABLE = sorted(p.relative_to(DESIGNS).as_posix() for p in DESIGNS.rglob("*.yaml") if not p.stem.endswith("-d0"))

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from sensorgen import cached
+from sensorgen.core import cache as cached
 
 QUESTION = {"what": "sum", "terms": [1, 2.5], "eps": {"x60": 4.68}}
 
@@ -111,11 +111,12 @@ def test_other_code_asks_anew(monkeypatch):
 
 def test_the_version_covers_the_models_and_what_they_stand_on(monkeypatch, tmp_path):
     package = tmp_path / "sensorgen"
-    (package / "models" / "_deep").mkdir(parents=True)
-    files = ["models/a.py", "models/_deep/b.py", "models/c.yaml", "cells.py", "scene.py", "sections.py"]
+    for folder in ("models/_deep", "solvers", "scene", "core"):
+        (package / folder).mkdir(parents=True)
+    files = ["models/a.py", "models/_deep/b.py", "models/c.yaml", "solvers/d.py", "scene/e.py", "core/units.py"]
     for name in files:
         (package / name).write_text("1")
-    monkeypatch.setattr(cached, "__file__", str(package / "cached.py"))
+    monkeypatch.setattr(cached, "__file__", str(package / "core" / "cache.py"))
     found = []
     for name in (None, *files):
         if name:

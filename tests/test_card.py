@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from sensorgen.card import card, surface
-from sensorgen.card.fisher import Setup, Slopes, bearable, bounds, shares, slopes
-from sensorgen.card.tones import spread
-from sensorgen.card.verdict import Required, bracket, metres, newtons, required, verdict
-from sensorgen.errors import SensorgenError
+from sensorgen.core.errors import SensorgenError
 from sensorgen.models import compression
-from sensorgen.predict import TONES_HZ
-from sensorgen.sensor import Sensor
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.identifiability import card, surface
+from sensorgen.prediction.identifiability.fisher import Setup, Slopes, bearable, bounds, shares, slopes
+from sensorgen.prediction.identifiability.tones import spread
+from sensorgen.prediction.identifiability.verdict import Required, bracket, metres, newtons, required, verdict
+from sensorgen.prediction.prediction import TONES_HZ
 
 EPS0 = 8.8541878128e-12
 TEN_TIMES = tuple(10 * f for f in TONES_HZ)
@@ -426,7 +426,7 @@ def test_it_is_plain_data():
 
 
 def test_it_needs_neither_scipy_nor_matplotlib():
-    program = "import sys, sensorgen.card, sensorgen.cli.card_text; print({'scipy', 'matplotlib'} & set(sys.modules))"
+    program = "import sys, sensorgen.prediction.identifiability, sensorgen.cli.card_text; print({'scipy', 'matplotlib'} & set(sys.modules))"  # noqa: E501
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
 

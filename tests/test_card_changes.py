@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sensorgen import materials
-from sensorgen.card import card, changes
-from sensorgen.card.changes import CHANGES, most_helpful, together
-from sensorgen.card.fisher import Setup
-from sensorgen.card.verdict import required
-from sensorgen.design import make
+from sensorgen.design import materials
+from sensorgen.design.design import make
 from sensorgen.models import compression
-from sensorgen.predict import TONES_HZ
-from sensorgen.sensing import sensor_of
-from sensorgen.sensor import Sensor
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.identifiability import card, changes
+from sensorgen.prediction.identifiability.changes import CHANGES, most_helpful, together
+from sensorgen.prediction.identifiability.fisher import Setup
+from sensorgen.prediction.identifiability.verdict import required
+from sensorgen.prediction.prediction import TONES_HZ
+from sensorgen.prediction.sensor_of_design import sensor_of
 
 EPS0 = 8.8541878128e-12
 PLATE = Sensor(

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sensorgen.card.fisher import Setup
+from sensorgen.analysis.plots import card as plots
 from sensorgen.models import compression
-from sensorgen.plots import card as plots
-from sensorgen.predict import TONES_HZ
-from sensorgen.sensor import Sensor
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.identifiability.fisher import Setup
+from sensorgen.prediction.prediction import TONES_HZ
 
 PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), 8.8541878128e-12 * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))
 

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from sensorgen import catalogue, design, printer
+from sensorgen.cli import catalogue
+from sensorgen.design import design, printer
 
 
 @pytest.mark.parametrize("kind", ["shapes", "materials", "printers", "qualities", "models", "sources"])

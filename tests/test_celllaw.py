@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 import pytest
 
-from sensorgen.celllaw import law_of
-from sensorgen.design import make
-from sensorgen.errors import SensorgenError
-from sensorgen.interval import Interval
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import SensorgenError
+from sensorgen.design.design import make
 from sensorgen.models import compression
-from sensorgen.planned import Press, carried_out, drawn, outlined
-from sensorgen.planner import Answer
+from sensorgen.models.compression_law import law_of
+from sensorgen.prediction.capacitance import Answer
+from sensorgen.prediction.ladder import Press, carried_out, drawn, outlined
 
 GAPS = Answer("columns", Interval(1e-10, 2e-10), ())
 OTHER = {"shape": "tri", "parameters": {"period_mm": 2.5}}
@@ -55,7 +55,7 @@ def test_a_prototype_is_known_and_nothing_is_solved(monkeypatch):
 
 def test_a_cell_of_boxes_is_solved_in_three_dimensions(monkeypatch):
     """An unknown one on two bricks per box and axis, held against one; a prototype's is stored."""
-    from sensorgen import celllaw
+    from sensorgen.models import compression_law as celllaw
     from sensorgen.models import press3d
 
     monkeypatch.setattr(press3d, "Pieces", partial(press3d.Pieces, 2))
@@ -87,7 +87,7 @@ def test_without_the_solver_a_plate_stands_in_and_that_is_said(monkeypatch):
 
 def test_a_curve_ends_where_the_capacitance_is_no_longer_known(monkeypatch):
     pytest.importorskip("netgen", reason="solves a cell: pip install sensorgen[fem]")
-    from sensorgen import celllaw
+    from sensorgen.models import compression_law as celllaw
     from sensorgen.models import press2d
 
     def lost_above_5_kpa(*given, press=press2d.press, **more):

@@ -4,11 +4,11 @@ from collections import defaultdict
 
 import pytest
 
-from sensorgen import cells
-from sensorgen.cells import Cell, cell
-from sensorgen.scene import Body, Fill, Prism, Scene, box
-from sensorgen.sections import ROUNDING_MM, columns, sections
-from sensorgen.shapes import reference, tri
+from sensorgen.design.shapes import reference, tri
+from sensorgen.scene import unit_cell as cells
+from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
+from sensorgen.scene.sections import ROUNDING_MM, columns, sections
+from sensorgen.scene.unit_cell import Cell, cell
 
 HEIGHT_MM = 1.4
 

@@ -22,15 +22,17 @@ from line_cases import off
 from test_sheet import two_stretches
 from test_stack import exact as exact_stack
 
-from sensorgen import chart, models, registry
-from sensorgen.chart import blocks, cells, exact, lines, membrane, networks, presses, rounds
-from sensorgen.chart import measured as measured_in
-from sensorgen.chart.cells import STANDARD
-from sensorgen.chart.measured import Point, with_front
-from sensorgen.errors import SensorgenError
-from sensorgen.interval import Interval
+from sensorgen import models
+from sensorgen.verification.chart import plot as pictures
+from sensorgen.core import plugins as registry
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import SensorgenError
 from sensorgen.models import fem3d
-from sensorgen.plots import chart as pictures
+from sensorgen.verification import chart
+from sensorgen.verification.chart import blocks, cells, exact, lines, membrane, networks, presses, rounds
+from sensorgen.verification.chart import measured as measured_in
+from sensorgen.verification.chart.cells import STANDARD
+from sensorgen.verification.chart.measured import Point, with_front
 
 REFERENCE = Path(__file__).parent / "reference"
 
@@ -542,7 +544,7 @@ def test_the_page_in_a_browser(measured, tmp_path):
 def test_the_command(tmp_path):
     from click.testing import CliRunner
 
-    from sensorgen.cli.chart_command import command
+    from sensorgen.verification.chart_command import command
 
     out = tmp_path / "new" / "chart"
     done = CliRunner().invoke(command, ["--scene", "plate, 0.6 mm", "--budget", "0.1", "-o", str(out)])
@@ -559,8 +561,8 @@ def test_the_command(tmp_path):
 
 
 def test_the_command_refuses_other_scenes():
-    from sensorgen.cli.chart_command import command
-    from sensorgen.errors import UnknownName
+    from sensorgen.core.errors import UnknownName
+    from sensorgen.verification.chart_command import command
 
     with pytest.raises(UnknownName, match=r"standard scene 'tri, 0.3 mm'; did you mean 'tri, 0.2 mm'|'tri, 0.1 mm'"):
         command.main(["--scene", "tri, 0.3 mm"], standalone_mode=False)

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sensorgen import compressed
-from sensorgen.compressed import Asked, Held
-from sensorgen.design import make
-from sensorgen.interval import Interval
+from sensorgen.core.bounds import Interval
+from sensorgen.design.design import make
+from sensorgen.prediction import compression as compressed
+from sensorgen.prediction.compression import Asked, Held
 
 KNOWN = json.loads((Path(__file__).parent / "reference" / "contact.json").read_text())
 LOADS = (0, 2, 6, 10)  # of the reference's, a tenth of its kPa

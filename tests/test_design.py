@@ -5,12 +5,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from sensorgen import design, printer
-from sensorgen.design import make, name_of
-from sensorgen.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
-from sensorgen.findings import Finding
-from sensorgen.scene import Envelope, Prism
-from sensorgen.shapes import reference
+from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
+from sensorgen.core.findings import Finding
+from sensorgen.design import design, printer
+from sensorgen.design.design import make, name_of
+from sensorgen.design.shapes import reference
+from sensorgen.scene.scene import Envelope, Prism
 
 
 def tri(**more):

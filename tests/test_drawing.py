@@ -12,13 +12,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sensorgen import registry, shapes
-from sensorgen.drawing import markers, measures, panels, svg
-from sensorgen.drawing.paper import fitted, spread, width, wrapped
-from sensorgen.drawing.view import period, views
-from sensorgen.findings import Finding
-from sensorgen.scene import Body, Fill, Point, Prism, Scene, area_mm2, box
-from sensorgen.sections import Column, columns
+from sensorgen.core import plugins as registry
+from sensorgen.core.findings import Finding
+from sensorgen.design import shapes
+from sensorgen.scene.drawing import markers, measures, panels, svg
+from sensorgen.scene.drawing.paper import fitted, spread, width, wrapped
+from sensorgen.scene.drawing.view import period, views
+from sensorgen.scene.scene import Body, Fill, Point, Prism, Scene, area_mm2, box
+from sensorgen.scene.sections import Column, columns
 
 SHAPES = registry.names(shapes)
 COLOURS = {"etpu": ("PI-eTPU 85-700+", "#303436"), "x60": ("Flexion X60", "#f2c14e"), "bvoh": ("BVOH", "#7fc8f8")}
@@ -241,8 +242,8 @@ def fresh(script: str, seed: str = "0") -> str:
 
 def test_the_same_input_gives_the_same_bytes() -> None:
     script = (
-        "import sys; from sensorgen.drawing import svg; from sensorgen.scene import Fill;"
-        "from sensorgen.shapes import rect; s = rect.scene(rect.Params(), Fill());"
+        "import sys; from sensorgen.scene.drawing import svg; from sensorgen.scene.scene import Fill;"
+        "from sensorgen.design.shapes import rect; s = rect.scene(rect.Params(), Fill());"
         "sys.stdout.write(svg(s, 't', [0.1 * k for k in range(15)], [], {}))"
     )
     assert len({fresh(script, seed) for seed in ("1", "2")}) == 1
@@ -251,8 +252,8 @@ def test_the_same_input_gives_the_same_bytes() -> None:
 
 def test_drawing_needs_neither_numpy_nor_the_cad_kernel() -> None:
     script = (
-        "import sys; from sensorgen.drawing import svg; from sensorgen.scene import Fill;"
-        "from sensorgen.shapes import tri; svg(tri.scene(tri.Params(), Fill()), 't', [0, 0.1], [], {});"
+        "import sys; from sensorgen.scene.drawing import svg; from sensorgen.scene.scene import Fill;"
+        "from sensorgen.design.shapes import tri; svg(tri.scene(tri.Params(), Fill()), 't', [0, 0.1], [], {});"
         "print([m for m in ('numpy', 'pydantic', 'matplotlib', 'build123d') if m in sys.modules])"
     )
     assert fresh(script) == "[]\n"

@@ -8,21 +8,21 @@ import pytest
 import yaml
 from scipy import stats
 
-from sensorgen import materials
+from sensorgen.analysis.comparison.leaky import across_ohm, along_ohm
+from sensorgen.analysis.fit import Fit, Fitted, Untold, fit, text
+from sensorgen.analysis.fit.fitting import held_back
+from sensorgen.analysis.fit.resistance import Allowed, leak, resistivity
+from sensorgen.analysis.fit.tones import _together
 from sensorgen.cli import cli
-from sensorgen.comparison.leaky import across_ohm, along_ohm
-from sensorgen.design import make
-from sensorgen.errors import BadInput, OutOfRange, SensorgenError, UnknownName
-from sensorgen.fit import Fit, Fitted, Untold, fit, text
-from sensorgen.fit.fitting import held_back
-from sensorgen.fit.resistance import Allowed, leak, resistivity
-from sensorgen.fit.tones import _together
-from sensorgen.log import Log, bench, words
-from sensorgen.losses import lost
-from sensorgen.materials import own
-from sensorgen.predict import prediction
-from sensorgen.sensing import sensor_of
-from sensorgen.specimen import design_of, parse
+from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
+from sensorgen.design import materials
+from sensorgen.design.design import make
+from sensorgen.design.materials import own
+from sensorgen.design.specimen_name import design_of, parse
+from sensorgen.measure.log import Log, bench, words
+from sensorgen.models.losses import lost
+from sensorgen.prediction.prediction import prediction
+from sensorgen.prediction.sensor_of_design import sensor_of
 
 
 @pytest.fixture(autouse=True)
@@ -36,7 +36,7 @@ def value(made, quantity):
 
 @pytest.fixture(scope="module")
 def of_thesis(tmp_path_factory):
-    from sensorgen.log import importing
+    from sensorgen.measure.log import importing
 
     with Log(tmp_path_factory.mktemp("fit") / "log.db", create=True) as log:
         importing.thesis(log)

@@ -8,15 +8,15 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from sensorgen.design import make
-from sensorgen.errors import BadInput, OutOfRange
-from sensorgen.invert import Estimator, Prior, Status, answers, estimate
-from sensorgen.invert.forward import Forward
-from sensorgen.invert.verdict import chi2_limit
+from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.design.design import make
 from sensorgen.models.compression import unconfined
-from sensorgen.predict import TONES_HZ
-from sensorgen.sensing import sensor_of
-from sensorgen.sensor import Sensor
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.inverse import Estimator, Prior, Status, answers, estimate
+from sensorgen.prediction.inverse.forward import Forward
+from sensorgen.prediction.inverse.verdict import chi2_limit
+from sensorgen.prediction.prediction import TONES_HZ
+from sensorgen.prediction.sensor_of_design import sensor_of
 
 TONES = np.array(TONES_HZ)
 NOISE = 1e-3

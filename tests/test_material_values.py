@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from sensorgen import materials
-from sensorgen.celllaw import elastic
-from sensorgen.design import make
-from sensorgen.errors import BadInput, OutOfRange, UnknownName
-from sensorgen.planner import permittivities, unloaded
-from sensorgen.predict import prediction
-from sensorgen.sensing import sensor_of
-from sensorgen.stacked.designs import stacked
+from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
+from sensorgen.design import materials
+from sensorgen.design.design import make
+from sensorgen.models.compression_law import elastic
+from sensorgen.prediction.capacitance import permittivities, unloaded
+from sensorgen.prediction.double_layer.designs import stacked
+from sensorgen.prediction.prediction import prediction
+from sensorgen.prediction.sensor_of_design import sensor_of
 
 
 def design(values, shape="reference", **rest):

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from sensorgen import materials
-from sensorgen.errors import MissingValue, UnknownName
+from sensorgen.core.errors import MissingValue, UnknownName
+from sensorgen.design import materials
 
 ALL = [
     (name, quantity, values)

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen import cached, places
-from sensorgen.log import logbook
-from sensorgen.materials import own
+from sensorgen.core import cache as cached
+from sensorgen.core import paths as places
+from sensorgen.design.materials import own
+from sensorgen.measure.log import logbook
 
 VARIABLES = (
     "XDG_CACHE_HOME",

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from sensorgen.errors import BadInput, SensorgenError
-from sensorgen.plan import Candidate, Level, Plan, cheapest, plain, walked
+from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, plain, walked
 
 RUNGS = (Candidate("none", passed_over="it knows no gaps"), Candidate("coarse", 0.1, 1.0), Candidate("fine", 0.01, 5.0))
 

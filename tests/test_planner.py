@@ -5,14 +5,16 @@ from types import SimpleNamespace
 
 import pytest
 
-from sensorgen import expectations, planner, registry
 from sensorgen import models as model_files
-from sensorgen.chart.cells import STANDARD
-from sensorgen.design import make
-from sensorgen.errors import OutOfRange, UnknownName
-from sensorgen.interval import Interval
-from sensorgen.planner import Contradiction, Unpredictable, capacitance
-from sensorgen.scene import Body, Prism, Scene, box
+from sensorgen.core import plugins as registry
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import OutOfRange, UnknownName
+from sensorgen.design.design import make
+from sensorgen.prediction import capacitance as planner
+from sensorgen.prediction import cost_model as expectations
+from sensorgen.prediction.capacitance import Contradiction, Unpredictable, capacitance
+from sensorgen.scene.scene import Body, Prism, Scene, box
+from sensorgen.verification.chart.cells import STANDARD
 
 EPS = {"x60": 4.68, "air": 1.00059}
 PLATE = Scene(
@@ -271,7 +273,7 @@ def test_a_sensor_that_is_cut_amid_a_cell_needs_twice_the_digits(fake):
 @pytest.fixture
 def failing(fake):
     """A cheap model that is not near enough, and a nearer one that raises."""
-    from sensorgen.models import _fem_bounds
+    from sensorgen.solvers.electrostatics import bounds as _fem_bounds
 
     def raising(error):
         def fails(scene, permittivity, width):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from manifold3d import CrossSection, FillRule
 
-from sensorgen.planview import parts
-from sensorgen.scene import Body, Outline, Prism, Scene, area_mm2, box, rectangle, rounded
+from sensorgen.scene.overlay import parts
+from sensorgen.scene.scene import Body, Outline, Prism, Scene, area_mm2, box, rectangle, rounded
 
 SIZE = (4.0, 3.0)
 

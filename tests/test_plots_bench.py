@@ -4,11 +4,11 @@ import made
 import numpy as np
 import pytest
 
-from sensorgen.plots import bench
-from sensorgen.process import lowpass, presses
-from sensorgen.process.schedule import Plan
-from sensorgen.recording import Clock, Recording, Source
-from sensorgen.recording.samples import blank
+from sensorgen.analysis.plots import bench
+from sensorgen.measure.recording import Clock, Recording, Source
+from sensorgen.measure.recording.samples import blank
+from sensorgen.measure.signal import lowpass, presses
+from sensorgen.measure.signal.schedule import Plan
 
 
 @pytest.fixture(scope="module")

@@ -12,14 +12,15 @@ import pytest
 from line_cases import PLATE as LINE_PLATE
 from line_cases import exact as exact_line
 
-from sensorgen import materials, planner
-from sensorgen.design import make
-from sensorgen.errors import MissingValue, OutOfRange
-from sensorgen.interval import Interval
-from sensorgen.losses import Lost
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import MissingValue, OutOfRange
+from sensorgen.design import materials
+from sensorgen.design.design import make
 from sensorgen.models import line
-from sensorgen.planner import Unpredictable, capacitance
-from sensorgen.predict import (
+from sensorgen.models.losses import Lost
+from sensorgen.prediction import capacitance as planner
+from sensorgen.prediction.capacitance import Unpredictable, capacitance
+from sensorgen.prediction.prediction import (
     FORCES_N,
     LARGEST,
     NOISE,
@@ -32,7 +33,7 @@ from sensorgen.predict import (
     prediction,
     presses,
 )
-from sensorgen.sensing import sensor_of
+from sensorgen.prediction.sensor_of_design import sensor_of
 
 EPS = {"x60": 4.68, "air": 1.00059}
 TABLE_3_2 = {"top_electrode": "etpu@thesis-3.2", "bottom_electrode": "etpu@thesis-3.2"}  # 1.2 S/m

@@ -2,8 +2,8 @@
 
 import pytest
 
-from sensorgen import materials, printer
-from sensorgen.errors import BadInput, UnknownName
+from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.design import materials, printer
 
 
 @pytest.fixture

@@ -2,8 +2,8 @@
 
 import pytest
 
-from sensorgen.errors import BadInput, NotInstalled, OutOfRange
-from sensorgen.processes import in_parallel, said
+from sensorgen.core.errors import BadInput, NotInstalled, OutOfRange
+from sensorgen.core.parallel import in_parallel, said
 
 
 def fails(error):

@@ -8,8 +8,8 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from sensorgen.errors import BadInput
-from sensorgen.readings import readings
+from sensorgen.core.errors import BadInput
+from sensorgen.measure.readings import readings
 
 HEAD = "time_s,re_ohm_1.1kHz,im_ohm_1.1kHz,re_ohm_99.7kHz,im_ohm_99.7kHz\n"
 ROW = "0.5,100,-2e6,90.5,-2e4\n"

@@ -2,9 +2,11 @@
 
 import pytest
 
-from sensorgen import models, registry, shapes
-from sensorgen.errors import BadInput, UnknownName, Unprintable
-from sensorgen.findings import Finding
+from sensorgen import models
+from sensorgen.core import plugins as registry
+from sensorgen.core.errors import BadInput, UnknownName, Unprintable
+from sensorgen.core.findings import Finding
+from sensorgen.design import shapes
 
 
 def test_names_are_those_of_the_files():
@@ -14,7 +16,7 @@ def test_names_are_those_of_the_files():
 
 @pytest.mark.parametrize("name", registry.names(shapes))
 def test_what_is_listed_loads(name):
-    assert registry.load(shapes, name).__name__ == f"sensorgen.shapes.{name}"
+    assert registry.load(shapes, name).__name__ == f"sensorgen.design.shapes.{name}"
 
 
 @pytest.mark.parametrize("name", ["__init__", "../errors", "tri.py", "", ".", "tri\0", "os", "errors"])

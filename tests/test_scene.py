@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sensorgen.scene import PLANE, Body, Fill, Prism, Scene, area_mm2, box, clipped, rectangle
-from sensorgen.shapes import rect, reference, tri
+from sensorgen.design.shapes import rect, reference, tri
+from sensorgen.scene.scene import PLANE, Body, Fill, Prism, Scene, area_mm2, box, clipped, rectangle
 
 SUPPORTED = Fill(support="bvoh")
 

@@ -5,9 +5,9 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from sensorgen.scene import Body, Fill, Prism, Scene, area_mm2, box
-from sensorgen.sections import alike, columns, sections
-from sensorgen.shapes import rect, reference, tri
+from sensorgen.design.shapes import rect, reference, tri
+from sensorgen.scene.scene import Body, Fill, Prism, Scene, area_mm2, box
+from sensorgen.scene.sections import alike, columns, sections
 
 SCENES = {
     "tri": tri.scene(tri.Params(length_mm=7.13, width_mm=3.3), Fill(support="bvoh")),

@@ -2,9 +2,9 @@
 
 import pytest
 
-from sensorgen.design import make
-from sensorgen.errors import BadInput, MissingValue, OutOfRange, UnknownName
-from sensorgen.sensing import sensor_of
+from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
+from sensorgen.design.design import make
+from sensorgen.prediction.sensor_of_design import sensor_of
 
 
 def sensed(shape, law="", **rest):

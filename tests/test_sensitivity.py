@@ -2,10 +2,10 @@
 
 import pytest
 
-from sensorgen.design import make
+from sensorgen.design.design import make
 from sensorgen.models import compression
-from sensorgen.predict import TONES_HZ
-from sensorgen.sensitivity import HELD, sensitivity
+from sensorgen.prediction.prediction import TONES_HZ
+from sensorgen.prediction.sensitivity import HELD, sensitivity
 
 PLATE = make({"shape": "reference"})
 

@@ -10,14 +10,14 @@ from xml.etree import ElementTree
 
 import pytest
 
-from sensorgen import materials
-from sensorgen.errors import BadInput, MissingValue, OutOfRange, SlicerFailed, UnknownName
-from sensorgen.gcode import extruded
-from sensorgen.printer import Printer, load_printer, load_quality, printer_names, quality_names
-from sensorgen.slicer import cura, curaengine, prusa
-from sensorgen.slicer.loads import Load, recipes
-from sensorgen.slicer.run import run
-from sensorgen.slicer.tower import MARGIN_MM, tower
+from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SlicerFailed, UnknownName
+from sensorgen.design import materials
+from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names
+from sensorgen.export.gcode import extruded
+from sensorgen.export.slicers import cura, curaengine, prusa
+from sensorgen.export.slicers.loads import Load, recipes
+from sensorgen.export.slicers.run import run
+from sensorgen.export.slicers.tower import MARGIN_MM, tower
 
 FINE = load_quality("fine")
 DIABASE = load_printer("diabase-h5")

@@ -13,18 +13,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sensorgen import slicing, threemf
-from sensorgen.design import make
-from sensorgen.errors import BadInput, SlicerFailed, UnknownName, Unwritable
-from sensorgen.gcode import paths
-from sensorgen.gcode.check import check
-from sensorgen.geometry.mesh import Mesh
-from sensorgen.printer import folder
-from sensorgen.printfile import slice_design
-from sensorgen.scene import Body, box
-from sensorgen.slicer import run, stl
-from sensorgen.slicing import Placed, alone, sliced
-from sensorgen.threemf.plate import box_mm
+from sensorgen.core.errors import BadInput, SlicerFailed, UnknownName, Unwritable
+from sensorgen.design.design import make
+from sensorgen.design.printer import folder
+from sensorgen.export import slicing, threemf
+from sensorgen.export.gcode import paths
+from sensorgen.export.gcode.check import check
+from sensorgen.export.slicers import run, stl
+from sensorgen.export.slicing import Placed, alone, sliced
+from sensorgen.export.threemf.plate import box_mm
+from sensorgen.scene.geometry.mesh import Mesh
+from sensorgen.scene.scene import Body, box
+from sensorgen.workflows.slice import slice_design
 
 
 def small(dielectric_mm=0.1, **more):

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sensorgen import design
-from sensorgen.errors import BadInput
-from sensorgen.specimen import MAX_LETTERS, Specimen, design_of, named, parse
+from sensorgen.core.errors import BadInput
+from sensorgen.design import design
+from sensorgen.design.specimen_name import MAX_LETTERS, Specimen, design_of, named, parse
 
 HERE = Path(__file__).parent
 DESIGNS = HERE.parent / "designs"

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen import store
-from sensorgen.errors import Unwritable
+from sensorgen.core import files as store
+from sensorgen.core.errors import Unwritable
 
 
 def publish(folder, **files):

@@ -13,9 +13,9 @@ import lib3mf
 import numpy as np
 import pytest
 
-from sensorgen.errors import BadInput, OutOfRange, SensorgenError, UnknownName
-from sensorgen.geometry.mesh import Mesh
-from sensorgen.threemf import FAMILIES, Part, content
+from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
+from sensorgen.export.threemf import FAMILIES, Part, content
+from sensorgen.scene.geometry.mesh import Mesh
 
 CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 HOSTILE = "top \"of\" 'it' <film> & Größe µ € 😀 %s %d {x}"

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sensorgen.errors import BadInput
-from sensorgen.units import (
+from sensorgen.core.errors import BadInput
+from sensorgen.core.units import (
     FORCE_N,
     FREQUENCY_HZ,
     LENGTH_MM,

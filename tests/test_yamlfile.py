@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from sensorgen import yamlfile
-from sensorgen.errors import BadInput
+from sensorgen.core import yamlfile
+from sensorgen.core.errors import BadInput
 
 PLAIN = {
     "1": 1, "-3": -3, "+3": 3, "0": 0, "1.5": 1.5, "1.": 1.0, ".5": 0.5, "-.5": -0.5, "1e3": 1000.0, "1e-3": 0.001,

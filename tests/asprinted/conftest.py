@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen import design, slicing
 from sensorgen.asprinted import compared
-from sensorgen.gcode import paths
-from sensorgen.slicer import curaengine, prusa
+from sensorgen.design import design
+from sensorgen.export import slicing
+from sensorgen.export.gcode import paths
+from sensorgen.export.slicers import curaengine, prusa
 
 SIZES = {"tri": {"length_mm": 12.0, "width_mm": 8.0}, "rect": {"length_mm": 8.0, "width_mm": 8.0}}
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from sensorgen import design
 from sensorgen.asprinted import compared
 from sensorgen.asprinted.compensation import BAKE, compensated
 from sensorgen.asprinted.tally import rule7
+from sensorgen.design import design
 
 from .conftest import small
 

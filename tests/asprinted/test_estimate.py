@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from sensorgen import design
 from sensorgen.asprinted import window
 from sensorgen.asprinted.estimate import estimate, layers
 from sensorgen.asprinted.strips import NoStrips, Strips, drawn, scene_of
-from sensorgen.errors import UnknownName
+from sensorgen.core.errors import UnknownName
+from sensorgen.design import design
 from sensorgen.models import columns
-from sensorgen.scene import Body, Prism, Scene, area_mm2, box
+from sensorgen.scene.scene import Body, Prism, Scene, area_mm2, box
 
 COG = "top_electrode_with_cogs"
 EPS = {"air": 1.00059, "x60": 4.68}

@@ -6,13 +6,14 @@ from functools import partial
 import numpy as np
 import pytest
 
-from sensorgen import celllaw, compressed
 from sensorgen.asprinted import compared, pressed
-from sensorgen.compressed import Asked
-from sensorgen.errors import SensorgenError
+from sensorgen.core.errors import SensorgenError
+from sensorgen.models import compression_law as celllaw
 from sensorgen.models import press2d, press3d
 from sensorgen.models.press2d import Elastic, Fineness, Held
-from sensorgen.scene import Body, Prism, Scene, rectangle
+from sensorgen.prediction import compression as compressed
+from sensorgen.prediction.compression import Asked
+from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 
 from .conftest import small
 

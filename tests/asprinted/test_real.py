@@ -12,9 +12,9 @@ from sensorgen.asprinted.beads import beads, layers
 from sensorgen.asprinted.report import report
 from sensorgen.asprinted.strips import drawn
 from sensorgen.asprinted.tally import rule7
-from sensorgen.errors import BadInput, UnknownName
+from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.models import fem2d, fem3d, traxels
-from sensorgen.scene import area_mm2
+from sensorgen.scene.scene import area_mm2
 
 from .conftest import small
 

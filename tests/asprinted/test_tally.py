@@ -6,7 +6,7 @@ import pytest
 
 from sensorgen.asprinted.strips import drawn
 from sensorgen.asprinted.tally import findings, tally
-from sensorgen.design import make
+from sensorgen.design.design import make
 
 DESIGN = make({"shape": "tri", "parameters": {"length_mm": 12.0, "width_mm": 8.0}})
 BODY, LAYER = "top_electrode_with_cogs", 8  # cogs of six periods, from 0.8 to 0.9 mm

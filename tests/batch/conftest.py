@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.batch import make
+from sensorgen.workflows.batch import make
 
 SMALL = """\
 iteration: 26

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sensorgen.batch.layout import Rect, Room, column, packed, room
-from sensorgen.errors import OutOfRange
-from sensorgen.printer import load_printer, load_quality
-from sensorgen.slicer.tower import tower
+from sensorgen.core.errors import OutOfRange
+from sensorgen.design.printer import load_printer, load_quality
+from sensorgen.export.slicers.tower import tower
+from sensorgen.workflows.batch.layout import Rect, Room, column, packed, room
 
 FINE = load_quality("fine")
 PRINTERS = ("diabase-h5", "prusa-xl5")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.batch import arranged, picture
+from sensorgen.workflows.batch import arranged, picture
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
 SVG = "{http://www.w3.org/2000/svg}"

@@ -10,11 +10,11 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sensorgen import design
-from sensorgen.batch import arranged
-from sensorgen.batch.pieces import pieces, shuffled, tools
-from sensorgen.batch.plan import Item, Plan, load
-from sensorgen.errors import BadInput, OutOfRange, SensorgenError, UnknownName
+from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
+from sensorgen.design import design
+from sensorgen.workflows.batch import arranged
+from sensorgen.workflows.batch.pieces import pieces, shuffled, tools
+from sensorgen.workflows.batch.plan import Item, Plan, load
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "docs" / "examples" / "film-study.yaml"
@@ -162,8 +162,8 @@ def test_places_in_the_order_are_as_good_as_evenly_spread():
 
 def test_the_order_does_not_hang_on_pythons_own_hashes():
     code = (
-        "from pathlib import Path\nfrom sensorgen.batch.pieces import pieces, shuffled\n"
-        "from sensorgen.batch.plan import load\n"
+        "from pathlib import Path\nfrom sensorgen.workflows.batch.pieces import pieces, shuffled\n"
+        "from sensorgen.workflows.batch.plan import load\n"
         f"path = Path({str(EXAMPLE)!r})\nprint([p.name for p in shuffled(pieces(load(path), path.parent), 1)])"
     )
     runs = {

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen import design
-from sensorgen.batch import make
-from sensorgen.batch.record import RECORD, Differences, differences
-from sensorgen.errors import BadInput, Unprintable, Unwritable
-from sensorgen.predict import prediction
-from sensorgen.specimen import parse
+from sensorgen.core.errors import BadInput, Unprintable, Unwritable
+from sensorgen.design import design
+from sensorgen.design.specimen_name import parse
+from sensorgen.prediction.prediction import prediction
+from sensorgen.workflows.batch import make
+from sensorgen.workflows.batch.record import RECORD, Differences, differences
 
 TRI = design.make({"shape": "tri", "parameters": {"length_mm": 20.0, "width_mm": 10.0}})
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sensorgen.batch import sheet
-from sensorgen.batch.pieces import Piece, pieces
-from sensorgen.batch.plan import load
-from sensorgen.design import make
-from sensorgen.errors import MissingValue
-from sensorgen.specimen import named, parse
+from sensorgen.core.errors import MissingValue
+from sensorgen.design.design import make
+from sensorgen.design.specimen_name import named, parse
+from sensorgen.workflows.batch import sheet
+from sensorgen.workflows.batch.pieces import Piece, pieces
+from sensorgen.workflows.batch.plan import load
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
 DOTS = 4  # of the picture, per square of a code

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from sensorgen import design
-from sensorgen.batch import tab
-from sensorgen.errors import BadInput
-from sensorgen.geometry import meshes
-from sensorgen.specimen import Specimen, parse
+from sensorgen.core.errors import BadInput
+from sensorgen.design import design
+from sensorgen.design.specimen_name import Specimen, parse
+from sensorgen.scene.geometry import meshes
+from sensorgen.workflows.batch import tab
 
 SENSOR = design.make({"shape": "tri"})
 NAME = "26 triX .2mm 12 x fine"

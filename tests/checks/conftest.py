@@ -5,10 +5,10 @@ from collections.abc import Callable
 import pytest
 
 from sensorgen import checks
-from sensorgen.findings import Finding
-from sensorgen.geometry import meshes, validity
-from sensorgen.printer import Printer, Quality, load_printer, load_quality
-from sensorgen.scene import Body, Prism, Scene, box
+from sensorgen.core.findings import Finding
+from sensorgen.design.printer import Printer, Quality, load_printer, load_quality
+from sensorgen.scene.geometry import meshes, validity
+from sensorgen.scene.scene import Body, Prism, Scene, box
 
 Findings = Callable[..., list[Finding]]
 

@@ -3,10 +3,10 @@
 import pytest
 
 from sensorgen.checks import bed
-from sensorgen.design import make
-from sensorgen.printer import load_printer
-from sensorgen.review import review
-from sensorgen.scene import Scene
+from sensorgen.checks.review import review
+from sensorgen.design.design import make
+from sensorgen.design.printer import load_printer
+from sensorgen.scene.scene import Scene
 
 HAIR = 1e-6
 

@@ -4,10 +4,10 @@ from itertools import pairwise
 
 import pytest
 
-from sensorgen.design import make
-from sensorgen.printer import load_printer
-from sensorgen.review import review
-from sensorgen.scene import Body, box
+from sensorgen.checks.review import review
+from sensorgen.design.design import make
+from sensorgen.design.printer import load_printer
+from sensorgen.scene.scene import Body, box
 
 HAIR = 1e-6
 

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from sensorgen.design import make
-from sensorgen.findings import SEVERITIES, Finding
-from sensorgen.review import report, review
-from sensorgen.scene import Body, box
+from sensorgen.checks.review import report, review
+from sensorgen.core.findings import SEVERITIES, Finding
+from sensorgen.design.design import make
+from sensorgen.scene.scene import Body, box
 
 BAD = {
     "shape": "tri",

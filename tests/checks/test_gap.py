@@ -3,8 +3,8 @@
 import pytest
 
 from sensorgen.checks.slices import Layers
-from sensorgen.scene import Fill
-from sensorgen.shapes import rect, tri
+from sensorgen.design.shapes import rect, tri
+from sensorgen.scene.scene import Fill
 
 HAIR = 1e-6
 

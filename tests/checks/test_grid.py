@@ -2,8 +2,8 @@
 
 import pytest
 
-from sensorgen.scene import Body, Fill, Prism, box
-from sensorgen.shapes import tri
+from sensorgen.design.shapes import tri
+from sensorgen.scene.scene import Body, Fill, Prism, box
 
 HAIR = 1e-6
 

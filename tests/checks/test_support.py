@@ -4,8 +4,10 @@ from dataclasses import fields
 
 import pytest
 
-from sensorgen import catalogue, design, registry, shapes
-from sensorgen.review import review
+from sensorgen.checks.review import review
+from sensorgen.cli import catalogue
+from sensorgen.core import plugins as registry
+from sensorgen.design import design, shapes
 
 
 def errors(**data):

@@ -5,9 +5,9 @@ Limits: files-and-slicers.md, rules 5 and 6; as-printed.md, "Mid-plane rules".
 
 import pytest
 
-from sensorgen.printer import load_printer
-from sensorgen.scene import Body, Fill, Prism, box
-from sensorgen.shapes import tri
+from sensorgen.design.printer import load_printer
+from sensorgen.design.shapes import tri
+from sensorgen.scene.scene import Body, Fill, Prism, box
 
 HAIR = 1e-6
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from sensorgen.recording import read, rig
+from sensorgen.measure.recording import read, rig
 
 
 def test_a_plan_as_csv_stays_on_the_sensor(run):

@@ -9,7 +9,7 @@ import pytest
 import scipy.io
 from scipy.signal import sosfreqz
 
-from sensorgen.process.lowpass import sections
+from sensorgen.measure.signal.lowpass import sections
 
 TONES = made.TONES_HZ[::3]
 SLOW = made.presses(4, seed=3, dwell_s=8, rest_s=6, least_n=2.0)  # up for four seconds, down for four

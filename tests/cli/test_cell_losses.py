@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.core.units import EPS0_F_PER_M
 
 PLATE_F_PER_M2 = EPS0_F_PER_M * 4.68 / 0.6e-3
 

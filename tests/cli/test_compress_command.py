@@ -10,7 +10,7 @@ import click
 import numpy as np
 import pytest
 
-from sensorgen.models._fem_bounds import CrossedBounds
+from sensorgen.solvers.electrostatics.bounds import CrossedBounds
 
 needs_mesher = pytest.mark.skipif("not __import__('importlib').util.find_spec('netgen')", reason="needs NGSolve")
 PLATE = ("compress", "reference", "--stress", "100", "--json")
@@ -296,7 +296,7 @@ MODULI = ("compress", "reference", "--stress", "50,100", "--sweep", "youngs_modu
 @pytest.fixture
 def asked(monkeypatch):
     """Moduli of X60 that a stub of press2d was asked about: the film gives way by 600 um times stress over E."""
-    from sensorgen.interval import Interval
+    from sensorgen.core.bounds import Interval
     from sensorgen.models import press2d
 
     moduli = []
@@ -319,7 +319,7 @@ def asked(monkeypatch):
 
 def test_a_sweep_solves_only_what_is_not_known(run, asked, monkeypatch):
     """The first point is too soft for its load: a reason in place of numbers, and exit code 1."""
-    from sensorgen import swept
+    from sensorgen.prediction import sweep as swept
 
     handed, in_parallel = [], swept.in_parallel
     monkeypatch.setattr(

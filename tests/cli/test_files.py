@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen import yamlfile
-from sensorgen.errors import BadInput
+from sensorgen.core import yamlfile
+from sensorgen.core.errors import BadInput
 
 DEEP = "[" * 100_000
 BOMB = "a: &a [x, x]\n" + "".join(f"{b}: &{b} [{','.join([f'*{a}'] * 9)}]\n" for a, b in pairwise("abcdefghi"))

@@ -12,9 +12,11 @@ import jsonschema
 import pytest
 import yaml
 
-from sensorgen import materials, models, printer, registry, shapes
+from sensorgen import models
 from sensorgen.cli import COMMANDS, cli
 from sensorgen.cli.designs import option_of
+from sensorgen.core import plugins as registry
+from sensorgen.design import materials, printer, shapes
 
 DESIGNS = Path(__file__).parents[2] / "designs"
 ON_DESIGNS = ("build", "check", "draw", "predict", "slice")
@@ -65,7 +67,7 @@ def test_every_option_has_help_and_every_command_its_line(run):
 
 
 def test_defaults_in_the_help_are_those_of_the_design(run):
-    from sensorgen.design import Design
+    from sensorgen.design.design import Design
 
     said = " ".join(run("build", "tri", "-h").out.split())
     for key in ("printer", "quality", "orientation"):
@@ -166,8 +168,8 @@ FAULTS = [
 
 @pytest.mark.parametrize("text", FAULTS)
 def test_schema_refuses_what_the_design_refuses(schema, text):
-    from sensorgen import design
-    from sensorgen.errors import SensorgenError
+    from sensorgen.core.errors import SensorgenError
+    from sensorgen.design import design
 
     with pytest.raises(SensorgenError):
         design.make(yaml.safe_load(text))

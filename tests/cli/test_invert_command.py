@@ -13,8 +13,8 @@ import pytest
 
 from sensorgen import cli
 from sensorgen.cli import main  # noqa: F401 - the fixtures run it
-from sensorgen.design import make
-from sensorgen.planned import usual
+from sensorgen.design.design import make
+from sensorgen.prediction.ladder import usual
 
 TONES = {"1.1kHz": 1.1e3, "10.1kHz": 10.1e3, "99.7kHz": 99.7e3, "0.5MHz": 5e5}
 DESIGN = ["tri", "--dielectric", "0.1", "--material", "electrode=etpu@thesis-3.2"]

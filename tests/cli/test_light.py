@@ -5,7 +5,7 @@ import os
 import pytest
 
 HEAVY = ("numpy", "pydantic", "yaml", "build123d", "trimesh", "OCP", "manifold3d")
-CAD = ("build123d", "trimesh", "OCP", "matplotlib", "scipy", "plotly", "sensorgen.plots", "ngsolve", "netgen")
+CAD = ("build123d", "trimesh", "OCP", "matplotlib", "scipy", "plotly", "sensorgen.analysis.plots", "ngsolve", "netgen")
 LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))"
 
 

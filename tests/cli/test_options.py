@@ -112,7 +112,7 @@ waivers:
 
 
 def test_a_file_with_every_key(taken, tmp_path):
-    from sensorgen.design import Design
+    from sensorgen.design.design import Design
 
     (tmp_path / "any.yaml").write_text(WHOLE)
     design = taken("any.yaml")
@@ -138,7 +138,7 @@ def test_a_file_is_named_by_itself_until_an_option_changes_it(taken, tmp_path):
 
 @pytest.mark.parametrize("path", sorted(DESIGNS.rglob("*.yaml")), ids=lambda p: p.stem)
 def test_the_designs_of_the_thesis_are_named_as_their_files(taken, path):
-    from sensorgen.design import name_of
+    from sensorgen.design.design import name_of
 
     design = taken(path)
     assert design.name == path.stem
@@ -212,7 +212,7 @@ def test_waived_findings_do_not_stop_a_build(run, tmp_path):
 
 def test_a_share_may_be_given_in_percent():
     from sensorgen.cli.words import Share
-    from sensorgen.errors import BadInput
+    from sensorgen.core.errors import BadInput
 
     assert Share().convert("20%", None, None) == Share().convert("0.2", None, None) == 0.2
     with pytest.raises(BadInput, match=r"expected 0\.2 or 20%"):

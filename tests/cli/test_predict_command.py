@@ -182,7 +182,7 @@ def test_a_file_holds_what_the_terminal_would_show(run, tmp_path, form, press):
 
 
 def test_a_file_that_fails_leaves_the_old_one(run, tmp_path, monkeypatch):
-    from sensorgen import predict
+    from sensorgen.prediction import prediction as predict
 
     def half(*_):
         yield "half"
@@ -205,7 +205,7 @@ def test_a_file_is_put_in_place_of_the_old_one(run, tmp_path):
 
 
 def test_pictures(run, tmp_path):
-    from sensorgen import plots
+    from sensorgen.analysis import plots
 
     said = run("predict", "reference", *PRESSES, "--plot", "a/b")
     assert (said.code, said.err) == (0, "")
@@ -291,17 +291,19 @@ def test_no_plot_library_is_loaded_without_a_plot(real, words):
     assert said.code == 0
     modules = set(said.out.rpartition("loaded: ")[2].split())
     assert "numpy" in modules
-    assert not {"matplotlib", "plotly", "scipy", "sensorgen.plots", "build123d", "trimesh"} & modules
+    assert not {"matplotlib", "plotly", "scipy", "sensorgen.analysis.plots", "build123d", "trimesh"} & modules
 
 
 def test_help_does_not_load_numpy(real):
     said = real("predict", "tri", "--help", before=LOADED)
-    assert not {"numpy", "pydantic", "sensorgen.predict"} & set(said.out.rpartition("loaded: ")[2].split())
+    assert not {"numpy", "pydantic", "sensorgen.prediction.prediction"} & set(
+        said.out.rpartition("loaded: ")[2].split()
+    )
 
 
 def test_options_are_what_the_planner_knows():
-    from sensorgen.celllaw import LAWS
     from sensorgen.cli.predict_command import OWN
+    from sensorgen.models.compression_law import LAWS
     from sensorgen.models.pressure import PROFILES
 
     options = {option.name: option for option in OWN}

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from sensorgen import thesis
-from sensorgen.thesis.items import chapter
-from sensorgen.thesis.reproduced import Row, row
-from sensorgen.thesis.verdicts import UNEXPLAINED, Verdict
+from sensorgen.verification import thesis
+from sensorgen.verification.thesis.items import chapter
+from sensorgen.verification.thesis.reproduced import Row, row
+from sensorgen.verification.thesis.verdicts import UNEXPLAINED, Verdict
 
 
 @pytest.fixture

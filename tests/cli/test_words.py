@@ -4,8 +4,8 @@ import click
 import pytest
 
 from sensorgen.cli.words import Values
-from sensorgen.errors import BadInput
-from sensorgen.units import FORCE_N, FREQUENCY_HZ, LENGTH_MM
+from sensorgen.core.errors import BadInput
+from sensorgen.core.units import FORCE_N, FREQUENCY_HZ, LENGTH_MM
 
 OPTION = click.Option(["-f", "--force"])
 

@@ -18,8 +18,8 @@ OLD, NEW = ("--period", "2"), ("--period", "2.5")
 @pytest.fixture(scope="module")
 def both(tmp_path_factory):
     """The files of the old build, and those of the new one."""
-    from sensorgen import design
-    from sensorgen.build import build
+    from sensorgen.design import design
+    from sensorgen.workflows.build import build
 
     def files(period):
         data = {"shape": "tri", "name": "x", "parameters": {"period_mm": period}}

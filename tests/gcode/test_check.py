@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from sensorgen.gcode.check import check
-from sensorgen.printer import Control, load_printer
+from sensorgen.design.printer import Control, load_printer
+from sensorgen.export.gcode.check import check
 
 from .good import LAB, MAKER, OWN, changed  # isort: skip
 

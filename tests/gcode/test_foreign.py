@@ -8,13 +8,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from sensorgen.errors import BadInput
-from sensorgen.gcode import paths
-from sensorgen.gcode.check import check
-from sensorgen.gcode.files import text_of
-from sensorgen.gcode.motion import follow
-from sensorgen.gcode.ready import ready
-from sensorgen.printer import load_printer
+from sensorgen.core.errors import BadInput
+from sensorgen.design.printer import load_printer
+from sensorgen.export.gcode import paths
+from sensorgen.export.gcode.check import check
+from sensorgen.export.gcode.files import text_of
+from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.ready import ready
 
 from .good import LAB, MAKER, OWN  # isort: skip
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sensorgen.gcode import paths
-from sensorgen.gcode.motion import follow
-from sensorgen.gcode.words import parse
-from sensorgen.printer import load_printer
+from sensorgen.design.printer import load_printer
+from sensorgen.export.gcode import paths
+from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.words import parse
 
 R = "M83"
 

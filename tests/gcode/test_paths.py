@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from sensorgen.errors import BadInput
-from sensorgen.gcode import paths
-from sensorgen.printer import load_printer
+from sensorgen.core.errors import BadInput
+from sensorgen.design.printer import load_printer
+from sensorgen.export.gcode import paths
 
 DIABASE = load_printer("diabase-h5")
 PRUSA = [

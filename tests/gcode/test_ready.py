@@ -2,12 +2,12 @@
 
 import pytest
 
-from sensorgen.errors import BadInput
-from sensorgen.gcode.check import check
-from sensorgen.gcode.files import text_of
-from sensorgen.gcode.motion import follow
-from sensorgen.gcode.ready import ready
-from sensorgen.printer import load_printer
+from sensorgen.core.errors import BadInput
+from sensorgen.design.printer import load_printer
+from sensorgen.export.gcode.check import check
+from sensorgen.export.gcode.files import text_of
+from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.ready import ready
 
 DIABASE = load_printer("diabase-h5")
 

@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from sensorgen import materials
-from sensorgen.gcode.check import check
-from sensorgen.gcode.motion import follow
-from sensorgen.gcode.timing import seconds
-from sensorgen.printer import load_printer
+from sensorgen.design import materials
+from sensorgen.design.printer import load_printer
+from sensorgen.export.gcode.check import check
+from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.timing import seconds
 
 from .good import OWN  # isort: skip
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sensorgen.gcode.words import Command, Line, parse
+from sensorgen.export.gcode.words import Command, Line, parse
 
 
 def commands(text: str) -> list[tuple[str, dict[str, str]]]:

@@ -13,11 +13,12 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen import registry, shapes
-from sensorgen.errors import CadFailed, Unwritable
-from sensorgen.geometry import cad
-from sensorgen.geometry.cad import CadProcess
-from sensorgen.scene import Body, Fill, Scene, box
+from sensorgen.core import plugins as registry
+from sensorgen.core.errors import CadFailed, Unwritable
+from sensorgen.design import shapes
+from sensorgen.scene.geometry import cad
+from sensorgen.scene.geometry.cad import CadProcess
+from sensorgen.scene.scene import Body, Fill, Scene, box
 
 SCENE = Scene((Body("film", "x60", (box(0, 2, 0, 1, 0, 0.1),)),), (2, 1, 0.1))
 COLOURS = {"film": "#f0e6d2"}
@@ -65,7 +66,7 @@ def gone(pid: int, within_s: float = 20.0) -> bool:
 @pytest.mark.parametrize("module", ["cad", "solids"])
 def test_import_is_light(module: str) -> None:
     heavy = "{'numpy', 'scipy', 'build123d', 'OCP', 'pydantic', 'yaml', 'manifold3d', 'asyncio', 'multiprocessing'}"
-    done = fresh(f"import sys, sensorgen.geometry.{module}\nprint(sorted({heavy} & set(sys.modules)))")
+    done = fresh(f"import sys, sensorgen.scene.geometry.{module}\nprint(sorted({heavy} & set(sys.modules)))")
     assert (done.stdout.strip(), done.stderr) == ("[]", "")
 
 

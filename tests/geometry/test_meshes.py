@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from sensorgen.geometry.mesh import Mesh
-from sensorgen.geometry.meshes import mesh
-from sensorgen.geometry.validity import solid
-from sensorgen.scene import Body, Fill, Prism, Scene, box
-from sensorgen.shapes import rect, reference, tri
+from sensorgen.design.shapes import rect, reference, tri
+from sensorgen.scene.geometry.mesh import Mesh
+from sensorgen.scene.geometry.meshes import mesh
+from sensorgen.scene.geometry.validity import solid
+from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 
 
 def second_program(made: Mesh) -> trimesh.Trimesh:

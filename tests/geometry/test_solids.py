@@ -14,10 +14,11 @@ from typing import Any
 
 import pytest
 
-from sensorgen import registry, shapes
-from sensorgen.errors import CadFailed, Unwritable
-from sensorgen.geometry import solids
-from sensorgen.scene import Body, Fill, Prism, Scene, box
+from sensorgen.core import plugins as registry
+from sensorgen.core.errors import CadFailed, Unwritable
+from sensorgen.design import shapes
+from sensorgen.scene.geometry import solids
+from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 
 pytestmark = pytest.mark.kernel
 COLOURS = ("#202428", "#f0e6d2", "#3080ff", "#202428")

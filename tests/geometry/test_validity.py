@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sensorgen.geometry.mesh import Mesh
-from sensorgen.geometry.meshes import mesh
-from sensorgen.geometry.validity import electrode_gap_mm, faults
-from sensorgen.scene import Body, Fill, Prism, Scene, box
-from sensorgen.shapes import rect, reference, tri
+from sensorgen.design.shapes import rect, reference, tri
+from sensorgen.scene.geometry.mesh import Mesh
+from sensorgen.scene.geometry.meshes import mesh
+from sensorgen.scene.geometry.validity import electrode_gap_mm, faults
+from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 
 
 def two_plates(*extra: Body, gap_mm: float = 0.2) -> Scene:

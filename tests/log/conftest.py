@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from sensorgen.cli import main
-from sensorgen.log import Log
+from sensorgen.measure.log import Log
 
 HERE = Path(__file__).parent
 

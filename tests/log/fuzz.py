@@ -10,9 +10,9 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from sensorgen.errors import SensorgenError
-from sensorgen.log import TABLES, Log, exporting, importing, verify
-from sensorgen.log.tables import thesis
+from sensorgen.core.errors import SensorgenError
+from sensorgen.measure.log import TABLES, Log, exporting, importing, verify
+from sensorgen.measure.log.tables import thesis
 
 ODD = (
     b"",

@@ -14,7 +14,7 @@ import time
 from hashlib import sha256
 from pathlib import Path
 
-from sensorgen.log import BenchRun, Log, Reading, files, verify
+from sensorgen.measure.log import BenchRun, Log, Reading, files, verify
 
 ROWS = 20  # of a table
 MOST = 2  # imports that a child may end before it is killed in the next one

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import scipy.io
 
-from sensorgen.errors import SensorgenError
-from sensorgen.log import Log, RawFile, files, verify
-from sensorgen.log.bench import take
-from sensorgen.recording import read
+from sensorgen.core.errors import SensorgenError
+from sensorgen.measure.log import Log, RawFile, files, verify
+from sensorgen.measure.log.bench import take
+from sensorgen.measure.recording import read
 
 MADE = made.presses(8)
 OFFSET_S = 3.217
@@ -143,7 +143,7 @@ def test_a_huge_file_is_refused_before_it_is_read(log, tmp_path, run_files, monk
 
 
 def test_a_recording_that_grows_while_it_is_read_is_refused(log, tmp_path, monkeypatch):
-    from sensorgen.log import bench
+    from sensorgen.measure.log import bench
 
     path = tmp_path / "run.csv"
     rows = "".join(f"{k},-{k},{k}\n" for k in range(1, 99))

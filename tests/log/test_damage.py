@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.errors import BadInput, SensorgenError
-from sensorgen.log import Log, files, verify
-from sensorgen.log.tables import thesis
+from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.measure.log import Log, files, verify
+from sensorgen.measure.log.tables import thesis
 
 
 @pytest.fixture
@@ -136,7 +136,7 @@ def test_raw_files_are_checked(log, tmp_path):
 
 
 def test_a_prediction_that_was_tuned_is_found(log, path):
-    from sensorgen.log.batches import prediction
+    from sensorgen.measure.log.batches import prediction
 
     log.add([prediction("d", "trix", {"capacitance_f": 1e-11})])
     assert list(verify.faults(log)) == []

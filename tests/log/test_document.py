@@ -10,8 +10,8 @@ import pytest
 import scipy.io
 
 from sensorgen.cli import cli
-from sensorgen.log import Log
-from sensorgen.log.values import read
+from sensorgen.measure.log import Log
+from sensorgen.measure.log.values import read
 
 pytest.importorskip("pyvisa_sim")
 ROOT = Path(__file__).parents[2]

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sensorgen.errors import BadInput, MissingValue, Unwritable
-from sensorgen.log import (
+from sensorgen.core.errors import BadInput, MissingValue, Unwritable
+from sensorgen.measure.log import (
     TABLES,
     Batch,
     BenchRun,
@@ -25,9 +25,9 @@ from sensorgen.log import (
     importing,
     verify,
 )
-from sensorgen.log.batches import prediction
-from sensorgen.log.tables import parsed
-from sensorgen.log.words import reading
+from sensorgen.measure.log.batches import prediction
+from sensorgen.measure.log.tables import parsed
+from sensorgen.measure.log.words import reading
 
 REMARKS = [
     "=1+1",

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.errors import Unwritable
-from sensorgen.log import Log, Reading, verify
-from sensorgen.log.words import reading
+from sensorgen.core.errors import Unwritable
+from sensorgen.measure.log import Log, Reading, verify
+from sensorgen.measure.log.words import reading
 
 HERE = Path(__file__).parent
 KILLS, FILES = 200, 600

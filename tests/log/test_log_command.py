@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from sensorgen.log import Log, Reading
-from sensorgen.log.words import reading
+from sensorgen.measure.log import Log, Reading
+from sensorgen.measure.log.words import reading
 
 
 def test_a_reading_with_everything(run, path):
@@ -260,4 +260,4 @@ def test_a_long_list_loads_little(tmp_path):
     assert "100000 readings" in done.stdout
     assert len(done.stdout.splitlines()) == 42
     loaded = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
-    assert not {"numpy", "pydantic", "yaml", "scipy", "build123d", "pyarrow", "sensorgen.design"} & loaded
+    assert not {"numpy", "pydantic", "yaml", "scipy", "build123d", "pyarrow", "sensorgen.design.design"} & loaded

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.errors import BadInput, UnknownName, Unwritable
-from sensorgen.log import (
+from sensorgen.core.errors import BadInput, UnknownName, Unwritable
+from sensorgen.measure.log import (
     TABLES,
     Batch,
     BenchRun,
@@ -24,7 +24,7 @@ from sensorgen.log import (
     schema,
     verify,
 )
-from sensorgen.log.words import reading
+from sensorgen.measure.log.words import reading
 
 HERE = Path(__file__).parent
 SHA = "0" * 64

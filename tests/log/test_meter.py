@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from sensorgen.errors import InstrumentFailed, MissingValue
-from sensorgen.log import Log, meter
+from sensorgen.core.errors import InstrumentFailed, MissingValue
+from sensorgen.measure.log import Log, meter
 
 pytest.importorskip("pyvisa_sim")
 HP, KEITHLEY = "GPIB0::22::INSTR", "GPIB0::16::INSTR"

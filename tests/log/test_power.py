@@ -8,8 +8,8 @@ import made
 import pytest
 import scipy.io
 
-from sensorgen.log import Log
-from sensorgen.log.bench import take
+from sensorgen.measure.log import Log
+from sensorgen.measure.log.bench import take
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="asks the kernel for the names of open files")
 

@@ -5,8 +5,8 @@ import zipfile
 
 import pytest
 
-from sensorgen.errors import SensorgenError
-from sensorgen.log import Log, importing, tables
+from sensorgen.core.errors import SensorgenError
+from sensorgen.measure.log import Log, importing, tables
 
 HEAD = "specimen,y,z,remark\n"
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.log.tables import thesis
+from sensorgen.measure.log.tables import thesis
 
 TABLE = list(csv.DictReader((Path(__file__).parents[1] / "reference" / "table_d1.csv").read_text("utf-8").splitlines()))
 OURS = {  # what the notes say, and the word of ours that says it
@@ -71,7 +71,7 @@ def test_the_words_are_the_thesis_s_own(rows):
 
 
 def test_in_and_out_again(run, path, tmp_path):
-    from sensorgen.log import Log
+    from sensorgen.measure.log import Log
 
     assert "69 of 69 rows logged" in run("import", "--thesis").out
     assert "0 of 69 rows logged, 69 were there" in run("import", "--thesis").out

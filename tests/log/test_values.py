@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sensorgen.errors import BadInput
-from sensorgen.log.values import MOST_OHM, OVERLOAD, read
+from sensorgen.core.errors import BadInput
+from sensorgen.measure.log.values import MOST_OHM, OVERLOAD, read
 
 PLAIN = {
     "650": 650.0,

@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.design.shapes import rect, tri
 from sensorgen.models import fem2d
-from sensorgen.models._fem_mesh import Cones
-from sensorgen.scene import Body, Fill, Prism, Scene, box
-from sensorgen.shapes import rect, tri
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
+from sensorgen.solvers.electrostatics.mesh import Cones
 
 EPS = {"x60": 4.68, "air": 1.00059}
 MM = 1e-3

@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from sensorgen.models._fem_cones import RATIO
-from sensorgen.models._fem_mesh import Cones
+from sensorgen.solvers.electrostatics.cones import RATIO
+from sensorgen.solvers.electrostatics.mesh import Cones
 
 
 def written_out(mesh: Cones) -> tuple[np.ndarray, list[tuple[int, int, int]], list[int], dict[str, list]]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sensorgen.scene import Body, Prism, Scene
+from sensorgen.scene.scene import Body, Prism, Scene
 
 ENDS = ("bottom", "top")
 

@@ -13,15 +13,15 @@ import pytest
 from cell_scenes import stairs
 from scipy.integrate import quad
 
-from sensorgen.cells import cell
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.design.shapes import rect, reference, tri
 from sensorgen.models import fem2d
-from sensorgen.models._fem_triangles import triangles
-from sensorgen.models._straight import energy as straight
 from sensorgen.models.columns import _mean_min, capacitance, unfit
-from sensorgen.scene import Body, Fill, Prism, Scene, box
-from sensorgen.sections import sections
-from sensorgen.shapes import rect, reference, tri
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
+from sensorgen.scene.sections import sections
+from sensorgen.scene.unit_cell import cell
+from sensorgen.solvers.electrostatics.triangles import triangles
+from sensorgen.solvers.line.straight import energy as straight
 
 EPS = {"x60": 4.68, "air": 1.00059}
 CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))

@@ -5,12 +5,12 @@ from math import cos, pi, sin, tau
 
 import pytest
 
-from sensorgen.errors import BadInput
+from sensorgen.core.errors import BadInput
+from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import fem3d
 from sensorgen.models.columns import capacitance, unfit
 from sensorgen.models.springs import displacement_m
-from sensorgen.scene import Body, Outline, Prism, Scene, box
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.scene.scene import Body, Outline, Prism, Scene, box
 
 EPS = {"x60": 4.68, "air": 1.00059}
 MM = 1e-3

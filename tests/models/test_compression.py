@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from sensorgen.errors import OutOfRange
+from sensorgen.core.errors import OutOfRange
 from sensorgen.models import compression
 
 TRI = {"dielectric_mm": 0.1, "period_mm": 2.0, "hang_height_mm": 0.5, "lower_height_mm": 0.24}

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from cell_scenes import EPS, MM, between_curves, bumps, plates, rect_cell, stairs, tri_cell
 
-from sensorgen.errors import OutOfRange
+from sensorgen.core.errors import OutOfRange
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.design.shapes import reference, tri
 from sensorgen.models import columns, fem2d
-from sensorgen.scene import Body, Fill, Scene, box
-from sensorgen.shapes import reference, tri
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.scene.scene import Body, Fill, Scene, box
 
 CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
 

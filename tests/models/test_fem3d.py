@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from cell_scenes import EPS, MM, cut_slabs, plates, rect_cell, stairs, tri_cell
 
-from sensorgen.errors import OutOfRange
-from sensorgen.interval import Interval
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import OutOfRange
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.design.shapes import rect
 from sensorgen.models import columns, fem3d
-from sensorgen.models._fem_boxes import flux, potential
-from sensorgen.models._fem_bricks import grid, layered
-from sensorgen.models._fem_dissection import least
-from sensorgen.models._fem_pair import Pair, boxes_of, whole
-from sensorgen.scene import Body, Fill, Scene, box
-from sensorgen.shapes import rect
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.scene.scene import Body, Fill, Scene, box
+from sensorgen.solvers.electrostatics.boxes import flux, potential
+from sensorgen.solvers.electrostatics.bricks import grid, layered
+from sensorgen.solvers.electrostatics.dissection import least
+from sensorgen.solvers.electrostatics.pair import Pair, boxes_of, whole
 
 CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
 

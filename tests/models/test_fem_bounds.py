@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from cell_scenes import EPS, MM, cut_slabs, tri_cell
 
-from sensorgen.interval import Interval
-from sensorgen.models import _fem_bounds, fem2d
-from sensorgen.scene import Fill
-from sensorgen.shapes import tri
+from sensorgen.core.bounds import Interval
+from sensorgen.design.shapes import tri
+from sensorgen.models import fem2d
+from sensorgen.scene.scene import Fill
+from sensorgen.solvers.electrostatics import bounds as _fem_bounds
 
 CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
 

@@ -8,9 +8,9 @@ import pytest
 from cell_scenes import MM, prism
 from scipy.special import ellipk
 
+from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import fem2d
-from sensorgen.scene import Body, Scene, box
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.scene.scene import Body, Scene, box
 
 VACUUM = {"air": 1.0}
 
@@ -47,7 +47,7 @@ def test_a_coaxial_line_is_met_with_the_square_of_its_corners(monkeypatch):
 
 def _closed_below(cell):
     """Triangles of a scene whose floor is a mirror: where no electrode lies on the floor, by intent here."""
-    from sensorgen.models import _fem_triangles
+    from sensorgen.solvers.electrostatics import triangles as _fem_triangles
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(_fem_triangles, "_refuse_open", lambda *_: None)

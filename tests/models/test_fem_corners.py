@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from sensorgen.models._fem_corners import exponent, exponents
-from sensorgen.models._fem_flips import flipped
-from sensorgen.models._fem_triangles import Triangles, apart
+from sensorgen.solvers.electrostatics.corners import exponent, exponents
+from sensorgen.solvers.electrostatics.flips import flipped
+from sensorgen.solvers.electrostatics.triangles import Triangles, apart
 
 
 def close(expected: float, rel: float):

@@ -4,7 +4,7 @@ import pytest
 from cell_scenes import EPS, bars, few_rings, plates, slab
 
 from sensorgen.models import fem2d
-from sensorgen.scene import Body, box
+from sensorgen.scene.scene import Body, box
 
 ALONG_CONES = {
     # ends beside a corner of the tooth, whose last spoke is where it ends

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from cell_scenes import EPS, MM, cut_slabs, plates, rect_cell, stairs, tri_cell
 
-from sensorgen.errors import OutOfRange
-from sensorgen.interval import Disc
+from sensorgen.core.bounds import Disc
+from sensorgen.core.errors import OutOfRange
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.design.shapes import tri
 from sensorgen.models import fem2d, fem3d
-from sensorgen.models._fem_lossy import Fields, disc, turned
-from sensorgen.scene import Body, Fill, box
-from sensorgen.shapes import tri
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.scene.scene import Body, Fill, box
+from sensorgen.solvers.electrostatics.lossy import Fields, disc, turned
 
 BOTH = pytest.mark.parametrize("model", [fem2d, fem3d])
 LOSSY = {"x60": 4.68 * (1 - 0.3j), "air": 1.00059}

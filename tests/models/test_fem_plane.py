@@ -9,13 +9,13 @@ import pytest
 from cell_scenes import EPS, MM, bars, bumps, few_rings, plates, prism, slab, stairs, tri_cell
 from numpy.polynomial import legendre
 
+from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import fem2d, fem3d
-from sensorgen.models._fem_cones import Cone, Layout, ring_corners
-from sensorgen.models._fem_fronts import Block, least
-from sensorgen.models._fem_plane import Plane
-from sensorgen.models._fem_polynomials import SIDES, condensed, crossed
-from sensorgen.scene import Body, Scene, box
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.scene.scene import Body, Scene, box
+from sensorgen.solvers.electrostatics.cones import Cone, Layout, ring_corners
+from sensorgen.solvers.electrostatics.fronts import Block, least
+from sensorgen.solvers.electrostatics.plane import Plane
+from sensorgen.solvers.electrostatics.polynomials import SIDES, condensed, crossed
 
 
 def close(expected, rel: float):
@@ -283,8 +283,8 @@ def test_air_of_a_nanometre_over_a_millimetre(thin):
 
 def test_it_needs_numpy_only():
     code = (
-        "import sys\nfrom sensorgen.models import fem2d\nfrom sensorgen.shapes import tri\n"
-        "from sensorgen.scene import Fill\n"
+        "import sys\nfrom sensorgen.models import fem2d\nfrom sensorgen.design.shapes import tri\n"
+        "from sensorgen.scene.scene import Fill\n"
         "fem2d.capacitance(tri.scene(tri.Params(length_mm=2.0), Fill()), {'x60': 4.68, 'air': 1.0}, 1e-6)\n"
         "assert not {'ngsolve', 'netgen', 'scipy', 'build123d'} & set(sys.modules), sorted(sys.modules)"
     )

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from quilts import ENDS, Quilt, by_adaptive_elements
 
+from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import fem2d
-from sensorgen.units import EPS0_F_PER_M
 
 UNKNOWNS = 1500  # where scikit-fem's two bounds are 1e-4 to 2e-2 apart
 PER_MM = 1e3 / EPS0_F_PER_M  # of a sensor 1 mm deep

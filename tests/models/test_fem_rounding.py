@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 from cell_scenes import EPS, MM, cut_slabs, plates, prism, tri_cell
 
-from sensorgen.models import _fem_bounds, columns, fem2d
-from sensorgen.models._fem_mesh import Cones
-from sensorgen.models._fem_plane import Plane
-from sensorgen.models._fem_polynomials import SIDES
-from sensorgen.models._fem_problem import Field
-from sensorgen.models._fem_triangles import Triangles
-from sensorgen.scene import Body, Scene, box
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.models import columns, fem2d
+from sensorgen.scene.scene import Body, Scene, box
+from sensorgen.solvers.electrostatics import bounds as _fem_bounds
+from sensorgen.solvers.electrostatics.mesh import Cones
+from sensorgen.solvers.electrostatics.plane import Plane
+from sensorgen.solvers.electrostatics.polynomials import SIDES
+from sensorgen.solvers.electrostatics.problem import Field
+from sensorgen.solvers.electrostatics.triangles import Triangles
 
 AIR_AT_1E4 = {"x60": 1e4, "air": 1.0}
 FORMS = {"needle": ((0, 0), (1, 0), (0, 1)), "flat": ((0, 0), (1, 0), (0.4, 1)), "wedge": ((0, 0), (1, 0), (1, 1))}

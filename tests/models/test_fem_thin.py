@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from cell_scenes import EPS, MM, between_curves, plates, stairs, tri_cell
 
-from sensorgen.models import _fem_bounds, columns, fem2d
-from sensorgen.scene import Body, box
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.models import columns, fem2d
+from sensorgen.scene.scene import Body, box
+from sensorgen.solvers.electrostatics import bounds as _fem_bounds
 
 
 def close(expected: float, rel: float):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from line_cases import PLATE, TONES, cases, exact, matrix, off, terminated
 
-from sensorgen.errors import BadInput, MissingValue, OutOfRange, UnknownName
+from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.models import line
 from sensorgen.models.line import cascade, corner_frequency_hz, impedance, sensitivities
 
@@ -101,7 +101,7 @@ def test_at_low_frequency_it_is_a_third_of_the_resistance_before_a_capacitor():
 
 
 def test_arrays_broadcast_and_blocks_make_no_difference(monkeypatch):
-    from sensorgen.models import _line_inputs
+    from sensorgen.solvers.line import inputs as _line_inputs
 
     grid = PLATE | {
         "f_Hz": np.array(TONES)[:, None, None],

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from line_cases import PLATE, TONES
 
-from sensorgen.errors import OutOfRange, UnknownName
+from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.models import line, line_fit
 
 OLDER = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from line_cases import PLATE, TONES, cases, exact, off
 
-from sensorgen.errors import OutOfRange, UnknownName
+from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.models import line, line_abcd, line_closed, line_ladder
 
 MODELS = {"abcd": line_abcd.impedance, "exponentials": line_closed.impedance}

@@ -8,7 +8,7 @@ import pytest
 from line_cases import PLATE
 
 from sensorgen.models import line, line_ladder
-from sensorgen.models._line_inputs import read
+from sensorgen.solvers.line.inputs import read
 
 
 def through_scikit_rf(inputs) -> complex:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from line_cases import PLATE, TONES, exact, matrix, off, terminated
 
-from sensorgen.errors import OutOfRange
-from sensorgen.models._line_inputs import BLOCK, blocks
+from sensorgen.core.errors import OutOfRange
 from sensorgen.models.line import cascade, impedance, sensitivities
+from sensorgen.solvers.line.inputs import BLOCK, blocks
 
 FREQUENCIES = np.geomspace(1e-9, 1e9, 37)
 

@@ -4,8 +4,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from sensorgen.models import _tanhc
-from sensorgen.models._tanhc import sech_squared, tanhc, tanhc_slope
+from sensorgen.solvers.line import tanhc as _tanhc
+from sensorgen.solvers.line.tanhc import sech_squared, tanhc, tanhc_slope
 
 BORDERS = [fraction.reach for fraction in _tanhc._FRACTIONS]
 SIZES = [

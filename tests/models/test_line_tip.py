@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from line_cases import TONES, matrix, terminated
 
-from sensorgen.errors import OutOfRange
+from sensorgen.core.errors import OutOfRange
+from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import compression, line_tip
 from sensorgen.models.pressure import bed, hertz
-from sensorgen.sensor import Sensor
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.models.sensor import Sensor
 
 PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), EPS0_F_PER_M * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))
 SOFT = replace(

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sensorgen.design import make
-from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.design.design import make
 
 pytest.importorskip("netgen")
 from sensorgen.models import press2d
-from sensorgen.models._press import closing, deformed, load, pressed
 from sensorgen.models.press2d import Fineness, Held
+from sensorgen.solvers.contact import closing, deformed, load, pressed
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "contact.json").read_text())
 VARIANTS = REFERENCE["variants_L1_k60_error_about_1pc"]

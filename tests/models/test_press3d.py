@@ -7,10 +7,12 @@ import pytest
 from scipy.optimize import brentq
 from scipy.sparse import csr_matrix
 
-from sensorgen.design import make
-from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.design.design import make
 from sensorgen.models import fem2d, fem3d, press2d, press3d, springs
-from sensorgen.models._press import (
+from sensorgen.models.press3d import Elastic, Held, Pieces
+from sensorgen.scene.scene import Body, Scene, box
+from sensorgen.solvers.contact import (
     brick_air,
     brick_element,
     brick_factors,
@@ -20,11 +22,9 @@ from sensorgen.models._press import (
     load,
     pressed,
 )
-from sensorgen.models._press.brick_field import Orders
-from sensorgen.models._press.bricks import Bricks
-from sensorgen.models._press.cell import Region
-from sensorgen.models.press3d import Elastic, Held, Pieces
-from sensorgen.scene import Body, Scene, box
+from sensorgen.solvers.contact.brick_field import Orders
+from sensorgen.solvers.contact.bricks import Bricks
+from sensorgen.solvers.contact.cell import Region
 
 EPS = {"x60": 4.68, "air": 1.00059}
 REGIONS = (Region("air", ""), Region("x60", ""), Region("etpu", "bottom"), Region("etpu", "top"))

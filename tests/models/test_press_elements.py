@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from sensorgen.models._press import element, load, support
-from sensorgen.models._press.contact import Faces
-from sensorgen.models._press.mesh import of_triangles
+from sensorgen.solvers.contact import element, load, support
+from sensorgen.solvers.contact.contact import Faces
+from sensorgen.solvers.contact.mesh import of_triangles
 
 
 def none(mesh):

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from sensorgen.errors import BadInput
-from sensorgen.scene import Body, Prism, Scene, rectangle
+from sensorgen.core.errors import BadInput
+from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d
-from sensorgen.models._press import field
 from sensorgen.models.press2d import Elastic, Fineness, Held
+from sensorgen.solvers.contact import field
 
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
 EPS = {"x60": 4.68, "air": 1.00059}

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from sensorgen.scene import Body, Prism, Scene, rectangle
+from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d
-from sensorgen.models._press import rays
 from sensorgen.models.press2d import Elastic, Fineness, Held
+from sensorgen.solvers.contact import rays
 
 RADIUS_MM, HALF_WIDTH_MM, E_PA = 1.0, 0.02, 6e6
 

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sensorgen.design import make
-from sensorgen.scene import Body, Prism, Scene, rectangle
-from sensorgen.sections import columns, sections
+from sensorgen.design.design import make
+from sensorgen.scene.scene import Body, Prism, Scene, rectangle
+from sensorgen.scene.sections import columns, sections
 
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d
-from sensorgen.models._press import cell as cells
-from sensorgen.models._press import contact
 from sensorgen.models.press2d import Elastic, Fineness, Held
+from sensorgen.solvers.contact import cell as cells
+from sensorgen.solvers.contact import contact
 
 EPS = {"x60": 4.68, "etpu": 5.0, "air": 1.00059}
 EPS0 = 8.8541878e-12

@@ -6,10 +6,10 @@ import pytest
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 
 from sensorgen.models import fem2d, press2d
-from sensorgen.models._press import field, mesh, rings, wedge
-from sensorgen.models._press.cell import OUTSIDE, Cell, Region
 from sensorgen.models.press2d import Fineness
-from sensorgen.scene import Body, Scene, box
+from sensorgen.scene.scene import Body, Scene, box
+from sensorgen.solvers.contact import field, mesh, rings, wedge
+from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Region
 
 EPS = {"x60": 4.68, "air": 1.00059}
 LEVELS = (Fineness(), Fineness().finer())

@@ -10,8 +10,8 @@ import pytest
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from test_press_feet import EPS, QUICK, SOLIDS, stacked
 
+from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import press2d
-from sensorgen.units import EPS0_F_PER_M
 
 LOADS_PA = [0.0, 1.9e4, 2e4, 2.1e4]
 

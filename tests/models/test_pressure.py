@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import integrate, optimize, special
 
-from sensorgen.errors import OutOfRange, UnknownName
+from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.models.pressure import BLUNT_M, PROFILES, bed, hertz, pieces, pressure_slope, profile
 
 POWER = {"uniform": 0.0, "hertz": 0.5, "parabola": 1.0}  # of u (1 - u)

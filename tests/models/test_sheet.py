@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from line_cases import PLATE
 
+from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line, sheet
 from sensorgen.models.sheet import BY, Contact, Patch, Sheet, impedance, solve
-from sensorgen.units import EPS0_F_PER_M
 
 TONES = np.array([1e-3, 1.1e3, 99.7e3, 1e6])
 C = EPS0_F_PER_M * PLATE["eps_r"] / PLATE["d_m"]

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from line_cases import PLATE, TONES
 
-from sensorgen.errors import OutOfRange, UnknownName
+from sensorgen.core.errors import OutOfRange, UnknownName
+from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line
 from sensorgen.models.sheet import Bounds, Patch, Sheet, contact_sets, depth_m, impedance, localise, solve
-from sensorgen.units import EPS0_F_PER_M
 
 C = EPS0_F_PER_M * PLATE["eps_r"] / PLATE["d_m"]
 FILM = Sheet(0.1, 0.1, (450.0, 450.0), C)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sensorgen.errors import BadInput, OutOfRange, UnknownName
+from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.models.sheet import Contact, Patch, Sheet, impedance, solve
 
 FILM = Sheet(0.1, 0.05, (450.0, 700.0), 7e-8)

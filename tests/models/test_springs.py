@@ -2,8 +2,8 @@
 
 import pytest
 
-from sensorgen.design import make
-from sensorgen.errors import OutOfRange
+from sensorgen.core.errors import OutOfRange
+from sensorgen.design.design import make
 from sensorgen.models import springs
 
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from line_cases import cases
 
-from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models import line, stack
-from sensorgen.models._line_inputs import read
 from sensorgen.models.compression import unconfined
 from sensorgen.models.stack import Film, Press, Stack, Track, port
+from sensorgen.solvers.line.inputs import read
 
 EXACT = 1e-11
 

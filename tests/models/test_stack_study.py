@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sensorgen.design import make
-from sensorgen.errors import OutOfRange
+from sensorgen.core.errors import OutOfRange
+from sensorgen.design.design import make
 from sensorgen.models.compression import unconfined
 from sensorgen.models.stack import Body, Film, Press, Stack, Track
-from sensorgen.predict import TONES_HZ
-from sensorgen.sensing import sensor_of
-from sensorgen.stacked import study
-from sensorgen.stacked.designs import halves, press_at, stack_of, stacked
-from sensorgen.stacked.differencing import bounds
-from sensorgen.stacked.touching import WIRINGS, Touching
+from sensorgen.prediction.double_layer import study
+from sensorgen.prediction.double_layer.designs import halves, press_at, stack_of, stacked
+from sensorgen.prediction.double_layer.differencing import bounds
+from sensorgen.prediction.double_layer.touching import WIRINGS, Touching
+from sensorgen.prediction.prediction import TONES_HZ
+from sensorgen.prediction.sensor_of_design import sensor_of
 
 TONES = np.array(TONES_HZ)
 PRESS = Press(6.0, 0.04, 0.01)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sensorgen.errors import OutOfRange
+from sensorgen.core.errors import OutOfRange
 from sensorgen.models.compression import unconfined
 from sensorgen.models.stack import Body, Film, Press, Stack, Touch, Track
 

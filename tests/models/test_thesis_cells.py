@@ -8,11 +8,11 @@ import pytest
 from cell_scenes import EPS, MM, rect_cell, tri_cell
 from scipy.integrate import quad
 
-from sensorgen.errors import OutOfRange
+from sensorgen.core.errors import OutOfRange
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.design.shapes import rect, tri
 from sensorgen.models import columns, fem2d, fem3d, thesis_cells, thesis_swept
-from sensorgen.scene import Fill
-from sensorgen.shapes import rect, tri
-from sensorgen.units import EPS0_F_PER_M
+from sensorgen.scene.scene import Fill
 
 CONTACT = json.loads((Path(__file__).parents[1] / "reference" / "contact.json").read_text("utf-8"))
 CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))

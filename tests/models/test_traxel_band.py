@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array, diags_array
 
-from sensorgen.errors import OutOfRange
-from sensorgen.models import _traxel_band
+from sensorgen.core.errors import OutOfRange
+from sensorgen.solvers.network import band as _traxel_band
 
 
 def network(n, reach, seed=1):

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from sensorgen.errors import OutOfRange
-from sensorgen.process import lowpass
-from sensorgen.process.lowpass import CUTOFF_HZ, THESIS_RATE_HZ, Live
-from sensorgen.recording import Clock, Recording, Source
-from sensorgen.recording.samples import blank
+from sensorgen.core.errors import OutOfRange
+from sensorgen.measure.recording import Clock, Recording, Source
+from sensorgen.measure.recording.samples import blank
+from sensorgen.measure.signal import lowpass
+from sensorgen.measure.signal.lowpass import CUTOFF_HZ, THESIS_RATE_HZ, Live
 
 RATE = 140.0
 

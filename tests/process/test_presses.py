@@ -4,10 +4,10 @@ import made
 import numpy as np
 import pytest
 
-from sensorgen.errors import BadInput, UnknownName
-from sensorgen.process import drift, laws, presses
-from sensorgen.process.hysteresis import hysteresis
-from sensorgen.process.surfaces import normalised, surface
+from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.measure.signal import drift, laws, presses
+from sensorgen.measure.signal.hysteresis import hysteresis
+from sensorgen.measure.signal.surfaces import normalised, surface
 
 MADE = made.presses(12)
 RUN = made.run(MADE, rate_hz=70, creep=0.004)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sensorgen.errors import OutOfRange
-from sensorgen.process.schedule import Plan
+from sensorgen.core.errors import OutOfRange
+from sensorgen.measure.signal.schedule import Plan
 
 PLAN = Plan(7, 400, (0.0, 6.0), (5.0, 95.0), 4.0, 6.0, repeats=1)
 

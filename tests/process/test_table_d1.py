@@ -6,9 +6,9 @@ from math import nan
 import pytest
 from scipy import stats
 
-from sensorgen.log import Log, importing
-from sensorgen.process.verdicts import Evidence, expected_from, verdict
-from sensorgen.process.yields import dependence, groups
+from sensorgen.measure.log import Log, importing
+from sensorgen.measure.signal.verdicts import Evidence, expected_from, verdict
+from sensorgen.measure.signal.yields import dependence, groups
 
 
 @pytest.fixture(scope="module")

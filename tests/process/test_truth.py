@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 import scipy.io as sio
 
-from sensorgen.card.fisher import bounds, slopes
-from sensorgen.invert import Estimator
-from sensorgen.process import drift, presses
-from sensorgen.process.presses import GUARD_S, WINDOW_S
-from sensorgen.recording import joined, read, rig
+from sensorgen.measure.recording import joined, read, rig
+from sensorgen.measure.signal import drift, presses
+from sensorgen.measure.signal.presses import GUARD_S, WINDOW_S
+from sensorgen.prediction.identifiability.fisher import bounds, slopes
+from sensorgen.prediction.inverse import Estimator
 
 NOISE, RATE = 1e-3, 140.0
 MADE = made.presses(60, dwell_s=3.0, rest_s=3.0, seed=11)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sensorgen.errors import OutOfRange
+from sensorgen.core.errors import OutOfRange
+from sensorgen.measure.signal.verdicts import WORDS, Evidence, electrode_ohm, expected_from, leak_s, verdict
+from sensorgen.measure.signal.yields import groups, independence, share
 from sensorgen.models import line
-from sensorgen.process.verdicts import WORDS, Evidence, electrode_ohm, expected_from, leak_s, verdict
-from sensorgen.process.yields import groups, independence, share
 
 
 @pytest.mark.parametrize("leak", [1e-12, 1e-6, 1e-3, 0.1, 10.0])

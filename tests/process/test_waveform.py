@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sensorgen.errors import BadInput, OutOfRange
-from sensorgen.process.waveform import coincidences, impedance, phasors, window_samples
+from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.measure.signal.waveform import coincidences, impedance, phasors, window_samples
 
 TONES = np.array([1100.0, 2300, 5300, 10100, 19900, 49900, 99700])
 WEIGHTS = np.array([10, 7, 4.5, 3, 2, 1.5, 1])

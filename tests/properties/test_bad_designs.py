@@ -9,8 +9,11 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from sensorgen import cli, design, registry, shapes, yamlfile
-from sensorgen.errors import SensorgenError
+from sensorgen import cli
+from sensorgen.core import plugins as registry
+from sensorgen.core import yamlfile
+from sensorgen.core.errors import SensorgenError
+from sensorgen.design import design, shapes
 
 
 def many(n):

@@ -11,11 +11,11 @@ import trimesh
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from sensorgen.design import make, parameters
-from sensorgen.geometry import meshes, validity
-from sensorgen.review import review
-from sensorgen.scene import Fill, Scene
-from sensorgen.shapes import rect, reference, tri
+from sensorgen.checks.review import review
+from sensorgen.design.design import make, parameters
+from sensorgen.design.shapes import rect, reference, tri
+from sensorgen.scene.geometry import meshes, validity
+from sensorgen.scene.scene import Fill, Scene
 
 stable = settings(deadline=None, derandomize=True, max_examples=150, suppress_health_check=[HealthCheck.too_slow])
 

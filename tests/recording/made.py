@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from sensorgen.models.compression import unconfined
-from sensorgen.sensor import Sensor
+from sensorgen.models.sensor import Sensor
 
 TONES_HZ = np.array([1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3])
 EPOCH_S = 1_661_419_320.0

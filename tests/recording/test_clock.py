@@ -4,8 +4,8 @@ import made
 import numpy as np
 import pytest
 
-from sensorgen.errors import BadInput
-from sensorgen.recording.clock import rebuilt
+from sensorgen.core.errors import BadInput
+from sensorgen.measure.recording.clock import rebuilt
 
 TIME = np.arange(140 * 60) / 140
 

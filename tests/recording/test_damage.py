@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import scipy.io as sio
 
-from sensorgen.errors import BadInput, SensorgenError
-from sensorgen.recording import read_all, rig
+from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.measure.recording import read_all, rig
 
 RUN = made.run(made.presses(1))
 
@@ -121,9 +121,9 @@ def test_damaged_logs_of_the_rig_end_in_a_word_or_a_log(tmp_path):
 
 def test_files_beyond_what_fits_into_memory_are_not_read(tmp_path, monkeypatch):
     (tmp_path / "long.csv").write_text("time_s,re_ohm_1kHz,im_ohm_1kHz\n0,1,1\n1,1,1\n")
-    monkeypatch.setattr("sensorgen.recording.files.MOST_BYTES", 40)
+    monkeypatch.setattr("sensorgen.measure.recording.files.MOST_BYTES", 40)
     with pytest.raises(BadInput, match=r"long\.csv: .* GB; expected up to .*split the run"):
         read_all(tmp_path / "long.csv")
-    monkeypatch.setattr(sys.modules["sensorgen.recording.rig"], "MOST_BYTES", 40)
+    monkeypatch.setattr(sys.modules["sensorgen.measure.recording.rig"], "MOST_BYTES", 40)
     with pytest.raises(BadInput, match="split the run"):
         rig(tmp_path / "long.csv")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import scipy.io as sio
 
-from sensorgen.errors import BadInput
-from sensorgen.recording import read, read_all
+from sensorgen.core.errors import BadInput
+from sensorgen.measure.recording import read, read_all
 
 SHORT = made.run(made.presses(2))
 BEFORE = np.s_[:300]
@@ -273,7 +273,7 @@ def test_what_is_no_recording_says_what_is_missing(tmp_path):
 
 def test_unpacking_is_bounded(tmp_path, monkeypatch, tree):
     file = save(tmp_path / "run.mat", tree, do_compression=True)
-    monkeypatch.setattr("sensorgen.recording.matfive.MOST_BYTES", 1 << 14)
+    monkeypatch.setattr("sensorgen.measure.recording.matfive.MOST_BYTES", 1 << 14)
     with pytest.raises(BadInput, match="a packed array of more than"):
         read(file)
 

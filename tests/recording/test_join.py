@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from sensorgen.errors import BadInput
-from sensorgen.recording import Clock, Recording, Source, joined, joined_all, offset, rig
-from sensorgen.recording.clock import rebuilt
-from sensorgen.recording.samples import blank, sifted
+from sensorgen.core.errors import BadInput
+from sensorgen.measure.recording import Clock, Recording, Source, joined, joined_all, offset, rig
+from sensorgen.measure.recording.clock import rebuilt
+from sensorgen.measure.recording.samples import blank, sifted
 
 MADE = made.presses(12)
 END = MADE[-1][1] + 4

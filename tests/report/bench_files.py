@@ -5,8 +5,8 @@ from dataclasses import replace
 import made
 import scipy.io as sio
 
-from sensorgen.comparison.moved import moved
-from sensorgen.sensing import sensor_of
+from sensorgen.analysis.comparison.moved import moved
+from sensorgen.prediction.sensor_of_design import sensor_of
 
 HOSTILE = "</script><script>document.title='taken'</script><img src=x onerror=alert(1)> \"'&$\\frac{ =cmd|'/c calc'!A1"
 FORMULA = '=HYPERLINK("http://example.org";"x")'

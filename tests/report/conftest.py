@@ -5,10 +5,10 @@ import os
 import bench_files
 import pytest
 
-from sensorgen.log import Log, bench, importing, words
-from sensorgen.log.batches import prediction
-from sensorgen.predict import prediction as predicted
-from sensorgen.specimen import design_of, parse
+from sensorgen.design.specimen_name import design_of, parse
+from sensorgen.measure.log import Log, bench, importing, words
+from sensorgen.measure.log.batches import prediction
+from sensorgen.prediction.prediction import prediction as predicted
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -7,8 +7,8 @@ import pytest
 from bench_files import HOSTILE
 from browser import Page
 
-from sensorgen.log import Log, words
-from sensorgen.report import report, written
+from sensorgen.analysis.report import report, written
+from sensorgen.measure.log import Log, words
 
 OUT = Path(__file__).parents[2] / "out" / "report"  # CI keeps it
 FIGURES = """[...document.querySelectorAll('.plot')].map(p => [p.dataset.key, p.getBoundingClientRect().width,

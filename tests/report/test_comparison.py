@@ -6,19 +6,19 @@ from math import inf, log
 import numpy as np
 import pytest
 
-from sensorgen.comparison import of_iteration, predicted
-from sensorgen.comparison.expected import electrode_ohm
-from sensorgen.comparison.leaky import across_ohm, along_ohm, electrode_and_leak
-from sensorgen.comparison.moved import Movable, at_rest, moved, pressed
-from sensorgen.design import make
-from sensorgen.errors import OutOfRange
-from sensorgen.log import Log, words
-from sensorgen.log.batches import prediction
+from sensorgen.analysis.comparison import of_iteration, predicted
+from sensorgen.analysis.comparison.expected import electrode_ohm
+from sensorgen.analysis.comparison.leaky import across_ohm, along_ohm, electrode_and_leak
+from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
+from sensorgen.core.errors import OutOfRange
+from sensorgen.design.design import make
+from sensorgen.design.specimen_name import design_of, parse
+from sensorgen.measure.log import Log, words
+from sensorgen.measure.log.batches import prediction
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
-from sensorgen.predict import prediction as plain_prediction
-from sensorgen.sensor import Sensor
-from sensorgen.specimen import design_of, parse
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.prediction import prediction as plain_prediction
 
 
 def ladder(electrode, leak, sections):

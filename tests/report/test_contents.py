@@ -15,15 +15,15 @@ import pytest
 from bench_files import FORMULA, HOSTILE
 from scipy import stats
 
-from sensorgen.comparison import of_iteration
-from sensorgen.log import Log, words
-from sensorgen.report import FORMATS, report, written, yields
-from sensorgen.report import page as page_of
-from sensorgen.report.figures import MOST_ROWS
-from sensorgen.report.pictures import files
-from sensorgen.report.tables import said
+from sensorgen.analysis.comparison import of_iteration
+from sensorgen.analysis.report import FORMATS, report, written, yields
+from sensorgen.analysis.report import page as page_of
+from sensorgen.analysis.report.figures import MOST_ROWS
+from sensorgen.analysis.report.pictures import files
+from sensorgen.analysis.report.tables import said
+from sensorgen.measure.log import Log, words
 
-TABLE = Path(__file__).parents[2] / "src" / "sensorgen" / "log" / "table_d1.csv"
+TABLE = Path(__file__).parents[2] / "src" / "sensorgen" / "measure" / "log" / "table_d1.csv"
 FACTOR = {"": 1.0, "k": 1e3, "m": 1e6}
 
 

@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sensorgen.analysis.comparison import runs
+from sensorgen.analysis.report.charts import Axis, Chart, Trace
+from sensorgen.analysis.report.identified import _lines
+from sensorgen.analysis.report.interactive import figure, packed
+from sensorgen.analysis.report.pictures import files
+from sensorgen.analysis.report.recordings import normalised_differences
+from sensorgen.analysis.report.thinned import kept
 from sensorgen.cli import cli
-from sensorgen.comparison import runs
-from sensorgen.errors import BadInput
-from sensorgen.log import Log
-from sensorgen.log.bench import take
-from sensorgen.report.charts import Axis, Chart, Trace
-from sensorgen.report.identified import _lines
-from sensorgen.report.interactive import figure, packed
-from sensorgen.report.pictures import files
-from sensorgen.report.recordings import normalised_differences
-from sensorgen.report.thinned import kept
+from sensorgen.core.errors import BadInput
+from sensorgen.measure.log import Log
+from sensorgen.measure.log.bench import take
 
 
 def test_thinned_curves_keep_what_stands_out():

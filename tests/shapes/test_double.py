@@ -2,11 +2,11 @@
 
 import pytest
 
-from sensorgen.design import make
+from sensorgen.checks.review import review
+from sensorgen.design.design import make
+from sensorgen.design.shapes import double
 from sensorgen.models import columns
-from sensorgen.review import review
-from sensorgen.scene import Fill
-from sensorgen.shapes import double
+from sensorgen.scene.scene import Fill
 
 
 def scene(**options):

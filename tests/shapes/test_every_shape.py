@@ -13,11 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sensorgen import registry, shapes
-from sensorgen.design import make
-from sensorgen.geometry import meshes, validity
-from sensorgen.review import review
-from sensorgen.scene import Envelope, Fill, Scene, area_mm2
+from sensorgen.checks.review import review
+from sensorgen.core import plugins as registry
+from sensorgen.design import shapes
+from sensorgen.design.design import make
+from sensorgen.scene.geometry import meshes, validity
+from sensorgen.scene.scene import Envelope, Fill, Scene, area_mm2
 
 STORED = Path(__file__).parents[1] / "reference" / "scenes"
 SMALL = {"length_mm": 3.0, "width_mm": 2.5}  # one and a half periods: the edge is clipped
@@ -60,12 +61,21 @@ def test_every_parameter_has_help_and_a_range_that_holds_its_default(shape):
 def test_it_imports_the_scene_and_the_standard_library_only(name):
     code = (
         "import json, sys; before = set(sys.modules); "
-        f"import sensorgen.shapes.{name}; print(json.dumps(sorted(set(sys.modules) - before)))"
+        f"import sensorgen.design.shapes.{name}; print(json.dumps(sorted(set(sys.modules) - before)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(json.loads(done.stdout))
     ours = {m for m in loaded if m.partition(".")[0] == "sensorgen"}
-    assert ours <= {"sensorgen", "sensorgen.scene", "sensorgen.errors", "sensorgen.shapes", f"sensorgen.shapes.{name}"}
+    assert ours <= {
+        "sensorgen",
+        "sensorgen.core",
+        "sensorgen.core.errors",
+        "sensorgen.scene",
+        "sensorgen.scene.scene",
+        "sensorgen.design",
+        "sensorgen.design.shapes",
+        f"sensorgen.design.shapes.{name}",
+    }
     assert {m.partition(".")[0] for m in loaded - ours} <= set(sys.stdlib_module_names)
 
 

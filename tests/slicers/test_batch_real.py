@@ -9,16 +9,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sensorgen import design
-from sensorgen.batch import make, tab
-from sensorgen.batch.record import RECORD, differences
-from sensorgen.errors import SlicerFailed
-from sensorgen.gcode import paths
-from sensorgen.log import batches
-from sensorgen.log.entries import Prediction, RawFile
-from sensorgen.printer import load_printer
-from sensorgen.slicer import run
-from sensorgen.slicer.tower import tower
+from sensorgen.core.errors import SlicerFailed
+from sensorgen.design import design
+from sensorgen.design.printer import load_printer
+from sensorgen.export.gcode import paths
+from sensorgen.export.slicers import run
+from sensorgen.export.slicers.tower import tower
+from sensorgen.measure.log import batches
+from sensorgen.measure.log.entries import Prediction, RawFile
+from sensorgen.workflows.batch import make, tab
+from sensorgen.workflows.batch.record import RECORD, differences
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
 MACHINE = load_printer("diabase-h5")

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sensorgen import design, yamlfile
-from sensorgen.gcode import extruded, paths
-from sensorgen.gcode.check import check
-from sensorgen.gcode.files import text_of
-from sensorgen.gcode.motion import follow
-from sensorgen.slicing import Placed, alone, sliced
+from sensorgen.core import yamlfile
+from sensorgen.design import design
+from sensorgen.export.gcode import extruded, paths
+from sensorgen.export.gcode.check import check
+from sensorgen.export.gcode.files import text_of
+from sensorgen.export.gcode.motion import follow
+from sensorgen.export.slicing import Placed, alone, sliced
 
 DESIGNS = Path(__file__).parents[2] / "designs"
 VARIANTS = sorted(p.relative_to(DESIGNS).as_posix() for p in DESIGNS.rglob("*.yaml") if not p.stem.endswith("-d0"))

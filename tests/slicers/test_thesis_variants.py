@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sensorgen import design
-from sensorgen.build import build
-from sensorgen.gcode import extruded
-from sensorgen.geometry import meshes
-from sensorgen.slicer import curaengine, prusa
-from sensorgen.slicer.loads import Load
+from sensorgen.design import design
+from sensorgen.export.gcode import extruded
+from sensorgen.export.slicers import curaengine, prusa
+from sensorgen.export.slicers.loads import Load
+from sensorgen.scene.geometry import meshes
+from sensorgen.workflows.build import build
 
 DESIGNS = Path(__file__).parents[2] / "designs"
 VARIANTS = sorted(p.relative_to(DESIGNS).as_posix() for p in DESIGNS.rglob("*.yaml") if not p.stem.endswith("-d0"))

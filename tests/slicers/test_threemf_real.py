@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sensorgen.geometry.mesh import Mesh
-from sensorgen.threemf import Part, content
+from sensorgen.export.threemf import Part, content
+from sensorgen.scene.geometry.mesh import Mesh
 
 CONFIG = "Metadata/Slic3r_PE_model.config"
 

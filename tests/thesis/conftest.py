@@ -2,7 +2,7 @@
 
 import pytest
 
-from sensorgen import thesis
+from sensorgen.verification import thesis
 
 
 @pytest.fixture(scope="session")

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from sensorgen import compressed
-from sensorgen.interval import Interval
+from sensorgen.core.bounds import Interval
 from sensorgen.models import columns, compression, line, line_abcd, line_closed, line_fit, line_ladder, thesis_cells
-from sensorgen.sensor import Sensor
-from sensorgen.thesis.checks import _field, inverse, strips, triangles
-from sensorgen.thesis.items import CHAPTERS, chapter
-from sensorgen.thesis.reproduced import row
-from sensorgen.thesis.verdicts import UNEXPLAINED
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction import compression as compressed
+from sensorgen.verification.thesis.checks import _field, inverse, strips, triangles
+from sensorgen.verification.thesis.items import CHAPTERS, chapter
+from sensorgen.verification.thesis.reproduced import row
+from sensorgen.verification.thesis.verdicts import UNEXPLAINED
 
 ITEMS = {(kind, item.number): (name, kind, item) for name in CHAPTERS for kind, item in chapter(name).items()}
 
@@ -168,7 +168,7 @@ def test_a_table_that_says_something_else_is_found_out(number, key, name, value)
 
 
 def test_a_material_that_changes_is_found_out(monkeypatch):
-    from sensorgen import materials
+    from sensorgen.design import materials
 
     sound = materials.load
     stiffer = sound("x60").with_values({"relative_permittivity": 5.0})

@@ -5,10 +5,10 @@ from collections import Counter
 
 import pytest
 
-from sensorgen import registry
-from sensorgen.errors import BadInput
-from sensorgen.thesis import checks
-from sensorgen.thesis.items import CHAPTERS, Item, chapter
+from sensorgen.core import plugins as registry
+from sensorgen.core.errors import BadInput
+from sensorgen.verification.thesis import checks
+from sensorgen.verification.thesis.items import CHAPTERS, Item, chapter
 
 # Counted in the thesis, chapter by chapter: the last number of each kind. 2.7, 3.6 and 6.24 are counted though the
 # copy at hand lacks their captions or numbers, and 3.55 though nothing stands beside it.
@@ -48,14 +48,14 @@ def test_every_check_exists_and_every_function_is_a_check():
         f"{name}.{function}"
         for name in registry.names(checks)
         for function, value in inspect.getmembers(registry.load(checks, name), inspect.isfunction)
-        if value.__module__ == f"sensorgen.thesis.checks.{name}" and not function.startswith("_")
+        if value.__module__ == f"sensorgen.verification.thesis.checks.{name}" and not function.startswith("_")
     }
     assert used == there
 
 
 @pytest.mark.parametrize("check", ["line", "line.Current", "os.path.join", "__import__.x"])
 def test_a_check_is_a_module_and_a_function(check):
-    from sensorgen.records import checked
+    from sensorgen.core.records import checked
 
     with pytest.raises(BadInput, match="check"):
         checked(Item, {"number": "1.1", "says": "x", "check": check})

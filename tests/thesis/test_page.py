@@ -7,10 +7,10 @@ from html.parser import HTMLParser
 
 import pytest
 
-from sensorgen import thesis
-from sensorgen.thesis.items import Item
-from sensorgen.thesis.reproduced import Row
-from sensorgen.thesis.verdicts import AGREES, Part, Verdict
+from sensorgen.verification import thesis
+from sensorgen.verification.thesis.items import Item
+from sensorgen.verification.thesis.reproduced import Row
+from sensorgen.verification.thesis.verdicts import AGREES, Part, Verdict
 
 VOID = {"meta", "input"}
 

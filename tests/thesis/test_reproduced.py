@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen import thesis
-from sensorgen.thesis.items import Item
-from sensorgen.thesis.reproduced import Row, row
-from sensorgen.thesis.verdicts import DIFFERS, LOST, MISPRINT, NOT_COVERED, UNEXPLAINED, Part
+from sensorgen.verification import thesis
+from sensorgen.verification.thesis.items import Item
+from sensorgen.verification.thesis.reproduced import Row, row
+from sensorgen.verification.thesis.verdicts import DIFFERS, LOST, MISPRINT, NOT_COVERED, UNEXPLAINED, Part
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -91,8 +91,8 @@ def test_a_confined_plate_gives_way_by_its_bulk(rows):
 
 
 def test_a_missing_solver_leaves_uncovered_and_any_other_refusal_is_unexplained(monkeypatch):
-    from sensorgen.errors import MissingValue, OutOfRange
-    from sensorgen.thesis.checks import triangles
+    from sensorgen.core.errors import MissingValue, OutOfRange
+    from sensorgen.verification.thesis.checks import triangles
 
     item = Item(number="3.35", says="x", check="triangles.whole", because="y", off={"x": 1.0}, within=0.1)
     for error, expected in ((MissingValue("no solver"), NOT_COVERED), (OutOfRange("strain"), UNEXPLAINED)):

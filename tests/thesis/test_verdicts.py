@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sensorgen.thesis import shown
-from sensorgen.thesis.verdicts import (
+from sensorgen.verification.thesis import shown
+from sensorgen.verification.thesis.verdicts import (
     DIFFERS,
     MISPRINT,
     UNEXPLAINED,

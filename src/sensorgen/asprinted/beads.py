@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from sensorgen.asprinted.intervals import Intervals, distances_mm, length_mm, united, within, without
 from sensorgen.asprinted.rules import ROUND
 from sensorgen.asprinted.strips import Strips, drawn
-from sensorgen.design import Design
-from sensorgen.errors import UnknownName
-from sensorgen.gcode.paths import Paths
-from sensorgen.scene import SLIVER_MM, Point, Scene
+from sensorgen.core.errors import UnknownName
+from sensorgen.design.design import Design
+from sensorgen.export.gcode.paths import Paths
+from sensorgen.scene.scene import SLIVER_MM, Point, Scene
 
 CONVENTIONS = ("vol", "deposit", "stadium")
 FULL = 0.95  # a plate of which this share is filled has no holes but between rounded lines

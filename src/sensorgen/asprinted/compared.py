@@ -8,7 +8,6 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen import planner
 from sensorgen.asprinted import estimate
 from sensorgen.asprinted.beads import CONVENTIONS, Beads, beads
 from sensorgen.asprinted.beads import layers as printed_layers
@@ -16,16 +15,17 @@ from sensorgen.asprinted.rectilinear import plate
 from sensorgen.asprinted.strips import Strips, drawn, scene_of
 from sensorgen.asprinted.tally import Row, findings, tally
 from sensorgen.asprinted.window import cut, evened, window
-from sensorgen.design import Design
-from sensorgen.errors import BadInput, OutOfRange
-from sensorgen.findings import Finding
-from sensorgen.gcode.paths import Paths
-from sensorgen.geometry import meshes, validity
-from sensorgen.interval import Interval
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.core.findings import Finding
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design.design import Design
+from sensorgen.export.gcode.paths import Paths
 from sensorgen.models import traxels
-from sensorgen.models._traxel_lines import Lines
-from sensorgen.scene import Scene
-from sensorgen.units import M_PER_MM
+from sensorgen.prediction import capacitance as planner
+from sensorgen.scene.geometry import meshes, validity
+from sensorgen.scene.scene import Scene
+from sensorgen.solvers.network.lines import Lines
 
 ACCURACY = 0.02  # of the capacitance: the conventions for a line's width differ by more
 CONTACTS_OHM_M2 = (0.0, 1e-6, 1e-5, 1e-4)  # no source gives the contact resistivity of printed eTPU

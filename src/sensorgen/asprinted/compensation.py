@@ -7,9 +7,9 @@ from typing import Any
 
 from sensorgen.asprinted.compared import cell, drawn_gap_mm, estimated, gap_mm
 from sensorgen.checks.widths import GAP_CLOSES
-from sensorgen.design import Design, fields, make, name_of
-from sensorgen.errors import SensorgenError
-from sensorgen.scene import SLIVER_MM
+from sensorgen.core.errors import SensorgenError
+from sensorgen.design.design import Design, fields, make, name_of
+from sensorgen.scene.scene import SLIVER_MM
 
 BAKE = 0.2  # what the bake takes off in the plane (thesis 6.2)
 _STEP_MM = 0.05  # by which a period grows

@@ -6,8 +6,8 @@ Tests hold it against the real slicers: capacitance within 2 % of PrusaSlicer's,
 from sensorgen.asprinted.intervals import Intervals, united, within, without
 from sensorgen.asprinted.rules import Rule, rule
 from sensorgen.asprinted.strips import Strips, drawn, scene_of
-from sensorgen.printer import Printer, Quality
-from sensorgen.scene import SLIVER_MM, Body, Scene
+from sensorgen.design.printer import Printer, Quality
+from sensorgen.scene.scene import SLIVER_MM, Body, Scene
 
 
 def estimate(scene: Scene, printer: Printer, quality: Quality, walls: str = "arachne") -> Scene:

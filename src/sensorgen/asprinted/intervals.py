@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.scene import SLIVER_MM, Point
+from sensorgen.scene.scene import SLIVER_MM, Point
 
 Intervals = tuple[Point, ...]
 

@@ -2,17 +2,18 @@
 
 from dataclasses import replace
 
-from sensorgen import planner, sensing
 from sensorgen.asprinted import compared
 from sensorgen.asprinted.compared import Printed
-from sensorgen.celllaw import Law
-from sensorgen.design import Design
-from sensorgen.interval import Interval
-from sensorgen.planner import Unloaded, Unpredictable
-from sensorgen.pressing import Piece, drawn
-from sensorgen.sections import sections
-from sensorgen.sensing import Sensed
-from sensorgen.sensor import UNIFORM
+from sensorgen.core.bounds import Interval
+from sensorgen.design.design import Design
+from sensorgen.models.compression_law import Law
+from sensorgen.models.mesh_ladder import Piece, drawn
+from sensorgen.models.sensor import UNIFORM
+from sensorgen.prediction import capacitance as planner
+from sensorgen.prediction import sensor_of_design as sensing
+from sensorgen.prediction.capacitance import Unloaded, Unpredictable
+from sensorgen.prediction.sensor_of_design import Sensed
+from sensorgen.scene.sections import sections
 
 _SOLID = "electrodes as solid plates: the contacts between printed lines add to their resistance"
 _LOSSES = "losses of the cell as drawn"
@@ -75,7 +76,7 @@ def sensor_of(
     design, printed : Design, Printed
         As of :func:`piece`.
     law, tip_m, profile, radius_m : str or Law, float, str, float
-        As of :func:`sensorgen.sensing.sensor_of`; lengths in [m].
+        As of :func:`sensorgen.prediction.sensor_of_design.sensor_of`; lengths in [m].
     known : Unloaded
         What :func:`unloaded` says, if it is at hand.
 
@@ -84,7 +85,7 @@ def sensor_of(
     Unpredictable
         As :func:`unloaded`.
     MissingValue, UnknownName, OutOfRange
-        As :func:`sensorgen.sensing.sensor_of`.
+        As :func:`sensorgen.prediction.sensor_of_design.sensor_of`.
     """
     found = sensing.sensor_of(
         design, law, tip_m, profile=profile, radius_m=radius_m, known=known or unloaded(design, printed),

@@ -7,8 +7,8 @@ from math import cos, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.models._traxel_lines import Lines
-from sensorgen.units import M_PER_MM
+from sensorgen.core.units import M_PER_MM
+from sensorgen.solvers.network.lines import Lines
 
 WALLS = 2
 OVERLAP = 0.25  # of a line's width, by which infill reaches into the walls (PrusaSlicer's own)

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from typing import Any
 
-from sensorgen import planner
 from sensorgen.asprinted import compared
 from sensorgen.asprinted.compared import ACCURACY, CONTACTS_OHM_M2, Printed, cell, gap_mm
-from sensorgen.design import Design
-from sensorgen.errors import SensorgenError
-from sensorgen.interval import Interval
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import SensorgenError
+from sensorgen.design.design import Design
+from sensorgen.prediction import capacitance as planner
 
 
 def report(

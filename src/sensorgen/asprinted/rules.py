@@ -7,9 +7,9 @@ from collections.abc import Callable
 from math import pi
 
 from sensorgen.checks.widths import SWELLS, VANISHES
-from sensorgen.errors import UnknownName
-from sensorgen.printer import Printer
-from sensorgen.scene import SLIVER_MM
+from sensorgen.core.errors import UnknownName
+from sensorgen.design.printer import Printer
+from sensorgen.scene.scene import SLIVER_MM
 
 ROUND = 1 - pi / 4  # a bead's rounded sides take this share of its height from its width
 

@@ -7,9 +7,9 @@ from itertools import pairwise
 
 from sensorgen.asprinted.intervals import Intervals, united
 from sensorgen.checks.slices import Rectangle, Slices, slanted
-from sensorgen.errors import SensorgenError
-from sensorgen.printer import Quality
-from sensorgen.scene import SLIVER_MM, Body, Prism, Scene, box
+from sensorgen.core.errors import SensorgenError
+from sensorgen.design.printer import Quality
+from sensorgen.scene.scene import SLIVER_MM, Body, Prism, Scene, box
 
 
 class NoStrips(SensorgenError):

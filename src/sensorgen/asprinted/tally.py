@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from sensorgen.asprinted.beads import Beads, beads, layers
 from sensorgen.asprinted.intervals import Intervals, length_mm
 from sensorgen.asprinted.strips import Strips, drawn
-from sensorgen.design import Design
-from sensorgen.findings import Finding
-from sensorgen.gcode.paths import Paths
-from sensorgen.scene import SLIVER_MM, Body, Point, Prism, Scene, area_mm2
+from sensorgen.core.findings import Finding
+from sensorgen.design.design import Design
+from sensorgen.export.gcode.paths import Paths
+from sensorgen.scene.scene import SLIVER_MM, Body, Point, Prism, Scene, area_mm2
 
 LOW, HIGH = 0.9, 1.1  # printed over exact volume, within which nothing is said
 VANISHED = 0.1  # a strip of which less than this share is printed is gone

@@ -10,8 +10,8 @@ from itertools import pairwise
 
 from sensorgen.asprinted.intervals import Intervals, within
 from sensorgen.asprinted.strips import Strips
-from sensorgen.cells import Band, Slice, mirrored
-from sensorgen.scene import SLIVER_MM, Point, Scene
+from sensorgen.scene.scene import SLIVER_MM, Point, Scene
+from sensorgen.scene.unit_cell import Band, Slice, mirrored
 
 ROUNDED_MM = 2e-3  # edges nearer than this are one: G-code has three decimals
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 from sensorgen.checks import bed, bridges, gap, grid, widths
 from sensorgen.checks.slices import Slices, slanted
-from sensorgen.findings import SEVERITIES, Finding
-from sensorgen.printer import Printer, Quality
-from sensorgen.scene import Scene
+from sensorgen.core.findings import SEVERITIES, Finding
+from sensorgen.design.printer import Printer, Quality
+from sensorgen.scene.scene import Scene
 
 
 def findings(scene: Scene, printer: Printer, quality: Quality, gap_mm: float) -> list[Finding]:

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 from sensorgen.checks.slices import TOUCH_MM
-from sensorgen.findings import Finding
-from sensorgen.printer import Printer
-from sensorgen.scene import Scene
+from sensorgen.core.findings import Finding
+from sensorgen.design.printer import Printer
+from sensorgen.scene.scene import Scene
 
 
 def check(scene: Scene, printer: Printer) -> Iterator[Finding]:

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from sensorgen.checks.slices import TOUCH_MM, Rectangle, Slice, Slices, stretches
 from sensorgen.checks.widths import VANISHES
-from sensorgen.findings import Finding
-from sensorgen.printer import Printer, Quality
-from sensorgen.scene import Body
+from sensorgen.core.findings import Finding
+from sensorgen.design.printer import Printer, Quality
+from sensorgen.scene.scene import Body
 
 Mask = NDArray[np.bool_]
 Lengths = NDArray[np.float64]

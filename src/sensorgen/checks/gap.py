@@ -5,9 +5,9 @@ from itertools import pairwise
 
 from sensorgen.checks.slices import TOUCH_MM, Layers, Slices
 from sensorgen.checks.widths import VANISHES
-from sensorgen.findings import Finding
-from sensorgen.printer import Printer, Quality
-from sensorgen.scene import Body, Scene
+from sensorgen.core.findings import Finding
+from sensorgen.design.printer import Printer, Quality
+from sensorgen.scene.scene import Body, Scene
 
 Pair = tuple[Body, Body]
 

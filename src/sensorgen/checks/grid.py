@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from sensorgen.checks.slices import TOUCH_MM, Layers
-from sensorgen.findings import Finding
-from sensorgen.scene import Body, Scene
+from sensorgen.core.findings import Finding
+from sensorgen.scene.scene import Body, Scene
 
 
 def check(scene: Scene, layers: Layers) -> Iterator[Finding]:

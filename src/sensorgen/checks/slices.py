@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.printer import Quality
-from sensorgen.scene import Body, Prism, Scene
+from sensorgen.design.printer import Quality
+from sensorgen.scene.scene import Body, Prism, Scene
 
 TOUCH_MM = 1e-9  # below this a distance is rounding
 

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from sensorgen.checks.slices import TOUCH_MM, Layers, Run, Slice, Slices, shown
-from sensorgen.findings import Finding
-from sensorgen.printer import Printer
-from sensorgen.scene import Body, Prism
+from sensorgen.core.findings import Finding
+from sensorgen.design.printer import Printer
+from sensorgen.scene.scene import Body, Prism
 
 # As shares of the nozzle.
 VANISHES = 0.12 / 0.4  # only Cura filling outline gaps prints a stretch this narrow

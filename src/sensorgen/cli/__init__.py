@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from sensorgen import __version__
-from sensorgen.errors import SensorgenError, Unprintable
+from sensorgen.core.errors import SensorgenError, Unprintable
 
 COMMANDS = (
     "build",
@@ -35,6 +35,7 @@ COMMANDS = (
     "schema",
     "completion",
 )
+_PACKAGE = {"chart": "verification", "thesis": "verification"}  # of a command's module, where it is not ``cli``
 WRONG_INPUT = 2
 FOUND_ERRORS = 1
 
@@ -48,7 +49,9 @@ class _Lazy(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
         if name not in COMMANDS:
             return None
-        command: click.Command = importlib.import_module(f"sensorgen.cli.{name}_command").command
+        command: click.Command = importlib.import_module(
+            f"sensorgen.{_PACKAGE.get(name, 'cli')}.{name}_command"
+        ).command
         return command
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -59,7 +62,7 @@ class _Lazy(click.Group):
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         if not ctx.resilient_parsing and not args[0].startswith("-") and args[0] not in COMMANDS:
-            from sensorgen.errors import UnknownName
+            from sensorgen.core.errors import UnknownName
 
             raise UnknownName("command", args[0], COMMANDS)
         return super().resolve_command(ctx, args)

@@ -10,12 +10,12 @@ import click
 from sensorgen.cli import show
 from sensorgen.cli.show import si
 from sensorgen.cli.words import OneOf
-from sensorgen.errors import BadInput
-from sensorgen.slicer import SLICERS
+from sensorgen.core.errors import BadInput
+from sensorgen.export.slicers import SLICERS
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.compared import Printed
-    from sensorgen.design import Design
+    from sensorgen.design.design import Design
 
 
 def compensate_option() -> click.Option:
@@ -56,7 +56,7 @@ def printed(design: "Design", slicer: str | None, walls: str | None) -> "Printed
 
     if not slicer:
         return compared.estimated(design, walls or "arachne")
-    from sensorgen import slicing
+    from sensorgen.export import slicing
 
     with tempfile.TemporaryDirectory() as folder, show.progress(slicing.STEPS) as step:
         made = slicing.sliced([slicing.alone(design)], slicer, Path(folder), step=step)

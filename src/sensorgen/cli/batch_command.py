@@ -7,12 +7,12 @@ import click
 from click.shell_completion import CompletionItem
 
 from sensorgen.cli import show
-from sensorgen.errors import BadInput, OutOfRange
-from sensorgen.slicer import TIME_LIMIT_S
+from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.export.slicers import TIME_LIMIT_S
 
 if TYPE_CHECKING:
-    from sensorgen.batch import Batch
-    from sensorgen.batch.record import Differences
+    from sensorgen.workflows.batch import Batch
+    from sensorgen.workflows.batch.record import Differences
 
 FOUND_ERRORS = FOUND_DIFFERENCES = 1
 
@@ -63,8 +63,8 @@ def _plan_command(name: str) -> click.Command:
 
 
 def _make(plan: str, *, out: str, no_gcode: bool, time_limit_s: float, force: bool, strict: bool, as_json: bool) -> int:
-    from sensorgen.batch import STEPS, make
-    from sensorgen.errors import Unprintable
+    from sensorgen.core.errors import Unprintable
+    from sensorgen.workflows.batch import STEPS, make
 
     if not 0 < time_limit_s < float("inf"):
         raise OutOfRange(f"--time-limit {time_limit_s:g}; expected seconds above 0")
@@ -146,7 +146,7 @@ def _printed(printed: dict[str, Any]) -> str:
 @click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
 def _verify(folder: str, as_json: bool) -> int:
     """Hash every file of a batch's folder again, and say what differs from its record; exit code 1 if anything does."""
-    from sensorgen.batch.record import differences
+    from sensorgen.workflows.batch.record import differences
 
     found = differences(Path(folder))
     if as_json:

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen import units
 from sensorgen.cli import bench_hysteresis, bench_live, bench_sets, bench_show, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Values, one
-from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.core import units
+from sensorgen.core.errors import BadInput, OutOfRange
 
 if TYPE_CHECKING:
-    from sensorgen.design import Design
-    from sensorgen.process.schedule import Plan
+    from sensorgen.design.design import Design
+    from sensorgen.measure.signal.schedule import Plan
 
 PLAN: list[click.Parameter] = [
     click.Option(
@@ -60,7 +60,7 @@ def _work(
     if picture:
         _draw(plan, picture)
     if output:
-        from sensorgen import store
+        from sensorgen.core import files as store
 
         store.replace(Path(output), plan.csv().encode())
     if as_json:
@@ -76,7 +76,7 @@ def _plan(
     design: "Design", presses: int, repeats: int, force_n: Sequence[float], tip_mm: float, dwell_s: float,
     rest_s: float, seed: int,
 ) -> "Plan":  # fmt: skip
-    from sensorgen.process.schedule import Plan
+    from sensorgen.measure.signal.schedule import Plan
 
     if len(force_n) != 2:
         raise BadInput(f"--force: {len(force_n)} values; expected the least and the largest, as in 0,6N")
@@ -90,8 +90,8 @@ def _plan(
 
 
 def _draw(plan: "Plan", picture: str) -> None:
-    from sensorgen import store
-    from sensorgen.plots import bench
+    from sensorgen.analysis.plots import bench
+    from sensorgen.core import files as store
 
     if not picture.lower().endswith(".png"):
         raise BadInput(f"--picture {picture}: expected a file that ends in .png")

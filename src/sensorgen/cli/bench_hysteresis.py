@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen import units
 from sensorgen.cli import bench_opened, show
 from sensorgen.cli.log_text import visible
 from sensorgen.cli.log_words import as_json as json_option
 from sensorgen.cli.log_words import made
-from sensorgen.errors import BadInput
+from sensorgen.core import units
+from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.process.hysteresis import Hysteresis
-    from sensorgen.process.run import Processed
+    from sensorgen.measure.signal.hysteresis import Hysteresis
+    from sensorgen.measure.signal.run import Processed
 
 _PARTS = ("R", "X")
 _LAW = "smooth"
@@ -30,7 +30,7 @@ def _hysteresis(
     the largest one, over the span of the readings, with the standard error that noise gives it.
     Drift is taken out by a law of time alone: what the film remembers of presses is what is looked for.
     """
-    from sensorgen.process.hysteresis import of_presses
+    from sensorgen.measure.signal.hysteresis import of_presses
 
     if not how["keep_drift"]:
         how["law"] = how["law"] or _LAW
@@ -71,8 +71,8 @@ def _data(start_s: float, way: "Hysteresis") -> dict[str, Any]:
 
 
 def _drawn(worked: "Processed", ways: "dict[float, Hysteresis]", name: str, plot: str) -> str:
-    from sensorgen import store
-    from sensorgen.plots.ways import ways as drawn
+    from sensorgen.analysis.plots.ways import ways as drawn
+    from sensorgen.core import files as store
 
     if not plot.lower().endswith(".png"):
         raise BadInput(f"--plot {plot}: expected a file that ends in .png")

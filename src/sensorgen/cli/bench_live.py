@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen import units
 from sensorgen.cli.log_words import made
 from sensorgen.cli.words import Values, one
+from sensorgen.core import units
 
 if TYPE_CHECKING:
-    from sensorgen.readings import Block, Readings
-    from sensorgen.recording.samples import Complex
+    from sensorgen.measure.readings import Block, Readings
+    from sensorgen.measure.recording.samples import Complex
 
 
 def _live(measured: str, rate_hz: tuple[float, ...], cutoff_hz: tuple[float, ...] | None) -> None:
@@ -22,8 +22,8 @@ def _live(measured: str, rate_hz: tuple[float, ...], cutoff_hz: tuple[float, ...
     reading is missing the one before is held, and its cells stay empty. Rows must come at an even --rate; columns
     that are no readings pass as they are.
     """
-    from sensorgen.process.lowpass import CUTOFF_HZ, Live
-    from sensorgen.readings import readings
+    from sensorgen.measure.readings import readings
+    from sensorgen.measure.signal.lowpass import CUTOFF_HZ, Live
 
     smooth = Live(one("--rate", rate_hz), one("--cutoff", cutoff_hz) if cutoff_hz else CUTOFF_HZ)
     with readings(measured) as source:

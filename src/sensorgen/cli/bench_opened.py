@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sensorgen.cli.log_words import columns_of, lcr_columns, opened, rig_columns, where
-from sensorgen.errors import BadInput
+from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.process.run import Processed
-    from sensorgen.recording import Recording, RigLog
+    from sensorgen.measure.recording import Recording, RigLog
+    from sensorgen.measure.signal.run import Processed
 
 
 def options() -> list[click.Parameter]:
@@ -34,8 +34,8 @@ def worked_up(
     law: str | None, keep_drift: bool, file: str | None, **how: Any,
 ) -> "tuple[Processed, RigLog | None]":  # fmt: skip
     """A recording with what pressed, freed of drift, cut into presses; and the rig's log, if there is one."""
-    from sensorgen import recording
-    from sensorgen.process.run import processed
+    from sensorgen.measure import recording
+    from sensorgen.measure.signal.run import processed
 
     if keep_drift and law:
         raise BadInput(f"--keep-drift and --drift {law} at once; expected one of them")
@@ -49,8 +49,8 @@ def _opened(
     what: str, rig_file: str | None, columns: tuple[str, ...], rig_columns: tuple[str, ...], file: str | None
 ) -> "tuple[tuple[Recording, ...], RigLog | None]":
     """Recordings and the rig's log, from files or by their number in the log."""
-    from sensorgen import recording
-    from sensorgen.log import BenchRun, bench
+    from sensorgen.measure import recording
+    from sensorgen.measure.log import BenchRun, bench
 
     if not (what.isascii() and what.isdigit()) or Path(what).is_file():
         read = recording.read_all(what, columns_of(columns, "--column"))

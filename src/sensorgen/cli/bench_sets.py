@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen import units
 from sensorgen.cli import bench_opened, show
 from sensorgen.cli.log_text import visible
 from sensorgen.cli.log_words import as_json as json_option
 from sensorgen.cli.log_words import made
-from sensorgen.errors import BadInput
+from sensorgen.core import units
+from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.process.presses import Pairs
-    from sensorgen.recording.samples import Real
+    from sensorgen.measure.recording.samples import Real
+    from sensorgen.measure.signal.presses import Pairs
 
 
 def _sets(
@@ -87,8 +87,8 @@ def _table(sets: "Mapping[str, Pairs]", tones_hz: "Real", output: str | None, *,
 
     import numpy as np
 
-    from sensorgen import store
-    from sensorgen.process.surfaces import normalised
+    from sensorgen.core import files as store
+    from sensorgen.measure.signal.surfaces import normalised
 
     scaled = [
         normalised([getattr(pairs.difference_ohm, part) for pairs in sets.values()], together=together)
@@ -108,8 +108,8 @@ def _table(sets: "Mapping[str, Pairs]", tones_hz: "Real", output: str | None, *,
 def _drawn(sets: "Mapping[str, Pairs]", tones_hz: "Real", plot: str | None, *, together: bool) -> list[str]:
     if plot is None:
         return []
-    from sensorgen import store
-    from sensorgen.plots import bench
+    from sensorgen.analysis.plots import bench
+    from sensorgen.core import files as store
 
     if not plot.lower().endswith(".png"):
         raise BadInput(f"--plot {plot}: expected a file that ends in .png")

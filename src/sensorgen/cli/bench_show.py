@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen import units
 from sensorgen.cli import bench_opened, show
 from sensorgen.cli.log_text import counted, rig_counted, visible
 from sensorgen.cli.log_words import as_json as json_option
 from sensorgen.cli.log_words import made
 from sensorgen.cli.words import Values, one
-from sensorgen.errors import BadInput
+from sensorgen.core import units
+from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.process.presses import Pairs
-    from sensorgen.process.run import Processed
-    from sensorgen.recording import RigLog
-    from sensorgen.recording.samples import Complex, Real
+    from sensorgen.measure.recording import RigLog
+    from sensorgen.measure.recording.samples import Complex, Real
+    from sensorgen.measure.signal.presses import Pairs
+    from sensorgen.measure.signal.run import Processed
 
 _WIDE = 13  # letters of a column
 
@@ -35,7 +35,7 @@ def _show(
     looked for in the readings, and their forces are not known. Differences are pressed less before, of means over a
     second, with their standard errors.
     """
-    from sensorgen.process import lowpass
+    from sensorgen.measure.signal import lowpass
 
     cutoff = one("--cutoff", cutoff_hz) if cutoff_hz else lowpass.CUTOFF_HZ
     worked, rig = bench_opened.worked_up(what, rig_file, cutoff_hz=cutoff, **how)
@@ -127,7 +127,7 @@ def _press(pairs: "Pairs", i: int) -> dict[str, Any]:
 
 def _tables(worked: "Processed", presses: str | None, filtered: str | None) -> list[str]:
     """Write the tables that were asked for; columns of tones as 'invert' and 'log bench' read them."""
-    from sensorgen import store
+    from sensorgen.core import files as store
 
     pairs, tones = worked.pairs, worked.recording.tones_hz
     if presses and pairs is None:
@@ -155,8 +155,8 @@ def _csv(names: tuple[str, ...], beside: "Sequence[Real]", tones_hz: "Real", z: 
 
 def _drawn(worked: "Processed", name: str, folder: Path) -> list[str]:
     """Pictures, and the page; surfaces only where presses span one."""
-    from sensorgen import store
-    from sensorgen.plots import bench
+    from sensorgen.analysis.plots import bench
+    from sensorgen.core import files as store
 
     if worked.pairs is None:
         raise BadInput(f"--plot {folder}: {worked.notes[-1]}")

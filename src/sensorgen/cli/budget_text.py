@@ -9,7 +9,7 @@ HEADS = {"magnitude": "|Z|", "re": "R", "im": "X", "by_force": "dZ/dF"}
 
 
 def lines(found: Mapping[str, Any]) -> Iterator[str]:
-    """What :func:`sensorgen.budget.budget` found, as lines of text."""
+    """What :func:`sensorgen.prediction.error_budget.budget` found, as lines of text."""
     press = found["press"]
     yield f"error budget at {press['force_n']:g} N and {press['position_m'] * 1e3:g} mm, at the worst tone:"
     yield f"{'':22}" + "".join(f"{name:>11}" for name in HEADS.values())

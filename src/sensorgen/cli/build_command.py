@@ -9,7 +9,7 @@ from sensorgen.cli import asprinted_text, card_text, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
-    from sensorgen.design import Design
+    from sensorgen.design.design import Design
 
 OWN: list[click.Parameter] = [
     click.Option(["--out"], default="out", show_default=True, metavar="DIR", help="Folder for the designs' folders."),
@@ -24,9 +24,9 @@ OWN: list[click.Parameter] = [
 def _work(
     design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool, compensate: str | None, as_json: bool
 ) -> int:
-    from sensorgen import store
-    from sensorgen.build import STEPS, build
-    from sensorgen.errors import Unprintable
+    from sensorgen.core import files as store
+    from sensorgen.core.errors import Unprintable
+    from sensorgen.workflows.build import STEPS, build
 
     design, changes = asprinted_text.compensated(design, compensate, "arachne", silent=as_json)
     try:

@@ -14,7 +14,7 @@ TONES = 7  # of more, those with most to tell of position are shown
 
 
 def card(found: Mapping[str, Any]) -> None:
-    """Print what :func:`sensorgen.card.card` found: less than thirty lines of at most ``WIDTH`` columns."""
+    """Print an identifiability card: less than thirty lines of at most ``WIDTH`` columns."""
     for line in lines(found):
         click.echo(line)
 
@@ -106,7 +106,7 @@ def _known(row: Mapping[str, Any]) -> str:
 
 
 def _short(value: float | None, unit: str) -> str:
-    from sensorgen.card.verdict import metres, newtons
+    from sensorgen.prediction.identifiability.verdict import metres, newtons
 
     return (newtons if unit == "N" else metres)(float("nan") if value is None else value)
 

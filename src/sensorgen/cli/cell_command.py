@@ -9,12 +9,12 @@ import click
 from sensorgen.cli import FOUND_ERRORS, cell_text, plan_text, settings, show, sweeps
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Ratio, Values, one
-from sensorgen.errors import BadInput, UnknownName
-from sensorgen.units import FREQUENCY_HZ, LENGTH_MM
+from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.core.units import FREQUENCY_HZ, LENGTH_MM
 
 if TYPE_CHECKING:
-    from sensorgen.bounds import Asked
-    from sensorgen.design import Design
+    from sensorgen.design.design import Design
+    from sensorgen.prediction.capacitance_answer import Asked
 
 Data = dict[str, Any]
 Points = Sequence[tuple[Any, "Design"]]
@@ -49,7 +49,7 @@ def _work(
     design: "Design", *, accuracy: float, model: str, no_cache: bool, frequency: tuple[float, ...] | None,
     sweep: str | None, jobs: int | None, press_mm: tuple[float, ...] | None, **how: Any,
 ) -> int:  # fmt: skip
-    from sensorgen.bounds import Asked
+    from sensorgen.prediction.capacitance_answer import Asked
 
     formula = model.startswith(FORMULA)
     _refuse_pairs(how, many=bool(sweep or (formula and press_mm)))
@@ -72,7 +72,7 @@ def _refuse_pairs(how: Data, *, many: bool) -> None:
 
 
 def _one(design: "Design", asked: "Asked", how: Data) -> int:
-    from sensorgen import bounds
+    from sensorgen.prediction import capacitance_answer as bounds
 
     if how["explain"]:
         _print_plan(design, asked)
@@ -83,7 +83,7 @@ def _one(design: "Design", asked: "Asked", how: Data) -> int:
 
 
 def _many(key: str, points: Points, asked: "Asked", jobs: int, how: Data) -> int:
-    from sensorgen import bounds
+    from sensorgen.prediction import capacitance_answer as bounds
 
     with sweeps.bar(len(points)) as done:
         found = bounds.answers([design for _, design in points], asked, jobs, done)
@@ -98,7 +98,7 @@ def _many(key: str, points: Points, asked: "Asked", jobs: int, how: Data) -> int
 
 def _formula(key: str, points: Points, asked: "Asked", press_mm: tuple[float, ...] | None, how: Data) -> int:
     """A formula alone, along a sweep, or along presses."""
-    from sensorgen import formulas
+    from sensorgen.prediction import thesis_formulas as formulas
 
     if asked.model not in formulas.NAMES:
         raise UnknownName("formula", asked.model, formulas.NAMES)
@@ -151,7 +151,8 @@ def _shortfall(data: Data) -> str:
 
 
 def _print_plan(design: "Design", asked: "Asked") -> None:
-    from sensorgen import losses, planner
+    from sensorgen.models import losses
+    from sensorgen.prediction import capacitance as planner
 
     click.echo(f"plan for an accuracy of {asked.width:g}")
     lossy = bool(losses.set_losses(design))
@@ -166,7 +167,7 @@ def _deliver(pieces: Iterable[str], output: str | None) -> None:
     if output in (None, "-"):
         click.echo(text, nl=False)
         return
-    from sensorgen import store
+    from sensorgen.core import files as store
 
     store.replace(Path(str(output)), text.encode())
     click.echo(output)

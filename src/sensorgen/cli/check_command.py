@@ -8,7 +8,7 @@ from sensorgen.cli import show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
-    from sensorgen.design import Design
+    from sensorgen.design.design import Design
 
 OWN: list[click.Parameter] = [
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
@@ -17,7 +17,7 @@ OWN: list[click.Parameter] = [
 
 
 def _work(design: "Design", *, strict: bool, as_json: bool) -> int:
-    from sensorgen.review import STEPS, report, review
+    from sensorgen.checks.review import STEPS, report, review
 
     with show.progress(STEPS) as step:
         held = review(design, step)

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen import units
 from sensorgen.cli import FOUND_ERRORS, asprinted_text, compress_text, plan_text, settings, show, sweeps
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf, Ratio, Values
-from sensorgen.errors import BadInput
-from sensorgen.plan import plain
+from sensorgen.core import units
+from sensorgen.core.errors import BadInput
+from sensorgen.prediction.plan import plain
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.compared import Printed
-    from sensorgen.compressed import Asked
-    from sensorgen.design import Design
-    from sensorgen.swept import Point
+    from sensorgen.design.design import Design
+    from sensorgen.prediction.compression import Asked
+    from sensorgen.prediction.sweep import Point
 
 Data = dict[str, Any]
 
@@ -64,7 +64,7 @@ def _work(
     no_cache: bool, as_printed: bool, slicer: str | None, walls: str | None, sweep: str | None, jobs: int | None,
     **how: Any,
 ) -> int:  # fmt: skip
-    from sensorgen import compressed
+    from sensorgen.prediction import compression as compressed
 
     asprinted_text.refuse_strays(as_printed=as_printed, slicer=slicer, walls=walls)
     _refuse_pairs(accuracy, how, check_mesh=check_mesh, swept=bool(sweep))
@@ -81,15 +81,15 @@ def _work(
 
 
 def _one(design: "Design", printed: "Printed | None", asked: "Asked", how: Data) -> int:
-    from sensorgen import compressed
+    from sensorgen.prediction import compression as compressed
 
     if how["explain"]:
         click.echo("\n".join(plan_text.planned(plain(compressed.planned(design, asked, printed)))) + "\n")
     with _bar(asked.stress_kpa) as step:
         data = compressed.answer(design, asked, printed=printed, step=step)
     if how["plot"]:
-        from sensorgen import store
-        from sensorgen.plots import compression
+        from sensorgen.analysis.plots import compression
+        from sensorgen.core import files as store
 
         store.replace(Path(how["plot"]), compression.png(data))
     if how["as_json"]:
@@ -100,7 +100,7 @@ def _one(design: "Design", printed: "Printed | None", asked: "Asked", how: Data)
 
 
 def _many(key: str, values: Sequence[Any], points: "Sequence[Point]", asked: "Asked", jobs: int, how: Data) -> int:
-    from sensorgen import swept
+    from sensorgen.prediction import sweep as swept
 
     with sweeps.bar(len(points)) as done:
         found = swept.answers(points, asked, jobs, done)
@@ -138,7 +138,7 @@ def _refuse_plot(plot: str | None) -> None:
         return
     if not plot.lower().endswith(".png"):
         raise BadInput(f"--plot {plot}: expected a file that ends in .png")
-    from sensorgen.plots.libraries import needed
+    from sensorgen.analysis.plots.libraries import needed
 
     needed("matplotlib")
 

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from sensorgen import registry, shapes, units
 from sensorgen.cli.settings import merged, pairs, setting
 from sensorgen.cli.words import Length, OneOf, Share, completed
-from sensorgen.errors import BadInput, SensorgenError, UnknownName
+from sensorgen.core import plugins as registry
+from sensorgen.core import units
+from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
+from sensorgen.design import shapes
 
 if TYPE_CHECKING:
-    from sensorgen.design import Design
+    from sensorgen.design.design import Design
 
 Data = dict[str, Any]
 Work = Callable[..., int]
@@ -43,7 +45,7 @@ class DesignGroup(click.Group):
         """The command for a shape, or for a design file."""
         if not _is_file(name):
             return self._command(name, registry.load(shapes, name), {"shape": name})
-        from sensorgen import yamlfile
+        from sensorgen.core import yamlfile
 
         base = {"name": Path(name).stem} | yamlfile.read(Path(name))
         try:
@@ -171,19 +173,19 @@ def _design_options() -> list[click.Parameter]:
 
 
 def _printers() -> list[str]:
-    from sensorgen.printer import printer_names
+    from sensorgen.design.printer import printer_names
 
     return printer_names()
 
 
 def _qualities() -> list[str]:
-    from sensorgen.printer import quality_names
+    from sensorgen.design.printer import quality_names
 
     return quality_names()
 
 
 def _design(base: Data, given: Data, word: str) -> "Design":
-    from sensorgen import design
+    from sensorgen.design import design
 
     unnamed = {k: v for k, v in base.items() if k != "name"}
     data = merged(unnamed, _changes(base, given))

@@ -10,7 +10,7 @@ from sensorgen.cli import asprinted_text, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
-    from sensorgen.design import Design
+    from sensorgen.design.design import Design
 
 OWN: list[click.Parameter] = [
     click.Option(
@@ -21,8 +21,8 @@ OWN: list[click.Parameter] = [
 
 
 def _work(design: "Design", *, output: str | None, as_printed: bool, slicer: str | None, walls: str | None) -> int:
-    from sensorgen import store
-    from sensorgen.review import STEPS, draw, review
+    from sensorgen.checks.review import STEPS, draw, review
+    from sensorgen.core import files as store
 
     asprinted_text.refuse_strays(as_printed=as_printed, slicer=slicer, walls=walls)
     made = asprinted_text.printed(design, slicer, walls) if as_printed else None

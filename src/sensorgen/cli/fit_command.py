@@ -10,7 +10,7 @@ import click
 from sensorgen.cli import log_words, show
 
 if TYPE_CHECKING:
-    from sensorgen.fit import Fit
+    from sensorgen.analysis.fit import Fit
 
 
 def _work(iteration: int, file: str | None, output: str | None, seed: int, *, dry_run: bool, as_json: bool) -> int:
@@ -21,9 +21,9 @@ def _work(iteration: int, file: str | None, output: str | None, seed: int, *, dr
     """
     from dataclasses import asdict
 
-    from sensorgen import store
-    from sensorgen.fit import fit, text
-    from sensorgen.materials import own
+    from sensorgen.analysis.fit import fit, text
+    from sensorgen.core import files as store
+    from sensorgen.design.materials import own
 
     with log_words.opened(file) as log:
         made = fit(log, iteration, seed)
@@ -43,7 +43,7 @@ def _work(iteration: int, file: str | None, output: str | None, seed: int, *, dr
 
 def _taken(made: "Fit") -> str:
     """How the next design takes the values."""
-    from sensorgen import materials
+    from sensorgen.design import materials
 
     named = dict.fromkeys(value.material for value in made.values)
     parts = {name: "electrode" if materials.load(name).conductor else "dielectric" for name in named}

@@ -6,7 +6,7 @@ from sensorgen.cli.words import completed
 
 
 def _printers() -> list[str]:
-    from sensorgen.printer import printer_names
+    from sensorgen.design.printer import printer_names
 
     return printer_names()
 
@@ -44,8 +44,8 @@ def check(file: str, printer: str, materials: tuple[str, ...], strict: bool, as_
     from pathlib import Path
 
     from sensorgen.cli import gcode_text, show
-    from sensorgen.gcode.check import check as checked
-    from sensorgen.printer import load_printer
+    from sensorgen.design.printer import load_printer
+    from sensorgen.export.gcode.check import check as checked
 
     machine = load_printer(printer)
     found = checked(Path(file), machine, _loaded(materials, machine.tool_numbers))
@@ -60,9 +60,9 @@ def check(file: str, printer: str, materials: tuple[str, ...], strict: bool, as_
 
 def _loaded(words: tuple[str, ...], tools: tuple[int, ...]) -> dict[int, str]:
     """Material of each tool that was named."""
-    from sensorgen import materials
     from sensorgen.cli.settings import pairs
-    from sensorgen.errors import BadInput
+    from sensorgen.core.errors import BadInput
+    from sensorgen.design import materials
 
     found = {}
     for tool, name in pairs(words, "--material"):

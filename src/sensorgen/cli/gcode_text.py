@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from sensorgen.gcode.check import Checked
-    from sensorgen.gcode.found import Found
-    from sensorgen.gcode.report import Report
+    from sensorgen.export.gcode.check import Checked
+    from sensorgen.export.gcode.found import Found
+    from sensorgen.export.gcode.report import Report
 
 _COLOURS = {"error": "red", "warning": "yellow", "info": "blue"}
 

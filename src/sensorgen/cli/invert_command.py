@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen import store, units
 from sensorgen.cli import show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Length, OneOf, Share
-from sensorgen.errors import BadInput
+from sensorgen.core import files as store
+from sensorgen.core import units
+from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.design import Design
-    from sensorgen.invert import Estimator, Prior
-    from sensorgen.invert.answers import Summary
-    from sensorgen.readings import Readings
+    from sensorgen.design.design import Design
+    from sensorgen.measure.readings import Readings
+    from sensorgen.prediction.inverse import Estimator, Prior
+    from sensorgen.prediction.inverse.answers import Summary
 
 _NORMAL = re.compile(r"(force|position)=(.+?)(?:\+-|±)(.+)")
 
@@ -64,8 +65,8 @@ OWN: list[click.Parameter] = [
 
 
 def _work(design: "Design", *, measured: str, output: str | None, as_json: bool, **how: Any) -> int:
-    from sensorgen.invert.answers import Summary
-    from sensorgen.readings import readings
+    from sensorgen.measure.readings import readings
+    from sensorgen.prediction.inverse.answers import Summary
 
     with readings(measured) as source:
         estimator, doubts = _estimator(design, source, **how)
@@ -94,8 +95,8 @@ def _estimator(
     compression: str | None,
 ) -> "tuple[Estimator, tuple[str, ...]]":
     """The estimator for this design, and what to doubt about its sensor."""
-    from sensorgen.invert import FORCE_LIMIT_N, Estimator
-    from sensorgen.planned import usual
+    from sensorgen.prediction.inverse import FORCE_LIMIT_N, Estimator
+    from sensorgen.prediction.ladder import usual
 
     sensed = usual(design, compression or "", tip_m=tip_mm * units.M_PER_MM)
     limit = FORCE_LIMIT_N if force_limit_n is None else force_limit_n
@@ -105,7 +106,7 @@ def _estimator(
 def _prior(text: str | None) -> "Prior | None":
     if text is None:
         return None
-    from sensorgen.invert import Prior
+    from sensorgen.prediction.inverse import Prior
 
     if text.strip() == "uniform":
         return Prior()
@@ -126,7 +127,7 @@ def _answers(
     source: "Readings", estimator: "Estimator", summary: "Summary", *, live: bool, written: bool
 ) -> Iterator[str]:
     """The answers as text, block by block; a stream's line by line. They are made only if they are written."""
-    from sensorgen.invert import answers
+    from sensorgen.prediction.inverse import answers
 
     if written:
         yield answers.header(source.kept)

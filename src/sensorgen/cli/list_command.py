@@ -19,8 +19,7 @@ def command(kind: str, as_json: bool) -> None:
     Shapes with their parameters, materials with every value and its source, printers, qualities, models, or what
     the sources stand for.
     """
-    from sensorgen import catalogue
-    from sensorgen.cli import show
+    from sensorgen.cli import catalogue, show
 
     entries = getattr(catalogue, kind)()
     if as_json:

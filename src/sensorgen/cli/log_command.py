@@ -5,7 +5,7 @@ from typing import Any
 import click
 
 from sensorgen.cli import log_read, log_write
-from sensorgen.errors import UnknownName
+from sensorgen.core.errors import UnknownName
 
 
 class _Group(click.Group):

@@ -8,10 +8,10 @@ import click
 from sensorgen.cli import FOUND_ERRORS, show
 from sensorgen.cli.log_words import as_json as json_option
 from sensorgen.cli.log_words import made, opened, where
-from sensorgen.errors import BadInput
+from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.log import Log
+    from sensorgen.measure.log import Log
 
 LAST = 40  # readings in a list, unless told otherwise
 
@@ -34,7 +34,7 @@ def _list(iteration: int | None, last: int, file: str | None, *, everything: boo
 
 
 def _total(log: "Log") -> str:
-    from sensorgen.log import BenchRun, Prediction, Reading
+    from sensorgen.measure.log import BenchRun, Prediction, Reading
 
     names = {Reading: "readings", BenchRun: "recordings", Prediction: "predictions"}
     counts = {name: log.count(kind) for kind, name in names.items()}
@@ -56,12 +56,12 @@ def _show(what: str, file: str | None, *, as_json: bool) -> None:
 
 
 def _found(log: "Log", what: str) -> list[Any]:
-    from sensorgen.log import BenchRun, Prediction, Print, Reading
+    from sensorgen.measure.log import BenchRun, Prediction, Print, Reading
 
     if what.isascii() and what.isdigit():
         found: list[Any] = list(log.entries(Reading, superseded=True, number=int(what)))
     else:
-        from sensorgen.log.words import named
+        from sensorgen.measure.log.words import named
 
         name = named(what)[0]["specimen"]
         found = [row for kind in (Reading, BenchRun) for row in log.entries(kind, superseded=True, specimen=name)]
@@ -75,7 +75,7 @@ def _found(log: "Log", what: str) -> list[Any]:
 
 def _export(place: str, file: str | None) -> None:
     """Write readings to a file, .csv or .parquet, or the whole log to a new folder; 'log import' takes both back."""
-    from sensorgen.log import exporting
+    from sensorgen.measure.log import exporting
 
     with opened(file) as log:
         rows = exporting.export(log, Path(place))
@@ -85,8 +85,8 @@ def _export(place: str, file: str | None) -> None:
 def _verify(file: str | None) -> int:
     """Check database, references and the SHA-256 of every raw file; exit code 1 where something is wrong."""
     from sensorgen.cli import log_text
-    from sensorgen.log import TABLES
-    from sensorgen.log.verify import faults
+    from sensorgen.measure.log import TABLES
+    from sensorgen.measure.log.verify import faults
 
     with opened(file) as log:
         found = list(faults(log))

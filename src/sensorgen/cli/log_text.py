@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from sensorgen.cli.show import si
 
 if TYPE_CHECKING:
-    from sensorgen.log import BenchRun, Entry, Log, Reading
+    from sensorgen.measure.log import BenchRun, Entry, Log, Reading
 
 _REMARK = 20  # letters of a remark in a list
 
@@ -128,7 +128,7 @@ def _plain(value: Any) -> Any:
 
 def of(entry: "Entry") -> Iterator[str]:
     """Everything about any row."""
-    from sensorgen.log import BenchRun, Reading
+    from sensorgen.measure.log import BenchRun, Reading
 
     if isinstance(entry, Reading):
         return reading(entry)
@@ -139,7 +139,7 @@ def of(entry: "Entry") -> Iterator[str]:
 
 def corrections(entry: "Entry", log: "Log") -> Iterator[str]:
     """Which row this one corrects, and which one corrects it."""
-    from sensorgen.log import BenchRun, Reading
+    from sensorgen.measure.log import BenchRun, Reading
 
     if isinstance(entry, Reading | BenchRun):
         if entry.supersedes:

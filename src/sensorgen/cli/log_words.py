@@ -9,7 +9,7 @@ import click
 from sensorgen.cli.settings import pairs
 
 if TYPE_CHECKING:
-    from sensorgen.log import Log
+    from sensorgen.measure.log import Log
 
 
 def where() -> click.Option:
@@ -58,7 +58,7 @@ def made(work: Callable[..., Any], name: str, about: str, *params: click.Paramet
 
 def opened(file: str | None, *, create: bool = False) -> "Log":
     """The log that ``--log`` names, or the usual one."""
-    from sensorgen.log import Log, place
+    from sensorgen.measure.log import Log, place
 
     return Log(Path(file) if file else place(), create=create)
 

@@ -14,11 +14,11 @@ from sensorgen.cli.log_words import ahead, columns_of, corrects, lcr_columns, ma
 from sensorgen.cli.log_words import as_json as json_option
 from sensorgen.cli.settings import pairs
 from sensorgen.cli.words import OneOf
-from sensorgen.errors import BadInput
+from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.design import Design
-    from sensorgen.log import Entry, Log
+    from sensorgen.design.design import Design
+    from sensorgen.measure.log import Entry, Log
 
 
 def _multimeter(
@@ -29,7 +29,7 @@ def _multimeter(
     Several readings have / between them, as in --z '2.3k / 3.8k'. A small m is taken for mega, and asked for on a
     terminal.
     """
-    from sensorgen.log import Reading, words
+    from sensorgen.measure.log import Reading, words
 
     meter = {key: how.pop(key) for key in ("visa", "axis", "wires")}
     if meter["visa"] and (y_words or z_words):
@@ -53,7 +53,7 @@ def _ahead(specimen: str, file: str | None, *, wanted: bool, as_json: bool) -> N
     if not wanted:
         return
     from sensorgen.cli import log_text
-    from sensorgen.log import ahead
+    from sensorgen.workflows import stored_prediction as ahead
 
     with opened(file, create=True) as log:
         for entry in ahead.predict(log, specimen):
@@ -62,7 +62,7 @@ def _ahead(specimen: str, file: str | None, *, wanted: bool, as_json: bool) -> N
 
 def _asked_mega(**typed: str) -> bool:
     """Whether a person says that a small m means mega; nobody is asked where there is no m, or no person."""
-    from sensorgen.log.words import resistance
+    from sensorgen.measure.log.words import resistance
 
     found = [word for axis, words in typed.items() for word in resistance(axis, words).mega]
     if not found or not sys.stdin.isatty():
@@ -74,7 +74,7 @@ def _asked_mega(**typed: str) -> bool:
 
 def _measured(visa: str, axis: str | None, wires: str) -> tuple[str, str, str]:
     """Words of a meter for Y and Z, and what it calls itself; leads are moved between the two."""
-    from sensorgen.log.meter import Meter
+    from sensorgen.measure.log.meter import Meter
 
     if axis is None and not sys.stdin.isatty():
         raise BadInput("--visa without --axis needs somebody to move the leads; expected --axis y or --axis z")
@@ -113,7 +113,7 @@ def _say_logged(new: Sequence["Entry"], log: "Log", *, as_json: bool, known: str
 
 def _near(entry: "Entry", log: "Log") -> Iterator[str]:
     """A hint where a specimen is on no print bed of its iteration, and another with nearly its name is."""
-    from sensorgen.log import Print, Reading
+    from sensorgen.measure.log import Print, Reading
 
     if isinstance(entry, Reading) and not entry.batch:
         names = [printed.specimen for printed in log.entries(Print, iteration=entry.iteration)]
@@ -127,7 +127,7 @@ def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, the
     A table of readings as CSV, the batch.json of a print bed, or what 'log export' wrote. Rows that the log has are
     passed over.
     """
-    from sensorgen.log import importing
+    from sensorgen.measure.log import importing
 
     if thesis == bool(path):
         raise BadInput(f"{'both' if path else 'neither'} of FILE and --thesis given; expected one of them")
@@ -150,7 +150,7 @@ def _bench(
 
     LCR_FILE is the impedance analyser's, RIG_FILE the rig's with force and position.
     """
-    from sensorgen.log import BenchRun, bench
+    from sensorgen.measure.log import BenchRun, bench
 
     maps = {
         "columns": columns_of(columns, "--column"),
@@ -171,8 +171,8 @@ def _bench(
 
 
 def _predict(design: "Design", *, file: str | None, as_json: bool) -> int:
-    from sensorgen.log.batches import prediction
-    from sensorgen.predict import prediction as predicted
+    from sensorgen.measure.log.batches import prediction
+    from sensorgen.prediction.prediction import prediction as predicted
 
     with opened(file, create=True) as log:
         new = log.add([prediction(design.id(), design.name, predicted(design))])

@@ -9,7 +9,7 @@ Data = Mapping[str, Any]
 
 
 def planned(plan: Data) -> Iterator[str]:
-    """A plan before anything is asked: :func:`sensorgen.plan.plain` of one, as lines."""
+    """A plan before anything is asked: :func:`sensorgen.prediction.plan.plain` of one, as lines."""
     yield f"plan for an accuracy of {plan['accuracy']:g} of {plan['of']}"
     yield from _levels(plan["levels"], expectation)
     yield "  the first that should do is taken, or else the one that should come nearest"

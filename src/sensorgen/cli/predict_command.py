@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen import units
 from sensorgen.cli import FOUND_ERRORS, asprinted_text, budget_text, card_text, plan_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Length, OneOf, Ratio, Share, Values, proper
-from sensorgen.errors import BadInput
-from sensorgen.plan import plain
+from sensorgen.core import units
+from sensorgen.core.errors import BadInput
+from sensorgen.prediction.plan import plain
 
 if TYPE_CHECKING:
-    from sensorgen.design import Design
-    from sensorgen.plan import Plan
-    from sensorgen.planned import Makers, Outline
-    from sensorgen.sensing import Sensed
+    from sensorgen.design.design import Design
+    from sensorgen.prediction.ladder import Makers, Outline
+    from sensorgen.prediction.plan import Plan
+    from sensorgen.prediction.sensor_of_design import Sensed
 
 _WORK = ("cell, compression and line",)
 Axes = tuple[Sequence[float], Sequence[float], Sequence[float]]
@@ -100,8 +100,8 @@ def _work(
     if how["as_printed"] and not pressed:
         _refuse_strangers((frequency_hz, tip_mm, radius_mm, compression), explain=how["explain"])
         return _as_printed(design, accuracy, how)
-    from sensorgen import planned
-    from sensorgen.predict import FORCES_N, TONES_HZ, middle, positions_mm, prediction
+    from sensorgen.prediction import ladder as planned
+    from sensorgen.prediction.prediction import FORCES_N, TONES_HZ, middle, positions_mm, prediction
 
     tones, wanted, law = frequency_hz or TONES_HZ, accuracy or planned.ACCURACY, compression or ""
     if not pressed:
@@ -123,7 +123,7 @@ def _made(
     design: "Design", asked: tuple[float, str, dict[str, Any]], axes: Axes, how: dict[str, Any]
 ) -> "tuple[Sensed, Plan | None]":
     """The sensor as drawn, or as printed; and how it was planned."""
-    from sensorgen import planned
+    from sensorgen.prediction import ladder as planned
 
     accuracy, law, tip = asked
     if not how["as_printed"]:
@@ -142,8 +142,8 @@ def _made(
 def _carried_out(
     design: "Design", makers: "Makers", axes: Axes, asked: tuple[float, str], how: dict[str, Any]
 ) -> "tuple[Sensed, Plan | None]":
-    from sensorgen import planned
-    from sensorgen.predict import check_presses, hardest
+    from sensorgen.prediction import ladder as planned
+    from sensorgen.prediction.prediction import check_presses, hardest
 
     outline = partial(planned.outlined, design, makers, hardest(*axes), *asked)
     _, force_n, position_mm = axes
@@ -247,7 +247,7 @@ def _pressed(
 ) -> dict[str, Any]:
     """Print what presses do, and say as much of it as decides the exit code."""
     sensed, plan = made
-    from sensorgen.predict import csv_blocks, moves, presses
+    from sensorgen.prediction.prediction import csv_blocks, moves, presses
 
     if how["plot"]:
         _plot(sensed, axes, Path(how["plot"]))
@@ -262,8 +262,9 @@ def _pressed(
 
 
 def _plot(sensed: "Sensed", axes: Axes, folder: Path) -> None:
-    from sensorgen import plots, store
-    from sensorgen.predict import check_presses
+    from sensorgen.analysis import plots
+    from sensorgen.core import files as store
+    from sensorgen.prediction.prediction import check_presses
 
     _, force_n, position_mm = axes
     check_presses(sensed.sensor, force_n, [x * units.M_PER_MM for x in position_mm])
@@ -281,8 +282,8 @@ def _deliver(pieces: Iterator[str], output: str | None, rows: int = 0) -> None:
         for piece in pieces:
             sys.stdout.write(piece)
         return
-    from sensorgen import store
-    from sensorgen.predict import ROWS
+    from sensorgen.core import files as store
+    from sensorgen.prediction.prediction import ROWS
 
     with show.progress([f"{share} %" for share in range(101)]) as step, store.replacing(Path(str(output))) as file:
         for k, piece in enumerate(pieces):

@@ -8,10 +8,10 @@ import click
 
 from sensorgen.cli import log_words, show
 from sensorgen.cli.words import OneOf
-from sensorgen.errors import BadInput
+from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.report import Report
+    from sensorgen.analysis.report import Report
 
 FORMATS = ("html", "md", "csv", "json")
 
@@ -24,8 +24,8 @@ def _work(
     One HTML file that needs no network, or Markdown, CSV or JSON with the same numbers. An iteration without readings
     makes a report that says so.
     """
-    from sensorgen import store
-    from sensorgen.report import report, written
+    from sensorgen.analysis.report import report, written
+    from sensorgen.core import files as store
 
     if show_it and (how != "html" or output == "-"):
         raise BadInput("--open shows an HTML file; expected --format html and a file")
@@ -46,8 +46,8 @@ def _work(
 
 
 def _draw(made: "Report", folder: Path) -> None:
-    from sensorgen import store
-    from sensorgen.report.pictures import files
+    from sensorgen.analysis.report.pictures import files
+    from sensorgen.core import files as store
 
     with show.progress([chart.key for chart in made.charts]) as step:
         for chart in made.charts:

@@ -2,11 +2,11 @@
 
 from typing import TYPE_CHECKING, Any
 
-from sensorgen import units
-from sensorgen.errors import BadInput, SensorgenError, UnknownName
+from sensorgen.core import units
+from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
 
 if TYPE_CHECKING:
-    from sensorgen.design import Design
+    from sensorgen.design.design import Design
 
 Data = dict[str, Any]
 
@@ -43,7 +43,7 @@ def setting(key: str, value: str, parameters: set[str]) -> Data:
     >>> setting("dielectric_mm", "100um", {"dielectric_mm"}), setting("eps_x60", "3", set())
     ({'parameters': {'dielectric_mm': 0.1}}, {'material_values': {'x60': {'relative_permittivity': 3}}})
     """
-    from sensorgen.design import Design
+    from sensorgen.design.design import Design
 
     path = ["parameters", key] if key in parameters else key.split(".")
     if len(path) == 1 and key not in Design.model_fields:
@@ -58,7 +58,7 @@ def setting(key: str, value: str, parameters: set[str]) -> Data:
 
 def _of_material(key: str) -> list[str] | None:
     """The place of a material's value: ``eps_x60`` or ``youngs_modulus_x60``, its unit left out if one likes."""
-    from sensorgen import materials
+    from sensorgen.design import materials
 
     word, _, name = key.rpartition("_")
     quantity = SYMBOLS.get(word) or next((q for q in materials.quantities() if f"{q}_".startswith(f"{word}_")), "")
@@ -86,7 +86,7 @@ def sweep(text: str, design: "Design") -> tuple[str, list[tuple[float | str, "De
     SensorgenError
         A key or values that mean nothing, or a value that this design cannot have: before any work.
     """
-    from sensorgen import design as designs
+    from sensorgen.design import design as designs
 
     ((key, typed),) = pairs((text,), "--sweep")
     fields = designs.fields(design.shape)

@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen import units
 from sensorgen.cli import sheet_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf, Share, Values, one, proper
-from sensorgen.errors import BadInput, OutOfRange
+from sensorgen.core import units
+from sensorgen.core.errors import BadInput, OutOfRange
 
 if TYPE_CHECKING:
-    from sensorgen.design import Design
+    from sensorgen.design.design import Design
+    from sensorgen.models.sensor import Sensor
     from sensorgen.models.sheet import Bounds, Patch, Port, Sheet
-    from sensorgen.sensor import Sensor
 
 SETS = ("one-edge", "opposite", "two-edges", "corner", "corners")
 PLACES = 7  # along each side
@@ -80,8 +80,8 @@ def _work(
     plot: Path | None,
 ) -> int:  # fmt: skip
     from sensorgen.models.sheet import impedance
-    from sensorgen.planned import usual
-    from sensorgen.predict import TONES_HZ
+    from sensorgen.prediction.ladder import usual
+    from sensorgen.prediction.prediction import TONES_HZ
 
     force_n, tip_mm, tones = one("--force", force), one("--tip", tip), frequencies or TONES_HZ
     proper("--noise", noise)
@@ -91,8 +91,8 @@ def _work(
     ports = _ports(film, contacts, pads)
     bounds = _bounds(film, ports, tones, press, per_newton, noise)
     if plot is not None:
-        from sensorgen import store
-        from sensorgen.plots import sheet
+        from sensorgen.analysis.plots import sheet
+        from sensorgen.core import files as store
 
         where = plot / f"{design.name}-sheet.png"
         store.replace(where, sheet.png(film, bounds, ports))

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from sensorgen.findings import Finding
-    from sensorgen.review import Review
+    from sensorgen.checks.review import Review
+    from sensorgen.core.findings import Finding
 
 WIDTH = 80
 _COLOURS = {"error": "red", "warning": "yellow", "info": "blue"}

@@ -8,11 +8,11 @@ import click
 from sensorgen.cli import asprinted_text, gcode_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf
-from sensorgen.errors import OutOfRange
-from sensorgen.slicer import SLICERS, TIME_LIMIT_S
+from sensorgen.core.errors import OutOfRange
+from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 
 if TYPE_CHECKING:
-    from sensorgen.design import Design
+    from sensorgen.design.design import Design
 
 OWN: list[click.Parameter] = [
     click.Option(
@@ -44,9 +44,9 @@ def _work(
     compensate: str | None,
     as_json: bool,
 ) -> int:
-    from sensorgen import printfile
-    from sensorgen.errors import Unprintable
-    from sensorgen.slicing import STEPS
+    from sensorgen.core.errors import Unprintable
+    from sensorgen.export.slicing import STEPS
+    from sensorgen.workflows import slice as printfile
 
     if not 0 < time_limit_s < float("inf"):
         raise OutOfRange(f"--time-limit {time_limit_s:g}; expected seconds above 0")

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen import units
 from sensorgen.cli import show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf, Share, Values, one, proper
+from sensorgen.core import units
 
 if TYPE_CHECKING:
-    from sensorgen.design import Design
+    from sensorgen.design.design import Design
 
 WIDTH = 80
 
@@ -59,8 +59,8 @@ def _work(
     frequency_hz: Sequence[float] | None, tip_mm: Sequence[float], noise: float, drift: float,
     within_n: Sequence[float], compression: str | None, as_json: bool,
 ) -> int:  # fmt: skip
-    from sensorgen.predict import TONES_HZ
-    from sensorgen.stacked import study
+    from sensorgen.prediction.double_layer import study
+    from sensorgen.prediction.prediction import TONES_HZ
 
     at_mm = None if position_mm is None else one("--position", position_mm)
     found = study(

@@ -5,8 +5,8 @@ from typing import Any
 
 import click
 
-from sensorgen import units
-from sensorgen.errors import BadInput, OutOfRange, UnknownName
+from sensorgen.core import units
+from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 
 
 class Length(click.ParamType):  # type: ignore[type-arg]

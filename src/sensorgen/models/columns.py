@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.interval import Interval
-from sensorgen.models._straight import energy as straight
-from sensorgen.planview import Part, parts
-from sensorgen.scene import Scene
-from sensorgen.sections import ROUNDING_MM, Column, Layer, sections
-from sensorgen.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.core.bounds import Interval
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.scene.overlay import Part, parts
+from sensorgen.scene.scene import Scene
+from sensorgen.scene.sections import ROUNDING_MM, Column, Layer, sections
+from sensorgen.solvers.line.straight import energy as straight
 
 SOURCE = "Thesis 3.2.1 and 3.2.2, Eqs. 3.10 to 3.49, corrected; Dirichlet's and Thomson's principles"
 COST = 1

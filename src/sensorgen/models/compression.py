@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen import yamlfile
-from sensorgen.errors import MissingValue, OutOfRange
+from sensorgen.core import yamlfile
+from sensorgen.core.errors import MissingValue, OutOfRange
 
 SOURCE = "Thesis Eq. B.49; Gent and Lindley (1959) for the bonded plate; solved cells as their file says"
 COST = 0

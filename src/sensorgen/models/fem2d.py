@@ -12,21 +12,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.cells import cell
-from sensorgen.interval import Disc, Interval
-from sensorgen.models import _fem_bounds as fem
-from sensorgen.models._fem_cones import RATIO
-from sensorgen.models._fem_corners import exponents
-from sensorgen.models._fem_fronts import Numbers
-from sensorgen.models._fem_grading import graded
-from sensorgen.models._fem_lossy import Fields, Turned, disc, turned
-from sensorgen.models._fem_mesh import Cones
-from sensorgen.models._fem_plane import Plane
-from sensorgen.models._fem_problem import Field
-from sensorgen.models._fem_triangles import Triangles, triangles
-from sensorgen.scene import Scene
-from sensorgen.sections import Section, sections
-from sensorgen.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.core.bounds import Disc, Interval
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.scene.scene import Scene
+from sensorgen.scene.sections import Section, sections
+from sensorgen.scene.unit_cell import cell
+from sensorgen.solvers.electrostatics import bounds as fem
+from sensorgen.solvers.electrostatics.cones import RATIO
+from sensorgen.solvers.electrostatics.corners import exponents
+from sensorgen.solvers.electrostatics.fronts import Numbers
+from sensorgen.solvers.electrostatics.grading import graded
+from sensorgen.solvers.electrostatics.lossy import Fields, Turned, disc, turned
+from sensorgen.solvers.electrostatics.mesh import Cones
+from sensorgen.solvers.electrostatics.plane import Plane
+from sensorgen.solvers.electrostatics.problem import Field
+from sensorgen.solvers.electrostatics.triangles import Triangles, triangles
 
 SOURCE = "Dirichlet's and Thomson's principles; hp finite elements, rings without end at corners"
 COST = 2
@@ -86,7 +86,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     Notes
     -----
     Where a sensor ends amid a period, the pattern is thought to go on beyond its ends, and the sensor gets the energy
-    that lies within its own length; see :func:`sensorgen.models._fem_bounds.whole`.
+    that lies within its own length; see :func:`sensorgen.solvers.electrostatics.bounds.whole`.
     """
     fem.check(permittivity, width)
     best = Interval(0.0, np.inf)
@@ -162,7 +162,7 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     Returns
     -------
     Disc
-        Capacitance of the whole sensor [F]; see :mod:`sensorgen.models._fem_lossy`.
+        Capacitance of the whole sensor [F]; see :mod:`sensorgen.solvers.electrostatics.lossy`.
 
     Raises
     ------

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sensorgen.errors import BadInput, OutOfRange
-from sensorgen.models._line_inputs import HIGHEST_OHM, Complex, Inputs, check_fit, far_load, in_blocks, passive, read
-from sensorgen.models._line_slopes import slopes
-from sensorgen.models._tanhc import tanhc
+from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.solvers.line.inputs import HIGHEST_OHM, Complex, Inputs, check_fit, far_load, in_blocks, passive, read
+from sensorgen.solvers.line.slopes import slopes
+from sensorgen.solvers.line.tanhc import tanhc
 
 SOURCE = "Thesis appendix B, solved for unequal tracks, leak, loss and any far end"
 COST = 0

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.errors import OutOfRange
-from sensorgen.models._line_inputs import Complex, Inputs, in_blocks, read
+from sensorgen.core.errors import OutOfRange
+from sensorgen.solvers.line.inputs import Complex, Inputs, in_blocks, read
 
 SOURCE = "Thesis Eqs. B.43, B.51 and B.52, for unequal tracks; D. M. Pozar, Microwave Engineering, 4.4"
 COST = 0

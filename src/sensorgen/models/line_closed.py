@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.errors import OutOfRange, UnknownName
-from sensorgen.models._line_inputs import Complex, Inputs, in_blocks, read
+from sensorgen.core.errors import OutOfRange, UnknownName
+from sensorgen.solvers.line.inputs import Complex, Inputs, in_blocks, read
 
 SOURCE = "Thesis appendix B, Eqs. B.39, B.42, B.48, B.51, B.53, and Eqs. 2.24 and B.54"
 COST = 0

@@ -3,7 +3,7 @@ r"""The thesis's own inverse: polynomials for R and C, fitted, then solved for f
 .. math:: C = C_0 + C_F F, \qquad R = R_0 + (A + E x + B x^2) F
 
 R is what the thesis reads off one tone, Re Z, and C is -1/(omega Im Z). The fit is linear, so one least-squares solve
-finds what the thesis's search was after. Kept for comparison; :mod:`sensorgen.invert` does the work.
+finds what the thesis's search was after. Kept for comparison; :mod:`sensorgen.prediction.inverse` does the work.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sensorgen.errors import OutOfRange, UnknownName
+from sensorgen.core.errors import OutOfRange, UnknownName
 
 SOURCE = "Thesis appendix C.1, Eqs. C.1 to C.5, as printed and corrected"
 COST = 0

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from sensorgen.errors import OutOfRange
-from sensorgen.models._line_inputs import Complex, Inputs, in_blocks, read
+from sensorgen.core.errors import OutOfRange
+from sensorgen.solvers.line.inputs import Complex, Inputs, in_blocks, read
 
 SOURCE = "Thesis Figs. 2.3, 2.4 and B.4: cells of finite length"
 COST = 1

@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.errors import OutOfRange
+from sensorgen.core.errors import OutOfRange
 from sensorgen.models import line
-from sensorgen.models._line_inputs import HIGHEST_OHM, far_load
-from sensorgen.models._line_slopes import Chain
 from sensorgen.models.compression import Compression
 from sensorgen.models.pressure import Pieces, pieces, pressure_slope
+from sensorgen.solvers.line.inputs import HIGHEST_OHM, far_load
+from sensorgen.solvers.line.slopes import Chain
 
 SOURCE = line.SOURCE
 COST = 0

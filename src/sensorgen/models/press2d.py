@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.errors import BadInput
-from sensorgen.interval import Interval
-from sensorgen.models._press.cell import AIR, Cell, cell_of
-from sensorgen.models._press.mesh import Fineness, Mesh, Unmeshed, mesh_of
-from sensorgen.models._press.pressed import (
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import BadInput
+from sensorgen.scene.scene import Scene
+from sensorgen.solvers.contact.cell import AIR, Cell, cell_of
+from sensorgen.solvers.contact.mesh import Fineness, Mesh, Unmeshed, mesh_of
+from sensorgen.solvers.contact.pressed import (
     DEEPEST,
     Elastic,
     Pressed,
@@ -26,12 +27,11 @@ from sensorgen.models._press.pressed import (
     reached,
     with_capacitances,
 )
-from sensorgen.models._press.support import Held
-from sensorgen.scene import Scene
+from sensorgen.solvers.contact.support import Held
 
 if TYPE_CHECKING:
-    from sensorgen.models._press.contact import Faces
-    from sensorgen.models._press.load import Problem, State
+    from sensorgen.solvers.contact.contact import Faces
+    from sensorgen.solvers.contact.load import Problem, State
 
 SOURCE = (
     "neo-Hookean plane strain, displacement with bubble and pressure (Crouzeix and Raviart 1973), penalty contact with "
@@ -125,7 +125,7 @@ def _solved(
     fineness: Fineness,
     step: Callable[[float], None],
 ) -> tuple[Pressed, _Run]:
-    from sensorgen.models._press import contact, element, load, support
+    from sensorgen.solvers.contact import contact, element, load, support
 
     mesh = mesh_of(cell, fineness)
     materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in cell.regions]
@@ -159,7 +159,7 @@ def _with_fields(found: Pressed, cell: Cell, run: _Run, permittivity: Mapping[st
 
 def _field(cell: Cell, run: _Run, u_m: Real, permittivity: Mapping[str, float]) -> tuple[Interval | None, Cell]:
     """Capacitance and outlines of a deformed cell; None where no sound mesh of them was found."""
-    from sensorgen.models._press import deformed, field
+    from sensorgen.solvers.contact import deformed, field
 
     outline = deformed.deformed(cell, run.mesh, run.faces, u_m)
     try:

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.errors import BadInput
-from sensorgen.interval import Interval
-from sensorgen.models._press.brick_field import Orders
-from sensorgen.models._press.bricks import Bricks, bricks_of
-from sensorgen.models._press.cell import AIR
-from sensorgen.models._press.pressed import (
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import BadInput
+from sensorgen.scene.scene import Scene
+from sensorgen.solvers.contact.brick_field import Orders
+from sensorgen.solvers.contact.bricks import Bricks, bricks_of
+from sensorgen.solvers.contact.cell import AIR
+from sensorgen.solvers.contact.pressed import (
     Elastic,
     Pressed,
     check,
@@ -26,14 +27,13 @@ from sensorgen.models._press.pressed import (
     reached,
     with_capacitances,
 )
-from sensorgen.models._press.support import Held
-from sensorgen.scene import Scene
+from sensorgen.solvers.contact.support import Held
 
 if TYPE_CHECKING:
-    from sensorgen.models._press.brick_element import BrickElements
-    from sensorgen.models._press.brick_field import Field
-    from sensorgen.models._press.brick_touch import BrickFaces
-    from sensorgen.models._press.load import Problem, State
+    from sensorgen.solvers.contact.brick_element import BrickElements
+    from sensorgen.solvers.contact.brick_field import Field
+    from sensorgen.solvers.contact.brick_touch import BrickFaces
+    from sensorgen.solvers.contact.load import Problem, State
 
 SOURCE = (
     "neo-Hookean in 3D, bricks with 27 nodes and a linear pressure each (Q2 / P1); bounds of the capacitance by "
@@ -159,7 +159,7 @@ def _solved(
     held: Held,
     step: Callable[[float], None],
 ) -> tuple[Pressed, _Run]:
-    from sensorgen.models._press import brick_element, brick_factors, brick_touch, element, load, support
+    from sensorgen.solvers.contact import brick_element, brick_factors, brick_touch, element, load, support
 
     mesh = brick_element.mesh_of(bricks, bricks.fill > 0)
     materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in bricks.regions]
@@ -197,8 +197,8 @@ def _judged(found: Pressed, problem: "Problem", states: "list[State]", held: Hel
 
 def _with_fields(found: Pressed, run: _Run, permittivity: Mapping[str, float], orders: Orders) -> Pressed:
     """The same with the capacitance of the deformed boxes."""
-    from sensorgen.models._press import brick_element
-    from sensorgen.models._press.brick_field import Field
+    from sensorgen.solvers.contact import brick_element
+    from sensorgen.solvers.contact.brick_field import Field
 
     bricks = run.elements.mesh.bricks
     whole = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
@@ -208,7 +208,7 @@ def _with_fields(found: Pressed, run: _Run, permittivity: Mapping[str, float], o
 
 def _bounds(cell: "Field", run: _Run, state: "State") -> Interval | None:
     """Bounds of the capacitance; gaps that are shut are held open by a little."""
-    from sensorgen.models._press import brick_air, brick_field
+    from sensorgen.solvers.contact import brick_air, brick_field
 
     moved = run.elements.all_nodes(state.u_m, state.inner)
     for share in _OPEN:

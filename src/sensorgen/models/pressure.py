@@ -11,7 +11,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.errors import OutOfRange, UnknownName
+from sensorgen.core.errors import OutOfRange, UnknownName
 
 SOURCE = "Hertz (1882) for a round tip on a thick soft body; Johnson, Contact Mechanics (1985), 5.8 for a thin one"
 COST = 0

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.errors import BadInput, OutOfRange
-from sensorgen.planview import Part, parts
-from sensorgen.scene import Scene
-from sensorgen.units import M_PER_MM
+from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.core.units import M_PER_MM
+from sensorgen.scene.overlay import Part, parts
+from sensorgen.scene.scene import Scene
 
 SOURCE = "Hooke's law, column by column; plane strain, E / (1 - nu^2)"
 COST = 0

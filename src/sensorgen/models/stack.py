@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sensorgen.errors import BadInput, OutOfRange
-from sensorgen.models._line_inputs import check_fit, numbers, passive
-from sensorgen.models._stack_body import Body, Touch, reading, with_body
-from sensorgen.models._stack_bounds import standard_errors
-from sensorgen.models._stack_lines import diagonal, directions, inverse, loops, march, side_by_side
-from sensorgen.models._stack_piece import Line, Matrix
+from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.solvers.line.inputs import check_fit, numbers, passive
+from sensorgen.solvers.multiline.body import Body, Touch, reading, with_body
+from sensorgen.solvers.multiline.bounds import standard_errors
+from sensorgen.solvers.multiline.lines import diagonal, directions, inverse, loops, march, side_by_side
+from sensorgen.solvers.multiline.piece import Line, Matrix
 
 __all__ = [
     "Body", "Film", "Press", "Response", "Stack", "Touch", "Track", "admittance", "impedance", "port",

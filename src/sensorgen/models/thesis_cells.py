@@ -10,10 +10,10 @@ from functools import partial
 from math import log
 from typing import Any
 
-from sensorgen.errors import OutOfRange
+from sensorgen.core.errors import OutOfRange
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.design.shapes import rect, tri
 from sensorgen.models import thesis_swept
-from sensorgen.shapes import rect, tri
-from sensorgen.units import EPS0_F_PER_M, M_PER_MM
 
 SOURCE = "Thesis 3.2.1 and 3.2.2, Eqs. 3.24, 3.34, 3.35, 3.49 and 3.55"
 COST = 0

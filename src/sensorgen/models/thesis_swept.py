@@ -9,8 +9,8 @@ from dataclasses import replace
 from math import asin, atan2, cos, hypot, sin
 from typing import Any, TypeVar, cast
 
-from sensorgen.errors import OutOfRange
-from sensorgen.shapes import rect, tri
+from sensorgen.core.errors import OutOfRange
+from sensorgen.design.shapes import rect, tri
 
 SOURCE = "Thesis 3.1.2 and figures 6.7 and 6.10"
 COST = 0

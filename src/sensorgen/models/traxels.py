@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.errors import OutOfRange
-from sensorgen.models import _traxel_links as links
-from sensorgen.models._traxel_band import product
-from sensorgen.models._traxel_lines import Lines
-from sensorgen.models._traxel_nodes import Nodes
+from sensorgen.core.errors import OutOfRange
+from sensorgen.solvers.network import links as links
+from sensorgen.solvers.network.band import product
+from sensorgen.solvers.network.lines import Lines
+from sensorgen.solvers.network.nodes import Nodes
 
 SOURCE = "Lines as in Dijkshoorn et al., Sensors 2021, 21, 3710 (traxel model); network derived anew"
 COST = 2

@@ -1,0 +1,1 @@
+"""Measured beside predicted: comparison, fit, report, plots."""

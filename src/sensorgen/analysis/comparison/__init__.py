@@ -1,0 +1,6 @@
+"""What was predicted of a specimen beside what was measured of it."""
+
+from sensorgen.analysis.comparison.expected import Predicted, predicted
+from sensorgen.analysis.comparison.specimens import Compared, Comparison, of_iteration
+
+__all__ = ["Compared", "Comparison", "Predicted", "of_iteration", "predicted"]

@@ -1,0 +1,95 @@
+"""A prediction with one of its parameters moved: what fits and explanations are made of."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from sensorgen.core.bounds import Interval
+from sensorgen.design.design import Design, make
+from sensorgen.measure.recording.samples import Complex, Real
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.capacitance import unloaded
+from sensorgen.prediction.sensor_of_design import Sensed, sensor_of
+
+PERMITTIVITY = "relative_permittivity"
+FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)  # of permittivity or film at which the capacitance is worked out
+
+
+@dataclass(frozen=True, eq=False)
+class Movable:
+    """A design's sensor that parameters can be moved of.
+
+    Attributes
+    ----------
+    design : Design
+        As drawn.
+    """
+
+    design: Design
+
+    @cached_property
+    def sensed(self) -> Sensed:
+        """As predicted; raises what :func:`sensorgen.prediction.sensor_of_design.sensor_of` raises."""
+        return sensor_of(self.design)
+
+    @property
+    def film(self) -> str:
+        """Name of the film's material."""
+        return self.design.slot("film")[0].name
+
+    @cached_property
+    def permittivity(self) -> float:
+        """Of the film, as predicted [-]."""
+        return next(t.value for t in self.sensed.unloaded.taken if t.material == self.film)
+
+    def capacitance_f(self, permittivity: float) -> Interval:
+        """With another permittivity of the film's material [F]."""
+        data = self.design.model_dump(exclude_defaults=True, mode="json")
+        values = data.get("material_values", {})
+        own = values.get(self.film, {}) | {PERMITTIVITY: permittivity}
+        return unloaded(make(data | {"material_values": values | {self.film: own}})).answer.capacitance_f
+
+    @cached_property
+    def by_permittivity(self) -> tuple[Real, Real]:
+        """Ln of the capacitance's middle, relative to the predicted one, over ln of the permittivity's factor."""
+        return self._curve(lambda factor: self.capacitance_f(self.permittivity * factor))
+
+    @cached_property
+    def by_film(self) -> tuple[Real, Real]:
+        """The same over ln of the film's factor; flat where a design has no film."""
+        data = self.design.model_dump(exclude={"name"}, exclude_defaults=True, mode="json")
+        d = getattr(self.design.params, "dielectric_mm", 0.0)
+        if not d:
+            return np.log(FACTORS), np.zeros(len(FACTORS))
+
+        def at(factor: float) -> Interval:
+            parameters = data.get("parameters", {}) | {"dielectric_mm": d * factor}
+            return unloaded(make(data | {"parameters": parameters})).answer.capacitance_f
+
+        return self._curve(at)
+
+    def _curve(self, at: Callable[[float], Interval]) -> tuple[Real, Real]:
+        known = self.sensed.unloaded.answer.capacitance_f.middle()
+        return np.log(FACTORS), np.log([at(k).middle() / known if k != 1 else 1.0 for k in FACTORS])
+
+
+def moved(sensor: Sensor, resistivity: float = 1.0, capacitance: float = 1.0, leak_s: float = 0.0) -> Sensor:
+    """A sensor with resistivities and capacitance times a factor [-], and a leak of the whole film [S]."""
+    top, bottom = sensor.resistivity_ohm_m
+    return replace(
+        sensor, resistivity_ohm_m=(top * resistivity, bottom * resistivity),
+        capacitance_f_per_m=sensor.capacitance_f_per_m * capacitance, leak_s_per_m=leak_s / sensor.length_m,
+    )  # fmt: skip
+
+
+def at_rest(sensor: Sensor, frequency_hz: Real) -> Complex:
+    """Ln Z with nothing on the sensor (m,)."""
+    return np.asarray(np.log(sensor.impedance(frequency_hz, 0.0, sensor.length_m / 2)))
+
+
+def pressed(sensor: Sensor, frequency_hz: Real, force_n: Real, position_m: Real, stiffness: float = 1.0) -> Complex:
+    """By how much presses move ln Z (p, m), of a film that is stiffer by a factor [-]: as a weaker press on ours."""
+    z = sensor.impedance(frequency_hz, force_n[:, None] / stiffness, position_m[:, None])
+    return np.asarray(np.log(z) - at_rest(sensor, frequency_hz))

@@ -1,0 +1,171 @@
+"""Specimens of an iteration: readings, designs, predictions and verdicts, row by row; and what cannot be compared."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite, log, nan
+
+from sensorgen.analysis.comparison.expected import Predicted, predicted
+from sensorgen.core.errors import SensorgenError
+from sensorgen.design.design import Design
+from sensorgen.design.specimen_name import Specimen, design_of, parse
+from sensorgen.measure.log import Log, Prediction, Reading
+from sensorgen.measure.signal.verdicts import Evidence, Verdict, expected_from, verdict
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One reading beside what was predicted of its design.
+
+    Attributes
+    ----------
+    reading : Reading
+        As logged.
+    predicted : Predicted or None
+        None where no design is known.
+    evidence, verdict : Evidence, Verdict
+        What the readings say by themselves; what an electrode should have is the median of its own shape.
+    """
+
+    reading: Reading
+    predicted: Predicted | None
+    evidence: Evidence
+    verdict: Verdict
+
+    @property
+    def residual(self) -> float:
+        """Ln of the least R_Y over the prediction's middle [-]; nan where one is missing."""
+        ry, expected = self.verdict.ry_ohm, self.predicted.ry_ohm if self.predicted else None
+        return log(ry / expected.middle()) if expected and isfinite(ry) and ry > 0 else nan
+
+    @property
+    def inside(self) -> bool | None:
+        """Whether a reading of R_Y lies within the prediction's interval; None where one is missing."""
+        expected = self.predicted.ry_ohm if self.predicted else None
+        if expected is None or not self.evidence.ry_ohm:
+            return None
+        return any(expected.lower <= value <= expected.upper for value in self.evidence.ry_ohm)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """An iteration.
+
+    Attributes
+    ----------
+    rows : tuple of Compared
+        One for each reading, in the order of the log.
+    designs : mapping of str to Design
+        Every design that is known, by name.
+    names : mapping of str to str
+        The design's name by the specimen's.
+    predictions : mapping of str to Predicted
+        By the design's name.
+    left_out : tuple of (str, str)
+        What could not be used, and why.
+    """
+
+    rows: tuple[Compared, ...]
+    designs: Mapping[str, Design]
+    names: Mapping[str, str]
+    predictions: Mapping[str, Predicted]
+    left_out: tuple[tuple[str, str], ...]
+
+    @property
+    def last(self) -> tuple[Compared, ...]:
+        """The last reading of each specimen: a yield counts specimens, however often one was measured."""
+        return tuple({row.reading.specimen: row for row in self.rows}.values())
+
+
+def of_iteration(log: Log, iteration: int) -> Comparison:
+    """Everything in the log about an iteration, compared.
+
+    Parameters
+    ----------
+    log : Log
+        An open one.
+    iteration : int
+        Of the design.
+    """
+    readings = log.readings(iteration=iteration)
+    left_out: list[tuple[str, str]] = [
+        (f"reading {old.number}, {old.specimen}", "a later reading corrects it") for old in _corrected(log, iteration)
+    ]
+    by_specimen = _by_specimen(log, iteration, left_out)
+    names = {specimen: design.name for specimen, design in by_specimen.items()}
+    designs = dict(sorted((design.name, design) for design in by_specimen.values()))
+    left_out += _other_designs(readings, designs.values())
+    found = {name: predicted(design, _stored(log, design)) for name, design in designs.items()}
+    evidence = [_evidence(reading, found.get(names.get(reading.specimen, ""))) for reading in readings]
+    usual = {shape: expected_from([e for e in evidence if e.shape == shape]) for shape in {e.shape for e in evidence}}
+    rows = []
+    for reading, of in zip(readings, evidence, strict=True):
+        known = replace(of, expected_ohm=usual[of.shape])
+        rows.append(Compared(reading, found.get(names.get(reading.specimen, "")), known, verdict(known)))
+    return Comparison(tuple(rows), designs, names, found, tuple(left_out + list(_unused(rows))))
+
+
+def _corrected(log: Log, iteration: int) -> Iterator[Reading]:
+    current = {r.number for r in log.readings(iteration=iteration)}
+    every = log.entries(Reading, superseded=True, iteration=iteration)
+    yield from (r for r in every if r.number not in current)
+
+
+def _by_specimen(log: Log, iteration: int, left_out: list[tuple[str, str]]) -> dict[str, Design]:
+    """The designs that the specimens' names stand for, each made once."""
+    found: dict[str, Design] = {}
+    made: dict[Specimen, Design | None] = {}
+    for specimen in log.specimens(iteration=iteration):
+        try:
+            kind = replace(parse(specimen.specimen), iteration=None, replicate=None, place="")
+            design = made[kind] if kind in made else made.setdefault(kind, design_of(kind))
+        except SensorgenError as error:
+            left_out.append((f"design of {specimen.specimen}", str(error)))
+            continue
+        if design is None:
+            left_out.append((f"design of {specimen.specimen}", "its name does not tell which design it is"))
+        else:
+            found[specimen.specimen] = design
+    return found
+
+
+def _other_designs(readings: Sequence[Reading], designs: Iterable[Design]) -> list[tuple[str, str]]:
+    """What the log says of designs that the names do not stand for."""
+    known = {design.id() for design in designs}
+    others = {(r.design, r.design_id) for r in readings if r.design_id and r.design_id not in known}
+    return [
+        (f"design {name} ({uid})", "the log names it for a specimen whose name stands for another design, or for this "
+         "one in another version of sensorgen: drawn and predicted is what the name stands for now")
+        for name, uid in sorted(others)
+    ]  # fmt: skip
+
+
+def _stored(log: Log, design: Design) -> Sequence[Prediction]:
+    return log.predictions(design_id=design.id())
+
+
+def _evidence(reading: Reading, of: Predicted | None) -> Evidence:
+    """Readings that a resistance can have; a slip below 0 is kept in the log and told as a doubt there."""
+    ry, rz = (tuple(v for v in values if v >= 0) for values in (reading.y_ohm, reading.z_ohm))
+    return Evidence(
+        reading.specimen, ry, rz, nan, reading.shape, reading.film_mm, reading.remark,
+        str(reading.iteration or ""), of is not None and of.touches,
+    )  # fmt: skip
+
+
+def _unused(rows: Sequence[Compared]) -> Iterator[tuple[str, str]]:
+    for row in rows:
+        name = f"reading {row.reading.number}, {row.reading.specimen}"
+        if row.predicted is None:
+            yield name, "no design is known: nothing to compare it with"
+        if not row.reading.y_ohm and not row.reading.z_ohm:
+            yield name, "no measurement in it"
+        elif not row.reading.y_ohm or not row.reading.z_ohm:
+            missing = "R_Z" if not row.reading.z_ohm else "R_Y"
+            yield name, f"no {missing}: counts for nothing where both are needed"
+        if any(value < 0 for value in (*row.reading.y_ohm, *row.reading.z_ohm)):
+            yield name, "a resistance below 0 is no reading"
+
+
+def known_iterations(log: Log) -> list[int]:
+    """Iterations that the log knows specimens of."""
+    return sorted({s.iteration for s in log.specimens() if s.iteration is not None})

@@ -1,0 +1,167 @@
+"""The fit of an iteration: specimens held back, values from the others, errors before and after on those held back."""
+
+from collections.abc import Sequence
+from hashlib import sha256
+from math import isfinite, log, nan, sqrt
+
+import numpy as np
+
+from sensorgen.analysis.comparison import Compared, Comparison, of_iteration, predicted
+from sensorgen.analysis.comparison.moved import Movable, at_rest, moved
+from sensorgen.analysis.comparison.runs import Run, runs
+from sensorgen.analysis.fit import resistance, tones
+from sensorgen.analysis.fit.results import Error, Fit, Fitted, Untold
+from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.design.design import Design, make
+from sensorgen.measure.log import Log
+
+HELD_BACK = 0.25  # of the specimens
+SEED = 23
+_ACROSS = Untold("resistivity_ohm_m across", "nothing was measured across the electrodes: R_Y and Re Z run along them")
+
+
+def fit(log: Log, iteration: int, seed: int = SEED) -> Fit:
+    """Fit material values to the readings and recordings of an iteration.
+
+    Parameters
+    ----------
+    log : Log
+        An open one.
+    iteration : int
+        Of the design.
+    seed : int
+        Of the split between specimens that are fitted to and specimens that are held back.
+
+    Raises
+    ------
+    BadInput
+        Nothing of that iteration in the log that a fit could use.
+    """
+    found = of_iteration(log, iteration)
+    left_out = list(found.left_out)
+    recorded = list(runs(log, iteration, left_out))
+    usable = _usable(found)
+    names = sorted({row.reading.specimen for row, _ in usable} | {run.entry.specimen for run in recorded})
+    if not names:
+        raise BadInput(
+            f"no readings of sound electrodes and no recordings of iteration {iteration} in {str(log.path)!r}; "
+            "expected some to fit to: sensorgen log list shows what there is"
+        )
+    kept_back = held_back(names, seed)
+    values, untold = _fitted(
+        [allowed for row, allowed in usable if row.reading.specimen not in kept_back],
+        _of_runs([run for run in recorded if run.entry.specimen not in kept_back], found, left_out),
+        next(iter(found.designs.values())), seed,
+    )  # fmt: skip
+    errors = [
+        *_reading_errors([row for row, _ in usable if row.reading.specimen in kept_back], found, values),
+        *_run_errors([run for run in recorded if run.entry.specimen in kept_back], found, values),
+    ]
+    return Fit(
+        iteration, seed, tuple(values), tuple(untold), tuple(errors), len(names) - len(kept_back),
+        tuple(sorted(kept_back)), tuple(left_out), _fingerprint(found, recorded),
+    )  # fmt: skip
+
+
+def _usable(found: Comparison) -> list[tuple[Compared, resistance.Allowed]]:
+    rows = [row for row in found.rows if row.predicted]
+    pairs = [(row, resistance.allowed(row, found.designs[row.predicted.design])) for row in rows if row.predicted]
+    return [(row, allowed) for row, allowed in pairs if allowed]
+
+
+def held_back(names: Sequence[str], seed: int) -> frozenset[str]:
+    """A quarter of the specimens, drawn by a seed; none of fewer than four.
+
+    >>> len(held_back("abcdefgh", 23))
+    2
+    """
+    count = round(HELD_BACK * len(names)) if len(names) >= 4 else 0
+    drawn = np.random.default_rng(seed).permutation(len(names))[:count]
+    return frozenset(sorted(names)[k] for k in drawn.tolist())
+
+
+def _of_runs(recorded: Sequence[Run], found: Comparison, left_out: list[tuple[str, str]]) -> list[tones.OfRun]:
+    fits = []
+    for run in recorded:
+        try:
+            fits.append(tones.of_run(run, Movable(_design(found, run.entry.specimen))))
+        except SensorgenError as error:
+            left_out.append((run.name, str(error)))
+    return fits
+
+
+def _design(found: Comparison, specimen: str) -> Design:
+    name = found.names.get(specimen)
+    if name is None:
+        raise BadInput(f"no design is known of {specimen}")
+    return found.designs[name]
+
+
+def _fitted(
+    readings: Sequence[resistance.Allowed], fits: Sequence[tones.OfRun], design: Design, seed: int
+) -> tuple[list[Fitted], list[Untold]]:
+    """All values and all that stays open; of two values of one quantity the one that is known better."""
+    electrode, film = design.slot("top_electrode")[0].name, design.slot("film")[0].name
+    found = [
+        resistance.resistivity(readings, electrode, seed),
+        *tones.values(fits),
+        resistance.leak(readings, film, seed),
+    ]
+    best: dict[tuple[str, str], Fitted] = {}
+    for value in found:
+        if isinstance(value, Fitted):
+            key = value.material, value.quantity
+            if key not in best or value.high / value.low < best[key].high / best[key].low:
+                best[key] = value
+    known = {quantity for _, quantity in best}
+    open_ = [u for u in found if isinstance(u, Untold)]
+    untold = [u for u in open_ if not any(quantity.startswith(u.parameter.split()[0]) for quantity in known)]
+    return list(best.values()), [_ACROSS, *untold]
+
+
+def with_values(design: Design, values: Sequence[Fitted]) -> Design:
+    """A design with fitted values in place of those of its sources."""
+    own: dict[str, dict[str, float]] = {}
+    for value in values:
+        own.setdefault(value.material, {})[value.quantity] = value.value
+    data = design.model_dump(exclude_defaults=True, mode="json")
+    return make(data | {"material_values": data.get("material_values", {}) | own})
+
+
+def _reading_errors(rows: Sequence[Compared], found: Comparison, values: Sequence[Fitted]) -> list[Error]:
+    if not rows:
+        return []
+    names = {row.predicted.design for row in rows if row.predicted}
+    after = {name: predicted(with_values(found.designs[name], values)).ry_ohm for name in names}
+    residuals = []
+    for row in rows:
+        expected = after[row.predicted.design] if row.predicted else None
+        residuals.append(log(row.verdict.ry_ohm / expected.middle()) if expected else nan)
+    return [Error("R_Y", len(rows), _rms([row.residual for row in rows]), _rms(residuals))]
+
+
+def _rms(values: Sequence[float]) -> float:
+    known = [v for v in values if isfinite(v)]
+    return sqrt(sum(v * v for v in known) / len(known)) if known else nan
+
+
+def _run_errors(recorded: Sequence[Run], found: Comparison, values: Sequence[Fitted]) -> list[Error]:
+    before: list[float] = []
+    after: list[float] = []
+    for run in recorded:
+        try:
+            design = _design(found, run.entry.specimen)
+            pair = [Movable(d).sensed.sensor for d in (design, with_values(design, values))]
+        except SensorgenError:
+            continue
+        f, measured = run.recording.tones_hz, np.log(run.rest_ohm)
+        for sensor, into in zip(pair, (before, after), strict=True):
+            into.extend(np.abs(measured - at_rest(moved(sensor), f)).tolist())
+    return [Error("Z at rest", len(before), _rms(before), _rms(after))] if before else []
+
+
+def _fingerprint(found: Comparison, recorded: Sequence[Run]) -> str:
+    """SHA-256 of what was fitted to."""
+    lines = [f"{r.reading.uid} {r.reading.specimen} {r.reading.y_ohm} {r.reading.z_ohm}" for r in found.rows]
+    lines += [f"{run.entry.uid} {run.entry.file} {run.entry.rig_file}" for run in recorded]
+    return sha256("\n".join(lines).encode()).hexdigest()

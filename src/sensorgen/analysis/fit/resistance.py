@@ -1,0 +1,98 @@
+r"""Resistivity and leak from a multimeter's readings.
+
+An electrode lies between :math:`\varrho L^2 / V` and :math:`\varrho L / (H W)`, so that each reading allows a range of
+:math:`\varrho`. A film that leaks evenly lets R_Y read less than the electrode has; a bridge at the contacts does not:
+nobody knows which it was, so the range runs from R_Y as it was read to R_Y as an even leak would have it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import exp, isfinite, log
+
+import numpy as np
+
+from sensorgen.analysis.comparison import Compared
+from sensorgen.analysis.comparison.expected import ENDS, electrode_ohm
+from sensorgen.analysis.comparison.leaky import electrode_and_leak
+from sensorgen.analysis.fit.results import LEVEL, Fitted, Untold
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design.design import Design
+from sensorgen.design.materials import FILM_LEAK
+from sensorgen.measure.recording.samples import Real
+
+RESISTIVITY = "resistivity_ohm_m"
+LEAST = 3  # readings that a scatter can be told from
+_DRAWS = 2000
+_PROPERTY = 10.0  # leaks that scatter by more than this factor about their median are no property of a material
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """ln of the resistivities [ohm m] that a reading allows, and of the leak per area [S/m2]; nan where unknown."""
+
+    low: float
+    high: float
+    leak: float
+
+
+def allowed(row: Compared, design: Design) -> Allowed | None:
+    """What a reading allows; None where it is none of a sound electrode."""
+    ry, rz = row.verdict.ry_ohm, row.verdict.rz_ohm
+    if row.verdict.electrode != "sound" or not (isfinite(ry) and ry > 0):
+        return None
+    per = _per_resistivity(design)
+    highest, leak = electrode_and_leak(ry, rz) if rz > 0 else (ry, float("nan"))
+    area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
+    return Allowed(log(ry / per[1]), log(highest / per[0]), log(leak / area) if leak > 0 else float("nan"))
+
+
+def _per_resistivity(design: Design) -> tuple[float, float]:
+    """Bounds of an electrode's resistance over its resistivity [1/m]."""
+    p = design.params
+    squares_per_m = p.length_mm / (p.electrode_mm * p.width_mm) / M_PER_MM
+    found = electrode_ohm(design, dict.fromkeys(ENDS, squares_per_m))
+    assert found is not None  # noqa: S101 - plates are given
+    return found.lower, found.upper
+
+
+def resistivity(readings: Sequence[Allowed], material: str, seed: int) -> Fitted | Untold:
+    """One resistivity for both electrodes: the median of the middles; its interval holds the medians of both ends."""
+    if len(readings) < LEAST:
+        return Untold(f"{RESISTIVITY} along", f"{len(readings)} readings of sound electrodes; expected {LEAST} or more")
+    ends = np.array([(r.low, r.high) for r in readings])
+    draws = _medians(ends, seed)
+    outer = 100 * np.array([(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    low, high = np.percentile(draws[:, 0], outer[0]), np.percentile(draws[:, 1], outer[1])
+    middle = float(np.median(ends.mean(axis=1)))
+    scatter = np.exp(np.percentile(_medians(ends.mean(axis=1)[:, None], seed)[:, 0], outer) - middle)
+    return Fitted(
+        material, RESISTIVITY, exp(middle), exp(low), exp(high),
+        f"R_Y of {len(readings)} specimens, along the electrode; scatter alone x {scatter[0]:.3g} to {scatter[1]:.3g}, "
+        "the rest of the interval: cogs, which electrode was measured, and how much of R_Y the film carried",
+    )  # fmt: skip
+
+
+def _medians(values: Real, seed: int) -> Real:
+    """Medians of specimens drawn again and again (bootstrap), column by column."""
+    draws = np.random.default_rng(seed).integers(0, len(values), (_DRAWS, len(values)))
+    return np.asarray(np.median(values[draws], axis=1))
+
+
+def leak(readings: Sequence[Allowed], material: str, seed: int) -> Fitted | Untold:
+    """Leak per area, where it scatters little enough to be anything of the material's."""
+    known = np.array([r.leak for r in readings if isfinite(r.leak)])
+    if len(known) < LEAST:
+        return Untold("leak", f"{len(known)} specimens that leak; expected {LEAST} or more")
+    middle, spread = float(np.median(known)), float(np.exp(np.median(np.abs(known - np.median(known)))))
+    if spread > _PROPERTY:
+        least, most = np.exp(known.min()), np.exp(known.max())
+        return Untold(
+            "leak",
+            f"{len(known)} specimens leak, if evenly, by {least:.2g} to {most:.2g} S/m2, median {np.exp(middle):.2g}; "
+            f"half of them by more than {spread:.3g} times more or less: single bridges, and no property of {material}",
+        )
+    outer = np.percentile(_medians(known[:, None], seed)[:, 0], 100 * np.array([(1 - LEVEL) / 2, (1 + LEVEL) / 2]))
+    return Fitted(
+        material, FILM_LEAK, exp(middle), exp(outer[0]), exp(outer[1]),
+        f"R_Z of {len(known)} specimens, taken to leak evenly",
+    )  # fmt: skip

@@ -1,0 +1,140 @@
+"""A design held against its printer: exact gap, valid bodies, and the findings of every rule."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from sensorgen import checks
+from sensorgen.core.findings import Finding
+from sensorgen.design import materials
+from sensorgen.design.design import Design
+from sensorgen.export.slicers.tower import tower
+from sensorgen.scene import drawing
+from sensorgen.scene.geometry import meshes, validity
+from sensorgen.scene.geometry.mesh import Mesh
+from sensorgen.scene.scene import Scene
+
+Step = Callable[[str], None]
+STEPS = ("meshes", "checks", "validity")
+
+
+@dataclass(frozen=True, eq=False)
+class Review:
+    """The printed bodies as meshes, by name, and all findings about them."""
+
+    meshes: dict[str, Mesh]
+    findings: list[Finding]
+
+    def with_meshes(self, design: Design) -> "Review":
+        """The same review, with the meshes that a misfit on the bed had spared."""
+        return self if self.meshes else Review(_meshes(design), self.findings)
+
+    def errors(self, strict: bool = False) -> list[Finding]:
+        """Findings that stop a build: errors, and when ``strict`` warnings, that the design does not waive."""
+        stops = ("error", "warning") if strict else ("error",)
+        return [f for f in self.findings if f.severity in stops and not f.waiver]
+
+    def counts(self) -> dict[str, int]:
+        """How many findings there are of each severity, and how many are waived."""
+        open_ones = [f.severity for f in self.findings if not f.waiver]
+        return {s: open_ones.count(s) for s in ("error", "warning", "info")} | {
+            "waived": len(self.findings) - len(open_ones)
+        }
+
+
+def review(design: Design, step: Step = lambda _: None) -> Review:
+    """Check a design as it lies on the bed.
+
+    Whether bodies overlap is looked at last, and only when nothing else is wrong: it takes longest.
+
+    Parameters
+    ----------
+    design : Design
+        What to check.
+    step : callable
+        Told what comes next, for a progress display.
+
+    Raises
+    ------
+    SensorgenError
+        A name or value of the design is missing.
+    """
+    misfit = design.waived(list(checks.bed.check(design.printed, design.machine)))
+    if any(not f.waiver for f in misfit):  # a sensor that no bed holds may be too large to mesh, too
+        step("checks")
+        return Review({}, misfit)
+    return _full(design, step)
+
+
+def _full(design: Design, step: Step) -> Review:
+    scene = design.printed
+    step("meshes")
+    made = _meshes(design)
+    step("checks")
+    gap_mm = validity.electrode_gap_mm(scene, made)
+    found = checks.findings(scene, design.machine, design.layers, gap_mm) + _crowding(design)
+    if not any(f.severity == "error" for f in found):
+        step("validity")
+        found = [_fault(*fault) for fault in validity.faults(scene, made)] + found
+    return Review(made, design.waived(found) + design.idle_waivers(found))
+
+
+def _meshes(design: Design) -> dict[str, Mesh]:
+    return {body.name: meshes.mesh(body) for body in design.printed.bodies}
+
+
+def _crowding(design: Design) -> list[Finding]:
+    """A sensor that stands where the slicers put the prime tower, without which no tool change prints well."""
+    place = tower(design.machine, design.layers, len(design.used()))
+    free = [place.x_mm - design.machine.bed_centre_mm()[0], place.y_mm - design.machine.bed_centre_mm()[1]]
+    reach = [size / 2 for size in design.printed.size_mm[:2]]
+    if reach[0] <= free[0] or reach[1] <= free[1]:
+        return []
+    length, width = (round(2 * limit, 3) for limit in free)
+    return [
+        Finding(
+            "8-bed",
+            "warning",
+            "sensor",
+            f"it reaches into the far right corner, where the prime tower of {place.side_mm:g} mm stands",
+            f"keep it shorter than {length:g} mm or narrower than {width:g} mm, or move the tower in the slicer",
+            reach[0],
+            round(free[0], 9),
+        )
+    ]
+
+
+def _fault(body: str, what: str) -> Finding:
+    return Finding(
+        "0-body",
+        "error",
+        body,
+        what,
+        "change the parameters; if they make sense, this is a fault of sensorgen: report it",
+    )
+
+
+def report(design: Design, held: Review) -> dict[str, Any]:
+    """The findings as plain data for ``check.json``."""
+    return {
+        "name": design.name,
+        "design": design.id(),
+        "printer": design.machine.name,
+        "quality": design.layers.name,
+        "counts": held.counts(),
+        "findings": [f.as_dict() for f in held.findings],
+    }
+
+
+def draw(design: Design, held: Review, printed: Scene | None = None, source: str = "") -> str:
+    """The drawing of the cross-section, as SVG, with what is printed outlined over it if that is given."""
+    scene = design.printed
+    names = {body.material for body in scene.bodies}
+    notes = [
+        f"{design.machine.name}, {design.layers.name}, printed {design.orientation}",
+        *([f"green outlines: {source}"] if source else []),
+    ]
+    known = {name: (materials.load(name).title, materials.load(name).colour) for name in sorted(names)}
+    return drawing.svg(
+        scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known, notes, printed
+    )

@@ -1,0 +1,1 @@
+"""Errors, units, bounds, files, cache, YAML and parallel work: what every package needs."""

@@ -1,0 +1,136 @@
+"""Answers that were worked out before, on disk: a question of plain data, and what it was answered with.
+
+An entry is a file of its own, named by the SHA-256 of the question and of the source code of the models, so that
+a new version of either asks anew. Deleting the folder costs time only.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from sensorgen import __version__
+from sensorgen.core import files as store
+from sensorgen.core import paths as places
+from sensorgen.core.errors import Unwritable
+
+PLACE = "SENSORGEN_CACHE"  # environment variable with another folder
+_SOURCES = ("models", "solvers", "scene", "core/bounds.py", "core/units.py")  # what decides an answer
+
+JSON = Any  # None, bool, int, float, str, and lists and string-keyed dicts of these
+
+_HELD_BACK: ContextVar[list[tuple[Mapping[str, JSON], JSON]] | None] = ContextVar("_HELD_BACK", default=None)
+_ONLY_KNOWN: ContextVar[bool] = ContextVar("_ONLY_KNOWN", default=False)
+
+
+class Unknown(BaseException):
+    """Nothing is known of a question, and nothing may be worked out: no error, so that it passes who catches those."""
+
+
+def answer(question: Mapping[str, JSON], work: Callable[[], JSON]) -> JSON:
+    """The answer that a question got before, or else what ``work`` gives, kept for the next time.
+
+    Parameters
+    ----------
+    question : mapping
+        Everything that decides the answer besides sensorgen itself, as plain data of finite numbers.
+    work : callable
+        Gives the answer as plain data; what it raises is passed on, and nothing is kept.
+
+    Raises
+    ------
+    ValueError
+        The question holds a number that is not finite.
+
+    Notes
+    -----
+    Where the folder cannot be written to, nothing is kept and nothing said: the answer is as good.
+    """
+    found = known(question)
+    if found is None:
+        if _ONLY_KNOWN.get():
+            raise Unknown
+        found = work()
+        keep(question, found)
+    return found
+
+
+@contextmanager
+def only_known() -> Iterator[None]:
+    """Within it :func:`answer` works nothing out: it raises Unknown instead."""
+    before = _ONLY_KNOWN.set(True)
+    try:
+        yield
+    finally:
+        _ONLY_KNOWN.reset(before)
+
+
+@contextmanager
+def held_back() -> Iterator[list[tuple[Mapping[str, JSON], JSON]]]:
+    """Questions and answers that would be kept, for another process to keep: one that may be ended writes nothing."""
+    entries: list[tuple[Mapping[str, JSON], JSON]] = []
+    before = _HELD_BACK.set(entries)
+    try:
+        yield entries
+    finally:
+        _HELD_BACK.reset(before)
+
+
+def known(question: Mapping[str, JSON]) -> JSON | None:
+    """The answer that a question got before, or None; an entry that is damaged counts as none."""
+    try:
+        entry = json.loads(_file(question).read_text("utf-8"))
+        sound = entry["question"] == json.loads(_text(question)) and entry["sha256"] == _digest(entry["answer"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+    return entry["answer"] if sound else None
+
+
+def keep(question: Mapping[str, JSON], found: JSON) -> None:
+    """Store the answer to a question, in place of what was there."""
+    held = _HELD_BACK.get()
+    if held is not None:
+        held.append((question, found))
+        return
+    file = _file(question)
+    entry = {"question": question, "answer": found, "sha256": _digest(found)}
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        store.replace(file, json.dumps(entry).encode())
+    except (OSError, Unwritable):
+        return
+
+
+def folder() -> Path:
+    """Where entries are: the system's place for caches, or what SENSORGEN_CACHE says."""
+    return places.cache(PLACE)
+
+
+def _file(question: Mapping[str, JSON]) -> Path:
+    key = _digest([_version(), question])
+    return folder() / key[:2] / f"{key}.json"
+
+
+def _digest(data: JSON) -> str:
+    return sha256(_text(data).encode()).hexdigest()
+
+
+def _text(data: JSON) -> str:
+    """Plain data as one canonical text."""
+    return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+@cache
+def _version() -> str:
+    """Hash of the source code that decides an answer, and the version of sensorgen."""
+    here = Path(__file__).parents[1]
+    files = sorted(f for name in _SOURCES for f in _code(here / name))
+    return sha256(b"".join([__version__.encode(), *(f.read_bytes() for f in files)])).hexdigest()
+
+
+def _code(place: Path) -> list[Path]:
+    return [place] if place.is_file() else [f for f in place.rglob("*") if f.suffix in (".py", ".yaml")]

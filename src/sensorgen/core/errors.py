@@ -1,0 +1,69 @@
+"""What went wrong, in words that tell the user what to do."""
+
+import difflib
+from collections.abc import Iterable, Sequence
+from typing import Any, Self
+
+
+class SensorgenError(Exception):
+    """Anything a user can put right; the command line shows it as one line and exits with 2."""
+
+    def within(self, where: str) -> Self:
+        """The same error, its message led by the file or key that it is about."""
+        if where:
+            self.args = (f"{where}: {self}",)
+        return self
+
+
+class OutOfRange(SensorgenError):
+    """A number outside the range in which it means something."""
+
+
+class UnknownName(SensorgenError):
+    """A name that nothing goes by."""
+
+    def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
+        """Name the nearest of ``known`` to ``given``, and list them all."""
+        names = sorted(known)
+        near = difflib.get_close_matches(given[:100].lower(), names, n=1)
+        hint = f"; did you mean '{near[0]}'?" if near else "."
+        super().__init__(f"unknown {kind} {given[:100]!r}{hint} Known: {', '.join(names)}")
+
+
+class BadInput(SensorgenError):
+    """A file or a word on the command line that cannot be read as what it should be."""
+
+
+class MissingValue(SensorgenError):
+    """A value that no source gives."""
+
+
+class NotInstalled(MissingValue):
+    """A library that an extra of sensorgen brings; the message says how."""
+
+
+class Unprintable(SensorgenError):
+    """A design whose checks found errors; ``findings`` holds all of them."""
+
+    def __init__(self, findings: Sequence[Any]) -> None:
+        """Take the findings (see :class:`sensorgen.core.findings.Finding`)."""
+        self.findings = list(findings)
+        open_ones = [f for f in self.findings if not f.waiver]
+        first = f"{open_ones[0].rule}, {open_ones[0].message}" if open_ones else "the checks found errors"
+        super().__init__(f"{first}; nothing was written (--force writes the files all the same)")
+
+
+class Unwritable(SensorgenError):
+    """A result that could not be put on disk."""
+
+
+class CadFailed(SensorgenError):
+    """The CAD kernel could not make a solid."""
+
+
+class SlicerFailed(SensorgenError):
+    """A slicer is missing, or could not slice; the message carries its own words."""
+
+
+class InstrumentFailed(SensorgenError):
+    """An instrument that is not there, is another one, or does not answer as it should."""

@@ -1,0 +1,214 @@
+"""Results on disk: written beside their place, then renamed, so that no file is ever half there."""
+
+import json
+import os
+import re
+import shutil
+import signal
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from hashlib import sha256
+from pathlib import Path
+from types import FrameType
+from typing import Any, BinaryIO
+
+from sensorgen.core.errors import Unwritable
+
+MANIFEST = "manifest.json"
+
+
+@contextmanager
+def staging(folder: Path) -> Iterator[Path]:
+    """An empty folder beside ``folder`` to write into; gone afterwards, whatever happens.
+
+    Raises
+    ------
+    Unwritable
+        The place cannot be written to, or the disk is full.
+    """
+    stage = folder.parent / f".{folder.name}.{os.getpid()}.part"
+    try:
+        try:
+            _refuse_file(folder)
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            _sweep(folder)
+            stage.mkdir()
+            yield stage
+        except OSError as error:
+            raise unwritable(folder, error) from None
+    finally:
+        with _undisturbed():
+            shutil.rmtree(stage, ignore_errors=True)
+
+
+def unwritable(path: Path, error: OSError) -> Unwritable:
+    """What to raise where a place cannot be written to."""
+    return Unwritable(f"cannot write to {str(path)!r}: {error.strerror or error}; name another place with --out")
+
+
+def _refuse_file(folder: Path) -> None:
+    for place in (folder, *folder.parents):
+        if os.path.lexists(place) and not place.is_dir():
+            what = "a link that leads nowhere" if place.is_symlink() else "a file"
+            raise Unwritable(
+                f"{str(place)!r} is {what}; expected a folder: move it away, or name another place with --out"
+            )
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what a killed run of this name has left."""
+    for left in folder.parent.glob(f".{folder.name}.*.part"):
+        pid = left.name.split(".")[-2]
+        if re.fullmatch("[0-9]{1,9}", pid) and not alive(int(pid)):
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def alive(pid: int) -> bool:
+    """Whether another process of that number runs; on Windows, where asking would end it, always."""
+    if pid == os.getpid():  # left by an earlier process of our number, as containers have them
+        return False
+    try:
+        if os.name != "nt":
+            os.kill(pid, 0)
+        return True
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+
+
+def publish(stage: Path, folder: Path, manifest: str = MANIFEST) -> None:
+    """Move all staged files into place, the manifest last; files that only an earlier manifest lists go.
+
+    Everything that can fail for lack of space or rights has happened by then: what is left is renaming.
+    A user's own files in the folder stay. Another run that publishes here, and Ctrl-C, wait until all are in place.
+    """
+    folder.mkdir(exist_ok=True)
+    staged = {_key(file, stage): file for file in _files(stage)}
+    targets = {name: folder / name for name in staged}
+    for target in targets.values():
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.is_dir() or not os.access(target.parent, os.W_OK):
+            raise Unwritable(
+                f"cannot write {str(target)!r}: a folder is in its place, or the folder around it is read-only"
+            )
+    with _alone(folder), _undisturbed():
+        stale = set(listed(folder, manifest)) - set(staged)
+        for name in sorted(set(staged) - {manifest}):
+            staged[name].replace(targets[name])
+        for name in stale:
+            (folder / name).unlink(missing_ok=True)
+        staged[manifest].replace(targets[manifest])
+
+
+def write(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write files, by their names relative to ``folder``, and make sure that they are on the disk."""
+    for name, content in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def replace(path: Path, content: bytes) -> None:
+    """Write one file beside its place, then put it there.
+
+    Raises
+    ------
+    Unwritable
+        The place cannot be written to, or the disk is full.
+    """
+    with replacing(path) as file:
+        file.write(content)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """A file to write to piece by piece, which takes its place when it is whole; a missing folder is made.
+
+    Raises
+    ------
+    Unwritable
+        The place cannot be written to, or the disk is full.
+    """
+    part = path.parent / f".{path.name}.{os.getpid()}.part"
+    try:
+        if path.exists() and not path.is_file():
+            raise Unwritable(f"cannot write {str(path)!r}: it is a folder or a device; expected a file")
+        part.parent.mkdir(parents=True, exist_ok=True)
+        with part.open("wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from None
+    finally:
+        with suppress(OSError):
+            part.unlink()
+
+
+def hashes(folder: Path) -> dict[str, str]:
+    """SHA-256 of every file below a folder, by its name relative to it."""
+    return {_key(f, folder): sha256(f.read_bytes()).hexdigest() for f in sorted(_files(folder))}
+
+
+def _files(folder: Path) -> list[Path]:
+    return [f for f in folder.rglob("*") if f.is_file()]
+
+
+def _key(file: Path, folder: Path) -> str:
+    return file.relative_to(folder).as_posix()
+
+
+def listed(folder: Path, manifest: str = MANIFEST) -> list[str]:
+    """Files in the manifest of an earlier build; none where it is missing or damaged, and none outside the folder."""
+    try:
+        names = list(json.loads((folder / manifest).read_text("utf-8"))["files"])
+        return [n for n in names if _inside(folder, folder / n)]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return []
+
+
+def _inside(folder: Path, file: Path) -> bool:
+    return file.parent.resolve().is_relative_to(folder.resolve()) and (file.is_file() or file.is_symlink())
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Wait until no other run publishes to a folder, where the system can tell."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a network folder without locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Hold back Ctrl-C and a request to end for a moment."""
+    held: list[int] = []
+    before: dict[int, Any] = {}
+
+    def hold(number: int, _: FrameType | None) -> None:
+        held.append(number)
+
+    with suppress(ValueError):  # not in the main thread: nobody interrupts here
+        for number in (signal.SIGINT, signal.SIGTERM):
+            before[number] = signal.signal(number, hold)
+    try:
+        yield
+    finally:
+        for which, handler in before.items():
+            signal.signal(which, handler)
+    for which in held[:1]:
+        signal.raise_signal(which)

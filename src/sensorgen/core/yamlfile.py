@@ -1,0 +1,126 @@
+"""YAML from people we do not know: plain data only, small, without aliases."""
+
+import os
+import re
+import stat
+from pathlib import Path
+from typing import Any, ClassVar
+
+import yaml
+
+from sensorgen.core.errors import BadInput
+
+MAX_BYTES = 100_000  # a design is a few hundred bytes; a hundred kilobytes are a mistake or an attack
+MAX_DEPTH = 20
+_TEXT = "tag:yaml.org,2002:str"
+_KINDS = {type(None): "nothing", list: "a list", str: "text", bool: "true or false", int: "a number", float: "a number"}
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Read a mapping from a YAML file.
+
+    Raises
+    ------
+    BadInput
+        Unreadable, no regular file, over ``MAX_BYTES``, not UTF-8, or what :func:`parse` refuses.
+    """
+    try:
+        content = _content(path)
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise BadInput(f"{path}: not UTF-8 at byte {error.start}: save it as UTF-8 text") from None
+    except (OSError, ValueError) as error:
+        raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
+    return parse(text, str(path))
+
+
+def _content(path: Path) -> bytes:
+    """Content of a regular file; a pipe or device, which may never end, is not waited for."""
+    with open(path, "rb", opener=_unblocked) as file:
+        found = os.fstat(file.fileno())
+        if not stat.S_ISREG(found.st_mode):
+            raise BadInput(f"{path}: not a file; expected a YAML file")
+        if found.st_size > MAX_BYTES:
+            raise BadInput(f"{path}: {found.st_size} bytes; expected at most {MAX_BYTES}: is this the right file?")
+        return file.read(MAX_BYTES)
+
+
+def _unblocked(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def parse(text: str, where: str) -> dict[str, Any]:
+    """Parse a YAML mapping; ``where`` names its file in errors.
+
+    Only what is written so is a number (``1e-3`` too), a truth (``true``, ``false``) or nothing; ``no``, ``010``,
+    ``1:30`` and dates stay text, unlike in YAML 1.1. Tags are refused, since they may name Python objects, and so
+    are aliases: a few lines of them expand to gigabytes, and no file of ours needs one.
+
+    >>> parse("{a: 1e-3, b: no, c: 010}", "example")
+    {'a': 0.001, 'b': 'no', 'c': '010'}
+
+    Raises
+    ------
+    BadInput
+        Not YAML, too deep, a key given twice, or not a mapping; the message names line and column.
+    """
+    try:
+        _refuse_tricks(text, where)
+        data = yaml.load(text, Loader=_Loader)  # noqa: S506 - _Loader is a safe loader
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        raise BadInput(f"{where}: {place}{', '.join(filter(None, (error.context, error.problem)))}") from None
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        raise BadInput(f"{where}: not YAML: {' '.join(str(error).split())}") from None
+    if not isinstance(data, dict):
+        kind = _KINDS.get(type(data), "something else")
+        raise BadInput(f"{where}: holds {kind}; expected a mapping of names to values")
+    return data
+
+
+def _refuse_tricks(text: str, where: str) -> None:
+    depth = 0
+    for event in yaml.parse(text, Loader=_Loader):
+        place = f"{where}: line {event.start_mark.line + 1}"  # type: ignore[union-attr]
+        if isinstance(event, yaml.AliasEvent):
+            raise BadInput(f"{place}: aliases (*name) are not taken: write the value out")
+        if getattr(event, "tag", None):
+            raise BadInput(f"{place}: tags (!name) are not taken: write plain values")
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        if depth > MAX_DEPTH:
+            raise BadInput(f"{place}: nested deeper than {MAX_DEPTH} levels")
+
+
+_Fast: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class _Loader(_Fast):  # type: ignore[misc,valid-type]
+    """The safe loader, ten times faster in C, with fewer surprises: a key given twice is refused."""
+
+    yaml_implicit_resolvers: ClassVar[dict[str, list[tuple[str, re.Pattern[str]]]]] = {}
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen: set[str] = set()
+        for key, _ in node.value:
+            if key.tag != _TEXT:
+                shown = repr(key.value) if isinstance(key, yaml.ScalarNode) else "that is a list or a mapping"
+                said = f"key {shown}: expected text, a number in quotes"
+                raise yaml.constructor.ConstructorError(None, None, said, key.start_mark)
+            if key.value in seen:
+                raise yaml.constructor.ConstructorError(None, None, f"key {key.value!r} is given twice", key.start_mark)
+            seen.add(key.value)
+        return dict(super().construct_mapping(node, deep))
+
+
+_FLOAT = r"[-+]?((0|[1-9][0-9]*)(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]{1,4})?|[-+]?\.inf|\.nan"
+for _kind, _pattern, _first in (  # as in YAML 1.2
+    ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
+    ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
+    ("int", r"[-+]?(0|[1-9][0-9]{0,17})", list("-+0123456789")),
+    ("float", _FLOAT, list("-+.0123456789")),
+):
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", re.compile(f"(?:{_pattern})$"), _first)

@@ -1,0 +1,1 @@
+"""What was asked for: shape, parameters, materials with sources, printer, quality."""

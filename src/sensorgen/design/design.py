@@ -1,0 +1,406 @@
+"""A design: one variant of a sensor, with everything that decides how it is printed and what it should do."""
+
+import dataclasses
+import hashlib
+import json
+import math
+import re
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator
+
+from sensorgen import __version__
+from sensorgen.core import plugins as registry
+from sensorgen.core import yamlfile
+from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
+from sensorgen.core.findings import Finding
+from sensorgen.core.records import Strict, checked, shown
+from sensorgen.design import materials as material_files
+from sensorgen.design import shapes
+from sensorgen.design.materials import own
+from sensorgen.design.printer import Printer, Quality, load_printer, load_quality
+from sensorgen.scene.scene import Envelope, Fill, Scene
+
+MAX_CELLS = 50_000  # crossed strips of 330 x 330 mm have 27 225
+MAX_LAYERS = 5_000  # 30 mm in layers of 0.06 mm have 500
+_NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,98}[A-Za-z0-9])?")
+# Windows cannot have files of these names.
+_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+
+Slot = Annotated[str, Field(pattern=r"^[a-z0-9-]+(@[a-z0-9.-]+)?$", examples=["x60", "x60@thesis-4.1"])]
+
+
+class Slots(Strict):
+    """Which material fills which part, each with the source of its values: ``x60`` or ``x60@thesis-4.1``."""
+
+    top_electrode: Slot = "etpu@thesis-c.1-top"
+    bottom_electrode: Slot = "etpu@thesis-c.1-bottom"
+    film: Slot = "x60"
+    dielectric: Slot = "x60"
+    isolation: Slot = "x60"
+    support: Slot | None = Field(default=None, description="Fills the air while printing; left empty when not given.")
+
+
+class Infill(Strict):
+    """How densely one material is printed."""
+
+    percent: Annotated[float, Field(gt=0, le=100)] | None = None
+    pattern: Literal["rectilinear", "grid", "concentric", "honeycomb", "triangles"] | None = None
+
+
+class Waiver(Strict):
+    """A finding that the designer accepts, and why."""
+
+    rule: Annotated[str, Field(pattern=r"^[0-9]+(-[a-z-]+)?$", examples=["5-width", "5"])]
+    body: str = Field(default="", description="Name of the body; all bodies when not given.")
+    reason: Annotated[str, Field(min_length=5)]
+
+
+class Design(Strict):
+    """A named variant of a sensor."""
+
+    name: str = Field(
+        default="",
+        description="Folder and file name; made from the parameters when not given.",
+        json_schema_extra={"pattern": f"^{_NAME.pattern}$"},
+    )
+    shape: str
+    parameters: dict[str, float | str] = Field(default={})
+    materials: Slots = Slots()
+    material_values: dict[str, dict[str, float]] = Field(
+        default={},
+        description="Material to quantity to a value, in its name's unit, that goes before every source's.",
+        examples=[{"x60": {"relative_permittivity": 3.0}}],
+    )
+    printer: str = "diabase-h5"
+    quality: str = "fine"
+    nozzle_mm: Annotated[float, Field(ge=0.05, le=5.0)] | None = Field(
+        default=None, description="Nozzle diameter when it is not the printer's own [mm]."
+    )
+    tools: dict[str, Annotated[int, Field(ge=0, le=99)]] = Field(
+        default={}, description="Material to tool, in the printer's own numbers."
+    )
+    infill: dict[str, Infill] = Field(default={}, description="Material to infill.")
+    orientation: Literal["as-drawn", "upside-down"] = "as-drawn"
+    shrinkage: Annotated[float, Field(ge=0, lt=0.9)] = Field(
+        default=0.0, description="Share that the bake takes off in the plane; the print is made larger by it [-]."
+    )
+    waivers: tuple[Waiver, ...] = Field(default=(), strict=False)  # YAML has lists only
+
+    @field_validator("name")
+    @classmethod
+    def _safe_name(cls, name: str) -> str:
+        if not _NAME.fullmatch(name) or _DEVICES.fullmatch(name):
+            raise ValueError(
+                f"{shown(name)} cannot be a file name everywhere; expected at most 100 letters a to z, digits, "
+                "'.', '-' and '_', with a letter or digit first and last: set it with --name, or 'name:' in the file"
+            )
+        return name
+
+    @cached_property
+    def params(self) -> Envelope:
+        """The shape's parameters, checked and complete."""
+        return parameters(self.shape, self.parameters)
+
+    @cached_property
+    def machine(self) -> Printer:
+        """The printer, with this design's nozzle."""
+        found = load_printer(self.printer)
+        return found.model_copy(update={"nozzle_mm": self.nozzle_mm}) if self.nozzle_mm else found
+
+    @cached_property
+    def layers(self) -> Quality:
+        """The print quality."""
+        return load_quality(self.quality)
+
+    def material(self, name: str) -> material_files.Material:
+        """A material by name, with the values that this design sets itself."""
+        slots = ((getattr(self.materials, part) or "").partition("@") for part in Slots.model_fields)
+        sources = sorted({source for material, _, source in slots if material == name and source})
+        return material_files.load(name, sources).with_values(self.material_values.get(name, {}))
+
+    def slot(self, part: str) -> tuple[material_files.Material, str]:
+        """Material of a part, and the source to take its values from."""
+        name, _, source = (getattr(self.materials, part) or "").partition("@")
+        return self.material(name), source
+
+    def used(self) -> dict[str, str]:
+        """Materials of the scene's bodies with their source; the first slot that names one decides."""
+        here = {body.material for body in self.drawn.bodies}
+        found: dict[str, str] = {}
+        for part in Slots.model_fields:
+            if getattr(self.materials, part):
+                material, source = self.slot(part)
+                if material.name in here:
+                    found[material.name] = found.get(material.name) or source
+        return found
+
+    @cached_property
+    def drawn(self) -> Scene:
+        """The sensor as it is meant to be, bottom electrode down."""
+        names = {part: (value or "").partition("@")[0] for part, value in self.materials.model_dump().items()}
+        scene: Scene = shape(self.shape).scene(self.params, Fill(**names))
+        return scene
+
+    @cached_property
+    def in_use(self) -> Scene:
+        """The sensor as drawn, its soluble support gone."""
+        return dataclasses.replace(self.drawn, bodies=tuple(b for b in self.drawn.bodies if not b.is_support()))
+
+    @cached_property
+    def printed(self) -> Scene:
+        """The sensor as it lies on the bed: enlarged against shrinkage, and turned over if so ordered."""
+        scene = self.drawn.stretched(1.0 / (1.0 - self.shrinkage)) if self.shrinkage else self.drawn
+        return scene.turned_over() if self.orientation == "upside-down" else scene
+
+    def tool(self, material: str) -> int:
+        """The tool that prints a material, in the printer's own number.
+
+        Raises
+        ------
+        MissingValue
+            Neither the design nor the printer says.
+        """
+        tools = self.machine.default_tools | self.tools
+        if material not in tools:
+            raise MissingValue(
+                f"no tool for {material}: name one with --tool {material}=NUMBER, or in the design's 'tools'"
+            )
+        return tools[material]
+
+    def resolved(self) -> dict[str, Any]:
+        """Everything that decides the sensor, with all defaults and the values of material and printer filled in."""
+        stuff = {}
+        for name, source in sorted(self.used().items()):
+            stuff[name] = self.material(name).model_dump() | {"source": source}
+        return {
+            "sensorgen": __version__,
+            **self.model_dump(exclude={"name", "parameters", "printer", "quality", "waivers"}),
+            "parameters": dataclasses.asdict(self.params),
+            "materials_values": stuff,
+            "printer_values": self.machine.model_dump(),
+            "quality_values": self.layers.model_dump(),
+        }
+
+    def id(self) -> str:
+        """Hash of all resolved parameters, material values and the software's version; not of the design's name."""
+        text = json.dumps(self.resolved(), sort_keys=True, allow_nan=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    def waived(self, findings: list[Finding]) -> list[Finding]:
+        """The findings, with the reason where the design accepts them."""
+        return [
+            dataclasses.replace(f, waiver=next((w.reason for w in self.waivers if _covers(w, f)), "")) for f in findings
+        ]
+
+    def idle_waivers(self, findings: list[Finding]) -> list[Finding]:
+        """A finding for each waiver that covers none of ``findings``: misspelt, or no longer needed."""
+        return [
+            Finding(
+                "10-waiver",
+                "warning",
+                w.body or "sensor",
+                f"the waiver of rule {w.rule} covers no finding",
+                "remove it, or correct its rule and body",
+            )
+            for w in self.waivers
+            if not any(_covers(w, f) for f in findings)
+        ]
+
+
+def _covers(waiver: Waiver, finding: Finding) -> bool:
+    same_rule = finding.rule == waiver.rule or finding.rule.partition("-")[0] == waiver.rule
+    return same_rule and waiver.body in ("", finding.body)
+
+
+def shape(name: str) -> ModuleType:
+    """The module of a shape; raises UnknownName with the nearest one."""
+    return registry.load(shapes, name)
+
+
+def fields(shape_name: str) -> dict[str, dataclasses.Field[Any]]:
+    """The parameters of a shape, by name."""
+    return {f.name: f for f in dataclasses.fields(shape(shape_name).Params)}
+
+
+def parameters(shape_name: str, given: Mapping[str, float | str]) -> Envelope:
+    """Check the parameters of a shape and fill in its defaults.
+
+    Raises
+    ------
+    UnknownName
+        The shape has no such parameter.
+    OutOfRange
+        A value is no number, or outside the range of sense.
+    """
+    known = fields(shape_name)
+    values = {}
+    for name, value in given.items():
+        if name not in known:
+            raise UnknownName(f"parameter of {shape_name}", name, known)
+        values[name] = _checked(known[name], value)
+    params: Envelope = shape(shape_name).Params(**values)
+    _refuse_swarms(params)
+    return params
+
+
+def _checked(field: dataclasses.Field[Any], value: float | str) -> float | str:
+    choices = field.metadata.get("choices")
+    if choices:
+        if value not in choices:
+            raise UnknownName(f"value of {field.name}", str(value), choices)
+        return value
+    low, high = field.metadata["range"]
+    if isinstance(value, str) or not math.isfinite(value) or not low <= value <= high:
+        shown = repr(value) if isinstance(value, str) else f"{value:g}"
+        raise OutOfRange(f"{field.name} is {shown}; expected a number from {low:g} to {high:g} mm")
+    return float(value)
+
+
+def _refuse_swarms(params: Envelope) -> None:
+    """Refuse patterns so fine that their mesh would fill the memory."""
+    cells = params.cells()
+    if cells > MAX_CELLS:
+        raise OutOfRange(
+            f"{cells:.3g} cells of the pattern on {params.length_mm:g} x {params.width_mm:g} mm; expected at most "
+            f"{MAX_CELLS}: use a longer period or a smaller sensor"
+        )
+
+
+def load(path: Path) -> Design:
+    """Read a design file.
+
+    Raises
+    ------
+    BadInput
+        Not readable, not YAML, or not a design; the message names file and key.
+    """
+    data = yamlfile.read(path)
+    return make({"name": path.stem} | data, str(path))
+
+
+def make(data: Mapping[str, Any], where: str = "") -> Design:
+    """Check a design given as plain data; ``where`` names its file in errors."""
+    try:
+        if isinstance(data, Mapping) and "shape" not in data:
+            raise BadInput(f"shape is missing; expected {', '.join(registry.names(shapes))}")
+        design = checked(Design, data)
+        _check_names(design)
+    except SensorgenError as error:
+        raise error.within(where) from None
+    return design if design.name else design.model_copy(update={"name": name_of(design)})
+
+
+def _check_names(design: Design) -> None:
+    """Look up every name that a design uses, so that a wrong one is told before any work."""
+    _ = design.params, design.machine, design.layers
+    for part in Slots.model_fields:
+        if getattr(design.materials, part):
+            material, source = design.slot(part)
+            if source and source not in material.sources():
+                raise UnknownName(f"source of {material.name}", source, material.sources() | set(own.names()))
+            if material.conductor != part.endswith("_electrode"):
+                kind = "conducts" if material.conductor else "does not conduct"
+                raise BadInput(f"materials.{part}: {material.name} {kind}")
+    for name, values in design.material_values.items():
+        material_files.check_own(name, values)
+    _one_source_each(design)
+    _soluble(design)
+    _refuse_stacks(design)
+    for name in (*design.tools, *design.infill):
+        material_files.load(name)
+    machine = design.machine
+    for name, tool in design.tools.items():
+        if tool not in machine.tool_numbers:
+            raise BadInput(f"tools.{name}: {machine.name} has no tool {tool}; it has {list(machine.tool_numbers)}")
+    _one_tool_each(design)
+
+
+def _one_source_each(design: Design) -> None:
+    """A dielectric has one permittivity, wherever it is used; the electrodes may differ."""
+    chosen: dict[str, str] = {}
+    for part in Slots.model_fields:
+        if getattr(design.materials, part) and not part.endswith("_electrode"):
+            material, source = design.slot(part)
+            if source and chosen.setdefault(material.name, source) != source:
+                other = chosen[material.name]
+                raise BadInput(f"materials.{part}: {material.name} is taken from {other} elsewhere; name one source")
+
+
+def _soluble(design: Design) -> None:
+    """The support is washed out: nothing that stays may be made of it."""
+    slots = {part: (value or "").partition("@")[0] for part, value in design.materials.model_dump().items()}
+    support = slots.pop("support")
+    if support and support in slots.values():
+        raise BadInput(
+            f"materials.support: the sensor itself is made of {support}; expected a material that dissolves, as bvoh"
+        )
+
+
+def _refuse_stacks(design: Design) -> None:
+    """Refuse layers so thin that they would fill the memory."""
+    layers = design.drawn.size_mm[2] / design.layers.layer_mm
+    if layers > MAX_LAYERS:
+        raise OutOfRange(
+            f"{layers:.3g} layers of {design.layers.layer_mm:g} mm; expected at most {MAX_LAYERS}: use another quality"
+        )
+
+
+def _one_tool_each(design: Design) -> None:
+    owners: dict[int, str] = {}
+    for material in sorted({body.material for body in design.drawn.bodies}):
+        tool = design.tool(material)
+        if tool in owners:
+            raise BadInput(
+                f"tool {tool} is given to both {owners[tool]} and {material}: choose with --tool {material}=NUMBER"
+            )
+        owners[tool] = material
+
+
+def name_of(design: Design) -> str:
+    """A name made of the shape and of whatever is not at its default.
+
+    >>> name_of(Design(shape="tri", parameters={"dielectric_mm": 0.1}))
+    'trix-d0.1'
+    >>> name_of(Design(shape="rect", parameters={"along": "yx", "length_mm": 50}, quality="extrafine"))
+    'sqyx-d0.2-length50-extrafine'
+    """
+    params, known = design.params, fields(design.shape)
+    start = getattr(shape(design.shape), "SHORT", design.shape) + str(getattr(params, "along", ""))
+    parts = [start]
+    if hasattr(params, "along"):
+        parts.append(f"d{params.dielectric_mm:.10g}")  # type: ignore[attr-defined]
+    said = {"along"} | ({"dielectric_mm"} if hasattr(params, "along") else set())
+    for key, field in known.items():
+        value = getattr(params, key)
+        if key not in said and value != field.default:
+            parts.append(key.removesuffix("_mm").replace("_", "-") + _said(value))
+    default = Design(shape=design.shape)
+    for given, usual in ((design.quality, default.quality), (design.printer, default.printer)):
+        parts.append("" if given == usual else _plain(Path(given).stem))
+    if design.orientation != default.orientation:
+        parts.append("upside-down")
+    said_if_set = {"material_values"} if design.material_values else set()
+    others = design.model_dump(include={"materials", "nozzle_mm", "tools", "infill", "shrinkage"} | said_if_set)
+    if others != default.model_dump(include=set(others)):
+        parts.append(_digest(others))
+    whole = "-".join(filter(None, parts))
+    return whole if len(whole) <= 100 else f"{whole[:90].rstrip('.-_')}-{_digest(whole)}"
+
+
+def _said(value: float | str) -> str:
+    """A parameter's value as a part of a name."""
+    return f"-{_plain(value)}" if isinstance(value, str) else f"{value:.10g}"
+
+
+def _plain(word: str) -> str:
+    """A word as a part of a file's name."""
+    return re.sub("[^A-Za-z0-9._]+", "-", word).strip(".-_")
+
+
+def _digest(data: object) -> str:
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:6]

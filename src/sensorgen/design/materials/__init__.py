@@ -1,0 +1,239 @@
+"""Materials: every published value under its source, because the sources disagree.
+
+A material is a YAML file beside this one; see ``etpu.yaml``. A design names a material and, if it
+likes, the source to take: ``x60`` or ``x60@thesis-4.1``. Sources of the user's own, as a fit to
+measurements, are files in a folder of theirs (:mod:`sensorgen.design.materials.own`); a design that names
+none of them never sees them, so that its identity does not hang on who looks at it.
+"""
+
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib import resources
+from math import inf, isinf
+from typing import Annotated
+
+from pydantic import Field
+
+from sensorgen.core import yamlfile
+from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
+from sensorgen.core.records import Strict, checked
+from sensorgen.design.materials import own
+
+FILM_LEAK = "leak_s_per_m2"  # leak of a film per area; a matter of how it was printed: no source that ships gives one
+PIEZORESISTANCE = "piezoresistance_per_pa"  # relative rise of an electrode's resistivity with pressure: none either
+SET = "set by the user"  # source of a value that stands in a design itself
+_RANGES = {  # finite ends belong to it; anything else is above 0
+    "poisson_ratio": (-1.0, 0.5),
+    "relative_permittivity": (1e-9, 1e9),  # far beyond any material; ratios of such values are still numbers
+    "loss_tangent": (0.0, 1e6),
+    PIEZORESISTANCE: (-inf, inf),
+}
+
+
+class Value(Strict):
+    """One number as one source gives it; the property's name carries the unit."""
+
+    value: float
+    source: str
+    default: bool = False
+    implausible: bool = False
+    note: str = ""
+    low: float | None = None
+    high: float | None = None
+
+
+class OwnValue(Strict):
+    """One number of a source of the user's own."""
+
+    value: float
+    note: str = ""
+    low: float | None = None
+    high: float | None = None
+
+
+class Own(Strict):
+    """A source of the user's own: what it is, and its values by material and quantity."""
+
+    about: str
+    materials: dict[str, dict[str, OwnValue]]
+
+
+class Material(Strict):
+    """A material with every value that its sources give."""
+
+    name: str
+    title: str
+    about: str
+    colour: Annotated[str, Field(pattern="^#[0-9a-f]{6}$")]
+    conductor: bool
+    properties: dict[str, list[Value]]
+    print: dict[str, list[Value]] = Field(default={})
+    drying: str = ""
+
+    def sources(self) -> set[str]:
+        """Names of all sources that this material quotes."""
+        groups = (self.properties, self.print)
+        return {v.source for group in groups for values in group.values() for v in values} - {SET}
+
+    def with_values(self, values: Mapping[str, float]) -> "Material":
+        """The material with values of the user's own, which go before every source's.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Number by quantity, in the unit of the quantity's name.
+        """
+        own = {key: [Value(value=value, source=SET), *self.properties.get(key, [])] for key, value in values.items()}
+        return self.model_copy(update={"properties": self.properties | own})
+
+    def value(self, quantity: str, source: str = "") -> Value:
+        """The value of a quantity that the user set, else from ``source``, or the default where that source is silent.
+
+        Parameters
+        ----------
+        quantity : str
+            Name with unit, as in the material's file: ``relative_permittivity``, ``speed_mm_s``.
+        source : str
+            Name of a source, or "" for the default.
+
+        Raises
+        ------
+        MissingValue
+            No source gives it, or only an implausible one that a design must name to get.
+        """
+        values = self.properties.get(quantity, []) + self.print.get(quantity, [])
+        own = [v for v in values if v.source == SET]
+        chosen = own or [v for v in values if v.source == source] or [v for v in values if v.default]
+        if not chosen:
+            named = ", ".join(sorted(v.source for v in values))
+            unnamed = ": no source gives it; set one with --set or material_values"
+            raise MissingValue(
+                f"{self.name} has no default {quantity}" + (f"; name one of its sources: {named}" if named else unnamed)
+            )
+        return chosen[0]
+
+
+def names() -> list[str]:
+    """Names of the materials that ship with sensorgen."""
+    files = resources.files(__name__).iterdir()
+    return sorted(f.name.removesuffix(".yaml") for f in files if f.name.endswith(".yaml") and f.name != "sources.yaml")
+
+
+@cache
+def quantities() -> list[str]:
+    """Names of all quantities that a material can have, those of printing left out."""
+    return sorted({quantity for name in names() for quantity in load(name).properties} | {FILM_LEAK})
+
+
+def check_own(name: str, values: Mapping[str, float]) -> None:
+    """Refuse values of the user's own that no material can have.
+
+    Raises
+    ------
+    UnknownName
+        No such material, or no such quantity; the nearest one is offered.
+    OutOfRange
+        A number that the quantity cannot be.
+    """
+    load(name)
+    for quantity, value in values.items():
+        if quantity not in quantities():
+            raise UnknownName(f"quantity of {name}", quantity, quantities())
+        low, high = _RANGES.get(quantity, (0.0, inf))
+        if not low <= value <= high or isinf(value) or (value == 0 and quantity not in _RANGES):
+            raise OutOfRange(f"{quantity} of {name} is {value:g}; expected {_said(low, high, 'a number above 0')}")
+
+
+def _said(low: float, high: float, unsigned: str) -> str:
+    """What numbers a quantity can be, in words."""
+    if high < inf:
+        return f"{low:g} to {high:g}"
+    return unsigned if low == 0 else "a finite number"
+
+
+def load(name: str, sources: Iterable[str] = ()) -> Material:
+    """Read a material by name.
+
+    Parameters
+    ----------
+    name : str
+        Of the material.
+    sources : iterable of str
+        Sources of the user's own whose values are wanted too; others among them count for nothing.
+
+    Raises
+    ------
+    UnknownName
+        No material goes by that name.
+    BadInput
+        The file of such a source is damaged.
+    """
+    found = _shipped(name)
+    for source in sources:
+        if source in own.names():
+            found = _extended(found, source)
+    return found
+
+
+def _extended(material: Material, source: str) -> Material:
+    """A material with the values that a source of the user's own has of it."""
+    added = own_source(source).materials.get(material.name, {})
+    values = {
+        quantity: [*material.properties.get(quantity, []), Value(source=source, **dict(value))]
+        for quantity, value in added.items()
+    }
+    return material.model_copy(update={"properties": material.properties | values})
+
+
+def own_source(source: str) -> Own:
+    """A source of the user's own.
+
+    Raises
+    ------
+    BadInput
+        Its file is damaged, or has the name of a source that ships.
+    """
+    path = own.path(source)
+    try:
+        found = checked(Own, yamlfile.read(path))
+        if source in _shipped_citations():
+            raise BadInput(f"{source} is the name of a source that ships with sensorgen; expected another name")
+        for name, values in found.materials.items():
+            _check_values(name, {key: value.value for key, value in values.items()})
+    except (BadInput, UnknownName, OutOfRange) as error:
+        raise error if str(path) in str(error) else error.within(str(path)) from None
+    return found
+
+
+def _check_values(name: str, values: Mapping[str, float]) -> None:
+    """Refuse values that are none; quantities may be new ones, which nothing reads."""
+    _shipped(name)
+    for quantity, value in values.items():
+        low, high = _RANGES.get(quantity, (0.0, inf))
+        if not low <= value <= high or isinf(value):
+            raise OutOfRange(f"{quantity} of {name} is {value:g}; expected {_said(low, high, 'a number from 0 on')}")
+
+
+@cache
+def _shipped(name: str) -> Material:
+    if name not in names():
+        raise UnknownName("material", name, names())
+    file = f"{name}.yaml"
+    data = yamlfile.parse((resources.files(__name__) / file).read_text("utf-8"), file)
+    try:
+        return checked(Material, {**data, "name": name})
+    except BadInput as error:
+        raise error.within(file) from None
+
+
+def citations() -> dict[str, str]:
+    """What each source's name stands for, those of the user's own too."""
+    return _shipped_citations() | {name: own_source(name).about for name in own.names()}
+
+
+@cache
+def _shipped_citations() -> dict[str, str]:
+    text = (resources.files(__name__) / "sources.yaml").read_text("utf-8")
+    data = yamlfile.parse(text, "sources.yaml")
+    theses = {str(name): f"{data['thesis']}: {where}" for name, where in data["sources"].items()}
+    return theses | {str(name): str(what) for name, what in data["others"].items()}

@@ -1,0 +1,184 @@
+"""Printers and print qualities, read from data: tools, nozzle, layers, bed."""
+
+import re
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Literal, Self, TypeVar
+
+from pydantic import Field, model_validator
+
+from sensorgen.core import yamlfile
+from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.core.records import Strict, checked
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# Titles stand on one line of a slicer's profile.
+Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]*$", examples=["one line without control characters"])]
+
+
+class MaxSpeed(Strict):
+    """Fastest the axes may move [mm/s]."""
+
+    xy: Positive
+    z: Positive
+    extruder: Positive
+
+
+class Reach(Strict):
+    """How far the axes go, in the printer's own coordinates [mm]."""
+
+    x: Annotated[tuple[Finite, Finite], Field(strict=False)]
+    y: Annotated[tuple[Finite, Finite], Field(strict=False)]
+    z: Annotated[tuple[Finite, Finite], Field(strict=False)]
+
+
+class Control(Strict):
+    """What the printer's firmware and macros make of G-code, where printers differ."""
+
+    reach_mm: Reach | None = None  # the bed and the height, where nobody says
+    spindles: Annotated[tuple[int, ...], Field(strict=False)] = ()  # tools that cut and do not print
+    layer_fan: int | None = None  # number of the fan on the part; None where it needs none
+    relative_e: bool = False  # absolute E is refused
+    names_tools: bool = False  # temperatures without a tool are refused, and set by G10 P S R
+    prime_macro: Line = ""  # changes tools, as tprime{tool}.g
+    macros: Annotated[tuple[Line, ...], Field(strict=False)] = ()  # others that stand on the printer
+    homes: Annotated[tuple[Line, ...], Field(strict=False)] = ("G28",)
+    levels: Annotated[tuple[Line, ...], Field(strict=False)] = ()
+    ends: Annotated[tuple[Line, ...], Field(strict=False)] = ()  # commands whose macro switches the heaters off
+    coldest_c: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 150.0
+    longest_purge_mm: Positive = 100.0
+    standby_c: Positive | None = None  # of a tool that waits; None: as hot as when it prints
+    preheat_s: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    tool_offsets_mm: dict[Annotated[int, Field(strict=False)], Finite] = Field(default={})  # baby steps per tool, M290
+    firmware_retraction: bool = False  # G10 and G11 instead of moves of E
+
+
+class Printer(Strict):
+    """A multi-tool printer; ``tool_numbers`` are those of its own G-code."""
+
+    name: str
+    title: Line
+    source: Line
+    bed_mm: Annotated[tuple[Positive, Positive], Field(strict=False)]  # YAML has lists only
+    height_mm: Positive
+    bed_origin: Literal["centre", "corner"]
+    gcode_flavour: Literal["reprapfirmware", "marlin"]
+    tool_numbers: Annotated[tuple[int, ...], Field(min_length=1, strict=False)]
+    default_tools: dict[str, int]
+    nozzle_mm: Positive
+    line_width_ratio: Positive
+    filament_mm: Positive
+    min_layer_mm: Positive
+    max_nozzle_c: Positive
+    max_bed_c: Positive
+    max_speed_mm_s: MaxSpeed
+    start_gcode: str
+    end_gcode: str
+    control: Control = Control()
+
+    @model_validator(mode="after")
+    def _tools_exist(self) -> Self:
+        if len(set(self.tool_numbers)) < len(self.tool_numbers):
+            raise ValueError(f"tool_numbers {list(self.tool_numbers)} has a number twice")
+        for material, tool in self.default_tools.items():
+            if tool not in self.tool_numbers:
+                raise ValueError(f"default tool {tool} for {material} is not among {list(self.tool_numbers)}")
+        for tool in (*self.control.spindles, *self.control.tool_offsets_mm):
+            if tool not in self.tool_numbers:
+                raise ValueError(f"tool {tool} under control is not among {list(self.tool_numbers)}")
+        return self
+
+    def line_mm(self) -> float:
+        """Width of one printed line [mm]."""
+        return round(self.nozzle_mm * self.line_width_ratio, 6)
+
+    def slicer_index(self, tool: int) -> int:
+        """Place of a tool in a slicer's list, which counts from 0 [-]."""
+        return self.tool_numbers.index(tool)
+
+    def tool_at_start(self) -> int | None:
+        """Tool in hand before a file takes one: RepRapFirmware has none, others have their first [-]."""
+        return None if self.gcode_flavour == "reprapfirmware" else self.tool_numbers[0]
+
+    def reach_mm(self) -> Reach:
+        """How far the axes go [mm]."""
+        if self.control.reach_mm is not None:
+            return self.control.reach_mm
+        (x, y), (wide, deep) = self.bed_centre_mm(), self.bed_mm
+        return Reach(x=(x - wide / 2, x + wide / 2), y=(y - deep / 2, y + deep / 2), z=(0.0, self.height_mm))
+
+    def bed_centre_mm(self) -> tuple[float, float]:
+        """Where the middle of the bed is in the printer's own coordinates [mm]."""
+        return (0.0, 0.0) if self.bed_origin == "centre" else (self.bed_mm[0] / 2, self.bed_mm[1] / 2)
+
+
+class Quality(Strict):
+    """How a print is cut into layers."""
+
+    name: str
+    title: Line
+    source: Line
+    layer_mm: Positive
+    first_layer_mm: Positive
+    infill_pattern: Literal["rectilinear", "grid", "concentric", "honeycomb", "triangles"]
+    travel_speed_mm_s: Positive
+    bridge_warning_mm: Positive
+    bridge_error_mm: Positive
+
+    def boundaries_mm(self, height_mm: float) -> list[float]:
+        """Heights of the layer boundaries from the bed to the first at or above ``height_mm`` [mm]."""
+        grid = [0.0]
+        while grid[-1] < height_mm - 1e-9:
+            grid.append(round(self.first_layer_mm + (len(grid) - 1) * self.layer_mm, 9))
+        return grid
+
+
+_Profile = TypeVar("_Profile", Printer, Quality)
+
+
+def folder() -> Path:
+    """Where printers, qualities and profile templates stand: inside the wheel, or beside ``src``."""
+    packed = Path(str(resources.files("sensorgen"))) / "slicer_profiles"
+    return packed if packed.is_dir() else Path(__file__).parents[3] / "slicer_profiles"
+
+
+def printer_names() -> list[str]:
+    """Names of the printers that ship with sensorgen."""
+    return sorted(p.stem for p in (folder() / "printers").glob("*.yaml"))
+
+
+def quality_names() -> list[str]:
+    """Names of the print qualities that ship with sensorgen."""
+    return sorted(p.stem for p in (folder() / "qualities").glob("*.yaml"))
+
+
+@cache
+def load_printer(name: str) -> Printer:
+    """Read a printer by its name, or from a YAML file of the user's."""
+    return _load(Printer, "printer", name, printer_names())
+
+
+@cache
+def load_quality(name: str) -> Quality:
+    """Read a print quality by its name, or from a YAML file of the user's."""
+    return _load(Quality, "quality", name, quality_names())
+
+
+def _load(kind: type[_Profile], word: str, name: str, known: list[str]) -> _Profile:
+    own = name.endswith((".yaml", ".yml"))
+    if not own and name not in known:
+        raise UnknownName(word, name, known)
+    plural = {"printer": "printers", "quality": "qualities"}[word]
+    path = Path(name) if own else folder() / plural / f"{name}.yaml"
+    data = yamlfile.read(path)
+    try:
+        return checked(kind, {**data, "name": _safe(path.stem)})
+    except BadInput as error:
+        raise error.within(str(path)) from None
+
+
+def _safe(stem: str) -> str:
+    """A file's name as it can stand in the names of other files, and in a slicer's profile."""
+    return re.sub("[^A-Za-z0-9._-]+", "-", stem)[:60].strip("._-") or "own"

@@ -1,0 +1,1 @@
+"""Files for the printer: 3MF, slicer profiles and runs, G-code parsed, checked and rewritten."""

@@ -1,0 +1,74 @@
+"""A file of G-code held against a printer: what it would do wrong, and what it takes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sensorgen.core.findings import SEVERITIES
+from sensorgen.design.printer import Printer
+from sensorgen.export.gcode import commands, limits
+from sensorgen.export.gcode.files import Source
+from sensorgen.export.gcode.found import Found, merged
+from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.report import Report, report
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What was found, the severe first, and what the file takes."""
+
+    findings: list[Found]
+    report: Report
+
+    def errors(self, strict: bool = False) -> list[Found]:
+        """Findings that refuse the file; with ``strict`` also the warnings."""
+        bad = SEVERITIES[: 2 if strict else 1]
+        return [f for f in self.findings if f.severity in bad]
+
+    def counts(self) -> dict[str, int]:
+        """How many findings there are of each severity [-]."""
+        return {severity: sum(f.severity == severity for f in self.findings) for severity in SEVERITIES}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, for JSON."""
+        return {"findings": [f.as_dict() for f in self.findings], **self.report.as_dict()}
+
+
+def check(
+    source: Source,
+    machine: Printer,
+    loaded: Mapping[int, str] | None = None,
+    *,
+    others_empty: bool = False,
+) -> Checked:
+    """Check a file, whoever has sliced it.
+
+    Parameters
+    ----------
+    source : Path, bytes or iterable of str
+        The file, its content, or its lines.
+    machine : Printer
+        Who is to print it.
+    loaded : mapping of int to str, optional
+        Material of each tool, for masses.
+    others_empty : bool
+        Whether nothing is on the other tools, so that they must not print.
+
+    Raises
+    ------
+    BadInput
+        The file cannot be read, or is no G-code.
+
+    Examples
+    --------
+    >>> from sensorgen.design.printer import load_printer
+    >>> found = check(["G90", "M83", "M140 S60", "G10 P9 S210"], load_printer("diabase-h5")).findings
+    >>> found[0].rule, found[0].line, found[0].message
+    ('tool', 4, 'tool 9 gets a temperature; diabase-h5 has 1, 2, 3, 4, 5')
+    """
+    motion = follow(source, machine.control.prime_macro)
+    loads = dict(loaded or {})
+    found = [*limits.check(motion, machine), *commands.check(motion, machine)]
+    if others_empty:
+        found += limits.check_loaded(motion, loads)
+    return Checked(merged(found), report(motion, machine, loads))

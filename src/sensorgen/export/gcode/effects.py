@@ -1,0 +1,150 @@
+"""Commands that change what later lines mean: while one holds, a file prints something else than it seems to.
+
+After RepRapFirmware's dictionary of G-code. Some hold until they are taken back (``G68`` until ``G69``, ``M221 S95``
+until ``M221 S100``) and are refused only if lines are printed meanwhile; a few are wrong wherever they stand.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from sensorgen.export.gcode.found import Found, error
+from sensorgen.export.gcode.moves import Event
+from sensorgen.export.gcode.words import Command
+
+PLACES = ("G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+STOPS = ("M2", "M81", "M99", "M112", "M999")  # after them nothing is printed; what a printer's files end with is more
+PAUSES = ("M25", "M226", "M600", "M601")
+# Steps, accelerations, speeds, limits, heaters and drives of the machine itself, which its own configuration sets.
+SETTINGS = (
+    "M42", "M143", "M201", "M203", "M208", "M280", "M301", "M302", "M303", "M304", "M305", "M307", "M308", "M500",
+    "M502", "M558", "M569", "M574", "M584", "M906", "M913", "M950",
+)  # fmt: skip
+# What the firmware takes, and the check follows or may pass over: moves, dwells, homing, probing, planes, units, modes.
+_KNOWN_G = {
+    *(f"G{n}" for n in (0, 1, 2, 3, 4, 10, 11, *range(17, 22), *range(27, 33), 53, 54, 60, 68, 69, *range(90, 95))),
+    *PLACES,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """What a command changes for the lines after it.
+
+    Attributes
+    ----------
+    name : str
+        What it changes; the command of the same name that takes it back ends it.
+    says : str
+        What comes of it, in words.
+    words : str
+        Letters of which it needs one to change anything; "" if it needs none.
+    neutral : float, optional
+        Number of these words that changes nothing, or takes an earlier one back.
+    """
+
+    name: str
+    says: str
+    words: str = ""
+    neutral: float | None = None
+
+    def is_neutral(self, command: Command) -> bool:
+        """Whether a command takes the effect back."""
+        given = [command.number(letter) for letter in self.words if command.has(letter)]
+        return bool(given) and all(value == self.neutral for value in given)
+
+    def speaks(self, command: Command) -> bool:
+        """Whether a command changes anything; without words most of them only ask."""
+        return not self.words or command.has(self.words)
+
+
+_EFFECTS = {
+    **dict.fromkeys(PLACES, Effect("place of work", "whose offset nobody knows")),
+    "G68": Effect("rotation", "turned in the plane of the bed"),
+    "G93": Effect("feed", "with feeds that are times"),
+    "M28": Effect("file", "into a file on the machine's card"),
+    "M37": Effect("simulation", "in simulation: not at all", "S", 0.0),
+    "M92": Effect("steps", "with other steps of the motors to a millimetre", "XYZE"),
+    "M200": Effect("volumes", "with E as volumes", "D", 0.0),
+    "M206": Effect("offset", "with places that are offset", "XYZ", 0.0),
+    "M221": Effect("flow", "with another flow than their E says", "S", 100.0),
+    "M452": Effect("mode", "by a machine in laser mode"),
+    "M453": Effect("mode", "by a machine in milling mode"),
+    "M556": Effect("skew", "skewed", "XYZ", 0.0),
+    "M563": Effect("tools", "by tools that are defined anew", "DHFXYS"),
+    "M564": Effect("limits", "with the machine's own limits switched off", "SH", 1.0),
+    "M567": Effect("mixture", "with another mixture of filaments", "E"),
+    "M579": Effect("scale", "in another size", "XYZ", 1.0),
+    "M592": Effect("flow", "with another flow than their E says", "AB", 0.0),
+    **dict.fromkeys(("M665", "M666", "M667", "M669"), Effect("kinematics", "with other kinematics")),
+}
+_OFFSETS = Effect("offset", "with places that are offset", "XYZ", 0.0)  # G10 with L1, L2 or L20, or of a tool
+_ENDS = {"G54": "place of work", "G69": "rotation", "G94": "feed", "M29": "file", "M451": "mode"}
+
+
+class Effects:
+    """What holds while a file is followed."""
+
+    def __init__(self) -> None:
+        """Nothing does."""
+        self.held: dict[tuple[str, str], tuple[int, str]] = {}  # name and tool or drive: line, and what is printed
+
+    def obey(self, event: Event) -> None:
+        """Follow one command."""
+        command = event.command
+        if ended := _ENDS.get(command.code):
+            self.held.pop((ended, ""), None)
+        effect = _OFFSETS if command.code == "G10" else _EFFECTS.get(command.code)
+        if effect is None or not effect.speaks(command):
+            return
+        key = effect.name, command.text("P") or command.text("D") or ""
+        if effect.is_neutral(command) and command.number("L") != 20:  # L20 offsets so that the nozzle is there
+            self.held.pop(key, None)
+        else:
+            self.held[key] = event.number, f"lines are printed {effect.says} ({_text(command)})"
+
+    def printing(self) -> Iterator[Found]:
+        """What is wrong with lines printed now; each told once."""
+        for number, message in self.held.values():
+            yield error("effect", number, message, "leave it out, and let the slicer place, scale and meter the print")
+        self.held.clear()
+
+
+def judge(command: Command, number: int) -> Iterator[Found]:
+    """What is wrong with a command wherever it stands.
+
+    Parameters
+    ----------
+    command : Command
+        Not of a move.
+    number : int
+        Its line.
+    """
+    code = command.code
+    if code[0] == "G" and code not in _KNOWN_G:
+        yield error("read", number, f"{code} is not followed: nobody knows where it goes", "write plain moves")
+    elif code in ("M112", "M999"):
+        yield error("end", number, f"{code} stops the machine at once", "leave it out")
+    elif code in ("M23", "M32", "M701", "M702", "M997"):
+        yield error("macro", number, f"{code} runs what the check cannot see", "leave it out")
+    elif code in PAUSES:
+        yield Found("pause", "info", number, f"{code} waits until somebody goes on", "be there, or leave it out")
+    elif code in SETTINGS:
+        yield Found(
+            "settings", "warning", number, f"{code} changes the machine itself; the check goes by the printer's file",
+            "leave it to the machine's own configuration",
+        )  # fmt: skip
+    elif code == "M121":
+        yield Found("modes", "warning", number, "M121 takes earlier modes back; that is not followed", "write them out")
+    elif code == "M220" and command.number("S") not in (None, 100.0):
+        yield Found(
+            "speed", "warning", number, f"{_text(command)} changes all speeds; the check goes by the feeds (F)",
+            "let the slicer set the speeds",
+        )  # fmt: skip
+    elif code[0] == "T" and command.number("P") is not None:
+        yield Found(
+            "tool-change", "warning", number, f"{_text(command)} leaves macros of the tool change out", "leave P out"
+        )
+
+
+def _text(command: Command) -> str:
+    return " ".join([command.code, *(letter + text[:20] for letter, text in command.words)])

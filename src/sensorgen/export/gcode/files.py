@@ -1,0 +1,63 @@
+"""Files of G-code from strangers: opened as text, or refused with the reason."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from sensorgen.core.errors import BadInput
+
+_MAGIC = {
+    b"GCDE": "binary G-code of Prusa's; export it as plain text (in PrusaSlicer: Preferences, Supports binary G-code)",
+    b"PK\x03\x04": "a zip archive, perhaps a 3MF; take the .gcode file out of it",
+    b"\x1f\x8b": "packed by gzip; unpack it",
+}
+_PEEK = 1 << 16
+
+
+Source = Path | bytes | Iterable[str]
+
+
+def text_of(source: Source) -> bytes:
+    r"""Text of a file of G-code, or of lines; every line ends with a line feed, whatever ended it before.
+
+    Parameters
+    ----------
+    source : Path, bytes or iterable of str
+        The file, its content, or its lines with or without their ends; lone surrogates stand for bytes that are no
+        UTF-8.
+
+    Raises
+    ------
+    BadInput
+        It cannot be read, is empty, or holds something else than text.
+
+    Examples
+    --------
+    >>> text_of(["G28", "G1 X1\n"])
+    b'G28\nG1 X1\n'
+    """
+    if isinstance(source, bytes):
+        return _one_end(source)
+    if not isinstance(source, Path):
+        return b"".join(_one_end(line.encode("utf-8", "surrogateescape") or b"\n") for line in source)
+    try:
+        text = source.read_bytes()
+    except OSError as error:
+        raise BadInput(f"cannot read {str(source)!r}: {error.strerror or error}") from None
+    _refuse(source, text[:_PEEK])
+    return _one_end(text)
+
+
+def _one_end(text: bytes) -> bytes:
+    if b"\r" in text:
+        text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return text if text.endswith(b"\n") or not text else text + b"\n"
+
+
+def _refuse(path: Path, head: bytes) -> None:
+    for magic, what in _MAGIC.items():
+        if head.startswith(magic):
+            raise BadInput(f"{str(path)!r} is {what}")
+    if not head.strip():
+        raise BadInput(f"{str(path)!r} is empty; expected G-code")
+    if b"\0" in head:
+        raise BadInput(f"{str(path)!r} is no text: byte {head.index(0) + 1} is 0; expected G-code as plain text")

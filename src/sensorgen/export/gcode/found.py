@@ -1,0 +1,54 @@
+"""What a check of G-code has found, as plain data: the form of :class:`sensorgen.core.findings.Finding`, with lines."""
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from sensorgen.core.findings import SEVERITIES
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """One finding of one rule.
+
+    Attributes
+    ----------
+    rule : str
+        Name of the rule, as in ``speed``.
+    severity : str
+        "error", "warning" or "info".
+    line : int
+        First line of the file where it shows, from 1 [-].
+    message : str
+        What is the matter, in one sentence.
+    advice : str
+        What to change.
+    count : int
+        In how many lines it shows [-].
+    """
+
+    rule: str
+    severity: str
+    line: int
+    message: str
+    advice: str
+    count: int = 1
+
+    def as_dict(self) -> dict[str, Any]:
+        """The finding, for JSON."""
+        return asdict(self)
+
+
+def error(rule: str, line: int, message: str, advice: str) -> Found:
+    """A finding that refuses the file."""
+    return Found(rule, "error", line, message, advice)
+
+
+def merged(found: Iterable[Found]) -> list[Found]:
+    """Findings of the same words as one, which has the first line; the severe first, and then by line."""
+    kept: dict[tuple[str, str, str], Found] = {}
+    for f in found:
+        key = (f.rule, f.severity, f.message)
+        old = kept.get(key)
+        kept[key] = f if old is None else replace(old, count=old.count + f.count)
+    return sorted(kept.values(), key=lambda f: (SEVERITIES.index(f.severity), f.line, f.rule))

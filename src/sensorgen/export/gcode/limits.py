@@ -1,0 +1,180 @@
+"""What the moves of a file ask of the axes: each rule looks at all moves at once."""
+
+from collections.abc import Callable, Iterator, Mapping
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.design.printer import Printer
+from sensorgen.export.gcode.found import Found, error
+from sensorgen.export.gcode.moves import NO_TOOL, Motion
+from sensorgen.export.gcode.words import Command
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+HAIR_MM = 1e-6  # what rounding may make of a limit
+STEP_MM = 1e-3  # heights closer than this are one height
+MM_MIN = 60.0
+MOST_TOLD = 20  # lines that cannot be read; more of them say no more
+
+
+def check(motion: Motion, machine: Printer) -> Iterator[Found]:
+    """Findings of all rules on moves.
+
+    Parameters
+    ----------
+    motion : Motion
+        The file.
+    machine : Printer
+        Who is to print it.
+    """
+    for rule in RULES:
+        yield from rule(motion, machine)
+
+
+def check_loaded(motion: Motion, loaded: Mapping[int, str]) -> Iterator[Found]:
+    """Refuse lines of tools on which there is nothing.
+
+    Parameters
+    ----------
+    motion : Motion
+        The file.
+    loaded : mapping of int to str
+        Material of each tool that has one.
+    """
+    tools = motion.tools.column(len(motion.rows), NO_TOOL)
+    for tool in np.setdiff1d(tools[motion.extruded_mm > 0], [NO_TOOL, *loaded]).astype(int).tolist():
+        number = int(motion.number[np.flatnonzero((tools == tool) & (motion.extruded_mm > 0))[0]])
+        known = ", ".join(f"{name} on {one}" for one, name in loaded.items())
+        yield error("tool", number, f"tool {tool} prints, and nothing is on it; loaded are {known}", "use another tool")
+
+
+def _found(motion: Motion, wrong: Mask, rule: str, severity: str, message: str, advice: str) -> Iterator[Found]:
+    """A finding if any move is wrong."""
+    if wrong.any():
+        numbers = np.unique(motion.rows[wrong, 9])
+        yield Found(rule, severity, int(numbers[0]), message, advice, len(numbers))
+
+
+def _reach(motion: Motion, machine: Printer) -> Iterator[Found]:
+    """No axis leaves its limits."""
+    reach = machine.reach_mm()
+    lowest, highest = motion.box_mm()
+    for k, (name, (low, high)) in enumerate(zip("XYZ", (reach.x, reach.y, reach.z), strict=True)):
+        below, above = lowest[:, k], highest[:, k]
+        for wrong, column, worst in ((below < low - HAIR_MM, below, np.min), (above > high + HAIR_MM, above, np.max)):
+            value = float(worst(column[wrong])) if wrong.any() else 0.0
+            yield from _found(
+                motion, wrong, "reach", "error",
+                f"a move goes to {name} {value:g}; the axis reaches {low:g} to {high:g} mm",
+                "place the print inside, and check the origin of the bed",
+            )  # fmt: skip
+
+
+def _bed(motion: Motion, machine: Printer) -> Iterator[Found]:
+    """Nothing is printed beside the bed or above the print volume."""
+    prints = _prints(motion)
+    middle = np.array(machine.bed_centre_mm())
+    low, high = (box[:, :2] for box in motion.box_mm())
+    beside = np.maximum(high - middle, middle - low) - np.array(machine.bed_mm) / 2
+    wrong = prints & (beside > HAIR_MM).any(axis=1)
+    far = float(beside[wrong].max()) if wrong.any() else 0.0
+    wide, deep = machine.bed_mm
+    yield from _found(
+        motion, wrong, "bed", "error", f"lines are printed up to {far:.3g} mm beside the bed of {wide:g} x {deep:g} mm",
+        "place the print on the bed",
+    )  # fmt: skip
+    above = prints & (motion.end_mm[:, 2] > machine.height_mm + HAIR_MM)
+    yield from _found(
+        motion, above, "bed", "error", f"lines are printed above {machine.height_mm:g} mm",
+        "print a lower piece",
+    )  # fmt: skip
+
+
+def _below(motion: Motion, _: Printer) -> Iterator[Found]:
+    """No move across goes lower than what is already printed: the nozzle would plough through it."""
+    prints, across = _prints(motion), motion.across_mm > 0
+    lowest = np.minimum(motion.start_mm[:, 2], motion.end_mm[:, 2])
+    printed = np.where(prints, lowest, -np.inf)
+    edges = [0, *sorted({e.row for e in motion.events if _names_z(e.command)}), len(lowest)]
+    wrong = np.zeros(len(lowest), dtype=bool)
+    for start, end in pairwise(edges):
+        top = np.maximum.accumulate(printed[start:end])
+        wrong[start:end] = across[start:end] & (motion.end_mm[start:end, 2] < top - STEP_MM)
+    yield from _found(
+        motion, wrong, "below", "error", "a move goes across lower than a layer that is already printed",
+        "raise the nozzle first; pieces printed one after the other are not for this printer",
+    )  # fmt: skip
+
+
+def _names_z(command: Command) -> bool:
+    """Whether heights count anew."""
+    return command.code == "G92" and (command.has("Z") or not command.has("XYE"))
+
+
+def _speed(motion: Motion, machine: Printer) -> Iterator[Found]:
+    """No axis is asked for more than its limit."""
+    feed = motion.feed_mm_min / MM_MIN
+    across, filament = motion.across_mm, np.abs(motion.filament_mm)
+    up = np.abs(motion.rows[:, 5] - motion.rows[:, 2])
+    way = np.hypot(across, up)
+    rate = feed / np.where(way > 0, way, np.maximum(filament, 1e-12))
+    limits = machine.max_speed_mm_s
+    extrudes = motion.extruded_mm > 0
+    axes = (("X and Y", across, limits.xy), ("Z", up, limits.z), ("E", filament, limits.extruder))
+    for name, length, limit in axes:
+        fast = rate * length
+        over = fast > limit * (1 + 1e-6)
+        for rows, severity, what, then in (
+            (over & extrudes, "error", "a line is printed", "it was sliced for another speed"),
+            (over & ~extrudes, "warning", "a move without printing goes", "the firmware slows it down"),
+        ):
+            most = float(fast[rows].max()) * MM_MIN if rows.any() else 0.0
+            yield from _found(
+                motion, rows, "speed", severity,
+                f"{what} with {name} at {most:.0f} mm/min; the limit is {limit * MM_MIN:.0f}: {then}",
+                "lower the feed (F)",
+            )  # fmt: skip
+
+
+def _feed(motion: Motion, _: Printer) -> Iterator[Found]:
+    """A feed is above 0."""
+    yield from _found(
+        motion, motion.feed_mm_min <= 0, "speed", "error", "a move has a feed of 0 or less", "give a feed (F)"
+    )
+
+
+def _purge(motion: Motion, machine: Printer) -> Iterator[Found]:
+    """Filament that is pushed on the spot stays within what was seen to work."""
+    most = machine.control.longest_purge_mm
+    pushed = np.where(motion.across_mm > 0, 0.0, np.abs(motion.filament_mm))
+    wrong = pushed > most + HAIR_MM
+    value = float(pushed.max()) if wrong.any() else 0.0
+    yield from _found(
+        motion, wrong, "purge", "error", f"{value:g} mm of filament are moved on the spot; the limit is {most:g} mm",
+        "purge in shorter pieces; left-over absolute E looks like this too",
+    )  # fmt: skip
+
+
+def _read(motion: Motion, _: Printer) -> Iterator[Found]:
+    """Every line can be read."""
+    for severe, advice in ((True, "correct the line"), (False, "keep to plain ASCII and plain commands")):
+        faults = [fault for fault in motion.faults if fault.severe == severe]
+        severity = "error" if severe else "warning"
+        for fault in faults[:MOST_TOLD]:
+            yield Found("read", severity, fault.number, fault.what, advice)
+        if rest := faults[MOST_TOLD:]:
+            message = "further lines cannot be read: is this G-code?"
+            yield Found("read", severity, rest[0].number, message, advice, len(rest))
+
+
+def _prints(motion: Motion) -> Mask:
+    rows: Mask = (motion.extruded_mm > 0) & (motion.across_mm > 0)
+    return rows
+
+
+RULES: tuple[Callable[[Motion, Printer], Iterator[Found]], ...] = (
+    _reach, _bed, _below, _speed, _feed, _purge, _read,
+)  # fmt: skip

@@ -1,0 +1,190 @@
+"""Where the nozzle goes and what it extrudes: a file read once, and all its moves followed at once, in columns."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from sensorgen.export.gcode.arcs import Arcs, centres_of_radius
+from sensorgen.export.gcode.columns import WORDS, Floats, Ints, Mask
+from sensorgen.export.gcode.files import Source, text_of
+from sensorgen.export.gcode.moves import NO_TOOL, Change, Event, Fault, Motion, Track
+from sensorgen.export.gcode.reading import PLACE, SHIFT, Holding, Reading
+
+DEFAULT_FEED_MM_MIN = 3000.0  # RepRapFirmware's, until a line says another
+MOST_MM = 1e9  # beyond this a number is a slip, and differences of it are noise
+
+
+def follow(source: Source, prime_macro: str = "") -> Motion:
+    """Follow a file; places and filament count as absolute until it says otherwise, as firmwares start.
+
+    Parameters
+    ----------
+    source : Path, bytes or iterable of str
+        The G-code; see :func:`sensorgen.export.gcode.files.text_of`.
+    prime_macro : str
+        Macro that changes tools, as ``tprime{tool}.g``; "" if the printer has none.
+
+    Raises
+    ------
+    BadInput
+        It cannot be read, or is no text.
+
+    Examples
+    --------
+    >>> motion = follow(["M83", "T3", "G1 X4 Y3 F600", ";TYPE:Perimeter", "G1 E-1", "G1 E1", "G1 X0 E0.5"])
+    >>> motion.extruded_mm.tolist(), motion.length_mm.tolist(), motion.kinds
+    ([0.0, 0.0, 0.0, 0.5], [5.0, 0.0, 0.0, 4.0], ('', 'perimeter'))
+    """
+    return _Steps(Reading(text_of(source), prime_macro)).motion()
+
+
+class _Steps:
+    """All moves of a file, and between them the places that it names anew, as G92 does."""
+
+    def __init__(self, said: Reading) -> None:
+        self.said = said
+        self.place, table = said.table()
+        self.code = table[:, 0]
+        self.moves = self.code != PLACE
+        numbers = table[:, 1:]
+        numbers *= self._held(said.scale, 1.0)[:, None]
+        self.words = dict(zip(WORDS, np.clip(numbers, -MOST_MM, MOST_MM, out=numbers).T, strict=True))
+
+    def motion(self) -> Motion:
+        """The file as moves in columns."""
+        said = self.said
+        rows = np.empty((np.count_nonzero(self.moves), 10))
+        for k, column in enumerate(self._columns()):
+            rows[:, k] = column if len(column) == len(rows) else column[self.moves]
+        far = ~np.all([np.abs(rows[:, k]) < MOST_MM for k in range(9)], axis=0)
+        rows[far, :9] = np.clip(rows[far, :9], -MOST_MM, MOST_MM)
+        faults = [Fault(int(number), "a number beyond all measure") for number in rows[far, 9][:1]]
+        back = self.moves & (self.code < 2) & ~np.isnan(self.words["R"])
+        faults += [Fault(n >> SHIFT, "R of G0 or G1 goes by a stored place") for n in self.place[back].tolist()]
+        arcs, wrong = self._arcs(rows)
+        return Motion(
+            rows, arcs, self._events(), self._changes(), self._track(said.tools), tuple(said.kinds),
+            self._track(said.kind), self._track(said.width_mm), self._track(said.height_mm), self._track(said.layer),
+            self._track(said.absolute_e), sorted([*said.faults, *faults, *wrong], key=lambda fault: fault.number),
+            said.lines, said.maker,
+        )  # fmt: skip
+
+    def _columns(self) -> Iterator[Floats]:
+        """Columns of ``Motion.rows``, for each step; one by one, since a million moves take room."""
+        sets = (self._held(self.said.relative, 0.0) == 0) | ~self.moves
+        for axis in "XYZ":
+            yield _before(_state(self.words[axis], sets))
+        for axis in "XYZ":
+            yield _state(self.words[axis], sets)
+        filament = self._filament()
+        yield _extruded(filament, self._held(self.said.tools, NO_TOOL))
+        yield filament
+        yield self._feed()
+        yield (self.place >> SHIFT).astype(np.float64)
+
+    def _held(self, holding: Holding, before: float) -> Floats:
+        """What holds for each step."""
+        rows = np.searchsorted(self.place, np.array(holding.places, np.int64))
+        return Track(rows.tolist(), holding.values.tolist()).column(len(self.place), before)
+
+    def _filament(self) -> Floats:
+        """Filament that each step pushes [mm]."""
+        given, absolute = self.words["E"], self._held(self.said.absolute_e, 1.0) > 0
+        at = _state(given, absolute | ~self.moves)
+        return np.where(self.moves & ~np.isnan(given), np.where(absolute, at - _before(at), given), 0.0)
+
+    def _feed(self) -> Floats:
+        last = _last(~np.isnan(self.words["F"]))
+        return np.where(last < 0, DEFAULT_FEED_MM_MIN, self.words["F"][last])
+
+    def _arcs(self, rows: Floats) -> tuple[Arcs, list[Fault]]:
+        """Moves that are arcs, and what is wrong with those that cannot be."""
+        code = self.code[self.moves]
+        row = np.flatnonzero((code == 2) | (code == 3))
+        start, end, clockwise = rows[row, 0:3], rows[row, 3:6], code[row] == 2
+        step = np.flatnonzero(self.moves)[row]
+        i, j, radius = (self.words[letter][step] for letter in "IJR")
+        offset = np.where(np.isnan(i) & np.isnan(j), np.nan, np.nan_to_num([i, j])).T
+        centre = np.where(
+            np.isnan(radius)[:, None],
+            _fitting(start[:, :2] + offset, start, end),
+            centres_of_radius(start[:, :2], end[:, :2], radius, clockwise),
+        )
+        centre[self._held(self.said.level, 1.0)[step] == 0] = np.nan
+        fits = ~np.isnan(centre).any(axis=1)
+        faults = [
+            Fault(int(rows[k, 9]), f"G{int(code[k])} without a centre that fits; taken as a straight line")
+            for k in row[~fits].tolist()
+        ]
+        return Arcs.of(row[fits], start[fits], end[fits], centre[fits], clockwise[fits]), faults
+
+    # Places of the file as numbers of moves.
+
+    def _rows(self, places: Sequence[int]) -> list[int]:
+        """How many moves come before each of some places."""
+        found: list[int] = np.searchsorted(self.place[self.moves], np.array(places, np.int64)).tolist()
+        return found
+
+    def _track(self, holding: Holding) -> Track:
+        return Track(self._rows(holding.places), holding.values.tolist())
+
+    def _events(self) -> list[Event]:
+        rows = self._rows([place for place, _ in self.said.events])
+        return [Event(row, place >> SHIFT, what) for row, (place, what) in zip(rows, self.said.events, strict=True)]
+
+    def _changes(self) -> list[Change]:
+        rows = self._rows([place for place, _, _ in self.said.changes])
+        return [
+            Change(row, place >> SHIFT, tool, macro)
+            for row, (place, tool, macro) in zip(rows, self.said.changes, strict=True)
+        ]
+
+
+def _last(given: Mask) -> Ints:
+    """For each step the last one until it that is marked; -1 before the first."""
+    return np.asarray(np.maximum.accumulate(np.where(given, np.arange(len(given)), -1)))
+
+
+def _state(given: Floats, sets: Mask) -> Floats:
+    """Where an axis is after each step, which sets it to what is given or moves it by that; 0 at the start."""
+    by = np.where(np.isnan(given) | sets, 0.0, given).cumsum()
+    last = _last(sets & ~np.isnan(given))
+    return np.asarray(np.where(last < 0, 0.0, given[last] - by[last]) + by)
+
+
+def _before(state: Floats) -> Floats:
+    """The state before each step."""
+    return np.concatenate([np.zeros_like(state[:1]), state[:-1]])
+
+
+def _extruded(filament: Floats, tool: Floats) -> Floats:
+    """Filament that each step extrudes: what goes beyond making good for what its tool has drawn back [mm]."""
+    extruded = np.maximum(filament, 0.0)
+    for one in np.unique(tool[filament < 0]):
+        rows = np.flatnonzero((tool == one) & (filament != 0))
+        pushed = filament[rows]
+        done = 0
+        for first in np.flatnonzero(pushed < 0).tolist():
+            if first >= done:
+                done = _made_good(extruded, rows, pushed, first)
+    return extruded
+
+
+def _made_good(extruded: Floats, rows: Ints, pushed: Floats, step: int) -> int:
+    """Follow a tool from where it draws filament back to where it owes nothing any more; the step after that."""
+    owed = 0.0
+    while step < len(rows):
+        extruded[rows[step]] = max(0.0, pushed[step] - owed)
+        owed = max(0.0, owed - pushed[step])
+        step += 1
+        if owed == 0:
+            break
+    return step
+
+
+def _fitting(centre: Floats, start: Floats, end: Floats) -> Floats:
+    """Middles that are about as far from the start as from the end of their arc; nan for others."""
+    radii = np.array([np.hypot(*(centre - place[:, :2]).T) for place in (start, end)])
+    near, far = radii.min(axis=0), radii.max(axis=0)
+    fits = (near > 0) & (near < MOST_MM) & (far - near <= 0.1 + 0.02 * near)
+    return np.where(fits[:, None], centre, np.nan)

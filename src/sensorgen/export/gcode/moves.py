@@ -1,0 +1,157 @@
+"""What a file makes a printer do, as plain data: moves in columns, and everything else as events between them."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.export.gcode.arcs import Arcs
+from sensorgen.export.gcode.words import Command
+
+Floats = NDArray[np.float64]
+
+NO_TOOL = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A command that is no move: the moves before it, its line, and what it says."""
+
+    row: int
+    number: int
+    command: Command
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """What could not be read or followed, and where."""
+
+    number: int
+    what: str
+    severe: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A tool is taken, by ``T`` or by a macro: the moves before it, its line, the tool, and how."""
+
+    row: int
+    number: int
+    tool: int
+    macro: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """Something that holds from one place in the file to the next: its values, and the moves before each."""
+
+    rows: list[int]
+    values: list[float]
+
+    def column(self, count: int, before: float = math.nan) -> Floats:
+        """What holds for each of ``count`` moves."""
+        edges = np.array([0, *self.rows, count], dtype=np.int64)
+        spans: NDArray[np.int64] = edges[1:] - edges[:-1]
+        return np.repeat(np.array([before, *self.values]), spans)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A file as moves in columns, and everything else as events between them.
+
+    Attributes
+    ----------
+    rows : (n, 10) float64 array
+        Start and end [mm], filament that is extruded and filament that is moved [mm], feed [mm/min], and
+        the line. Filament that only makes good for a retraction is moved, not extruded.
+    arcs : Arcs
+        Moves that do not go straight.
+    events : sequence of Event
+        All other commands.
+    changes : sequence of Change
+        Tools in the order in which they are taken, also the same again; ``NO_TOOL`` where one is put down.
+    tools : Track
+        The tool in hand, ``NO_TOOL`` before the first.
+    kinds : tuple of str
+        Kinds of line that comments name, in lower case; the first is "".
+    kind, width_mm, height_mm, layer : Track
+        Index into ``kinds``, and what comments say of the lines: width and height [mm], and layer from 1.
+    absolute_e : Track
+        1 where E is absolute, 0 where it is relative.
+    faults : sequence of Fault
+        What could not be read or followed.
+    lines : int
+        How many lines the file has.
+    maker : str
+        Slicer that names itself at the top, where that tells something; else "".
+    """
+
+    rows: Floats
+    arcs: Arcs
+    events: Sequence[Event]
+    changes: Sequence[Change]
+    tools: Track
+    kinds: tuple[str, ...]
+    kind: Track
+    width_mm: Track
+    height_mm: Track
+    layer: Track
+    absolute_e: Track
+    faults: Sequence[Fault]
+    lines: int
+    maker: str
+
+    @property
+    def start_mm(self) -> Floats:
+        """Where each move starts, (n, 3) [mm]."""
+        return self.rows[:, 0:3]
+
+    @property
+    def end_mm(self) -> Floats:
+        """Where each move ends, (n, 3) [mm]."""
+        return self.rows[:, 3:6]
+
+    @property
+    def extruded_mm(self) -> Floats:
+        """Filament that each move extrudes, without what makes good for a retraction [mm]."""
+        return self.rows[:, 6]
+
+    @property
+    def filament_mm(self) -> Floats:
+        """Filament that each move pushes, or draws back if negative [mm]."""
+        return self.rows[:, 7]
+
+    @property
+    def feed_mm_min(self) -> Floats:
+        """Feed that the file asks for [mm/min]."""
+        return self.rows[:, 8]
+
+    @property
+    def number(self) -> NDArray[np.int64]:
+        """Line of each move, from 1 [-]."""
+        return self.rows[:, 9].astype(np.int64)
+
+    @cached_property
+    def across_mm(self) -> Floats:
+        """Way of the nozzle in plan, in each move [mm]."""
+        step = self.rows[:, 3:5] - self.rows[:, 0:2]
+        way: Floats = np.hypot(step[:, 0], step[:, 1])
+        way[self.arcs.row] = self.arcs.across_mm()
+        return way
+
+    @cached_property
+    def length_mm(self) -> Floats:
+        """Way of the nozzle in each move [mm]."""
+        way: Floats = np.hypot(self.across_mm, self.rows[:, 5] - self.rows[:, 2])
+        return way
+
+    def box_mm(self) -> tuple[Floats, Floats]:
+        """Lowest and highest place of each move, (n, 3) twice [mm]; a straight one counts by its end."""
+        if not len(self.arcs):
+            return self.end_mm, self.end_mm
+        low, high = self.end_mm.copy(), self.end_mm.copy()
+        low[self.arcs.row], high[self.arcs.row] = self.arcs.box_mm()
+        return low, high

@@ -1,0 +1,159 @@
+"""The lines that a file prints, in columns: what every model of the printed piece reads."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.design.printer import Printer
+from sensorgen.export.gcode.extruded import NOT_MODEL
+from sensorgen.export.gcode.files import Source
+from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.moves import NO_TOOL, Motion
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Paths:
+    """One row per move that extrudes; arcs stand as chords, retractions and their return count for nothing.
+
+    Attributes
+    ----------
+    start_mm, end_mm : (n, 3) float64 array
+        Where the line begins and ends [mm].
+    filament_mm : (n,) float64 array
+        Filament that it takes [mm].
+    tool : (n,) int64 array
+        The printer's own number of its tool [-].
+    kind : (n,) int64 array
+        Index into ``kinds`` [-].
+    height_mm, width_mm : (n,) float64 array
+        Height and width that the file declares [mm]; nan where it does not.
+    layer : (n,) int64 array
+        Layer from 1 at the bed, as the comments count; by heights where no comment does [-].
+    number : (n,) int64 array
+        Line of the file, from 1 [-].
+    kinds : tuple of str
+        What the file's comments call its lines, in lower case; the first is "".
+    """
+
+    start_mm: Floats
+    end_mm: Floats
+    filament_mm: Floats
+    tool: Integers
+    kind: Integers
+    height_mm: Floats
+    width_mm: Floats
+    layer: Integers
+    number: Integers
+    kinds: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.number)
+
+    def length_mm(self) -> Floats:
+        """Length of each line [mm]; 0 where filament is pushed on the spot."""
+        way: Floats = np.sqrt(((self.end_mm - self.start_mm) ** 2).sum(axis=1))
+        return way
+
+    def volume_mm3(self, filament_diameter_mm: float) -> Floats:
+        """Volume of each line [mm3].
+
+        Parameters
+        ----------
+        filament_diameter_mm : float
+            Diameter of the filament [mm].
+        """
+        return self.filament_mm * (math.pi / 4 * filament_diameter_mm**2)
+
+    def chosen(self, rows: NDArray[np.bool_]) -> "Paths":
+        """The rows of a mask, (n,)."""
+        columns = ("start_mm", "end_mm", "filament_mm", "tool", "kind", "height_mm", "width_mm", "layer", "number")
+        return replace(self, **{name: getattr(self, name)[rows] for name in columns})
+
+    def model(self) -> "Paths":
+        """The lines of the bodies: neither skirt, tower nor support, and nothing pushed on the spot."""
+        bodies = np.array([name not in NOT_MODEL for name in self.kinds])
+        return self.chosen(bodies[self.kind] & (self.length_mm() > 0))
+
+
+def read(source: Source, machine: Printer, numbering: Literal["printer", "slicer"] = "printer") -> Paths:
+    """Read the lines that a file prints.
+
+    Parameters
+    ----------
+    source : Path, bytes or iterable of str
+        The file, its content, or its lines.
+    machine : Printer
+        Whose G-code it is.
+    numbering : "printer" or "slicer"
+        Whether T counts as the printer does, or from 0 as a slicer's own file does.
+
+    Raises
+    ------
+    BadInput
+        The file is not there, or no G-code.
+
+    Examples
+    --------
+    >>> from sensorgen.design.printer import load_printer
+    >>> paths = read(["M83", "T3", "G1 Z0.1", ";WIDTH:0.44", "G1 X10 E0.2"], load_printer("diabase-h5"))
+    >>> paths.tool.tolist(), paths.length_mm().tolist(), paths.width_mm.tolist(), paths.layer.tolist()
+    ([3], [10.0], [0.44], [1])
+    """
+    return paths_of(follow(source, machine.control.prime_macro), machine, numbering)
+
+
+def paths_of(motion: Motion, machine: Printer, numbering: Literal["printer", "slicer"] = "printer") -> Paths:
+    """The lines that a followed file prints; see :func:`read`."""
+    rows, start, end, share = _straight(motion, np.flatnonzero(motion.extruded_mm > 0))
+    count = len(motion.rows)
+    tools = motion.tools.column(count, NO_TOOL)[rows].astype(np.int64)
+    return Paths(
+        start_mm=start,
+        end_mm=end,
+        filament_mm=motion.extruded_mm[rows] * share,
+        tool=_own_numbers(tools, machine) if numbering == "slicer" else _or_first(tools, machine),
+        kind=motion.kind.column(count, 0)[rows].astype(np.int64),
+        height_mm=motion.height_mm.column(count)[rows],
+        width_mm=motion.width_mm.column(count)[rows],
+        layer=_layers(motion, rows),
+        number=motion.number[rows],
+        kinds=motion.kinds,
+    )
+
+
+def _straight(motion: Motion, rows: Integers) -> tuple[Integers, Floats, Floats, Floats]:
+    """Some moves as straight lines: the move of each, its start and end [mm], and its share of the move's filament."""
+    bent = np.isin(motion.arcs.row, rows)
+    which, start, end = motion.arcs.chosen(bent).chords()
+    row = motion.arcs.row[bent]
+    kept = rows[~np.isin(rows, row)]
+    every = np.concatenate([kept, row[which]])
+    order = np.argsort(every, kind="stable")
+    starts, ends = np.concatenate([motion.start_mm[kept], start]), np.concatenate([motion.end_mm[kept], end])
+    share = np.concatenate([np.ones(len(kept)), 1.0 / np.bincount(which, minlength=1)[which]])
+    return every[order], starts[order], ends[order], share[order]
+
+
+def _or_first(tools: Integers, machine: Printer) -> Integers:
+    """A file without any tool means the printer's first."""
+    return np.where(tools == NO_TOOL, machine.tool_numbers[0], tools)
+
+
+def _own_numbers(tools: Integers, machine: Printer) -> Integers:
+    """The printer's numbers for a slicer's, which count from 0; one that the printer lacks stays negative."""
+    known = np.array([*machine.tool_numbers, NO_TOOL])
+    within = tools < len(machine.tool_numbers)
+    return known[np.where(within, np.maximum(tools, 0), len(known) - 1)]
+
+
+def _layers(motion: Motion, rows: Integers) -> Integers:
+    if motion.layer.rows:
+        return motion.layer.column(len(motion.rows), 0)[rows].astype(np.int64)
+    heights = np.round(motion.end_mm[rows, 2], 4)
+    return np.unique(heights, return_inverse=True)[1].astype(np.int64).ravel() + 1

@@ -1,0 +1,226 @@
+"""The lines of a file sorted: moves into a table, everything else into lists, each with its place in the file.
+
+A place is the line's number and, where a line says more than one thing, how many came before: one integer, so that
+places sort as the file runs.
+"""
+
+import re
+from array import array
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+
+import numpy as np
+
+from sensorgen.export.gcode import columns, remarks, words
+from sensorgen.export.gcode.columns import Floats, Ints
+from sensorgen.export.gcode.moves import NO_TOOL, Fault
+from sensorgen.export.gcode.words import Command
+
+INCH_MM = 25.4
+SHIFT = 12  # bits of a place below the line's number: no line has so many commands
+PLACE = 92.0  # code of a row that says where the nozzle is, as G92 does
+MOST_FAULTS = 10_000  # enough to know that a file is none
+_PIECE = 1 << 20  # bytes that are read at once
+_TOOL = re.compile("-?[0-9]{1,6}")
+_NONE = [np.nan] * len(columns.WORDS)
+_Does = Callable[[Command, int], None]
+_note = lru_cache(maxsize=4096)(remarks.read)
+
+
+class Holding:
+    """Something that holds from one place of a file to the next."""
+
+    def __init__(self) -> None:
+        """Nothing holds yet."""
+        self.places, self.values = array("q"), array("d")
+
+    def put(self, place: int, value: float) -> None:
+        """Let a value hold from a place on."""
+        self.places.append(place)
+        self.values.append(value)
+
+
+class Reading:
+    """A file, read; nothing is followed yet.
+
+    Attributes
+    ----------
+    events : list of (int, Command)
+        Places and commands that are no moves.
+    changes : list of (int, int, bool)
+        Place, tool and whether a macro takes it.
+    faults : list of Fault
+        What could not be read.
+    scale, relative, absolute_e, level : Holding
+        Millimetres of a unit, whether places are relative, whether E is absolute, whether arcs lie in the bed's plane.
+    tools, kind, width_mm, height_mm, layer : Holding
+        As of :class:`sensorgen.export.gcode.moves.Motion`.
+    kinds : dict of str to int
+        Kinds of line and their numbers.
+    maker : str
+        Slicer that names itself.
+    lines : int
+        How many lines there are.
+    """
+
+    def __init__(self, text: bytes, prime_macro: str = "") -> None:
+        """Read a text, each line of which ends with a line feed; ``prime_macro`` as for ``follow``."""
+        self.events: list[tuple[int, Command]] = []
+        self.changes: list[tuple[int, int, bool]] = []
+        self.faults: list[Fault] = []
+        self.scale, self.relative, self.absolute_e, self.level = Holding(), Holding(), Holding(), Holding()
+        self.tools, self.kind, self.width_mm, self.height_mm, self.layer = (Holding() for _ in range(5))
+        self.kinds = {"": 0}
+        self.maker = ""
+        self.lines = 0
+        head, _, tail = prime_macro.partition("{tool}")
+        self._macro = re.compile(f"{re.escape(head)}([0-9]+){re.escape(tail)}") if prime_macro else None
+        self._places: list[Ints] = []
+        self._rows: list[Floats] = []
+        self._own_places, self._own_rows = array("q"), array("d")
+        self._does = {
+            **dict.fromkeys(("G0", "G1", "G2", "G3"), self._move), "G28": self._home, "G92": self._place,
+            "M98": self._call, **{code: self._holds(*what) for code, what in self._modes().items()},
+        }  # fmt: skip
+        for piece in _pieces(text):
+            self._read(piece)
+
+    def table(self) -> tuple[Ints, Floats]:
+        """Places and rows of all moves, in order: the code, and the numbers of ``columns.WORDS``; once."""
+        places, rows = (
+            np.concatenate([*self._places, np.array(self._own_places, np.int64)]),
+            np.concatenate([*self._rows, self._own()]),
+        )
+        self._places, self._rows = [], []  # a million moves take room
+        if not self._own_places:
+            return places, rows
+        order = np.argsort(places, kind="stable")
+        return places[order], rows[order]
+
+    def _own(self) -> Floats:
+        return np.array(self._own_rows).reshape(-1, 1 + len(columns.WORDS))
+
+    def _modes(self) -> dict[str, tuple[Holding, float]]:
+        return {
+            "G17": (self.level, 1.0), "G18": (self.level, 0.0), "G19": (self.level, 0.0),
+            "G20": (self.scale, INCH_MM), "G21": (self.scale, 1.0), "G90": (self.relative, 0.0),
+            "G91": (self.relative, 1.0), "M82": (self.absolute_e, 1.0), "M83": (self.absolute_e, 0.0),
+        }  # fmt: skip
+
+    def _read(self, piece: bytes) -> None:
+        found = columns.read(piece)
+        first = self.lines + 1
+        self._places.append((found.plain + first) << SHIFT)
+        self._rows.append(np.column_stack([found.code, found.words]))
+        for row in found.rest.tolist():
+            self._rest(piece[found.start[row] : found.end[row]], first + row)
+        self.lines += len(found.start)
+
+    def _rest(self, line: bytes, number: int) -> None:
+        text = line.decode("utf-8", "surrogateescape")
+        if text[0] == ";" and line.isascii():
+            self._remark(text[1:], number << SHIFT)
+        elif not text.isspace():
+            self._other(text, number)
+
+    def _remark(self, text: str, place: int) -> None:
+        for quantity, value in _note(text):
+            if quantity == remarks.MAKER:
+                self.maker = str(value)
+            elif isinstance(value, str):
+                self.kind.put(place, self.kinds.setdefault(value, len(self.kinds)))
+            elif quantity == remarks.WIDTH:
+                self.width_mm.put(place, value)
+            elif quantity == remarks.HEIGHT:
+                self.height_mm.put(place, value)
+            else:
+                last = self.layer.values[-1] if self.layer.values else 0.0
+                self.layer.put(place, last + 1 if quantity == remarks.NEXT_LAYER else value)
+
+    def _other(self, text: str, number: int) -> None:
+        said = words.parse(text)
+        place = number << SHIFT
+        if said.remark:
+            self._remark(said.remark, place)
+        if not text.isascii():
+            foreign = not text.partition(";")[0].isascii()
+            self._fault(place, "characters that are not ASCII" + ("" if foreign else " in a comment"), severe=foreign)
+        for what in said.faults:
+            self._fault(place, what, severe=not words.is_meta(text))
+        for here, command in enumerate(said.commands, place):
+            if command.code[0] == "T":
+                self._select(command.code[1:], here)
+            else:
+                self._does.get(command.code, _nothing)(command, here)
+            if command.code not in ("G0", "G1", "G2", "G3"):
+                self.events.append((here, command))
+
+    def _fault(self, place: int, what: str, *, severe: bool = True) -> None:
+        if len(self.faults) < MOST_FAULTS:
+            self.faults.append(Fault(place >> SHIFT, what, severe))
+
+    # What each command says, by its code.
+
+    def _put(self, place: int, code: float, numbers: list[float]) -> None:
+        self._own_places.append(place)
+        self._own_rows.extend((code, *numbers))
+
+    def _move(self, command: Command, place: int) -> None:
+        numbers = [self._number(command, letter, place) for letter in columns.WORDS]
+        if command.has("H") and command.number("H") != 0:
+            self._fault(place, f"H{command.text('H')} of {command.code}: an axis goes until it meets something")
+        self._put(place, float(command.code[1:]), numbers)
+
+    def _place(self, command: Command, place: int) -> None:
+        every = not command.has("XYZE")
+        numbers = [0.0 if every else self._number(command, letter, place) for letter in "XYZE"]
+        self._put(place, PLACE, [*numbers, *_NONE[4:]])
+
+    def _home(self, command: Command, place: int) -> None:
+        every = not command.has("XYZ")
+        numbers = [0.0 if every or command.has(letter) else np.nan for letter in "XYZ"]
+        self._put(place, PLACE, [*numbers, *_NONE[3:]])
+
+    def _number(self, command: Command, letter: str, place: int) -> float:
+        """Number of a word; nan without the word, or where it has none."""
+        text = command.text(letter)
+        if text is None:
+            return np.nan
+        value = command.number(letter)
+        if value is None or np.isnan(value):
+            self._fault(place, f"{letter}{text} of {command.code} is no number")
+            return np.nan
+        return value
+
+    def _holds(self, what: Holding, value: float) -> _Does:
+        return lambda _, place: what.put(place, value)
+
+    def _call(self, command: Command, place: int) -> None:
+        if self._macro and (found := self._macro.fullmatch(macro_name(command))):
+            self._select(found[1], place, macro=True)
+
+    def _select(self, digits: str, place: int, *, macro: bool = False) -> None:
+        if not _TOOL.fullmatch(digits):
+            self._fault(place, f"T{digits[:20]} is no tool")
+            return
+        tool = max(int(digits), NO_TOOL)
+        self.tools.put(place, tool)
+        self.changes.append((place, tool, macro))
+
+
+def macro_name(command: Command) -> str:
+    """File that ``M98`` calls, without drive and folders."""
+    return (command.text("P") or "").rpartition(":")[2].rpartition("/")[2]
+
+
+def _nothing(_: Command, __: int) -> None:
+    """Most commands move nothing."""
+
+
+def _pieces(text: bytes) -> Iterator[bytes]:
+    """Whole lines, many at once."""
+    start = 0
+    while start < len(text):
+        end = text.find(b"\n", min(start + _PIECE, len(text)) - 1) + 1 or len(text)
+        yield text[start:end]
+        start = end

@@ -1,0 +1,274 @@
+"""A slicer's own G-code to what one printer takes: its tool numbers, its temperatures, its fan, its tool changes.
+
+The file is parsed, never searched for text: only commands that the printer wants in other words change, and
+comments, moves and everything else stay as they are. What changes is the printer's ``control`` section:
+
+- tools get the printer's own numbers, also where temperatures name them;
+- temperatures name their tool and say what it has while it waits (``G10 P S R``);
+- ``M82`` goes, where the printer prints with relative E;
+- the fan on the part gets its number;
+- after a tool is taken, the file waits for its temperature, and ``M290`` sets its height where tools differ;
+- the tool that comes next is heated some seconds before;
+- the first tool is taken once the axes are homed, and all are switched off after the last line;
+- commands after the printer's last one are never reached and go.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import pairwise
+from math import isfinite
+from sys import maxsize
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.errors import BadInput
+from sensorgen.design.printer import Printer
+from sensorgen.export.gcode import words
+from sensorgen.export.gcode.moves import NO_TOOL, Motion
+from sensorgen.export.gcode.timing import seconds
+from sensorgen.export.gcode.words import Command
+
+
+def ready(text: bytes, motion: Motion, machine: Printer) -> Iterator[bytes]:
+    r"""The file for the printer, in pieces of whole lines.
+
+    Parameters
+    ----------
+    text : bytes
+        A slicer's own file, each line with its line feed; it counts tools from 0.
+    motion : Motion
+        The same file, followed.
+    machine : Printer
+        Whose words to use.
+
+    Raises
+    ------
+    BadInput
+        The file takes a tool that the printer lacks, or pushes filament with absolute E though the
+        printer's is relative.
+
+    Examples
+    --------
+    >>> from sensorgen.export.gcode.motion import follow
+    >>> from sensorgen.design.printer import load_printer
+    >>> raw = b"G28\nM83\nT2 ; go\nM104 S210 ; warm\nM106 S255\nG1 X1 E1 F60 ; T2\n"
+    >>> print(b"".join(ready(raw, follow(raw), load_printer("diabase-h5"))).decode(), end="")
+    G28
+    M83
+    T3 ; go
+    M116 P3
+    G10 P3 S210 R180 ; warm
+    M106 P3 S255
+    G1 X1 E1 F60 ; T2
+    G10 P3 S0 R0
+    """
+    _refuse_absolute(motion, machine)
+    writer, moves = _Writer(machine), np.unique(motion.number)
+    starts = np.flatnonzero(np.frombuffer(b"\n" + text, np.uint8) == ord("\n")).tolist()  # of each line, and the end
+    commands = {event.number for event in motion.events}
+    before, end = dict(_preheats(motion, machine)), _last_line(motion)
+    done = 0  # lines
+    for number in sorted({*commands, *before, end, len(starts)} - {0}):
+        move = _after(moves, done)
+        if move <= number and (held := writer.take()):
+            yield text[starts[done] : starts[move - 1]] + _coded(held)
+            done = move - 1
+        yield text[starts[done] : starts[number - 1]] + _coded(before.get(number, ()))
+        done = min(number, len(starts) - 1)
+        line = text[starts[number - 1] : starts[done]]
+        yield _coded(writer.line(line.decode("utf-8", "surrogateescape"))) if number in commands else line
+        yield _coded(writer.cold() if number == end else ())
+        if writer.ended:
+            break
+    said = commands.union(moves.tolist())
+    yield from (text[starts[n] : starts[n + 1]] for n in range(done, len(starts) - 1) if n + 1 not in said)
+
+
+def _after(moves: NDArray[np.int64], done: int) -> int:
+    """Line of the first move after some lines; without one, beyond all lines."""
+    place = int(np.searchsorted(moves, done, side="right"))
+    return int(moves[place]) if place < len(moves) else maxsize
+
+
+def _coded(lines: Iterable[str]) -> bytes:
+    return "".join(lines).encode("utf-8", "surrogateescape")
+
+
+def _refuse_absolute(motion: Motion, machine: Printer) -> None:
+    if not machine.control.relative_e:
+        return
+    absolute = motion.absolute_e.column(len(motion.rows), 1.0) > 0
+    wrong = np.flatnonzero(absolute & (motion.filament_mm != 0))
+    if len(wrong):
+        raise BadInput(
+            f"line {motion.number[wrong[0]]} of the slicer's file moves filament with absolute E (M82); "
+            f"{machine.name} prints with relative E: let the slicer write that"
+        )
+
+
+def _last_line(motion: Motion) -> int:
+    """Line of the last move of filament; 0 if there is none."""
+    moved = np.flatnonzero(motion.filament_mm != 0)
+    return int(motion.number[moved[-1]]) if len(moved) else 0
+
+
+def _preheats(motion: Motion, machine: Printer) -> Iterator[tuple[int, list[str]]]:
+    """Lines to write before a line: the next tool is heated while the one before it still prints."""
+    if machine.control.standby_c is None or not machine.control.names_tools or not len(motion.rows):
+        return
+    clock = np.concatenate([[0.0], np.cumsum(seconds(motion, machine.max_speed_mm_s))])
+    numbers = motion.number
+    for last, change in pairwise(motion.changes):
+        if NO_TOOL in (last.tool, change.tool) or change.tool == last.tool or change.row == last.row:
+            continue
+        row = int(np.searchsorted(clock, clock[change.row] - machine.control.preheat_s))
+        row = min(max(row, last.row), change.row - 1)
+        yield int(numbers[row]), [f"M568 P{_own(machine, change.tool)} A2\n"]
+
+
+def _own(machine: Printer, index: float) -> int:
+    """The printer's number of a tool that a slicer counts from 0."""
+    count = len(machine.tool_numbers)
+    if index not in range(count):
+        raise BadInput(f"the slicer's file takes tool {index:g}, counted from 0; {machine.name} has {count} tools")
+    return machine.tool_numbers[int(index)]
+
+
+class _Writer:
+    """What has been written so far, as far as later lines depend on it."""
+
+    def __init__(self, machine: Printer) -> None:
+        self.machine, self.control = machine, machine.control
+        self.tool: int | None = None  # the printer's number
+        self.held: list[str] = []  # taking the first tool, until the axes are homed
+        self.homed = machine.tool_at_start() is not None  # such a printer may take tools at any time
+        self.ended = False
+        self.hot: list[int] = []
+        self.offset_mm = None if self.control.tool_offsets_mm else 0.0  # an earlier print may have left another
+        self.changes: dict[str, Callable[[Command], Sequence[str] | None]] = {
+            "G10": self._tool_settings, "M104": self._temperature, "M109": self._temperature, "M106": self._fan,
+            "M107": self._fan_off, "M82": self._absolute, "M116": self._of_tool, "M568": self._state,
+        }  # fmt: skip
+
+    def line(self, line: str) -> Iterator[str]:
+        """A line that may have to change."""
+        said = words.parse(line)
+        made = [self._command(command) for command in said.commands]
+        if all(new is None for new in made):
+            yield line
+        else:
+            texts = [
+                text for c, new in zip(said.commands, made, strict=True) for text in (_text(c) if new is None else new)
+            ]
+            yield from _with_remark(line, texts)
+        for command in said.commands:
+            self.homed |= command.code in self.control.homes
+            self.ended |= command.code in self.control.ends
+
+    def take(self) -> list[str]:
+        """What was held until the first move."""
+        held, self.held = self.held, []
+        return held
+
+    def cold(self) -> Iterator[str]:
+        """Switch the tools off that the file has heated."""
+        if self.control.names_tools:
+            yield from (f"G10 P{tool} S0 R0\n" for tool in self.hot)
+        self.hot = []
+
+    def _command(self, command: Command) -> Sequence[str] | None:
+        """Other words for a command; None where it stays."""
+        if command.code[0] == "T" and command.code != "T-1":
+            return self._change(command)
+        return self.changes.get(command.code, _stays)(command)
+
+    def _change(self, command: Command) -> Sequence[str]:
+        self.tool = _own(self.machine, float(command.code[1:]))
+        texts = [_text(Command(f"T{self.tool}", command.words))[0]]
+        if self.control.names_tools:
+            texts.append(f"M116 P{self.tool}")
+        offset_mm = self.control.tool_offsets_mm.get(self.tool, 0.0)
+        if offset_mm != self.offset_mm:
+            texts.append(f"M290 S{offset_mm:g} R0")
+            self.offset_mm = offset_mm
+        if self.homed:
+            return texts
+        self.held = [f"{text}\n" for text in texts]
+        return []
+
+    def _tool_settings(self, command: Command) -> Sequence[str] | None:
+        if not command.has("SR"):
+            return None  # retraction by the firmware, or offsets of a place of work
+        if not self.control.names_tools:
+            return self._of_tool(command)
+        index = command.number("P")
+        tool = self.tool if index is None else _own(self.machine, index)
+        return None if tool is None else [self._settings(tool, command.number("S"), command.number("R"))]
+
+    def _temperature(self, command: Command) -> Sequence[str] | None:
+        active = command.number("S")
+        if not self.control.names_tools or active is None:
+            return self._of_tool(command, "T")
+        index = command.number("T")
+        if index is None and active <= 0:
+            return [text.strip() for text in self.cold()]
+        tool = self.tool if index is None else _own(self.machine, index)
+        if tool is None:
+            raise BadInput(f"{command.code} of the slicer's file names no tool, and none is taken yet")
+        waits = [f"M116 P{tool}"] if command.code == "M109" else []
+        return [self._settings(tool, active, None), *waits]
+
+    def _settings(self, tool: int, active: float | None, standby: float | None) -> str:
+        if active is not None and standby is None:
+            standby = active if self.control.standby_c is None else min(active, self.control.standby_c)
+        if active and tool not in self.hot:
+            self.hot.append(tool)
+        elif active == 0 and tool in self.hot:
+            self.hot.remove(tool)
+        given = [("S", active), ("R", standby)]
+        if any(value is not None and not isfinite(value) for _, value in given):
+            raise BadInput(f"the slicer's file sets tool {tool} to a temperature that is no number")
+        return " ".join([f"G10 P{tool}", *(f"{letter}{value:g}" for letter, value in given if value is not None)])
+
+    def _state(self, command: Command) -> Sequence[str] | None:
+        """``M568``: temperatures as those of G10, and the state by itself."""
+        settings = self._tool_settings(command) if self.control.names_tools else None
+        state = Command("M568", tuple(word for word in command.words if word[0] not in "SR"))
+        if not settings:
+            return self._of_tool(command)
+        return [*settings, *(self._of_tool(state) or _text(state))] if command.has("A") else settings
+
+    def _fan(self, command: Command) -> Sequence[str] | None:
+        if self.control.layer_fan is None or command.has("P"):
+            return None
+        return _text(Command("M106", (("P", str(self.control.layer_fan)), *command.words)))
+
+    def _fan_off(self, _: Command) -> Sequence[str] | None:
+        return None if self.control.layer_fan is None else [f"M106 P{self.control.layer_fan} S0"]
+
+    def _absolute(self, _: Command) -> Sequence[str] | None:
+        return [] if self.control.relative_e else None
+
+    def _of_tool(self, command: Command, letter: str = "P") -> Sequence[str] | None:
+        """A command that names a tool, with the printer's number of it."""
+        index = command.number(letter)
+        if index is None or _own(self.machine, index) == index:
+            return None
+        own = str(_own(self.machine, index))
+        return _text(Command(command.code, tuple((n, own if n == letter else t) for n, t in command.words)))
+
+
+def _stays(_: Command) -> None:
+    return None
+
+
+def _text(command: Command) -> list[str]:
+    return [" ".join([command.code, *(f"{letter}{text}" for letter, text in command.words)])]
+
+
+def _with_remark(line: str, texts: Sequence[str]) -> Iterator[str]:
+    """The new texts as lines; the old line's comment stays behind the first, or goes with what it spoke of."""
+    code, semicolon, remark = line.rstrip("\r\n").partition(";")
+    gap = code[len(code.rstrip()) :]
+    for place, text in enumerate(texts):
+        yield f"{text}{gap}{semicolon}{remark}\n" if place == 0 and semicolon else f"{text}\n"

@@ -1,0 +1,137 @@
+"""What a file takes: time, filament and mass of each tool, changes of tool, and what goes into purging."""
+
+import math
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.errors import MissingValue, UnknownName
+from sensorgen.design import materials
+from sensorgen.design.printer import Printer
+from sensorgen.export.gcode.extruded import NOT_MODEL
+from sensorgen.export.gcode.moves import NO_TOOL, Motion
+from sensorgen.export.gcode.timing import seconds
+
+
+@dataclass(frozen=True)
+class OfTool:
+    """What one tool prints: filament and its part that is no body [mm], volume [mm3], mass [g] where known."""
+
+    tool: int
+    material: str
+    filament_mm: float
+    purge_mm: float
+    volume_mm3: float
+    mass_g: float | None
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a file takes.
+
+    Attributes
+    ----------
+    lines, moves, layers : int
+        How many it has; layers as its comments count, 0 without [-].
+    time_s : float
+        At the feeds of the file, without acceleration, heating and changing tools: a lower bound [s].
+    tools : tuple of OfTool
+        Each tool that prints.
+    tool_changes : int
+        How often another tool is taken [-].
+    box_mm : tuple of two (float, float, float), or None
+        Around all printed lines [mm].
+    """
+
+    lines: int
+    moves: int
+    layers: int
+    time_s: float
+    tools: tuple[OfTool, ...]
+    tool_changes: int
+    box_mm: tuple[tuple[float, ...], tuple[float, ...]] | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """The report, for JSON."""
+        return asdict(self)
+
+
+def report(motion: Motion, machine: Printer, loaded: dict[int, str] | None = None) -> Report:
+    """Sum a file up.
+
+    Parameters
+    ----------
+    motion : Motion
+        The file.
+    machine : Printer
+        Who is to print it.
+    loaded : dict of int to str, optional
+        Material of each tool; the printer's usual ones where a tool has one only.
+    """
+    printed = motion.extruded_mm > 0
+    across = printed & (motion.length_mm > 0)
+    taken = [change.tool for change in motion.changes if change.tool != NO_TOOL]
+    return Report(
+        lines=motion.lines,
+        moves=len(motion.rows),
+        layers=int(max(motion.layer.values, default=0)),
+        time_s=float(seconds(motion, machine.max_speed_mm_s).sum()) + _dwells(motion),
+        tools=_tools(motion, machine, usual(machine) | (loaded or {})),
+        tool_changes=sum(a != b for a, b in pairwise(taken)),
+        box_mm=_box_mm(motion, across) if across.any() else None,
+    )
+
+
+def usual(machine: Printer) -> dict[int, str]:
+    """Material of each tool, where the printer has one usual material for it."""
+    named = list(machine.default_tools.items())
+    tools = [tool for _, tool in named]
+    return {tool: material for material, tool in named if tools.count(tool) == 1}
+
+
+def _box_mm(motion: Motion, printed: NDArray[np.bool_]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Lowest and highest place of some moves, axis by axis: a copy of all places would take much room [mm]."""
+    low, high = motion.box_mm()
+    return tuple(float(low[printed, k].min()) for k in range(3)), tuple(float(high[printed, k].max()) for k in range(3))
+
+
+def _dwells(motion: Motion) -> float:
+    """Time that the file waits on purpose, G4 [s]."""
+    waits = (e.command for e in motion.events if e.command.code == "G4")
+    total = sum((w.number("S") or 0.0) + (w.number("P") or 0.0) / 1000 for w in waits)
+    return total if 0 <= total < math.inf else 0.0
+
+
+def _tools(motion: Motion, machine: Printer, loaded: dict[int, str]) -> tuple[OfTool, ...]:
+    count = len(motion.rows)
+    start = machine.tool_at_start()
+    tools = motion.tools.column(count, NO_TOOL if start is None else start).astype(np.int64)
+    kinds = motion.kind.column(count, 0).astype(np.int64)
+    waste = np.array([kind in NOT_MODEL for kind in motion.kinds])[kinds] | (motion.length_mm == 0)
+    extruded = motion.extruded_mm
+    found = []
+    for tool in np.unique(tools[extruded > 0]).tolist():
+        length_mm = float(extruded[tools == tool].sum())
+        volume_mm3 = length_mm * math.pi / 4 * machine.filament_mm**2
+        density = _density_kg_m3(loaded.get(tool, ""))
+        found.append(
+            OfTool(
+                tool=tool,
+                material=loaded.get(tool, ""),
+                filament_mm=length_mm,
+                purge_mm=float(extruded[(tools == tool) & waste].sum()),
+                volume_mm3=volume_mm3,
+                mass_g=None if density is None else volume_mm3 * density * 1e-6,
+            )
+        )
+    return tuple(found)
+
+
+def _density_kg_m3(material: str) -> float | None:
+    try:
+        return materials.load(material).value("density_kg_m3").value if material else None
+    except (MissingValue, UnknownName):
+        return None

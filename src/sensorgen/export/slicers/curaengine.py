@@ -1,0 +1,152 @@
+"""CuraEngine's command line: slice bodies with the settings that Cura would have worked out.
+
+Cura's window evaluates formulas, the engine does not: here the settings of :mod:`sensorgen.export.slicers.cura`
+are spelt out down to those that the engine reads. It takes one STL per body, standing round the middle of
+the bed.
+"""
+
+import configparser
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from string import Template
+
+from sensorgen.core.errors import SlicerFailed
+from sensorgen.design.printer import Printer, Quality, folder
+from sensorgen.export.slicers import cura
+from sensorgen.export.slicers.loads import Load, recipes
+from sensorgen.export.slicers.run import USUAL, Runner, find, run
+
+RESOURCES = (Path("/usr/share/cura/resources"), Path("/usr/local/share/cura/resources"))
+
+
+@dataclass(frozen=True)
+class EngineSettings:
+    """What the engine must be told: files it reads, settings for all, and settings by tool (from 0).
+
+    ``tools`` are those with a material; ``unused`` are the others, which the engine knows all the same.
+    """
+
+    printer: str
+    files: dict[str, str]
+    common: dict[str, str]
+    tools: dict[int, dict[str, str]]
+    unused: dict[int, dict[str, str]]
+
+
+def engine_settings(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> EngineSettings:
+    """Settings for a run of the engine.
+
+    Parameters
+    ----------
+    printer, quality : Printer, Quality
+        What prints, and in which layers.
+    loads : mapping
+        Load under the printer's own tool number [-].
+
+    Raises
+    ------
+    BadInput, MissingValue, OutOfRange, UnknownName
+        See :func:`sensorgen.export.slicers.cura.profiles`.
+    """
+    used = recipes(printer, quality, loads)
+    files = cura.profiles(printer, quality, loads)
+    own = f"quality/{printer.name}/{printer.name}_{quality.name}"
+    common = cura.of_all(printer, quality, used)
+    tools = {}
+    for index, r in used.items():
+        profile = _sections(files[f"{own}_{cura.material_id(r)}.inst.cfg"])["values"]
+        tools[index] = profile | _engine("tool", cura.of_tool(printer, quality, r)) | {"extruder_nr": str(index)}
+    return EngineSettings(
+        printer=printer.name,
+        files={path: text for path, text in files.items() if path.startswith(("definitions/", "extruders/"))},
+        common=_sections(files[f"{own}_global.inst.cfg"])["values"] | _engine("all", common),
+        tools=tools,
+        unused={i: _engine("unused", common) for i in range(len(printer.tool_numbers)) if i not in used},
+    )
+
+
+def slice_bodies(
+    stls: Sequence[tuple[Path, int]], settings: EngineSettings, gcode: Path, runner: Runner = USUAL
+) -> None:
+    """Slice one STL per body with CuraEngine.
+
+    Parameters
+    ----------
+    stls : sequence of (Path, int)
+        A body's mesh [mm] with the origin in the middle of the bed, and its tool as Cura counts, from 0
+        (``Printer.slicer_index``).
+    settings : EngineSettings
+        From :func:`engine_settings`.
+    gcode : Path
+        What to write.
+    runner : Runner
+        Which program, and for how long [s].
+
+    Raises
+    ------
+    SlicerFailed
+        CuraEngine or its definitions are not installed, a mesh is missing, or its tool has no load; or
+        the engine refuses.
+    """
+    program = find("CuraEngine", "cura-engine cura", runner.program)
+    for path, index in stls:
+        if not path.is_file():
+            raise SlicerFailed(f"nothing to slice: there is no file {path}")
+        if index not in settings.tools:
+            raise SlicerFailed(f"{path} wants tool {index}, which has no material; loaded are {sorted(settings.tools)}")
+    with tempfile.TemporaryDirectory() as here:
+        for name, text in settings.files.items():
+            place = Path(here) / name
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_text(text, "utf-8")
+        command = [program, "slice", *_arguments(stls, settings, Path(here)), "-o", str(gcode)]
+        search = os.pathsep.join(map(str, _search(Path(here))))
+        run(command, gcode, {"CURA_ENGINE_SEARCH_PATH": search}, runner)
+
+
+def resources() -> Path:
+    """Folder of Cura's own definitions, on which ours build.
+
+    Raises
+    ------
+    SlicerFailed
+        It is not where Cura's packages put it.
+    """
+    for path in RESOURCES:
+        if (path / "definitions" / "fdmprinter.def.json").is_file():
+            return path
+    raise SlicerFailed(f"Cura's definitions are not in {RESOURCES[0]}; on Debian: apt install cura")
+
+
+def _search(here: Path) -> list[Path]:
+    return [base / kind for base in (here, resources()) for kind in ("definitions", "extruders")]
+
+
+def _arguments(stls: Sequence[tuple[Path, int]], settings: EngineSettings, here: Path) -> list[str]:
+    """General settings, then each tool's, then each body under its tool: the engine reads in this order."""
+    words = ["-j", str(here / "definitions" / f"{settings.printer}.def.json"), *_given(settings.common)]
+    for index, values in sorted((settings.unused | settings.tools).items()):
+        words += [f"-e{index}", *_given(values)]
+    for path, index in stls:
+        words += [f"-e{index}", "-l", str(path), "-s", f"extruder_nr={index}"]
+    return words
+
+
+def _given(values: Mapping[str, str]) -> list[str]:
+    return [word for key, value in values.items() for word in ("-s", f"{key}={value}")]
+
+
+def _engine(section: str, names: Mapping[str, str]) -> dict[str, str]:
+    said = _sections((folder() / "cura" / "engine.ini").read_text("utf-8"))[section]
+    return {key: Template(value).safe_substitute(names) for key, value in said.items()}
+
+
+@lru_cache(maxsize=16)
+def _sections(text: str) -> dict[str, dict[str, str]]:
+    parser = configparser.ConfigParser(interpolation=None)
+    parser.read_string(text)
+    return {name: dict(section) for name, section in parser.items()}

@@ -1,0 +1,157 @@
+"""What each tool prints, as numbers that the printer can do: the one source of every profile."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
+from sensorgen.design.materials import Material
+from sensorgen.design.printer import Printer, Quality
+
+PATTERNS = ("rectilinear", "grid", "concentric", "honeycomb", "triangles")
+RETRACTION_SPEED_MM_S = 40.0  # PrusaSlicer's default; slower where the printer's extruder is
+
+
+@dataclass(frozen=True)
+class Load:
+    """What a tool prints: the material, the source of its numbers, and what the design overrides."""
+
+    material: Material
+    source: str = ""
+    infill_percent: float | None = None
+    infill_pattern: str | None = None
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How one tool prints its material: lengths [mm], temperatures [C], speeds [mm/s], shares [%]."""
+
+    material: Material
+    source: str
+    nozzle_c: float
+    bed_c: float
+    speed_mm_s: float
+    fan_percent: float
+    infill_percent: float
+    infill_pattern: str
+    wall_lines: int
+    flow_percent: float
+    retraction_mm: float
+    retraction_speed_mm_s: float
+
+
+def recipe(printer: Printer, quality: Quality, tool: int, load: Load) -> Recipe:
+    """Look up a load's numbers and hold them against the printer's limits.
+
+    Parameters
+    ----------
+    printer, quality : Printer, Quality
+        What prints, and in which layers.
+    tool : int
+        The printer's own number of the tool [-]; errors name it.
+    load : Load
+        What that tool prints.
+
+    Raises
+    ------
+    MissingValue
+        The material's file has no such value.
+    OutOfRange
+        The printer cannot do it, or the number means nothing.
+    UnknownName
+        No infill pattern goes by that name.
+    """
+    where = f"{load.material.name} on tool {tool}"
+    limits = printer.max_speed_mm_s
+    pattern = load.infill_pattern or quality.infill_pattern
+    if pattern not in PATTERNS:
+        raise UnknownName("infill pattern", pattern, PATTERNS)
+    infill = _value(load, tool, "infill_percent") if load.infill_percent is None else load.infill_percent
+    return Recipe(
+        material=load.material,
+        source=load.source,
+        nozzle_c=_between(
+            where, "nozzle temperature [C]", _value(load, tool, "nozzle_temperature_c"), 0, printer.max_nozzle_c
+        ),
+        bed_c=_between(where, "bed temperature [C]", _value(load, tool, "bed_temperature_c"), 0, printer.max_bed_c),
+        speed_mm_s=_between(where, "speed [mm/s]", _value(load, tool, "speed_mm_s"), 0.1, limits.xy),
+        fan_percent=_between(where, "fan [%]", _value(load, tool, "fan_percent"), 0, 100),
+        infill_percent=_between(where, "infill [%]", infill, 1, 100),
+        infill_pattern=pattern,
+        wall_lines=_whole(where, "walls [lines]", _value(load, tool, "wall_lines")),
+        flow_percent=_between(where, "flow [%]", _value(load, tool, "flow_percent"), 10, 200),
+        retraction_mm=_between(where, "retraction [mm]", _value(load, tool, "retraction_mm"), 0, 20),
+        retraction_speed_mm_s=min(RETRACTION_SPEED_MM_S, limits.extruder),
+    )
+
+
+def recipes(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> dict[int, Recipe]:
+    """Recipe of each loaded tool under the slicer's number of it, which counts from 0.
+
+    Parameters
+    ----------
+    printer, quality : Printer, Quality
+        What prints, and in which layers.
+    loads : mapping
+        Load under the printer's own tool number [-].
+
+    Raises
+    ------
+    BadInput
+        No load, a tool that the printer does not have, or two bed temperatures: there is one bed.
+    OutOfRange, MissingValue, UnknownName
+        See :func:`recipe`; also where layers or travel are beyond the printer.
+    """
+    if not loads:
+        raise BadInput("no tool is loaded: a profile needs at least one tool with a material")
+    absent = sorted(set(loads) - set(printer.tool_numbers))
+    if absent:
+        raise BadInput(f"{printer.name} has no tool {absent[0]}; its tools are {list(printer.tool_numbers)}")
+    _between(printer.name, "layer height [mm]", quality.layer_mm, printer.min_layer_mm, printer.nozzle_mm)
+    _between(printer.name, "first layer height [mm]", quality.first_layer_mm, printer.min_layer_mm, printer.nozzle_mm)
+    _between(quality.name, "travel speed [mm/s]", quality.travel_speed_mm_s, 1, printer.max_speed_mm_s.xy)
+    made = {tool: recipe(printer, quality, tool, loads[tool]) for tool in sorted(loads)}
+    _one_bed(made)
+    return {printer.slicer_index(tool): made[tool] for tool in sorted(made, key=printer.slicer_index)}
+
+
+def by_hand(material: Material) -> list[str]:
+    """What the operator sets by hand, in words: the extruder's cam dial, and drying."""
+    found = [f"Drying: {material.drying}"] if material.drying else []
+    if "cam_dial" in material.print:
+        found.insert(0, f"Cam dial of the extruder: {number(material.value('cam_dial').value)}")
+    return found
+
+
+def number(value: float) -> str:
+    """A number as profiles write it: as short as it is exact to a millionth [-]."""
+    return f"{value:.6f}".rstrip("0").rstrip(".")
+
+
+def _value(load: Load, tool: int, quantity: str) -> float:
+    try:
+        return load.material.value(quantity, load.source).value
+    except MissingValue as error:
+        raise MissingValue(
+            f"tool {tool}: {error}; add it under 'print' in the material's file, or load another material"
+        ) from None
+
+
+def _between(where: str, what: str, value: float, low: float, high: float) -> float:
+    if not (math.isfinite(value) and low <= value <= high):
+        raise OutOfRange(
+            f"{where}: {what} is {value:g}; expected {low:g} to {high:g}: change it, or the printer's limit"
+        )
+    return value
+
+
+def _whole(where: str, what: str, value: float) -> int:
+    if value != round(_between(where, what, value, 1, 100)):
+        raise OutOfRange(f"{where}: {what} is {value:g}; expected a whole number")
+    return int(value)
+
+
+def _one_bed(made: Mapping[int, Recipe]) -> None:
+    if len({r.bed_c for r in made.values()}) > 1:
+        each = ", ".join(f"{r.material.name} on tool {tool} {r.bed_c:g} C" for tool, r in made.items())
+        raise BadInput(f"one bed, two temperatures: {each}; name sources that agree, or print without one of them")

@@ -1,0 +1,146 @@
+"""Run a slicer and say in its own words what it did not like."""
+
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from sensorgen.core.errors import SlicerFailed
+from sensorgen.export.slicers import TIME_LIMIT_S
+
+KEPT_LINES = 12
+_TICK_S = 0.1
+_KEPT_BYTES = 1 << 16
+
+
+@dataclass(frozen=True)
+class Runner:
+    """How to run a slicer: which program, for how long, and whom to tell that time passes.
+
+    Attributes
+    ----------
+    program : str
+        Path of the program; "" for the one on PATH.
+    time_limit_s : float
+        How long it may take [s].
+    tick : callable
+        Called some times a second.
+    """
+
+    program: str = ""
+    time_limit_s: float = TIME_LIMIT_S
+    tick: Callable[[], None] = lambda: None
+
+
+USUAL = Runner()
+
+
+def find(program: str, package: str, given: str = "") -> str:
+    """Path of a program, or of the one that the user names.
+
+    Raises
+    ------
+    SlicerFailed
+        It is not installed; the message names the package that has it.
+    """
+    if given:
+        path = shutil.which(given)
+        if path is None:
+            raise SlicerFailed(f"there is no program {given!r}; name the file of {program}, or leave it out")
+        return path
+    path = shutil.which(program)
+    if path is None:
+        raise SlicerFailed(f"{program} is not installed or not on PATH; on Debian: apt install {package}")
+    return path
+
+
+def run(
+    command: Sequence[str], gcode: Path, environment: Mapping[str, str] | None = None, runner: Runner = USUAL
+) -> None:
+    """Run a slicer that is to write ``gcode``; what an earlier run left there is removed first.
+
+    Raises
+    ------
+    SlicerFailed
+        Exit code other than 0, no G-code in spite of 0, or more time than it was given.
+    """
+    gcode.unlink(missing_ok=True)
+    name = Path(command[0]).name
+    with tempfile.TemporaryFile() as said:
+        try:
+            code = _wait(command, said, {**os.environ, **(environment or {})}, runner)
+        except subprocess.TimeoutExpired:
+            raise SlicerFailed(
+                f"{name} took more than {runner.time_limit_s:g} s and was ended: slice fewer pieces at once, or give "
+                f"it more time; it last said: {_last_words(said)}"
+            ) from None
+        except OSError as error:
+            raise SlicerFailed(f"cannot run {command[0]}: {error.strerror or error}") from None
+        if code != 0:
+            raise SlicerFailed(f"{name} {_failed(code)}: {_last_words(said)}")
+        if not gcode.is_file() or gcode.stat().st_size == 0:
+            raise SlicerFailed(f"{name} ended well but wrote no {gcode}: {_last_words(said)}")
+
+
+def _failed(code: int) -> str:
+    """Exit code in words; a negative one is a signal, as SIGXFSZ where files may not be larger."""
+    if code > 0:
+        return f"failed with exit code {code}"
+    try:
+        return f"was ended by {signal.Signals(-code).name}"
+    except ValueError:
+        return f"was ended by signal {-code}"
+
+
+def _wait(command: Sequence[str], said: BinaryIO, environment: Mapping[str, str], runner: Runner) -> int:
+    end = time.monotonic() + runner.time_limit_s
+    with _started(command, said, environment) as process:
+        while True:
+            runner.tick()
+            left = end - time.monotonic()
+            try:
+                return process.wait(timeout=max(0.0, min(_TICK_S, left)))
+            except subprocess.TimeoutExpired:
+                if left <= 0:
+                    raise
+
+
+@contextmanager
+def _started(
+    command: Sequence[str], said: BinaryIO, environment: Mapping[str, str]
+) -> Iterator["subprocess.Popen[bytes]"]:
+    """A process that ends with this block, together with whatever it started itself."""
+    process = subprocess.Popen(  # noqa: S603 - a slicer found by name, with our own arguments
+        list(command), stdin=subprocess.DEVNULL, stdout=said, stderr=said, env=environment, start_new_session=True
+    )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            with suppress(ProcessLookupError):
+                _end(process)
+            process.wait()
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    if hasattr(os, "killpg"):
+        os.killpg(process.pid, signal.SIGKILL)
+    else:  # Windows
+        process.kill()
+
+
+def _last_words(said: BinaryIO) -> str:
+    """What the slicer calls an error, or else the end of what it said; the rest is licence and progress."""
+    said.seek(max(0, said.seek(0, os.SEEK_END) - _KEPT_BYTES))
+    text = said.read().decode(errors="replace").replace("\t", " ")
+    lines = ["".join(filter(str.isprintable, line)).strip() for line in text.splitlines()]
+    errors = [line for line in lines if "error" in line.lower()]
+    kept = [line for line in lines if line and not any(word in line for word in ("[trace]", "[debug]", "[WARNING]"))]
+    return " | ".join((errors or kept)[-KEPT_LINES:]) or "it said nothing"

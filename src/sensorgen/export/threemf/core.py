@@ -1,0 +1,124 @@
+"""What all families share: the model file of the 3MF core specification.
+
+Bodies keep their own vertices even where they touch: welded, they would be one surface that is no
+longer the boundary of anything.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.export.threemf.part import Part, escaped
+
+MODEL = "3D/3dmodel.model"
+OBJECT_ID = 1  # the one object of the build; the bodies of a family with one object each come after it
+MATERIALS_ID = 1000000  # far above any body's, so that a body's id stays its place in the list
+
+_CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+_ROWS = 1 << 15  # rows of text made at once: some megabytes
+
+
+def model(
+    title: str,
+    metadata: Mapping[str, str],
+    namespaces: Mapping[str, str],
+    parts: Sequence[Part],
+    objects: Iterator[str],
+    shift_mm: NDArray[np.float64],
+) -> Iterator[str]:
+    """Text of the model file: head, materials, the family's objects, and where the one object stands.
+
+    Parameters
+    ----------
+    title : str
+        Name of the print.
+    metadata : mapping of str to str
+        The family's own marks, by name.
+    namespaces : mapping of str to str
+        Address of each prefix that those names use.
+    parts : sequence of Part
+        The bodies, for their materials.
+    objects : iterator of str
+        Text of the objects; that of ``OBJECT_ID`` is built.
+    shift_mm : (3,) float64 array
+        From the sensor's coordinates to those of the bed [mm].
+    """
+    prefixes = "".join(f' xmlns:{prefix}="{escaped(address)}"' for prefix, address in namespaces.items())
+    yield f'<?xml version="1.0" encoding="UTF-8"?>\n<model unit="millimeter" xmlns="{_CORE}"{prefixes}>\n'
+    for name, value in {"Title": title, "Application": "sensorgen", **metadata}.items():
+        yield f'<metadata name="{escaped(name)}">{escaped(value)}</metadata>\n'
+    yield "<resources>\n"
+    yield from _base_materials(parts)
+    yield from objects
+    where = " ".join(f"{x:.9g}" for x in (1, 0, 0, 0, 1, 0, 0, 0, 1, *shift_mm))
+    yield f'</resources>\n<build>\n<item objectid="{OBJECT_ID}" transform="{where}"/>\n</build>\n</model>\n'
+
+
+def mesh(parts: Sequence[Part], marks: Sequence[str]) -> Iterator[str]:
+    """Text of one mesh of all ``parts``, side by side; ``marks`` are further attributes of their triangles."""
+    yield "<mesh>\n<vertices>\n"
+    for part in parts:
+        yield from _vertices(part.mesh.vertices_mm)
+    yield "</vertices>\n<triangles>\n"
+    first = 0
+    for part, mark in zip(parts, marks, strict=True):
+        yield from _triangles(part.mesh.triangles, first, mark)
+        first += len(part.mesh.vertices_mm)
+    yield "</triangles>\n</mesh>\n"
+
+
+def body(number: int, part: Part, parts: Sequence[Part], group: str = "") -> Iterator[str]:
+    """Text of the object of one body; ``group`` is that of its metadata, ``parts`` are for its material."""
+    yield f'<object id="{number}" type="model" name="{escaped(part.name)}"{material(part, parts)}>\n{group}'
+    yield from mesh([part], [""])
+    yield "</object>\n"
+
+
+def assembly(title: str, count: int) -> Iterator[str]:
+    """Text of the object that holds ``count`` bodies, which must stand before it."""
+    yield f'<object id="{OBJECT_ID}" type="model" name="{escaped(title)}">\n<components>\n'
+    for place in range(count):
+        yield f'<component objectid="{body_id(place)}"/>\n'
+    yield "</components>\n</object>\n"
+
+
+def body_id(place: int) -> int:
+    """Number of the object of the body at ``place`` in the list [-]."""
+    return OBJECT_ID + 1 + place
+
+
+def material(part: Part, parts: Sequence[Part], index: str = "pindex") -> str:
+    """Attributes that give an object (``pindex``) or a triangle (``p1``) the material of ``part``."""
+    return f' pid="{MATERIALS_ID}" {index}="{_palette(parts).index((part.material, part.colour))}"'
+
+
+def _palette(parts: Sequence[Part]) -> list[tuple[str, str]]:
+    return sorted({(part.material, part.colour) for part in parts})
+
+
+def _base_materials(parts: Sequence[Part]) -> Iterator[str]:
+    yield f'<basematerials id="{MATERIALS_ID}">\n'
+    for name, colour in _palette(parts):
+        yield f'<base name="{escaped(name)}" displaycolor="{colour.upper()}"/>\n'
+    yield "</basematerials>\n"
+
+
+def _vertices(vertices_mm: NDArray[np.float64]) -> Iterator[str]:
+    # Grids have few distinct coordinates: each is put in words once. Readers keep float32, and nine digits
+    # tell any two of those apart; below 1e-9 mm there is only noise, and no -0.
+    values, places = np.unique(np.round(vertices_mm, 9) + 0.0, return_inverse=True)
+    words = np.array([f"{value:.9g}" for value in values.tolist()], dtype=object)
+    places = places.reshape(-1, 3)
+    for start in range(0, len(places), _ROWS):
+        yield _lines('<vertex x="%s" y="%s" z="%s"/>\n', words[places[start : start + _ROWS]])
+
+
+def _triangles(triangles: NDArray[np.int32], first: int, mark: str) -> Iterator[str]:
+    for start in range(0, len(triangles), _ROWS):
+        yield _lines(f'<triangle v1="%d" v2="%d" v3="%d"{mark}/>\n', triangles[start : start + _ROWS] + first)
+
+
+def _lines(line: str, cells: NDArray[np.generic]) -> str:
+    # One format call for all rows: measured 1.7 times as fast as one per row.
+    return line * len(cells) % tuple(cells.ravel().tolist())

@@ -1,7 +1,0 @@
-"""Material values out of what was measured, as a new source that the next prediction can take."""
-
-from sensorgen.fit.fitting import fit
-from sensorgen.fit.results import Error, Fit, Fitted, Untold
-from sensorgen.fit.writing import text
-
-__all__ = ["Error", "Fit", "Fitted", "Untold", "fit", "text"]

@@ -1,9 +1,0 @@
-"""Readings of printed specimens, the bench's recordings and what was predicted, kept in one file that only grows."""
-
-from sensorgen.log.entries import Batch, BenchRun, Entry, Prediction, Print, RawFile, Reading, Specimen
-from sensorgen.log.logbook import PLACE, TABLES, Log, place
-
-__all__ = [
-    "PLACE", "TABLES", "Batch", "BenchRun", "Entry", "Log", "Prediction", "Print", "RawFile", "Reading", "Specimen",
-    "place",
-]  # fmt: skip

@@ -1,0 +1,1 @@
+"""What was measured: log, instruments, recordings, signal processing."""

@@ -1,0 +1,108 @@
+"""A file to its recordings, by what the file begins with and not by what it is called."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.measure.recording import hdf, matfive, table, tiepie
+from sensorgen.measure.recording.matfive import MOST_BYTES
+from sensorgen.measure.recording.samples import Recording, Source
+
+_REFUSED = {
+    b"PK\x03\x04": "a zip archive (an .npz or .xlsx is one, too): unpack it, or export the table as CSV",
+    b"\x1f\x8b": "packed with gzip: unpack it first",
+    b"BZh": "packed with bzip2: unpack it first",
+    b"\xfd7zXZ": "packed with xz: unpack it first",
+    b"7z\xbc\xaf": "a 7z archive: unpack it first",
+    b"\x93NUMPY": "a NumPy file, which may hold pickled objects: save the numbers as CSV, .mat or HDF5",
+    b"\x80\x02": "a Python pickle, which could run anything: it is not opened; save the numbers as CSV, .mat or HDF5",
+    b"PAR1": "a Parquet file: save the numbers as CSV, .mat or HDF5",
+    b"SQLite format 3": "a database: export the table as CSV",
+}
+_REFUSED |= {b"\x80" + bytes([n]): _REFUSED[b"\x80\x02"] for n in (3, 4, 5)}
+_HDF = b"\x89HDF\r\n\x1a\n"
+_HDF_PLACES = (0, 512, 1024, 2048)
+
+
+def read(path: Path | str, columns: Mapping[str, str] | None = None) -> Recording:
+    """The recording in a file that has one.
+
+    Parameters, errors and formats as :func:`read_all`; several lock-ins are refused as well.
+    """
+    found = read_all(path, columns)
+    if len(found) > 1:
+        raise BadInput(f"{path}: {len(found)} lock-ins; expected one: choose among those of read_all")
+    return found[0]
+
+
+def read_all(path: Path | str, columns: Mapping[str, str] | None = None) -> tuple[Recording, ...]:
+    """Every lock-in's recording in a file.
+
+    Parameters
+    ----------
+    path : Path or str
+        TiePieLCR's .mat (MATLAB 5, either byte order, or 7.3), an HDF5 file with the same variables, or CSV.
+    columns : mapping of str to str, optional
+        Only for CSV: what the file calls its columns, to what we call them, see
+        :mod:`sensorgen.measure.recording.table`.
+
+    Raises
+    ------
+    BadInput
+        A file that is missing, empty, damaged, cut off, too large or of another kind, with the place where that shows.
+    MissingValue
+        HDF5, without h5py.
+    """
+    path = Path(path)
+    head = _head(path)
+    try:
+        return _reader(head)(path, columns or {})
+    except OSError as error:
+        raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None
+    except SensorgenError as error:
+        raise error if str(path) in str(error) else error.within(str(path)) from None
+
+
+def _head(path: Path) -> bytes:
+    try:
+        if path.is_dir():
+            raise BadInput(f"{path} is a folder; expected a file of readings")
+        if not path.is_file():
+            raise BadInput(f"cannot read {str(path)!r}: there is no such file")
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            head = file.read(_HDF_PLACES[-1] + len(_HDF))
+    except (OSError, ValueError) as error:
+        raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
+    if not head:
+        raise BadInput(f"{path}: the file is empty")
+    if size > MOST_BYTES:
+        raise BadInput(f"{path}: {size / 2**30:.3g} GB; expected up to {MOST_BYTES >> 30} GB: split the run")
+    for magic, why in _REFUSED.items():
+        if head.startswith(magic):
+            raise BadInput(f"{path} is {why}")
+    return head
+
+
+def _reader(head: bytes) -> Callable[[Path, Mapping[str, str]], tuple[Recording, ...]]:
+    if any(head[place : place + len(_HDF)] == _HDF for place in _HDF_PLACES):
+        return _mat73 if head.startswith(b"MATLAB") else _hdf
+    if head.startswith(b"MATLAB") or head[126:128] in (b"IM", b"MI"):
+        return _mat5
+    return _csv
+
+
+def _mat5(path: Path, _: Mapping[str, str]) -> tuple[Recording, ...]:
+    return tiepie.recordings(matfive.variables(path.read_bytes(), tiepie.WANTED), Source(path.name, "MATLAB 5"))
+
+
+def _mat73(path: Path, _: Mapping[str, str]) -> tuple[Recording, ...]:
+    return tiepie.recordings(hdf.variables(path, tiepie.WANTED), Source(path.name, "MATLAB 7.3"))
+
+
+def _hdf(path: Path, _: Mapping[str, str]) -> tuple[Recording, ...]:
+    return tiepie.recordings(hdf.variables(path, tiepie.WANTED), Source(path.name, "HDF5"))
+
+
+def _csv(path: Path, columns: Mapping[str, str]) -> tuple[Recording, ...]:
+    return (table.recording(path, Source(path.name, "CSV"), columns),)

@@ -1,0 +1,211 @@
+"""The thesis's low-pass: Butterworth, order 4, in second-order sections, live and offline.
+
+Sections and not polynomials: with cut-off far below the sampling rate the poles crowd at 1, where polynomial
+coefficients lose one digit after the other until the filter is unstable. The sampling rate is that of the recording:
+the thesis's 66.6666 Hz belongs to another version of the instrument's program.
+"""
+
+from dataclasses import dataclass, field
+from math import ceil, log10
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.errors import OutOfRange
+from sensorgen.measure.recording.samples import Bools, Complex, Real, Recording
+
+CUTOFF_HZ = 0.2727
+THESIS_RATE_HZ = 66.6666
+ORDER = 4
+_SETTLED = 3.0  # over the cut-off: until then a filter that was started wrong has forgotten it
+_END = 0.5  # over the cut-off: how much of an end says how it goes on
+_LONGEST_GAP = 0.5  # over the cut-off: what is missing for longer is not made up
+_EVEN = 1e-3  # of a step: how evenly samples must lie to be taken as they are
+
+
+def sections(rate_hz: float, cutoff_hz: float = CUTOFF_HZ, order: int = ORDER) -> Real:
+    """Second-order sections of the low-pass.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Sampling rate of the data that it is meant for [Hz].
+    cutoff_hz : float
+        Where the power is halved: -3 dB in one pass, -6 dB forward and backward [Hz].
+    order : int
+        Of the filter.
+
+    Raises
+    ------
+    OutOfRange
+        A cut-off that is not between 0 and half the rate.
+    """
+    from scipy.signal import butter
+
+    if not 0 < cutoff_hz < rate_hz / 2:
+        raise OutOfRange(
+            f"a cut-off of {cutoff_hz:g} Hz at {rate_hz:g} samples/s; expected one between 0 and half of it"
+        )
+    return np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))
+
+
+@dataclass
+class Live:
+    """The filter for a stream: begun in the steady state of the first reading, so that it need not settle.
+
+    Parameters
+    ----------
+    rate_hz, cutoff_hz : float
+        Sampling rate and cut-off [Hz].
+
+    Examples
+    --------
+    >>> live = Live(140.0)
+    >>> live(np.full((3, 1), 41 + 2j)).round(6).ravel().tolist()
+    [(41+2j), (41+2j), (41+2j)]
+    """
+
+    rate_hz: float
+    cutoff_hz: float = CUTOFF_HZ
+    _sections: Real = field(init=False, repr=False)
+    _state: NDArray[Any] | None = field(init=False, default=None, repr=False)
+    _last: NDArray[Any] | None = field(init=False, default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        """Make the filter, or refuse."""
+        self._sections = sections(self.rate_hz, self.cutoff_hz)
+
+    def __call__(self, block: NDArray[Any]) -> NDArray[Any]:
+        """Filter the next samples (n, m); where one is nan the last reading is held, and the answer is nan."""
+        from scipy.signal import sosfilt, sosfilt_zi
+
+        missing = np.isnan(block)
+        held = self._held(np.array(block), missing)
+        if self._state is None:
+            self._state = np.full((len(self._sections), 2, block.shape[1]), np.nan, block.dtype)
+        fresh = np.isnan(self._state[0, 0]) & bool(len(block))  # a column begins with its own first reading
+        self._state[:, :, fresh] = sosfilt_zi(self._sections)[:, :, None] * held[:1, fresh]
+        found, self._state = sosfilt(self._sections, held, axis=0, zi=self._state)
+        return np.where(missing, np.nan, found)
+
+    def _held(self, values: NDArray[Any], missing: Bools) -> NDArray[Any]:
+        """Every gap filled by the reading before it; before the first one, by that."""
+        last = np.full(values.shape[1], np.nan, values.dtype) if self._last is None else self._last
+        for j in np.flatnonzero(missing.any(axis=0)):
+            places = np.where(missing[:, j], -1, np.arange(len(values)))
+            held = np.maximum.accumulate(places)
+            first = values[np.argmin(missing[:, j]), j] if np.isnan(last[j]) and not missing[:, j].all() else last[j]
+            values[:, j] = np.where(held >= 0, values[held, j], first)
+        if len(values):
+            self._last = values[-1].copy()
+        return values
+
+
+def offline(values: NDArray[Any], rate_hz: float, cutoff_hz: float = CUTOFF_HZ) -> NDArray[Any]:
+    """Evenly sampled values, forward and backward: no delay, -6 dB at the cut-off.
+
+    Parameters
+    ----------
+    values : (n, m) array
+        Real or complex, without gaps.
+    rate_hz, cutoff_hz : float
+        Sampling rate and cut-off [Hz].
+
+    Notes
+    -----
+    At both ends the values are continued for as long as the filter remembers: reflected at the end of a straight line
+    through the last half period of the cut-off, so that a drift goes on and the noise of the last reading does
+    not become a step.
+
+    Raises
+    ------
+    OutOfRange
+        As :func:`sections`.
+    """
+    from scipy.signal import sosfiltfilt
+
+    made = sections(rate_hz, cutoff_hz)
+    if len(values) < 2:
+        return np.array(values)
+    pad = min(len(values) - 1, ceil(_SETTLED * rate_hz / cutoff_hz))
+    fit = min(len(values), ceil(_END * rate_hz / cutoff_hz))
+    begin = 2 * _first(values[:fit]) - values[pad:0:-1]
+    end = 2 * _first(values[: -fit - 1 : -1]) - values[-2 : -pad - 2 : -1]
+    longer = np.concatenate([begin, values, end])
+    parts = [longer.real, longer.imag] if np.iscomplexobj(values) else [longer]
+    found = [np.asarray(sosfiltfilt(made, part, axis=0, padlen=0))[pad : pad + len(values)] for part in parts]
+    return found[0] if len(found) == 1 else found[0] + 1j * found[1]
+
+
+def _first(values: NDArray[Any]) -> NDArray[Any]:
+    """Where a straight line through some values begins."""
+    t = np.arange(len(values)) - (len(values) - 1) / 2
+    spread = float(t @ t)
+    slope = t @ values / spread if spread else np.zeros(values.shape[1])
+    return np.asarray(values.mean(axis=0) + slope * t[0])
+
+
+def filtered(recording: Recording, cutoff_hz: float = CUTOFF_HZ) -> tuple[Real, Complex]:
+    """A recording's valid samples on even steps of its rebuilt clock, filtered forward and backward.
+
+    Parameters
+    ----------
+    recording : Recording
+        What was measured; samples that do not count are bridged by straight lines.
+    cutoff_hz : float
+        Cut-off [Hz].
+
+    Returns
+    -------
+    (n,) array, (n, m) array
+        Times [s] and impedances [ohm]; nan within gaps that last longer than half a period of the cut-off.
+
+    Raises
+    ------
+    OutOfRange
+        As :func:`sections`; fewer than two valid samples.
+    """
+    valid = recording.valid()
+    time, z = recording.time_s[valid], recording.impedance_ohm[valid]
+    if len(time) < 2:
+        raise OutOfRange(f"{len(time)} valid samples; expected two or more to filter")
+    rate = recording.source.rate_hz
+    grid, values = evenly(time, z, rate)
+    found = offline(values, rate, cutoff_hz)
+    before = np.clip(np.searchsorted(time, grid, side="right") - 1, 0, len(time) - 2)
+    found[(time[before + 1] - time[before]) * cutoff_hz > _LONGEST_GAP] = np.nan
+    return grid, found
+
+
+def evenly(time_s: Real, values: Complex, rate_hz: float) -> tuple[Real, Complex]:
+    """Values on even steps: as they are where they lie so, or on straight lines between their neighbours."""
+    steps = np.diff(time_s) * rate_hz
+    if np.abs(steps - 1).max() < _EVEN:
+        return time_s, values
+    grid = np.arange(time_s[0], time_s[-1] + 0.5 / rate_hz, 1 / rate_hz)
+    found = np.empty((len(grid), values.shape[1]), np.complex128)
+    for j in range(values.shape[1]):
+        found[:, j] = np.interp(grid, time_s, values[:, j])
+    return grid, found
+
+
+def response_db(frequency_hz: float, cutoff_hz: float, rate_hz: float, order: int = ORDER) -> float:
+    r"""Gain of one pass, in closed form [dB].
+
+    .. math:: |H|^2 = \frac{1}{1 + (\tan(\pi f / f_s) / \tan(\pi f_c / f_s))^{2n}}
+
+    Parameters
+    ----------
+    frequency_hz, cutoff_hz, rate_hz : float
+        Of the signal, the cut-off, and the samples [Hz].
+    order : int
+        Of the filter.
+
+    Examples
+    --------
+    >>> round(response_db(0.2727, 0.2727, 140.0), 3)
+    -3.01
+    """
+    ratio = np.tan(np.pi * frequency_hz / rate_hz) / np.tan(np.pi * cutoff_hz / rate_hz)
+    return -10 * log10(1 + float(ratio) ** (2 * order))

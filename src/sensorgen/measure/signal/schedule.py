@@ -1,0 +1,114 @@
+"""The plan of a run: random presses, the same for the same seed, that any rig can follow.
+
+Forces and positions are drawn independently and evenly, so that neither drift nor creep can be taken for either. The
+order is random as drawn; a press that is repeated comes back at a random place of the run, not at once, so that the two
+tell repeatability and not memory.
+"""
+
+import csv
+import io
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from sensorgen.core.errors import OutOfRange
+
+MOST_PRESSES = 100_000
+_STEP_N, _STEP_MM = 0.001, 0.001  # to which the numbers are rounded, so that the file says all of them
+
+
+@dataclass(frozen=True)
+class Step:
+    """One press.
+
+    Attributes
+    ----------
+    press : int
+        Counted from 1, in the order of the run.
+    point : int
+        Which of the points it presses, counted from 1; the same in a repeat.
+    start_s : float
+        When the tip comes down, from the begin of the run [s].
+    force_n, position_mm : float
+        What to press with and where: the centre of the tip along the sensor [N], [mm].
+    dwell_s, rest_s : float
+        How long to press, and how long to wait after it [s].
+    """
+
+    press: int
+    point: int
+    start_s: float
+    force_n: float
+    position_mm: float
+    dwell_s: float
+    rest_s: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A run that is to be.
+
+    Attributes
+    ----------
+    seed : int
+        Of the random numbers.
+    presses : int
+        Points; each is pressed ``1 + repeats`` times.
+    force_n, position_mm : (float, float)
+        Least and largest [N], [mm].
+    dwell_s, rest_s : float
+        How long each press and each rest lasts [s].
+    repeats : int
+        How often each point is pressed again.
+    """
+
+    seed: int
+    presses: int
+    force_n: tuple[float, float]
+    position_mm: tuple[float, float]
+    dwell_s: float
+    rest_s: float
+    repeats: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what no rig can run."""
+        total = self.presses * (1 + self.repeats)
+        if self.presses < 1 or self.repeats < 0 or total > MOST_PRESSES:
+            raise OutOfRange(f"{self.presses} presses, each {self.repeats} times more; expected up to {MOST_PRESSES}")
+        for name, (low, high) in {"forces": self.force_n, "positions": self.position_mm}.items():
+            if not 0 <= low <= high < np.inf:
+                raise OutOfRange(f"{name} from {low:g} to {high:g}; expected two numbers that rise, from 0 on")
+        if not (0 < self.dwell_s < np.inf and 0 <= self.rest_s < np.inf):
+            raise OutOfRange(f"dwell {self.dwell_s:g} s and rest {self.rest_s:g} s; expected a dwell above 0")
+
+    def steps(self) -> list[Step]:
+        """Every press, in the order of the run; a rest comes first."""
+        rng = np.random.default_rng(self.seed)
+        force = np.round(rng.uniform(*self.force_n, self.presses) / _STEP_N) * _STEP_N
+        position = np.round(rng.uniform(*self.position_mm, self.presses) / _STEP_MM) * _STEP_MM
+        order = list(range(self.presses))
+        for _ in range(self.repeats):
+            order += rng.permutation(self.presses).tolist()
+        each = self.dwell_s + self.rest_s
+        starts = [round(self.rest_s + k * each, 6) for k in range(len(order))]
+        return [
+            Step(k, p + 1, start, round(float(force[p]), 6), round(float(position[p]), 6), self.dwell_s, self.rest_s)
+            for k, (p, start) in enumerate(zip(order, starts, strict=True), 1)
+        ]
+
+    def seconds(self) -> float:
+        """How long the run takes [s]."""
+        return self.rest_s + self.presses * (1 + self.repeats) * (self.dwell_s + self.rest_s)
+
+    def data(self) -> dict[str, Any]:
+        """The plan as plain data."""
+        return asdict(self) | {"seconds": self.seconds(), "steps": [asdict(step) for step in self.steps()]}
+
+    def csv(self) -> str:
+        """The plan as CSV, a row per press."""
+        text = io.StringIO()
+        table = csv.DictWriter(text, [field.name for field in fields(Step)], lineterminator="\n")
+        table.writeheader()
+        table.writerows(asdict(step) for step in self.steps())
+        return text.getvalue()

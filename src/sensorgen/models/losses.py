@@ -1,0 +1,154 @@
+"""What dielectrics lose: the complex permittivities of a design at a frequency, and what the line makes of them."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import pi
+
+from sensorgen.core.errors import BadInput, MissingValue
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.design.design import Design
+from sensorgen.design.materials import FILM_LEAK, SET
+from sensorgen.prediction.capacitance import Taken, capacitance, permittivities
+
+LOSSES = ("loss_tangent", "resistivity_ohm_m")
+LOWEST_HZ = 1.1e3  # of the bench's tones: a leak is strongest there
+
+_ACCURACY = 1e-5
+_WEAK = 0.1  # of what is stored: up to here a leak is a conductance within 1 %
+
+
+def set_losses(design: Design) -> list[Taken]:
+    """Loss tangents and resistivities that a design sets for its dielectrics itself.
+
+    No source gives a loss tangent, and the one resistivity that a source prints is a slip: what the user does not set
+    is taken for lossless.
+    """
+    dielectrics = {body.material for body in design.in_use.bodies if not body.terminal} | {"air"}
+    return [
+        Taken(name, quantity, values[quantity], SET)
+        for name, values in sorted(design.material_values.items())
+        if name in dielectrics
+        for quantity in LOSSES
+        if quantity in values
+    ]
+
+
+def permittivity(design: Design, frequency_hz: float | None = None) -> tuple[dict[str, complex], list[Taken]]:
+    r"""Relative permittivity of every dielectric and of air, complex where one loses or leaks; and what it rests on.
+
+    .. math:: \varepsilon = \varepsilon' (1 - j \tan\delta) - j / (\omega \varepsilon_0 \varrho)
+
+    Parameters
+    ----------
+    design : Design
+        Its support is taken to be gone.
+    frequency_hz : float or None
+        Of the field, above 0 [Hz]; needed where a dielectric leaks.
+
+    Raises
+    ------
+    BadInput
+        A resistivity without a frequency.
+    MissingValue
+        A dielectric without a permittivity.
+    """
+    taken = permittivities(design)
+    found = _with(taken, set_losses(design), frequency_hz)
+    return found, [*taken, *set_losses(design)]
+
+
+def _with(taken: Sequence[Taken], lost: Sequence[Taken], frequency_hz: float | None) -> dict[str, complex]:
+    found: dict[str, complex] = {t.material: t.value for t in taken}
+    for loss in lost:
+        if loss.quantity == "loss_tangent":
+            found[loss.material] -= 1j * found[loss.material].real * loss.value
+        elif frequency_hz is None:
+            raise BadInput(
+                f"{loss.material} leaks ({loss.value:g} ohm m), and its share depends on the frequency; "
+                "expected one: --frequency 1.1kHz"
+            )
+        else:
+            found[loss.material] -= 1j * _conduction(loss.value, frequency_hz)
+    return found
+
+
+def _conduction(resistivity_ohm_m: float, frequency_hz: float) -> float:
+    """What a leak adds to the permittivity, minus its imaginary part [-]."""
+    return 1 / (2 * pi * frequency_hz * EPS0_F_PER_M * resistivity_ohm_m)
+
+
+@dataclass(frozen=True)
+class Lost:
+    """What the dielectrics of a whole sensor lose.
+
+    Attributes
+    ----------
+    tan_delta : float
+        Of the whole, the same at every frequency [-].
+    leak_s : float
+        Conductance between the electrodes, the same at every frequency [S].
+    taken : tuple of Taken
+        What both rest on; empty where nothing is lost.
+    doubts : tuple of str
+        Why they are to be taken with care.
+    """
+
+    tan_delta: float = 0.0
+    leak_s: float = 0.0
+    taken: tuple[Taken, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+
+def lost(design: Design) -> Lost:
+    r"""What the dielectrics of a design lose, as far as the design or a source that it names says.
+
+    A weak leak is a conductance :math:`G = \omega C''`: to first order in :math:`1 / (\omega \varepsilon \varrho)` it
+    does not depend on the frequency, whatever lies in series with what leaks. It is taken at the lowest tone. What a
+    film leaks per area, as a fit finds it, is a conductance of its own beside that.
+
+    Raises
+    ------
+    Unpredictable
+        No model knows the losses of this scene.
+    """
+    taken, sets = permittivities(design), set_losses(design)
+    parts = {quantity: [t for t in sets if t.quantity == quantity] for quantity in LOSSES}
+    tangents, leaks = (_tangent(design, taken, parts[quantity]) for quantity in LOSSES)
+    film, p = _film_leak(design), design.params
+    through_film_s = sum(t.value for t in film) * p.length_mm * p.width_mm * M_PER_MM**2
+    return Lost(
+        tangents[0], 2 * pi * LOWEST_HZ * leaks[1] + through_film_s, (*sets, *film),
+        tuple(_strong(taken, parts[LOSSES[1]])),
+    )  # fmt: skip
+
+
+def _film_leak(design: Design) -> list[Taken]:
+    """Leak of the film per area [S/m2], where one is known."""
+    material, source = design.slot("film")
+    try:
+        value = material.value(FILM_LEAK, source or design.used().get(material.name, ""))
+    except MissingValue:
+        return []
+    return [Taken(material.name, FILM_LEAK, value.value, value.source)]
+
+
+def _tangent(design: Design, taken: Sequence[Taken], some: Sequence[Taken]) -> tuple[float, float]:
+    """C''/C' [-] and C'' [F] of the sensor with some of its losses."""
+    if not some:
+        return 0.0, 0.0
+    found = capacitance(design.in_use, _with(taken, some, LOWEST_HZ), _ACCURACY)
+    if found.loss_f is None:
+        return 0.0, 0.0
+    loss = (found.loss_f.lower + found.loss_f.upper) / 2
+    return loss / found.capacitance_f.middle(), loss
+
+
+def _strong(taken: Sequence[Taken], leaks: Sequence[Taken]) -> Iterator[str]:
+    eps = {t.material: t.value for t in taken}
+    for leak in leaks:
+        share = _conduction(leak.value, LOWEST_HZ) / eps[leak.material]
+        if share > _WEAK:
+            yield (
+                f"{leak.material} leaks {share:.2g} of what it stores at {LOWEST_HZ / 1e3:g} kHz: beyond {_WEAK:g} its "
+                "leak depends on the frequency, and is taken as of that tone"
+            )

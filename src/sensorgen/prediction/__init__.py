@@ -1,0 +1,1 @@
+"""What a sensor should measure, with its error budget, identifiability and inverse."""

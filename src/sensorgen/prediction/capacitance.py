@@ -1,0 +1,375 @@
+"""The cheapest model that can speak of a design, for each thing that has to be known of it before it is pressed.
+
+Models that cost next to nothing are always asked: their own bounds tell whether more is needed. The dear ones are
+weighed first, by what they should cost and reach (:mod:`sensorgen.prediction.cost_model`), and asked one after the
+other.
+"""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from hashlib import sha256
+from json import dumps
+from math import hypot, inf
+from types import ModuleType
+from typing import Any
+
+from sensorgen import models
+from sensorgen.core import cache as cached
+from sensorgen.core import plugins as registry
+from sensorgen.core.bounds import Disc, Interval
+from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
+from sensorgen.design import materials
+from sensorgen.design.design import Design
+from sensorgen.prediction.cost_model import expected
+from sensorgen.prediction.plan import Candidate
+from sensorgen.scene.scene import Scene
+from sensorgen.scene.sections import overlap
+
+_EXACT = 1e-9  # relative width of a capacitance's bounds below which the scene is a plate
+_LOSSLESS, _LOSSY = "capacitance", "lossy"  # functions of a model
+_CHEAP = 1  # up to this cost, a model is asked before it is weighed
+
+
+class Unpredictable(SensorgenError):
+    """No model can speak of the scene; the message holds what each one said."""
+
+
+class Contradiction(SensorgenError):
+    """Two models whose bounds exclude each other: a fault, and no result."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A model's capacitance, and what the models before it refused.
+
+    Attributes
+    ----------
+    model : str
+        Name of the model.
+    capacitance_f : Interval
+        Of the whole sensor [F]; its real part where dielectrics lose.
+    refused : tuple of str
+        Why other models cannot speak of the scene.
+    wanted : float
+        How wide the interval might be, relative to its middle [-].
+    plan : tuple of Candidate
+        All models, in the order in which they were weighed.
+    known : bool
+        Whether the answer was known from before.
+    loss_f : Interval or None
+        Minus the imaginary part, where dielectrics lose [F].
+    """
+
+    model: str
+    capacitance_f: Interval
+    refused: tuple[str, ...]
+    wanted: float = inf
+    plan: tuple[Candidate, ...] = ()
+    known: bool = False
+    loss_f: Interval | None = None
+
+    def reached(self) -> bool:
+        """Whether the interval is as narrow as wanted."""
+        return self.width() <= self.wanted
+
+    def width(self) -> float:
+        """How far the bounds are apart, relative to their middle; of a complex value, to its modulus [-]."""
+        if self.loss_f is None:
+            return self.capacitance_f.width()
+        real, loss = self.capacitance_f, self.loss_f
+        return (real.upper - real.lower) / hypot(real.upper + real.lower, loss.upper + loss.lower) * 2
+
+    def seconds(self) -> float:
+        """Time that all models took together, imports left out [s]."""
+        return sum(c.seconds or 0.0 for c in self.plan)
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A material value that a prediction rests on."""
+
+    material: str
+    quantity: str
+    value: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Unloaded:
+    """What is known of a design before anything presses on it.
+
+    Attributes
+    ----------
+    answer : Answer
+        Its capacitance.
+    resistivity_ohm_m : (float, float)
+        Of the top and the bottom electrode [ohm m].
+    taken : tuple of Taken
+        Material values that both rest on.
+    """
+
+    answer: Answer
+    resistivity_ohm_m: tuple[float, float]
+    taken: tuple[Taken, ...]
+
+
+def capacitance(
+    scene: Scene, permittivity: Mapping[str, complex], width: float = inf, model: str = "", keep: bool = True
+) -> Answer:
+    """Ask models, the cheapest that will do, for the capacitance of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        As drawn.
+    permittivity : mapping of str to float or complex
+        Relative permittivity of each dielectric, and of "air" [-]; complex where one loses.
+    width : float
+        How wide the interval may be, relative to its middle; the narrowest one where none is that narrow [-].
+    model : str
+        The only model to ask, or "".
+    keep : bool
+        Take an answer that is known from before, and keep a new one. Answers of any width are never kept: they cost
+        next to nothing.
+
+    Raises
+    ------
+    Unpredictable
+        Bodies overlap; no model can speak of the scene, or the one that is named cannot.
+    Contradiction
+        The bounds of two models exclude each other.
+    UnknownName
+        No model of capacitance goes by that name.
+    OutOfRange
+        A width that is not above 0.
+
+    Notes
+    -----
+    A known answer is given without loading any model.
+    """
+    if not width > 0:
+        raise OutOfRange(f"an accuracy of {width:g}; expected a number above 0, as 1e-4")
+    if not keep or (width == inf and not model):
+        return _asked(scene, permittivity, width, model)
+    question = _question(scene, permittivity, width, model)
+    found = cached.known(question)
+    if found is not None:
+        return replace(_of_plain(found), known=True)
+    answer = _asked(scene, permittivity, width, model)
+    remember(scene, permittivity, model, answer)
+    return answer
+
+
+def remember(scene: Scene, permittivity: Mapping[str, complex], model: str, answer: Answer) -> None:
+    """Keep an answer to :func:`capacitance` for the next time."""
+    cached.keep(_question(scene, permittivity, answer.wanted, model), _plain(answer))
+
+
+def is_known(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str = "") -> bool:
+    """Whether the answer to :func:`capacitance` is known from before."""
+    return cached.known(_question(scene, permittivity, width, model)) is not None
+
+
+def weighed(scene: Scene, width: float = inf, model: str = "", lossy: bool = False) -> tuple[Candidate, ...]:
+    """The plan before anything is asked: all models of capacitance in the order in which they would be.
+
+    Parameters
+    ----------
+    scene, width, model : Scene, float, str
+        As of :func:`capacitance`.
+    lossy : bool
+        Whether a dielectric loses.
+    """
+    kind = _LOSSY if lossy else _LOSSLESS
+    plan = _ordered(scene, width, model)
+    return tuple(replace(c, passed_over=c.passed_over or _unfit(c, scene, kind)) for c in plan)
+
+
+def _ordered(scene: Scene, width: float, model: str) -> list[Candidate]:
+    loaded = capacitance_models()
+    if model and model not in loaded:
+        raise UnknownName("model of capacitance", model, loaded)
+    found = [
+        Candidate(name, *expected(name, scene, width), "" if model in ("", name) else f"--model {model}")
+        for name in loaded
+    ]
+    return sorted(found, key=lambda c: _rank(c, loaded[c.model].COST, width))
+
+
+def capacitance_models() -> dict[str, ModuleType]:
+    """The models of capacitance, by name."""
+    return {name: registry.load(models, name) for name in registry.defining(models, "capacitance")}
+
+
+def _unfit(candidate: Candidate, scene: Scene, kind: str) -> str:
+    model = capacitance_models()[candidate.model]
+    return (model.unfit(scene) or "") if hasattr(model, kind) else "it knows no losses"
+
+
+def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float]:
+    """Cheap models first, then those that should do by their cost, then the others by what they should reach."""
+    short = cost > _CHEAP and candidate.reach() > width
+    return short, candidate.reach() if short else 0.0, cost
+
+
+def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str) -> Answer:
+    from sensorgen.solvers.electrostatics.bounds import Unsolved
+
+    overlaps = overlap(scene)
+    if overlaps:
+        raise Unpredictable(f"{overlaps}; expected each place to belong to one body")
+    plan: list[Candidate] = []
+    refused: list[str] = []
+    bounds: dict[str, Interval | Disc] = {}
+    kind = _kind(permittivity)
+    for candidate in _ordered(scene, width, model):
+        reason = candidate.passed_over or _idle(candidate, bounds, width)
+        if not reason:
+            reason = _unfit(candidate, scene, kind)
+            refused += [f"{candidate.model}: {reason}"] if reason else []
+        if reason:
+            plan.append(replace(candidate, passed_over=reason))
+            continue
+        try:
+            found, seconds = _timed(candidate.model, kind, scene, permittivity, width)
+        except Unsolved as error:  # the others answer as well as they can
+            refused.append(f"{candidate.model}: {error}")
+            plan.append(replace(candidate, passed_over=str(error)))
+            continue
+        bounds[candidate.model] = found
+        _refuse_contradiction(bounds)
+        plan.append(replace(candidate, width=found.width(), seconds=seconds))
+    if not bounds:
+        raise Unpredictable(_together(refused))
+    best = min(bounds, key=lambda name: bounds[name].width())
+    real, loss = _parts(bounds[best])
+    return Answer(best, real, tuple(refused), width, tuple(plan), loss_f=loss)
+
+
+def _together(refused: Sequence[str]) -> str:
+    """What models said, each reason once."""
+    names: dict[str, list[str]] = {}
+    for line in refused:
+        name, _, reason = line.partition(": ")
+        names.setdefault(reason, []).append(name)
+    return "; ".join(f"{', '.join(those)}: {reason}" for reason, those in names.items())
+
+
+def _kind(permittivity: Mapping[str, complex]) -> str:
+    """Which of a model's functions speaks of these permittivities."""
+    return _LOSSY if any(isinstance(value, complex) for value in permittivity.values()) else _LOSSLESS
+
+
+def _parts(found: Interval | Disc) -> tuple[Interval, Interval | None]:
+    """Bounds of a capacitance, and those of what it loses."""
+    if isinstance(found, Interval):
+        return found, None
+    real, loss = found.centre.real, -found.centre.imag
+    return Interval(real - found.radius, real + found.radius), Interval(loss - found.radius, loss + found.radius)
+
+
+def _refuse_contradiction(bounds: Mapping[str, Interval | Disc]) -> None:
+    """All of them hold the truth: any two overlap."""
+    for part in zip(*(_parts(found) for found in bounds.values()), strict=True):
+        named = {name: found for name, found in zip(bounds, part, strict=True) if found}
+        if named:
+            _refuse_apart(named)
+
+
+def _refuse_apart(bounds: Mapping[str, Interval]) -> None:
+    lower = max(bounds, key=lambda name: bounds[name].lower)
+    upper = min(bounds, key=lambda name: bounds[name].upper)
+    if bounds[lower].lower > bounds[upper].upper * (1 + _EXACT):
+        raise Contradiction(
+            f"{lower} says at least {bounds[lower].lower:.9g} F, {upper} at most {bounds[upper].upper:.9g} F: one of "
+            "them fails on this scene; report it, and use neither"
+        )
+
+
+def _idle(candidate: Candidate, bounds: Mapping[str, Interval | Disc], width: float) -> str:
+    """Why a model that might speak need not."""
+    best = min((found.width() for found in bounds.values()), default=inf)
+    if bounds and best <= width:
+        return "not needed"
+    return f"not expected to come nearer than {candidate.reach():.2g}" if candidate.reach() >= best else ""
+
+
+def _timed(
+    name: str, kind: str, scene: Scene, permittivity: Mapping[str, complex], width: float
+) -> tuple[Interval | Disc, float]:
+    """A model's bounds, or its disc, and how long they took once the model is loaded [s]."""
+    model = capacitance_models()[name]
+    given = (model.WIDTH if width == inf else width,) if hasattr(model, "WIDTH") else ()
+    start = time.perf_counter()
+    found: Interval | Disc = getattr(model, kind)(scene, permittivity, *given)
+    return found, time.perf_counter() - start
+
+
+def _question(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str) -> dict[str, Any]:
+    """Everything that decides an answer: the scene's content, materials, and what is wanted."""
+    look = [
+        (body.name, body.material, body.terminal, [(p.axis, p.outline, p.start_mm, p.end_mm) for p in body.prisms])
+        for body in scene.bodies
+    ]
+    return {
+        "what": "capacitance",
+        "scene": sha256(dumps([look, scene.size_mm]).encode()).hexdigest(),
+        "permittivity": {name: [v.real, v.imag] if isinstance(v, complex) else v for name, v in permittivity.items()},
+        "width": width if width < inf else None,
+        "model": model,
+    }
+
+
+def _plain(answer: Answer) -> dict[str, Any]:
+    """An answer as plain data."""
+    return asdict(answer) | {"wanted": answer.wanted if answer.wanted < inf else None}
+
+
+def _of_plain(data: dict[str, Any]) -> Answer:
+    """An answer from plain data."""
+    return Answer(
+        data["model"], Interval(**data["capacitance_f"]), tuple(data["refused"]),
+        inf if data["wanted"] is None else data["wanted"], tuple(Candidate(**c) for c in data["plan"]),
+        loss_f=Interval(**data["loss_f"]) if data["loss_f"] else None,
+    )  # fmt: skip
+
+
+def unloaded(design: Design, width: float = inf) -> Unloaded:
+    """Capacitance and resistivities of a design, its support gone.
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    width : float
+        How wide the bounds of the capacitance may be, relative to their middle [-].
+
+    Raises
+    ------
+    Unpredictable
+        No model can speak of the scene, as of a short.
+    MissingValue
+        No source gives a material value that is needed.
+    """
+    taken = permittivities(design)
+    answer = capacitance(design.in_use, {t.material: t.value for t in taken}, width)
+    top, bottom = (_take(*design.slot(f"{end}_electrode"), "resistivity_ohm_m") for end in ("top", "bottom"))
+    return Unloaded(answer, (top.value, bottom.value), (*taken, top, bottom))
+
+
+def is_plate(answer: Answer) -> bool:
+    """Whether a capacitance is that of a solid plate, which has no other bounds than itself."""
+    return answer.capacitance_f.width() < _EXACT
+
+
+def permittivities(design: Design) -> list[Taken]:
+    """Relative permittivity of every dielectric in the sensor, and of air."""
+    used = design.used() | {"air": ""}
+    names = {body.material for body in design.in_use.bodies if not body.terminal} | {"air"}
+    return [_take(design.material(name), used[name], "relative_permittivity") for name in sorted(names)]
+
+
+def _take(material: materials.Material, source: str, quantity: str) -> Taken:
+    value = material.value(quantity, source)
+    return Taken(material.name, quantity, value.value, value.source)

@@ -1,0 +1,108 @@
+"""The stacks that a design makes."""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sensorgen.core.errors import OutOfRange
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design.design import Design, make
+from sensorgen.models.sensor import Sensor
+from sensorgen.models.stack import Film, Press, Stack, Track
+from sensorgen.prediction.sensor_of_design import TIP_M, Sensed, sensor_of
+
+
+@dataclass(frozen=True)
+class Stacked:
+    """Stacks of a design.
+
+    Attributes
+    ----------
+    own, double : Stack
+        As drawn; and with two films, which is the same for a double sensor and two of a kind for any other.
+    tip_m : float
+        Length of the tip and of the touch [m].
+    isolation_eps_r : float
+        Relative permittivity of the isolation's material [-].
+    taken : list of dict
+        Material values that the numbers rest on.
+    doubts : tuple of str
+        Why they are to be taken with care.
+    """
+
+    own: Stack
+    double: Stack
+    tip_m: float
+    isolation_eps_r: float
+    taken: list[dict[str, Any]]
+    doubts: tuple[str, ...]
+
+
+def stacked(design: Design, law: str = "", tip_m: float = TIP_M) -> Stacked:
+    """The stacks of a design; parameters and errors as :func:`sensorgen.prediction.sensor_of_design.sensor_of`."""
+    found = [sensor_of(half, law, tip_m) for half in halves(design)]
+    lower, upper = found[0], found[-1]
+    double = stack_of([lower.sensor, upper.sensor])
+    own = double if len(found) > 1 else stack_of([lower.sensor])
+    material, source = design.slot("isolation")
+    taken = {tuple(vars(value).items()) for half in found for value in half.taken}
+    return Stacked(
+        own, double, tip_m, material.value("relative_permittivity", source).value,
+        [dict(value) for value in sorted(taken)], _doubts(found),
+    )  # fmt: skip
+
+
+def _doubts(found: Sequence[Sensed]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(doubt for half in found for doubt in half.doubts))
+
+
+def halves(design: Design) -> list[Design]:
+    """A double sensor as the two plates that share its middle electrode; any other design is its own only one."""
+    if design.shape != "double":
+        return [design]
+    p = design.params
+    data = design.model_dump(include={"printer", "quality", "tools", "material_values"}) | {"shape": "reference"}
+    envelope = {f.name: getattr(p, f.name) for f in dataclasses.fields(p) if not f.name.endswith("dielectric_mm")}
+    slots = design.model_dump(include={"materials"})["materials"]
+    return [
+        make(
+            data
+            | {
+                "parameters": envelope | {"dielectric_mm": getattr(p, f"{half}_dielectric_mm"), "isolation_mm": 0.0},
+                "materials": slots | {"dielectric": slots[part], "bottom_electrode": slots[below]},
+            }
+        )
+        for half, part, below in (("lower", "film", "bottom_electrode"), ("upper", "dielectric", "top_electrode"))
+    ]
+
+
+def stack_of(sensors: Sequence[Sensor]) -> Stack:
+    """Sensors on top of each other, from the bottom; each takes over the electrode below it from its neighbour.
+
+    Parameters
+    ----------
+    sensors : sequence of Sensor
+        Of one outline.
+    """
+    first = sensors[0]
+    tracks = [_track(first, 1), *(_track(sensor, 0) for sensor in sensors)]
+    films = [Film(s.capacitance_f_per_m, s.compression.thinning, s.tan_delta, s.leak_s_per_m) for s in sensors]
+    return Stack(first.length_m, first.width_m, tuple(tracks), tuple(films))
+
+
+def _track(sensor: Sensor, end: int) -> Track:
+    section = sensor.electrode_m[end] * sensor.width_m
+    return Track(sensor.resistivity_ohm_m[end] / section, sensor.piezoresistance_per_pa[end])
+
+
+def press_at(found: Stacked, force_n: float, position_m: float | None) -> Press:
+    """The tip centred at a position, or in the middle; raises OutOfRange where it overhangs the sensor's end."""
+    centre = found.own.length_m / 2 if position_m is None else position_m
+    left = centre - found.tip_m / 2
+    if not -1e-12 <= left <= found.own.length_m - found.tip_m + 1e-12:
+        raise OutOfRange(
+            f"a tip of {found.tip_m / M_PER_MM:g} mm at {centre / M_PER_MM:g} mm overhangs the sensor of "
+            f"{found.own.length_m / M_PER_MM:g} mm: move it inwards"
+        )
+    return Press(force_n, max(left, 0.0), found.tip_m)

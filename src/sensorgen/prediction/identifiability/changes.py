@@ -1,0 +1,226 @@
+"""What a design or its reading could change, each as a function of a setup, and what it would be worth.
+
+A change keeps the press: the same force at the same place. What is required of it stays that of the unchanged setup.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from sensorgen.core.errors import OutOfRange
+from sensorgen.models import compression
+from sensorgen.models.compression import Plate
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.identifiability.fisher import Bounds, Setup
+from sensorgen.prediction.identifiability.tones import spread
+from sensorgen.prediction.identifiability.verdict import Required
+
+SHOWN = 3
+HELPS = 0.95  # a change counts that takes the shortfall below this share of what it was
+
+WORSE_ETPU_OHM_M = 1 / 1.2  # thesis, Table 3.2: 1.2 S/m
+SOFTER_X60_PA, SOFTER_X60 = 1e6, 6.0  # thesis, Table 4.1: 1 MPa; Tables 3.1 and 3.2 have 6 MPa
+_CELL = {"dielectric_mm": 0.1, "period_mm": 2.0, "hang_height_mm": 0.5, "lower_height_mm": 0.24}
+_CELL_PA = {"x60": 6.0e6, "etpu": 22.0e6}  # thesis, Table 3.2
+CELL_F_PER_M2 = 159.65204e-12 / 2e-3  # of that cell, unloaded, by finite elements: per depth, over its period
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing to do differently.
+
+    Attributes
+    ----------
+    kind : str
+        What it is a change of; of each kind only the most helpful one is advised.
+    name : str
+        In words; ``{lowest}`` and ``{highest}`` stand for the tones.
+    risk : str
+        What it costs or endangers.
+    apply : callable
+        The changed setup, or the same where this is nothing to do.
+    """
+
+    kind: str
+    name: str
+    risk: str
+    apply: Callable[[Setup], Setup]
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A change and what a press is then known to."""
+
+    change: Change
+    setup: Setup
+    bounds: Bounds
+    shortfall: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """As plain data, SI units."""
+        tones = self.setup.frequency_hz
+        named = self.change.name.format(lowest=_khz(min(tones)), highest=_khz(max(tones)))
+        return {
+            "kind": self.change.kind,
+            "change": named,
+            "risk": self.change.risk,
+            "sigma_force_n": float(self.bounds.force_n),
+            "sigma_position_m": float(self.bounds.position_m),
+            "shortfall": self.shortfall,
+        }
+
+
+def most_helpful(setup: Setup, need: Required) -> list[Tried]:
+    """The changes that bring the worse of both errors down most, one of each kind, the best first.
+
+    Parameters
+    ----------
+    setup : Setup
+        As designed.
+    need : Required
+        What a press has to be known to; the errors are held against it.
+    """
+    before = float(need.shortfall(setup.bounds()))
+    ranked = sorted((t for t in _tried(setup, need) if t.shortfall < HELPS * before), key=lambda t: t.shortfall)
+    of_kind = {t.change.kind: t for t in reversed(ranked)}
+    return sorted(of_kind.values(), key=lambda t: t.shortfall)[:SHOWN]
+
+
+def together(setup: Setup, changes: Sequence[Tried]) -> Bounds | None:
+    """What several changes do at once, tones last since they go by the corner; None where that has no answer."""
+    ordered = sorted((t.change for t in changes), key=CHANGES.index)
+    try:
+        return reduce(lambda so_far, change: change.apply(so_far), ordered, setup).bounds()
+    except OutOfRange:
+        return None
+
+
+def _tried(setup: Setup, need: Required) -> Iterator[Tried]:
+    """Every change that has an answer: not one that presses a film flat."""
+    for change in CHANGES:
+        changed = change.apply(setup)
+        try:
+            found = changed.bounds()
+        except OutOfRange:
+            continue
+        yield Tried(change, changed, found, float(need.shortfall(found)))
+
+
+def worse_filament(setup: Setup) -> Setup:
+    """Both electrodes at least as resistive as Table 3.2's."""
+    top, bottom = (max(rho, WORSE_ETPU_OHM_M) for rho in setup.sensor.resistivity_ohm_m)
+    return setup.on(replace(setup.sensor, resistivity_ohm_m=(top, bottom)))
+
+
+def resistive(setup: Setup) -> Setup:
+    """Both electrodes five times as resistive."""
+    top, bottom = (5 * rho for rho in setup.sensor.resistivity_ohm_m)
+    return setup.on(replace(setup.sensor, resistivity_ohm_m=(top, bottom)))
+
+
+def thin_electrodes(setup: Setup) -> Setup:
+    """Both electrodes half as thick."""
+    top, bottom = (h / 2 for h in setup.sensor.electrode_m)
+    return setup.on(replace(setup.sensor, electrode_m=(top, bottom)))
+
+
+def cell(setup: Setup) -> Setup:
+    """The solved cell of triangles in place of what is there."""
+    sensor = setup.sensor
+    law = compression.solved("tri", _CELL, _CELL_PA)
+    if law is None or law == sensor.compression or setup.assumed:  # what an unsolved cell would gain, nobody knows
+        return setup
+    return setup.on(replace(sensor, capacitance_f_per_m=CELL_F_PER_M2 * sensor.width_m, compression=law))
+
+
+def soft_film(setup: Setup) -> Setup:
+    """A plate six times softer, down to 1 MPa; a solved curve would have to be solved anew."""
+    law = setup.sensor.compression
+    if not isinstance(law, Plate):
+        return setup
+    return setup.on(_giving_way(setup.sensor, min(law.modulus_pa, max(law.modulus_pa / SOFTER_X60, SOFTER_X60_PA))))
+
+
+def thin_film(setup: Setup) -> Setup:
+    """A free plate half as thick: twice the capacitance, the same strain."""
+    if setup.sensor.compression.name != "unconfined" or setup.assumed:
+        return setup
+    return setup.on(replace(setup.sensor, capacitance_f_per_m=2 * setup.sensor.capacitance_f_per_m))
+
+
+def narrow(setup: Setup) -> Setup:
+    """Half the width: the same force on half the area. A bonded plate would in truth grow softer besides."""
+    sensor = setup.sensor
+    half = replace(sensor, width_m=sensor.width_m / 2, capacitance_f_per_m=sensor.capacitance_f_per_m / 2)
+    return setup.on(half)
+
+
+def ended(setup: Setup) -> Setup:
+    """A resistor at an open far end, as large as both electrodes."""
+    if setup.sensor.far_end != "open" or not setup.sensor.resistance_ohm():
+        return setup
+    return setup.on(replace(setup.sensor, far_end=setup.sensor.resistance_ohm()))
+
+
+def tip(factor: float) -> Callable[[Setup], Setup]:
+    """A tip so many times as long [-], as far as the sensor is long enough."""
+
+    def apply(setup: Setup) -> Setup:
+        length = min(factor * setup.sensor.tip_m, setup.sensor.length_m)
+        return setup.on(replace(setup.sensor, tip_m=length))
+
+    return apply
+
+
+def higher_tones(setup: Setup) -> Setup:
+    """Ten times higher tones, where the instrument can give them."""
+    if 10 * max(setup.frequency_hz) > setup.highest_hz:
+        return setup
+    return replace(setup, frequency_hz=tuple(10 * f for f in setup.frequency_hz))
+
+
+def tones_at_corner(setup: Setup) -> Setup:
+    """As many tones spread about the corner."""
+    if not setup.sensor.resistance_ohm():
+        return setup
+    return replace(setup, frequency_hz=spread(setup))
+
+
+def quieter(setup: Setup) -> Setup:
+    """A tenth of the noise."""
+    return replace(setup, noise=setup.noise / 10)
+
+
+def _giving_way(sensor: Sensor, modulus_pa: float) -> Sensor:
+    law = sensor.compression
+    return replace(sensor, compression=Plate(law.name, law.source, modulus_pa))
+
+
+def _khz(frequency_hz: float) -> str:
+    return f"{np.round(frequency_hz / 1e3, 3):.4g} kHz"
+
+
+CHANGES = (
+    Change("film", "a cell of triangles over a film of 0.1 mm (tri), in place of the film",
+           "the apexes may short through a film of one or two layers; printing it needs support", cell),
+    Change("film", "a film six times softer (X60: 1 MPa by Table 4.1 in place of 6 MPa)",
+           "softer filaments are hard to feed, and creep more", soft_film),
+    Change("film", "a film half as thick", "it shorts sooner, and if bonded is four times stiffer", thin_film),
+    Change("electrodes", "electrodes of at least 0.83 ohm m (eTPU by Table 3.2)",
+           "resistance then drifts more with strain and temperature", worse_filament),
+    Change("electrodes", "electrodes five times as resistive", "needs another filament: little carbon scatters much",
+           resistive),
+    Change("electrodes", "electrodes half as thick", "few layers: gaps in one of them cut the track", thin_electrodes),
+    Change("outline", "half the width", "a smaller target, and twice the pressure on the film", narrow),
+    Change("far end", "a resistor at the far end, as large as both electrodes", "a contact at the far end", ended),
+    Change("tip", "a tip twice as long", "two presses closer than the tip become one", tip(2.0)),
+    Change("tip", "a tip half as long", "twice the pressure on the film", tip(0.5)),
+    Change("tones", "ten times higher tones, {lowest} to {highest}", "stray capacitance and leads count more",
+           higher_tones),
+    Change("tones", "tones about the corner, {lowest} to {highest}", "stray capacitance and leads count more",
+           tones_at_corner),
+    Change("noise", "a tenth of the noise", "a hundred readings averaged in place of one, or a better bridge", quieter),
+)  # fmt: skip

@@ -1,0 +1,128 @@
+"""What the bounds mean: when a design senses force and locates a press, and how to say it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sensorgen.prediction.identifiability.fisher import Bounds, Real, Setup
+
+FORCE_SHARE = 0.1  # a force is sensed that is known to a tenth
+GUESS = 12**-0.5  # standard deviation of a blind guess between two ends, as a share of their distance [-]
+
+_FORCE = {"yes": "senses force", "roughly": "senses force only roughly", "no": "cannot sense force"}
+_POSITION = {
+    "yes": "locates a press",
+    "roughly": "locates a press only roughly",
+    "no": "cannot locate a press",
+}
+_RANK = ("no", "roughly", "yes")
+
+
+@dataclass(frozen=True)
+class Required:
+    """How well a press has to be known.
+
+    A quantity is sensed ("yes") where its standard error is at most what is required: a tenth of the press's force,
+    one length of the tip. It is not ("no") where the error is that of a blind guess or more: force range/sqrt(12),
+    sensor length/sqrt(12); a reading then tells nothing. Between the two it is sensed "roughly".
+
+    Attributes
+    ----------
+    force_n, position_m : float
+        Standard errors that serve [N], [m].
+    guess_force_n, guess_position_m : float
+        Those of a blind guess [N], [m].
+    """
+
+    force_n: float
+    position_m: float
+    guess_force_n: float
+    guess_position_m: float
+
+    def shortfall(self, bounds: Bounds) -> Real:
+        """How many times the worse of both errors exceeds what is required [-]; infinite where undefined."""
+        with np.errstate(all="ignore"):  # nothing is required where nothing presses
+            worse = np.maximum(bounds.force_n / self.force_n, bounds.position_m / self.position_m)
+        return np.where(np.isnan(worse), np.inf, worse)
+
+    def force(self, sigma_n: float) -> str:
+        """Whether force is sensed at a standard error [N]: yes, roughly or no."""
+        return _grade(sigma_n, self.force_n, self.guess_force_n)
+
+    def position(self, sigma_m: float) -> str:
+        """Whether a press is located at a standard error [m]: yes, roughly or no."""
+        return _grade(sigma_m, self.position_m, self.guess_position_m)
+
+
+def required(setup: Setup) -> Required:
+    """What is required of a press: a tenth of its force, and one length of the tip."""
+    force, sensor = abs(setup.force_n), setup.sensor
+    return Required(FORCE_SHARE * force, sensor.tip_m, GUESS * force, GUESS * sensor.length_m)
+
+
+def _grade(sigma: float, serves: float, guess: float) -> str:
+    if sigma <= min(serves, guess):
+        return "yes"
+    return "roughly" if sigma < guess else "no"
+
+
+def verdict(setup: Setup, bounds: Bounds, need: Required, reason: str) -> str:
+    """One plain sentence on what a design can do; ``reason`` says why position is undefined."""
+    where = f"at {setup.force_n:g} N and {setup.position_m * 1e3:g} mm"
+    unless = f"not known, as {setup.assumed}; if it did: " if setup.assumed else ""
+    return (
+        f"{unless}at {setup.noise * 100:g} % noise this design {_ability(bounds, need)}: {where} "
+        f"{_known(bounds, reason)}; the sensor is {metres(setup.sensor.length_m)} long"
+    )
+
+
+def bracket(free: Bounds, stiff: Bounds, need: Required) -> str:
+    """What it means for a verdict that the film may give way anywhere between freely and not sideways at all."""
+    certain = ": what it cannot do is certain" if "no" in _grades(free, need) else ""
+    return (
+        f"the film is taken to give way sideways freely, the softest case{certain}; bonded to stiff electrodes, the "
+        f"stiffest, it {_ability(stiff, need)} ({newtons(stiff.force_n)}, {metres(stiff.position_m)})"
+    )
+
+
+def _ability(bounds: Bounds, need: Required) -> str:
+    force, position = _grades(bounds, need)
+    return f"{_FORCE[force]} and {_POSITION[position]}"
+
+
+def _grades(bounds: Bounds, need: Required) -> tuple[str, str]:
+    return need.force(float(bounds.force_n)), need.position(float(bounds.position_m))
+
+
+def _known(bounds: Bounds, reason: str) -> str:
+    force = f"force is known to {newtons(bounds.force_n)}"
+    return f"{force}, but {reason}" if reason else f"{force}, position to {metres(bounds.position_m)}"
+
+
+def newtons(value: float | Real) -> str:
+    """A force to two digits.
+
+    >>> newtons(2.2299), newtons(213.4), newtons(0.1508), newtons(float("nan"))
+    ('2.2 N', '213 N', '0.15 N', 'undefined')
+    """
+    return _said(float(value), {"N": 1.0}, "kN")
+
+
+def metres(value: float | Real) -> str:
+    """A length to two digits.
+
+    >>> metres(0.22495), metres(21.34), metres(0.00829), metres(2e5)
+    ('225 mm', '21 m', '8.3 mm', 'more than 1 km')
+    """
+    return _said(float(value), {"mm": 1e-3, "m": 1.0}, "km")
+
+
+def _said(value: float, units: dict[str, float], beyond: str) -> str:
+    """A value in the first unit that keeps it below a thousand; whole digits are all told."""
+    for unit, size in units.items():
+        shown = value / size
+        if shown < 99.5:
+            return f"{shown:.2g} {unit}"
+        if shown < 999.5:
+            return f"{shown:.0f} {unit}"
+    return "undefined" if np.isnan(value) else f"more than 1 {beyond}"

@@ -1,0 +1,164 @@
+"""Estimates as text: rows of a CSV file, and a summary with what to do about it."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from sensorgen.core.units import M_PER_MM
+from sensorgen.prediction.inverse.estimator import Estimates, Estimator
+from sensorgen.prediction.inverse.verdict import Status
+
+COLUMNS = (
+    "force_n", "position_mm", "force_error_n", "position_error_mm", "covariance_n_mm", "force_low_n", "force_high_n",
+    "position_low_mm", "position_high_mm", "other_force_n", "other_position_mm", "chi2", "tones", "status",
+)  # fmt: skip
+_MM = 1 / M_PER_MM
+_DIAGONAL = np.arange(2)
+
+
+def header(kept: Sequence[str]) -> str:
+    """Names of the columns, those of the input before; one that is called like an answer is ``..._given``.
+
+    >>> header(["time_s", "force_n"])[:32]
+    'time_s,force_n_given,force_n,pos'
+    """
+    return _row([*(_cell(f"{name}_given" if name in COLUMNS else name) for name in kept), *COLUMNS])
+
+
+def rows(kept: Sequence[Sequence[str]], found: Estimates, *, prior: bool = False) -> str:
+    """Rows of a CSV file, blank where the reading does not say.
+
+    Parameters
+    ----------
+    kept : sequence of sequence of str
+        The input's other cells, row by row.
+    found : Estimates
+        The answers.
+    prior : bool
+        Whether a prior was stated, so that an answer is one even where the reading says little.
+    """
+    words = [status.words for status in Status]
+    ends = zip(kept, _numbers(found, prior).tolist(), found.tones.tolist(), found.status.tolist(), strict=True)
+    return "".join(_row([*map(_cell, own), *map(_text, row), str(n), words[status]]) for own, row, n, status in ends)
+
+
+def _numbers(found: Estimates, prior: bool) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """All columns but the last two; nan is a blank."""
+    counts = np.array([[s.force_counts, s.position_counts] for s in Status])[found.status]
+    counts |= (prior & (found.status <= Status.NOT_IDENTIFIABLE))[:, None]
+    force, position = np.where(counts, 1.0, np.nan).T
+    error, error_m = np.sqrt(found.covariance[:, _DIAGONAL, _DIAGONAL]).T
+    columns = [
+        found.force_n * force, found.position_m * position * _MM, error, error_m * _MM,
+        found.covariance[:, 0, 1] * _MM, *found.force_90_n.T * force, *found.position_90_m.T * position * _MM,
+        found.other_force_n, found.other_position_m * _MM, found.chi2,
+    ]  # fmt: skip
+    numbers = np.stack(columns, -1)
+    numbers[found.tones == 0] = np.nan
+    return numbers
+
+
+class Summary:
+    """What is counted on the way through a file; of standard errors each block's median is kept.
+
+    Parameters
+    ----------
+    estimator : Estimator
+        What the answers come from.
+    doubts : sequence of str
+        What to doubt about its sensor.
+    """
+
+    def __init__(self, estimator: Estimator, doubts: Sequence[str] = ()) -> None:
+        self._estimator, self._doubts = estimator, [*doubts, *estimator.doubts]
+        self._statuses: Counter[int] = Counter()
+        self._errors: list[tuple[float, float]] = []
+        self._excess: list[float] = []
+
+    @property
+    def samples(self) -> int:
+        """How many there were."""
+        return self._statuses.total()
+
+    def add(self, found: Estimates) -> None:
+        """Count a block."""
+        self._statuses.update(found.status.tolist())
+        measured, free = found.tones > 0, found.tones > 1
+        if measured.any():
+            force, position = np.median(np.sqrt(found.covariance[measured][:, _DIAGONAL, _DIAGONAL]), 0).tolist()
+            self._errors.append((force, position * _MM))
+        if free.any():
+            self._excess.append(float(np.median(np.sqrt(found.chi2[free] / (2 * found.tones[free] - 2)))))
+
+    def data(self) -> dict[str, Any]:
+        """The summary as plain data."""
+        force, position = (
+            (_middle(column) for column in zip(*self._errors, strict=True)) if self._errors else (None,) * 2
+        )
+        return {
+            "samples": self.samples,
+            "statuses": {s.words: self._statuses[s] for s in Status if self._statuses[s]},
+            "frequency_hz": self._estimator.frequency_hz.tolist(),
+            "force_limit_n": float(self._estimator.scale[0]),
+            "median_force_error_n": force,
+            "median_position_error_mm": position,
+            "median_residual_over_noise": _middle(self._excess),
+            "doubts": self._doubts,
+            "advice": list(self._advice()),
+        }
+
+    def lines(self) -> Iterator[str]:
+        """The summary as a person reads it."""
+        told = self.data()
+        counts = ", ".join(f"{count} {words}" for words, count in told["statuses"].items())
+        yield f"{self.samples} sample{'s' * (self.samples != 1)}: {counts}"
+        force, position = told["median_force_error_n"], told["median_position_error_mm"]
+        yield f"median standard errors: force {_said(force, 'N')}, position {_said(position, 'mm')}"
+        yield from (f"note: {doubt}" for doubt in self._doubts)
+        yield from told["advice"]
+
+    def _advice(self) -> Iterator[str]:
+        """What to do where most samples share a trouble."""
+        excess = _middle(self._excess)
+        if self._most(Status.NO_FIT) and excess is not None:
+            yield (
+                f"no press explains most readings: the residuals are {excess:.3g} times the noise; give a larger "
+                "--noise if that is noise, or another design or material source if it is not"
+            )
+        if self._most(Status.NOT_IDENTIFIABLE, Status.FORCE_ONLY):
+            yield (
+                "most readings say less than a guess: average them, choose tones nearer to the sensor's corner "
+                "frequency, more resistive electrodes or a softer cell (see sensorgen predict), or state with --prior "
+                "what is known"
+            )
+        if self._most(Status.AT_THE_END):
+            yield "most presses lie on the border of what was searched: see --force-limit, and which end is connected"
+
+    def _most(self, *statuses: Status) -> bool:
+        return sum(self._statuses[s] for s in statuses) > self.samples / 2
+
+
+def _middle(values: Sequence[float]) -> float | None:
+    """Median, None where there is none or it is infinite."""
+    found = median(values) if values else np.inf
+    return found if found < np.inf else None
+
+
+def _said(value: float | None, unit: str) -> str:
+    return f"{value:.3g} {unit}" if value is not None else "unknown"
+
+
+def _text(value: float) -> str:
+    return f"{value:.9g}" if abs(value) < np.inf else ""
+
+
+def _cell(text: str) -> str:
+    """A cell as CSV; quoted where it would come apart."""
+    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
+
+
+def _row(cells: Sequence[str]) -> str:
+    return ",".join(cells) + "\n"

@@ -1,0 +1,105 @@
+"""The forward model of one sensor at fixed tones: everything that no press changes is worked out once."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.models import line
+from sensorgen.models.sensor import UNIFORM, Sensor
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+FORCE_LIMIT_N = 13.0  # the rig's largest force, thesis chapter 6
+_HALVINGS = 40
+
+
+class Forward:
+    """Exact ln Z of a sensor at its tones, for one press per row.
+
+    Attributes
+    ----------
+    sensor : Sensor
+        The sensor.
+    frequency_hz : (n_tones,) array
+        Tones [Hz].
+    susceptance, loose : (n_tones,) array
+        Per length, unpressed: omega C', and the whole admittance of the film [S/m].
+    track, track_per_pascal : float
+        Resistance of both electrodes per length, and how it rises under the tip [ohm/m], [ohm/m/Pa].
+
+    Examples
+    --------
+    >>> from sensorgen.models.compression import unconfined
+    >>> sensor = Sensor(0.1, 0.01, (3e-4, 3e-4), (5.0, 5.0), 7.6e-10, unconfined(6e5))
+    >>> Forward(sensor, [1e3, 1e5]).log_impedance(np.array([3.0]), np.array([0.05])).shape
+    (1, 2)
+    """
+
+    def __init__(self, sensor: Sensor, frequency_hz: ArrayLike) -> None:
+        if sensor.profile != UNIFORM:
+            raise OutOfRange(f"a pressure like a {sensor.profile!r}; the way back is known for a uniform one only")
+        self.sensor, self.frequency_hz = sensor, tones(frequency_hz)
+        self.susceptance: Real = 2 * np.pi * self.frequency_hz * sensor.capacitance_f_per_m
+        self.loose = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * self.susceptance
+        self.track, self.track_per_pascal = sensor.track_ohm_per_m()
+
+    def log_impedance(self, force_n: Real, position_m: Real) -> Complex:
+        """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.line_inputs`.
+
+        As :meth:`Sensor.impedance`, but what the tones share and a search would repeat at every step is done once.
+        """
+        sensor, force = self.sensor, force_n[:, None]
+        patch = sensor.patch(position_m[:, None])
+        stress = force / (sensor.width_m * patch.length_m)
+        thinning, _ = sensor.compression.thinning(stress)
+        pressed = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * (self.susceptance / (1 - thinning))
+        under = self.track + stress * self.track_per_pascal
+        right = np.maximum(sensor.length_m - patch.left_m - patch.length_m, 0.0)
+        return np.log(
+            line.cascade(
+                [self.track, under, self.track], [self.loose, pressed, self.loose],
+                [patch.left_m, patch.length_m, right], sensor.far_end,
+            )
+        )  # fmt: skip
+
+    def force_limit_n(self, most_n: float = FORCE_LIMIT_N) -> float:
+        """The largest force up to ``most_n`` that the sensor bears anywhere, the tip half over its end [N]."""
+        if not 0 < most_n < np.inf:
+            raise OutOfRange(f"a force limit of {most_n:g} N; expected a number above 0")
+        low, high = 0.0, most_n
+        if self._bears(high):
+            return high
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if self._bears(middle) else (low, middle)
+        return low * (1 - 1e-6)
+
+    def _bears(self, force_n: float) -> bool:
+        try:
+            self.log_impedance(np.full(2, force_n), np.array([0.0, self.sensor.length_m]))
+        except OutOfRange:
+            return False
+        return True
+
+
+def tones(frequency_hz: ArrayLike) -> Real:
+    """Tones as an array, or an error that says which one is none.
+
+    Raises
+    ------
+    BadInput, OutOfRange
+        No list of numbers; none at all, one that is not above 0 and finite, or two that are equal.
+    """
+    try:
+        found = np.atleast_1d(np.asarray(frequency_hz, np.float64))
+    except (TypeError, ValueError):
+        raise BadInput(f"tones are numbers in Hz, not {str(frequency_hz)[:60]!r}") from None
+    if found.ndim != 1 or not found.size:
+        raise BadInput(f"expected a list of tones in Hz, not an array of shape {found.shape}")
+    bad = ~((found > 0) & (found < np.inf))
+    if bad.any():
+        raise OutOfRange(f"a tone of {found[bad][0]:g} Hz; expected a number above 0")
+    if len(np.unique(found)) < len(found):
+        raise OutOfRange("the same tone twice: give each tone once")
+    return found

@@ -1,0 +1,106 @@
+"""What to make of an estimate: one word per sample."""
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.prediction.inverse.descent import Fit
+from sensorgen.prediction.inverse.forward import Real
+
+PAIR = 9.21  # 99 % of chi-squared with two degrees of freedom: force and position
+_TAIL = 3.719  # normal deviate of 1e-4
+_ROUNDING = np.finfo(float).eps
+_EDGE = 1e-9  # of the square
+
+
+class Status(IntEnum):
+    """The verdict on a sample, the worst that applies."""
+
+    OK = 0
+    AMBIGUOUS = 1
+    """Another press explains the reading as well."""
+    AT_THE_END = 2
+    """The best press lies on the border: no force, the force limit, or an end of the sensor."""
+    FORCE_ONLY = 3
+    """The reading says less on the position than a guess."""
+    NOT_IDENTIFIABLE = 4
+    """It says less on the force, too."""
+    NO_FIT = 5
+    """No press explains it: the residual is far above the noise."""
+    MISSING = 6
+    """No tone was measured."""
+
+    @property
+    def words(self) -> str:
+        """As files and people read it."""
+        return _WORDS[self]
+
+    @property
+    def force_counts(self) -> bool:
+        """Whether the force may be used."""
+        return self <= Status.FORCE_ONLY
+
+    @property
+    def position_counts(self) -> bool:
+        """Whether the position may be used."""
+        return self <= Status.AT_THE_END
+
+
+_WORDS = (
+    "ok", "two presses", "at the end", "force only", "not identifiable", "no fit", "missing",
+)  # fmt: skip
+
+
+def covariance(fisher: Real) -> Real:
+    """Inverse of the information (n, 2, 2); infinite variances where it is singular."""
+    (ff, fx), (_, xx) = fisher.transpose(1, 2, 0)
+    determinant = ff * xx - fx * fx
+    singular = determinant <= _ROUNDING * ff * xx
+    found = np.empty_like(fisher)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found[:, 0, 0], found[:, 1, 1] = xx / determinant, ff / determinant
+        found[:, 0, 1] = found[:, 1, 0] = -fx / determinant
+        if singular.any():
+            found[singular] = np.array([[0.0, 0.0], [0.0, np.inf]])
+            found[singular, 0, 0] = np.where(ff > 0, 1 / ff, np.inf)[singular]
+    return found
+
+
+def statuses(fit: Fit, variance: Real, tones: NDArray[np.intp], ambiguous: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Verdicts on least-squares estimates.
+
+    Parameters
+    ----------
+    fit : Fit
+        The estimates, scaled.
+    variance : (n, 2) array
+        Of scaled force and position, from the data alone.
+    tones : (n,) array
+        How many were measured.
+    ambiguous : (n,) array
+        Where another press explains the reading as well.
+    """
+    lost = variance > 1 / 12  # a uniform guess on the unit length has this variance
+    rules = (
+        (Status.AMBIGUOUS, ambiguous),
+        (Status.AT_THE_END, ((fit.press < _EDGE) | (fit.press > 1 - _EDGE)).any(1)),
+        (Status.FORCE_ONLY, lost[:, 1]),
+        (Status.NOT_IDENTIFIABLE, lost[:, 0]),
+        (Status.NO_FIT, fit.chi2 > chi2_limit(2 * tones - 2)),
+        (Status.MISSING, tones == 0),
+    )
+    found = np.zeros(len(tones), np.uint8)
+    for status, applies in rules:
+        found[applies] = status
+    return found
+
+
+def chi2_limit(degrees: NDArray[np.intp]) -> Real:
+    """Sum of squares that noise exceeds once in ten thousand samples (Wilson and Hilferty 1931); none for 0 degrees.
+
+    >>> chi2_limit(np.array([12])).round(1).tolist()
+    [39.5]
+    """
+    ninth = 2 / (9 * np.maximum(degrees, 1))
+    return np.where(degrees > 0, degrees * (1 - ninth + _TAIL * np.sqrt(ninth)) ** 3, np.inf)

@@ -1,0 +1,1 @@
+"""Which material fills which region: prisms, sections, unit cell, meshes, solids, drawing."""

@@ -1,0 +1,169 @@
+"""A dimensioned drawing of a sensor: its sections with the layer grid over them, and the findings in place.
+
+One page, A4 landscape, as SVG::
+
+    +----------------------------------------------------------+
+    | detail: one or two sections at one true scale            |
+    |   heights | section ... | section ... | layers           |
+    | overview: the whole length, height exaggerated           |
+    | findings, numbered                  | legend             |
+    |                                     | title block        |
+    +----------------------------------------------------------+
+
+It reads the scene alone and knows no shapes. The same input gives the same bytes.
+"""
+
+from collections.abc import Iterator, Sequence
+
+from sensorgen.core.findings import Finding
+from sensorgen.scene.drawing import dimensions, layers, markers, measures, overview, panels, titleblock
+from sensorgen.scene.drawing.panels import Colours, Panel
+from sensorgen.scene.drawing.paper import ARROWS, STYLE, box, element, escaped, line
+from sensorgen.scene.drawing.printed import over
+from sensorgen.scene.drawing.view import views
+from sensorgen.scene.scene import Point, Scene
+
+WIDTH, HEIGHT = 297.0, 210.0
+LEFT, RIGHT = 9.0, 288.0
+DETAIL, OVERVIEW, FOOT, BOTTOM = 8.0, 109.0, 143.0, 204.0  # where the parts of the page begin, and the end
+SPLIT = 192.0  # between findings and legend
+NAMES = "AB"  # of the sections
+Lanes = Sequence[Sequence[measures.Measure]]
+
+
+def svg(
+    scene: Scene,
+    title: str,
+    boundaries_mm: Sequence[float],
+    findings: Sequence[Finding],
+    materials: Colours,
+    notes: Sequence[str] = (),
+    printed: Scene | None = None,
+) -> str:
+    """Draw a scene as it is printed.
+
+    Parameters
+    ----------
+    scene : Scene
+        The sensor on the bed, turned over if it is printed so.
+    title : str
+        What the page is about; any text.
+    boundaries_mm : sequence of float
+        Heights of the layer boundaries, from 0 at the bed [mm].
+    findings : sequence of Finding
+        What the checks say of this scene, on this bed.
+    materials : mapping
+        Display title and colour (``#rrggbb``) of each material by its name.
+    notes : sequence of str
+        Further lines for the title block.
+    printed : Scene, optional
+        What is printed of it, in boxes, to be outlined over the sections.
+
+    Returns
+    -------
+    str
+        The SVG file's text.
+    """
+    grid = list(boundaries_mm) or [0.0, scene.size_mm[2]]
+    lanes, details = _details(scene, grid)
+    wholes = overview.arrange(details, scene.size_mm[2], LEFT, RIGHT, OVERVIEW + 10)
+    marked = markers.ranked(findings)
+    entries = markers.placed(marked, panels.letters(scene.bodies), (LEFT + 2, FOOT + 8.5, SPLIT - 3, BOTTOM - 2))
+    shown = [entry.mark for entry in entries]
+    gap = _gap(details)
+    parts = [
+        *_detail_parts(scene, details, lanes, grid, materials),
+        *(part for panel in details if printed for part in over(panel, printed)),
+        *_notes(details, gap, shown, grid),
+        *(p for d, w, n in zip(details, wholes, NAMES, strict=False) for p in overview.draw(d, w, n, scene, materials)),
+        *markers.on_overview(shown, details, wholes),
+        *markers.listed(entries, marked, LEFT + 2, FOOT + 3.5, SPLIT - LEFT - 5),
+        *_foot(scene, title, titleblock.rows(scene, details[0].frame, grid, gap[0] if gap else None, notes), materials),
+    ]
+    return _page(title, parts)
+
+
+def _details(scene: Scene, grid: Sequence[float]) -> tuple[Lanes, list[Panel]]:
+    """The lanes of heights and the detail views between them and the layers' numbers."""
+    height = scene.size_mm[2]
+    seen = views(scene)
+    lanes = measures.heights(seen, height)
+    above, below = (max(len(measures.widths(view)[side]) for view in seen) for side in (0, 1))
+    left = LEFT + 2 + sum(map(dimensions.lane_width, lanes)) + 2
+    top = DETAIL + 7 + dimensions.ROW * above
+    bottom = OVERVIEW - 5 - dimensions.ROW * below
+    return lanes, panels.arrange(seen, max(grid[-1], height), height, (left, top, RIGHT - layers.WIDTH, bottom))
+
+
+def _detail_parts(
+    scene: Scene, details: Sequence[Panel], lanes: Lanes, grid: Sequence[float], colours: Colours
+) -> Iterator[str]:
+    """The sections with grid, dimensions and letters."""
+    names = panels.letters(scene.bodies)
+    first, right = details[0].frame, details[-1].frame.right
+    yield box("bed", first.left - 2, first.bed, right - first.left + 4, 0.9)
+    for panel in details:
+        inside = "".join(panels.materials(panel, colours))
+        yield element("g", "view", inside, data_across=panel.view.section.across, data_scale=repr(panel.frame.per_mm))
+    yield from layers.grid(first, grid, right + panels.GUTTER)
+    yield from layers.labels(first, grid, right + panels.GUTTER)
+    yield from dimensions.beside(first, lanes)
+    for panel, name in zip(details, NAMES, strict=False):
+        yield from _around(panel, name)
+        yield from panels.lettered(panel, names, colours)
+
+
+def _around(panel: Panel, name: str) -> Iterator[str]:
+    """Caption, widths and break line of one detail view."""
+    above, below = measures.widths(panel.view)
+    over = panel.frame.top - 3
+    yield panels.caption(panel, name, min(over - dimensions.ROW * len(above) - 1.5, panel.frame.top - 5.8))
+    yield from dimensions.rows(panel.frame, above, over, -dimensions.ROW)
+    yield from dimensions.rows(panel.frame, below, panel.frame.bed + 5.4, dimensions.ROW)
+    yield panels.broken(panel)
+
+
+def _gap(details: Sequence[Panel]) -> tuple[measures.Gap, Panel] | None:
+    """The electrode gap, and the view that shows it smallest."""
+    found = [(gap, panel) for panel in details if (gap := measures.nearest(panel.view))]
+    return min(found, key=lambda pair: round(pair[0].value_mm, 6), default=None)
+
+
+def _notes(
+    details: Sequence[Panel],
+    gap: tuple[measures.Gap, Panel] | None,
+    shown: Sequence[markers.Marked],
+    grid: Sequence[float],
+) -> Iterator[str]:
+    """The gap and the findings, over everything else and clear of the letters."""
+    taken: list[Point] = [place for panel in details for place in panels.letter_places(panel).values()]
+    if gap and gap[0].near[0] <= gap[1].view.end_mm:
+        marks, room = dimensions.gap(gap[1], gap[0])
+        taken += room
+        yield marks
+    yield from markers.on_detail(shown, details, grid, taken)
+
+
+def _foot(scene: Scene, title: str, rows: Sequence[str], colours: Colours) -> Iterator[str]:
+    """Rules, legend and title block."""
+    left, room = SPLIT + 3, RIGHT - SPLIT - 3
+    yield line("frame", 6, FOOT - 2, WIDTH - 6, FOOT - 2) + line("frame", SPLIT, FOOT - 2, SPLIT, HEIGHT - 6)
+    yield from titleblock.legend(scene, panels.letters(scene.bodies), colours, left, FOOT + 3, room)
+    yield from titleblock.block(title, rows, left, BOTTOM - 3.5, room)
+
+
+def _page(title: str, parts: Sequence[str]) -> str:
+    root = {
+        "xmlns": "http://www.w3.org/2000/svg",
+        "width": "297mm",
+        "height": "210mm",
+        "viewBox": "0 0 297 210",
+    }
+    head = [
+        element("title", "", escaped(title)),
+        element("style", "", STYLE),
+        element("defs", "", ARROWS),
+        box("", 0, 0, WIDTH, HEIGHT, fill="#ffffff"),
+        box("frame", 6, 6, WIDTH - 12, HEIGHT - 12),
+    ]
+    return element("svg", "", "\n".join(["", *head, *(p for p in parts if p), ""]), **root) + "\n"

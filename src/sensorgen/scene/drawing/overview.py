@@ -1,0 +1,63 @@
+"""The whole sensor under the detail: long, flat, with its height exaggerated."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from sensorgen.scene.drawing import dimensions
+from sensorgen.scene.drawing.measures import Measure
+from sensorgen.scene.drawing.panels import Colours, Panel, materials
+from sensorgen.scene.drawing.paper import Frame, box, fitted, number, text
+from sensorgen.scene.scene import AXES, Scene
+
+HEIGHT = 9.0  # of the strip on paper [mm]
+FINEST = 0.25  # a period that is shorter on paper is not drawn [mm]
+MOST_CORNERS = 6000
+LEFT, RIGHT = 14.0, 4.0  # room beside a strip [mm]
+
+
+def arrange(details: Sequence[Panel], height_mm: float, left: float, right: float, top: float) -> list[Panel]:
+    """A strip for each detail view, side by side on the page [mm]."""
+    each = (right - left) / len(details)
+    up = HEIGHT / height_mm
+    panels = []
+    for k, detail in enumerate(details):
+        view = replace(detail.view, end_mm=detail.view.extent_mm)
+        along = min((each - LEFT - RIGHT) / view.extent_mm, up)
+        start = left + k * each + LEFT
+        panels.append(Panel(view, Frame(start, top + HEIGHT, start + view.extent_mm * along, top, along, up)))
+    return panels
+
+
+def draw(detail: Panel, whole: Panel, name: str, scene: Scene, colours: Colours) -> Iterator[str]:
+    """The strip with its detail window, its length and its height."""
+    frame = whole.frame
+    yield text("bold", frame.left, frame.top - 6.6, "; ".join(_caption(detail, whole, name, scene)))
+    yield from _filled(whole, colours)
+    if detail.view.end_mm < whole.view.extent_mm:
+        window = detail.view.end_mm * frame.per_mm
+        yield box("window", frame.left - 0.4, frame.top - 0.6, window + 0.8, HEIGHT + 1.2)
+    yield from dimensions.beside(frame, [[Measure(0.0, scene.size_mm[2])]])
+    yield from dimensions.rows(frame, [[Measure(0.0, whole.view.extent_mm)]], frame.bed + 4.6, dimensions.ROW)
+
+
+def _caption(detail: Panel, whole: Panel, name: str, scene: Scene) -> Iterator[str]:
+    frame, view = whole.frame, whole.view
+    ratio = frame.per_mm_up / frame.per_mm
+    yield f"Overview {name}: all of {view.section.across}, {number(scene.size_mm[AXES.index(view.normal)])} mm deep"
+    if view.period_mm:
+        yield f"period {number(view.repeat_mm())} mm"
+    yield f"height × {ratio:.3g}" if ratio > 1.0005 else "true to scale"
+    if detail.view.end_mm < view.extent_mm:
+        yield "dashed: the detail above"
+
+
+def _filled(whole: Panel, colours: Colours) -> Iterator[str]:
+    frame, view = whole.frame, whole.view
+    corners = sum(len(outline) for _, outline in view.section.regions)
+    if corners <= MOST_CORNERS and not 0 < view.repeat_mm() * frame.per_mm < FINEST:
+        yield from materials(whole, colours, "body far")
+        return
+    long = frame.right - frame.left
+    yield box("fine", frame.left, frame.top, long, HEIGHT)
+    words = f"a period of {number(view.repeat_mm())} mm is too fine to be drawn here"
+    yield text("small middle", frame.left + long / 2, frame.top + HEIGHT / 2 + 0.8, fitted(words, long))

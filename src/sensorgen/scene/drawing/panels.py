@@ -1,0 +1,170 @@
+"""Views on the page: their scale, their room, and the materials in them."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import floor, log10
+
+from sensorgen.scene.drawing.paper import Frame, element, fitted, number, text
+from sensorgen.scene.drawing.view import View
+from sensorgen.scene.scene import Body, Point
+
+GUTTER = 8.0  # between a view and what is right of it: room for markers [mm]
+CAPTION = 78.0  # room for the words over a view [mm]
+REPEATS, MOST_REPEATS = 1.7, 60.0
+LOWEST = 12.0  # a view that is flatter on paper shows nothing [mm]
+LARGER = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
+SMALLER = (1.0, 2.0, 5.0)  # 1:2 and 1:5 are read at a glance, 1:1.67 is not
+
+Colours = Mapping[str, tuple[str, str]]
+MISSING_COLOUR = "#c8c8c8"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A view and where it stands on the page."""
+
+    view: View
+    frame: Frame
+
+    def place(self, at_mm: Point) -> Point:
+        """Place on the page of a point (along, z) of the section [mm]."""
+        return self.frame.x(at_mm[0]), self.frame.y(at_mm[1])
+
+
+Room = tuple[float, float, float, float]  # left, top, right, bottom on the page [mm]
+
+
+def arrange(views: Sequence[View], grid_mm: float, height_mm: float, room: Room) -> list[Panel]:
+    """Views side by side at one true scale.
+
+    ``grid_mm`` is the height of the highest layer boundary, which may lie over the sensor's ``height_mm``.
+    """
+    left, top, right, bottom = room
+    each = (right - left) / len(views) - GUTTER
+    wanted = max(min(_wanted_mm(view, height_mm), each / LOWEST * height_mm) for view in views)
+    scale = round_scale(min((bottom - top) / grid_mm, each / wanted))
+    bottom -= (bottom - top - grid_mm * scale) / 2
+    panels = []
+    for view in views:
+        end = _end_mm(view, each / scale)
+        frame = Frame(left, bottom, left + end * scale, bottom - grid_mm * scale, scale, scale)
+        panels.append(Panel(replace(view, end_mm=end), frame))
+        left = max(frame.right + GUTTER, left + CAPTION)
+    return panels
+
+
+def _wanted_mm(view: View, height_mm: float) -> float:
+    """A period and most of the next or, where nothing repeats, four heights [mm]."""
+    wanted = max(REPEATS * view.repeat_mm(), height_mm) if view.period_mm else 4 * height_mm
+    return min(wanted, view.extent_mm)
+
+
+def _end_mm(view: View, room_mm: float) -> float:
+    """All of the sensor if there is room, else a round length."""
+    most = min(room_mm, MOST_REPEATS * view.repeat_mm() or room_mm)
+    digit = 10.0 ** (floor(log10(most)) - 1)
+    return min(view.extent_mm, round(floor(most / digit + 1e-9) * digit, 12))
+
+
+def round_scale(most: float) -> float:
+    """The largest customary scale up to ``most`` [-].
+
+    >>> round_scale(56.0), round_scale(0.4)
+    (50.0, 0.2)
+    """
+    power = 10.0 ** floor(log10(most) + 1e-12)
+    steps = LARGER if most >= 1 else SMALLER
+    return round(max(step for step in steps if step <= most / power + 1e-9) * power, 12)
+
+
+def scale_words(scale: float) -> str:
+    """A scale as it is written on a drawing.
+
+    >>> scale_words(50.0), scale_words(0.2)
+    ('50:1', '1:5')
+    """
+    return f"{number(scale)}:1" if scale >= 1 else f"1:{number(1 / scale)}"
+
+
+def materials(panel: Panel, colours: Colours, kind: str = "body") -> Iterator[str]:
+    """What is cut, one path for each body."""
+    paths: dict[str, list[str]] = {}
+    bodies: dict[str, Body] = {}
+    for body, outline in panel.view.regions:
+        bodies[body.name] = body
+        paths.setdefault(body.name, []).append(panel.frame.outline(outline))
+    for name, path in paths.items():
+        material = bodies[name].material
+        told = {"data_body": name, "data_material": material}
+        yield element("path", kind, "", d="".join(path), fill=colour(colours, material), **told)
+
+
+def colour(colours: Colours, material: str) -> str:
+    """Colour of a material; a grey where it has none."""
+    return colours.get(material, ("", MISSING_COLOUR))[1]
+
+
+def letters(bodies: Iterable[Body]) -> dict[str, str]:
+    """A letter for each body's name, in their order from the bed."""
+    return {body.name: _letter(k) for k, body in enumerate(bodies)}
+
+
+def _letter(k: int) -> str:
+    return chr(ord("A") + k) if k < 26 else _letter(k // 26 - 1) + _letter(k % 26)
+
+
+def letter_places(panel: Panel) -> dict[str, Point]:
+    """For each body, where its letter has most room on the page [mm]."""
+    best: dict[str, tuple[float, Point]] = {}
+    for column in panel.view.columns:
+        along = _aside((column.left_mm, column.right_mm))
+        for layer in column.layers:
+            low, high = _aside(layer.bottom_mm), _aside(layer.top_mm)
+            room = round(min(column.right_mm - column.left_mm, high - low), 6)
+            if room > best.get(layer.body.name, (0.0,))[0]:
+                best[layer.body.name] = (room, panel.place((along, (low + high) / 2)))
+    left, right = panel.frame.left + 2, max(panel.frame.right - 2, panel.frame.left + 2)
+    return {name: (min(max(x, left), right), y) for name, (_, (x, y)) in best.items()}
+
+
+def _aside(ends: Point) -> float:
+    """A little left of the middle, where no line of symmetry runs."""
+    return ends[0] + 0.4 * (ends[1] - ends[0])
+
+
+def lettered(panel: Panel, names: Mapping[str, str], colours: Colours) -> Iterator[str]:
+    """The bodies' letters, in ink that shows on their colour."""
+    materials_of = {body.name: body.material for body, _ in panel.view.regions}
+    for name, (x, y) in letter_places(panel).items():
+        fill = colour(colours, materials_of[name])
+        ink = "#ffffff" if _is_dark(fill) else "#1f2328"
+        yield text("bold middle halo", x, y + 0.9, names[name], style=f"fill:{ink};stroke:{fill}")
+
+
+def _is_dark(fill: str) -> bool:
+    red, green, blue = (int(fill[k : k + 2], 16) for k in (1, 3, 5))
+    return 0.3 * red + 0.59 * green + 0.11 * blue < 128
+
+
+def caption(panel: Panel, name: str, y: float) -> str:
+    """What the view shows, in one line at ``y`` on the page [mm]."""
+    view, scale = panel.view, panel.frame.per_mm
+    words = (
+        f"Section {name}: {view.normal} = {number(view.section.at_mm)} mm, "
+        f"{view.section.across} from 0 to {number(view.end_mm)} mm, {scale_words(scale)}"
+    )
+    return text("bold", panel.frame.left, y, fitted(words, (CAPTION - 2) / 1.08))
+
+
+def broken(panel: Panel) -> str:
+    """The break line at the right end, where the sensor goes on."""
+    if panel.view.end_mm >= panel.view.extent_mm:
+        return ""
+    x, top, bottom = panel.frame.right, panel.frame.y(_top(panel.view)), panel.frame.bed
+    middle = (top + bottom) / 2
+    path = f"M{number(x)} {number(top - 2)}V{number(middle - 2)}l-1.6 .6l3.2 2.8l-1.6 .6V{number(bottom + 2)}"
+    return element("path", "under", d=path) + element("path", "thin", d=path)
+
+
+def _top(view: View) -> float:
+    return max(z for _, outline in view.regions for _, z in outline)

@@ -1,0 +1,192 @@
+"""Marks on paper: SVG elements in millimetres, and text that keeps to its room."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from unicodedata import east_asian_width
+
+from sensorgen.scene.scene import Point
+
+ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})
+PLAIN = 2.5  # height of text; the smallest is 2.3, for less cannot be read on A4 [mm]
+# Widths in DejaVu Sans, the widest of the usual fonts, in groups [em].
+WIDTHS = ((0.28, "ijl"), (0.34, " .,:;'|!I"), (0.43, "frt()[]-/"), (0.53, "csz"), (0.6, "aekovxy"), (0.83, "w"))
+GLYPHS = {c: em for em, letters in (*WIDTHS, (1.0, "mMW@%\N{EM DASH}")) for c in letters}
+
+STYLE = """
+text{font-family:sans-serif;font-size:2.5px;fill:#1f2328}
+.small{font-size:2.3px}.bold{font-weight:bold}.faint{fill:#59636e}.heading{font-size:3px;font-weight:bold}
+.title{font-size:4.4px;font-weight:bold}.middle{text-anchor:middle}.end{text-anchor:end}
+.halo{paint-order:stroke;stroke:#fff;stroke-width:.9;stroke-linejoin:round}
+.body{stroke:#1f2328;stroke-width:.13;stroke-linejoin:round}.far{stroke-width:.05}
+.under{stroke:#fff;stroke-width:.4;stroke-opacity:.4;fill:none}
+.grid{stroke:#2878d0;stroke-width:.14;fill:none}.dense{stroke-width:.08}
+.mid{stroke:#2878d0;stroke-width:.12;stroke-dasharray:1.2 1;fill:none}
+.halo-line{stroke:#fff;stroke-width:.75;fill:none}.printed{stroke:#00806c;stroke-width:.4;fill:none}
+.thin{stroke:#1f2328;stroke-width:.13;fill:none}.frame{stroke:#1f2328;stroke-width:.35;fill:none}
+.dim,.tick{stroke:#1f2328;stroke-width:.16;fill:none}
+.dim{marker-start:url(#sg-start);marker-end:url(#sg-end)}.tick{marker-start:url(#sg-tick);marker-end:url(#sg-tick)}
+.gap{stroke:#d4207e;stroke-width:.35;fill:none}.gaptext{fill:#b3135f;font-weight:bold}
+.window{stroke:#d4207e;stroke-width:.3;stroke-dasharray:1.6 .8;fill:none}
+.bed{fill:#8c959f}.fine{fill:#d0d7de}
+.spot{stroke:#fff;stroke-width:.25}.leader{stroke-width:.25}.balloon{stroke:#fff;stroke-width:.4}
+.error{fill:#d1242f}.warning{fill:#f59e0b}.info{fill:#1f6feb}.waived{fill:#848d97}
+.leader.error{stroke:#d1242f}.leader.warning{stroke:#f59e0b}.leader.info{stroke:#1f6feb}.leader.waived{stroke:#848d97}
+.count{fill:#fff;font-weight:bold;text-anchor:middle;font-size:2.4px}.count.dark{fill:#1f2328}
+"""
+ARROWS = "".join(
+    f'<marker id="sg-{name}" viewBox="-6 -3 12 6" markerWidth="{width}" markerHeight="{height}" '
+    f'markerUnits="userSpaceOnUse" orient="auto"><path d="{shape}"/></marker>'
+    for name, width, height, shape in (
+        ("start", 4, 2, "M0 0L6 -1V1Z"),
+        ("end", 4, 2, "M0 0L-6 -1V1Z"),
+        ("tick", 4, 2, "M-2 2.4L1.6 -2.4L2 -2.4L-1.6 2.4Z"),
+    )
+)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where a view stands on the page.
+
+    Attributes
+    ----------
+    left, bed : float
+        Place of the sensor's corner on the page [mm].
+    right, top : float
+        Where the view ends on the page [mm].
+    per_mm, per_mm_up : float
+        Paper per sensor, along the section and in height [mm/mm].
+    """
+
+    left: float
+    bed: float
+    right: float
+    top: float
+    per_mm: float
+    per_mm_up: float
+
+    def x(self, along_mm: float) -> float:
+        """Place on the page of a length along the section [mm]."""
+        return self.left + along_mm * self.per_mm
+
+    def y(self, height_mm: float) -> float:
+        """Place on the page of a height over the bed [mm]."""
+        return self.bed - height_mm * self.per_mm_up
+
+    def outline(self, points: Iterable[Point]) -> str:
+        """Path of a closed outline [mm]."""
+        return "M" + "L".join(f"{number(self.x(u))} {number(self.y(z))}" for u, z in points) + "Z"
+
+
+def number(value: float) -> str:
+    """A coordinate, to a thousandth; the same text on every machine.
+
+    >>> number(-0.0001), number(12.5)
+    ('0', '12.5')
+    """
+    text = f"{value:.3f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def element(tag: str, kind: str = "", inside: str = "", **attributes: float | str) -> str:
+    """One SVG element of a class; ``_`` in an attribute's name stands for ``-``."""
+    named = ({"class": kind} if kind else {}) | attributes
+    words = "".join(
+        f' {key.replace("_", "-")}="{value.translate(ESCAPES) if isinstance(value, str) else number(value)}"'
+        for key, value in named.items()
+    )
+    return f"<{tag}{words}>{inside}</{tag}>" if inside else f"<{tag}{words}/>"
+
+
+def line(kind: str, x0: float, y0: float, x1: float, y1: float) -> str:
+    """A straight line [mm]."""
+    return element("line", kind, x1=x0, y1=y0, x2=x1, y2=y1)
+
+
+def seen(kind: str, x0: float, y0: float, x1: float, y1: float) -> str:
+    """A straight line that shows on dark and on light [mm]."""
+    return line("under", x0, y0, x1, y1) + line(kind, x0, y0, x1, y1)
+
+
+def box(kind: str, x: float, y: float, width: float, height: float, **attributes: float | str) -> str:
+    """A rectangle from its upper left corner [mm]."""
+    return element("rect", kind, "", x=x, y=y, width=width, height=height, **attributes)
+
+
+def text(kind: str, x: float, y: float, words: str, **attributes: float | str) -> str:
+    """One line of text on its base line [mm]; any string is safe."""
+    return element("text", kind, escaped(words), x=x, y=y, **attributes)
+
+
+def escaped(words: str) -> str:
+    """Text that may stand inside an element."""
+    return clean(words).translate(ESCAPES)
+
+
+def clean(words: str) -> str:
+    """Text without the characters that XML forbids or that no font shows."""
+    return "".join(c if c.isprintable() else " " for c in words)
+
+
+def width(words: str, size: float = PLAIN) -> float:
+    """Room that a text takes at most [mm], for a letter height of ``size`` [mm]."""
+
+    def em(c: str) -> float:
+        return 1.05 if east_asian_width(c) in "WF" else GLYPHS.get(c, 0.72 if c.isupper() else 0.64)
+
+    return size * sum(map(em, words))
+
+
+def fitted(words: str, room: float, size: float = PLAIN) -> str:
+    """The text, or as much of its beginning as fits into ``room`` [mm]."""
+    if width(words, size) <= room:
+        return words
+    ends = list(accumulate(width(c, size) for c in words))
+    keep = sum(end <= room - size for end in ends)
+    return words[:keep].rstrip() + "…"
+
+
+def wrapped(words: str, room: float, lines: int, size: float = PLAIN) -> list[str]:
+    """The text in up to so many lines of ``room`` [mm]; what is left over is cut off."""
+    rows = [""]
+    for word in clean(words).split():
+        longer = f"{rows[-1]} {word}".strip()
+        if width(longer, size) <= room or len(rows) == lines or not rows[-1]:
+            rows[-1] = longer
+        else:
+            rows.append(word)
+    return [fitted(row, room, size) for row in rows]
+
+
+def spread(wanted: Sequence[float], pitch: Sequence[float], low: float, high: float) -> list[float]:
+    """Places nearest to the wanted ones, in their order, with room between neighbours.
+
+    Parameters
+    ----------
+    wanted : sequence of float
+        Where each would like to be, ascending [mm].
+    pitch : sequence of float
+        Least distance of each to the one before it; the first is not used [mm].
+    low, high : float
+        Between which all shall stay, if they can [mm].
+
+    Notes
+    -----
+    Isotonic regression by pooling neighbours, after the least distances are taken out.
+
+    Examples
+    --------
+    >>> spread([1.0, 1.0, 9.0], [2.0, 2.0, 2.0], 0.0, 10.0)
+    [0.0, 2.0, 9.0]
+    """
+    steps = list(accumulate([0.0, *pitch[1:]])) if wanted else []
+    pools: list[tuple[float, int]] = []
+    for place, step in zip(wanted, steps, strict=True):
+        total, count = place - step, 1
+        while pools and pools[-1][0] / pools[-1][1] > total / count:
+            total, count = total + pools[-1][0], count + pools.pop()[1]
+        pools.append((total, count))
+    means = [total / count for total, count in pools for _ in range(count)]
+    room = max(high - steps[-1], low) if steps else high
+    return [min(max(mean, low), room) + step for mean, step in zip(means, steps, strict=True)]

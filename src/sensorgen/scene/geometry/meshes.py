@@ -1,0 +1,133 @@
+"""Triangle meshes straight from the scene, in double precision, without a CAD kernel."""
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.scene.geometry.mesh import Mesh
+from sensorgen.scene.scene import PLANE, Body, Outline, Prism
+
+Ints = NDArray[np.int64]
+
+
+def mesh(body: Body) -> Mesh:
+    """Mesh a body: boxes that share faces become one shell, other prisms one shell each.
+
+    Shells that touch along an edge or at a corner keep vertices of their own, so that every edge
+    belongs to two triangles.
+    """
+    if all(p.is_box() for p in body.prisms):
+        return _grid(body.prisms)
+    return _joined([_prism(p) for p in body.prisms])
+
+
+def _joined(parts: list[Mesh]) -> Mesh:
+    offsets = np.cumsum([0] + [len(p.vertices_mm) for p in parts[:-1]])
+    triangles = [p.triangles + offset for p, offset in zip(parts, offsets, strict=True)]
+    return Mesh(np.concatenate([p.vertices_mm for p in parts]), np.concatenate(triangles).astype(np.int32))
+
+
+def _prism(prism: Prism) -> Mesh:
+    """Two caps and a wall."""
+    ring = np.array(prism.outline)
+    n = len(ring)
+    vertices = np.empty((2 * n, 3))
+    for half, level in ((slice(0, n), prism.start_mm), (slice(n, None), prism.end_mm)):
+        for column, axis in enumerate(PLANE[prism.axis]):
+            vertices[half, "xyz".index(axis)] = ring[:, column]
+        vertices[half, "xyz".index(prism.axis)] = level
+    cap = _cap(prism.outline)
+    here = np.arange(n)
+    after = (here + 1) % n
+    wall = np.concatenate([np.stack([here, after, after + n], 1), np.stack([here, after + n, here + n], 1)])
+    triangles = np.concatenate([cap[:, ::-1], cap + n, wall])
+    if prism.axis == "y":  # x, z and y are a left-handed set
+        triangles = triangles[:, ::-1]
+    return Mesh(vertices, triangles.astype(np.int32))
+
+
+def _cap(outline: Outline) -> Ints:
+    """Triangles of a flat outline, as indices of its corners."""
+    if len(outline) == 3:
+        return np.array([[0, 1, 2]])
+    import manifold3d
+
+    return np.asarray(manifold3d.triangulate([np.array(outline)]), np.int64)
+
+
+def _grid(prisms: tuple[Prism, ...]) -> Mesh:
+    """Outer faces of boxes, on the grid of all their coordinates."""
+    lines = [np.unique([edge for p in prisms for edge in p.span(axis)]) for axis in "xyz"]
+    filled = np.zeros([len(line) - 1 for line in lines], bool)
+    for p in prisms:
+        ends = (np.searchsorted(line, p.span(axis)) for line, axis in zip(lines, "xyz", strict=True))
+        filled[tuple(slice(low, high) for low, high in ends)] = True
+    around = _surroundings(filled)
+    keys = np.concatenate([_faces(filled, around, axis, side) for axis in range(3) for side in (0, 1)])
+    used = np.zeros(around.size * 4, bool)
+    used[keys.ravel()] = True
+    number = np.cumsum(used) - 1
+    quads = number[keys]
+    places = np.unravel_index(np.flatnonzero(used) // 4, around.shape)
+    vertices = np.stack([line[place] for line, place in zip(lines, places, strict=True)], 1)
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return Mesh(vertices, triangles.astype(np.int32))
+
+
+def _surroundings(filled: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Which of the eight cells around each grid point are filled, as bits x + 2 y + 4 z."""
+    padded = np.pad(filled, 1).astype(np.uint8)
+    around = np.zeros([n + 1 for n in filled.shape], np.uint8)
+    for bit, shift in enumerate(_CORNERS):
+        window = tuple(slice(s, s + n) for s, n in zip(shift, around.shape, strict=True))
+        around |= padded[window] << bit
+    return around
+
+
+def _faces(filled: NDArray[np.bool_], around: NDArray[np.uint8], axis: int, side: int) -> Ints:
+    """Outer faces on one side of the filled cells: (n, 4) keys of corners, counter-clockwise from outside.
+
+    A key is four times the number of the grid point, plus the number of the solid at that point: two
+    solids that meet there in an edge or corner only are told apart by it.
+    """
+    outside = np.zeros_like(filled)
+    inner = tuple(slice(1 - side, filled.shape[k] - side) if k == axis else slice(None) for k in range(3))
+    beyond = tuple(slice(side, filled.shape[k] - 1 + side) if k == axis else slice(None) for k in range(3))
+    outside[...] = filled
+    outside[inner] &= ~filled[beyond]
+    cells = np.argwhere(outside)
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    turn = ((0, 0), (1, 0), (1, 1), (0, 1)) if side else ((0, 0), (0, 1), (1, 1), (1, 0))
+    keys = np.empty((len(cells), 4), np.int64)
+    for corner, (du, dv) in enumerate(turn):
+        offset = np.zeros(3, np.int64)
+        offset[[axis, u, v]] = side, du, dv
+        point = np.ravel_multi_index(tuple((cells + offset).T), around.shape)
+        own = int((1 - offset) @ (1, 2, 4))  # the cell itself, seen from its corner
+        keys[:, corner] = 4 * point + _SOLIDS[around.ravel()[point], own]
+    return keys
+
+
+_CORNERS = [(x, y, z) for z, y, x in product((0, 1), repeat=3)]
+
+
+def _number_solids() -> NDArray[np.int64]:
+    """For each pattern of eight cells around a point: which of the solids there each cell belongs to.
+
+    Cells that share a face are one solid; (256, 8), cells in the order of the bits.
+    """
+    table = np.zeros((256, 8), np.int64)
+    for pattern in range(256):
+        solid = {cell: cell for cell in range(8) if pattern >> cell & 1}
+        for _ in range(3):  # a label travels at most three faces
+            for cell, step in product(solid, (1, 2, 4)):
+                if cell ^ step in solid:
+                    solid[cell] = solid[cell ^ step] = min(solid[cell], solid[cell ^ step])
+        order = {label: number for number, label in enumerate(sorted(set(solid.values())))}
+        for cell, label in solid.items():
+            table[pattern, cell] = order[label]
+    return table
+
+
+_SOLIDS = _number_solids()

@@ -1,0 +1,89 @@
+"""Are the meshes closed, oriented, apart from one another, and the electrodes apart?"""
+
+from collections.abc import Mapping
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sensorgen.scene.geometry.mesh import Mesh
+from sensorgen.scene.scene import Scene
+
+if TYPE_CHECKING:
+    import manifold3d
+
+# Where bodies share a face, rounding leaves a film of some 1e-13 mm; a real overlap is far above this.
+OVERLAP_MM = 1e-9
+
+
+def solid(mesh: Mesh) -> "manifold3d.Manifold":
+    """The mesh as a solid of manifold3d, in double precision; look at its ``status()``."""
+    import manifold3d
+
+    data = manifold3d.Mesh64(vert_properties=mesh.vertices_mm, tri_verts=mesh.triangles.astype(np.uint64))
+    return manifold3d.Manifold(data)
+
+
+def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
+    """Bodies, and what is wrong with them; empty when all are valid.
+
+    Parameters
+    ----------
+    scene : Scene
+        For the volumes that the meshes must have.
+    meshes : mapping of str to Mesh
+        One for each body, by its name.
+    """
+    import manifold3d
+
+    solids = {name: solid(mesh) for name, mesh in meshes.items()}
+    found = []
+    for body in scene.bodies:
+        exact, got = body.volume_mm3(), meshes[body.name].volume_mm3()
+        if solids[body.name].status() != manifold3d.Error.NoError:
+            found.append((body.name, f"not a closed oriented surface ({solids[body.name].status().name})"))
+        elif not _two_manifold(meshes[body.name]):
+            found.append((body.name, "shells are welded along an edge: programs that read 3MF refuse that"))
+        elif abs(got - exact) > 1e-9 * exact:
+            found.append((body.name, f"encloses {got:.9g} mm3, not {exact:.9g} mm3"))
+        elif (twice := _self_overlap_mm3(solids[body.name])) > OVERLAP_MM * solids[body.name].surface_area():
+            found.append((body.name, f"overlaps itself by {twice:.3g} mm3"))
+    if found:
+        return found
+    return [(f"{a} / {b}", f"overlap by {volume:.3g} mm3") for a, b, volume in _overlaps(solids)]
+
+
+def _two_manifold(mesh: Mesh) -> bool:
+    """Whether every edge has one triangle on each side; manifold3d takes a seam with four and parts it."""
+    ends = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    there, back = (np.sort(ends @ way) for way in ([1, len(mesh.vertices_mm)], [len(mesh.vertices_mm), 1]))
+    return bool(np.all(np.diff(there) > 0) and np.array_equal(there, back))
+
+
+def _self_overlap_mm3(solid: "manifold3d.Manifold") -> float:
+    """Volume that the shells of one body enclose more than once [mm3]."""
+    import manifold3d
+
+    shells = solid.decompose()
+    united = manifold3d.Manifold.batch_boolean(shells, manifold3d.OpType.Add) if len(shells) > 1 else solid
+    return float(solid.volume() - united.volume())
+
+
+def _overlaps(solids: Mapping[str, "manifold3d.Manifold"]) -> list[tuple[str, str, float]]:
+    shared = (
+        (a, b, (solids[a] ^ solids[b]).volume()) for a, b in combinations(solids, 2) if _near(solids[a], solids[b])
+    )
+    return [(a, b, v) for a, b, v in shared if v > OVERLAP_MM * min(solids[a].surface_area(), solids[b].surface_area())]
+
+
+def _near(a: "manifold3d.Manifold", b: "manifold3d.Manifold") -> bool:
+    """Whether their enclosing boxes share more than a face."""
+    box_a, box_b = np.array(a.bounding_box()), np.array(b.bounding_box())
+    return bool(np.all(np.minimum(box_a[3:], box_b[3:]) - np.maximum(box_a[:3], box_b[:3]) > OVERLAP_MM))
+
+
+def electrode_gap_mm(scene: Scene, meshes: Mapping[str, Mesh]) -> float:
+    """Smallest distance between bodies at different terminals, exact [mm]."""
+    ends = [(b.terminal, solid(meshes[b.name])) for b in scene.bodies if b.terminal]
+    reach = sum(scene.size_mm)
+    return min(float(a.min_gap(b, reach)) for (s, a), (t, b) in combinations(ends, 2) if s != t)

@@ -1,0 +1,169 @@
+"""Cross-sections of a scene, and the vertical columns that they are made of."""
+
+from bisect import bisect_left
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+from sensorgen.scene.scene import PLANE, Body, Outline, Point, Prism, Scene, rounded
+
+ROUNDING_MM = 1e-9  # edges nearer than this are one edge, reached by different sums
+
+
+@dataclass(frozen=True, eq=False)  # one object for one section: its columns are cut once
+class Section:
+    """A cross-section that the sensor has over some depth.
+
+    Attributes
+    ----------
+    across : str
+        Axis that the section runs along, "x" or "y"; its outlines are in (across, z).
+    depth_mm : float
+        Total length over which the sensor looks like this, square to the section [mm].
+    at_mm : float
+        One place where it does [mm].
+    regions : tuple of (Body, Outline)
+        What is cut.
+    """
+
+    across: str
+    depth_mm: float
+    at_mm: float
+    regions: tuple[tuple[Body, Outline], ...]
+
+
+def sections(scene: Scene) -> list[Section]:
+    """The distinct cross-sections of a scene, with the depth of each; together they are the scene.
+
+    One for shapes of one extrusion, a few for crossed strips.
+
+    Raises
+    ------
+    ValueError
+        Some outline is slanted in plan, or slants run both ways: no vertical cut is constant over a depth.
+    """
+    return list(_fewest(scene))
+
+
+@lru_cache(maxsize=8)
+def _fewest(scene: Scene) -> list[Section]:
+    normals = [n for n in "yx" if all(p.axis == n or p.is_box() for b in scene.bodies for p in b.prisms)]
+    if not normals:
+        raise ValueError("no direction in which this scene is made of constant cross-sections")
+    return min((_sections(scene, n) for n in normals), key=len)
+
+
+def _sections(scene: Scene, normal: str) -> list[Section]:
+    across = "x" if normal == "y" else "y"
+    spans = [(p.span(normal), body, p) for body in scene.bodies for p in body.prisms]
+    cuts = sorted({edge for span, _, _ in spans for edge in span})
+    slabs: list[list[int]] = [[] for _ in cuts[1:]]
+    for index, ((low, high), _, _) in enumerate(spans):
+        for k in range(bisect_left(cuts, low), bisect_left(cuts, high)):
+            slabs[k].append(index)
+    looks: dict[object, int] = {}
+    look = [looks.setdefault((body.name, _seen(p, normal)), len(looks)) for _, body, p in spans]
+    found: dict[tuple[int, ...], tuple[float, float, list[int]]] = {}
+    for (low, high), here in zip(pairwise(cuts), slabs, strict=True):
+        key = tuple(look[i] for i in here)
+        depth, at, members = found.get(key, (0.0, (low + high) / 2, here))
+        found[key] = (depth + high - low, at, members)
+    return [
+        Section(across, depth, at, tuple((spans[i][1], o) for i in members for o in spans[i][2].cut(normal, at)))
+        for depth, at, members in found.values()
+    ]
+
+
+def _seen(prism: Prism, normal: str) -> tuple[Point, ...]:
+    """What of a prism a section square to ``normal`` shows: the same for every place inside it."""
+    if prism.axis == normal:
+        return prism.outline
+    return tuple(prism.span(axis) for axis in PLANE[normal])
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One material within a column, between two straight lines.
+
+    ``bottom_mm`` and ``top_mm`` are heights at the column's left and right side [mm].
+    """
+
+    body: Body
+    bottom_mm: Point
+    top_mm: Point
+
+
+@dataclass(frozen=True)
+class Column:
+    """A vertical strip of a section in which every interface is one straight line."""
+
+    left_mm: float
+    right_mm: float
+    layers: tuple[Layer, ...]
+
+
+def columns(section: Section) -> list[Column]:
+    """Cut a section into columns, from left to right; layers from bottom to top."""
+    return list(_columns(section))
+
+
+@lru_cache(maxsize=8)
+def alike(section: Section) -> list[int]:
+    """Of each column, the number of the first that looks like it: as wide, of the same bodies at the same heights."""
+    firsts: dict[object, int] = {}
+    return [firsts.setdefault(_look(column), k) for k, column in enumerate(_columns(section))]
+
+
+def _look(column: Column) -> object:
+    lines = ((layer.body.name, *map(rounded, (*layer.bottom_mm, *layer.top_mm))) for layer in column.layers)
+    return rounded(column.right_mm - column.left_mm), *lines
+
+
+@lru_cache(maxsize=8)
+def _columns(section: Section) -> list[Column]:
+    cuts = sorted({u for _, outline in section.regions for u, _ in outline})
+    edges: list[list[tuple[Point, int]]] = [[] for _ in cuts[1:]]
+    for number, (_, outline) in enumerate(section.regions):
+        for a, b in zip(outline, outline[1:] + outline[:1], strict=True):
+            (ua, va), (ub, vb) = sorted((a, b))
+            for k in range(bisect_left(cuts, ua), bisect_left(cuts, ub)):
+                slope = (vb - va) / (ub - ua)
+                left, right = va + (cuts[k] - ua) * slope, va + (cuts[k + 1] - ua) * slope
+                edges[k].append(((left, vb if cuts[k + 1] == ub else right), number))
+    return [
+        Column(left, right, tuple(_layers(section, found)))
+        for (left, right), found in zip(pairwise(cuts), edges, strict=True)
+        if right - left > ROUNDING_MM
+    ]
+
+
+def overlap(scene: Scene) -> str | None:
+    """Where bodies run into each other, or an outline into itself; None where nowhere, or where no section tells."""
+    try:
+        found = sections(scene)
+    except ValueError:
+        return None
+    for section in found:
+        for column in columns(section):
+            for below, above in pairwise(column.layers):
+                if min(a - b for a, b in zip(above.bottom_mm, below.top_mm, strict=True)) < -ROUNDING_MM:
+                    names = " and ".join(dict.fromkeys((below.body.name, above.body.name)))
+                    return f"outlines overlap near {section.across} = {column.left_mm:g} mm: {names}"
+    return None
+
+
+def _layers(section: Section, edges: list[tuple[Point, int]]) -> Iterator[Layer]:
+    by_region: dict[int, list[Point]] = {}
+    for line, number in edges:
+        by_region.setdefault(number, []).append(line)
+    layers = [
+        Layer(section.regions[number][0], low, high)
+        for number, lines in by_region.items()
+        for low, high in _pairs(sorted(lines, key=sum))
+    ]
+    yield from sorted(layers, key=lambda layer: sum(layer.bottom_mm) + sum(layer.top_mm))
+
+
+def _pairs(lines: list[Point]) -> Iterator[tuple[Point, Point]]:
+    yield from zip(lines[::2], lines[1::2], strict=True)

@@ -1,0 +1,287 @@
+"""The repeating cell of a cross-section: the piece from which mirrors make the whole sensor.
+
+Where planes x = m + k h mirror the section into itself, the field between the first two is the field everywhere:
+a sensor of 100 mm is solved as half a period. The pattern is thought to go on beyond the sensor's ends, so that
+no fringe arises there; a section without such planes is continued by its own mirror image instead.
+"""
+
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache, lru_cache, partial
+from itertools import pairwise
+
+import numpy as np
+
+from sensorgen.scene.scene import Point
+from sensorgen.scene.sections import ROUNDING_MM, Column, Section, columns
+
+_MOST_PLACES = 400  # for the first two mirrors; a pattern of more corners than these is solved as a whole
+
+
+@dataclass(frozen=True)
+class Band:
+    """One material between two straight lines of a slice.
+
+    Attributes
+    ----------
+    material : str
+        Name of a dielectric, or "" for a conductor.
+    terminal : str
+        "top" or "bottom" for a conductor, else "".
+    bottom_mm, top_mm : (float, float)
+        Heights at the slice's left and right side [mm].
+    """
+
+    material: str
+    terminal: str
+    bottom_mm: Point
+    top_mm: Point
+
+    def is_same(self, other: "Band") -> bool:
+        """Whether both are of one material, or of one conductor."""
+        return (self.material, self.terminal) == (other.material, other.terminal)
+
+
+@dataclass(frozen=True)
+class Slice:
+    """A vertical strip of a section, filled from bottom to top, air included; every interface is one straight line."""
+
+    left_mm: float
+    right_mm: float
+    bands: tuple[Band, ...]
+
+    def lines_mm(self, at_mm: float) -> tuple[float, ...]:
+        """Heights of the interfaces at one place [mm]."""
+        share = (at_mm - self.left_mm) / (self.right_mm - self.left_mm)
+        return tuple(b.top_mm[0] + share * (b.top_mm[1] - b.top_mm[0]) for b in self.bands)
+
+    def between(self, left_mm: float, right_mm: float) -> "Slice":
+        """The part between two places within it [mm]."""
+        if (left_mm, right_mm) == (self.left_mm, self.right_mm):
+            return self
+        ends = (self.lines_mm(left_mm), self.lines_mm(right_mm))
+        floor = self.bands[0].bottom_mm[0]
+        bands, below = [], (floor, floor)
+        for band, *top in zip(self.bands, *ends, strict=True):
+            bands.append(Band(band.material, band.terminal, below, (top[0], top[1])))
+            below = (top[0], top[1])
+        return Slice(left_mm, right_mm, tuple(bands))
+
+    def is_flat(self) -> bool:
+        """Whether all its interfaces are level."""
+        return all(abs(b.top_mm[0] - b.top_mm[1]) < ROUNDING_MM for b in self.bands)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What has to be solved of a section, with zero flux through both sides.
+
+    Attributes
+    ----------
+    slices : tuple of Slice
+        From left to right.
+    shares : tuple of float
+        How often each slice, or its mirror image, occurs in the sensor [-].
+    """
+
+    slices: tuple[Slice, ...]
+    shares: tuple[float, ...]
+
+
+@lru_cache(maxsize=8)
+def cell(section: Section, height_mm: float) -> Cell:
+    """The smallest piece of a section that mirrors at its own two sides continue to the whole.
+
+    Parameters
+    ----------
+    section : Section
+        Polygons of any form.
+    height_mm : float
+        Up to where air fills what no polygon does [mm].
+
+    Raises
+    ------
+    ValueError
+        Outlines overlap, or an outline is open.
+    """
+    return mirrored([_slice(column, height_mm) for column in columns(section)])
+
+
+def mirrored(slices: list[Slice]) -> Cell:
+    """The smallest run of slices that mirrors at its own two sides continue to all of them."""
+    whole = _straightened(slices)
+    places = _candidates(whole)
+    end = whole[-1].right_mm
+    is_mirror = cache(partial(_is_mirror, whole))
+    for fits in (_is_even, _has_room):
+        for low, high in _pairs(places, end):
+            if not fits(low - places[0], high - low, end - places[0]) or not (is_mirror(low) and is_mirror(high)):
+                continue
+            if _repeats(whole, low, high):
+                return _cell(whole, low, high)
+    return Cell(tuple(whole), (1.0,) * len(whole))
+
+
+def _slice(column: Column, height_mm: float) -> Slice:
+    """A column with the air between its layers; layers of one material that touch are one."""
+    bands: list[Band] = []
+    at = (0.0, 0.0)
+    for layer in column.layers:
+        if min(layer.bottom_mm[0] - at[0], layer.bottom_mm[1] - at[1]) < -ROUNDING_MM:
+            raise ValueError(f"outlines overlap near {column.left_mm:g} mm: {layer.body.name} runs into its neighbour")
+        terminal = layer.body.terminal
+        bands.append(Band("air", "", at, layer.bottom_mm))
+        bands.append(Band("" if terminal else layer.body.material, terminal, layer.bottom_mm, layer.top_mm))
+        at = layer.top_mm
+    bands.append(Band("air", "", at, (height_mm, height_mm)))
+    return Slice(column.left_mm, column.right_mm, tuple(_joined(bands)))
+
+
+def _joined(bands: Iterable[Band]) -> list[Band]:
+    """Bands without those of no height, and neighbours of one material as one."""
+    found: list[Band] = []
+    for band in bands:
+        if max(t - b for b, t in zip(band.bottom_mm, band.top_mm, strict=True)) <= ROUNDING_MM:
+            continue
+        if found and found[-1].is_same(band):
+            band = Band(band.material, band.terminal, found.pop().bottom_mm, band.top_mm)
+        found.append(band)
+    return found
+
+
+def _straightened(slices: Iterable[Slice]) -> list[Slice]:
+    """Slices as wide as their interfaces are straight."""
+    found: list[Slice] = []
+    for here in slices:
+        last = found[-1] if found else None
+        joined = Slice(last.left_mm, here.right_mm, _bridged(last, here)) if last else None
+        if last and joined and len(joined.bands) == len(last.bands) and _runs_on(joined, last, here):
+            found[-1] = joined
+        else:
+            found.append(here)
+    return found
+
+
+def _bridged(last: Slice, here: Slice) -> tuple[Band, ...]:
+    pairs = zip(last.bands, here.bands, strict=False)
+    return tuple(
+        Band(a.material, a.terminal, (a.bottom_mm[0], b.bottom_mm[1]), (a.top_mm[0], b.top_mm[1])) for a, b in pairs
+    )
+
+
+def _runs_on(joined: Slice, last: Slice, here: Slice) -> bool:
+    """Whether two neighbours are one slice: the same materials, lines that neither jump nor bend."""
+    if len(last.bands) != len(here.bands) or not all(map(Band.is_same, last.bands, here.bands)):
+        return False
+    middle = joined.lines_mm(here.left_mm)
+    lines = zip(middle, last.lines_mm(last.right_mm), here.lines_mm(here.left_mm), strict=True)
+    return all(max(abs(m - a), abs(m - b)) < ROUNDING_MM for m, a, b in lines)
+
+
+def _candidates(slices: list[Slice]) -> list[float]:
+    """Where a mirror may stand: between slices, and in the middle of level ones."""
+    edges = {slices[0].left_mm, *(s.right_mm for s in slices)}
+    return sorted(edges | {(s.left_mm + s.right_mm) / 2 for s in slices if s.is_flat()})
+
+
+def _is_even(start_mm: float, piece_mm: float, whole_mm: float) -> bool:
+    """Whether a piece occurs a whole number of times, each of its parts as often as another."""
+    times = round(whole_mm / piece_mm)
+    return abs(times * piece_mm - whole_mm) < ROUNDING_MM and (times % 2 == 0 or start_mm < ROUNDING_MM)
+
+
+def _has_room(start_mm: float, piece_mm: float, whole_mm: float) -> bool:
+    """Whether two whole pieces follow each other: one alone would not show that it repeats."""
+    return start_mm + 2 * piece_mm <= whole_mm + ROUNDING_MM
+
+
+def _pairs(places: list[float], end_mm: float) -> Iterator[Point]:
+    """Pairs of places, the nearest first, of which the first lies no further from the start than they are apart.
+
+    The whole has to hold two of the pieces between them, or it would not show that they repeat. In windows of twice
+    the size each, so that a long sensor's pattern is found in its first periods.
+    """
+    at = np.array(places) - places[0]
+    reach = float(np.diff(at).min())
+    most = (end_mm - places[0]) / 2 + ROUNDING_MM
+    while reach / 2 < most:
+        near = at[: min(int(np.searchsorted(at, 2 * reach + ROUNDING_MM)), _MOST_PLACES)]
+        i, j = np.triu_indices(len(near), 1)
+        apart = near[j] - near[i]
+        fits = (near[i] <= apart + ROUNDING_MM) & (reach / 2 < apart) & (apart <= min(reach, most))
+        order = np.argsort(apart[fits], kind="stable")
+        yield from ((places[a], places[b]) for a, b in zip(i[fits][order], j[fits][order], strict=True))
+        reach *= 2
+
+
+def _is_mirror(slices: list[Slice], at: float) -> bool:
+    """Whether a place mirrors what lies to both its sides, as far as the nearer end reaches."""
+    reach = min(at - slices[0].left_mm, slices[-1].right_mm - at)
+    return reach <= ROUNDING_MM or _repeats(_cut(slices, at - reach, at + reach), at, at + reach)
+
+
+def _repeats(slices: list[Slice], low: float, high: float) -> bool:
+    """Whether mirrors at two places make the whole section from what lies between them."""
+    inside = _cut(slices, low, high)
+    lefts = [s.left_mm for s in inside]
+    for piece in _folded(slices, low, high):
+        at = max(bisect_right(lefts, (piece.left_mm + piece.right_mm) / 2) - 1, 0)
+        if not _agree(piece, inside[at]):
+            return False
+    return True
+
+
+def _agree(piece: Slice, place: Slice) -> bool:
+    if piece.left_mm < place.left_mm - ROUNDING_MM or piece.right_mm > place.right_mm + ROUNDING_MM:
+        return False
+    if len(piece.bands) != len(place.bands) or not all(map(Band.is_same, piece.bands, place.bands)):
+        return False
+    ends = ((x, piece.lines_mm(x), place.lines_mm(x)) for x in (piece.left_mm, piece.right_mm))
+    return all(abs(a - b) < 10 * ROUNDING_MM for _, mine, other in ends for a, b in zip(mine, other, strict=True))
+
+
+def _cut(slices: list[Slice], low: float, high: float) -> list[Slice]:
+    """The slices between two places."""
+    pieces = ((s, max(s.left_mm, low), min(s.right_mm, high)) for s in slices)
+    return [s.between(a, b) for s, a, b in pieces if b - a > ROUNDING_MM]
+
+
+def _folded(slices: list[Slice], low: float, high: float) -> Iterator[Slice]:
+    """Every piece of the section, mirrored until it lies between two places."""
+    width = high - low
+    for s in slices:
+        first, last = (int(np.floor((x - low) / width)) for x in (s.left_mm + ROUNDING_MM, s.right_mm - ROUNDING_MM))
+        for k in range(first, last + 1):
+            start = low + k * width
+            for piece in _cut([s], start, start + width):
+                yield _mirrored(piece, start, width, low) if k % 2 else _moved(piece, low - start)
+
+
+def _moved(piece: Slice, by_mm: float) -> Slice:
+    return Slice(piece.left_mm + by_mm, piece.right_mm + by_mm, piece.bands)
+
+
+def _mirrored(piece: Slice, start: float, width: float, low: float) -> Slice:
+    bands = tuple(Band(b.material, b.terminal, b.bottom_mm[::-1], b.top_mm[::-1]) for b in piece.bands)
+    end = 2 * start + width
+    return Slice(end - piece.right_mm + low - start, end - piece.left_mm + low - start, bands)
+
+
+def _cell(slices: list[Slice], low: float, high: float) -> Cell:
+    """The piece between two places, cut where a sensor's end falls into it, and how often each part occurs."""
+    pieces = [(p.left_mm, p.right_mm) for p in _folded(slices, low, high)]
+    inside = _cut(slices, low, high)
+    ends = _distinct(
+        sorted({x for piece in pieces for x in piece} | {x for s in inside for x in (s.left_mm, s.right_mm)})
+    )
+    parts = [p for a, b in pairwise(ends) for p in _cut(inside, a, b)]
+    middles = [(p.left_mm + p.right_mm) / 2 for p in parts]
+    shares = [float(sum(a < m < b for a, b in pieces)) for m in middles]
+    if max(shares) == min(shares):
+        return Cell(tuple(inside), (shares[0],) * len(inside))
+    return Cell(tuple(parts), tuple(shares))
+
+
+def _distinct(values: list[float]) -> list[float]:
+    return [v for k, v in enumerate(values) if k == 0 or v - values[k - 1] > 10 * ROUNDING_MM]

@@ -1,4 +1,0 @@
-"""Sensor shapes: one file each, with its parameters (``Params``) and its ``scene``.
-
-A shape is known by its file name. It imports :mod:`sensorgen.scene` and the standard library only.
-"""

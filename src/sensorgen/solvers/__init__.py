@@ -1,0 +1,1 @@
+"""Numerical solvers: arrays in, arrays out. They know no sensor."""

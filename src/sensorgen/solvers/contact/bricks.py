@@ -1,0 +1,106 @@
+"""One cell of a scene of boxes as bricks: between its mirrors, cut into layers that shrink towards its planes."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.errors import BadInput
+from sensorgen.core.units import M_PER_MM
+from sensorgen.scene.scene import Scene
+from sensorgen.scene.unit_cell import Band, Slice, mirrored
+from sensorgen.solvers.contact.cell import AIR, Region
+
+Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+_SAME_MM = 1e-9  # places nearer than this are one
+
+
+@dataclass(frozen=True)
+class Bricks:
+    """Boxes between planes square to the axes.
+
+    Attributes
+    ----------
+    planes_m : three arrays
+        Where the planes lie on x, y and z [m].
+    fill : (i, j, k) array
+        What is in each box: an index into ``regions``.
+    regions : tuple of Region
+        Air first.
+    """
+
+    planes_m: tuple[Real, Real, Real]
+    fill: Whole
+    regions: tuple[Region, ...]
+
+    def spans_m(self) -> Real:
+        """Where it begins and ends along each axis (3, 2) [m]."""
+        return np.array([[p[0], p[-1]] for p in self.planes_m])
+
+    def written(self) -> str:
+        """Everything that it is, as text."""
+        return repr(([planes.tolist() for planes in self.planes_m], self.fill.tolist(), self.regions))
+
+    def cut(self, pieces: int, shrink: float) -> "Bricks":
+        """Every box in that many pieces along each axis, each ``shrink`` of the next towards planes inside."""
+        parts = [_cut(planes, pieces, shrink) for planes in self.planes_m]
+        x, y, z = (planes for planes, _ in parts)
+        return Bricks((x, y, z), self.fill[np.ix_(*(owner for _, owner in parts))], self.regions)
+
+
+def bricks_of(scene: Scene) -> Bricks:
+    """The cell of a scene of boxes, between mirrors at all four sides.
+
+    Raises
+    ------
+    BadInput
+        A prism is no box, or bodies overlap.
+    """
+    prisms = [(body, p) for body in scene.bodies for p in body.prisms]
+    if not all(p.is_box() for _, p in prisms):
+        raise BadInput("pressing in 3D needs a scene of boxes: not all of its prisms are")
+    planes = [_planes([p.span(axis) for _, p in prisms]) for axis in "xyz"]
+    regions = [Region(AIR, ""), *dict.fromkeys(Region(body.material, body.terminal) for body, _ in prisms)]
+    fill = np.zeros([len(p) - 1 for p in planes], np.int64)
+    for body, prism in prisms:
+        ends = [np.searchsorted(p, np.array(prism.span(a)) - _SAME_MM) for a, p in zip("xyz", planes, strict=True)]
+        here = tuple(slice(*end) for end in ends)
+        if fill[here].any():
+            raise BadInput(f"{body.name} overlaps its neighbour")
+        fill[here] = regions.index(Region(body.material, body.terminal))
+    for axis in (0, 1):
+        planes[axis], owner = _cell(planes[axis], np.moveaxis(fill, axis, 0))
+        fill = fill.take(owner, axis)
+    x, y, z = (p * M_PER_MM for p in planes)
+    return Bricks((x, y, z), fill, tuple(regions))
+
+
+def _planes(spans: list[tuple[float, float]]) -> Real:
+    values = np.unique(np.array(spans))
+    return np.asarray(values[np.concatenate([[True], np.diff(values) > _SAME_MM])])
+
+
+def _cell(planes: Real, fill: Whole) -> tuple[Real, Whole]:
+    """Planes of the smallest piece that mirrors at its ends continue to the whole, and from which slice each is."""
+    looks: dict[bytes, str] = {}
+    names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in fill]
+    slices = [
+        Slice(a, b, (Band(n, "", (0.0, 0.0), (1.0, 1.0)),))
+        for (a, b), n in zip(pairwise(planes.tolist()), names, strict=True)
+    ]
+    found = mirrored(slices).slices
+    middles = [(s.left_mm + s.right_mm) / 2 for s in found]
+    return np.array([found[0].left_mm, *(s.right_mm for s in found)]), np.searchsorted(planes, middles) - 1
+
+
+def _cut(planes: Real, pieces: int, shrink: float) -> tuple[Real, Whole]:
+    """Planes with more between them, and from which interval each piece is; both ends are as coarse as the middle."""
+    found, last, steps = [planes[:1]], len(planes) - 2, np.arange(pieces)
+    for k, (a, b) in enumerate(pairwise(planes.tolist())):
+        apart = np.minimum(steps + pieces * (k == 0), steps[::-1] + pieces * (k == last))
+        size = (1 / shrink) ** np.minimum(apart, pieces - 1)
+        found.append(a + (b - a) * np.cumsum(size) / size.sum())
+    return np.concatenate(found), np.repeat(np.arange(last + 1), pieces)

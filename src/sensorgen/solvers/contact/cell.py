@@ -1,0 +1,197 @@
+"""One cell of a cross-section as edges with a region on each side: what a mesher needs, for any prismatic scene."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+from sensorgen.core.errors import BadInput
+from sensorgen.scene.scene import Point, Scene
+from sensorgen.scene.sections import Column, Layer, columns, sections
+
+OUTSIDE = 0  # the region beyond the cell
+AIR = "air"
+_DIGITS = 9  # of a coordinate [mm]: places nearer than a picometre are one
+_SLIVER_MM = 1e-9
+
+Edge = tuple[Point, Point]
+
+
+@dataclass(frozen=True)
+class Region:
+    """What fills one part of a cell: its material, and the electrode that it belongs to, or ""."""
+
+    material: str
+    terminal: str
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell, or half of one that is its own mirror image.
+
+    Attributes
+    ----------
+    edges : mapping
+        Each edge, from its left or lower end, to the regions (left of it, right of it); 0 is outside.
+    regions : tuple of Region
+        Region k is ``regions[k - 1]``.
+    left_mm, right_mm : float
+        Where it begins and ends [mm].
+    mirrored : bool
+        Both sides are mirrors; else the cell repeats.
+    """
+
+    edges: Mapping[Edge, tuple[int, int]]
+    regions: tuple[Region, ...]
+    left_mm: float
+    right_mm: float
+    mirrored: bool
+
+    def width_mm(self) -> float:
+        """Its width [mm]."""
+        return self.right_mm - self.left_mm
+
+    def solid(self, region: int) -> bool:
+        """Whether a region is filled by a body."""
+        return region != OUTSIDE and self.regions[region - 1].material != AIR
+
+    def heights_mm(self) -> Point:
+        """Lowest and highest place [mm]."""
+        heights = [v for edge in self.edges for _, v in edge]
+        return min(heights), max(heights)
+
+
+def cell_of(scene: Scene, period_mm: float | None) -> Cell:
+    """As :func:`sensorgen.models.press2d.cell`, which documents it."""
+    try:
+        found = sections(scene)
+    except ValueError as error:
+        raise BadInput(f"compression needs a prismatic scene: {error}") from None
+    if len(found) > 1:
+        raise BadInput(f"compression needs one cross-section; this scene has {len(found)}: it must be solved in 3D")
+    whole = columns(found[0])
+    start, end = whole[0].left_mm, whole[-1].right_mm
+    period = period_mm or min(end - start, max(whole[0].layers[-1].top_mm))
+    if period > (end - start) * (1 + 1e-9):
+        raise BadInput(f"the sensor is {end - start:g} mm long, less than its period of {period:g} mm")
+    axes = {place for c in whole for place in (c.left_mm, (c.left_mm + c.right_mm) / 2)}
+    for axis in sorted(axes):
+        if axis + period <= end + _SLIVER_MM and _is_mirror(whole, axis, period):
+            return _cell(whole, axis, axis + period / 2, mirrored=True)
+    return _cell(whole, start, start + period, mirrored=False)
+
+
+Strip = tuple[float, float, list[tuple[Region, Point, Point]]]
+
+
+def _is_mirror(whole: list[Column], axis: float, period: float) -> bool:
+    """Whether the half period after ``axis`` and the one after that are mirror images."""
+    middle, end = axis + period / 2, axis + period
+    ahead = _strips(whole, axis, middle)
+    turned: list[Strip] = [
+        (axis + end - b, axis + end - a, [(region, low[::-1], high[::-1]) for region, low, high in layers])
+        for a, b, layers in reversed(_strips(whole, middle, end))
+    ]
+    return [_look(strip) for strip in ahead] == [_look(strip) for strip in turned]
+
+
+def _look(strip: Strip) -> tuple[object, ...]:
+    left, right, layers = strip
+    return round(left, 6), round(right, 6), [(r, *(round(v, 6) for v in (*low, *high))) for r, low, high in layers]
+
+
+def _strips(whole: list[Column], left: float, right: float) -> list[Strip]:
+    """The columns between two places, cut there: left, right, and each region with its bottom and top line.
+
+    Columns that only go on with what the one before them began are one.
+    """
+    found: list[Strip] = []
+    for c in whole:
+        a, b = max(c.left_mm, left), min(c.right_mm, right)
+        if b - a > _SLIVER_MM:
+            strip = (a, b, _filled([_layer(c, x, a, b) for x in c.layers]))
+            found[-1:] = _joined(found[-1], strip) if found else [strip]
+    return found
+
+
+def _joined(one: Strip, other: Strip) -> list[Strip]:
+    """Two neighbours, as one strip where every line of them runs on straight."""
+    (a, b, before), (_, c, after) = one, other
+    if [r for r, *_ in before] != [r for r, *_ in after]:
+        return [one, other]
+    for (_, *lines), (_, *others) in zip(before, after, strict=True):
+        for u, v in zip(lines, others, strict=True):
+            bent = (v[1] - v[0]) * (b - a) - (u[1] - u[0]) * (c - b)
+            if abs(u[1] - v[0]) > _SLIVER_MM or abs(bent) > _SLIVER_MM * (c - a):
+                return [one, other]
+    layers = [(r, (u[0], x[1]), (v[0], y[1])) for (r, u, v), (_, x, y) in zip(before, after, strict=True)]
+    return [(a, c, layers)]
+
+
+def _layer(column: Column, layer: Layer, left: float, right: float) -> tuple[Region, Point, Point]:
+    region = Region(layer.body.material, layer.body.terminal)
+    return region, _at(column, layer.bottom_mm, left, right), _at(column, layer.top_mm, left, right)
+
+
+def _filled(layers: list[tuple[Region, Point, Point]]) -> list[tuple[Region, Point, Point]]:
+    """Layers, with air where one does not reach up to the next."""
+    found = layers[:1]
+    for region, low, high in layers[1:]:
+        below = found[-1][2]
+        if max(low[k] - below[k] for k in range(2)) > _SLIVER_MM:
+            found.append((Region(AIR, ""), below, low))
+        found.append((region, low, high))
+    return found
+
+
+def _at(column: Column, line: Point, left: float, right: float) -> Point:
+    """The heights of a line of a column at two places in it."""
+    slope = (line[1] - line[0]) / (column.right_mm - column.left_mm)
+    a, b = (line[0] + slope * (u - column.left_mm) for u in (left, right))
+    return (line[0] if left == column.left_mm else a, line[1] if right == column.right_mm else b)
+
+
+def _cell(whole: list[Column], left: float, right: float, *, mirrored: bool) -> Cell:
+    strips = _strips(whole, left, right)
+    regions = list(dict.fromkeys(region for _, _, layers in strips for region, _, _ in layers))
+    number = {region: k + 1 for k, region in enumerate(regions)}
+    edges: dict[Edge, tuple[int, int]] = {}
+    for a, b, layers in strips:
+        for region, low, high in layers:
+            _add(edges, (a, low[0]), (b, low[1]), (number[region], OUTSIDE))
+            _add(edges, (a, high[0]), (b, high[1]), (OUTSIDE, number[region]))
+    for before, after in pairwise([None, *strips, None]):
+        _uprights(edges, before, after, number)
+    kept = {edge: sides for edge, sides in edges.items() if sides[0] != sides[1]}
+    return Cell(kept, tuple(regions), left, right, mirrored)
+
+
+def _add(edges: dict[Edge, tuple[int, int]], a: Point, b: Point, sides: tuple[int, int]) -> None:
+    """Add an edge from left to right, or from below upwards; what is known of it from its other side stays."""
+    key = (_rounded(a), _rounded(b))
+    known = edges.get(key, (OUTSIDE, OUTSIDE))
+    edges[key] = (sides[0] or known[0], sides[1] or known[1])
+
+
+def _rounded(p: Point) -> Point:
+    return round(p[0], _DIGITS), round(p[1], _DIGITS)
+
+
+def _uprights(
+    edges: dict[Edge, tuple[int, int]], before: Strip | None, after: Strip | None, number: Mapping[Region, int]
+) -> None:
+    """Upright edges where one strip ends and the next begins."""
+    place = after[0] if after else before[1]  # type: ignore[index]
+    sides = [_spans(before, 1, number), _spans(after, 0, number)]
+    heights = sorted({v for spans in sides for low, high, _ in spans for v in (low, high)})
+    for low, high in pairwise(heights):
+        middle = (low + high) / 2
+        left, right = (next((r for a, b, r in spans if a < middle < b), OUTSIDE) for spans in sides)
+        if left or right:
+            edges[_rounded((place, low)), _rounded((place, high))] = (left, right)
+
+
+def _spans(strip: Strip | None, end: int, number: Mapping[Region, int]) -> list[tuple[float, float, int]]:
+    """Which region lies between which heights at one end of a strip."""
+    layers = strip[2] if strip else []
+    heights = [(round(low[end], _DIGITS), round(high[end], _DIGITS), number[r]) for r, low, high in layers]
+    return [(low, high, region) for low, high, region in heights if high - low > _SLIVER_MM]

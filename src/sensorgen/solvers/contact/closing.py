@@ -1,0 +1,173 @@
+"""Faces that touch, laid along each other: each runs over the points of the other that touch it, so both are one line.
+
+Mirrors at the cell's ends are faces as well; points that touch one are put onto it.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.units import M_PER_MM
+from sensorgen.solvers.contact.cell import OUTSIDE
+from sensorgen.solvers.contact.contact import Faces
+
+Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+Run = tuple[int, int]
+Sides = dict[Run, tuple[int, int]]
+
+_CLOSED = 5e-3  # gaps less than this share of a side are none [-]
+_BETWEEN = 0.3  # and less than this share where both ends of the side touch [-]
+_ONE = 0.25  # points that touch and are nearer than this share of a side become one [-]
+_PAST = 0.1  # how far past its ends a side is still touched [-]
+_CORNER = 0.1  # sine of the angle by which a face turns at a corner, at least [-]
+_AGAINST = -0.3  # faces whose normals' product is above this do not look at each other [-]
+
+
+@dataclass(frozen=True)
+class _Air:
+    """The border of the air.
+
+    Attributes
+    ----------
+    runs : (k, 2) array
+        Points, the air to the right from the first to the second.
+    mirror : (k,) array
+        Whether it is one of the cell's ends.
+    behind : (k,) array
+        How deep a point that touches may lie behind [mm].
+    places : (n, 2) array
+        Of all points [mm].
+    """
+
+    runs: Whole
+    mirror: Mask
+    behind: Real
+    places: Real
+
+    @cached_property
+    def points(self) -> Whole:
+        return np.unique(self.runs)
+
+    @cached_property
+    def along(self) -> Real:
+        return np.asarray(self.places[self.runs[:, 1]] - self.places[self.runs[:, 0]])
+
+    @cached_property
+    def length(self) -> Real:
+        return np.asarray(np.hypot(*self.along.T))
+
+    @cached_property
+    def scale(self) -> Real:
+        """Length of the shorter of a run and those at a point (n, k): what makes a gap large or small."""
+        own = np.where(self.mirror, np.inf, self.length)
+        return np.minimum(self._least(np.repeat(own[:, None], len(own), axis=1)), own)
+
+    @cached_property
+    def facing(self) -> Mask:
+        """Whether a face at a point looks against a run (n, k), which does not end there."""
+        way = self.along / np.maximum(self.length, 1e-300)[:, None]
+        ends = (self.points[:, None, None] == self.runs).any(axis=2)
+        return np.asarray((self._least(way @ way.T) < _AGAINST) & ~ends & np.isfinite(self.scale))
+
+    def _least(self, values: Real) -> Real:
+        """Of the runs that begin or end at each point, from values of every run (k, m)."""
+        found = np.full((len(self.points), values.shape[1]), np.inf)
+        for end in self.runs.T:
+            np.minimum.at(found, np.searchsorted(self.points, end), values)
+        return found
+
+    def seen(self, instead: Whole) -> tuple[Real, Real]:
+        """Where on each run a point lies (0 to 1), and how far before it (n, k), points replaced by others."""
+        a, b = self.places[instead[self.runs]].transpose(1, 0, 2)
+        u, away = b - a, self.places[instead[self.points]][:, None] - a
+        square = np.maximum((u**2).sum(axis=1), 1e-300)
+        share = (away * u).sum(axis=2) / square
+        ahead = (away[..., 0] * u[:, 1] - away[..., 1] * u[:, 0]) / np.sqrt(square)
+        return share, ahead
+
+    def near(self, ahead: Real, limit: Real | float) -> Mask:
+        """Which gaps are none: less than a share of the scale, and not so deep that it is another side."""
+        behind = np.minimum(self.behind, self.scale)
+        return np.asarray(self.facing & (ahead < limit * self.scale) & (ahead > -behind))
+
+
+def closed(edges: Sides, air: int, places: Real, faces: Faces) -> Sides:
+    """Edges (node, node), with the regions to their left and right, whose gaps of air are closed where faces touch.
+
+    Points that touch a mirror are moved onto it in ``places`` [mm].
+    """
+    border = _border(edges, air, places, faces)
+    if not len(border.runs):
+        return edges
+    instead, touched = _joined(border, _fixed(edges, air, faces))
+    ways = dict(zip(map(tuple, border.runs.tolist()), _ways(border, instead, touched), strict=True))
+    found: Sides = {}
+    for run, sides in edges.items():
+        way = ways.get(run) or ways.get(run[::-1], [])[::-1] or instead[list(run)].tolist()
+        for a, b in pairwise(way):
+            if a != b:
+                key, here = ((a, b), sides) if a < b else ((b, a), sides[::-1])
+                known = found.get(key, (air, air))
+                found[key] = (known[0] if here[0] == air else here[0], known[1] if here[1] == air else here[1])
+    return found
+
+
+def _border(edges: Sides, air: int, places: Real, faces: Faces) -> _Air:
+    depth = dict(zip(map(tuple, faces.halves.tolist()), np.tile(faces.depth_m, 2) / M_PER_MM, strict=True))
+    known = {run if sides[1] == air else run[::-1]: OUTSIDE in sides for run, sides in edges.items() if air in sides}
+    behind = np.array([depth.get(run, np.inf) for run in known])
+    return _Air(np.array([*known], int).reshape(-1, 2), np.array([*known.values()], bool), behind, places)
+
+
+def _fixed(edges: Sides, air: int, faces: Faces) -> Mask:
+    """Points that stay where they are: where a face turns by more than a tenth or ends, and ends of other edges."""
+    drawn = faces.mesh.points_m
+    found = np.zeros(len(drawn), bool)
+    found[[k for run, sides in edges.items() if air not in sides or OUTSIDE in sides for k in run]] = True
+    after = dict(faces.halves.tolist())
+    before = {b: a for a, b in after.items()}
+    found[list(set(after) ^ set(before))] = True
+    both = np.array([(before[k], k, after[k]) for k in after if k in before], int).reshape(-1, 3)
+    u, v = drawn[both[:, 1]] - drawn[both[:, 0]], drawn[both[:, 2]] - drawn[both[:, 1]]
+    found[both[:, 1]] |= abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) > _CORNER * np.hypot(*u.T) * np.hypot(*v.T)
+    return found
+
+
+def _joined(border: _Air, fixed: Mask) -> tuple[Whole, Mask]:
+    """Which point stands for each, where two that touch are near each other, and which touch at all."""
+    instead, touched = np.arange(len(border.places)), np.zeros(len(border.places), bool)
+    share, ahead = border.seen(instead)
+    touches = border.near(ahead, _CLOSED)
+    touched[border.points[(touches & (share >= 0) & (share <= 1)).any(axis=1)]] = True
+    row, run = np.nonzero(touches & (share > -_PAST) & (share < 1 + _PAST))
+    pairs = np.column_stack([border.points[row], border.runs[run, (share[row, run] > 0.5).astype(int)]])
+    apart = np.hypot(*(border.places[pairs[:, 1]] - border.places[pairs[:, 0]]).T)
+    one = np.flatnonzero(apart < _ONE * border.scale[row, run])
+    used: set[int] = set()
+    for pair in pairs[one[np.argsort(apart[one], kind="stable")]].tolist():
+        if used.isdisjoint(pair):
+            used.update(pair)
+            kept, gone = sorted(pair, key=lambda p: (not fixed[p], p))
+            instead[gone] = kept
+            touched[pair] = True
+    return instead, touched
+
+
+def _ways(border: _Air, instead: Whole, touched: Mask) -> list[list[int]]:
+    """Of each run, over the points that touch it; those that touch a mirror are put onto it."""
+    share, ahead = border.seen(instead)
+    limit = np.where(touched[border.runs].all(axis=1) & ~border.mirror, _BETWEEN, _CLOSED)
+    near = border.near(ahead, limit) & (share > 0) & (share < 1)
+    found = []
+    for k, (a, b) in enumerate(instead[border.runs].tolist()):
+        inside = np.flatnonzero(near[:, k])
+        over = instead[border.points[inside[np.argsort(share[inside, k], kind="stable")]]].tolist()
+        if border.mirror[k]:
+            border.places[over, 0] = border.places[a, 0]
+        found.append([a, *(p for p in over if p not in (a, b)), b])
+    return found

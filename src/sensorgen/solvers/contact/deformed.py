@@ -1,0 +1,83 @@
+"""The outlines of a pressed cell: sides bent as they are, faces that touch closed, what is left between them is air."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.units import M_PER_MM
+from sensorgen.solvers.contact.cell import AIR, OUTSIDE, Cell
+from sensorgen.solvers.contact.closing import Sides, closed
+from sensorgen.solvers.contact.contact import Faces
+from sensorgen.solvers.contact.mesh import Mesh, at_border
+
+Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+_ROUND = [0, 3, 1, 4, 2, 5]  # the nodes of a triangle, in turn
+
+
+def deformed(cell: Cell, mesh: Mesh, faces: Faces, u_m: Real) -> Cell:
+    """The cell at given displacements (2n) [m]; the sides of gaps become two straight pieces each."""
+    places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
+    found = _edges(cell, mesh)
+    if u_m.any():
+        found = closed(found, _air(cell), places, faces)
+    edges = {}
+    for (a, b), sides in found.items():
+        p, q = (tuple(np.round(places[k], 9).tolist()) for k in (a, b))
+        if sides[0] != sides[1] and p != q:
+            edges[(p, q) if p < q else (q, p)] = sides if p < q else sides[::-1]
+    return replace(cell, edges=edges, right_mm=float(np.round(places[mesh.points_m[:, 0].argmax(), 0], 9)))
+
+
+def misfit(cell: Cell, mesh: Mesh, u_m: Real) -> float:
+    """Largest change of a solid's area by what was closed, over that area [-]; ``cell`` has the closed outlines."""
+    places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
+    kept = np.bincount(mesh.region, _areas(places[mesh.triangles[:, _ROUND]]), len(cell.regions) + 1)
+    found = np.zeros(len(kept))
+    for (a, b), sides in cell.edges.items():
+        half = (a[0] * b[1] - a[1] * b[0]) / 2
+        found[sides[0]] += half
+        found[sides[1]] -= half
+    solid = kept > 0
+    return float(np.abs(found[solid] / kept[solid] - 1).max())
+
+
+def _areas(corners: Real) -> Real:
+    """Of polygons (m, n, 2)."""
+    ahead = np.roll(corners, -1, axis=1)
+    return np.asarray((corners[..., 0] * ahead[..., 1] - corners[..., 1] * ahead[..., 0]).sum(axis=1) / 2)
+
+
+def _air(cell: Cell) -> int:
+    return next((k + 1 for k, region in enumerate(cell.regions) if region.material == AIR), OUTSIDE)
+
+
+def _edges(cell: Cell, mesh: Mesh) -> Sides:
+    """Sides between different regions: (node, node) to the regions on their left and right; halved but at walls."""
+    found: Sides = {}
+    air, walls = _air(cell), _walls(mesh)
+    for k in range(3):
+        for (a, m, b), region in zip(
+            mesh.triangles[:, [k, k + 3, (k + 1) % 3]].tolist(), mesh.region.tolist(), strict=True
+        ):
+            for p, q in ((a, b),) if m in walls else ((a, m), (m, b)):
+                if (q, p) in found:
+                    found[q, p] = (found[q, p][0], region)
+                else:
+                    found[p, q] = (region, OUTSIDE)
+    for a, b, m in mesh.rim[~at_border(mesh)].tolist():
+        for run in ((a, m), (m, b)):
+            found[run] = (found[run][0], air)
+    nodes = {tuple(np.round(p / M_PER_MM, 9).tolist()): k for k, p in enumerate(mesh.points_m)}
+    for (p, q), sides in cell.edges.items():
+        if air != OUTSIDE and set(sides) == {air, OUTSIDE}:
+            found[nodes[p], nodes[q]] = sides
+    return {run: sides for run, sides in found.items() if sides[0] != sides[1]}
+
+
+def _walls(mesh: Mesh) -> set[int]:
+    """Middles of the sides on the left and right end of the cell."""
+    x, middles = mesh.points_m[:, 0], mesh.rim[:, 2]
+    return set(middles[np.isin(x[middles], (x.min(), x.max()))].tolist())

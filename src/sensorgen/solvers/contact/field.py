@@ -1,0 +1,196 @@
+"""Capacitance of a cell's outlines, by triangles of second order, from both sides.
+
+Any potential that is right on the electrodes bounds it from above (Dirichlet); any flux without sources from below
+(Thomson). In the plane such a flux is the curl of a stream function, which turns the lower bound into the same problem
+with 1/eps, its values given on the sides of the cell in place of the electrodes.
+"""
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import OutOfRange
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.solvers.contact import rings
+from sensorgen.solvers.contact.cell import AIR, OUTSIDE, Cell, Edge
+from sensorgen.solvers.contact.mesh import Mesh, Net, Unmeshed, Whole, nearest, of_triangles, triangulated
+from sensorgen.solvers.contact.wedge import Wedge, filled, wedges
+
+Real = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Edges = Mapping[Edge, tuple[int, int]]
+
+_ROUNDING = 1e-9
+_SYMMETRIC: dict[str, Any] = {
+    "permc_spec": "MMD_AT_PLUS_A",
+    "diag_pivot_thresh": 0.0,
+    "options": {"SymmetricMode": True},
+    "relax": 1,  # columns one by one: so sparse a factor has no panels worth their room
+    "panel_size": 1,
+}
+_RINGS = 6
+_HOLE = 1e-6  # area that a mesh may miss, as a share
+_MIDS = np.array([[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])  # middles of the sides: exact to degree 2
+
+
+def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float, growth: float) -> Interval:
+    """Bounds of the capacitance per area of a cell [F/m2].
+
+    Parameters
+    ----------
+    cell : Cell
+        Its outlines, pressed or not; mirrored.
+    permittivity : mapping of str to float
+        Relative permittivity by material, with "air" [-].
+    coarse_mm, growth : float
+        Largest triangle [mm], and by how much triangles grow per distance [-].
+
+    Raises
+    ------
+    OutOfRange
+        The electrodes touch.
+    Unmeshed
+        The mesher gave up, left a hole, or the bounds are in the wrong order, which no sound mesh can do.
+    """
+    air = next((k + 1 for k, r in enumerate(cell.regions) if r.material == AIR), OUTSIDE)
+    mesh = _meshed(cell, air, coarse_mm, growth)
+    terminal = np.array([r.terminal for r in cell.regions])[mesh.region - 1]
+    ends = [_nodes(mesh, terminal == end) for end in ("bottom", "top")]
+    if (ends[0] & ends[1]).any():
+        raise OutOfRange("the electrodes touch: the capacitance grows without bound")
+    triangles, region = _between(mesh.triangles[terminal == ""], mesh.region[terminal == ""], ends)
+    eps = np.array([permittivity.get(r.material, np.nan) for r in cell.regions])[region - 1]
+    x = mesh.points_m[:, 0]
+    sides = [abs(x - end) < 1e-9 * (x.max() - x.min()) for end in (x.min(), x.max())]
+    width = float(x.max() - x.min())
+    upper = _energy(mesh.points_m, triangles, eps, *ends) / width
+    lower = 1 / (_energy(mesh.points_m, triangles, 1 / eps, *sides) * width)
+    if not lower <= upper * (1 + _ROUNDING):
+        raise Unmeshed(f"bounds in the wrong order, {lower} above {upper}")
+    return Interval(lower, upper).times(EPS0_F_PER_M)
+
+
+def _meshed(cell: Cell, air: int, coarse_mm: float, growth: float) -> Mesh:
+    """Mesh everything but the thin ends of the air, which are filled with triangles of their own; rings at corners."""
+    edges = cell.edges
+    cut, thin = dict(edges), wedges(edges, air) if air != OUTSIDE else []
+    for number, wedge in enumerate(thin, 1):
+        for p, q in (*pairwise(wedge.first), *pairwise(wedge.second[::-1])):
+            key, place = ((p, q), 0) if (p, q) in cut else ((q, p), 1)
+            cut[key] = (-number, cut[key][1]) if place == 0 else (cut[key][0], -number)
+        if wedge.first[-1] != wedge.second[-1]:
+            cut[wedge.first[-1], wedge.second[-1]] = (-number, air)
+    _refuse_outside(cell)
+    _refuse_crossings(np.array(list(edges)).reshape(-1, 2, 2))
+    net = triangulated(cut, coarse_mm, growth, quick=True)
+    new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
+    corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])
+    _refuse_holes(edges, net.points_m[corners])
+    region = np.concatenate([net.region, np.full(len(new), air)])
+    tips = [nearest(net.points_m, place) for place in rings.corners(edges, cell.left_mm, cell.right_mm)]
+    return of_triangles(*rings.ringed(net.points_m, corners, region, tips, _RINGS))
+
+
+def _refuse_outside(cell: Cell) -> None:
+    """Faces that fold through a wall of the cell, which is a mirror, run into their own image."""
+    places, room = [x for edge in cell.edges for x, _ in edge], _ROUNDING * cell.width_mm()
+    if min(places) < cell.left_mm - room or max(places) > cell.right_mm + room:
+        raise Unmeshed("the deformed outlines run through the mirrors")
+
+
+def _refuse_crossings(edges: Real) -> None:
+    """Edges (k, 2, 2) that cross each other would keep the mesher busy for ever, or end the process."""
+    a, b = edges[:, None, 0], edges[:, None, 1]
+    c, d = edges[None, :, 0], edges[None, :, 1]
+    apart = _side(a, b, c) * _side(a, b, d) < 0
+    if (apart & apart.T).any():
+        raise Unmeshed("the deformed outlines run into each other")
+
+
+def _side(a: Real, b: Real, p: Real) -> Real:
+    """On which side of the lines through a and b the points p lie: their sign."""
+    u, v = b - a, p - a
+    turn = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    size = np.abs(u[..., 0] * v[..., 1]) + np.abs(u[..., 1] * v[..., 0])
+    return np.asarray(np.where(np.abs(turn) > _ROUNDING * size, np.sign(turn), 0.0))
+
+
+def _refuse_holes(edges: Edges, corners: Real) -> None:
+    """Compare the area within the edges with that of the triangles (m, 3, 2), none of which may be turned over."""
+    area = sum(
+        0.5 * (a[0] * b[1] - a[1] * b[0]) * ((left > 0) - (right > 0)) for (a, b), (left, right) in edges.items()
+    )
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    parts = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / M_PER_MM**2
+    if parts.min() <= 0 or abs(parts.sum() / area - 1) > _HOLE:
+        raise Unmeshed("the mesh has holes or folds")
+
+
+def _filling(net: Net, number: int, wedge: Wedge) -> Iterator[tuple[int, int, int]]:
+    """Triangles for a wedge, whose sides the mesher may have cut."""
+    places = net.points_m.tolist()
+    beside: dict[int, list[int]] = {}
+    for a, b in net.marked[-number]:
+        beside.setdefault(a, []).append(b)
+        beside.setdefault(b, []).append(a)
+    tip, ahead = (nearest(net.points_m, p) for p in wedge.first[:2])
+    ring = [tip, min(beside[tip], key=lambda k: _turn(net.points_m, tip, k, ahead))]
+    while ring[-1] != tip:
+        ring.append(next(k for k in beside[ring[-1]] if k != ring[-2]))
+    yield from filled(ring[:-1], places)
+
+
+def _turn(points: Real, tip: int, a: int, b: int) -> float:
+    """How far two ways from a tip are from one way, as 1 - cos."""
+    u, v = points[a] - points[tip], points[b] - points[tip]
+    return float(1 - u @ v / np.sqrt((u @ u) * (v @ v)))
+
+
+def _nodes(mesh: Mesh, which: Mask) -> Mask:
+    found = np.zeros(len(mesh.points_m), bool)
+    found[mesh.triangles[which]] = True
+    return found
+
+
+def _between(triangles: Whole, region: Whole, ends: list[Mask]) -> tuple[Whole, Whole]:
+    """Triangles, with their region, of the pieces that touch both electrodes; others carry no field."""
+    n, middles = len(ends[0]), triangles[:, 3:]
+    beside = coo_matrix((np.ones(middles.size), (middles.ravel(), middles[:, [1, 2, 0]].ravel())), (n, n))
+    _, piece = connected_components(beside)
+    touched = [np.unique(piece[middles[end[middles].any(axis=1), 0]]) for end in ends]
+    inside = np.isin(piece[middles[:, 0]], np.intersect1d(touched[0], touched[1]))
+    return triangles[inside], region[inside]
+
+
+def _energy(points: Real, triangles: Whole, weight: Real, zero: Mask, one: Mask) -> float:
+    """Least of the integral of weight |grad v|^2 over functions that are 0 and 1 at given nodes [-]."""
+    n = len(points)
+    local = _stiffness(points, triangles) * weight[:, None, None]
+    rows, columns = np.repeat(triangles, 6, axis=1).ravel(), np.tile(triangles, (1, 6)).ravel()
+    matrix = coo_matrix((local.ravel(), (rows, columns)), (n, n)).tocsr()
+    used = np.zeros(n, bool)
+    used[triangles] = True
+    v = one.astype(float)
+    free = used & ~zero & ~one
+    inner = matrix[free][:, free].tocsc()
+    solver = splu(inner, **_SYMMETRIC)
+    v[free] = solver.solve(-(matrix @ v)[free])
+    return float(v @ (matrix @ v))
+
+
+def _stiffness(points: Real, triangles: Whole) -> Real:
+    """Integrals of grad . grad of the six functions of each triangle (m, 6, 6)."""
+    from sensorgen.solvers.contact.element import gradients
+
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    jacobian = np.stack([b - a, c - a], axis=2)
+    g = np.einsum("qnk,mki->mqni", gradients(*_MIDS.T)[:, :6], np.linalg.inv(jacobian))
+    g = g.transpose(0, 2, 1, 3).reshape(len(triangles), 6, 6)
+    return np.asarray(np.matmul(g, g.transpose(0, 2, 1)) * (np.linalg.det(jacobian) / 6)[:, None, None])

@@ -1,0 +1,207 @@
+"""Triangles of six nodes in a cell's solid parts, fine at notches and where two of them meet in one point."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.errors import BadInput, NotInstalled
+from sensorgen.core.units import M_PER_MM
+from sensorgen.scene.scene import Point
+from sensorgen.solvers.contact import rings
+from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Edge
+
+Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
+Run = tuple[int, int]
+
+_SAME = 1e-9  # of the cell's size: places nearer than this are one
+_LEAST_APEX_MM = 1e-3
+_RINGS = 4  # around a notch
+_SIDES = ((0, 1), (1, 2), (2, 0))
+
+
+class Unmeshed(BadInput):
+    """No sound mesh of these outlines was found."""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A mesh of straight-sided triangles with six nodes.
+
+    Attributes
+    ----------
+    points_m : (n, 2) array
+        Places of the nodes [m].
+    triangles : (m, 6) array
+        Corners counter-clockwise, then the middles of the sides 01, 12, 20.
+    region : (m,) array
+        Region of each triangle, from 1 on.
+    rim : (k, 3) array
+        Sides with nothing behind them: the solid lies to the left from the first to the second corner; then the middle.
+    """
+
+    points_m: Real
+    triangles: Whole
+    region: Whole
+    rim: Whole
+
+    def lengths_m(self) -> Real:
+        """Length of each side of the rim [m]."""
+        ends = self.points_m[self.rim[:, 1]] - self.points_m[self.rim[:, 0]]
+        return np.asarray(np.hypot(*ends.T))
+
+
+@dataclass(frozen=True)
+class Net:
+    """What the mesher gives: places [m], corners and regions of triangles, and sides along negative regions."""
+
+    points_m: Real
+    corners: Whole
+    region: Whole
+    marked: Mapping[int, list[Run]]
+
+
+def of_triangles(points_m: Real, corners: Whole, region: Whole) -> Mesh:
+    """A mesh with middles on the sides of given triangles, which are counter-clockwise."""
+    sides = np.concatenate([corners[:, side] for side in _SIDES])
+    unique, back, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
+    back = back.reshape(-1)
+    middles = points_m[unique].mean(axis=1)
+    numbers = len(points_m) + back
+    rim = np.column_stack([sides, numbers])[count[back] == 1]
+    triangles = np.concatenate([corners, numbers.reshape(3, -1).T], axis=1)
+    return Mesh(np.concatenate([points_m, middles]), triangles, region, rim)
+
+
+def at_border(mesh: Mesh) -> NDArray[np.bool_]:
+    """Which sides of the rim lie on the straight border of the cell, and not within it."""
+    a, b = (mesh.points_m[mesh.rim[:, k]] for k in range(2))
+    ends = np.array([mesh.points_m.min(axis=0), mesh.points_m.max(axis=0)])
+    near = _SAME * (ends[1] - ends[0]).max()
+    return np.asarray(((abs(a - ends[:, None]) < near) & (abs(b - ends[:, None]) < near)).any(axis=(0, 2)))
+
+
+def pinches(cell: Cell) -> set[Point]:
+    """Points in which solids touch and nothing more: four edges of solids meet there, mirrors among them."""
+    seen: dict[Point, int] = {}
+    for edge, sides in cell.edges.items():
+        if cell.solid(sides[0]) != cell.solid(sides[1]):
+            for point in edge:
+                seen[point] = seen.get(point, 0) + 1
+    return {point for point, edges in seen.items() if edges >= 4}
+
+
+def netgen() -> type:
+    """The 2D mesher; raises NotInstalled where it is not installed."""
+    try:
+        from netgen.geom2d import SplineGeometry
+    except ImportError:
+        raise NotInstalled("meshes need NGSolve: pip install 'sensorgen[fem]'") from None
+    found: type = SplineGeometry
+    return found
+
+
+@dataclass(frozen=True)
+class Fineness:
+    """Sizes of triangles: where solids meet in one point, at the other ends of gaps, and far from both [mm].
+
+    ``growth`` is by how much the size grows per distance [-].
+    """
+
+    apex_mm: float = 1e-3
+    corner_mm: float = 0.05
+    coarse_mm: float = 0.15
+    growth: float = 0.5
+
+    def scaled(self, factor: float) -> "Fineness":
+        """Every length and the growth times a factor; but triangles of less than 1 um at an apex fold sooner."""
+        apex = max(factor * self.apex_mm, min(self.apex_mm, _LEAST_APEX_MM))
+        return Fineness(apex, *(factor * value for value in (self.corner_mm, self.coarse_mm, self.growth)))
+
+    def finer(self) -> "Fineness":
+        """The next level."""
+        return self.scaled(1 / 2)
+
+
+def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
+    """Mesh the solid parts of a cell.
+
+    The edges are cut here, because a mesher that smooths its sizes forgets the small ones at an apex.
+    """
+    sharp = pinches(cell)
+    faces = [
+        e for e, sides in cell.edges.items() if OUTSIDE not in sides and cell.solid(sides[0]) != cell.solid(sides[1])
+    ]
+    exposed = {p for edge in faces for p in edge}
+    sizes = dict.fromkeys(exposed, fineness.corner_mm) | dict.fromkeys(sharp, fineness.apex_mm)
+    pieces: dict[Edge, tuple[int, int]] = {}
+    for (a, b), sides in cell.edges.items():
+        ends = [sizes.get(p, fineness.coarse_mm) for p in (a, b)]
+        shares = cuts(float(np.hypot(b[0] - a[0], b[1] - a[1])), ends[0], ends[1], fineness)
+        places = [a, *((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])) for t in shares), b]
+        open_sides = (sides[0] * cell.solid(sides[0]), sides[1] * cell.solid(sides[1]))
+        if open_sides != (OUTSIDE, OUTSIDE):
+            pieces |= dict.fromkeys(pairwise(places), open_sides)
+    net = triangulated(pieces, fineness.coarse_mm, fineness.growth)
+    tips = [nearest(net.points_m, place) for place in rings.notches(cell)]
+    return of_triangles(*rings.ringed(net.points_m, net.corners, net.region, tips, _RINGS))
+
+
+def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth: float, *, quick: bool = False) -> Net:
+    """Mesh what edges with a region to their left and right enclose; regions from 0 down are left open.
+
+    ``quick`` triangles are Delaunay's, bettered once: for potentials as good as those of a front that runs inwards.
+    """
+    geometry = netgen()()
+    numbers: dict[Point, int] = {}
+    for (a, b), (left, right) in edges.items():
+        for p in (a, b):
+            if p not in numbers:
+                numbers[p] = geometry.AppendPoint(*p)
+        domains = {"leftdomain": max(left, 0), "rightdomain": max(right, 0)}
+        geometry.Append(["line", numbers[a], numbers[b]], **domains)
+    try:
+        made = geometry.GenerateMesh(maxh=coarse_mm, grading=growth, optsteps2d=1 if quick else 3, delaunay2d=quick)
+    except Exception as error:  # the mesher's own kind of exception, known only where it is installed
+        raise Unmeshed(f"these outlines cannot be meshed ({error}): do bodies overlap, or leave slivers?") from None
+    elements, sides = made.Elements2D().NumPy(), made.Elements1D().NumPy()
+    points = np.asarray(made.Coordinates(), float)[:, :2] * M_PER_MM
+    behind = [min(pair) for pair in edges.values()]
+    marked: dict[int, list[Run]] = {}
+    for (a, b), number in zip((sides["nodes"][:, :2] - 1).tolist(), sides["index"].tolist(), strict=True):
+        if behind[number - 1] < 0:
+            marked.setdefault(behind[number - 1], []).append((a, b))
+    corners = elements["nodes"][:, :3].astype(np.int64) - 1
+    return Net(points, corners, elements["index"].astype(np.int64), marked)
+
+
+def nearest(points_m: Real, place_mm: Point) -> int:
+    """The point that is nearest to a place."""
+    return int(np.hypot(*(points_m - np.array(place_mm) * M_PER_MM).T).argmin())
+
+
+def cuts(length_mm: float, first_mm: float, last_mm: float, fineness: Fineness) -> list[float]:
+    """Where to cut an edge so that its pieces grow from both ends, as shares of its length.
+
+    >>> [round(t, 3) for t in cuts(1.0, 0.1, 0.1, Fineness(coarse_mm=0.3, growth=1.0))]
+    [0.186, 0.5, 0.814]
+    """
+    half = length_mm / 2
+    ahead, behind = (_grown(half, size, fineness) / length_mm for size in (first_mm, last_mm))
+    found = [*ahead[:-1], 0.5, *(1 - behind[-2::-1])] if len(ahead) + len(behind) > 2 else []
+    return [float(t) for t in found]
+
+
+def _grown(reach: float, size: float, fineness: Fineness) -> Real:
+    """Ends of pieces that begin with ``size`` and grow up to the coarse size, the last at ``reach`` [mm]."""
+    growth = fineness.growth
+    size = min(size, fineness.coarse_mm)
+    bend = (fineness.coarse_mm - size) / growth  # from here on all are coarse
+    turns = np.log(fineness.coarse_mm / size) / growth
+    whole = np.log1p(growth * reach / size) / growth if reach < bend else turns + (reach - bend) / fineness.coarse_mm
+    t = whole * np.arange(1, max(1, round(whole)) + 1) / max(1, round(whole))
+    grown = np.where(t < turns, size / growth * np.expm1(growth * t), bend + (t - turns) * fineness.coarse_mm)
+    return np.asarray(grown)

@@ -1,0 +1,102 @@
+"""How a cell is held and loaded: which displacements are fixed or equal, and the pressure on its top."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.solvers.contact.mesh import Mesh
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+Real = NDArray[np.float64]
+
+_SAME = 1e-9  # of the cell's width: places nearer than this are one
+
+
+@dataclass(frozen=True)
+class Held:
+    """Choices of the boundary.
+
+    Attributes
+    ----------
+    base : str
+        "bonded", or "sliding" without friction.
+    period : str
+        "fixed", or "free" to widen until nothing pulls sideways.
+    top : str
+        "even" pressure, or a "rigid" plate without friction.
+    contact : str
+        "frictionless", or "stick" once touched.
+    """
+
+    base: str = "bonded"
+    period: str = "fixed"
+    top: str = "even"
+    contact: str = "frictionless"
+
+
+CHOICES = {
+    "base": ("bonded", "sliding"),
+    "period": ("fixed", "free"),
+    "top": ("even", "rigid"),
+    "contact": ("frictionless", "stick"),
+}
+
+
+def free_of(
+    points_m: Real, held: Held, spans_m: Real | None = None, used: NDArray[np.bool_] | None = None
+) -> "csr_matrix":
+    """Displacements (x, y of each node, or x, y, z) from the free ones, as a sparse matrix of ones.
+
+    Parameters
+    ----------
+    points_m : (n, d) array
+        Places of the nodes, the height last; all sides of the cell are mirrors [m].
+    held : Held
+        Choices of the boundary.
+    spans_m : (d, 2) array, optional
+        Where the cell begins and ends; as far as its nodes reach where not given [m].
+    used : (n,) array, optional
+        Nodes that elements share; others do not move. All where not given.
+    """
+    from scipy.sparse import csr_matrix
+
+    nodes, d = points_m.shape
+    spans = np.column_stack([points_m.min(axis=0), points_m.max(axis=0)]) if spans_m is None else spans_m
+    near = _SAME * np.ptp(spans[0])
+    ends = [[np.flatnonzero(abs(x - end) < near) for end in span] for x, span in zip(points_m.T, spans, strict=True)]
+    wide = d * nodes + np.arange(d - 1)  # these numbers stand for how the cell widens
+    leader = np.arange(d * nodes + d - 1)
+    fixed = np.zeros(len(leader), bool)
+    for axis, (start, stop) in enumerate(ends[:-1]):
+        fixed[d * start + axis] = True
+        leader[d * stop + axis] = wide[axis]
+    floor, roof = ends[-1]
+    fixed[d * floor + d - 1] = True
+    for axis in range(d - 1):
+        fixed[d * floor + axis] |= held.base == "bonded"
+    fixed[wide] = held.period == "fixed" or held.base == "bonded"
+    if used is not None:
+        fixed[: d * nodes] |= ~np.repeat(used, d)
+    if held.top == "rigid":
+        leader[d * roof + d - 1] = d * roof[0] + d - 1
+    while (leader[leader] != leader).any():
+        leader = leader[leader]
+    held_too = np.zeros(len(leader), bool)
+    held_too[leader[fixed]] = True
+    number = np.where(held_too[leader], -1, leader)[: d * nodes]
+    kept, column = np.unique(number[number >= 0], return_inverse=True)
+    return csr_matrix((np.ones(len(column)), (np.flatnonzero(number >= 0), column)), (d * nodes, len(kept)))
+
+
+def top_load(mesh: Mesh) -> Real:
+    """Forces of a unit pressure on the top, downwards, in its first direction and area [m]."""
+    top = mesh.points_m[:, 1].max()
+    on_top = (mesh.points_m[mesh.rim, 1] == top).all(axis=1)
+    force = np.zeros(2 * len(mesh.points_m))
+    for node, share in zip(mesh.rim[on_top].T, (1 / 6, 1 / 6, 2 / 3), strict=True):
+        np.add.at(force, 2 * node + 1, -share * mesh.lengths_m()[on_top])
+    return force

@@ -1,0 +1,96 @@
+r"""Both bounds of a capacitance: potentials from above, fluxes from below.
+
+Dirichlet: any continuous u, 0 and 1 V on the electrodes, has :math:`C \le \int \varepsilon |\nabla u|^2`.
+Thomson: any D of continuous normal component, without sources, tangential at the mirrors, has
+:math:`C \ge 2 Q(D) - \int |D|^2 / \varepsilon`, Q its flux into the electrode at 1 V.
+Both are stationary at their best field: what a solver leaves unsolved enters squared, and to the safe side.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import OutOfRange, SensorgenError
+from sensorgen.scene.scene import Scene
+
+
+class CrossedBounds(SensorgenError):
+    """A lower bound above its upper one: a fault of the solver, and no result."""
+
+
+class Unsolved(SensorgenError):
+    """A mesh so slender that doubles do not solve it."""
+
+
+ROUNDING = 1e-9  # relative: what edges nearer than a nanometre's thousandth lose; both bounds are moved outwards by it
+
+
+@dataclass(frozen=True)
+class Energies:
+    """What one mesh and order give, each over eps0: [mm], or per depth in two dimensions [-].
+
+    Attributes
+    ----------
+    lower, upper : float
+        By Thomson's and by Dirichlet's principle.
+    part : float
+        Of ``upper``: the energy weighted with how often each region occurs beyond the least.
+    unknowns : int
+        That the larger of the two systems couples.
+    rounding : float
+        Share by which doubles may be off, where it was estimated; an answer allows for ``ROUNDING`` at least [-].
+    """
+
+    lower: float
+    upper: float
+    part: float
+    unknowns: int
+    rounding: float = 0.0
+
+
+def third_electrode(scene: Scene) -> str | None:
+    """Why bounds between two terminals cannot speak of a scene of more, or None."""
+    if {body.terminal for body in scene.bodies} - {"", "top", "bottom"}:
+        return "more than two electrodes: sensorgen stack speaks of them"
+    return None
+
+
+def check(permittivity: Mapping[str, complex], width: float) -> None:
+    """Refuse permittivities and accuracies that mean nothing."""
+    for material, value in permittivity.items():
+        if not (np.isfinite(value) and np.real(value) > 0):
+            raise OutOfRange(f"relative permittivity of {material} is {value:g}; expected a number above 0")
+    if not width > 0:
+        raise OutOfRange(f"accuracy is {width:g}; expected a number above 0, as 1e-4")
+
+
+def whole(found: Energies, shares: Sequence[float]) -> Interval:
+    r"""All cells of the sensor from one, and the cut ones at its ends from the energy in their part of it.
+
+    With weights w up to W on parts of the cell, the energy norm of the exact field differs from the computed one by at
+    most :math:`\sqrt{W (C_{upper} - C_{lower})}`, since its error over the whole cell is
+    :math:`\|u_h - u\|^2 = C_{upper} - C`.
+
+    Raises
+    ------
+    CrossedBounds
+        The lower bound lies above the upper one by more than rounding.
+    Unsolved
+        The lower bound is not above 0.
+    """
+    below, above, rounding = found.lower, found.upper, max(found.rounding, ROUNDING)
+    if not (below > 0 and np.isfinite(above)):
+        raise Unsolved(f"doubles do not solve this scene: its lower bound is {below:.3g}, its upper one {above:.3g}")
+    if below > above * (1 + rounding):
+        raise CrossedBounds(
+            f"lower bound {below:.12g} above upper bound {above:.12g}: the solver failed on this scene; report it, "
+            "and use --model columns meanwhile"
+        )
+    least, most = min(shares), max(shares)
+    apart = above - below + found.rounding * (above + below)
+    part, off = np.sqrt(found.part), np.sqrt((most - least) * max(apart, 0.0))
+    lower = least * below + max(part - off, 0.0) ** 2
+    upper = least * above + (part + off) ** 2
+    return Interval(float(min(lower, upper) * (1 - rounding)), float(upper * (1 + rounding)))

@@ -1,0 +1,207 @@
+"""A scene of boxes as a grid of bricks: its repeating cell, and layers that shrink towards every edge."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.scene.scene import Scene
+from sensorgen.scene.unit_cell import Band, Cell, Slice, mirrored
+from sensorgen.solvers.electrostatics.corners import exponent
+
+RATIO = 0.15  # of a layer's distance from an edge to the next layer's
+_ROUNDING_MM = 1e-9
+_INFINITE = 1 - 1e-6  # exponents of the potential below this: the field is infinite
+
+Ints = NDArray[np.int_]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Boxes between planes square to the axes.
+
+    Attributes
+    ----------
+    planes_mm : three arrays
+        Where the planes lie on x, y and z [mm].
+    fill : (i, j, k) array
+        What is in each box: an index into ``names``.
+    names : list of str
+        Materials; "@bottom" and "@top" first.
+    shares : (i, j) array
+        How often each place of the cell, or a mirror image, occurs in the sensor [-].
+    """
+
+    planes_mm: tuple[NDArray[np.float64], ...]
+    fill: Ints
+    names: list[str]
+    shares: NDArray[np.float64]
+
+
+def grid(scene: Scene) -> Grid:
+    """The repeating cell of a scene of boxes, between its mirrors.
+
+    Raises
+    ------
+    ValueError
+        A prism is no box, bodies overlap, the electrodes touch, or one does not cover the sensor.
+    """
+    planes, fill, names = _raster(scene)
+    across, along = (mirrored(_slices(planes[axis], np.moveaxis(fill, axis, 0))) for axis in (0, 1))
+    at = [_taken(cell, planes[axis]) for axis, cell in ((0, across), (1, along))]
+    shares = np.outer(*(_shares(cell) for cell in (across, along)))
+    cut = Grid((_edges(across), _edges(along), planes[2]), fill[np.ix_(at[0], at[1])], names, shares)
+    _refuse_contact(cut.fill)
+    return _between(cut)
+
+
+def _raster(scene: Scene) -> tuple[tuple[NDArray[np.float64], ...], Ints, list[str]]:
+    prisms = [(body, p) for body in scene.bodies for p in body.prisms]
+    if not all(p.is_box() for _, p in prisms):
+        raise ValueError("not all of it is boxes")
+    ends = [
+        {0.0, size} | {x for _, p in prisms for x in p.span(axis)}
+        for axis, size in zip("xyz", scene.size_mm, strict=True)
+    ]
+    planes = tuple(_distinct(np.array(sorted(e))) for e in ends)
+    names = ["@bottom", "@top", *sorted({b.material for b in scene.bodies if not b.terminal} | {"air"})]
+    fill = np.full([len(p) - 1 for p in planes], -1)
+    for body, prism in prisms:
+        here = tuple(
+            slice(*np.searchsorted(p, np.array(prism.span(a)) - _ROUNDING_MM))
+            for a, p in zip("xyz", planes, strict=True)
+        )
+        if (fill[here] >= 0).any():
+            raise ValueError(f"{body.name} overlaps its neighbour")
+        fill[here] = names.index(f"@{body.terminal}" if body.terminal else body.material)
+    fill[fill < 0] = names.index("air")
+    return planes, fill, names
+
+
+def _distinct(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    found: NDArray[np.float64] = values[np.concatenate([[True], np.diff(values) > _ROUNDING_MM])]
+    return found
+
+
+def _slices(planes: NDArray[np.float64], fill: Ints) -> list[Slice]:
+    """What a walk along one axis meets: one level band, named by all that stands on this place."""
+    looks: dict[bytes, str] = {}
+    names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in fill]
+    ends = pairwise(planes.tolist())
+    return [Slice(a, b, (Band(n, "", (0.0, 0.0), (1.0, 1.0)),)) for (a, b), n in zip(ends, names, strict=True)]
+
+
+def _edges(cell: Cell) -> NDArray[np.float64]:
+    return np.array([cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)])
+
+
+def _shares(cell: Cell) -> NDArray[np.float64]:
+    return np.array(cell.shares)
+
+
+def _taken(cell: Cell, planes: NDArray[np.float64]) -> Ints:
+    """In which layer of the whole scene each slice of the cell lies."""
+    middles = [(s.left_mm + s.right_mm) / 2 for s in cell.slices]
+    return np.searchsorted(planes, middles) - 1
+
+
+def _refuse_contact(fill: Ints) -> None:
+    """Refuse electrodes that share a face, an edge or a corner."""
+    corners = []
+    for terminal in (0, 1):
+        full = np.pad(fill == terminal, 1)
+        for axis in range(3):
+            full = full | np.roll(full, 1, axis)
+        corners.append(full)
+    if (corners[0] & corners[1]).any():
+        raise ValueError("the electrodes touch: the capacitance grows without bound")
+
+
+def _between(cut: Grid) -> Grid:
+    """The grid with every dielectric outside the field turned to conductor; refuses an open field."""
+    inside = _reached(cut.fill, 0) & _reached(cut.fill, 1)
+    if not inside.any():
+        raise ValueError("no dielectric lies between a top and a bottom electrode")
+    if inside[:, :, [0, -1]].any():
+        raise ValueError("an electrode does not cover the whole sensor")
+    used = np.unique(cut.fill[inside])
+    number = np.full(len(cut.names), -1)
+    number[[0, 1, *used]] = np.arange(len(used) + 2)
+    fill = np.where(inside, number[cut.fill], np.where(cut.fill > 1, -1, cut.fill))
+    return Grid(cut.planes_mm, fill, ["@bottom", "@top", *(cut.names[k] for k in used)], cut.shares)
+
+
+def _reached(fill: Ints, terminal: int) -> NDArray[np.bool_]:
+    """Dielectric boxes that a walk through dielectric reaches from one electrode."""
+    found = fill == terminal
+    allowed = found | (fill > 1)
+    while True:
+        grown = found.copy()
+        for axis in range(3):
+            ahead, back = (np.moveaxis(m, axis, 0) for m in (grown, found))
+            ahead[1:] |= back[:-1]
+            ahead[:-1] |= back[1:]
+        grown &= allowed
+        if (grown == found).all():
+            reached: NDArray[np.bool_] = found & (fill > 1)
+            return reached
+        found = grown
+
+
+def layered(coarse: Grid, values: Sequence[float], layers: int) -> Grid:
+    """Cut a grid into layers that shrink towards planes in which the field is infinite at some edge.
+
+    Parameters
+    ----------
+    coarse : Grid
+        A cell.
+    values : list of float
+        Relative permittivity of each name; its modulus where it is complex [-].
+    layers : int
+        How many times the distance from a plane shrinks where it holds an edge of an electrode; half as often where
+        dielectrics meet [-].
+    """
+    counts = [np.zeros(len(p), dtype=int) for p in coarse.planes_mm]
+    for axis in range(3):
+        first, second = (a for a in range(3) if a != axis)
+        boxes = np.moveaxis(coarse.fill, axis, 2)
+        around = np.stack([boxes[i : i - 1 or None, j : j - 1 or None] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))])
+        patterns, which = np.unique(around.reshape(4, -1), axis=1, return_inverse=True)
+        wanted = np.array([_wanted(p, values, layers) for p in patterns.T.tolist()])[which].reshape(around.shape[1:])
+        counts[first][1:-1] = np.maximum(counts[first][1:-1], wanted.max((1, 2), initial=0))
+        counts[second][1:-1] = np.maximum(counts[second][1:-1], wanted.max((0, 2), initial=0))
+    parts = [_graded(planes, count.tolist()) for planes, count in zip(coarse.planes_mm, counts, strict=True)]
+    owners = [owner for _, owner in parts]
+    x, y, z = (planes for planes, _ in parts)
+    return Grid((x, y, z), coarse.fill[np.ix_(*owners)], coarse.names, coarse.shares[np.ix_(*owners[:2])])
+
+
+def _wanted(around: list[int], values: Sequence[float], layers: int) -> int:
+    """Layers that an edge asks for, by what fills the four boxes around it in turn."""
+    free = [code > 1 for code in around]
+    if not any(free):
+        return 0
+    if all(free):
+        fan = tuple((np.pi / 2, values[code]) for code in around)
+        return layers // 2 if exponent(fan, None) < _INFINITE else 0
+    starts = [k for k in range(4) if free[k] and not free[k - 1]]
+    for start in starts:
+        run = [around[(start + k) % 4] for k in range(next(k for k in range(1, 4) if not free[(start + k) % 4]))]
+        if exponent(tuple((np.pi / 2, values[code]) for code in run), (True, True)) < _INFINITE:
+            return layers
+    return 0
+
+
+def _graded(planes: NDArray[np.float64], layers: list[int]) -> tuple[NDArray[np.float64], Ints]:
+    """Planes with layers between them, and from which interval each layer comes."""
+    found, owners = [planes[0]], []
+    for k, (a, b) in enumerate(pairwise(planes.tolist())):
+        half = (b - a) / 2
+        left = a + half * RATIO ** np.arange(layers[k], 0, -1)
+        right = b - half * RATIO ** np.arange(1, layers[k + 1] + 1)
+        inner = [*left.tolist(), *right.tolist(), b]
+        found += inner
+        owners += [k] * len(inner)
+    return np.array(found), np.array(owners)

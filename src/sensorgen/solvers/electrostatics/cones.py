@@ -1,0 +1,180 @@
+"""Rings of triangles around a corner: in the plane energies have no scale, so that all rings are one.
+
+One ring joined to itself makes two, these four, and so on (cyclic reduction): a thousand rings take ten steps, and no
+radius is ever written down, be it 1e-300 of the cell's.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.solvers.electrostatics.fronts import Numbers, Whole, added, eliminated
+from sensorgen.solvers.electrostatics.polynomials import Real, numbered
+
+RATIO = 0.25  # of one ring's radius to the last; more lowers the error no further
+
+
+def ring_corners(tips: Real) -> Real:
+    """The two triangles (2 s, 3, 2) of each tip (s, 3, 2; at the origin, first, last) in the outermost ring."""
+    first, last = tips[:, 1], tips[:, 2]
+    both = [last, RATIO * last, first], [RATIO * last, RATIO * first, first]
+    return np.stack([np.stack(part, axis=1) for part in both], axis=1).reshape(-1, 3, 2)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Unknowns of one ring around a corner, by what they touch.
+
+    Attributes
+    ----------
+    free : array
+        Spokes that are not held. Their outer ends are the first unknowns.
+    rim : (s, 2) array
+        Spokes at the ends of each outer side, the lower first. Their modes are the next unknowns.
+    outer : int
+        m, how many unknowns these are.
+    held : bool
+        Whether the corner lies on a line of one value.
+    ring, ring_signs : (s, 2, 3 order) array
+        Unknowns of both triangles in each sector: 1 to m outer, m more inner, the held value if any, others; 0 is none.
+    tip, tip_signs : (s, 3 order) array
+        Of the innermost triangles: 1 to m outer, the held value if any, others.
+    """
+
+    free: Whole
+    rim: Whole
+    outer: int
+    held: bool
+    ring: Whole
+    ring_signs: Real
+    tip: Whole
+    tip_signs: Real
+
+    @classmethod
+    @cache
+    def of(cls, spokes: int, closed: bool, ends: tuple[bool, bool], order: int) -> "Layout":
+        """For so many spokes, of which the first and the last may be held."""
+        fixed = np.zeros(spokes, bool)
+        fixed[0], fixed[-1] = ends
+        a = np.arange(spokes if closed else spokes - 1)
+        b = (a + 1) % spokes
+        pairs = np.stack([b, b + spokes, a, b + spokes, a + spokes, a], axis=1).reshape(-1, 3)
+        ring, ring_signs = _arranged(pairs, spokes, 2, np.tile(fixed, 2), order)
+        tips = np.stack([np.full_like(a, spokes), a, b], axis=1)
+        tip, tip_signs = _arranged(tips, spokes, 1, np.append(fixed, fixed.any()), order)
+        rim = np.stack([np.minimum(a, b), np.maximum(a, b)], axis=1)
+        rim = rim[np.lexsort((rim[:, 1], rim[:, 0]))]
+        outer = int((~fixed).sum()) + len(a) * (order - 1)
+        shape = (len(a), 2, 3 * order)
+        free, held = np.flatnonzero(~fixed), bool(fixed.any())
+        return cls(free, rim, outer, held, ring.reshape(shape), ring_signs.reshape(shape), tip, tip_signs)
+
+
+def _arranged(corners: Whole, spokes: int, levels: int, fixed: NDArray[np.bool_], order: int) -> tuple[Whole, Real]:
+    """Unknowns of triangles, numbered from 1: by levels of so many points, then the held value, then all others."""
+    points, after = np.arange(len(fixed)), np.roll(corners, -1, axis=1)
+    ends = np.sort(np.stack([corners, after], axis=-1), axis=-1).reshape(-1, 2)
+    (low, high), side = np.unique(ends.T, axis=1, return_inverse=True)
+    vertex, first, level = np.zeros(len(fixed), np.int64), np.zeros(len(low), np.int64), np.full(len(low), levels)
+    level[low // spokes == high // spokes] = (low // spokes)[low // spokes == high // spokes]
+    is_spoke = (low % spokes == high % spokes) | (levels == 1)
+    level[fixed[low] & fixed[high] & is_spoke & (level == levels)] = -1
+    count = 1
+    for here in range(levels + 1):
+        if here == levels and fixed.any():
+            vertex[fixed], count = count, count + 1
+        own, sides = (np.minimum(points // spokes, levels) == here) & ~fixed, level == here
+        vertex[own] = count + np.arange(own.sum())
+        count += int(own.sum())
+        first[sides] = count + (order - 1) * np.arange(sides.sum())
+        count += (order - 1) * int(sides.sum())
+    return numbered(corners, vertex, first[side.reshape(corners.shape)], order)
+
+
+@dataclass(frozen=True)
+class Cone:
+    """All rings around a corner: an energy of what is on the outermost, and the way back inside.
+
+    Attributes
+    ----------
+    layout : Layout
+        Of its unknowns.
+    matrix : (m, m) or (m + 1, m + 1) array
+        Of the outermost unknowns, and of the held value if there is one.
+    in_ring, at_tip : array
+        Unknowns within a ring from those at its rims; of the innermost triangles from their outer ones.
+    between : list of array
+        Unknowns amid two rings, amid four, ... from those at their rims.
+    innermost : array
+        Unknowns at the innermost triangles' rim from what ``matrix`` takes.
+    """
+
+    layout: Layout
+    matrix: Numbers
+    in_ring: Numbers
+    between: list[Numbers]
+    innermost: Numbers
+    at_tip: Numbers
+
+    @classmethod
+    def of(cls, layout: Layout, rings: Numbers, tips: Numbers, doublings: int) -> "Cone":
+        """Of energies (s, 2, k, k) of one ring's triangles, and (s, k, k) of the innermost, 2 ** doublings rings."""
+        m, held = layout.outer, int(layout.held)
+        ring, in_ring = eliminated(_assembled(layout.ring, layout.ring_signs, rings), 2 * m + held)
+        tip, at_tip = eliminated(_assembled(layout.tip, layout.tip_signs, tips), m + held)
+        between = []
+        for _ in range(doublings):
+            ring, amid = _doubled(ring, m)
+            between.append(amid)
+        matrix, innermost = _closed(ring, tip, m)
+        return cls(layout, matrix, in_ring, between, innermost, at_tip)
+
+    def inside(self, values: Numbers) -> tuple[Numbers, Numbers]:
+        """Values in all rings' triangles (rings, s, 2, k) and in the innermost (s, k), from those ``matrix`` takes."""
+        m = self.layout.outer
+        held = values[m:]
+        rims = np.stack([values[:m], self.innermost @ values])
+        for amid in reversed(self.between):
+            finer = np.empty((2 * len(rims) - 1, m), rims.dtype)
+            finer[::2], finer[1::2] = rims, _pairs(rims, held) @ amid.T
+            rims = finer
+        pairs, last = _pairs(rims, held), np.concatenate([rims[-1], held])
+        rings = np.concatenate([np.zeros((len(pairs), 1)), pairs, pairs @ self.in_ring.T], axis=1)
+        tip = np.concatenate([[0.0], last, self.at_tip @ last])
+        layout = self.layout
+        return rings[:, layout.ring] * layout.ring_signs, tip[layout.tip] * layout.tip_signs
+
+
+def _pairs(rims: Numbers, held: Numbers) -> Numbers:
+    """Each rim beside the next, and the held value."""
+    return np.concatenate([rims[:-1], rims[1:], np.broadcast_to(held, (len(rims) - 1, len(held)))], axis=1)
+
+
+def _assembled(ids: Whole, signs: Real, matrices: Numbers) -> Numbers:
+    """Sum of the triangles' energies; unknown 0 is none."""
+    signed = signs[..., :, None] * matrices * signs[..., None, :]
+    return added(int(ids.max()) + 1, [(ids, signed)])[1:, 1:]
+
+
+def _doubled(ring: Numbers, m: int) -> tuple[Numbers, Numbers]:
+    """Two rings as one, without the unknowns amid them, and the matrix that gives those."""
+    outer, inner, held = slice(m), slice(m, 2 * m), slice(2 * m, None)
+    mixed = np.concatenate([ring[inner, outer], ring[outer, inner], ring[inner, held] + ring[outer, held]], axis=1)
+    amid = -np.linalg.solve(ring[inner, inner] + ring[outer, outer], mixed)
+    apart = ring.copy()
+    apart[outer, inner] = apart[inner, outer] = 0.0
+    apart[held, held] *= 2
+    return apart + mixed.T @ amid, amid
+
+
+def _closed(ring: Numbers, tip: Numbers, m: int) -> tuple[Numbers, Numbers]:
+    """A ring around the innermost triangles, without the unknowns amid them, and the matrix that gives those."""
+    inner, kept = slice(m, 2 * m), np.r_[:m, 2 * m : len(ring)]
+    mixed = ring[inner][:, kept]
+    mixed[:, m:] += tip[:m, m:]
+    amid = -np.linalg.solve(ring[inner, inner] + tip[:m, :m], mixed)
+    both = ring[kept[:, None], kept]
+    both[m:, m:] += tip[m:, m:]
+    return both + mixed.T @ amid, amid

@@ -1,0 +1,112 @@
+"""How singular the field is at each corner: u grows as r^lambda, and lambda below 1 means an infinite field."""
+
+from collections.abc import Iterable, Mapping
+from functools import cache, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.solvers.electrostatics.fans import Fan, fans
+from sensorgen.solvers.electrostatics.triangles import Triangles
+
+_DEGREE = 8  # of the polynomials in a sector
+_WIDEST = np.pi / 3  # of a sector
+_NO_FIELD = 1e-9  # lambda^2 of a constant
+_SMOOTH = 1e-6  # how near to a whole number lambda counts as one
+_HIGHEST = 3.5  # lambda above which polynomials serve without refinement
+
+
+def exponents(mesh: Triangles, permittivity: Mapping[str, float]) -> dict[int, float]:
+    r"""Lowest exponent that is no whole number, for each corner that has one below 3.5.
+
+    Around a corner u = r^lambda w(theta), :math:`(\varepsilon w')' + \lambda^2 \varepsilon w = 0`, w = 0 on electrodes,
+    w' = 0 on mirrors: an eigenvalue problem in one dimension, solved with polynomials per sector.
+
+    Parameters
+    ----------
+    mesh : Triangles
+        The cell's few triangles; one fan at each corner.
+    permittivity : dict of str to float
+        Relative, of each material; its modulus where it is complex [-].
+
+    Returns
+    -------
+    dict of int to float
+        Corner's number to lambda [-].
+    """
+    found: dict[int, float] = {}
+    for corner, (fan,) in fans(mesh.triangles).items():
+        ends = None if fan.closed else tuple(_on_terminal(mesh, corner, fan.spokes[k]) for k in (0, -1))
+        value = exponent(_sectors(mesh, corner, fan, permittivity), ends)
+        if value < _HIGHEST:
+            found[corner] = value
+    return found
+
+
+_Sectors = tuple[tuple[float, float], ...]
+
+
+def _sectors(mesh: Triangles, corner: int, fan: Fan, permittivity: Mapping[str, float]) -> _Sectors:
+    """Angle and permittivity of the triangles around a corner, in turn."""
+    away = mesh.points[[*fan.spokes, *fan.spokes[:1]]] - mesh.points[corner]
+    angles = np.arctan2(
+        away[:-1, 0] * away[1:, 1] - away[:-1, 1] * away[1:, 0], (away[:-1] * away[1:]).sum(axis=1)
+    ).tolist()
+    return _merged((angle, permittivity[mesh.regions[n][0]]) for angle, n in zip(angles, fan.members, strict=False))
+
+
+def _on_terminal(mesh: Triangles, a: int, b: int) -> bool:
+    return (min(a, b), max(a, b)) in mesh.terminals
+
+
+def _merged(sectors: Iterable[tuple[float, float]]) -> _Sectors:
+    found: list[tuple[float, float]] = []
+    for angle, eps in sectors:
+        if found and found[-1][1] == eps:
+            angle += found.pop()[0]
+        found.append((round(angle, 12), eps))
+    return tuple(found)
+
+
+@cache
+def _reference() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Stiffness and mass of polynomials on 0..1, given by their values at Chebyshev's points."""
+    nodes = (1 - np.cos(np.pi * np.arange(_DEGREE + 1) / _DEGREE)) / 2
+    at, weight = np.polynomial.legendre.leggauss(_DEGREE + 1)
+    at, weight = (at + 1) / 2, weight / 2
+    powers = np.linalg.inv(np.vander(nodes, increasing=True))
+    value = np.vander(at, _DEGREE + 1, increasing=True) @ powers
+    slope = np.vander(at, _DEGREE, increasing=True) @ (powers[1:] * np.arange(1, _DEGREE + 1)[:, None])
+    return (slope.T * weight) @ slope, (value.T * weight) @ value
+
+
+@lru_cache(maxsize=1000)
+def exponent(sectors: _Sectors, fixed: tuple[bool, ...] | None) -> float:
+    """The lowest exponent that is no whole number, or infinity.
+
+    ``sectors`` holds angle [rad] and permittivity [-] in turn; ``fixed`` says whether an electrode bounds
+    the first and the last, and is None where they close to a ring.
+    """
+    parts = [(angle / n, eps) for angle, eps in sectors for n in [int(np.ceil(angle / _WIDEST))] for _ in range(n)]
+    size = _DEGREE * len(parts) + 1
+    stiffness, mass = np.zeros((size, size)), np.zeros((size, size))
+    for k, (angle, eps) in enumerate(parts):
+        here = slice(_DEGREE * k, _DEGREE * (k + 1) + 1)
+        stiffness[here, here] += eps / angle * _reference()[0]
+        mass[here, here] += eps * angle * _reference()[1]
+    keep = _kept(size, fixed)
+    stiffness, mass = (keep.T @ m @ keep for m in (stiffness, mass))
+    root = np.linalg.inv(np.linalg.cholesky(mass))
+    squares = np.linalg.eigvalsh(root @ stiffness @ root.T)
+    values = np.sqrt(squares[squares > _NO_FIELD])
+    odd = values[np.abs(values - np.round(values)) > _SMOOTH]
+    return float(odd.min()) if len(odd) else np.inf
+
+
+def _kept(size: int, fixed: tuple[bool, ...] | None) -> NDArray[np.float64]:
+    """From free values to all values: 0 on electrodes, the same at both ends of a ring."""
+    if fixed is None:
+        keep = np.eye(size)[:, :-1]
+        keep[-1, 0] = 1.0
+        return keep
+    return np.eye(size)[:, int(fixed[0]) : size - int(fixed[1])]

@@ -1,0 +1,219 @@
+"""A cell as few triangles: what lies between the electrodes, with its edges at the electrodes."""
+
+from bisect import bisect_left
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.scene.sections import ROUNDING_MM
+from sensorgen.scene.unit_cell import Cell, Slice
+from sensorgen.solvers.electrostatics.fans import Fan, fans
+from sensorgen.solvers.electrostatics.flips import flipped
+
+Edge = tuple[int, int]
+Triangle = tuple[int, int, int]
+
+TERMINALS = ("bottom", "top")
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """The dielectric between the electrodes.
+
+    Attributes
+    ----------
+    points : (n, 2) array
+        Corners [mm].
+    triangles : list of (int, int, int)
+        Counter-clockwise.
+    regions : list of (str, float)
+        Of each triangle: material, and how often it occurs in the sensor.
+    terminals : dict of edge to str
+        Edges that lie on an electrode, each with its lower corner's number first: "top" or "bottom".
+    """
+
+    points: NDArray[np.float64]
+    triangles: list[Triangle]
+    regions: list[tuple[str, float]]
+    terminals: dict[Edge, str]
+
+
+def triangles(cell: Cell) -> Triangles:
+    """Triangulate the dielectric of a cell between its electrodes.
+
+    Raises
+    ------
+    ValueError
+        The electrodes touch, none lies opposite the other, or the field between them would leave the sensor.
+    """
+    points, found = _all(cell)
+    _refuse_contact(points, found)
+    owners: dict[Edge, list[int]] = defaultdict(list)
+    for number, (corners, _) in enumerate(found):
+        for edge in edges_of(corners):
+            owners[edge].append(number)
+    inside = _between(found, owners)
+    terminals = {}
+    for edge, sides in owners.items():
+        names = {found[n][1][0] for n in sides}
+        if names & {"@top", "@bottom"} and any(n in inside for n in sides):
+            terminals[edge] = next(n[1:] for n in names if n.startswith("@"))
+    _refuse_open(points, owners, inside, cell)
+    kept = sorted(inside)
+    regions = [found[n][1] for n in kept]
+    return apart(Triangles(points, flipped(points, [found[n][0] for n in kept], regions), regions, terminals))
+
+
+def apart(mesh: Triangles) -> Triangles:
+    """The same, with a point for each of the pieces that only touch there: no field runs through a point."""
+    for corner, found in fans(mesh.triangles).items():
+        if len(found) > 1:
+            return apart(_parted(mesh, corner, found[1]))
+    return mesh
+
+
+def _parted(mesh: Triangles, corner: int, fan: Fan) -> Triangles:
+    """One of a corner's fans with a new point at the same place."""
+    new = len(mesh.points)
+    corners, terminals = list(mesh.triangles), dict(mesh.terminals)
+    for n in fan.members:
+        a, b, c = (new if k == corner else k for k in corners[n])
+        corners[n] = (a, b, c)
+    for spoke in fan.spokes:
+        if name := terminals.pop((min(corner, spoke), max(corner, spoke)), ""):
+            terminals[spoke, new] = name
+    return Triangles(np.vstack([mesh.points, mesh.points[corner]]), corners, mesh.regions, terminals)
+
+
+def edges_of(corners: Triangle) -> list[Edge]:
+    """The edges of a triangle, each with its lower corner's number first."""
+    a, b, c = corners
+    return [(min(e), max(e)) for e in ((a, b), (b, c), (c, a))]
+
+
+_Found = list[tuple[Triangle, tuple[str, float]]]
+
+
+def _all(cell: Cell) -> tuple[NDArray[np.float64], _Found]:
+    """All triangles of a cell, those of electrodes with "@top" or "@bottom" for a material."""
+    ends = [cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)]
+    levels = [_levels(cell.slices, k) for k in range(len(ends))]
+    first = np.concatenate([[0], np.cumsum([len(z) for z in levels])])
+    points = np.array([(x, z) for x, heights in zip(ends, levels, strict=True) for z in heights])
+    found: _Found = []
+    for k, (here, share) in enumerate(zip(cell.slices, cell.shares, strict=True)):
+        for band in here.bands:
+            left, right = (
+                [int(first[k + side]) + n for n in _run(levels[k + side], band.bottom_mm[side], band.top_mm[side])]
+                for side in (0, 1)
+            )
+            region = (f"@{band.terminal}" if band.terminal else band.material, share)
+            found += [(corners, region) for corners in _fanned(points, [*left[::-1], *right])]
+    return points, found
+
+
+def _levels(slices: tuple[Slice, ...], k: int) -> list[float]:
+    """Heights at which anything meets the line between slice k - 1 and slice k [mm]."""
+    sides = [(s, side) for s, side in zip(slices[max(k - 1, 0) : k + 1], (1, 0) if k else (0,), strict=False)]
+    heights = sorted(z for s, side in sides for b in s.bands for z in (b.bottom_mm[side], b.top_mm[side]))
+    return [z for n, z in enumerate(heights) if n == 0 or z - heights[n - 1] > ROUNDING_MM]
+
+
+def _run(levels: list[float], low: float, high: float) -> range:
+    """Which of the levels a band takes in, from its lower to its upper line."""
+    return range(bisect_left(levels, low - 2 * ROUNDING_MM), bisect_left(levels, high + 2 * ROUNDING_MM))
+
+
+def _fanned(points: NDArray[np.float64], polygon: list[int]) -> Iterable[Triangle]:
+    return fan(points[polygon], polygon)
+
+
+def fan(places: NDArray[np.float64], polygon: list[int]) -> Iterable[Triangle]:
+    """Triangles of a convex polygon, some of whose corners may lie on a line; as few slender ones as can be.
+
+    Each edge takes the corner from which it looks widest (Delaunay), as long as the triangle has an area.
+    ``places`` are the corners' coordinates, ``polygon`` their numbers, counter-clockwise.
+    """
+    todo = [list(range(len(polygon)))]
+    while todo:
+        ring = todo.pop()
+        if len(ring) < 3:
+            continue
+        k = _apex(places[ring])
+        yield polygon[ring[0]], polygon[ring[k]], polygon[ring[-1]]
+        todo += [ring[: k + 1], ring[k:]]
+
+
+def _apex(corners: NDArray[np.float64]) -> int:
+    """The corner from which the edge from the last to the first looks widest, flat triangles apart."""
+    to_first, to_last = corners[0] - corners[1:-1], corners[-1] - corners[1:-1]
+    cross = to_last[:, 0] * to_first[:, 1] - to_last[:, 1] * to_first[:, 0]
+    dot = (to_first * to_last).sum(1)
+    angle = np.arctan2(cross, dot)
+    size = np.hypot(*to_first.T) * np.hypot(*to_last.T)
+    angle[np.abs(cross) < _FLAT * size] = -1.0
+    return int(angle.argmax()) + 1
+
+
+_FLAT = 1e-12  # sine of the angle of three corners on a line
+
+
+def _refuse_contact(points: NDArray[np.float64], found: _Found) -> None:
+    top, bottom = (
+        {p for corners, (what, _) in found if what == f"@{end}" for p in corners} for end in ("top", "bottom")
+    )
+    places = sorted((*points[p], p in top) for p in top | bottom)
+    for (x, z, end), (at, above, other) in pairwise(places):
+        if x == at and above - z < _CONTACT_MM and end != other:
+            raise ValueError("the electrodes touch: the capacitance grows without bound")
+    if top & bottom:
+        raise ValueError("the electrodes touch: the capacitance grows without bound")
+
+
+_CONTACT_MM = 1e-7  # a gap below a tenth of a nanometre is contact
+
+
+def _between(found: _Found, owners: dict[Edge, list[int]]) -> set[int]:
+    """The dielectric triangles whose field runs from one electrode to the other."""
+    beside: dict[int, list[int]] = defaultdict(list)
+    for pair in (sides for sides in owners.values() if len(sides) == 2):
+        beside[pair[0]].append(pair[1])
+        beside[pair[1]].append(pair[0])
+    left = {n for n, (_, (what, _)) in enumerate(found) if not what.startswith("@")}
+    inside: set[int] = set()
+    while left:
+        piece, ends = _piece(found, beside, left)
+        left -= piece
+        inside |= piece if len(ends) == 2 else set()
+    if not inside:
+        raise ValueError("no dielectric lies between a top and a bottom electrode")
+    return inside
+
+
+def _piece(found: _Found, beside: dict[int, list[int]], left: set[int]) -> tuple[set[int], set[str]]:
+    """A connected piece of dielectric, and the electrodes that it touches."""
+    todo = [next(iter(left))]
+    piece, ends = set(todo), set()
+    while todo:
+        for n in beside[todo.pop()]:
+            if found[n][1][0].startswith("@"):
+                ends.add(found[n][1][0])
+            elif n not in piece:
+                piece.add(n)
+                todo.append(n)
+    return piece, ends
+
+
+def _refuse_open(points: NDArray[np.float64], owners: dict[Edge, list[int]], inside: set[int], cell: Cell) -> None:
+    """Refuse a field that would reach the box's floor or lid: beyond them lies more than the scene says."""
+    last = cell.slices[0].bands
+    ends = (last[0].bottom_mm[0], last[-1].top_mm[0])
+    for edge, sides in owners.items():
+        if len(sides) == 1 and sides[0] in inside:
+            z = points[list(edge), 1]
+            if any(np.abs(z - end).max() < ROUNDING_MM for end in ends):
+                raise ValueError("an electrode does not cover the whole sensor")

@@ -1,0 +1,1 @@
+"""Transmission lines with position-dependent sections: inputs, slopes, series."""

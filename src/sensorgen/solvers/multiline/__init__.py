@@ -1,0 +1,1 @@
+"""Coupled lines of stacked electrodes."""

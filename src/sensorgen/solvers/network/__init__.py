@@ -1,0 +1,1 @@
+"""Resistor networks of extruded tracks."""

@@ -1,0 +1,114 @@
+"""Elimination of a network's unknowns in a narrow band, a stretch at a time: memory for one stretch, not for a factor.
+
+An electrode is long and thin, so from one end to the other few of its nodes are neighbours of those before them. Only
+a current is wanted, no potential: forward elimination of two right-hand sides tells it, and what is done is let go.
+"""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.errors import OutOfRange
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+_WIDEST = 1500  # beyond, a sparse factor is quicker
+_STRETCH = 4096  # unknowns that are eliminated at once, or four times the band
+
+
+class _Rest(NamedTuple):
+    """What elimination leaves to the unknowns after a stretch: of their matrix, as a band, and of both right sides."""
+
+    band: Floats
+    sides: Floats
+
+
+def product(matrix: "csr_array[np.float64]", one: Floats, other: Floats) -> float:
+    """``one . matrix^-1 . other``.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse array
+        Symmetric, positive definite.
+    one, other : (n,) array
+        Both sides.
+
+    Raises
+    ------
+    OutOfRange
+        The matrix is not positive definite in doubles: parts hang together by next to nothing.
+
+    Examples
+    --------
+    >>> from scipy.sparse import csr_array
+    >>> product(csr_array([[2.0, -1.0], [-1.0, 2.0]]), np.array([1.0, 0.0]), np.array([0.0, 3.0]))
+    1.0
+    """
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
+    sides = np.stack([one, other], axis=1)[order]
+    column, below, value = _banded(matrix, order)
+    wide = max(int(below.max()), 1)
+    if wide > _WIDEST:
+        return _by_factor(matrix, one, other)
+    step = max(4 * wide, _STRETCH)
+    stretch = np.append(0, np.cumsum(np.bincount(column // step)))
+    by_stretch = np.argsort((column // step).astype(np.int32), kind="stable")
+    total, rest = 0.0, _Rest(np.zeros((wide + 1, wide)), np.zeros((wide, 2)))
+    for start, first, last in zip(range(0, len(order), step), stretch[:-1], stretch[1:], strict=True):
+        here = by_stretch[first:last]
+        band = np.zeros((wide + 1, min(step, len(order) - start)), order="F")
+        band[below[here], column[here] - start] = value[here]
+        part, rest = _eliminated(band, sides[start : start + step], rest)
+        total += part
+    return total
+
+
+def _by_factor(matrix: "csr_array[np.float64]", one: Floats, other: Floats) -> float:
+    """The product by a sparse factor of the whole matrix."""
+    from scipy.sparse.linalg import splu
+
+    solver = splu(  # columns one by one: so sparse a factor has no panels worth their room
+        matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, options={"SymmetricMode": True}
+    )
+    return float(one @ solver.solve(other))
+
+
+def _banded(matrix: "csr_array[np.float64]", order: NDArray[np.int32]) -> tuple[Ints, Ints, Floats]:
+    """Lower half of a symmetric matrix in another order: column, how far below the diagonal, and value."""
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    row, column = np.repeat(rank, np.diff(matrix.indptr)), rank[matrix.indices]
+    half = column <= row
+    column = column[half]
+    return column, row[half] - column, matrix.data[half]
+
+
+def _eliminated(band: Floats, sides: Floats, rest: _Rest) -> tuple[float, _Rest]:
+    """One stretch: its part of the product, and what it leaves."""
+    from scipy.linalg import solve_triangular
+    from scipy.linalg.lapack import dpbtrf, dtbtrs
+
+    wide, count = rest.band.shape[1], band.shape[1]
+    band[:, :wide] += rest.band[:, :count]
+    sides[:wide] += rest.sides[:count]
+    factor, failed = dpbtrf(band, lower=1, overwrite_ab=1)
+    if failed:
+        raise OutOfRange(
+            "these lines hang together by next to nothing: expected contacts that conduct as lines do, or not at all"
+        )
+    solved, _ = dtbtrs(factor, sides, uplo="L")
+    part = float(solved[:, 0] @ solved[:, 1])
+    if count < wide:  # the last
+        return part, rest
+    row, col = np.arange(wide + 1)[:, None] + np.arange(wide), np.arange(wide)
+    square = np.zeros((2 * wide + 1, wide))
+    square[row, col] = factor[:, -wide:]
+    linked = solve_triangular(square[:wide], square[wide : 2 * wide].T, lower=True, check_finite=False)
+    square[:wide], square[wide:] = -linked.T @ linked, 0.0
+    return part, _Rest(square[row, col], -linked.T @ solved[-wide:])

@@ -1,0 +1,341 @@
+"""The resistors of a network of lines: along each line, and across every contact."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.solvers.network.lines import Floats, Ints, Lines
+from sensorgen.solvers.network.nodes import Nodes, interleaved
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+_PARALLEL = np.cos(np.radians(20.0))
+_REACH = 1.3  # lines whose middles are further apart than this many mean widths do not touch
+_BEVEL = _REACH * _PARALLEL / np.sqrt(1 - _PARALLEL**2)  # neighbours end no further apart, in widths, on one wall
+_LONG = 5.0  # widths; shorter stretches are turns of infill
+_STACKED = 0.25  # parallel lines lie on each other when their middles differ by less, in mean widths
+
+
+@dataclass(frozen=True, eq=False)
+class Links:
+    """Resistors, each over four nodes.
+
+    Attributes
+    ----------
+    node : (m, 4) array of int
+        Nodes.
+    weight : (m, 4) array
+        By which their potentials make the voltage across the resistor [-].
+    area_m2, path_m : (m,) array
+        Its cross-section, and how far the current goes through bulk [m2, m].
+    contacts : (m,) array
+        Contacts on the way: 0 along a line, else 1 [-].
+    """
+
+    node: Ints
+    weight: Floats
+    area_m2: Floats
+    path_m: Floats
+    contacts: Floats
+
+    def conductance_s(self, resistivity_ohm_m: float, contact_ohm_m2: float) -> Floats:
+        """Conductance of each resistor [S]."""
+        contact = np.where(self.contacts > 0, contact_ohm_m2, 0.0)
+        return np.asarray(self.area_m2 / (resistivity_ohm_m * self.path_m + contact))
+
+    def matrix(self, conductance_s: Floats, nodes: int) -> "csr_array[np.float64]":
+        """Currents that flow from all nodes at their potentials, (nodes, nodes) [S].
+
+        Parameters
+        ----------
+        conductance_s : (m,) array
+            Of each resistor [S].
+        nodes : int
+            How many there are [-].
+        """
+        from scipy.sparse import csr_array
+
+        used = self.weight != 0
+        ends = np.append(0, np.cumsum(used.sum(axis=1)))
+        voltages = csr_array((self.weight[used], self.node[used], ends), shape=(len(self.node), nodes))
+        currents = voltages.copy()
+        currents.data *= np.repeat(conductance_s, np.diff(ends))
+        matrix = csr_array(voltages.T.tocsr() @ currents)
+        matrix.eliminate_zeros()
+        return matrix
+
+    @classmethod
+    def between(
+        cls, nodes: Nodes, one: tuple[Ints, Floats], other: tuple[Ints, Floats], area_m2: Floats, path_m: Floats
+    ) -> "Links":
+        """Contacts between places of two pieces each (piece, share of its length)."""
+        (a, wa), (b, wb) = nodes.weights(*one), nodes.weights(*other)
+        return cls(np.hstack([a, b]), np.hstack([wa, -wb]), area_m2, path_m, np.ones(len(area_m2)))
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """Where lines of neighbouring layers cross: both pieces, the shares of their lengths, and the sine between them."""
+
+    one: Ints
+    other: Ints
+    share_one: Floats
+    share_other: Floats
+    sine: Floats
+
+    def places(self) -> tuple[Ints, Floats]:
+        """All of them as (piece, share of its length)."""
+        return np.concatenate([self.one, self.other]), np.concatenate([self.share_one, self.share_other])
+
+
+def near(lines: Lines) -> tuple[Ints, Ints]:
+    """Pairs of pieces, of one layer or of neighbouring ones, that may touch; the lower number first.
+
+    By squares of a few widths that both pass through.
+    """
+    side = 2.0 * float(lines.width_m.max())
+    count = np.ceil(lines.length_m() / side).astype(np.int64) + 1
+    piece = np.repeat(np.arange(len(lines)), count)
+    step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    cell = np.floor(lines.at(piece, step / (count[piece] - 1).clip(1)) / side).astype(np.int64)
+    cell -= cell.min(axis=0) - 1
+    wide, high = cell.max(axis=0) + 2
+    layer = lines.layer[piece] - lines.layer.min()
+    key = (layer * wide + cell[:, 0]) * high + cell[:, 1]
+    held = _distinct(key * len(lines) + piece)  # sorted by square
+    within, inside = held // len(lines), held % len(lines)
+    begin = np.flatnonzero(np.append(True, np.diff(within) != 0))
+    square, begin, fill = within[begin], np.append(begin, len(held)), np.diff(begin, append=len(held))
+    found = []
+    # Squares in a column follow each other: of one layer the next half of those around, of the layer above all of them.
+    for first, last in [(0, 1), *((n * high - 1, n * high + 1) for n in (1, wide - 1, wide, wide + 1))]:
+        low, top = np.searchsorted(square, square + first), np.searchsorted(square, square + last, "right")
+        low, n = np.repeat(begin[low], fill), np.repeat(begin[top] - begin[low], fill)
+        a = np.repeat(inside, n)
+        b = inside[np.arange(n.sum()) - np.repeat(np.cumsum(n) - n - low, n)]
+        apart = a != b
+        found.append(_distinct(np.minimum(a, b)[apart] * len(lines) + np.maximum(a, b)[apart]))
+    pairs = _distinct(np.concatenate(found))
+    return pairs // len(lines), pairs % len(lines)
+
+
+def _distinct(numbers: Ints) -> Ints:
+    """Each number once, rising; ``np.unique`` sorts by hash tables, which takes ten times as long."""
+    rising = np.sort(numbers)
+    return np.asarray(rising[np.append(True, rising[1:] != rising[:-1])[: len(rising)]])
+
+
+def crossings(lines: Lines, pairs: tuple[Ints, Ints]) -> Crossings:
+    """Pairs in neighbouring layers that cross at an angle."""
+    i, j = pairs
+    apart = lines.layer[i] != lines.layer[j]
+    i, j = i[apart], j[apart]
+    d = lines.end_m - lines.start_m
+    sine = _cross(lines.direction()[i], lines.direction()[j])
+    steep = np.abs(sine) > np.sqrt(1 - _PARALLEL**2)
+    i, j, sine = i[steep], j[steep], sine[steep]
+    gap, turn = lines.start_m[j] - lines.start_m[i], _cross(d[i], d[j])
+    s, t = _cross(gap, d[j]) / turn, _cross(gap, d[i]) / turn
+    hit = (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
+    return Crossings(i[hit], j[hit], s[hit], t[hit], np.abs(sine[hit]))
+
+
+def gathered(lines: Lines, nodes: Nodes, pairs: tuple[Ints, Ints], crossed: Crossings) -> Links:
+    """All resistors."""
+    ends = _Ends(lines, pairs)
+    neighbours = _alongside(lines, pairs, same_layer=True)
+    kinds = [
+        _along(lines, nodes, neighbours), _over(lines, nodes, crossed), _beside(lines, nodes, neighbours, ends),
+        _stacked(lines, nodes, _alongside(lines, pairs, same_layer=False)), ends.links(nodes),
+    ]  # fmt: skip
+    return Links(*(np.concatenate([getattr(k, name) for k in kinds]) for name in Links.__dataclass_fields__))
+
+
+class _Alongside(NamedTuple):
+    """Parallel pairs with a common stretch: both pieces, their distance, and the stretch along the first [m]."""
+
+    one: Ints
+    other: Ints
+    away_m: Floats
+    low_m: Floats
+    high_m: Floats
+
+
+def _along(lines: Lines, nodes: Nodes, neighbours: _Alongside) -> Links:
+    piece, a, b = nodes.steps()
+    length = (nodes.key[b] - nodes.key[a]) * lines.length_m()[piece]
+    node = np.stack([nodes.number[a], nodes.number[b]] * 2, axis=1)
+    weight = np.tile([1.0, -1.0, 0.0, 0.0], (len(piece), 1))
+    area = (_own_width_m(lines, neighbours) * lines.height_m)[piece]
+    return Links(node, weight, area, length, np.zeros(len(piece)))
+
+
+def _own_width_m(lines: Lines, neighbours: _Alongside) -> Floats:
+    """Width of each piece without half of what long neighbours overlap: one place conducts once [m]."""
+    i, j, away, low, high = neighbours
+    mean, stretch = (lines.width_m[i] + lines.width_m[j]) / 2, high - low
+    over = np.where((stretch > _LONG * mean) & (away > _STACKED * mean), np.maximum(mean - away, 0.0), 0.0)
+    lost = np.zeros(len(lines))
+    for piece in (i, j):
+        np.add.at(lost, piece, over / 2 * stretch / lines.length_m()[piece])
+    return np.maximum(lines.width_m - lost, lines.width_m / 4)
+
+
+def _over(lines: Lines, nodes: Nodes, c: Crossings) -> Links:
+    area = lines.width_m[c.one] * lines.width_m[c.other] / c.sine
+    path = (lines.height_m[c.one] + lines.height_m[c.other]) / 2
+    return Links.between(nodes, (c.one, c.share_one), (c.other, c.share_other), area, path)
+
+
+def _beside(lines: Lines, nodes: Nodes, neighbours: _Alongside, ends: "_Ends") -> Links:
+    """Lines of one layer that run side by side."""
+    i, j, away, _, _ = neighbours
+    mean = (lines.width_m[i] + lines.width_m[j]) / 2
+    fits = (away > _STACKED * mean) & (away < _REACH * mean)
+    i, j, away = i[fits], j[fits], away[fits]
+    low, high = ends.widened(i, j)
+    fits = high > low
+    i, j, away, low, high = i[fits], j[fits], away[fits], low[fits], high[fits]
+    height = np.minimum(lines.height_m[i], lines.height_m[j])
+    return _distributed(lines, nodes, (i, j), (low, high), height, away)
+
+
+def _stacked(lines: Lines, nodes: Nodes, above: _Alongside) -> Links:
+    """Lines of neighbouring layers that run on each other."""
+    i, j, away, low, high = above
+    fits = away < _STACKED * (lines.width_m[i] + lines.width_m[j]) / 2
+    i, j, away, low, high = i[fits], j[fits], away[fits], low[fits], high[fits]
+    wide = (lines.width_m[i] + lines.width_m[j]) / 2 - away
+    return _distributed(lines, nodes, (i, j), (low, high), wide, (lines.height_m[i] + lines.height_m[j]) / 2)
+
+
+def _alongside(lines: Lines, pairs: tuple[Ints, Ints], *, same_layer: bool) -> _Alongside:
+    """Parallel pairs with a common stretch."""
+    i, j = pairs
+    way = lines.direction()
+    fits = (lines.layer[i] == lines.layer[j]) == same_layer
+    fits &= np.abs(_dot(way[i], way[j])) > _PARALLEL
+    i, j = i[fits], j[fits]
+    ends = np.stack([_dot(p[j] - lines.start_m[i], way[i]) for p in (lines.start_m, lines.end_m)])
+    low, high = np.maximum(ends.min(0), 0.0), np.minimum(ends.max(0), lines.length_m()[i])
+    middle = lines.start_m[i] + way[i] * ((low + high) / 2)[:, None] - lines.start_m[j]
+    away = np.abs(_cross(way[j], middle))
+    fits = high > low
+    return _Alongside(i[fits], j[fits], away[fits], low[fits], high[fits])
+
+
+def _distributed(
+    lines: Lines, nodes: Nodes, pair: tuple[Ints, Ints], stretch: tuple[Floats, Floats], breadth: Floats, path: Floats
+) -> Links:
+    """A contact along a stretch, as resistors at every node that either line has there, and at its ends."""
+    i, j = pair
+    low, high = stretch
+    length, way = lines.length_m(), lines.direction()
+    towards = _dot(way[i], way[j])
+    start = _dot(lines.start_m[j] - lines.start_m[i], way[i])  # of j, along i
+    of_j = np.sort(np.stack([(low - start) / towards, (high - start) / towards]) / length[j], axis=0)
+    qi, si = nodes.within(i, low / length[i], high / length[i])
+    qj, sj = nodes.within(j, *of_j)
+    every = np.arange(len(i))
+    query = np.concatenate([every, every, qi, qj])
+    at = np.concatenate([low, high, si * length[i][qi], start[qj] + sj * length[j][qj] * towards[qj]])
+    query, at, share = interleaved(query, np.clip(at, low[query], high[query]))
+    kept = share > 0
+    query, at, share = query[kept], at[kept], share[kept]
+    on_i = at / length[i][query]
+    on_j = (at - start[query]) / towards[query] / length[j][query]
+    return Links.between(nodes, (i[query], on_i), (j[query], on_j), share * breadth[query], path[query])
+
+
+class _Ends:
+    """Where pieces end on the side of another line of their layer, as infill does on a wall."""
+
+    def __init__(self, lines: Lines, pairs: tuple[Ints, Ints]) -> None:
+        self.lines = lines
+        self.piece, self.side, self.wall, self.share, self.away, self.sine = _walls(lines, pairs)
+        self.room = np.zeros((2, len(lines)))  # from a piece's start and end to the wall, along the piece [m]
+        room = (self.away - lines.width_m[self.wall] / 2) / self.sine
+        self.room[self.side, self.piece] = room
+        self.sines = np.ones((2, len(lines)))
+        self.sines[self.side, self.piece] = self.sine
+        self.turns = np.stack([lines.joined, lines.goes_on()])
+
+    def links(self, nodes: Nodes) -> Links:
+        """Ends on walls; where a line turns, the piece after the turn lies along the wall itself."""
+        free = ~self.turns[self.side, self.piece]
+        lines, i = self.lines, self.piece[free]
+        area = lines.width_m[i] * lines.height_m[i] / self.sine[free]
+        at = (i, self.side[free].astype(float)), (self.wall[free], self.share[free])
+        return Links.between(nodes, *at, area, self.away[free])
+
+    def widened(self, i: Ints, j: Ints) -> tuple[Floats, Floats]:
+        """Where neighbours i and j touch, along i: up to the wall, or to the piece that joins both there."""
+        lines, length = self.lines, self.lines.length_m()
+        way = lines.direction()
+        start = _dot(lines.start_m[j] - lines.start_m[i], way[i])
+        back = _dot(way[i], way[j]) < 0
+        end = start + np.where(back, -length[j], length[j])
+        apart = _BEVEL * (lines.width_m[i] + lines.width_m[j]) / 2
+        low = _reach((0.0, self.room[0, i]), (-np.minimum(start, end), self.room[np.where(back, 1, 0), j]), apart)
+        high = _reach((length[i], self.room[1, i]), (np.maximum(start, end), self.room[np.where(back, 0, 1), j]), apart)
+        bridge = lines.width_m[np.minimum(i + 1, len(lines) - 1)] / self.sines[1, i]
+        return -low, high - np.where(self._bridged(i, j), bridge, 0.0)
+
+    def _bridged(self, i: Ints, j: Ints) -> NDArray[np.bool_]:
+        """Whether one short piece joins the end of i with the start of j."""
+        joined = self.lines.joined
+        last = len(joined) - 1
+        return np.asarray((j == i + 2) & joined[np.minimum(i + 1, last)] & joined[np.minimum(i + 2, last)])
+
+
+def _reach(one: tuple[float | Floats, Floats], other: tuple[float | Floats, Floats], apart: Floats) -> Floats:
+    """How far two neighbours touch, of where each ends and what room it has there.
+
+    Where both end on one wall, thus not far apart, to where the line between them meets it; else to the end of the
+    shorter one.
+    """
+    (a, room_a), (b, room_b) = one, other
+    shorter = np.where(np.less(a, b), a + room_a, b + room_b)
+    one_wall = (room_a > 0) & (room_b > 0) & (np.abs(a - b) < apart)
+    return np.where(one_wall, (a + room_a + b + room_b) / 2, shorter)
+
+
+def _walls(lines: Lines, pairs: tuple[Ints, Ints]) -> tuple[Ints, Ints, Ints, Floats, Floats, Floats]:
+    """For each end of a piece the nearest line across it: piece, end (0 or 1), wall, share, distance [m] and sine."""
+    a, b = pairs
+    way, length = lines.direction(), lines.length_m()
+    fits = (lines.layer[a] == lines.layer[b]) & ~_chained(lines, a, b)
+    a, b = a[fits], b[fits]
+    steep = np.abs(_dot(way[a], way[b])) < _PARALLEL
+    a, b = a[steep], b[steep]
+    mean, sine = (lines.width_m[a] + lines.width_m[b]) / 2, np.abs(_cross(way[a], way[b]))
+    found = []
+    for i, j in ((a, b), (b, a)):
+        for side, at in ((0, lines.start_m), (1, lines.end_m)):
+            gap = at[i] - lines.start_m[j]
+            foot, away = _dot(gap, way[j]), np.abs(_cross(way[j], gap))
+            touch = (foot >= 0) & (foot <= length[j]) & (away < 1.1 * mean) & (away > _STACKED * mean)
+            ends = i[touch], np.full(touch.sum(), side), j[touch], (foot / length[j])[touch], away[touch], sine[touch]
+            found.append(np.stack(ends))
+    every = np.concatenate(found, axis=1)
+    every = every[:, np.lexsort((every[4], every[1], every[0]))]
+    first = np.append(True, (np.diff(every[0]) != 0) | (np.diff(every[1]) != 0))[: every.shape[1]]
+    piece, side, wall, share, away, sine = every[:, first]
+    return piece.astype(np.int64), side.astype(np.int64), wall.astype(np.int64), share, away, sine
+
+
+def _chained(lines: Lines, i: Ints, j: Ints) -> NDArray[np.bool_]:
+    """Whether two pieces meet at a joint."""
+    high = np.maximum(i, j)
+    return np.asarray((np.abs(i - j) == 1) & lines.joined[high])
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1])
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

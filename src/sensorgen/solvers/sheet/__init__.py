@@ -1,0 +1,1 @@
+"""Conducting sheets coupled by a distributed admittance."""

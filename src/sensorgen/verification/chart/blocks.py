@@ -1,0 +1,200 @@
+"""Models of compression on bodies whose way under pressure is known: how far their top comes down.
+
+A block follows closed forms; a strip that is bonded to stiff plates, and rect pressed lightly, were solved by another
+program to the digits that are given. The error is the largest one over the loads.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design import design as designs
+from sensorgen.models import compression, press2d, press3d, springs
+from sensorgen.models.compression import Plate
+from sensorgen.models.press2d import Elastic, Fineness
+from sensorgen.models.press3d import Held, Pieces, Pressed
+from sensorgen.scene.scene import Body, Scene, box
+from sensorgen.verification.chart.measured import DIGITS, Point, timed
+from sensorgen.verification.chart.presses import has_mesher
+
+Real = NDArray[np.float64]
+
+ASKED = "how far the top of a body comes down"
+_RUBBER = Elastic(6e6, 0.5)
+_STRETCHES = np.array([0.97, 0.9, 0.8])  # along the load, of blocks
+_BLOCK_MM, _STRIP_MM, _HALF_MM = 1.2, 10.0, 0.3  # heights of block and half strip, width of the strip
+_FLOOR_MM, _HARD = 0.1, 1e6  # under the strip, and its modulus over that of rubber
+_RECT_M = 6.65e-8  # 6.42, 6.51 and 6.54 on meshes of 0.3, 0.2 and 0.17 mm, order 3, small strain [m]
+_BONDED = 92.456  # modulus over E of an incompressible strip 10 x 0.6 mm, order 6 and 60 cells along it
+_MESHES = (Fineness(4e-3, 0.2, 0.4, 1.0), Fineness(), Fineness().finer())
+_PIECES = (1, 2, 3)
+
+
+@dataclass(frozen=True)
+class Standard:
+    """A body whose way under pressure is known.
+
+    Attributes
+    ----------
+    scene, period_mm : Scene, float or None
+        What is pressed, and its period [mm].
+    solids : dict of str to Elastic
+        By material.
+    held : Held
+        How it is held.
+    stress_pa, down_m : array
+        Loads [Pa] and how far its top comes down [m].
+    known_to : float
+        Its relative error [-].
+    laws : tuple of Plate
+        That can speak of it.
+    height_m : float
+        Of the film that they take it for [m].
+    plane, columns : bool
+        Whether it is held along its depth; whether each of its columns reaches its top.
+    """
+
+    scene: Scene
+    period_mm: float | None
+    solids: dict[str, Elastic]
+    held: Held
+    stress_pa: Real
+    down_m: Real
+    known_to: float
+    laws: tuple[Plate, ...]
+    height_m: float
+    plane: bool = True
+    columns: bool = True
+
+
+def _block(stress_over_mu: Callable[[Real], Real], *, plane: bool) -> Standard:
+    scene = designs.make({"shape": "reference"}).in_use
+    stress = _RUBBER.youngs_modulus_pa / 3 * stress_over_mu(_STRETCHES)
+    height = _BLOCK_MM * M_PER_MM
+    laws = (compression.unconfined(_RUBBER.youngs_modulus_pa),)
+    solids, held = dict.fromkeys(("x60", "etpu"), _RUBBER), Held("sliding", "free")
+    return Standard(scene, None, solids, held, stress, (1 - _STRETCHES) * height, DIGITS, laws, height, plane)
+
+
+def block() -> Standard:
+    r"""A block that widens along x only, incompressible neo-Hookean: :math:`\sigma = \mu (b^{-3} - b)`."""
+    return _block(lambda b: b**-3 - b, plane=True)
+
+
+def free_block() -> Standard:
+    r"""The same that widens along x and y: :math:`\sigma = \mu (b^{-2} - b)`."""
+    return _block(lambda b: b**-2 - b, plane=False)
+
+
+def strip() -> Standard:
+    """The lower half of a strip between stiff plates to which it is bonded, in slices that are narrow at its sides."""
+    cuts = 0.5 * _STRIP_MM * (1 + np.sin(np.linspace(-0.5, 0.5, 17) * np.pi)) + 0.5
+    cuts, top = cuts.round(6).tolist(), _FLOOR_MM + _HALF_MM
+    bodies = (
+        Body("floor", "etpu", (box(0, _STRIP_MM + 1, 0, 1, 0, _FLOOR_MM),), "bottom"),
+        Body("strip", "x60", tuple(box(a, b, 0, 1, _FLOOR_MM, top) for a, b in pairwise(cuts))),
+    )
+    scene = Scene(bodies, (_STRIP_MM + 1, 1.0, top))
+    solids = {"x60": _RUBBER, "etpu": Elastic(_RUBBER.youngs_modulus_pa * _HARD, 0.3)}
+    e, strain, height = _RUBBER.youngs_modulus_pa, np.array([1e-4]), _HALF_MM * M_PER_MM
+    laws = compression.unconfined(e), compression.bonded(e, _STRIP_MM * M_PER_MM, 2 * height)
+    return Standard(
+        scene, _STRIP_MM + 1, solids, Held(top="rigid"), _BONDED * e * strain, strain * height, 1e-4, laws,
+        height, columns=False,
+    )  # fmt: skip
+
+
+def rect() -> Standard:
+    """Rect with a film of 0.1 mm under 1 kPa: between the limits of first and second order of meshes in tetrahedra."""
+    scene = designs.make({"shape": "rect", "parameters": {"dielectric_mm": 0.1}}).in_use
+    solids = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
+    laws = (compression.unconfined(6e6), compression.bonded(6e6, 10e-3, 0.7e-3))
+    return Standard(scene, None, solids, Held(), np.array([1e3]), np.array([_RECT_M]), 0.01, laws, 0.7e-3)
+
+
+STANDARD: dict[str, Callable[[], Standard]] = {
+    "block, free along x": block,
+    "block, free all round": free_block,
+    "bonded strip": strip,
+    "rect pressed, 0.1 mm: top down": rect,
+}
+
+
+def points(name: str, budget_s: float) -> list[Point]:
+    """Measure every model of compression on one body.
+
+    Parameters
+    ----------
+    name : str
+        Of ``STANDARD``.
+    budget_s : float
+        A finer mesh is not tried where that would take longer, ten times the last one taken as a guess [s].
+    """
+    standard = STANDARD[name]()
+    return [_point(name, standard, *found) for found in (*_cheap(standard), *_solved(standard, budget_s))]
+
+
+def unfit(name: str) -> dict[str, str]:
+    """Why models of compression cannot speak of a scene."""
+    standard = STANDARD[name]()
+    flat = "it holds the body along its depth" if not standard.plane else press2d.unfit(standard.scene) or ""
+    deep = press3d.unfit(standard.scene) or "free sides give way in both directions, not along x alone"
+    return {"press2d": flat or "the mesher is not installed (extra fem)", "press3d": deep,
+            "springs": "beside the strip nothing reaches the top"}  # fmt: skip
+
+
+Found = Iterator[tuple[str, str, Real, float]]
+
+
+def _cheap(standard: Standard) -> Found:
+    """Displacement by laws of plates and by springs, with the seconds that they took [m]."""
+    for law in standard.laws:
+        value, seconds = timed(lambda law=law: law.thinning(standard.stress_pa)[0])  # type: ignore[misc]
+        yield f"compression: {law.name}", "", value * standard.height_m, seconds
+    if not standard.columns:
+        return
+    moduli = {
+        name: s.youngs_modulus_pa / (1 - standard.plane * s.poisson_ratio**2) for name, s in standard.solids.items()
+    }
+    value, seconds = timed(lambda: springs.displacement_m(standard.scene, moduli, list(standard.stress_pa)))
+    yield "springs", "", value, seconds
+
+
+def _solved(standard: Standard, budget_s: float) -> Found:
+    """The same by finite elements from coarse to fine, in two and in three dimensions."""
+    if standard.plane and has_mesher() and not press2d.unfit(standard.scene):
+        yield from _finer(
+            "press2d", [(f"mesh {k}, ", partial(_flat, standard, m)) for k, m in enumerate(_MESHES, 1)], budget_s
+        )
+    if not (standard.plane and standard.held.period == "free"):
+        yield from _finer("press3d", [(f"{n} pieces, ", partial(_deep, standard, n)) for n in _PIECES], budget_s)
+
+
+def _finer(model: str, meshes: list[tuple[str, Callable[[], Pressed]]], budget_s: float) -> Found:
+    for said, work in meshes:
+        found, seconds = timed(work)
+        if not found.faults:
+            yield model, said, found.displacement_m[1:], seconds
+        if 10 * seconds > budget_s:
+            return
+
+
+def _flat(standard: Standard, mesh: Fineness) -> Pressed:
+    cell = press2d.cell(standard.scene, standard.period_mm)
+    return press2d.press(cell, standard.solids, [0.0, *standard.stress_pa], None, standard.held, mesh)
+
+
+def _deep(standard: Standard, pieces: int) -> Pressed:
+    cell = press3d.cell(standard.scene)
+    return press3d.press(cell, standard.solids, [0.0, *standard.stress_pa], None, standard.held, Pieces(pieces))
+
+
+def _point(scene: str, standard: Standard, model: str, said: str, value: Real, seconds: float) -> Point:
+    off = value / standard.down_m - 1
+    worst = float(off[np.argmax(np.abs(off))])
+    return Point(scene, model, max(abs(worst), standard.known_to), seconds, f"{said}off by {worst:+.3g} at most")

@@ -1,0 +1,153 @@
+"""Models of a cell's capacitance on scenes whose capacitance is known."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import SensorgenError
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.design import design as designs
+from sensorgen.models import thesis_cells
+from sensorgen.prediction import capacitance as planner
+from sensorgen.scene.scene import Scene
+from sensorgen.verification.chart import exact
+from sensorgen.verification.chart.measured import Point, timed
+
+ASKED = "the capacitance of a cell at rest"
+_LEAST_WIDTH = 1e-9  # that is asked of a model
+_DEARER = 10.0  # by how much the next accuracy may cost more than the last
+
+
+@dataclass(frozen=True)
+class Standard:
+    """A scene whose capacitance is known.
+
+    Attributes
+    ----------
+    scene : Scene
+        As models see it.
+    permittivity : mapping of str to float
+        Of its dielectrics and of "air" [-].
+    capacitance_f_per_m2 : float
+        Per area of the sensor [F/m2].
+    known_to : float
+        Relative half-width of what is known of it [-].
+    shape, params : str, Params or None
+        What it was made from, for formulas of one shape.
+    """
+
+    scene: Scene
+    permittivity: Mapping[str, float]
+    capacitance_f_per_m2: float
+    known_to: float
+    shape: str = ""
+    params: Any = None
+
+
+def _designed(shape: str, dielectric_mm: float, capacitance_f_per_m2: float, known_to: float) -> Standard:
+    design = designs.make({"shape": shape, "parameters": {"dielectric_mm": dielectric_mm}})
+    return Standard(design.in_use, _EPS, capacitance_f_per_m2, known_to, shape, design.params)
+
+
+def _exact(case: exact.Exact) -> Standard:
+    per_area = case.capacitance_f_per_m / (case.scene.size_mm[0] * M_PER_MM)
+    return Standard(case.scene, exact.PERMITTIVITY, per_area, case.known_to)
+
+
+# tri: hp finite elements, agreeing with two other programs; rect: H1 and H(div) elements, agreeing with finite volumes;
+# the others are exact.
+_EPS = {"x60": 4.68, "air": 1.00059}
+STANDARD: dict[str, Callable[[], Standard]] = {
+    "tri, 0.1 mm": lambda: _designed("tri", 0.1, 1.5965204052211506e-10 / 2e-3, 9e-10),
+    "tri, 0.2 mm": lambda: _designed("tri", 0.2, 1.2851365895937111e-10 / 2e-3, 8e-10),
+    "rect, 0.1 mm": lambda: _designed("rect", 0.1, 8.123429165e-13 / 4e-6, 2.7e-5),
+    "rect, 0.2 mm": lambda: _designed("rect", 0.2, 4.852340605e-13 / 4e-6, 2.5e-5),
+    "plate, 0.6 mm": lambda: _designed("reference", 0.6, EPS0_F_PER_M * _EPS["x60"] / 0.6e-3, 1e-15),
+    "coaxial line": lambda: _exact(exact.coaxial()),
+    "eccentric cylinders": lambda: _exact(exact.eccentric()),
+    "stripline": lambda: _exact(exact.stripline()),
+    "interdigital, half space": lambda: _exact(exact.interdigital()),
+}
+
+
+def points(name: str, budget_s: float) -> list[Point]:
+    """Measure every model that can speak of a scene.
+
+    Parameters
+    ----------
+    name : str
+        Of ``STANDARD``.
+    budget_s : float
+        A model is not asked for more where that would take longer, ten times the last one taken as a guess [s].
+    """
+    standard = STANDARD[name]()
+    return [*_formulas(name, standard), *_bounds(name, standard, budget_s)]
+
+
+def unfit(name: str) -> dict[str, str]:
+    """Why models of capacitance cannot speak of a scene."""
+    scene = STANDARD[name]().scene
+    said = {model: module.unfit(scene) for model, module in planner.capacitance_models().items()}
+    only = "it has formulas of tri and rect alone"
+    return {model: why for model, why in said.items() if why} | {"thesis_cells": only}
+
+
+def _bounds(name: str, standard: Standard, budget_s: float) -> Iterator[Point]:
+    """Every model with bounds, from coarse to fine."""
+    area = standard.scene.size_mm[0] * standard.scene.size_mm[1] * M_PER_MM**2
+    for model, module in planner.capacitance_models().items():
+        if module.unfit(standard.scene):
+            continue
+        given = (standard.scene, standard.permittivity)
+        for wanted, interval, seconds in _rungs(module.capacitance, given, module, budget_s):
+            yield point(name, model, interval.times(1 / area), standard, seconds, wanted=wanted)
+
+
+def _rungs(
+    work: Callable[..., Interval], given: tuple[Any, ...], module: Any, budget_s: float
+) -> Iterator[tuple[float | None, Interval, float]]:
+    """Width that was asked for, bounds and seconds; each time for a decade less than was reached."""
+    if not hasattr(module, "WIDTH"):
+        yield (None, *timed(lambda: work(*given)))
+        return
+    wanted, last = 0.1, math.inf
+    while wanted >= _LEAST_WIDTH * (1 - 1e-6):
+        asked = wanted
+        try:
+            interval, seconds = timed(lambda asked=asked: work(*given, asked))  # type: ignore[misc]
+        except SensorgenError:  # doubles end here, or this order fails
+            if last < math.inf:
+                return
+            wanted /= 10
+            continue
+        width = interval.width()
+        if width >= last:
+            return
+        yield asked, interval, seconds
+        if width > asked or seconds * _DEARER > budget_s or width == 0:
+            return
+        wanted, last = 10.0 ** math.ceil(math.log10(width) - 1), width
+
+
+def _formulas(name: str, standard: Standard) -> Iterator[Point]:
+    """The thesis's formulas for this shape."""
+    for model, law in thesis_cells.NAMED.items():
+        if standard.shape in law.shapes:
+            given = standard.params, standard.permittivity["x60"]
+            value, seconds = timed(partial(law.value_f_per_m2, *given))
+            label = f"thesis_cells: {model.removeprefix('thesis-')}"
+            yield point(name, label, Interval(value, value), standard, seconds, bounded=False)
+
+
+def point(
+    scene: str, model: str, found: Interval, standard: Standard, seconds: float, *,
+    wanted: float | None = None, bounded: bool = True,
+) -> Point:  # fmt: skip
+    """What a model gave per area, held against what is known."""
+    off = [abs(bound / standard.capacitance_f_per_m2 - 1) for bound in (found.lower, found.upper)]
+    error = max(*off, standard.known_to)
+    said = f"{found.lower:.9g} to {found.upper:.9g} F/m²" if bounded else f"{found.lower:.9g} F/m²"
+    return Point(scene, model, error, seconds, said, bounded, wanted, found.lower, found.upper)

@@ -1,0 +1,129 @@
+"""Scenes whose capacitance textbooks know in closed form, as scenes between a lower and an upper electrode.
+
+Their symmetry planes without an electrode are walls of next to no permittivity on the lower electrode, or under the
+upper one. Circles are drawn with straight lines that keep their mean radius.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from math import acosh, asinh, cos, log, pi, sin, sqrt, tan, tanh
+
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.scene.scene import Body, Outline, Prism, Scene, box
+
+PERMITTIVITY = {"air": 1.0, "wall": 1e-10}
+CORNERS = 24  # of a quarter of a circle
+
+_PLATE_MM = 0.1  # thickness of electrodes and walls
+_FLOOR_MM = 2 * _PLATE_MM
+
+
+@dataclass(frozen=True)
+class Exact:
+    """A scene 1 mm deep.
+
+    Attributes
+    ----------
+    scene : Scene
+        As models see it.
+    capacitance_f_per_m : float
+        Per depth [F/m].
+    known_to : float
+        What straight lines in place of arcs, a lid in place of infinity, and walls that are no mirrors cost [-].
+    """
+
+    scene: Scene
+    capacitance_f_per_m: float
+    known_to: float
+
+
+def coaxial(corners: int = CORNERS) -> Exact:
+    r"""A quarter of a coaxial line of radii 1 and 2 mm.
+
+    .. math:: C = \frac{2 \pi \varepsilon_0}{\ln(b / a)}
+    """
+    low = _above([(0.0, 0.0), *_arc(0.0, 1.0, 0.0, 0.5, corners)])
+    high = _above([*_arc(0.0, 2.0, 0.0, 0.5, corners), (0.0, 2.2), (2.2, 2.2), (2.2, 0.0)])
+    return Exact(_scene(low, high, 2.2, 2.2), 0.5 * pi * EPS0_F_PER_M / log(2), 2e-5)
+
+
+def eccentric(corners: int = CORNERS) -> Exact:
+    r"""Half of a line of radii 1 and 2 mm whose axes are 0.5 mm apart.
+
+    .. math:: C = \frac{2 \pi \varepsilon_0}{\operatorname{arcosh}((a^2 + b^2 - e^2) / (2 a b))}
+    """
+    low = _above(_arc(2.7, 1.0, 0.0, 1.0, 2 * corners))
+    high = _above([(4.4, 0.0), *_arc(2.2, 2.0, 0.0, 1.0, 2 * corners), (0.0, 0.0), (0.0, 2.2), (4.4, 2.2)])
+    return Exact(_scene(low, high, 4.4, 2.2), pi * EPS0_F_PER_M / acosh((5 - 0.25) / 4), 2e-5)
+
+
+def stripline() -> Exact:
+    r"""The upper half of a strip w = 1 mm wide, without thickness, midway between plates b = 1 mm apart.
+
+    .. math:: C = 4 \varepsilon_0 \frac{K(k)}{K(k')}, \quad k = \tanh\frac{\pi w}{2 b}
+    """
+    low = Body("low", "etpu", (box(3.5, 4.5, 0, 1, _PLATE_MM, _FLOOR_MM), _floor(8.0)), "bottom")
+    roof = _FLOOR_MM + 0.5
+    high = Body("high", "etpu", (box(0, 8, 0, 1, roof, roof + _PLATE_MM),), "top")
+    wall = Body("wall", "wall", tuple(box(a, b, 0, 1, _PLATE_MM, _FLOOR_MM) for a, b in ((0, 3.5), (4.5, 8))))
+    exact = 2 * EPS0_F_PER_M * _ratio(tanh(pi / 2))
+    return Exact(Scene((low, wall, high), (8.0, 1.0, roof + _PLATE_MM)), exact, 1e-7)
+
+
+def interdigital() -> Exact:
+    r"""Fingers of no thickness that fill half of their plane, on a half space: from one's middle to the next one's.
+
+    .. math:: C = \tfrac{1}{2} \varepsilon_0 \frac{K(k)}{K(k')}, \quad k = \sin\frac{\pi s}{2}
+
+    Igreja and Dias, Sens. Actuators A 112, 291 (2004). The next finger hangs on a lid 4 pitches up, under a wall.
+    """
+    roof = _FLOOR_MM + 8.0
+    low = Body("low", "etpu", (box(0, 0.5, 0, 1, _PLATE_MM, _FLOOR_MM), _floor(2.0)), "bottom")
+    high = Body("high", "etpu", (box(1.5, 2, 0, 1, _PLATE_MM + 0.05, _FLOOR_MM), _lid(2.0, roof)), "top")
+    walls = box(0.5, 1.5, 0, 1, _PLATE_MM, _FLOOR_MM), box(1.5, 2, 0, 1, _PLATE_MM, _PLATE_MM + 0.05)
+    under_lid = box(0, 2, 0, 1, roof - _PLATE_MM, roof)
+    scene = Scene((low, Body("wall", "wall", (*walls, under_lid)), high), (2.0, 1.0, roof + _PLATE_MM))
+    return Exact(scene, 0.5 * EPS0_F_PER_M * _ratio(sin(pi / 4)), 1e-7)
+
+
+def _arc(middle: float, radius: float, start: float, stop: float, corners: int) -> Iterator[tuple[float, float]]:
+    """Corners of an arc, counter-clockwise; angles in half turns. Sides between them have the arc's mean radius."""
+    half = 0.5 * pi * (stop - start) / corners
+    outer = radius * half / (cos(half) * asinh(tan(half)))
+    for k in range(corners + 1):
+        angle = pi * (start + (stop - start) * k / corners)
+        yield middle + outer * cos(angle), outer * sin(angle)
+
+
+def _above(points: Iterable[tuple[float, float]]) -> Outline:
+    """Raised onto the floor."""
+    return tuple((round(x, 12), round(z, 12) + _FLOOR_MM) for x, z in points)
+
+
+def _floor(length_mm: float) -> Prism:
+    return box(0, length_mm, 0, 1, 0, _PLATE_MM)
+
+
+def _lid(length_mm: float, at_mm: float) -> Prism:
+    return box(0, length_mm, 0, 1, at_mm, at_mm + _PLATE_MM)
+
+
+def _scene(low: Outline, high: Outline, length_mm: float, height_mm: float) -> Scene:
+    """Two conductors over a wall that covers the whole floor."""
+    bodies = (
+        Body("low", "etpu", (Prism("y", low, 0, 1), _floor(length_mm)), "bottom"),
+        Body("wall", "wall", (box(0, length_mm, 0, 1, _PLATE_MM, _FLOOR_MM),)),
+        Body("high", "etpu", (Prism("y", high, 0, 1),), "top"),
+    )
+    return Scene(bodies, (length_mm, 1.0, height_mm + _FLOOR_MM))
+
+
+def _ratio(k: float) -> float:
+    """K(k) / K(k'), complete elliptic integrals of the first kind, by arithmetic-geometric means."""
+    return _mean(1.0, k) / _mean(1.0, sqrt(1 - k * k))
+
+
+def _mean(a: float, b: float) -> float:
+    while abs(a - b) > 1e-15 * a:
+        a, b = 0.5 * (a + b), sqrt(a * b)
+    return a

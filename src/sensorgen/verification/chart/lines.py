@@ -1,0 +1,179 @@
+"""Models of the pressed line on a plate whose impedance is known to 17 digits.
+
+One press is that of a round tip (Hertz's ellipse of pressure); what models of a flat tip are off is what it counts.
+The error is the larger one of abs(Z) and of Re Z by itself, at the worst tone: Re Z, which tells where the press is, is
+a thousandth of abs(Z) at low tones, and is lost first.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from sensorgen.core.errors import OutOfRange
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.models import compression, line, line_abcd, line_closed, line_ladder, line_tip, sheet, stack
+from sensorgen.models.sheet import Patch, Sheet
+from sensorgen.solvers.line.inputs import read
+from sensorgen.verification.chart.measured import DIGITS, Point, timed
+
+ASKED = "the impedance of a pressed line"
+
+# The plate of Table 3.1, pressed in its middle.
+PLATE = {
+    "L_m": 0.1, "W_m": 0.01, "H_top_m": 3e-4, "H_bottom_m": 3e-4, "rho_top_ohm_m": 0.07, "rho_bottom_ohm_m": 0.2,
+    "d_m": 6e-4, "eps_r": 4.68, "E_Pa": 6e6, "L_p_m": 0.01, "x_p_left_edge_m": 0.045,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Standard:
+    """A press on the plate.
+
+    Attributes
+    ----------
+    known : dict of float to complex
+        Impedance [ohm] by frequency [Hz]: transfer matrices in 60 digits; under a round tip a Taylor series in 30.
+    force_n : float
+        On the tip [N].
+    profile : str
+        How its pressure is spread.
+    """
+
+    known: dict[float, complex]
+    force_n: float = 3.0
+    profile: str = "uniform"
+
+    def inputs(self) -> dict[str, Any]:
+        """What models of a flat tip are given."""
+        return PLATE | {"F_N": self.force_n, "f_Hz": np.array(list(self.known))}
+
+
+STANDARD = {
+    "line, seven tones": Standard({
+        1.1e3: 3000.3727298841273 - 2093949.0417808136j,
+        2.3e3: 3000.3715445141763 - 1001455.2752495972j,
+        5.3e3: 3000.3649204154106 - 434597.15912340827j,
+        10.1e3: 3000.3434447099399 - 228061.65201439313j,
+        19.9e3: 3000.2580348134131 - 115761.42355379636j,
+        49.9e3: 2999.64993089581 - 46198.143984803854j,
+        99.7e3: 2997.4895813800539 - 23180.507246802561j,
+    }),
+    "line, 1 mHz to 100 MHz": Standard({
+        1e-3: 3000.3730814279532 - 2303343000759.7946j,
+        1.0: 3000.3730814276627 - 2303343000.7605758j,
+        1e6: 2748.5461764976843 - 2986.339472756103j,
+        1e8: 322.02875456248957 - 322.02875461574191j,
+    }),
+    "line under a round tip, 60 N": Standard({
+        1.1e3: 3008.3362535807886 - 2071759.8206417623j,
+        2.3e3: 3008.3350669899552 - 990843.04192650195j,
+        5.3e3: 3008.3284360686263 - 429991.85729211865j,
+        10.1e3: 3008.3069382438599 - 225645.02033600015j,
+        19.9e3: 3008.2214403754716 - 114534.91583195183j,
+        49.9e3: 3007.6127100033606 - 45709.083630459323j,
+        99.7e3: 3005.4501333850121 - 22935.852798041187j,
+    }, 60.0, "hertz"),
+}  # fmt: skip
+
+_LADDERS = (1, 10, 100, 1000, 10_000)  # cells per section
+_GRIDS = (20, 40, 80)  # cells along the sheet
+_PIECES = (1, 4, 16, 64, 256)  # of a tip
+
+Model = Callable[..., Any]
+
+
+def points(name: str, budget_s: float) -> list[Point]:
+    """Measure every model of the line.
+
+    Parameters
+    ----------
+    name : str
+        Of ``STANDARD``.
+    budget_s : float
+        A ladder gets no more cells where that would take longer, ten times the last one taken as a guess [s].
+    """
+    return [*_closed(name), *_grown(name, budget_s)]
+
+
+def _closed(name: str) -> Iterator[Point]:
+    models: dict[str, Model] = {
+        "line": line.impedance,
+        "line_abcd": line_abcd.impedance,
+        "line_closed": line_closed.impedance,
+        "line_closed: B.48 as printed": partial(line_closed.impedance, "B.48"),
+        "line_closed: uniform": line_closed.uniform,
+        "line_closed: R and C in series": line_closed.series,
+        "stack: one film": _stack,
+    }
+    for model, work in models.items():
+        try:
+            yield _point(name, model, work)
+        except OutOfRange:
+            continue  # it has no number there
+
+
+def _grown(name: str, budget_s: float) -> Iterator[Point]:
+    """Ladders, grids and pieces of a tip, from coarse to fine."""
+    tip = partial(_tip, STANDARD[name].profile)
+    pieces = _PIECES if STANDARD[name].profile != "uniform" else _PIECES[:1]
+    for model, work, cells, kind in (
+        ("line_ladder", line_ladder.impedance, _LADDERS, "cells"),
+        ("sheet", _sheet, _GRIDS, "cells"),
+        ("line_tip", tip, pieces, "pieces"),
+    ):
+        for number in cells:
+            try:
+                point = _point(name, model, partial(work, number), f"{number} {kind}, ")
+            except OutOfRange:
+                break  # current reaches less deep than a cell
+            yield point
+            if point.seconds * 10 > budget_s:
+                break
+
+
+def unfit(name: str) -> dict[str, str]:
+    """Why models of lines cannot speak of a scene."""
+    if STANDARD[name].profile == "uniform":
+        return {"pressure": "a flat tip presses evenly"}
+    return {"pressure": "it cuts the tip into the pieces of line_tip"}
+
+
+def _stack(**inputs: Any) -> Any:
+    """Two tracks and the film between them."""
+    sections = read(inputs).sections()
+    tracks = [[0.5 * r, 0.5 * r] for r in sections.r_ohm_per_m]  # what a loop runs through is their sum
+    return stack.impedance(tracks, [[y] for y in sections.y_s_per_m], sections.length_m)[..., 0, 0]
+
+
+def _sheet(cells: int, **inputs: Any) -> Any:
+    """Two sheets with contacts all along one edge, pressed across their whole width."""
+    p = inputs
+    resistances = p["rho_top_ohm_m"] / p["H_top_m"], p["rho_bottom_ohm_m"] / p["H_bottom_m"]
+    plate = Sheet(p["L_m"], p["W_m"], resistances, EPS0_F_PER_M * p["eps_r"] / p["d_m"])
+    thinner = 1 / (1 - p["F_N"] / (p["W_m"] * p["L_p_m"] * p["E_Pa"]))
+    press = Patch(p["x_p_left_edge_m"], 0.0, p["L_p_m"], p["W_m"], thinner)
+    contacts = plate.edge("top", "left"), plate.edge("bottom", "left")
+    return sheet.impedance(plate, [contacts], p["f_Hz"], press, cells)[:, 0, 0]
+
+
+def _tip(profile: str, pieces: int, **inputs: Any) -> Any:
+    """The patch in pieces, each with its own pressure."""
+    p, law = inputs, compression.unconfined(inputs["E_Pa"])
+    r = (p["rho_top_ohm_m"] / p["H_top_m"] + p["rho_bottom_ohm_m"] / p["H_bottom_m"]) / p["W_m"]
+    track = line_tip.Track(p["L_m"], r, 0.0, EPS0_F_PER_M * p["eps_r"] * p["W_m"] / p["d_m"], 0.0, 0.0, "open")
+    middle, contact = p["x_p_left_edge_m"] + p["L_p_m"] / 2, (np.asarray(p["L_p_m"]), np.zeros(()))
+    tip = line_tip.resting(p["L_m"], p["W_m"], (profile, pieces), np.asarray(p["F_N"]), np.asarray(middle), contact)
+    return line_tip.impedance(track, tip, law, p["f_Hz"])
+
+
+def _point(name: str, model: str, work: Model, said: str = "") -> Point:
+    standard = STANDARD[name]
+    known = np.array(list(standard.known.values()))
+    found, seconds = timed(lambda: work(**standard.inputs()))
+    whole = float(np.max(abs(found - known) / abs(known)))
+    real = float(np.max(abs(found.real - known.real) / abs(known.real)))
+    words = f"{said}abs(Z) off by {whole:.2g}, Re Z by {real:.2g}"
+    return Point(name, model, max(whole, real, DIGITS), seconds, words)

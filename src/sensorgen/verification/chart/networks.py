@@ -1,0 +1,172 @@
+"""Conductors beyond the line: two coupled films, a sheet between two contacts, printed lines across the current.
+
+Their truths are transfer matrices of 60 digits, a conformal map, resistors in a row, and another program's network.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.asprinted.rectilinear import plate
+from sensorgen.models import line, sheet, stack, traxels
+from sensorgen.models.sheet import Sheet
+from sensorgen.solvers.network.lines import Lines
+from sensorgen.verification.chart.measured import DIGITS, Point, timed
+
+ASKED = "what a network of tracks, sheets or lines conducts"
+
+Values = NDArray[Any]
+Works = list[tuple[str, Callable[[], Values]]]
+
+
+@dataclass(frozen=True)
+class Standard:
+    """Values that are known, and the work of each model that gives them.
+
+    Attributes
+    ----------
+    known : array
+        Impedances [ohm], or resistances over those of a solid [-].
+    known_to : float
+        Their relative error [-].
+    models : dict of str to tuple
+        By name: a list of words and works, from coarse to fine.
+    """
+
+    known: Values
+    known_to: float
+    models: dict[str, Works]
+
+
+_TRACKS, _FILMS = (23e3, 67e3, 23e3), (7e-10, 3.5e-10)  # [ohm/m], [F/m]
+_PRESSED = (1.3, 1.1)  # by how much each film has more capacitance under the press
+_LENGTHS_M = (0.045, 0.01, 0.045)
+_TONES_HZ = (1.1e3, 99.7e3)
+_STACK = np.array([  # [ohm] by film and film, tone by tone
+    [[3022.1409649083649 - 2006746.0822725504j, -2244.2493496187548 + 0.97652479818476318j],
+     [-2244.2493496187548 + 0.97652479818476318j, 3007.4105466358274 - 4092965.8966650541j]],
+    [[3017.1198405332813 - 22241.712333957895j, -2239.7750411322322 + 88.273088255219587j],
+     [-2239.7750411322322 + 88.273088255219587j, 3003.384599793356 - 45241.32367848025j]],
+])  # fmt: skip
+
+_SHEET = Sheet(0.1, 0.07, (450.0, 700.0), 7e-8)
+_STRETCHES_M = (0.02, 0.03, 0.035, 0.09)  # along the front edge
+_SQUARES = 0.9443847944062356  # between them
+_GRIDS = (20, 40, 80, 160)
+
+_RHO_OHM_M, _CONTACTS_OHM_M2 = 0.2, (1e-6, 1e-4, 1e-2)
+_LINE_MM, _LAYER_MM, _ACROSS = 0.42, 0.1, 12
+
+
+def two_films() -> Standard:
+    """Two films with a track in common, pressed in their middle; off the diagonal what one film shows of the other."""
+    return Standard(_STACK, DIGITS, {"stack": [("", _stacked)], "line: each film alone": [("", _alone)]})
+
+
+def front_edge() -> Standard:
+    """A sheet of 100 x 70 mm between two stretches of one edge: its rectangle as a half plane."""
+    port = [tuple(_SHEET.edge("top", "front", *_STRETCHES_M[k : k + 2]) for k in (0, 2))]
+    works: Works = [(f"{n} cells, ", partial(_between, port, n)) for n in _GRIDS]
+    return Standard(np.array([_SQUARES]), 1e-15, {"sheet": works})
+
+
+def lines_across() -> Standard:
+    """Twelve lines side by side across the current: n lines and n - 1 contacts in a row."""
+    share = (_ACROSS - 1) / _ACROSS / (_RHO_OHM_M * _LINE_MM * 1e-3)
+    known = 1 + share * np.array(_CONTACTS_OHM_M2)
+    return Standard(known, DIGITS, {"traxels": [("", _across)], "traxels: as a solid": [("", lambda: np.ones(3))]})
+
+
+def electrode() -> Standard:
+    """Three layers of 100 x 10 mm, across, along and across, in two walls; contacts of 1e-4 ohm m2."""
+    return Standard(
+        np.array([1.422]), 0.05, {"traxels": [("", _electrode)], "traxels: as a solid": [("", lambda: np.ones(1))]}
+    )
+
+
+STANDARD: dict[str, Callable[[], Standard]] = {
+    "two films, one track shared": two_films,
+    "sheet, contacts on one edge": front_edge,
+    "printed lines across the current": lines_across,
+    "printed electrode, 1e-4 ohm m²": electrode,
+}
+
+
+def points(name: str, budget_s: float) -> list[Point]:
+    """Measure every model of a network.
+
+    Parameters
+    ----------
+    name : str
+        Of ``STANDARD``.
+    budget_s : float
+        A finer grid is not tried where that would take longer, ten times the last one taken as a guess [s].
+    """
+    return list(_points(name, STANDARD[name](), budget_s))
+
+
+def unfit(_: str) -> dict[str, str]:
+    """Why models of networks cannot speak of a scene."""
+    other = "this network is of another kind"
+    return {"stack": other, "sheet": other, "traxels": other, "line": other}
+
+
+def _points(name: str, standard: Standard, budget_s: float) -> Iterator[Point]:
+    for model, works in standard.models.items():
+        for said, work in works:
+            found, seconds = timed(work)
+            off = max(_off(part(found), part(standard.known)) for part in (np.asarray, np.real))
+            yield Point(name, model, max(off, standard.known_to), seconds, f"{said}off by {off:.3g} at most")
+            if 10 * seconds > budget_s:
+                break
+
+
+def _off(found: Values, known: Values) -> float:
+    return float(np.max(abs(found - known) / abs(known)))
+
+
+def _sections() -> tuple[list[list[float]], Values]:
+    """Tracks of each section, and its films' admittances, tone by tone [S/m]."""
+    free = 2j * np.pi * np.array(_TONES_HZ)[:, None] * np.array(_FILMS)
+    return [list(_TRACKS)] * 3, np.stack([free, free * _PRESSED, free])
+
+
+def _stacked() -> Values:
+    tracks, films = _sections()
+    return stack.impedance(tracks, [list(section.T) for section in films], _LENGTHS_M)
+
+
+def _alone() -> Values:
+    """As if no track were shared: nothing off the diagonal."""
+    tracks, films = _sections()
+    found = np.zeros_like(_STACK)
+    for k in (0, 1):
+        loop = [np.asarray(section[k] + section[k + 1]) for section in tracks]
+        lengths = [np.asarray(length) for length in _LENGTHS_M]
+        found[:, k, k] = line.cascade(loop, list(films[:, :, k]), lengths, "open")
+    return found
+
+
+def _between(port: list[Any], cells: int) -> Values:
+    z = sheet.impedance(_SHEET, port, 0.0, cells=cells)[0, 0, 0]
+    return np.array([z.real / _SHEET.sheet_resistance_ohm[0]])
+
+
+def _across() -> Values:
+    """Between the middles of the first and the last line; half a line more at each end."""
+    pitch, high, reach = _LINE_MM * 1e-3, _LAYER_MM * 1e-3, 5e-3
+    x, full = pitch * np.arange(_ACROSS), np.ones(_ACROSS)
+    start, end = (np.column_stack([x, side * reach * full]) for side in (-1, 1))
+    lines = Lines(start, end, full * pitch, full * high, np.zeros(_ACROSS, np.int64), np.zeros(_ACROSS, bool))
+    span, area = (0.0, float(x[-1])), high * 2 * reach
+    found = [traxels.resistance(lines, _RHO_OHM_M, contact, span, area).ratio for contact in _CONTACTS_OHM_M2]
+    return (1 + (_ACROSS - 1) * np.array(found)) / _ACROSS
+
+
+def _electrode() -> Values:
+    lines = plate(100.0, 10.0, _LINE_MM, _LAYER_MM, (90, 180, 90))
+    return np.array([traxels.resistance(lines, _RHO_OHM_M, 1e-4, (-48.9e-3, 48.9e-3), 3e-6).ratio])

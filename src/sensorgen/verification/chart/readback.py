@@ -1,0 +1,90 @@
+"""Ways back from impedance to the press: force and position that one reading gives.
+
+The reading is that of the first line of :mod:`sensorgen.verification.chart.lines`, known to 17 digits. The error is
+the larger one
+of force, as a share of it, and position, as a share of the sensor's length.
+"""
+
+from collections.abc import Callable
+from functools import cache, partial
+
+import numpy as np
+
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.models import compression, line, line_fit
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.inverse import Estimator
+from sensorgen.verification.chart import lines
+from sensorgen.verification.chart.measured import DIGITS, Point, timed
+
+ASKED = "force and position from an impedance"
+_LINE = lines.STANDARD["line, seven tones"]
+_TONES = np.array(list(_LINE.known))
+_READING = np.array(list(_LINE.known.values()))
+_FIT_HZ, _FIT = 10.1e3, 3  # tone of the thesis's fit, and its place among all
+_LENGTH_M, _TIP_M = lines.PLATE["L_m"], lines.PLATE["L_p_m"]
+
+STANDARD = {"press read back": (_LINE.force_n, lines.PLATE["x_p_left_edge_m"] + _TIP_M / 2)}  # [N], centre [m]
+
+Press = tuple[float, float]
+
+
+def points(name: str, _: float) -> list[Point]:
+    """Measure every way back; what is prepared once for a sensor is not in its time.
+
+    Parameters
+    ----------
+    name : str
+        Of ``STANDARD``.
+    """
+    ways: dict[str, Callable[[], Press]] = {
+        **{f"line_fit: {form}": partial(_by_fit, form) for form in line_fit.FORMS},
+        "line_fit: C.5 as printed": _as_printed,
+        "invert: seven tones": _sought,
+    }
+    return [_point(name, model, *timed(work)) for model, work in ways.items()]
+
+
+def unfit(_: str) -> dict[str, str]:
+    """Why models of the line are not asked: only what turns around is."""
+    return {}
+
+
+@cache
+def _fitted(form: str) -> line_fit.LineFit:
+    """The fit to presses all over the plate, by the line's own model."""
+    force, x = (a.ravel() for a in np.meshgrid(np.linspace(1, 6, 6), np.linspace(0, _LENGTH_M - _TIP_M, 10)))
+    z = line.impedance(**lines.PLATE | {"F_N": force, "x_p_left_edge_m": x, "f_Hz": _FIT_HZ})
+    return line_fit.fit(force, x + _TIP_M / 2, *line_fit.series(_FIT_HZ, z), form)
+
+
+def _by_fit(form: str) -> Press:
+    found = _fitted(form).presses(*line_fit.series(_FIT_HZ, _READING[[_FIT]]))
+    return float(found.force_n[0]), float(found.choice(_LENGTH_M)[0])
+
+
+def _as_printed() -> Press:
+    capacitance, _ = line_fit.series(_FIT_HZ, _READING[[_FIT]])
+    fit = _fitted("printed")
+    return float(fit.force_n(capacitance)[0]), float(fit.printed_position_m(capacitance)[0])
+
+
+@cache
+def _estimator() -> Estimator:
+    p = lines.PLATE
+    film = EPS0_F_PER_M * p["eps_r"] * p["W_m"] / p["d_m"]
+    high, rho = (p["H_top_m"], p["H_bottom_m"]), (p["rho_top_ohm_m"], p["rho_bottom_ohm_m"])
+    law = compression.unconfined(p["E_Pa"])
+    return Estimator(Sensor(_LENGTH_M, p["W_m"], high, rho, film, law, _TIP_M), _TONES)
+
+
+def _sought() -> Press:
+    found = _estimator().one(_READING)
+    return found.force_n, found.position_m
+
+
+def _point(scene: str, model: str, found: Press, seconds: float) -> Point:
+    force, position = STANDARD[scene]
+    off = abs(found[0] / force - 1), abs(found[1] - position) / _LENGTH_M
+    said = f"{found[0]:.6g} N at {1e3 * found[1]:.6g} mm"
+    return Point(scene, model, max(*off, DIGITS), seconds, said)

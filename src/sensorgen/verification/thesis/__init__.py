@@ -1,0 +1,8 @@
+"""The thesis, reproduced: every numbered equation, table and figure with its value, ours, and a verdict."""
+
+from sensorgen.verification.thesis.markdown import markdown
+from sensorgen.verification.thesis.page import html
+from sensorgen.verification.thesis.plain import plain
+from sensorgen.verification.thesis.reproduced import Row, rows
+
+__all__ = ["Row", "html", "markdown", "plain", "rows"]

@@ -1,0 +1,65 @@
+"""Columns of layers between two electrodes, as our model of columns has them; and cells as field solvers have them."""
+
+from collections.abc import Sequence
+
+from sensorgen.core.errors import MissingValue
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design import design as designs
+from sensorgen.models import columns
+from sensorgen.prediction import capacitance as planner
+from sensorgen.scene.scene import Body, Scene, box
+
+EPS_R = 4.68
+PERMITTIVITY = {"x60": EPS_R, "air": 1.0}  # the thesis takes air for vacuum
+FILM_MM = 0.1
+SHOWN = 3  # digits of a field solver's answer
+_ACCURACY = 1e-3  # of it, against which 20 % show
+
+Layer = tuple[str, float]  # material and thickness [mm]
+_ELECTRODE_MM = 0.1
+
+
+def piles_f(piles: Sequence[tuple[float, Sequence[Layer]]], depth_mm: float = 1.0) -> float:
+    """Capacitance of columns side by side, each of a width [mm] and of layers from below [F].
+
+    The top electrode comes down to each of them, so that what stands in a column is what is named.
+    """
+    top = 2 * _ELECTRODE_MM + max(sum(thickness for _, thickness in layers) for _, layers in piles)
+    end = sum(width for width, _ in piles)
+    solid, conductor, left = [], [], 0.0
+    for width, layers in piles:
+        z = _ELECTRODE_MM
+        for material, thickness in layers:
+            if material == "x60":
+                solid.append(box(left, left + width, 0.0, depth_mm, z, z + thickness))
+            z += thickness
+        conductor.append(box(left, left + width, 0.0, depth_mm, z, top))
+        left += width
+    bodies = (
+        Body("bottom_electrode", "etpu", (box(0.0, end, 0.0, depth_mm, 0.0, _ELECTRODE_MM),), "bottom"),
+        Body("film", "x60", tuple(solid)),
+        Body("top_electrode", "etpu", tuple(conductor), "top"),
+    )
+    return columns.capacitance(Scene(bodies, (end, depth_mm, top)), PERMITTIVITY).lower
+
+
+def pile_f_per_m2(layers: Sequence[Layer]) -> float:
+    """Capacitance per area of layers on one another [F/m2]."""
+    return piles_f([(1.0, layers)]) / M_PER_MM**2
+
+
+def exact_f_per_m2(shape: str) -> float:
+    """Capacitance per area of a shape's default cell, the mean of close bounds [F/m2].
+
+    Raises
+    ------
+    MissingValue
+        No solver that is installed comes near enough.
+    """
+    made = designs.make({"shape": shape, "parameters": {"dielectric_mm": FILM_MM}})
+    eps = {taken.material: taken.value for taken in planner.permittivities(made)}
+    found = planner.capacitance(made.in_use, eps, _ACCURACY)
+    if not found.reached():
+        raise MissingValue(f"no model here comes as near as {_ACCURACY:g}: {'; '.join(found.refused)}")
+    area = made.params.length_mm * made.params.width_mm * M_PER_MM**2
+    return (found.capacitance_f.lower + found.capacitance_f.upper) / 2 / area

@@ -1,0 +1,101 @@
+"""Potentials and currents along an unpressed line, from nothing but impedances that our model gives.
+
+A piece of line with its far end open and shorted gives the piece as a two-port, by reciprocity and symmetry; the whole
+line then says what flows into it. So the thesis's differential equations are held against a model that never saw them.
+"""
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import ArrayLike, NDArray
+
+from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.models import line
+
+Complex = NDArray[np.complex128]
+
+LENGTH_M, WIDTH_M, HEIGHT_M, FILM_M = 0.1, 0.01, 3e-4, 6e-4  # Table 3.1
+EPS_R = 4.68
+RHO_OHM_M = 0.135  # Table C.1, mean of both electrodes: the thesis's equations know only one
+FREQUENCY_HZ = 99.7e3
+OMEGA = 2 * np.pi * FREQUENCY_HZ
+STEP_M = 1e-6  # that stands for a Delta x
+INPUT_V = 1.0
+
+TRACKS = {
+    "W_m": WIDTH_M, "H_top_m": HEIGHT_M, "H_bottom_m": HEIGHT_M, "rho_top_ohm_m": RHO_OHM_M,
+    "rho_bottom_ohm_m": RHO_OHM_M, "d_m": FILM_M, "eps_r": EPS_R, "f_Hz": FREQUENCY_HZ,
+}  # fmt: skip
+
+AREA_M2 = HEIGHT_M * WIDTH_M
+CAPACITANCE_F_PER_M = EPS0_F_PER_M * EPS_R * WIDTH_M / FILM_M
+GAMMA = 1j * OMEGA * EPS0_F_PER_M * EPS_R * RHO_OHM_M / (HEIGHT_M * FILM_M)  # B.17
+K = np.sqrt(2 * GAMMA)
+
+_DEGREE = 16  # of the polynomials: the fields' own are below rounding from 12 on
+
+
+class Smooth:
+    """A field along the line, and its derivatives."""
+
+    def __init__(self, field: Callable[[NDArray[np.float64]], Complex]) -> None:
+        """Interpolate between the ends."""
+        places = chebyshev.chebpts1(_DEGREE + 1)
+        values = field((places + 1) / 2 * LENGTH_M)
+        self._terms: NDArray[Any] = np.linalg.solve(chebyshev.chebvander(places, _DEGREE), values)
+
+    def at(self, x_m: ArrayLike, order: int = 0) -> Complex:
+        """Its value, or a derivative of it, per metre to the power of the order."""
+        terms = chebyshev.chebder(self._terms, order) * (2 / LENGTH_M) ** order
+        return np.asarray(chebyshev.chebval(2 * np.asarray(x_m) / LENGTH_M - 1, terms))
+
+
+class Line:
+    """The line of Table 3.1 at its highest tone, 1 V on its top track and the bottom one earthed."""
+
+    @cached_property
+    def impedance_ohm(self) -> complex:
+        """At the contacts."""
+        return complex(line.impedance(L_m=LENGTH_M, **TRACKS))
+
+    @cached_property
+    def input_a(self) -> complex:
+        """Current into the top track."""
+        return INPUT_V / self.impedance_ohm
+
+    @cached_property
+    def difference_v(self) -> Smooth:
+        """U1 - U2."""
+        return Smooth(lambda x: self._behind(x)[0])
+
+    @cached_property
+    def current_a(self) -> Smooth:
+        """I1; I2 is its opposite, since what goes out on one track comes back on the other."""
+        return Smooth(lambda x: self._behind(x)[1])
+
+    def top_v(self, x_m: ArrayLike, order: int = 0) -> Complex:
+        """U1 or a derivative: both tracks resist alike, so that U1 + U2 is the same everywhere."""
+        return ((order == 0) * INPUT_V + self.difference_v.at(x_m, order)) / 2
+
+    def bottom_v(self, x_m: ArrayLike, order: int = 0) -> Complex:
+        """U2 or a derivative."""
+        return ((order == 0) * INPUT_V - self.difference_v.at(x_m, order)) / 2
+
+    def transfer(self, x_m: ArrayLike) -> tuple[Complex, Complex, Complex]:
+        """A11 = A22, A12 and A21 of a piece of the line, from its impedances."""
+        length = np.asarray(x_m, float)
+        far_open = line.impedance(L_m=length, **TRACKS)
+        far_short = line.impedance(L_m=length, far_end="short", **TRACKS)
+        same = np.sqrt(far_open / (far_open - far_short))
+        return same, -far_short * same, -same / far_open
+
+    def _behind(self, x_m: ArrayLike) -> tuple[Complex, Complex]:
+        same, a12, a21 = self.transfer(x_m)
+        return same * INPUT_V + a12 * self.input_a, a21 * INPUT_V + same * self.input_a
+
+
+LINE = Line()
+PLACES_M = np.array([0.013, 0.031, 0.057, 0.086])  # where equations along the line are tried

@@ -1,0 +1,81 @@
+"""What is numbered in the thesis, chapter by chapter: the files in ``chapters/``, in our own words."""
+
+from collections.abc import Iterator
+from functools import cache
+from importlib import resources
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from sensorgen.core import yamlfile
+from sensorgen.core.errors import BadInput
+from sensorgen.core.records import Strict, checked
+from sensorgen.verification.thesis.verdicts import EXACT, Expected
+
+CHAPTERS = ("2", "3", "4", "5", "6", "7", "B", "C", "D")
+Kind = Literal["equation", "figure", "table"]
+KINDS: tuple[Kind, ...] = ("equation", "figure", "table")
+
+Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]*$", examples=["one line without control characters"])]
+
+
+class Item(Strict):
+    """One numbered thing.
+
+    Attributes
+    ----------
+    number, says : str
+        As numbered; what it says.
+    check : str
+        Module and function in ``checks/`` that computes it, or "".
+    given : dict
+        What that function is told: mostly the thesis's own values.
+    tolerance, off, within, erratum, because
+        As of :class:`sensorgen.verification.thesis.verdicts.Expected`.
+    why_tolerance : str
+        Why a larger tolerance than rounding is right.
+    lost, uncovered : str
+        Why it cannot be reproduced; why nothing here speaks of it. What a check then gives is shown, not judged.
+    """
+
+    number: Text
+    says: Text
+    check: Annotated[str, Field(pattern=r"^([a-z]+\.[a-z_]+)?$", examples=["line.current"])] = ""
+    given: dict[str, Any] = Field(default={})
+    tolerance: float = EXACT
+    why_tolerance: Text = ""
+    off: dict[str, float] = Field(default={})
+    within: float = 0.0
+    erratum: Text = ""
+    because: Text = ""
+    lost: Text = ""
+    uncovered: Text = ""
+
+    def expected(self) -> Expected:
+        """What is known of it beforehand."""
+        return Expected(self.tolerance, self.erratum, self.because, self.off, self.within)
+
+
+class Chapter(Strict):
+    """A chapter or appendix with all its items."""
+
+    title: Text
+    equations: list[Item] = Field(default=[])
+    figures: list[Item] = Field(default=[])
+    tables: list[Item] = Field(default=[])
+
+    def items(self) -> Iterator[tuple[Kind, Item]]:
+        """All of them, with what they are."""
+        for kind, found in zip(KINDS, (self.equations, self.figures, self.tables), strict=True):
+            yield from ((kind, item) for item in found)
+
+
+@cache
+def chapter(name: str) -> Chapter:
+    """Read a chapter of ``CHAPTERS``."""
+    file = f"chapters/{name}.yaml"
+    data = yamlfile.parse((resources.files("sensorgen.verification.thesis") / file).read_text("utf-8"), file)
+    try:
+        return checked(Chapter, data)
+    except BadInput as error:
+        raise error.within(file) from None

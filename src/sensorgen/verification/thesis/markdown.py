@@ -1,0 +1,97 @@
+"""The reproduction as Markdown."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+from sensorgen.verification.thesis import shown
+from sensorgen.verification.thesis.items import CHAPTERS, KINDS, chapter
+from sensorgen.verification.thesis.reproduced import Row
+from sensorgen.verification.thesis.verdicts import UNEXPLAINED, WORDS
+
+ABOUT = (
+    "Every numbered equation, table and figure of chapters 2 to 7 and appendices B to D of the thesis, held against "
+    "this package. Its values are computed as `sensorgen thesis` runs; what stands under “thesis” is a printed value, "
+    "or a printed equation put into numbers. Lines are those of Table 3.1 with the mean resistivity of Table C.1, "
+    "0.135 ohm m, at 99.7 kHz where nothing else is said; cells are the default ones with a film of 0.1 mm."
+)
+VERDICTS = {
+    "agrees": "the thesis's value and ours have these leading digits in common",
+    "misprint confirmed": "as printed it differs from ours, corrected it agrees",
+    "differs": "it differs by as much as is known, for the reason that is given",
+    "not covered": "nothing here speaks of it, or nothing in it can be compared",
+    "cannot be reproduced": "numbers did not survive or were never published; ours are shown where we have some",
+    "unexplained": "it differs, and nobody knows why: report it",
+}
+
+
+def markdown(rows: Sequence[Row]) -> str:
+    """The whole page."""
+    return "\n".join(_lines(rows)) + "\n"
+
+
+def words(rows: Sequence[Row]) -> list[str]:
+    """Verdicts in use, in their order; the one that should not occur only where it does."""
+    found = {row.verdict.word for row in rows}
+    return [word for word in WORDS if word != UNEXPLAINED or word in found]
+
+
+def _lines(rows: Sequence[Row]) -> Iterator[str]:
+    yield "# The thesis, reproduced"
+    yield ""
+    yield "Written by `sensorgen thesis`; a test holds the two together."
+    yield ""
+    yield ABOUT
+    yield ""
+    yield from (f"- **{word}**: {VERDICTS[word]}" for word in words(rows))
+    yield ""
+    yield from _summary(rows)
+    for name in CHAPTERS:
+        yield ""
+        yield f"## {heading(name)}"
+        yield ""
+        yield "| number | what it says | thesis | ours | verdict | erratum |"
+        yield "|---|---|---|---|---|---|"
+        yield from (_row(row) for row in rows if row.chapter == name)
+
+
+def heading(name: str) -> str:
+    """A chapter's name and title."""
+    return f"{'Chapter' if name.isdigit() else 'Appendix'} {name}: {chapter(name).title}"
+
+
+def counted(rows: Sequence[Row]) -> Iterator[tuple[str, list[int]]]:
+    """Each verdict, and how many equations, figures and tables, and of all, have it; last the sums."""
+    for word in (*words(rows), ""):
+        found = Counter(row.kind for row in rows if row.verdict.word == word or not word)
+        yield word, [*(found[kind] for kind in KINDS), sum(found.values())]
+
+
+def _summary(rows: Sequence[Row]) -> Iterator[str]:
+    yield f"| | {' | '.join(f'{kind}s' for kind in KINDS)} | all |"
+    yield f"|---|{'---|' * (len(KINDS) + 1)}"
+    for word, counts in counted(rows):
+        yield f"| {word or 'all'} | {' | '.join(map(str, counts))} |"
+
+
+def _row(row: Row) -> str:
+    item = row.item
+    cells = (
+        row.name(),
+        item.says,
+        "; ".join(shown.thesis(row.parts, item.tolerance)),
+        "; ".join(shown.ours(row.parts, item.tolerance)),
+        verdict(row),
+        item.erratum,
+    )
+    return f"| {' | '.join(map(_cell, cells))} |"
+
+
+def _cell(text: str) -> str:
+    """Without what Markdown would take for a new cell, or for HTML."""
+    return text.replace("|", "&#124;").replace("<", "&lt;")
+
+
+def verdict(row: Row) -> str:
+    """The verdict, and why its tolerance is what it is."""
+    why = row.item.why_tolerance
+    return row.verdict.text() + (f"; tolerance {row.item.tolerance:.2g}, since {why}" if why else "")

@@ -1,0 +1,69 @@
+"""All numbered items of the thesis, computed anew and judged."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sensorgen.core import plugins as registry
+from sensorgen.core.errors import MissingValue, SensorgenError
+from sensorgen.verification.thesis import checks
+from sensorgen.verification.thesis.items import CHAPTERS, Item, Kind, chapter
+from sensorgen.verification.thesis.verdicts import LOST, NOT_COVERED, UNEXPLAINED, Part, Verdict, judged
+
+
+@dataclass(frozen=True)
+class Row:
+    """An item with what came of it."""
+
+    chapter: str
+    kind: Kind
+    item: Item
+    parts: tuple[Part, ...]
+    verdict: Verdict
+
+    def name(self) -> str:
+        """As one would cite it: ``Table 3.1``."""
+        return f"{'Eq.' if self.kind == 'equation' else self.kind.capitalize()} {self.item.number}"
+
+
+def rows(started: Callable[[str], None] = lambda _: None) -> list[Row]:
+    """Every item of every chapter, in order.
+
+    Parameters
+    ----------
+    started : callable
+        Told each chapter's name before it is computed.
+    """
+    found = []
+    for name in CHAPTERS:
+        started(name)
+        found += [row(name, kind, item) for kind, item in chapter(name).items()]
+    return found
+
+
+def row(of_chapter: str, kind: Kind, item: Item) -> Row:
+    """One item, computed.
+
+    Notes
+    -----
+    A value or a solver that is missing here leaves it uncovered; any other refusal of a model is unexplained.
+    """
+    try:
+        parts = tuple(_computed(item.check, item.given)) if item.check else ()
+    except MissingValue as error:
+        return Row(of_chapter, kind, item, (), Verdict(NOT_COVERED, f"({error})"))
+    except SensorgenError as error:
+        return Row(of_chapter, kind, item, (), Verdict(UNEXPLAINED, f"({error})"))
+    if item.lost:
+        verdict = Verdict(LOST, f"({item.lost})")
+    elif item.uncovered:
+        verdict = Verdict(NOT_COVERED, f"({item.uncovered})")
+    else:
+        verdict = judged(item.expected(), parts)
+    return Row(of_chapter, kind, item, parts, verdict)
+
+
+def _computed(check: str, given: Mapping[str, Any]) -> list[Part]:
+    module, _, function = check.partition(".")
+    found: list[Part] = getattr(registry.load(checks, module), function)(**given)
+    return found

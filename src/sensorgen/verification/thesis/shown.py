@@ -1,0 +1,91 @@
+"""What was computed, in words: one line for the thesis, one for us."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sensorgen.verification.thesis.verdicts import Part
+
+_FEW = 3  # parts, or complex values in a part, that are all shown
+_FEW_REAL = 8
+_NONE = "no number"
+_NOISE = 1e-9  # below this share of what is large, a number is what rounding left
+
+MINUS, ELLIPSIS = "\u2212", "\u2026"
+
+_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+_PREFIXED = ("A", "C", "F", "Hz", "N", "Pa", "S", "V", "m", "ohm")  # units that take one, alone or over something
+
+
+def thesis(parts: Sequence[Part], tolerance: float) -> list[str]:
+    """The thesis's values: those that differ, or all where they are few."""
+    return [_line(part, _printed(part)) for part in _chosen(parts, tolerance) if part.printed is not None]
+
+
+def ours(parts: Sequence[Part], tolerance: float) -> list[str]:
+    """Ours of the same, and how many more there are."""
+    chosen = _chosen(parts, tolerance)
+    more = len(parts) - len(chosen)
+    rest = [f"{more} more values that agree"] if more else []
+    return [_line(part, _number(part, part.ours)) for part in chosen] + rest
+
+
+def _chosen(parts: Sequence[Part], tolerance: float) -> Sequence[Part]:
+    if len(parts) <= _FEW:
+        return parts
+    wrong = [part for part in parts if not abs(part.off()) <= tolerance]
+    return wrong or parts[:_FEW]
+
+
+def _line(part: Part, value: str) -> str:
+    return f"{part.name}: {value}"
+
+
+def _printed(part: Part) -> str:
+    corrected = "" if part.corrected is None else f"; corrected {_number(part, part.corrected)}"
+    return f"{_number(part, part.printed)}{corrected}" if part.printed is not None else ""
+
+
+def _number(part: Part, values: ArrayLike) -> str:
+    """In the light of ours: what is nothing beside it is what rounding left."""
+    return number(values, part.unit, max(part.scale, float(np.max(abs(np.asarray(part.ours))))), part.shown)
+
+
+def number(values: ArrayLike, unit: str = "", scale: float = 0.0, digits: int = 5) -> str:
+    """One number or several with their unit.
+
+    >>> number(2997.116648 - 23192.109j, "ohm"), number([1.0, 2e-3], "V"), number(float("nan"))
+    ('2.9971 − 23.192j kohm', '1, 0.002 V', 'no number')
+    """
+    flat = np.atleast_1d(np.asarray(values)).ravel()
+    if np.isnan(flat).all():
+        return _NONE
+    large = max((abs(v) for v in flat.tolist() if not np.isnan(v)), default=0.0)
+    power = _power(large if large > _NOISE * scale else 0.0, unit)
+    texts = [_one(value / 10.0**power, _NOISE * max(large, scale) / 10.0**power, digits) for value in flat.tolist()]
+    end = f" {_PREFIXES[power]}{unit}" if unit else ""
+    if len(texts) <= (_FEW if np.iscomplexobj(flat) else _FEW_REAL):
+        return f"{', '.join(texts)}{end}"
+    return f"{texts[0]} {ELLIPSIS} {texts[-1]}{end} ({len(texts)} values)"
+
+
+def _power(large: float, unit: str) -> int:
+    """Of ten, by which a unit is prefixed so that the largest value has one to three digits before its point."""
+    if unit.partition("/")[0] not in _PREFIXED:
+        return 0
+    return max((p for p in _PREFIXES if large >= 10.0**p * (1 - _NOISE)), default=0)
+
+
+def _one(value: complex, noise: float, digits: int) -> str:
+    if np.isnan(value):
+        return _NONE
+    real, imaginary = (0.0 if abs(v) <= noise else v for v in (value.real, value.imag))
+    if not isinstance(value, complex) or not imaginary:
+        return _real(real, digits)
+    sign = MINUS if imaginary < 0 else "+"
+    return f"{_real(real, digits)} {sign} {_real(abs(imaginary), digits)}j" if real else f"{_real(imaginary, digits)}j"
+
+
+def _real(value: float, digits: int) -> str:
+    return f"{value:.{digits}g}".replace("-", MINUS)

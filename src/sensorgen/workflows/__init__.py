@@ -1,0 +1,1 @@
+"""Complete sets of files: build, slice, batch."""

@@ -1,0 +1,229 @@
+"""Print batches: a plan of designs and copies becomes one plate, with a record of what lies where."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from sensorgen.checks.review import Review, Step, review
+from sensorgen.core import files as store
+from sensorgen.core.errors import BadInput, OutOfRange, Unprintable
+from sensorgen.core.findings import Finding
+from sensorgen.design.design import Design
+from sensorgen.export import threemf
+from sensorgen.export.slicers import TIME_LIMIT_S
+from sensorgen.prediction.prediction import prediction
+from sensorgen.workflows.batch import picture, printing, record, sheet, tab
+from sensorgen.workflows.batch.layout import Plate, Room, Size, column, packed, room
+from sensorgen.workflows.batch.pieces import Piece, pieces, shuffled, tools
+from sensorgen.workflows.batch.plan import Plan, load
+from sensorgen.workflows.build import json_bytes, versions
+
+ACCURACY = 1e-3  # of the expected capacitance: what a print is held against should not be the largest doubt
+STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "as printed", "record", "done")
+
+
+@dataclass(frozen=True, eq=False)
+class Arranged:
+    """A plan's specimens on their plate.
+
+    Attributes
+    ----------
+    plan : Plan
+        As read.
+    pieces : tuple of Piece
+        In the random order in which the plate is filled.
+    room : Room
+        What the plate has to offer.
+    plate : mapping of int to Rect
+        Place of each piece.
+    """
+
+    plan: Plan
+    pieces: tuple[Piece, ...]
+    room: Room
+    plate: Plate
+
+    @cached_property
+    def designs(self) -> dict[str, Design]:
+        """The designs, once each, by their hash."""
+        return {piece.design_id: piece.design for piece in self.pieces}
+
+    @cached_property
+    def tools(self) -> dict[int, str]:
+        """What each tool prints."""
+        return tools(self.designs.values())
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What a batch has left behind.
+
+    Attributes
+    ----------
+    folder : Path
+        Where the files are.
+    record : dict
+        As in ``batch.json``.
+    findings : dict
+        Findings about each design, by its name.
+    """
+
+    folder: Path
+    record: dict[str, Any]
+    findings: dict[str, list[Finding]]
+
+    def gcode_errors(self) -> int:
+        """How many findings of severity error the check of the G-code has [-]."""
+        return sum(f["severity"] == "error" for used in self.record["slicers"].values() for f in used["findings"])
+
+    def lost(self) -> int:
+        """How many layers of bodies are not printed at all, against the will of their design [-]."""
+        designs = (made for used in self.record["slicers"].values() for made in used["printed"].values())
+        return sum(f["severity"] == "error" and not f["waiver"] for made in designs for f in made["findings"])
+
+
+def arranged(path: Path) -> Arranged:
+    """A plan's file laid out on its plate.
+
+    Parameters
+    ----------
+    path : Path
+        The plan.
+
+    Raises
+    ------
+    BadInput
+        The plan is wrong, or needs more than one plate.
+    OutOfRange
+        One of its specimens fits on no plate.
+    """
+    plan = load(path)
+    found = shuffled(pieces(plan, path.parent), plan.seed)
+    first = found[0].design
+    count = len(tools(piece.design for piece in found))
+    here = room(first.machine, first.layers, count, plan.layout.spacing_mm, plan.layout.brim_mm)
+    layout = packed if plan.layout.kind == "packed" else column(plan.layout.per_column)
+    try:
+        plates = layout([_size(plan, piece) for piece in found], here)
+    except OutOfRange as error:
+        raise error.within(str(path)) from None
+    if len(plates) > 1:
+        raise BadInput(
+            f"{path}: {len(found)} specimens need {len(plates)} plates, {len(plates[0])} of them on the first "
+            f"(layout {plan.layout.kind}, {here.gap_mm:g} mm apart): make {len(plates)} plans, or ask for fewer"
+        )
+    return Arranged(plan, found, here, plates[0])
+
+
+def _size(plan: Plan, piece: Piece) -> Size:
+    """Length and width that a specimen takes on the plate, its tab included [mm]."""
+    length, width, _ = piece.design.printed.size_mm
+    return (length + tab.size_mm(piece.design, piece.name)[0], width) if plan.labels.tab else (length, width)
+
+
+def make(
+    path: Path,
+    out: Path,
+    *,
+    gcode: bool = True,
+    time_limit_s: float = TIME_LIMIT_S,
+    force: bool = False,
+    strict: bool = False,
+    step: Step = lambda _: None,
+) -> Batch:
+    """Write all files of a batch into ``out/<name>``.
+
+    Parameters
+    ----------
+    path : Path
+        The plan.
+    out : Path
+        Folder that holds the batches' folders.
+    gcode : bool
+        Also slice; the slicers take most of the time.
+    time_limit_s : float
+        How long each slicer may take [s].
+    force : bool
+        Write the files in spite of findings of severity error.
+    strict : bool
+        Take warnings for errors.
+    step : callable
+        Told what comes next, for a progress display.
+
+    Raises
+    ------
+    Unprintable
+        The checks found errors; nothing was written.
+    SensorgenError
+        The plan or one of its designs is wrong, a slicer is missing or fails, or the place cannot be written to;
+        nothing was written.
+    """
+    step("plan")
+    found = arranged(path)
+    step("checks")
+    held = {key: review(design) for key, design in found.designs.items()}
+    _refuse_unprintable(found, held, force=force, strict=strict)
+    step("predictions")
+    predicted = {key: prediction(design, accuracy=ACCURACY, judged=False) for key, design in found.designs.items()}
+    folder = out / found.plan.name
+    with store.staging(folder) as stage:
+        step("3MF")
+        store.write(stage, {"plan.yaml": path.read_bytes()})
+        on_plate = printing.placed(found.plan, found.pieces, found.plate)
+        slicers = found.plan.slicers if gcode else ()
+        sliced_from = {"prusa"} & set(slicers)  # slicing leaves the 3MF that it took; CuraEngine takes none
+        families = [family for family in threemf.FAMILIES if family not in sliced_from]
+        for name, content in (*printing.threemfs(found.plan.name, on_plate, families), *_files(found)):
+            store.write(stage, {name: content})
+        sliced: dict[str, Any] = {
+            s: printing.gcode(found.plan.name, on_plate, s, stage, time_limit_s, step) for s in slicers
+        }
+        step("record")
+        made = record.sealed(_record(found, predicted, sliced, stage))
+        store.write(stage, {record.RECORD: json_bytes(made)})
+        store.publish(stage, folder, record.RECORD)
+    step("done")
+    return Batch(folder, made, {found.designs[key].name: held[key].findings for key in held})
+
+
+def _refuse_unprintable(found: Arranged, held: Mapping[str, Review], *, force: bool, strict: bool) -> None:
+    wrong = [key for key in held if held[key].errors(strict)]
+    if wrong and not force:
+        raise Unprintable([f for key in wrong for f in held[key].findings]).within(found.designs[wrong[0]].name)
+
+
+def _files(found: Arranged) -> Iterator[tuple[str, bytes]]:
+    """What is for people: designs, plate and labels."""
+    plan, machine = found.plan, found.pieces[0].design.machine
+    for key, design in found.designs.items():
+        yield f"designs/{key}.json", json_bytes(design.model_dump(mode="json"))
+    yield "plate.svg", picture.svg(plan.name, machine, found.room, found.plate, found.pieces).encode()
+    if plan.labels.sheet:
+        labels = [sheet.Label.of(found.pieces[n], plan.name, order) for order, n in enumerate(found.plate, 1)]
+        yield "labels.html", sheet.page(labels, plan.name).encode()
+
+
+def _record(
+    found: Arranged, predicted: Mapping[str, Mapping[str, Any]], sliced: Mapping[str, Any], stage: Path
+) -> dict[str, Any]:
+    plan, first = found.plan, found.pieces[0].design
+    loaded = record.tools(plan, found.tools)
+    return {
+        "batch": plan.name,
+        "iteration": plan.iteration,
+        "seed": plan.seed,
+        "printer": first.machine.name,
+        "quality": first.layers.name,
+        "layout": plan.layout.model_dump(),
+        "tower": [vars(kept) for kept in found.room.kept],
+        "tools": loaded,
+        "checklist": record.checklist(plan, loaded),
+        "bake": [step.model_dump() for step in plan.bake],
+        "specimens": record.specimens(found.pieces, found.plate, predicted, record.of_prints(sliced)),
+        "designs": record.designs(found.designs),
+        "slicers": dict(sliced),
+        "versions": versions(),
+        "files": store.hashes(stage),
+    }

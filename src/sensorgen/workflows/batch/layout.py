@@ -1,0 +1,265 @@
+"""Where specimens lie on the plate: in columns, or packed; never over one another, the tower or the edge."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from sensorgen.core.errors import OutOfRange
+from sensorgen.design.printer import Printer, Quality
+from sensorgen.export.slicers.tower import tower
+
+EDGE_MM = 5.0  # to the edge of the bed: the skirt runs 3 mm round everything, a line or two wide
+TOWER_BRIM_MM = 2.0
+_ROUNDING_MM = 1e-6
+
+Size = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Rect:
+    """A rectangle on the bed, in the printer's own coordinates [mm]: front left and back right corner."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+
+    @property
+    def centre_mm(self) -> tuple[float, float]:
+        """Its middle [mm]."""
+        return (self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2
+
+    def meets(self, other: "Rect") -> bool:
+        """Whether the two overlap; a shared edge is none."""
+        return (
+            min(self.x1, other.x1) - max(self.x0, other.x0) > _ROUNDING_MM
+            and min(self.y1, other.y1) - max(self.y0, other.y0) > _ROUNDING_MM
+        )
+
+    def holds(self, other: "Rect") -> bool:
+        """Whether the other lies inside."""
+        return (
+            other.x0 >= self.x0 - _ROUNDING_MM
+            and other.y0 >= self.y0 - _ROUNDING_MM
+            and other.x1 <= self.x1 + _ROUNDING_MM
+            and other.y1 <= self.y1 + _ROUNDING_MM
+        )
+
+    def grown(self, left: float, front: float, right: float, back: float) -> "Rect":
+        """With its edges moved outwards [mm]."""
+        return Rect(self.x0 - left, self.y0 - front, self.x1 + right, self.y1 + back)
+
+    def moved(self, x_mm: float, y_mm: float) -> "Rect":
+        """Somewhere else."""
+        return Rect(self.x0 + x_mm, self.y0 + y_mm, self.x1 + x_mm, self.y1 + y_mm)
+
+
+@dataclass(frozen=True)
+class Room:
+    """What a plate has to offer.
+
+    Attributes
+    ----------
+    area : Rect
+        Where specimens may lie.
+    kept : tuple of Rect
+        What they must stay clear of: the prime tower with its brim.
+    gap_mm : float
+        Least distance of neighbours, and of a specimen and the tower [mm].
+    """
+
+    area: Rect
+    kept: tuple[Rect, ...]
+    gap_mm: float
+
+    def free(self, place: Rect) -> bool:
+        """Whether a specimen may lie there, were it alone."""
+        around = place.grown(*[self.gap_mm] * 4)
+        return self.area.holds(place) and not any(around.meets(k) for k in self.kept)
+
+
+Plate = dict[int, Rect]  # number in the list of sizes, to place
+Layouts = Callable[[Sequence[Size], Room], list[Plate]]
+
+
+def room(printer: Printer, quality: Quality, tools: int, spacing_mm: float, brim_mm: float) -> Room:
+    """What the plate of a printer has to offer.
+
+    Parameters
+    ----------
+    printer, quality : Printer, Quality
+        Their bed, and the layers that decide how large the tower is.
+    tools : int
+        How many tools print; one alone has no tower [-].
+    spacing_mm, brim_mm : float
+        Between neighbours, and round each of them [mm].
+    """
+    (x, y), (width, depth) = printer.bed_centre_mm(), printer.bed_mm
+    edge = EDGE_MM + brim_mm
+    area = Rect(x - width / 2 + edge, y - depth / 2 + edge, x + width / 2 - edge, y + depth / 2 - edge)
+    at = tower(printer, quality, tools)
+    kept = Rect(at.x_mm, at.y_mm, at.x_mm + at.side_mm, at.y_mm + at.side_mm).grown(*[TOWER_BRIM_MM] * 4)
+    return Room(area, (kept,) if tools > 1 else (), spacing_mm + 2 * brim_mm)
+
+
+def packed(sizes: Sequence[Size], room: Room) -> list[Plate]:
+    """As many as fit on each plate: in their order, or largest first where that takes fewer plates.
+
+    Parameters
+    ----------
+    sizes : sequence of (float, float)
+        Length along x and width along y of each [mm].
+    room : Room
+        The plate.
+
+    Raises
+    ------
+    OutOfRange
+        One of them fits on no plate.
+
+    Notes
+    -----
+    Each goes to the place furthest to the front, then to the left, of the largest free rectangles (Jylanki's maximal
+    rectangles, bottom-left rule). Nothing is turned: lines and their resistance have a direction.
+    """
+    _refuse_giants(sizes, room, middle=False)
+    given = range(len(sizes))
+    largest = sorted(given, key=lambda i: (-sizes[i][0] * sizes[i][1], -sizes[i][0], i))
+    plates = min((_packed(sizes, order, room) for order in (given, largest)), key=len)
+    return [_centred(plate, room) for plate in plates]
+
+
+def _packed(sizes: Sequence[Size], order: Sequence[int], room: Room) -> list[Plate]:
+    plates: list[Plate] = []
+    frees: list[list[Rect]] = []
+    for number in order:
+        length, width = (side + room.gap_mm for side in sizes[number])
+        first = next((k for k, free in enumerate(frees) if _corners(free, length, width)), len(plates))
+        if first == len(plates):
+            plates.append({})
+            frees.append(_all_free(room))
+        y, x = min(_corners(frees[first], length, width))
+        taken = Rect(x, y, x + length, y + width)
+        frees[first] = _without(frees[first], taken)
+        plates[first][number] = taken.grown(0, 0, -room.gap_mm, -room.gap_mm)
+    return plates
+
+
+def _all_free(room: Room) -> list[Rect]:
+    """The empty plate; each specimen takes its gap along, to the right and the back."""
+    free = [room.area.grown(0, 0, room.gap_mm, room.gap_mm)]
+    for kept in room.kept:
+        free = _without(free, kept.grown(0, 0, room.gap_mm, room.gap_mm))
+    return free
+
+
+def _corners(free: Sequence[Rect], length: float, width: float) -> list[tuple[float, float]]:
+    """Front left corners, y before x, of the free rectangles in which there is room."""
+    return [(r.y0, r.x0) for r in free if r.x1 - r.x0 >= length - _ROUNDING_MM and r.y1 - r.y0 >= width - _ROUNDING_MM]
+
+
+def _without(free: Sequence[Rect], taken: Rect) -> list[Rect]:
+    """The largest free rectangles after a place is taken; those inside others are left out."""
+    pieces = sorted({p for r in free for p in _around(r, taken)}, key=lambda r: (r.y0, r.x0, r.y1, r.x1))
+    kept: list[Rect] = []
+    for piece in sorted(pieces, key=lambda r: -(r.x1 - r.x0) * (r.y1 - r.y0)):
+        if not any(k.holds(piece) for k in kept):
+            kept.append(piece)
+    return kept
+
+
+def _around(r: Rect, taken: Rect) -> Iterator[Rect]:
+    if not r.meets(taken):
+        yield r
+        return
+    for part in (
+        Rect(r.x0, r.y0, taken.x0, r.y1),
+        Rect(taken.x1, r.y0, r.x1, r.y1),
+        Rect(r.x0, r.y0, r.x1, taken.y0),
+        Rect(r.x0, taken.y1, r.x1, r.y1),
+    ):
+        if part.x1 - part.x0 > _ROUNDING_MM and part.y1 - part.y0 > _ROUNDING_MM:
+            yield part
+
+
+def column(per_column: int) -> Layouts:
+    """The layout in columns of at most ``per_column``, in the middle of the plate, as the thesis had its five.
+
+    >>> from sensorgen.design.printer import load_printer, load_quality
+    >>> here = room(load_printer("diabase-h5"), load_quality("fine"), tools=2, spacing_mm=5, brim_mm=0)
+    >>> column(5)([(100.0, 10.0)] * 5, here)[0][0]
+    Rect(x0=-50.0, y0=-35.0, x1=50.0, y1=-25.0)
+    """
+
+    def layout(sizes: Sequence[Size], room: Room) -> list[Plate]:
+        _refuse_giants(sizes, room, middle=True)
+        plates: list[Plate] = []
+        columns: list[list[int]] = []
+        for group in _columns(sizes, per_column, room):
+            wider = _in_columns(sizes, [*columns, group], room)
+            if all(map(room.free, wider.values())):
+                columns.append(group)
+                plates[-1:] = [wider]
+            else:
+                columns = [group]
+                plates.append(_in_columns(sizes, columns, room))
+        return plates
+
+    return layout
+
+
+def _columns(sizes: Sequence[Size], per_column: int, room: Room) -> Iterator[list[int]]:
+    """Numbers of the specimens in each column, which is no deeper than lies free in the middle of the plate."""
+    group: list[int] = []
+    for number in range(len(sizes)):
+        longer = _in_columns(sizes, [[*group, number]], room)
+        if len(group) == per_column or not all(map(room.free, longer.values())):
+            yield group
+            group = []
+        group.append(number)
+    yield group
+
+
+def _in_columns(sizes: Sequence[Size], columns: Sequence[Sequence[int]], room: Room) -> Plate:
+    lengths = [max(sizes[i][0] for i in group) for group in columns]
+    x, middle_y = room.area.centre_mm
+    x -= (sum(lengths) + room.gap_mm * (len(columns) - 1)) / 2
+    plate: Plate = {}
+    for group, length in zip(columns, lengths, strict=True):
+        y = middle_y - (sum(sizes[i][1] for i in group) + room.gap_mm * (len(group) - 1)) / 2
+        for i in group:
+            left = x + (length - sizes[i][0]) / 2
+            plate[i] = Rect(left, y, left + sizes[i][0], y + sizes[i][1])
+            y += sizes[i][1] + room.gap_mm
+        x += length + room.gap_mm
+    return plate
+
+
+def _centred(plate: Plate, room: Room) -> Plate:
+    """The whole of a plate moved to its middle, where the tower is not in the way."""
+    places = plate.values()
+    block = Rect(
+        min(p.x0 for p in places), min(p.y0 for p in places), max(p.x1 for p in places), max(p.y1 for p in places)
+    )
+    (x, y), (to_x, to_y) = block.centre_mm, room.area.centre_mm
+    for by in ((to_x - x, to_y - y), (to_x - x, 0.0), (0.0, to_y - y)):
+        moved = {number: place.moved(*by) for number, place in plate.items()}
+        if all(map(room.free, moved.values())):
+            return moved
+    return plate
+
+
+def _refuse_giants(sizes: Sequence[Size], room: Room, *, middle: bool) -> None:
+    """Refuse what fits on no plate, however empty, or not in its ``middle``."""
+    free = _all_free(room)
+    for length, width in dict.fromkeys(sizes):
+        if not _corners(free, length + room.gap_mm, width + room.gap_mm):
+            x, y = max(room.area.x1 - room.area.x0, 0.0), max(room.area.y1 - room.area.y0, 0.0)
+            raise OutOfRange(
+                f"a specimen of {length:g} x {width:g} mm fits on no plate of this printer: {x:g} x {y:g} mm are free, "
+                "less the prime tower; make it smaller, or keep less room for a brim"
+            )
+        if middle and not room.free(_in_columns([(length, width)], [[0]], room)[0]):
+            raise OutOfRange(
+                f"a specimen of {length:g} x {width:g} mm in the middle of the plate reaches the prime tower; "
+                "use the layout 'packed'"
+            )

@@ -1,0 +1,94 @@
+"""What slicers get, and what they give: the plate as one 3MF per family, and as G-code."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from shutil import rmtree
+from typing import Any
+
+from sensorgen.checks.review import Step
+from sensorgen.core import files as store
+from sensorgen.export import slicing
+from sensorgen.export.gcode.check import check
+from sensorgen.export.slicers import curaengine
+from sensorgen.export.slicing import Placed
+from sensorgen.workflows.batch import printed, tab
+from sensorgen.workflows.batch.layout import Plate
+from sensorgen.workflows.batch.pieces import Piece, tools
+from sensorgen.workflows.batch.plan import Plan
+from sensorgen.workflows.build import json_bytes
+
+
+def placed(plan: Plan, pieces: Sequence[Piece], plate: Plate) -> list[Placed]:
+    """The specimens of a plate as slicing knows them, each with its tab where the plan wants them."""
+    return [
+        Placed(
+            pieces[number].design, place.centre_mm, pieces[number].name,
+            tab.bodies(pieces[number].design, pieces[number].name) if plan.labels.tab else (),
+        )
+        for number, place in plate.items()
+    ]  # fmt: skip
+
+
+def threemfs(name: str, found: Sequence[Placed], families: Sequence[str]) -> Iterator[tuple[str, bytes]]:
+    """Name and content of the 3MF of a plate called ``name``, for some families of slicers."""
+    for family in families:
+        yield f"{name}.{family}.3mf", slicing.plate_3mf(found, family, name)
+
+
+def gcode(
+    name: str, found: Sequence[Placed], slicer: str, folder: Path, time_limit_s: float, step: Step
+) -> dict[str, Any]:
+    """Slice a plate into ``folder``, and say by what; the 3MF on record is the one that PrusaSlicer took.
+
+    Parameters
+    ----------
+    name : str
+        Of the batch; ``<name>.<slicer>.gcode`` is for the printer.
+    found : sequence of Placed
+        The specimens.
+    slicer : str
+        ``prusa`` or ``cura``.
+    folder : Path
+        Of the batch; the slicer's own G-code and its settings go to a folder of its name in there.
+    time_limit_s : float
+        How long the slicer may take [s].
+    step : callable
+        Told again and again while the slicer works.
+
+    Returns
+    -------
+    dict
+        Version of the slicer, the names of its files, what is printed of each design, what the check of the printer's
+        file found, and what it takes.
+    """
+    inside, own, ready = folder / f".{slicer}", folder / slicer, folder / f"{name}.{slicer}.gcode"
+    made = slicing.sliced(found, slicer, inside, title=name, time_limit_s=time_limit_s, step=lambda _: step("slicing"))
+    own.mkdir()
+    made.raw.replace(own / "raw.gcode")
+    made.ready.replace(ready)
+    if slicer == "prusa":
+        (inside / "plate.3mf").replace(folder / f"{name}.prusa.3mf")
+        settings = "profile.ini"
+        (inside / settings).replace(own / settings)
+    else:
+        settings = "settings.json"
+        store.write(own, {settings: json_bytes(_engine_settings(found))})
+    rmtree(inside)  # what is left are the bodies again, as the slicer took them
+    loaded = tools(piece.design for piece in found)
+    checked = check(ready, found[0].design.machine, loaded, others_empty=True)
+    step("as printed")
+    printed_designs = printed.of_designs(found, made)
+    return {
+        "version": made.version,
+        "gcode": ready.name,
+        "raw": f"{slicer}/raw.gcode",
+        "profile": f"{slicer}/{settings}",
+        "printed": printed_designs,
+        **checked.as_dict(),
+    }
+
+
+def _engine_settings(found: Sequence[Placed]) -> dict[str, Any]:
+    design = found[0].design
+    return asdict(curaengine.engine_settings(design.machine, design.layers, slicing.plate_loads(found)))

@@ -1,0 +1,185 @@
+"""From a design to the files that print it: one folder, complete or not there at all."""
+
+import json
+import platform
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Future
+from contextlib import ExitStack
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from sensorgen import __version__
+from sensorgen.checks.review import Review, Step, draw, report, review
+from sensorgen.core import files as store
+from sensorgen.core.errors import Unprintable
+from sensorgen.design import materials, printer
+from sensorgen.design.design import Design
+from sensorgen.export import slicing, threemf
+from sensorgen.export.slicers import cura, prusa
+from sensorgen.prediction.prediction import prediction
+from sensorgen.scene.geometry.cad import CadProcess
+
+QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
+LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")
+STEPS = ("meshes", "checks", "validity", "3MF", "profiles", "drawing", "STEP", "done")
+
+
+@dataclass(frozen=True)
+class Built:
+    """What a build has left behind.
+
+    Attributes
+    ----------
+    folder : Path
+        Where the files are.
+    review : Review
+        The findings.
+    prediction : dict
+        As in ``prediction.json``.
+    """
+
+    folder: Path
+    review: Review
+    prediction: dict[str, Any]
+
+
+def build(
+    design: Design,
+    out: Path,
+    *,
+    cad: bool = True,
+    force: bool = False,
+    strict: bool = False,
+    step: Step = lambda _: None,
+) -> Built:
+    """Write all files of a design into ``out/<name>``.
+
+    Parameters
+    ----------
+    design : Design
+        What to build.
+    out : Path
+        Folder that holds the designs' folders.
+    cad : bool
+        Also write the STEP file; it takes the CAD kernel some seconds.
+    force : bool
+        Write the files in spite of findings of severity error.
+    strict : bool
+        Take warnings for errors.
+    step : callable
+        Told what comes next, for a progress display.
+
+    Raises
+    ------
+    Unprintable
+        The checks found errors; its ``findings`` has them, and nothing was written.
+    Unwritable, CadFailed, MissingValue
+        See there; nothing was written.
+    """
+    folder = out / design.name
+    with ExitStack() as stack:
+        kernel = stack.enter_context(CadProcess()) if cad else None  # its import runs beside everything below
+        held = review(design, step)
+        if held.errors(strict) and not force:
+            raise Unprintable(held.findings)
+        held = held.with_meshes(design)
+        stage = stack.enter_context(store.staging(folder))
+        step_file = stage / f"{design.name}.step"
+        job = kernel.submit(design.printed, _colours(design), design.name, step_file) if kernel else None
+        predicted = prediction(design)
+        for name, content in _files(design, held, predicted, step):
+            store.write(stage, {name: content})
+        if job:
+            _await(job, step)
+        store.write(stage, {store.MANIFEST: json_bytes(_manifest(design, stage))})
+        store.publish(stage, folder)
+        step("done")
+    return Built(folder, held, predicted)
+
+
+def _files(design: Design, held: Review, predicted: dict[str, Any], step: Step) -> Iterator[tuple[str, bytes]]:
+    name = design.name
+    step("3MF")
+    for family in threemf.FAMILIES:
+        yield (
+            f"{name}.{family}.3mf",
+            threemf.content(family, name, slicing.parts(design, held.meshes), _centre_mm(design, family)),
+        )
+    step("profiles")
+    for path, text in profiles(design).items():
+        yield path, text.encode()
+    step("drawing")
+    yield f"{name}.svg", draw(design, held).encode()
+    yield "check.json", json_bytes(report(design, held))
+    yield "prediction.json", json_bytes(predicted)
+    yield "design.json", json_bytes(design.model_dump(mode="json"))
+
+
+def _await(job: "Future[None]", step: Step) -> None:
+    """Wait for the STEP file, and let the progress display see that time passes."""
+    while True:
+        step("STEP")
+        try:
+            return job.result(timeout=0.2)
+        except TimeoutError:
+            continue
+
+
+def profiles(design: Design) -> dict[str, str]:
+    """Slicer profiles, by file name: PrusaSlicer and Cura, for every quality that ships and the design's own."""
+    loads = slicing.loads(design)
+    texts: dict[str, str] = {}
+    # The design's own quality comes last: Cura's machine definition, one for all, then starts with it.
+    others = (printer.load_quality(name) for name in QUALITIES if name != design.layers.name)
+    for quality in (*others, design.layers):
+        texts[f"profiles/prusa/{design.machine.name}-{quality.name}.ini"] = prusa.profile(
+            design.machine, quality, loads
+        )
+        texts |= {f"profiles/cura/{path}": text for path, text in cura.profiles(design.machine, quality, loads).items()}
+    return texts
+
+
+def _centre_mm(design: Design, family: str) -> tuple[float, float]:
+    """Middle of the bed as a slicer family counts it: Cura from the front left corner, whatever the printer does."""
+    bed_x, bed_y = design.machine.bed_mm
+    return (bed_x / 2, bed_y / 2) if family == "cura" else design.machine.bed_centre_mm()
+
+
+def _colours(design: Design) -> dict[str, str]:
+    return {body.name: materials.load(body.material).colour for body in design.printed.bodies}
+
+
+def _manifest(design: Design, stage: Path) -> dict[str, Any]:
+    return {
+        "name": design.name,
+        "design": design.id(),
+        "resolved": design.resolved(),
+        "files": store.hashes(stage),
+        "versions": versions(),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Versions of this software, of Python and of the libraries that the results depend on."""
+    found = {"sensorgen": __version__, "python": platform.python_version()}
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def json_bytes(data: Mapping[str, Any]) -> bytes:
+    """Indented JSON that ends in a newline; infinity, which JSON lacks, becomes a word."""
+    return (json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def _plain(data: Any) -> Any:
+    if isinstance(data, Mapping):
+        return {key: _plain(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_plain(value) for value in data]
+    return "infinity" if data == float("inf") else data
