@@ -426,7 +426,10 @@ def test_it_is_plain_data():
 
 
 def test_it_needs_neither_scipy_nor_matplotlib():
-    program = "import sys, sensorgen.prediction.identifiability, sensorgen.cli.card_text; print({'scipy', 'matplotlib'} & set(sys.modules))"  # noqa: E501
+    program = (
+        "import sys, sensorgen.prediction.identifiability, sensorgen.cli.card_text; "
+        "print({'scipy', 'matplotlib'} & set(sys.modules))"
+    )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
 

@@ -23,7 +23,6 @@ from test_sheet import two_stretches
 from test_stack import exact as exact_stack
 
 from sensorgen import models
-from sensorgen.verification.chart import plot as pictures
 from sensorgen.core import plugins as registry
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import SensorgenError
@@ -31,6 +30,7 @@ from sensorgen.models import fem3d
 from sensorgen.verification import chart
 from sensorgen.verification.chart import blocks, cells, exact, lines, membrane, networks, presses, rounds
 from sensorgen.verification.chart import measured as measured_in
+from sensorgen.verification.chart import plot as pictures
 from sensorgen.verification.chart.cells import STANDARD
 from sensorgen.verification.chart.measured import Point, with_front
 

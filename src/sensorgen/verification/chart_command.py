@@ -50,8 +50,8 @@ def command(scene: tuple[str, ...], budget: float, output: str, as_json: bool) -
 
 
 def _write(folder: Path, points: Sequence["Point"], rows: Sequence[dict[str, Any]]) -> None:
-    from sensorgen.verification.chart import plot as chart
     from sensorgen.core import files as store
+    from sensorgen.verification.chart import plot as chart
 
     files = dict(zip(FILES, (_csv(rows).encode(), chart.png(points), chart.html(points).encode()), strict=True))
     try:
