@@ -319,7 +319,7 @@ def test_rows_by_columns_that_there_are(log):
 WRITER = """
 import sys
 from pathlib import Path
-from sensorgen.log import Log, Reading
+from sensorgen.measure.log import Log, Reading
 for k in range(int(sys.argv[3])):
     with Log(Path(sys.argv[1]), create=True) as log:
         log.add(Reading(uid=f"{sys.argv[2]}-{k}-{j}", specimen="23 triX", written="23 triX") for j in range(10))
