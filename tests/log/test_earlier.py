@@ -22,7 +22,9 @@ def shown(value):
 
 def rows(log):
     return {
-        table: [{k: shown(v) for k, v in dataclasses.asdict(entry).items()} for entry in log.entries(kind, superseded=True)]
+        table: [
+            {k: shown(v) for k, v in dataclasses.asdict(entry).items()} for entry in log.entries(kind, superseded=True)
+        ]
         for kind, table in TABLES.items()
     }
 

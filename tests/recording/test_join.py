@@ -132,8 +132,8 @@ def test_a_rigs_log_in_other_words(tmp_path):
     assert np.diff(found.time_s).tolist() == [1.5, -0.5]
     assert found.set_force_n.tolist() == [1.5, 2, 2]
     assert found.error.tolist() == [False, True, True]
-    assert any("not after" in note for note in found.notes)
-    assert "not whole" in found.notes[0]
+    assert any("not later" in note for note in found.notes)
+    assert "incomplete" in found.notes[0]
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def test_a_rigs_log_in_other_words(tmp_path):
         ("time_s,set_force_n,set_position_mm\n2023-05-04T12:00:00,1,3\n", "is not a number"),
         ("time_s,set_force_n,set_position_mm\n1,2,3,4\n", "row 2: 4 cells, but the header has 3"),
         ("time_s,set_force_n,set_position_mm\n", "no rows"),
-        ("time_s,set_force_n,set_position_mm\n1,inf,3\n", "not a number"),
+        ("time_s,set_force_n,set_position_mm\n1,inf,3\n", "is not finite"),
         ("x" * 70_000, "row 1: longer than"),
     ],
 )
