@@ -48,31 +48,31 @@ def test_the_database_reads_as_it_was_written(earlier):
 
 
 def test_the_export_gives_the_same_log(log):
-    done = importing.take(log, EARLIER / "export", {})
+    done = importing.import_file(log, EARLIER / "export", {})
     assert (done.rows, done.new) == (sum(map(len, ROWS.values())),) * 2
     assert rows(log) == ROWS
     assert list(verify.faults(log)) == []
 
 
 def test_readings_in_parquet_are_the_same(log):
-    importing.take(log, EARLIER / "readings.parquet", {})
+    importing.import_file(log, EARLIER / "readings.parquet", {})
     assert rows(log)["reading"] == ROWS["reading"]
 
 
 def test_the_log_that_it_came_from_takes_nothing_of_it(earlier):
     with Log(earlier) as log:
-        assert importing.take(log, EARLIER / "export", {}).new == 0
+        assert importing.import_file(log, EARLIER / "export", {}).new == 0
 
 
 def test_recordings_are_read_again_from_their_files(log):
-    importing.take(log, EARLIER / "export", {})
+    importing.import_file(log, EARLIER / "export", {})
     first, *others = log.recordings(superseded=True)
-    (one,), rig = bench.reopened(log, first)
+    (one,), rig = bench.read_again(log, first)
     facts = json.loads(first.facts)
     assert (len(one.time_s), rig.counts()) == (575, {"rows": 144, "errors": 1})
     assert one.tones_hz.tolist() == facts["lockins"][0]["tones_hz"]
     for run in others:
-        (one,), rig = bench.reopened(log, run)
+        (one,), rig = bench.read_again(log, run)
         assert (len(one.time_s), rig) == (40, None)
 
 

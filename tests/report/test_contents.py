@@ -21,7 +21,7 @@ from sensorgen.analysis.report import page as page_of
 from sensorgen.analysis.report.figures import MOST_ROWS
 from sensorgen.analysis.report.pictures import files
 from sensorgen.analysis.report.tables import said
-from sensorgen.measure.log import Log, words
+from sensorgen.measure.log import Log, notes
 
 TABLE = Path(__file__).parents[2] / "src" / "sensorgen" / "measure" / "log" / "table_d1.csv"
 FACTOR = {"": 1.0, "k": 1e3, "m": 1e6}
@@ -107,8 +107,8 @@ def test_whether_groups_differ_is_asked_of_films_only(of_thesis, by_hand):
 def test_of_two_questions_each_has_to_be_twice_as_sure(shorted, said, tmp_path):
     """6 and 5 of 10 against 12 of 12: p = 0.029 and 0.010, of which the first would do if only one thing were asked."""
     with Log(tmp_path / "log.db", create=True) as log:
-        first = [words.reading(f"40 triX .1mm {k + 1}", "700", "30" if k < shorted else "OL") for k in range(10)]
-        log.add(first + [words.reading(f"40 triX .2mm {k + 1}", "700", "30") for k in range(12)])
+        first = [notes.reading(f"40 triX .1mm {k + 1}", "700", "30" if k < shorted else "OL") for k in range(10)]
+        log.add(first + [notes.reading(f"40 triX .2mm {k + 1}", "700", "30") for k in range(12)])
         found = of_iteration(log, 40)
     chance = stats.fisher_exact([[shorted, 10 - shorted], [12, 0]]).pvalue
     assert chance < 0.05
@@ -128,8 +128,8 @@ def test_r_z_is_not_compared_where_the_electrodes_touch_as_drawn(of_thesis, by_h
 
 def test_a_specimen_counts_once_and_with_its_last_reading(tmp_path):
     with Log(tmp_path / "log.db", create=True) as log:
-        log.add([words.reading("40 triX .1mm", "0.7k", z) for z in ("10", "12", "OL")])
-        log.add([words.reading("40 triX .1mm 2", "0.7k", "20")])
+        log.add([notes.reading("40 triX .1mm", "0.7k", z) for z in ("10", "12", "OL")])
+        log.add([notes.reading("40 triX .1mm 2", "0.7k", "20")])
         made = report(log, 40)
     assert any(text.startswith("1 of 2 specimens that allow") for text in made.findings)
     assert any(text.startswith("1 of 2 specimens with both") for text in made.findings)
@@ -143,7 +143,7 @@ def test_thousands_of_readings(tmp_path, monkeypatch):
     monkeypatch.setattr(page_of, "MOST_ROWS", 50)
     with Log(tmp_path / "log.db", create=True) as log:
         names = [f"40 {shape} .1mm {k + 1}" for k in range(600) for shape in ("triX", "triY")]
-        log.add([words.reading(n, f"{700 + k % 99}", "30" if k % 3 else "OL") for k, n in enumerate(names)])
+        log.add([notes.reading(n, f"{700 + k % 99}", "30" if k % 3 else "OL") for k, n in enumerate(names)])
         made = report(log, 40)
     charts = {chart.key: chart for chart in made.charts}
     assert [len(charts[key].y[0].names) for key in ("residuals", "resistance")] == [MOST_ROWS] * 2
@@ -327,7 +327,7 @@ def test_an_iteration_without_readings_says_so_in_every_format(thesis):
 
 def test_readings_without_a_design_make_a_report(tmp_path):
     with Log(tmp_path / "log.db", create=True) as log:
-        log.add([words.reading("50 tri", "650", "OL"), words.reading("50 sq", "", "")])
+        log.add([notes.reading("50 tri", "650", "OL"), notes.reading("50 sq", "", "")])
         made = report(log, 50)
     assert any("does not tell which design" in row[1] for row in table(made, "left_out").rows)
     for how in FORMATS:

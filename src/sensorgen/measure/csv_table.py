@@ -187,20 +187,22 @@ def opened(path: Path | str, columns: Mapping[str, str] = SAME_NAMES) -> Iterato
     BadInput
         A file that is missing or cannot be read; a header without a column that ``columns`` names.
     """
-    how = {"encoding": "utf-8-sig", "errors": "surrogateescape", "newline": "\n"}
     if path == "-":
         if hasattr(sys.stdin, "reconfigure"):
-            sys.stdin.reconfigure(**how)
+            sys.stdin.reconfigure(encoding="utf-8-sig", errors="surrogateescape", newline="\n")
         yield Table("standard input", sys.stdin, columns)
         return
     if Path(path).is_dir():
         raise BadInput(f"{path} is a folder; expected a CSV file")
+    with _open(path) as file:
+        yield Table(str(path), file, columns)
+
+
+def _open(path: Path | str) -> IO[str]:
     try:
-        file = Path(path).open(**how)  # type: ignore[call-overload]
+        return Path(path).open(encoding="utf-8-sig", errors="surrogateescape", newline="\n")
     except (OSError, ValueError) as error:
         raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
-    with file:
-        yield Table(str(path), file, columns)
 
 
 def separator_of(header: str) -> str:

@@ -1,7 +1,6 @@
 """Recordings from CSV: impedance columns with a time, a time stamp or both beside them."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
