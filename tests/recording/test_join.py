@@ -34,7 +34,7 @@ def test_the_offset_is_found_within_its_error(tmp_path, run, offset_s):
     assert found.offset_error_s < 0.01
     assert found.offset_s == pytest.approx(offset_s + 0.03, abs=3 * found.offset_error_s)
     assert found.skew == 0
-    assert f"{found.offset_s:.4f} +- " in found.words()
+    assert f"{found.offset_s:.4f} +- " in found.clock_text()
     truth, _ = made.force_at(run.time_s, MADE)
     told = np.isfinite(found.force_n)
     assert told.mean() > 0.99
@@ -112,7 +112,7 @@ def test_a_sensor_that_does_not_answer_leaves_the_clocks_as_they_are(tmp_path, r
     found = joined(recording(dead), log)
     assert (found.offset_s, found.skew) == (0, 0)
     assert np.isnan(found.offset_error_s)
-    assert "believed" in found.words()
+    assert "assumed to agree" in found.clock_text()
 
     with pytest.raises(BadInput, match="too little to find the offset"):
         joined(recording(dead, stamped=False), log)

@@ -145,7 +145,7 @@ def _lockin(recording: "Recording") -> LockIn:
 
 def _rig(log: "RigLog", joined: "Joined") -> Rig:
     return Rig(
-        **log.counts(), samples=joined.recording.counts()["rig error"], clocks=joined.words(), notes=joined.notes,
+        **log.counts(), samples=joined.recording.counts()["rig error"], clocks=joined.clock_text(), notes=joined.notes,
         offset_s=_known(joined.offset_s), offset_error_s=_known(joined.offset_error_s), skew=_known(joined.skew),
         skew_error=_known(joined.skew_error), explained=_known(joined.explained),
     )  # fmt: skip

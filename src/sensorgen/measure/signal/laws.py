@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from sensorgen.measure.recording.movement import slowly
+from sensorgen.measure.recording.response import relaxation
 from sensorgen.measure.recording.samples import Complex, Real
 
 BIN_S = 0.25  # beyond the demodulator's own memory, so that bins are independent of each other
@@ -175,7 +175,7 @@ def remembering(bins: Bins, found: Fit, time_s: Real, force_n: Real, fastest_s: 
 
     def memory(log_tau: float) -> Memory:
         tau = float(np.exp(log_tau))
-        return Memory(tau, slowly(time_s, force_n, tau))
+        return Memory(tau, relaxation(time_s, force_n, tau))
 
     taus = np.log(np.geomspace(fastest_s, max(2 * fastest_s, float(time_s[-1] - time_s[0])), _SCAN))
     base, weight = np.linalg.qr(_basis(found.terms, bins.time_s) * bins.weight[:, None])[0], bins.weight[:, None]

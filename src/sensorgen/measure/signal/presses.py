@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording.movement import strongest
+from sensorgen.measure.recording.response import principal_component
 from sensorgen.measure.recording.samples import Bools, Complex, Real
 
 THRESHOLD_N = 0.2
@@ -70,7 +70,7 @@ def found(time_s: Real, impedance_ohm: Complex) -> list[Press]:
     if len(time_s) < 2 * _LEAST:
         raise BadInput(f"{len(time_s)} readings; expected at least {2 * _LEAST} to find presses in")
     width = min(max(1, round(_STEP_S / float(np.median(np.diff(time_s))))), len(time_s) // 2)
-    before, after = _beside(strongest(impedance_ohm), width)
+    before, after = _beside(principal_component(impedance_ohm), width)
     step = after - before
     limit = _SURE * float(np.median(np.abs(step - np.median(step)))) / _MAD
     edges = [(at, 1) for at in _peaks(step, limit)] + [(at, -1) for at in _peaks(-step, limit)]

@@ -80,7 +80,7 @@ def processed(
     if rig is not None:
         beside = joined(one, rig) if isinstance(rig, RigLog) else rig
         one, force, position = beside.recording, beside.force_n, beside.set_position_mm
-        notes += [beside.words(), *beside.notes]
+        notes += [beside.clock_text(), *beside.notes]
     valid = one.valid()
     filtered = lowpass.filtered(one, cutoff_hz)
     spans = presses.pressed(one.time_s, force) if rig else presses.found(one.time_s[valid], one.impedance_ohm[valid])
