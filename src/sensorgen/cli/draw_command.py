@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import asprinted_text, show
+from sensorgen.cli import body_options, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ OWN: list[click.Parameter] = [
     click.Option(
         ["--output", "-o"], metavar="FILE", help="SVG file to write; NAME.svg here if not given, - for the terminal."
     ),
-    *asprinted_text.printed_options(),
+    *body_options.body_options(),
 ]
 
 
