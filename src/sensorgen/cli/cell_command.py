@@ -48,7 +48,8 @@ OWN: list[click.Parameter] = [
 
 def _work(
     design: "Design", *, accuracy: float | None, model: str, no_cache: bool, frequency: tuple[float, ...] | None,
-    drawn: bool, slicer: str | None, walls: str | None, sweep: str | None, jobs: int | None, press_mm: tuple[float, ...] | None, **how: Any,
+    drawn: bool, slicer: str | None, walls: str | None,
+    sweep: str | None, jobs: int | None, press_mm: tuple[float, ...] | None, **how: Any,
 ) -> int:  # fmt: skip
     from sensorgen.prediction.capacitance_answer import Asked
 

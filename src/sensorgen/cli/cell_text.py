@@ -33,7 +33,8 @@ def lines(data: Data, *, explain: bool) -> Iterator[str]:
         yield "measured"
         yield from (f"  {line}" for line in measured(data["plan"]))
         yield ""
-    yield f"{data['design']}, {data['body']}: {show.si(low * data['area_m2'], 'F')} to {show.si(high * data['area_m2'], 'F')}"
+    low_f, high_f = (show.si(end * data["area_m2"], "F") for end in (low, high))
+    yield f"{data['design']}, {data['body']}: {low_f} to {high_f}"
     yield f"{'per area':12}{low:.10g} to {high:.10g} F/m2"
     if "loss_lower_f_per_m2" in data:
         yield from _loss(data)

@@ -20,12 +20,11 @@ OWN: list[click.Parameter] = [
 ]
 
 
-def _work(design: "Design", *, output: str | None, as_printed: bool, slicer: str | None, walls: str | None) -> int:
+def _work(design: "Design", *, output: str | None, drawn: bool, slicer: str | None, walls: str | None) -> int:
     from sensorgen.checks.review import STEPS, draw, review
     from sensorgen.core import files as store
 
-    asprinted_text.refuse_strays(as_printed=as_printed, slicer=slicer, walls=walls)
-    made = asprinted_text.printed(design, slicer, walls) if as_printed else None
+    made = None if drawn else body_options.printed_of(design, slicer, walls)
     with show.progress(STEPS) as step:
         held = review(design, step)
     if made:

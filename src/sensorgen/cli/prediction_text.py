@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from sensorgen.cli import card_text
-from sensorgen.cli.show import WIDTH, si
+from sensorgen.cli.show import PREFIXES, WIDTH, si
 
 if TYPE_CHECKING:
     from sensorgen.core.bounds import Bounds
@@ -34,20 +34,36 @@ def _row(label: str, cells: list[str]) -> str:
 
 
 def _bounds(bounds: "Bounds | None") -> str:
+    """Best value, and the range in the same unit."""
     if bounds is None:
         return "-"
-    value = si(bounds.value, bounds.unit)
-    if f"{bounds.lower:.2g}" == f"{bounds.upper:.2g}" == f"{bounds.value:.2g}":
-        return value
-    return f"{value} ({_short(bounds.lower, bounds.unit)} to {_short(bounds.upper, bounds.unit)})"
+    prefix, scale = _prefix(bounds.value, bounds.unit)
+    low, value, high = (end / scale for end in (bounds.lower, bounds.value, bounds.upper))
+    unit = f"{prefix}{bounds.unit}"
+    if f"{low:.2g}" == f"{high:.2g}":
+        return f"{value:.4g} {unit}"
+    return f"{value:.3g} {unit} ({_short(low)} to {_short(high)})"
 
 
-def _short(value: float, unit: str) -> str:
-    return si(float(f"{value:.2g}"), unit).removesuffix(unit).rstrip()
+def _prefix(value: float, unit: str) -> tuple[str, float]:
+    """SI prefix for a value and its size; lengths in mm, and ratios and forces without one."""
+    if unit == "m":
+        return "m", 1e-3
+    if unit in ("N", "1/kPa") or not value:
+        return "", 1.0
+    power = max((p for p in PREFIXES if abs(value) >= 10.0**p), default=min(PREFIXES))
+    return PREFIXES[power], 10.0**power
+
+
+def _short(value: float) -> str:
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def _value(value: float | None, unit: str) -> str:
-    return "-" if value is None else si(float(f"{value:.2g}"), unit)
+    if value is None:
+        return "-"
+    prefix, scale = _prefix(value, unit)
+    return f"{_short(value / scale)} {prefix}{unit}"
 
 
 def impedance(found: "Prediction") -> Iterator[str]:

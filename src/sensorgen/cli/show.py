@@ -7,6 +7,7 @@ import textwrap
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 WIDTH = 80
 _COLOURS = {"error": "red", "warning": "yellow", "info": "blue"}
-_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
 def findings(found: Sequence["Finding"]) -> None:
@@ -35,6 +36,16 @@ def findings(found: Sequence["Finding"]) -> None:
         click.echo(
             textwrap.fill(f"{f.message}{_place(f)} {after}", width, initial_indent=" " * 8, subsequent_indent=" " * 8)
         )
+
+
+def most_severe(found: Sequence["Finding"], count: int) -> list["Finding"]:
+    """The first findings that matter: each rule and body once, with all its places, the severe first."""
+    order = ("error", "warning", "info")
+    merged: dict[tuple[str, str, str], Finding] = {}
+    for f in sorted((f for f in found if not f.waiver), key=lambda f: order.index(f.severity)):
+        key = (f.severity, f.rule, f.advice)
+        merged[key] = replace(merged[key], count=merged[key].count + f.count) if key in merged else f
+    return list(merged.values())[:count]
 
 
 def _where(f: "Finding") -> str:
@@ -141,9 +152,9 @@ def si(value: float, unit: str) -> str:
     >>> si(6.29e-11, "F"), si(2333.3, "ohm"), si(0.0, "F")
     ('62.9 pF', '2.333 kohm', '0 F')
     """
-    powers = [p for p in _PREFIXES if value and abs(value) >= 10.0**p]
-    power = max(powers, default=0 if not value else min(_PREFIXES))
-    return f"{value / 10.0**power:.4g} {_PREFIXES[power]}{unit}"
+    powers = [p for p in PREFIXES if value and abs(value) >= 10.0**p]
+    power = max(powers, default=0 if not value else min(PREFIXES))
+    return f"{value / 10.0**power:.4g} {PREFIXES[power]}{unit}"
 
 
 def as_json(data: Any) -> None:

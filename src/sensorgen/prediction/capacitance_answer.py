@@ -8,7 +8,6 @@ from typing import Any
 from sensorgen.core.parallel import in_parallel, said
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
-from sensorgen.design.design import Design
 from sensorgen.prediction import capacitance as planner
 from sensorgen.prediction import losses
 from sensorgen.prediction.capacitance import Answer, Unpredictable
@@ -22,7 +21,7 @@ class Asked:
 
     Attributes
     ----------
-    width : float
+    width : float or None
         Relative width of the bounds [-]; the default of :mod:`sensorgen.prediction.rest_state` if None.
     model : str
         The only model to ask, or "".
@@ -84,7 +83,7 @@ def answers(bodies: Sequence[Body], asked: Asked, jobs: int, done: Callable[[], 
     inputs = [_inputs(body, asked) for body in bodies]
     missing = [
         k for k, (scene, eps, of) in enumerate(inputs)
-        if not (asked.keep and planner.is_known(scene, eps, of.width, of.model))
+        if not (asked.keep and planner.is_known(scene, eps, _width(scene, of), of.model))
     ]  # fmt: skip
     found: dict[int, Answer | str] = {}
     for k in sorted(set(range(len(inputs))) - set(missing)):
@@ -103,23 +102,20 @@ def answers(bodies: Sequence[Body], asked: Asked, jobs: int, done: Callable[[], 
 
 def _inputs(body: Body, asked: Asked) -> tuple[Scene, dict[str, complex], Asked]:
     scene = body.cells.first()
-    width = default_width(scene) if asked.width is None else asked.width
-    return scene, _permittivity(body.design, asked), replace(asked, width=width)
+    return scene, losses.permittivity(body.design, asked.frequency_hz)[0], replace(asked, width=_width(scene, asked))
+
+
+def _width(scene: Scene, asked: Asked) -> float:
+    return default_width(scene) if asked.width is None else asked.width
 
 
 def _solved(scene: Scene, permittivity: dict[str, complex], asked: Asked) -> Answer:
-    return planner.capacitance(
-        scene, permittivity, inf if asked.width is None else asked.width, asked.model, asked.keep
-    )
+    return planner.capacitance(scene, permittivity, _width(scene, asked), asked.model, asked.keep)
 
 
 def _said(scene: Scene, permittivity: dict[str, complex], asked: Asked) -> Answer | str:
     """The answer, or why there is none."""
     return said(_solved, scene, permittivity, asked, refused=(Unpredictable,))
-
-
-def _permittivity(design: Design, asked: Asked) -> dict[str, complex]:
-    return losses.permittivity(design, asked.frequency_hz)[0]
 
 
 def _plain(body: Body, found: Answer | str, asked: Asked) -> dict[str, Any]:

@@ -19,8 +19,9 @@ from sensorgen.design.materials import PIEZORESISTANCE
 from sensorgen.design.values import ENDS, MaterialValue, material_value, piezoresistance, resistivities
 from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
-from sensorgen.prediction.rest_state import permittivity_ratios, spread
+from sensorgen.prediction.rest_state import permittivity_ratios
 from sensorgen.prediction.sensor_model import SensorModel
+from sensorgen.prediction.spread import spread
 
 _NEAR = 1.01  # ratio of moduli that are not told apart
 _RICHARDSON = 4 / 3  # of what halving changes, where errors fall by four

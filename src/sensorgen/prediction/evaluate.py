@@ -19,14 +19,14 @@ from sensorgen.models import line
 from sensorgen.models.compression import Compression
 from sensorgen.prediction import bodies, planning
 from sensorgen.prediction.capacitance import Unpredictable
-from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.prediction.error_budget import Load, error_budget
 from sensorgen.prediction.identifiability import FORCE_N, NOISE, card
 from sensorgen.prediction.losses import Lost, lost
 from sensorgen.prediction.plan import Plan
-from sensorgen.prediction.rest_state import RestState, rest_state, spread
+from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.results import SCHEMA, Impedance, Prediction, from_json, to_json
 from sensorgen.prediction.sensor_model import SensorModel, Tip
+from sensorgen.prediction.spread import spread
 
 TONES_HZ = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)  # thesis, Table 5.1, its 4990 corrected
 _ASSUMED = "the cell was not solved, and is taken to deform as a solid plate"
@@ -151,7 +151,7 @@ def _gap(body: Body) -> Bounds | None:
 
 def _at_rest(found: Prediction, body: Body, rest: RestState, frequency_hz: tuple[float, ...]) -> Prediction:
     """Capacitance, resistance, corner frequency and impedance without a load."""
-    resistance, c, gone = electrode_resistance(body), rest.capacitance, lost(body.design)
+    resistance, c, gone = rest.resistance, rest.capacitance, lost(body.design)
     r = _in_series(resistance["top"], resistance["bottom"])
     corner = _of_line(r, c, lambda ohm, farad: line.corner_frequency_hz(ohm, farad), "Hz")
     return replace(

@@ -6,9 +6,10 @@ from math import inf, prod
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
-from sensorgen.design.materials import SET
 from sensorgen.design.values import MaterialValue, permittivities, resistivities
 from sensorgen.prediction.capacitance import Answer, Unpredictable, capacitance
+from sensorgen.prediction.electrodes import electrode_resistance
+from sensorgen.prediction.spread import spread
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import sections
 
@@ -25,6 +26,8 @@ class RestState:
         Capacitance of the most likely cell, counted to the whole sensor.
     capacitance : Bounds
         Of the sensor, with models, print and materials [F].
+    resistance : dict of str to Bounds
+        Of the top and the bottom electrode, end to end, cogs included [ohm].
     resistivity_ohm_m : (float, float)
         Of the top and the bottom electrode [ohm m].
     values : tuple of MaterialValue
@@ -35,6 +38,7 @@ class RestState:
 
     answer: Answer
     capacitance: Bounds
+    resistance: dict[str, Bounds]
     resistivity_ohm_m: tuple[float, float]
     values: tuple[MaterialValue, ...]
     doubts: tuple[str, ...] = ()
@@ -86,7 +90,8 @@ def rest_state(body: Body, width: float | None = None) -> RestState:
         material=Interval(c.middle(), c.middle()) if rough else _permittivity_range(body.design, scene, c.middle()),
     )  # fmt: skip
     ends = (rho["top"].value, rho["bottom"].value)
-    return RestState(answer, bounds, ends, (*values, *rho.values()), tuple(doubts))
+    resistance = electrode_resistance(body)
+    return RestState(answer, bounds, resistance, ends, (*values, *rho.values()), tuple(doubts))
 
 
 def _permittivity_range(design: Design, scene: Scene, middle: float) -> Interval:
@@ -114,10 +119,3 @@ def permittivity_ratios(design: Design, scene: Scene) -> dict[str, tuple[float, 
             )
             found[value.material] = (next(ends), next(ends))
     return found
-
-
-def spread(design: Design, value: MaterialValue) -> tuple[float, float]:
-    """Lowest and highest of a value and of what all sources give; a value that the user set is not doubted."""
-    given = design.material(value.material).properties.get(value.quantity, [])
-    plausible = [] if value.source == SET else [v.value for v in given if not v.implausible]
-    return min([value.value, *plausible]), max([value.value, *plausible])

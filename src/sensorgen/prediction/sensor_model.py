@@ -118,7 +118,7 @@ def build_sensor(
     sensor = Sensor(
         length_m=p.length_mm * M_PER_MM,
         width_m=p.width_mm * M_PER_MM,
-        electrode_m=(p.electrode_mm * M_PER_MM,) * 2,
+        electrode_m=_thickness_m(body, rest),
         resistivity_ohm_m=rest.resistivity_ohm_m,
         capacitance_f_per_m=rest.capacitance.value / (p.length_mm * M_PER_MM),
         compression=law.compression,
@@ -130,6 +130,16 @@ def build_sensor(
         piezoresistance_per_pa=tuple(rises[end].value if end in rises else 0.0 for end in ENDS),  # type: ignore[arg-type]
     )
     return SensorModel(body, sensor, rest, law, gone, rises)
+
+
+def _thickness_m(body: Body, rest: RestState) -> tuple[float, float]:
+    """Of plates that have the electrodes' resistance, cogs included [m]."""
+    p = body.design.params
+    found = [
+        rho * p.length_mm / (p.width_mm * rest.resistance[end].value) if rho else p.electrode_mm * M_PER_MM
+        for end, rho in zip(ENDS, rest.resistivity_ohm_m, strict=True)
+    ]
+    return found[0], found[1]
 
 
 def _contact(body: Body, law: Law, pressed: Piece, profile: str, radius_m: float) -> pressure.Contact:

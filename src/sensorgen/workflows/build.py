@@ -46,6 +46,12 @@ class Built:
     review: Review
     prediction: Prediction
 
+    @property
+    def verdict(self) -> str:
+        """CHANGE where a check reports an error, PRINT WITH WARNINGS, or PRINT."""
+        counts = self.review.counts()
+        return "CHANGE" if counts["error"] else "PRINT WITH WARNINGS" if counts["warning"] else "PRINT"
+
 
 def build(
     design: Design,
@@ -118,6 +124,18 @@ def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> I
     yield "check.json", json_bytes(report(design, held))
     yield "prediction.json", json_bytes(json.loads(to_json(predicted)))
     yield "design.json", json_bytes(design.model_dump(mode="json"))
+
+
+def as_dict(design: Design, built: Built, files: list[str]) -> dict[str, Any]:
+    """The result as plain data, for JSON."""
+    return {
+        "name": design.name,
+        "folder": str(built.folder),
+        "files": files,
+        "verdict": built.verdict,
+        "findings": [finding.as_dict() for finding in built.review.findings],
+        "prediction": json.loads(to_json(built.prediction)),
+    }
 
 
 def _await(job: "Future[None]", step: Step) -> None:
