@@ -45,6 +45,6 @@ def _sources(found: Comparison) -> list[tuple[str, str]]:
     used: dict[str, set[str]] = {}
     for of in found.predictions.values():
         for value in of.prediction.values:
-            used.setdefault(value.source, set()).add(f"{value['material']} {value['quantity']} = {value['value']:.6g}")
+            used.setdefault(value.source, set()).add(f"{value.material} {value.quantity} = {value.value:.6g}")
     known = citations() | {SET: "by the design itself"}
     return [(name, f"{known.get(name, name)}: {', '.join(sorted(values))}") for name, values in sorted(used.items())]
