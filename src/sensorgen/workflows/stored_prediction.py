@@ -1,10 +1,16 @@
 """Predict a specimen's design and log the prediction before the specimen is measured."""
 
+import json
+from pathlib import Path
+
 from sensorgen.core.errors import MissingValue
+from sensorgen.design.design import Design
 from sensorgen.measure.log import notes
 from sensorgen.measure.log.batches import prediction
 from sensorgen.measure.log.entries import Entry
 from sensorgen.measure.log.logbook import Log
+
+OUT = Path("out")  # folder of the designs' folders, where build and slice write
 
 
 def predict(log: Log, specimen: str) -> list[Entry]:
@@ -29,8 +35,6 @@ def predict(log: Log, specimen: str) -> list[Entry]:
     MissingValue
         The name stands for no design, or the specimen was printed from another design, whose file must be predicted.
     """
-    from sensorgen.prediction.prediction import prediction as predicted
-
     design = notes.design_of(specimen)
     printed = [row.design_id for row in log.prints(specimen=notes.specimen(specimen).specimen)][-1:]
     design_ids = printed or ([design.id()] if design else [])
@@ -38,4 +42,14 @@ def predict(log: Log, specimen: str) -> list[Entry]:
         return []
     if design is None or design.id() != design_ids[0]:
         raise MissingValue(f"{specimen!r} names no design; log a prediction of its file: sensorgen log predict FILE")
-    return log.add([prediction(design.id(), design.name, predicted(design))])
+    return log.add([predicted_row(design)])
+
+
+def predicted_row(design: Design) -> Entry:
+    """Prediction of a design's print, as a row of the log."""
+    from sensorgen.prediction import bodies
+    from sensorgen.prediction.evaluate import evaluate
+    from sensorgen.prediction.results import to_json
+
+    predicted = evaluate(bodies.default_body(design, OUT / design.name))
+    return prediction(design.id(), design.name, json.loads(to_json(predicted)))

@@ -18,7 +18,7 @@ MOST_BYTES = 64_000_000
 
 
 class _Piece(Strict, extra="ignore"):
-    """One specimen on the bed."""
+    """One specimen on the bed; version 0.1.0 has its prediction in ``expected``."""
 
     design_id: str = Field(min_length=1)
     design: str
@@ -35,6 +35,7 @@ class _Record(Strict, extra="ignore"):
     """The parts of ``batch.json`` that are logged."""
 
     specimens: dict[str, _Piece]
+    predictions: dict[str, dict[str, Any]] | None = None
     batch: str | None = None
     slicers: dict[str, _Slicer] | None = None
 
@@ -69,7 +70,9 @@ def _piece(batch: str, name: str, piece: _Piece, record: _Record) -> Iterator[En
     yield Print(
         **vars(of), uid=f"{batch} {of.specimen}", batch_uid=batch, design_id=piece.design_id, design=piece.design
     )
-    if piece.expected:
+    if record.predictions and piece.design_id in record.predictions:
+        yield prediction(piece.design_id, piece.design, record.predictions[piece.design_id])
+    elif piece.expected:
         slicers = (record.slicers or {}).items()
         printed = {slicer: used.printed[piece.design_id] for slicer, used in slicers
                    if used.printed and piece.design_id in used.printed}  # fmt: skip
