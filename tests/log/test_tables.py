@@ -69,7 +69,7 @@ def test_blank_cells_are_missing_and_doubtful(take, log):
 
 
 WRONG = {
-    "empty": (b"", "t.csv is empty; expected a header"),
+    "empty": (b"", "t.csv' is empty; expected a table as CSV"),
     "blank": (b"\n\n", "row 1 is empty"),
     "header alone": (HEAD, "no rows below the header"),
     "no specimen": ("y,z\n1,2\n", "row 1: no column specimen among 'y, z'; name it, as --column specimen=NAME"),
@@ -81,9 +81,9 @@ WRONG = {
     "bad value": (HEAD + "23 triX,1,2,\n23 triX,1,about 2,\n", "row 3: resistance in Z: 'about 2' is no resistance"),
     "bad name": (HEAD + "23 triX,1,2,\n\n23 trj,1,2,\n", "row 4: '23 trj' is no specimen's name"),
     "bad state": ("specimen,y,baked\n23 triX,1,half\n", "row 2: column baked: 'half'; expected yes, no or nothing"),
-    "zip": (b"PK\x03\x04" + b"\0" * 99, "is a zip archive or a spreadsheet; expected a table as CSV"),
-    "pickle": (pickle.dumps({"specimen": 1}), "is a pickle"),
-    "gzip": (b"\x1f\x8b\x08\0", "is gzip"),
+    "zip": (b"PK\x03\x04" + b"\0" * 99, "is a zip archive, as .xlsx and .npz are; expected a table as CSV"),
+    "pickle": (pickle.dumps({"specimen": 1}), "is a Python pickle"),
+    "gzip": (b"\x1f\x8b\x08\0", "is packed with gzip"),
     "utf-16": (HEAD.encode("utf-16"), "is UTF-16"),
     "latin-1": (HEAD.encode() + "23 triX,1,2,gr\xf6\xdfe\n".encode("latin-1"), "row 2: byte 0xf6 is not UTF-8"),
     "zero byte": (HEAD + "23 triX,1,2,\0\n", "row 2: a zero byte"),

@@ -12,6 +12,7 @@ from pathlib import Path
 from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
 from sensorgen.core.records import shown
 from sensorgen.measure.csv_table import separator_of
+from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log.entries import Reading
 from sensorgen.measure.log.notes import reading
 
@@ -28,12 +29,6 @@ NAMES = {  # our columns, and names that are recognised
 }
 _TRUTH = {"": None, "yes": True, "true": True, "1": True, "baked": True, "no": False, "false": False, "0": False,
           "unbaked": False, "not baked": False}  # fmt: skip
-_FIRST_BYTES = {
-    b"PK\x03\x04": "a zip archive or a spreadsheet", b"\x80\x04": "a pickle", b"\x80\x05": "a pickle",
-    b"\x80\x03": "a pickle", b"\x80\x02": "a pickle", b"\x1f\x8b": "gzip", b"SQLite": "a database",
-    b"\x89HDF": "HDF5", b"MATLAB": "MATLAB's", b"PAR1": "Parquet", b"\xd0\xcf\x11\xe0": "an old spreadsheet",
-    b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -66,7 +61,11 @@ def sheet(path: Path) -> Sheet:
     BadInput
         Missing, no regular file, too large, not UTF-8 or not CSV; with file and row.
     """
-    return parsed(_content(path), str(path))
+    checked_head(path, MOST_BYTES, "a table as CSV in UTF-8")
+    try:
+        return parsed(path.read_bytes(), str(path))
+    except OSError as error:
+        raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None
 
 
 def parsed(content: bytes, name: str) -> Sheet:
@@ -95,23 +94,7 @@ def parsed(content: bytes, name: str) -> Sheet:
     return Sheet(name, columns, tuple(rows[1:]), tuple(numbers[1:]))
 
 
-def _content(path: Path) -> bytes:
-    try:
-        if path.exists() and not path.is_file():
-            raise BadInput(f"{str(path)!r} is no file; expected a table as CSV")
-        if (size := path.stat().st_size) > MOST_BYTES:
-            raise BadInput(f"{str(path)!r}: {size} bytes; expected at most {MOST_BYTES}: split it")
-        return path.read_bytes()
-    except (OSError, ValueError) as error:
-        raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
-
-
 def _text(content: bytes, name: str) -> str:
-    other = next((kind for start, kind in _FIRST_BYTES.items() if content.startswith(start)), "")
-    if other:
-        raise BadInput(f"{name} is {other}; expected a table as CSV in UTF-8")
-    if not content:
-        raise BadInput(f"{name} is empty; expected a header such as specimen,y,z,remark, and rows below it")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
