@@ -114,7 +114,7 @@ def readings_csv(path, line, made, frequency_hz=TONES_HZ, noise=1e-3, seed=2):
     """A row for every press, as invert reads it; the truth stands beside it."""
     z = np.stack([line.impedance(frequency_hz, f, x * 1e-3) for f, x in made])
     z = noisy(z, noise, np.random.default_rng(seed))
-    _write(path, ["true_force_n", "true_position_mm", *columns(frequency_hz)], np.hstack([made, _parts(z)]))
+    write(path, ["true_force_n", "true_position_mm", *columns(frequency_hz)], np.hstack([made, _parts(z)]))
     return path
 
 
@@ -129,11 +129,11 @@ def bench_csv(lcr, rig, line, made, frequency_hz=TONES_HZ, noise=1e-4, seed=3, r
     rest = line.impedance(frequency_hz)
     pressed = np.stack([line.impedance(frequency_hz, f, x * 1e-3) for f, x in made])
     z = noisy(np.where(which[:, None] < 0, rest, pressed[which]), noise, rng)
-    _write(lcr, ["time_s", "stamp_s", *columns(frequency_hz)], np.column_stack([time, EPOCH_S + time, _parts(z)]))
+    write(lcr, ["time_s", "stamp_s", *columns(frequency_hz)], np.column_stack([time, EPOCH_S + time, _parts(z)]))
     force = np.where(which < 0, 0.0, made[which, 0])
     near = np.abs(time[:, None] - (start + dwell_s / 2)).argmin(1)  # the tip moves while it is up
     told = np.column_stack([EPOCH_S + time, force, made[near, 1], force + 0.01 * rng.standard_normal(len(time))])
-    _write(rig, ["time_s", "set_force_n", "set_position_mm", "force_n"], told)
+    write(rig, ["time_s", "set_force_n", "set_position_mm", "force_n"], told)
     return lcr, rig
 
 
@@ -141,6 +141,7 @@ def _parts(z):
     return np.stack([z.real, z.imag], -1).reshape(len(z), -1)
 
 
-def _write(path, names, rows):
+def write(path, names, rows):
+    """Rows of numbers as CSV."""
     lines = [",".join(f"{v:.3f}" if v > 1e6 else f"{v:.7g}" for v in row) for row in np.asarray(rows).tolist()]
     Path(path).write_text("\n".join([",".join(names), *lines]) + "\n", "utf-8")
