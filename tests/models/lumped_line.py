@@ -40,13 +40,17 @@ class Line:
         """Unloaded [F]."""
         return self.farad_per_m * self.length_m
 
+    def farad_ratio(self, force_n):
+        """Capacitance per length under the tip over the unloaded one."""
+        kpa = force_n / (self.width_m * self.tip_m) * 1e-3
+        return 1 + float(PchipInterpolator(*self.rise)(kpa))
+
     def impedance(self, frequency_hz, force_n=0.0, position_m=0.05, sections=SECTIONS):
         """Of the ladder at its contacts (tones,) [ohm]: each section a resistor between two halves of its capacitor."""
         dx = self.length_m / sections
         edges = np.linspace(0, self.length_m, sections + 1)
         under = _overlap(edges, position_m - self.tip_m / 2, position_m + self.tip_m / 2) / dx
-        kpa = force_n / (self.width_m * self.tip_m) * 1e-3
-        c = self.farad_per_m * (1 + under * float(PchipInterpolator(*self.rise)(kpa)))
+        c = self.farad_per_m * (1 + under * (self.farad_ratio(force_n) - 1))
         half = 1j * np.pi * np.asarray(frequency_hz, float)[:, None] * c * dx  # admittance of C/2 [S]
         r = self.ohm_per_m * dx
         y = np.zeros(len(half), complex)
@@ -86,6 +90,19 @@ def tri(film_mm, top_ohm_m, bottom_ohm_m, cogs=1.0, electrode_mm=0.3, **more):
         (top_ohm_m * cogs + bottom_ohm_m) / (electrode_mm * 1e-3 * width_m),
         cell["C_F_per_m"] * width_m / (PITCH_MM * 1e-3),
         (tuple(pressed["p_kPa"]), rise),
+        **more,
+    )
+
+
+def plate(thickness_m, top_ohm_m, bottom_ohm_m, modulus_pa, permittivity=4.68, electrode_mm=0.3, **more):
+    """A plain plate of 100 x 10 mm that gives way as a column free sideways: strain p/E (thesis, B.49)."""
+    width_m = more.get("width_m", 0.01)
+    kpa = np.linspace(0, 100, 201)
+    strain = kpa * 1e3 / modulus_pa
+    return Line(
+        (top_ohm_m + bottom_ohm_m) / (electrode_mm * 1e-3 * width_m),
+        8.8541878128e-12 * permittivity * width_m / thickness_m,
+        (tuple(kpa), tuple(strain / (1 - strain))),
         **more,
     )
 
