@@ -1,6 +1,6 @@
 """Layers as regions in plan: what every body covers at one height, as polygons [mm]."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -49,26 +49,34 @@ class LayerRegions:
 
 def parts(region: Region) -> list[Polygon]:
     """Separate polygons of a region, from left to right."""
-    found: list[Polygon] = [p for p in shapely.get_parts(region).tolist() if p.geom_type == "Polygon" and p.area > 0]
-    return sorted(found, key=lambda part: part.bounds)
-
-
-def united(outlines: Iterable[Outline]) -> Region:
-    """Union of outlines."""
-    polygons = [Polygon(outline) for outline in outlines]
-    return polygons[0] if len(polygons) == 1 else shapely.union_all(polygons)
+    found = shapely.get_parts(region)
+    found = found[shapely.area(found) > 0]
+    order: list[Polygon] = found[np.lexsort(shapely.bounds(found).T[::-1])].tolist()
+    return order
 
 
 def cleaned(region: Region) -> Region:
     """A region without parts narrower than a sliver, which are rounding."""
-    kept = [p for p in parts(region) if min(p.bounds[2] - p.bounds[0], p.bounds[3] - p.bounds[1]) > SLIVER_MM]
-    return kept[0] if len(kept) == 1 else MultiPolygon(kept)
+    found = shapely.get_parts(region)
+    low, high = shapely.bounds(found).reshape(-1, 2, 2).swapaxes(0, 1)
+    wide = (high - low > SLIVER_MM).all(1)
+    if wide.all():
+        return region
+    return shapely.multipolygons(found[wide])
 
 
 def is_box(part: Polygon) -> bool:
     """Whether a polygon is a rectangle along the axes."""
     x0, y0, x1, y1 = part.bounds
     return abs((x1 - x0) * (y1 - y0) - part.area) < SLIVER_MM**2
+
+
+def is_rectilinear(region: Region) -> bool:
+    """Whether all edges run along x or y."""
+    rings = shapely.get_rings(shapely.get_parts(region))
+    corners, ring = shapely.get_coordinates(rings, return_index=True)
+    steps = np.abs(np.diff(corners, axis=0)).min(1)
+    return bool((steps[ring[1:] == ring[:-1]] < SLIVER_MM).all())
 
 
 def narrow_mm(part: Polygon) -> float:
@@ -95,19 +103,24 @@ def drawn(scene: Scene, boundaries_mm: Sequence[float]) -> tuple[LayerRegions, .
 
 @lru_cache(maxsize=16)
 def _drawn(scene: Scene, boundaries_mm: tuple[float, ...]) -> tuple[LayerRegions, ...]:
-    known: dict[frozenset[Outline], Region] = {}
-    spans = {body.name: [(p.span("z"), p) for p in body.prisms] for body in scene.bodies}
     layers = []
     for bottom, top in pairwise(boundaries_mm):
-        at, regions = rounded((bottom + top) / 2), {}
-        for name, prisms in spans.items():
-            cuts = frozenset(o for (low, high), p in prisms if low <= at <= high for o in p.cut("z", at))
-            if cuts and cuts not in known:
-                known[cuts] = united(cuts)
-            if cuts:
-                regions[name] = known[cuts]
+        found = {body.name: region_at(body, rounded((bottom + top) / 2)) for body in scene.bodies}
+        regions = {name: region for name, region in found.items() if not region.is_empty}
         layers.append(LayerRegions(bottom, top, regions, _along(regions, scene)))
     return tuple(layers)
+
+
+def region_at(body: Body, z_mm: float) -> Region:
+    """Region of a body at a height."""
+    return _united(frozenset(o for p in body.prisms for o in p.cut("z", z_mm)))
+
+
+@lru_cache(maxsize=64)
+def _united(outlines: frozenset[Outline]) -> Region:
+    """Union of outlines; equal layers share one."""
+    polygons = [Polygon(outline) for outline in outlines]
+    return polygons[0] if len(polygons) == 1 else shapely.union_all(polygons)
 
 
 def _along(regions: Mapping[str, Region], scene: Scene) -> str:
@@ -167,8 +180,8 @@ def outlines(region: Region) -> Iterator[Outline]:
 
 def _cut_at(part: Polygon) -> float | None:
     """Where to cut a polygon that is rectilinear or has holes; None where it is neither."""
-    corners = shapely.get_coordinates(part)
-    if (np.abs(np.diff(corners, axis=0)).min(1) < SLIVER_MM).all() and not part.interiors:
-        inside = corners[(corners[:, 0] > part.bounds[0] + SLIVER_MM) & (corners[:, 0] < part.bounds[2] - SLIVER_MM), 0]
-        return float(inside.min()) if len(inside) else None
-    return float(part.interiors[0].centroid.x) if part.interiors else None
+    if part.interiors:
+        return float(part.interiors[0].centroid.x)
+    x = shapely.get_coordinates(part)[:, 0]
+    inside = x[(x > part.bounds[0] + SLIVER_MM) & (x < part.bounds[2] - SLIVER_MM)]
+    return float(inside.min()) if is_rectilinear(part) and len(inside) else None
