@@ -17,7 +17,7 @@ from sensorgen.export.gcode import extruded
 from sensorgen.export.slicers import cura, curaengine, prusa
 from sensorgen.export.slicers.loads import Load, recipes
 from sensorgen.export.slicers.run import run
-from sensorgen.export.slicers.tower import MARGIN_MM, tower
+from sensorgen.design.tower import MARGIN_MM, tower
 
 FINE = load_quality("fine")
 DIABASE = load_printer("diabase-h5")

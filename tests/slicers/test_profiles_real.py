@@ -19,7 +19,7 @@ from sensorgen.design.printer import Printer, load_printer, load_quality, printe
 from sensorgen.export.gcode import extruded
 from sensorgen.export.slicers import cura, curaengine, prusa
 from sensorgen.export.slicers.loads import Load
-from sensorgen.export.slicers.tower import tower
+from sensorgen.design.tower import tower
 
 DIABASE = load_printer("diabase-h5")
 FINE = load_quality("fine")

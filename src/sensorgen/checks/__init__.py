@@ -13,7 +13,9 @@ from sensorgen.design.printer import Printer, Quality
 from sensorgen.scene.scene import Scene
 
 
-def findings(scene: Scene, printer: Printer, quality: Quality, gap_mm: float) -> list[Finding]:
+def findings(
+    scene: Scene, printer: Printer, quality: Quality, gap_mm: float, walls: str = "arachne"
+) -> list[Finding]:
     """All findings about a scene, the most severe first.
 
     Parameters
@@ -24,6 +26,8 @@ def findings(scene: Scene, printer: Printer, quality: Quality, gap_mm: float) ->
         What prints it.
     gap_mm : float
         Smallest distance of the electrodes, exact [mm].
+    walls : str
+        Of the slicer, one of :data:`sensorgen.checks.estimate.RULES`.
     """
     slices = Slices(scene, quality)
     found = [
@@ -32,7 +36,7 @@ def findings(scene: Scene, printer: Printer, quality: Quality, gap_mm: float) ->
         *widths.check(slices, printer),
         *bed.check(scene, printer),
         *bridges.check(slices, printer, quality),
-        *volumes.findings(volumes.rows(scene, estimate.layers(scene, printer, quality)), scene),
+        *volumes.findings(volumes.rows(scene, estimate.layers(scene, printer, quality, walls)), scene),
     ]
     return sorted(_merged(found), key=lambda f: (SEVERITIES.index(f.severity), int(f.rule.partition("-")[0])))
 

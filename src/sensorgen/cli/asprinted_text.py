@@ -1,7 +1,7 @@
 """A design as drawn and as printed, as lines for the terminal."""
 
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +14,10 @@ from sensorgen.core.errors import BadInput
 from sensorgen.export.slicers import SLICERS
 
 if TYPE_CHECKING:
-    from sensorgen.asprinted.compared import Printed
+    from sensorgen.asprinted.printed import Printed
+    from sensorgen.checks.volumes import Row
     from sensorgen.design.design import Design
+    from sensorgen.prediction.as_printed import Capacitance, Comparison, Resistance
 
 
 def compensate_option() -> click.Option:
@@ -52,15 +54,15 @@ def refuse_strays(*, as_printed: bool, slicer: str | None, walls: str | None) ->
 
 def printed(design: "Design", slicer: str | None, walls: str | None) -> "Printed":
     """What is printed of a design: sliced for real, or estimated."""
-    from sensorgen.asprinted import compared
+    from sensorgen.asprinted.printed import body
 
     if not slicer:
-        return compared.estimated(design, walls or "arachne")
+        return body(design, walls=walls or "arachne")
     from sensorgen.export import slicing
 
     with tempfile.TemporaryDirectory() as folder, show.progress(slicing.STEPS) as step:
         made = slicing.sliced([slicing.alone(design)], slicer, Path(folder), step=step)
-    return compared.sliced(design, made.lines, f"{slicer} {made.version}")
+    return body(design, made.lines, slicer=f"{slicer} {made.version}")
 
 
 def compensated(
@@ -81,64 +83,51 @@ def compensated(
     return found, [c.as_dict() for c in changes]
 
 
-def lines(found: Mapping[str, Any]) -> Iterator[str]:
-    """The whole comparison.
-
-    Parameters
-    ----------
-    found : mapping
-        As of :func:`sensorgen.asprinted.report.report`.
-    """
-    yield f"{found['design']}, as drawn and as printed: {found['source']}"
-    if found["estimate"]:
+def lines(found: "Comparison") -> Iterator[str]:
+    """The whole comparison."""
+    gap = found.electrode_gap_mm
+    yield f"{found.design}, as drawn and as printed: {found.source}"
+    if found.estimate:
         yield "an ESTIMATE: no slicer was asked; --slicer prusa or cura does"
     yield ""
     yield f"{'':18}{'drawn':>12}   printed"
-    low, high = found["electrode_gap_mm"]["printed"]
-    gap = f"{low:g} mm" if low == high else f"{low:g} .. {high:g} mm"
-    yield f"{'electrode gap':18}{found['electrode_gap_mm']['drawn']:>9g} mm   {gap}"
-    yield from _capacitance(found["capacitance_f"])
-    yield from _resistance(found["electrode_resistance_ohm"], found["contact_ohm_m2"])
+    yield f"{'electrode gap':18}{gap.drawn:>9g} mm   {' .. '.join(f'{g:g}' for g in sorted(set(gap.printed)))} mm"
+    yield from _capacitance(found.capacitance_f)
+    yield from _resistance(found.electrode_resistance_ohm, found.contact_ohm_m2)
     yield ""
-    yield from table(found["layers"])
+    yield from table(found.layers)
 
 
-def _capacitance(c: Mapping[str, Any]) -> Iterator[str]:
-    if isinstance(c["drawn"], str):
-        yield f"{'capacitance':18}{'none':>12}   {c['drawn']}"
+def _capacitance(c: "Capacitance") -> Iterator[str]:
+    if isinstance(c.drawn, str):
+        yield f"{'capacitance':18}{'none':>12}   {c.drawn}"
         return
-    drawn = si(c["drawn"]["middle"], "F")
-    if c["printed"] is None:
-        yield f"{'capacitance':18}{drawn:>12}   none: {next(iter(c['by_width'].values()))}"
+    drawn = si(c.drawn.middle, "F")
+    if c.printed is None:
+        yield f"{'capacitance':18}{drawn:>12}   none: {next(iter(c.by_width.values()))}"
         return
-    yield f"{'capacitance':18}{drawn:>12}   {si(c['printed']['lower'], 'F')} .. {si(c['printed']['upper'], 'F')}"
-    for name, value in c["by_width"].items():
-        said = value if isinstance(value, str) else si(value["middle"], "F")
+    yield f"{'capacitance':18}{drawn:>12}   {si(c.printed.lower, 'F')} .. {si(c.printed.upper, 'F')}"
+    for name, value in c.by_width.items():
+        said = value if isinstance(value, str) else si(value.middle, "F")
         yield f"{'  lines by ' + name:30}   {said}"
 
 
-def _resistance(r: Mapping[str, Any], contacts: Sequence[float]) -> Iterator[str]:
-    if r["drawn"] is None:
-        yield f"{'electrodes':18}{'':12}   {r['reason']}"
+def _resistance(r: "Resistance", contacts: Sequence[float]) -> Iterator[str]:
+    if r.drawn is None or r.printed is None:
+        yield f"{'electrodes':18}{'':12}   {r.reason}"
         return
-    for end, solid in r["drawn"].items():
+    for end, solid in r.drawn.items():
         yield f"{end + ' electrode':18}{si(solid, 'ohm'):>12}"
-        for contact, value in zip(contacts, r["printed"][end], strict=True):
+        for contact, value in zip(contacts, r.printed[end], strict=True):
             yield f"{f'  contacts {contact:g} ohm m2':30}   {si(value, 'ohm')}"
 
 
-def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Printed over exact volume of every body, layer by layer from the top.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        As of :class:`sensorgen.asprinted.tally.Row`, with "ratio".
-    """
-    bodies = list(dict.fromkeys(row["body"] for row in rows))
-    cells = {(row["layer"], row["body"]): _cell(row) for row in rows}
-    spans = {row["layer"]: f"{row['bottom_mm']:g}-{row['top_mm']:g}" for row in rows}
-    yield "printed over exact volume (strips lost or fused)"
+def table(rows: "Sequence[Row]") -> Iterator[str]:
+    """Printed over drawn volume of every body, layer by layer from the top."""
+    bodies = list(dict.fromkeys(row.body for row in rows))
+    cells = {(row.layer, row.body): _cell(row) for row in rows}
+    spans = {row.layer: f"{row.bottom_mm:g}-{row.top_mm:g}" for row in rows}
+    yield "printed over drawn volume (-n: missing parts, +n: merged parts)"
     yield f"{'layer':>5} {'mm':11}" + " ".join(f"{name:>{_wide(name)}}" for name in bodies)
     for layer in sorted(spans, reverse=True):
         row = " ".join(f"{cells.get((layer, name), ''):>{_wide(name)}}" for name in bodies)
@@ -149,7 +138,7 @@ def _wide(name: str) -> int:
     return max(len(name), 12)
 
 
-def _cell(row: Mapping[str, Any]) -> str:
-    lost = f" -{row['vanished']}" if row["vanished"] else ""
-    fused = f" +{row['fused']}" if row["fused"] else ""
-    return f"{'extra' if row['ratio'] is None else format(row['ratio'], '.2f')}{lost}{fused}"
+def _cell(row: "Row") -> str:
+    lost = f" -{row.vanished}" if row.vanished else ""
+    fused = f" +{row.fused}" if row.fused else ""
+    return f"{format(row.ratio, '.2f') if row.exact_mm3 > 0 else 'extra'}{lost}{fused}"

@@ -38,6 +38,7 @@ def _work(
         else:
             show.findings(error.findings)
         raise
+    code = 1 if built.review.lost() and not force else 0
     files = sorted([*store.listed(built.folder), store.MANIFEST])
     if as_json:
         found = [f.as_dict() for f in built.review.findings]
@@ -51,14 +52,14 @@ def _work(
                 "prediction": built.prediction,
             }
         )
-        return 0
+        return code
     show.findings(built.review.findings)
     click.echo()
     show.prediction(built.prediction)
     for line in card_text.of_prediction(built.prediction):
         click.echo(line)
     click.echo(f"\n{built.folder}: {len(files)} files; {show.summary(built.review)}")
-    return 0
+    return code
 
 
 command = DesignGroup(

@@ -18,7 +18,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.prediction.plan import plain
 
 if TYPE_CHECKING:
-    from sensorgen.asprinted.compared import Printed
+    from sensorgen.asprinted.printed import Printed
     from sensorgen.design.design import Design
     from sensorgen.prediction.compression import Asked
     from sensorgen.prediction.sweep import Point

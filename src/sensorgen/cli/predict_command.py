@@ -128,13 +128,13 @@ def _made(
     accuracy, law, tip = asked
     if not how["as_printed"]:
         return _carried_out(design, planned.drawn(design, **tip), axes, (accuracy, law), how)
-    from sensorgen.asprinted import pressed
+    from sensorgen.prediction import as_printed
 
     printed = asprinted_text.printed(design, how["slicer"], how["walls"])
     makers = planned.Makers(
-        partial(pressed.unloaded, design, printed),
-        lambda law, known: pressed.sensor_of(design, printed, law, known=known, **tip),
-        pressed.piece(design, printed),
+        partial(as_printed.unloaded, printed),
+        lambda law, known: as_printed.sensor_of(printed, law, known=known, **tip),
+        as_printed.piece(printed),
     )
     return _carried_out(design, makers, axes, (accuracy, law), how)
 
@@ -168,14 +168,13 @@ def _explain(outline: "Outline") -> None:
 
 def _as_printed(design: "Design", accuracy: float | None, how: dict[str, Any]) -> int:
     """Drawn against printed; 1 where a body is missing from a layer and nobody has waived it."""
-    from sensorgen.asprinted import compared
-    from sensorgen.asprinted.report import report
+    from sensorgen.prediction import as_printed
 
     printed = asprinted_text.printed(design, how["slicer"], how["walls"])
-    found = report(design, printed, accuracy or compared.ACCURACY)
+    found = as_printed.comparison(printed, accuracy or as_printed.ACCURACY)
     text = (f"{line}\n" for line in asprinted_text.lines(found))
-    _deliver(iter([show.json_text(found)]) if how["as_json"] else text, how["output"])
-    return FOUND_ERRORS if any(f["severity"] == "error" and not f["waiver"] for f in found["findings"]) else 0
+    _deliver(iter([show.json_text(found.as_dict())]) if how["as_json"] else text, how["output"])
+    return FOUND_ERRORS if any(f.severity == "error" and not f.waiver for f in found.findings) else 0
 
 
 def _refuse_strangers(pressing: Sequence[object], *, explain: bool) -> None:

@@ -73,7 +73,7 @@ def _work(
     click.echo(f"{design.name}: {show.summary(made.review)} (sensorgen check tells them)")
     for line in (*gcode_text.findings(made.checked), *gcode_text.report(made.checked.report)):
         click.echo(line)
-    for line in asprinted_text.table([row.as_dict() for row in made.rows]):
+    for line in asprinted_text.table(made.rows):
         click.echo(line)
     show.findings(made.printed)
     click.echo(f"{made.gcode}: {made.slicer} {made.version}, {made.seconds:.1f} s; {gcode_text.summary(made.checked)}")

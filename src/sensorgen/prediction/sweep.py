@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from sensorgen.asprinted.compared import Printed
+from sensorgen.asprinted.printed import Printed
 from sensorgen.core import cache as cached
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange
 from sensorgen.core.parallel import in_parallel, said

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-from sensorgen.asprinted import compared
-from sensorgen.asprinted.report import report
+from sensorgen.asprinted.printed import body
 from sensorgen.core.errors import SensorgenError
 from sensorgen.export.slicing import Placed, Sliced
+from sensorgen.prediction.as_printed import comparison
 
 CONTACTS_OHM_M2 = (0.0,)  # no source gives another; predict --as-printed shows what others would do
 
@@ -29,7 +29,7 @@ def of_designs(found: Sequence[Placed], made: Sliced) -> dict[str, Any]:
 
 def _of(piece: Placed, made: Sliced) -> dict[str, Any]:
     try:
-        printed = compared.sliced(piece.design, made.lines, f"{made.slicer} {made.version}", piece.sensor_mm())
-        return {"specimen": piece.name, **report(piece.design, printed, contacts_ohm_m2=CONTACTS_OHM_M2)}
+        printed = body(piece.design, made.lines, slicer=f"{made.slicer} {made.version}", centre_mm=piece.sensor_mm())
+        return {"specimen": piece.name, **comparison(printed, contacts_ohm_m2=CONTACTS_OHM_M2).as_dict()}
     except SensorgenError as error:
         return {"specimen": piece.name, "design": piece.design.name, "findings": [], "reason": str(error)}
