@@ -13,9 +13,7 @@ from sensorgen.design.printer import Printer, Quality
 from sensorgen.scene.scene import Scene
 
 
-def findings(
-    scene: Scene, printer: Printer, quality: Quality, gap_mm: float, walls: str = "arachne"
-) -> list[Finding]:
+def findings(scene: Scene, printer: Printer, quality: Quality, gap_mm: float, walls: str = "arachne") -> list[Finding]:
     """All findings about a scene, the most severe first.
 
     Parameters

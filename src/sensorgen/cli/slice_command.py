@@ -9,7 +9,7 @@ from sensorgen.cli import asprinted_text, gcode_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf
 from sensorgen.core.errors import OutOfRange
-from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
+from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S, WALLS
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
@@ -50,8 +50,7 @@ def _work(
 
     if not 0 < time_limit_s < float("inf"):
         raise OutOfRange(f"--time-limit {time_limit_s:g}; expected seconds above 0")
-    walls = "arachne" if slicer == "prusa" else "cura-gaps"
-    design, changes = asprinted_text.compensated(design, compensate, walls, silent=as_json)
+    design, changes = asprinted_text.compensated(design, compensate, WALLS[slicer], silent=as_json)
     try:
         with show.progress(("checks", *STEPS)) as step:
             made = printfile.slice_design(

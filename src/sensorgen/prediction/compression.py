@@ -16,10 +16,10 @@ from sensorgen.design.design import Design
 from sensorgen.design.values import permittivities
 from sensorgen.models import press2d
 from sensorgen.models.press2d import Held, Pressed
-from sensorgen.prediction.as_printed import piece as printed_piece
-from sensorgen.prediction.as_printed import width_by
 from sensorgen.prediction import capacitance_answer as bounds
 from sensorgen.prediction import closed_form_compression as guesses
+from sensorgen.prediction.as_printed import piece as printed_piece
+from sensorgen.prediction.as_printed import width_by
 from sensorgen.prediction.compression_law import elastic, expected
 from sensorgen.prediction.mesh_ladder import MODELS, SAFETY, USUAL, Case, Piece, Rung, drawn, pressed, rungs, unfit
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, plain, walked

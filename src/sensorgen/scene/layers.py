@@ -181,7 +181,8 @@ def outlines(region: Region) -> Iterator[Outline]:
 def _cut_at(part: Polygon) -> float | None:
     """Where to cut a polygon that is rectilinear or has holes; None where it is neither."""
     if part.interiors:
-        return float(part.interiors[0].centroid.x)
+        hole = part.interiors[0]
+        return float(hole.bounds[0] if is_rectilinear(part) else hole.centroid.x)
     x = shapely.get_coordinates(part)[:, 0]
     inside = x[(x > part.bounds[0] + SLIVER_MM) & (x < part.bounds[2] - SLIVER_MM)]
     return float(inside.min()) if is_rectilinear(part) and len(inside) else None

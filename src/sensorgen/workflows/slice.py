@@ -15,7 +15,7 @@ from sensorgen.core.errors import Unprintable
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.check import Checked, check
-from sensorgen.export.slicers import TIME_LIMIT_S
+from sensorgen.export.slicers import TIME_LIMIT_S, WALLS
 from sensorgen.export.slicing import Sliced, Step, alone, sliced
 
 
@@ -124,7 +124,7 @@ def slice_design(
         The place cannot be written to, or the disk is full.
     """
     step("checks")
-    held = review(design, walls=WALLS[slicer])
+    held = review(design, walls=WALLS.get(slicer, "arachne"))
     if held.errors(strict) and not force:
         raise Unprintable(held.findings)
     folder = out / design.name
