@@ -20,7 +20,6 @@ _CUTS = (-0.37, -0.2, 0.0, 0.17, 0.41)  # places of the cuts, in shares of a ten
 _LEVEL_MM = 0.01  # a line belongs to a layer whose top it is this near
 
 Floats = NDArray[np.float64]
-Polygons = NDArray[np.object_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,20 +210,19 @@ def _merged(runs: Floats) -> tuple[Floats, Floats]:
 
 def _union(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convention: str) -> Region:
     """All lines, with slits between touching ones closed."""
-    rectangles = shapely.polygons(lines.corners_mm(convention))
-    region = shapely.union_all(rectangles)
+    region = shapely.union_all(shapely.polygons(lines.corners_mm(convention)))
     if convention == "deposit":
-        region = shapely.union_all([_pushed(part, rectangles) for part in parts(region)])
+        region = shapely.union_all([_pushed(part, lines) for part in parts(region)])
     slit = ROUND * layer.height_mm
     closed = region.buffer(slit, join_style="mitre").buffer(-slit, join_style="mitre")
     return shapely.clip_by_rect(closed, 0.0, 0.0, size_mm[0], size_mm[1])
 
 
-def _pushed(part: Region, rectangles: Polygons) -> Region:
+def _pushed(part: Region, lines: Beads) -> Region:
     """A connected part, wider by what its lines overlap."""
-    inside = shapely.intersects(part, rectangles)
-    more = max(float(shapely.area(rectangles[inside]).sum()) - part.area, 0.0) / part.length
-    return part.buffer(more, join_style="mitre")
+    inside = shapely.contains_xy(part, (lines.start_mm + lines.end_mm) / 2)
+    deposited = float((lines.volume_mm3[inside] / lines.height_mm[inside]).sum())
+    return part.buffer(max(deposited - part.area, 0.0) / part.length, join_style="mitre")
 
 
 def _order(scene: Scene, lines: Beads, *, electrode_wins: bool) -> list[int]:

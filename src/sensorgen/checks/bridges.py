@@ -1,6 +1,7 @@
 """Rule 9: bridges, overhangs and islands over air. Any body below supports, whatever its material."""
 
 from collections.abc import Iterator
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +12,8 @@ from sensorgen.checks.slices import TOUCH_MM, Slices
 from sensorgen.checks.widths import VANISHES
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer, Quality
-from sensorgen.scene.layers import Region, cleaned, is_rectilinear, narrow_mm, parts
-from sensorgen.scene.scene import SLIVER_MM, Body
+from sensorgen.scene.layers import Region, cleaned, is_rectilinear
+from sensorgen.scene.scene import Body
 
 Mask = NDArray[np.bool_]
 Lengths = NDArray[np.float64]
@@ -38,8 +39,7 @@ def check(slices: Slices, printer: Printer, quality: Quality) -> Iterator[Findin
             if cleaned(shapely.difference(shape, ground)).is_empty:
                 continue
             if (shape, ground) not in known:
-                measured = _spans if is_rectilinear(shape) and is_rectilinear(ground) else _reach
-                known[shape, ground] = measured(shape, ground, least)
+                known[shape, ground] = _spans(shape, ground, least)
             yield from _judged(body, layer + 1, slices.layers.mids_mm[layer], known[shape, ground], quality, line)
 
 
@@ -66,35 +66,25 @@ def _judged(
         )  # fmt: skip
 
 
-def _reach(shape: Region, ground: Region, least_mm: float) -> dict[str, _Span]:
-    """Longest bridge, overhang and island of slanted outlines: by the distance of what is over air from the ground."""
-    found = dict.fromkeys(("bridge", "overhang", "island"), _Span())
-    supported = shapely.intersection(shape, ground)
-    for part in parts(shapely.difference(shape, ground)):
-        edges = shapely.line_merge(shapely.intersection(part.boundary, supported.buffer(SLIVER_MM)))
-        held = min(len([e for e in shapely.get_parts(edges) if e.length > SLIVER_MM and not e.is_closed]), 2)
-        reach = shapely.hausdorff_distance(part, supported.boundary) if shapely.touches(part, supported) else 0.0
-        x, y = part.representative_point().coords[0]
-        kind, length = {0: ("island", narrow_mm(part)), 1: ("overhang", reach), 2: ("bridge", 2 * reach)}[held]
-        if length > max(found[kind].mm, least_mm if kind == "island" else 0.0):
-            found[kind] = _Span(length, round(x, 9), round(y, 9))
-    return found
+def _grid(shape: Region, ground: Region, step_mm: float) -> tuple[tuple[Lengths, Lengths], Mask, Mask]:
+    """Lines along x and y, and which cells between them the shape fills, and the ground.
 
-
-def _grid(shape: Region, ground: Region) -> tuple[tuple[Lengths, Lengths], Mask, Mask]:
-    """Lines of all edges along x and y, and which cells between them the shape fills, and the ground."""
+    The lines are those of all edges; where some are slanted, lines a step apart.
+    """
     x, y = (np.unique(at.round(9)) for at in shapely.get_coordinates([shape, ground]).T)
+    if not (is_rectilinear(shape) and is_rectilinear(ground)):
+        x, y = (np.linspace(at[0], at[-1], ceil((at[-1] - at[0]) / step_mm) + 1) for at in (x, y))
     middles = np.meshgrid((x[:-1] + x[1:]) / 2, (y[:-1] + y[1:]) / 2, indexing="ij")
     return (x, y), shapely.contains_xy(shape, *middles), shapely.contains_xy(ground, *middles)
 
 
 def _spans(shape: Region, ground: Region, least_mm: float) -> dict[str, _Span]:
-    """Longest bridge, overhang and island of a rectilinear shape above a ground.
+    """Longest bridge, overhang and island of a shape above a ground, along x or y.
 
     Every unsupported place is held along x or along y; the better way counts. Places that are held neither way,
     as the corners of a roof that juts out on two sides, hold on to those that are.
     """
-    lines, filled, below = _grid(shape, ground)
+    lines, filled, below = _grid(shape, ground, least_mm / 2)
     air = filled & ~below
     found = dict.fromkeys(("bridge", "overhang", "island"), _Span())
 

@@ -17,7 +17,7 @@ def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> 
 
     Of three electrodes or more, neighbours are held apart by plates: there the distance is that of their faces.
     """
-    pairs = list(pairwise(_electrodes(slices.scene)))
+    pairs = [pair for pair in pairwise(_electrodes(slices.scene)) if pair[0].terminal != pair[1].terminal]
     for pair in pairs:
         yield from _between_two(pair, slices, printer, quality, gap_mm if len(pairs) == 1 else _apart_mm(pair))
 

@@ -42,7 +42,7 @@ def _samples(body: Body, layers: Layers) -> Iterator[Finding]:
     for low, high in lost:
         yield Finding(
             "4-unsampled", "error", body.name,
-            f"{high - low:g} mm from {low:g} to {high:g} mm lie between the slicer's sampling planes and are not printed",
+            f"{low:g} to {high:g} mm ({high - low:g} mm) lies between the slicer's sampling planes and is not printed",
             "make it a layer thick, or move it onto the layer grid",
             round(high - low, 9), layers.boundaries_mm[1] / 2, place_mm=_place(body, (low + high) / 2),
             count=sum(p.span("z") == (low, high) for p in body.prisms),
