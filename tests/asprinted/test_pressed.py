@@ -109,7 +109,7 @@ def test_the_printed_sensor_has_the_law_of_its_own_cell():
     assert (span.lower, span.upper) == (expected.lower, expected.upper)
     assert sensed.sensor.capacitance_f() == pytest.approx(span.middle(), rel=1e-12, abs=0)
     assert sensed.piece.period_mm == 2.0
-    assert "as printed: printed, estimated (Arachne)" in sensed.doubts[0]
+    assert "printed, estimated (Arachne)" in sensed.doubts[0]
 
 
 @needs_mesher

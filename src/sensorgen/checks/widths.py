@@ -133,9 +133,9 @@ def _findings(rule: str, body: Body, found: Sequence[_Narrow]) -> Iterator[Findi
             run = [each for _, each in group]
             worst = min(run, key=lambda each: each.stretches[0].width_mm)
             least, most = worst.stretches[0].width_mm, max(each.stretches[-1].width_mm for each in run)
-            widths = f"{least:.3g}" if f"{least:.3g}" == f"{most:.3g}" else f"{least:.3g} to {most:.3g}"
+            wide = f"{least:.3g}" if f"{least:.3g}" == f"{most:.3g}" else f"{least:.3g} to {most:.3g}"
             yield Finding(
-                rule, band.severity, body.name, f"a {band.noun} {widths} mm wide at mid-layer {band.effect}", band.advice,
+                rule, band.severity, body.name, f"a {band.noun} {wide} mm wide at mid-layer {band.effect}", band.advice,
                 least, round(band.upto_mm, 6), run[0].layer + 1, (*worst.stretches[0].middle_mm, worst.z_mm),
                 max(len(each.stretches) for each in run), run[-1].layer + 1 if len(run) > 1 else None,
             )  # fmt: skip

@@ -316,6 +316,4 @@ def sensor_of(
         printed.design, law, tip_m, profile=profile, radius_m=radius_m, known=known or unloaded(printed),
         printed=piece(printed),
     )  # fmt: skip
-    return replace(
-        found, caveats=(f"as printed: {width_by(printed)}", _SOLID, *([_LOSSES] if found.lost.taken else []))
-    )
+    return replace(found, caveats=(width_by(printed), _SOLID, *([_LOSSES] if found.lost.taken else [])))
