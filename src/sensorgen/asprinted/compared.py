@@ -20,9 +20,10 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.findings import Finding
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.design.values import permittivities
+from sensorgen.design.values import permittivities, resistivities
 from sensorgen.export.gcode.paths import Paths
 from sensorgen.models import traxels
+from sensorgen.models.conduction import equivalent_thickness_m
 from sensorgen.prediction import capacitance as planner
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.scene import Scene
@@ -151,7 +152,11 @@ def capacitance_f(design: Design, printed: Printed, width: float = ACCURACY) -> 
 def resistance_ohm(
     design: Design, printed: Printed, contacts_ohm_m2: Sequence[float] = CONTACTS_OHM_M2
 ) -> dict[str, list[float]]:
-    """Resistance of each electrode from end to end, one for each contact resistivity [ohm].
+    """Resistance of each electrode from end to end, cogs included, one for each contact resistivity [ohm].
+
+    The solid body that is printed, times what contacts between its lines add in their network. Where they add nothing,
+    the network is no better than the solid: a line has one potential across its width, so that cogs across the current,
+    of one or two lines each, carry too little of it.
 
     Parameters
     ----------
@@ -162,29 +167,32 @@ def resistance_ohm(
     contacts_ohm_m2 : sequence of float
         Contact resistivities between lines [ohm m2].
     """
+    solid = solid_ohm(design, printed)
     return {
-        end: [solid * _ratio(design, printed, end, rho, contact) for contact in contacts_ohm_m2]
-        for end, (solid, rho) in solid_ohm(design).items()
+        end: [solid[end] * rise for rise in _rises(design, printed, end, rho.value, contacts_ohm_m2)]
+        for end, rho in resistivities(design).items()
     }
 
 
-def solid_ohm(design: Design) -> dict[str, tuple[float, float]]:
-    """Of each electrode rho L / (H W) of its plate alone [ohm], and rho [ohm m].
+def solid_ohm(design: Design, printed: Printed | None = None) -> dict[str, float]:
+    """Resistance of each electrode as a solid body, cogs included, from end to end [ohm].
 
     Parameters
     ----------
     design : Design
         As drawn.
+    printed : Printed, optional
+        What is printed of it, where that conducts and not the drawing.
     """
-    p, found = design.params, {}
-    for end in ("top", "bottom"):
-        material, source = design.slot(f"{end}_electrode")
-        rho = material.value("resistivity_ohm_m", source).value
-        found[end] = rho * p.length_mm / (p.electrode_mm * p.width_mm) / M_PER_MM, rho
-    return found
+    p, scene = design.params, cell(design, printed.first())[0] if printed else design.in_use
+    return {
+        end: rho.value * p.length_mm / (p.width_mm * equivalent_thickness_m(scene, end).middle())
+        for end, rho in resistivities(design).items()
+    }
 
 
-def _ratio(design: Design, printed: Printed, end: str, rho: float, contact: float) -> float:
+def _rises(design: Design, printed: Printed, end: str, rho: float, contacts_ohm_m2: Sequence[float]) -> Sequence[float]:
+    """Resistance of the lines over that of lines without contact resistance, for each contact resistivity [-]."""
     length, width, _ = design.printed.size_mm
     lines = _estimated_lines(design) if printed.lines is None else electrode(design, printed.lines, end)
     clamp = _CLAMP_LINES * design.machine.line_mm()
@@ -192,7 +200,10 @@ def _ratio(design: Design, printed: Printed, end: str, rho: float, contact: floa
         raise OutOfRange(f"an electrode of {length:g} mm; expected more than {4 * clamp:g} mm to tell its resistance")
     area = design.params.electrode_mm * width * M_PER_MM**2
     reach = (length / 2 - clamp) * M_PER_MM
-    return traxels.resistance(lines, rho, contact, (-reach, reach), area).ratio
+    if not any(contacts_ohm_m2):
+        return [1.0] * len(contacts_ohm_m2)
+    found = {c: traxels.resistance(lines, rho, c, (-reach, reach), area).ratio for c in {0.0, *contacts_ohm_m2}}
+    return [found[c] / found[0.0] for c in contacts_ohm_m2]
 
 
 def _estimated_lines(design: Design) -> Lines:

@@ -15,7 +15,7 @@ from sensorgen.prediction.mesh_ladder import Piece, drawn
 from sensorgen.prediction.sensor_of_design import Sensed
 from sensorgen.scene.sections import sections
 
-_SOLID = "electrodes as solid plates: the contacts between printed lines add to their resistance"
+_SOLID = "electrodes as solid bodies: the contacts between printed lines add to their resistance"
 _LOSSES = "losses of the cell as drawn"
 
 

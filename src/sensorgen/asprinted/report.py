@@ -74,8 +74,10 @@ def _printed_f(design: Design, printed: Printed, accuracy: float) -> dict[str, A
 
 def _resistance(design: Design, printed: Printed, contacts_ohm_m2: Sequence[float]) -> dict[str, Any]:
     try:
-        solid = {end: ohm for end, (ohm, _) in compared.solid_ohm(design).items()}
-        return {"drawn": solid, "printed": compared.resistance_ohm(design, printed, contacts_ohm_m2)}
+        return {
+            "drawn": compared.solid_ohm(design),
+            "printed": compared.resistance_ohm(design, printed, contacts_ohm_m2),
+        }
     except SensorgenError as error:
         return {"drawn": None, "printed": None, "reason": str(error)}
 

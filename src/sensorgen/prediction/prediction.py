@@ -17,6 +17,7 @@ from sensorgen.core.units import M_PER_MM, frequency_text
 from sensorgen.design.design import Design
 from sensorgen.design.values import ENDS, MaterialValue, piezoresistance
 from sensorgen.models import line
+from sensorgen.models.conduction import electrode_resistance
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction import ladder as planned
 from sensorgen.prediction.capacitance import Unloaded, Unpredictable, unloaded
@@ -89,7 +90,7 @@ def prediction(
         "values": [vars(t) for t in (*found.taken, *rises.values(), *gone.taken)],
         "assumptions": [
             "ideal electrodes and no fringe at the sensor's edge for the capacitance",
-            "electrode resistance of the plates alone: cogs can only lower it",
+            "electrode resistance from end face to end face, cogs included",
             _lossless(gone),
             *gone.doubts,
             _pressed(rises),
@@ -161,10 +162,9 @@ def _unjudged(error: SensorgenError) -> Data:
 
 
 def _resistance_ohm(design: Design, found: Unloaded) -> dict[str, float]:
-    """Resistance of each electrode's plate from end to end, rho L / (H W) [ohm]."""
-    p = design.params
-    squares_per_m = p.length_mm / (p.electrode_mm * p.width_mm) / M_PER_MM
-    return {end: rho * squares_per_m for end, rho in zip(("top", "bottom"), found.resistivity_ohm_m, strict=True)}
+    """Resistance of each electrode from end to end, cogs included [ohm]."""
+    values = zip(ENDS, found.resistivity_ohm_m, strict=True)
+    return {end: electrode_resistance(design.in_use, end, rho).middle() for end, rho in values}
 
 
 def _line(resistance_ohm: float, capacitance_f: Interval, gone: Lost, frequency_hz: Sequence[float]) -> dict[str, Any]:

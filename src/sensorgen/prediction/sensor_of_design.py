@@ -8,6 +8,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.values import MaterialValue, film, of_all_materials, piezoresistance
 from sensorgen.models import pressure
+from sensorgen.models.conduction import equivalent_thickness_m
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.capacitance import Unloaded, unloaded
 from sensorgen.prediction.compression_law import Law, gap_m, law_of
@@ -100,7 +101,7 @@ def sensor_of(
     sensor = Sensor(
         length_m=p.length_mm * M_PER_MM,
         width_m=p.width_mm * M_PER_MM,
-        electrode_m=(p.electrode_mm * M_PER_MM,) * 2,
+        electrode_m=(_thickness_m(piece, "top"), _thickness_m(piece, "bottom")),
         resistivity_ohm_m=found.resistivity_ohm_m,
         capacitance_f_per_m=found.answer.capacitance_f.middle() / (p.length_mm * M_PER_MM),
         compression=how.compression,
@@ -112,6 +113,10 @@ def sensor_of(
         piezoresistance_per_pa=(_of("top", rises), _of("bottom", rises)),
     )
     return Sensed(sensor, found, how, gone, piece, tuple(rises.values()))
+
+
+def _thickness_m(piece: Piece, end: str) -> float:
+    return equivalent_thickness_m(piece.scene, end).middle()
 
 
 def _of(end: str, rises: dict[str, MaterialValue]) -> float:

@@ -8,12 +8,11 @@ from typing import Any
 from sensorgen import __version__
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import MissingValue
-from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
+from sensorgen.design.values import ENDS, resistivities
 from sensorgen.measure.log import Prediction
+from sensorgen.models.conduction import electrode_resistance
 from sensorgen.prediction.prediction import prediction
-
-ENDS = ("top", "bottom")
 
 
 @dataclass(frozen=True)
@@ -87,8 +86,9 @@ def predicted(design: Design, stored: Sequence[Prediction] = ()) -> Predicted:
     """
     first = min(stored, key=lambda p: p.number, default=None)
     data = json.loads(first.data) if first else prediction(design)
+    known = data.get("electrode_resistance_ohm", {}).values()
     return Predicted(
-        design.name, design.id(), electrode_ohm(design, data.get("electrode_resistance_ohm")),
+        design.name, design.id(), Interval(min(known), max(known)) if known else electrode_ohm(design),
         _interval(data.get("capacitance_f")), tuple(_tone(t) for t in data.get("impedance_ohm", ())),
         "electrodes touch" in data.get("reason", ""), first.logged_at if first else "",
         first.version if first else __version__, data.get("reason", ""), tuple(data.get("values", ())),
@@ -105,47 +105,24 @@ def _tone(data: Mapping[str, Any]) -> Tone:
     return Tone(data["frequency_hz"], complex(data["re"], data["im"]), low, high)
 
 
-def electrode_ohm(design: Design, plates: Mapping[str, float] | None = None) -> Interval | None:
-    r"""Resistance of an electrode from end to end, between bounds [ohm].
-
-    .. math:: \frac{\varrho L^2}{V} \le R \le \frac{\varrho L}{H W}
+def electrode_ohm(design: Design, resistivity_ohm_m: Mapping[str, float] | None = None) -> Interval | None:
+    """Resistance of an electrode from end to end, cogs included: from the better to the worse of the two [ohm].
 
     Parameters
     ----------
     design : Design
         As drawn.
-    plates : mapping or None
-        The right-hand side for "top" and "bottom" [ohm], where that is known; worked out if not given.
+    resistivity_ohm_m : mapping or None
+        Of the "top" and the "bottom" electrode; by their materials' sources if not given.
 
     Returns
     -------
     Interval or None
-        From the left-hand side of the better electrode to the right-hand side of the worse one; None where no source
-        gives a resistivity.
-
-    Notes
-    -----
-    Cogs only add paths, so the plate without them is the upper bound (Rayleigh). An even field is one that Dirichlet's
-    principle allows, and gives the lower bound with all the electrode's volume V.
+        As :func:`sensorgen.models.conduction.electrode_resistance`; None where no source gives a resistivity.
     """
-    plates = plates or _plates(design)
-    if not plates:
+    try:
+        rho = resistivity_ohm_m or {end: value.value for end, value in resistivities(design).items()}
+    except MissingValue:
         return None
-    p = design.params
-    plate_mm3 = p.length_mm * p.width_mm * p.electrode_mm
-    volume = {b.terminal: b.volume_mm3() for b in design.in_use.bodies if b.terminal}
-    lower = [plates[end] * min(1.0, plate_mm3 / volume[end]) for end in ENDS]
-    return Interval(min(lower), max(plates[end] for end in ENDS))
-
-
-def _plates(design: Design) -> dict[str, float]:
-    p = design.params
-    squares_per_m = p.length_mm / (p.electrode_mm * p.width_mm) / M_PER_MM
-    found = {}
-    for end in ENDS:
-        material, source = design.slot(f"{end}_electrode")
-        try:
-            found[end] = material.value("resistivity_ohm_m", source).value * squares_per_m
-        except MissingValue:
-            return {}
-    return found
+    found = [electrode_resistance(design.in_use, end, rho[end]) for end in ENDS]
+    return Interval(min(ohm.lower for ohm in found), max(ohm.upper for ohm in found))

@@ -1,8 +1,9 @@
 r"""Resistivity and leak from a multimeter's readings.
 
-An electrode lies between :math:`\varrho L^2 / V` and :math:`\varrho L / (H W)`, so that each reading allows a range of
-:math:`\varrho`. A film that leaks evenly lets R_Y read less than the electrode has; a bridge at the contacts does not:
-nobody knows which it was, so the range runs from R_Y as it was read to R_Y as an even leak would have it.
+Resistivity is R_Y over the electrode's R / :math:`\varrho`, cogs included. It differs between the top and the bottom
+electrode, and the readings do not say which was measured, so that each allows a range of :math:`\varrho`. A film that
+leaks evenly lets R_Y read less than the electrode has; a bridge at the contacts does not: the range runs from R_Y as it
+was read to R_Y as an even leak would have it.
 """
 
 from collections.abc import Sequence
@@ -12,12 +13,13 @@ from math import exp, isfinite, log
 import numpy as np
 
 from sensorgen.analysis.comparison import Compared
-from sensorgen.analysis.comparison.expected import ENDS, electrode_ohm
+from sensorgen.analysis.comparison.expected import electrode_ohm
 from sensorgen.analysis.comparison.leaky import electrode_and_leak
 from sensorgen.analysis.fit.results import LEVEL, Fitted, Untold
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.materials import FILM_LEAK
+from sensorgen.design.values import ENDS
 from sensorgen.measure.recording.samples import Real
 
 RESISTIVITY = "resistivity_ohm_m"
@@ -48,10 +50,8 @@ def allowed(row: Compared, design: Design) -> Allowed | None:
 
 def _per_resistivity(design: Design) -> tuple[float, float]:
     """Bounds of an electrode's resistance over its resistivity [1/m]."""
-    p = design.params
-    squares_per_m = p.length_mm / (p.electrode_mm * p.width_mm) / M_PER_MM
-    found = electrode_ohm(design, dict.fromkeys(ENDS, squares_per_m))
-    assert found is not None  # noqa: S101 - plates are given
+    found = electrode_ohm(design, dict.fromkeys(ENDS, 1.0))
+    assert found is not None  # noqa: S101 - resistivities are given
     return found.lower, found.upper
 
 
@@ -68,7 +68,7 @@ def resistivity(readings: Sequence[Allowed], material: str, seed: int) -> Fitted
     return Fitted(
         material, RESISTIVITY, exp(middle), exp(low), exp(high),
         f"R_Y of {len(readings)} specimens, along the electrode; scatter alone x {scatter[0]:.3g} to {scatter[1]:.3g}, "
-        "the rest of the interval: cogs, which electrode was measured, and how much of R_Y the film carried",
+        "the rest of the interval: which electrode was measured, and how much of R_Y the film carried",
     )  # fmt: skip
 
 
