@@ -5,6 +5,7 @@ from math import inf, log
 
 import numpy as np
 import pytest
+from sensorgen.prediction.prediction import prediction as plain_prediction
 
 from sensorgen.analysis.comparison import of_iteration, predicted
 from sensorgen.analysis.comparison.expected import electrode_ohm
@@ -18,7 +19,6 @@ from sensorgen.measure.log.batches import prediction
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.prediction import prediction as plain_prediction
 
 
 def ladder(electrode, leak, sections):
@@ -74,13 +74,13 @@ def test_a_plain_electrode_has_its_own_resistance_for_both_bounds():
     assert (found.lower, found.upper) == (pytest.approx(0.07 * squares), pytest.approx(0.2 * squares))
 
 
-@pytest.mark.parametrize(("along", "share"), [("x", 0.845677), ("y", 0.705882)])
-def test_the_better_electrode_is_the_one_with_cogs(along, share):
-    design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1, "along": along}})
+def test_cogs_lower_the_lower_bound_by_the_share_of_their_volume():
+    design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})
     p = design.params
-    squares = p.length_mm / (p.electrode_mm * p.width_mm) * 1e3
-    found = electrode_ohm(design)
-    assert (found.lower, found.upper) == (pytest.approx(0.07 * squares * share, rel=3e-5), pytest.approx(0.2 * squares))
+    plate = 0.07 * p.length_mm / (p.electrode_mm * p.width_mm) * 1e3
+    volume = design.drawn.body("top_electrode_with_cogs").volume_mm3()
+    assert electrode_ohm(design).lower == pytest.approx(plate * p.length_mm * p.width_mm * p.electrode_mm / volume)
+    assert volume > p.length_mm * p.width_mm * p.electrode_mm * 1.2
 
 
 def test_the_earliest_stored_prediction_is_taken_as_it_was(tmp_path):

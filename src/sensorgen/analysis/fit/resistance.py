@@ -1,9 +1,8 @@
 r"""Resistivity and leak from a multimeter's readings.
 
-Resistivity is R_Y over the electrode's R / :math:`\varrho`, cogs included. It differs between the top and the bottom
-electrode, and the readings do not say which was measured, so that each allows a range of :math:`\varrho`. A film that
-leaks evenly lets R_Y read less than the electrode has; a bridge at the contacts does not: the range runs from R_Y as it
-was read to R_Y as an even leak would have it.
+An electrode's resistance over its resistivity is known between bounds, so that each reading allows a range of
+:math:`\varrho`. A film that leaks evenly lets R_Y read less than the electrode has; a bridge at the contacts does not:
+nobody knows which it was, so the range runs from R_Y as it was read to R_Y as an even leak would have it.
 """
 
 from collections.abc import Sequence
@@ -13,14 +12,15 @@ from math import exp, isfinite, log
 import numpy as np
 
 from sensorgen.analysis.comparison import Compared
-from sensorgen.analysis.comparison.expected import electrode_ohm
 from sensorgen.analysis.comparison.leaky import electrode_and_leak
 from sensorgen.analysis.fit.results import LEVEL, Fitted, Untold
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.materials import FILM_LEAK
-from sensorgen.design.values import ENDS
+from sensorgen.design.values import resistivities
 from sensorgen.measure.recording.samples import Real
+from sensorgen.prediction import bodies
+from sensorgen.prediction.electrodes import electrode_resistance
 
 RESISTIVITY = "resistivity_ohm_m"
 LEAST = 3  # readings that a scatter can be told from
@@ -50,9 +50,13 @@ def allowed(row: Compared, design: Design) -> Allowed | None:
 
 def _per_resistivity(design: Design) -> tuple[float, float]:
     """Bounds of an electrode's resistance over its resistivity [1/m]."""
-    found = electrode_ohm(design, dict.fromkeys(ENDS, 1.0))
-    assert found is not None  # noqa: S101 - resistivities are given
-    return found.lower, found.upper
+    body, rho = bodies.default_body(design), resistivities(design)
+    found = [
+        end / rho[name].value
+        for name, r in electrode_resistance(body).items()
+        for end in (r.model.lower, r.model.upper, r.print.lower, r.print.upper)
+    ]
+    return min(found), max(found)
 
 
 def resistivity(readings: Sequence[Allowed], material: str, seed: int) -> Fitted | Untold:
@@ -68,7 +72,7 @@ def resistivity(readings: Sequence[Allowed], material: str, seed: int) -> Fitted
     return Fitted(
         material, RESISTIVITY, exp(middle), exp(low), exp(high),
         f"R_Y of {len(readings)} specimens, along the electrode; scatter alone x {scatter[0]:.3g} to {scatter[1]:.3g}, "
-        "the rest of the interval: which electrode was measured, and how much of R_Y the film carried",
+        "the rest of the interval: which electrode was measured, how it is printed, and how much of R_Y the film took",
     )  # fmt: skip
 
 
