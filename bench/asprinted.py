@@ -14,6 +14,7 @@ import numpy as np
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
+from sensorgen.prediction.as_printed import electrode
 
 from sensorgen.asprinted.printed import body, gap_mm
 from sensorgen.asprinted.rectilinear import plate
@@ -22,7 +23,6 @@ from sensorgen.design.design import make
 from sensorgen.export import slicing
 from sensorgen.export.gcode import paths
 from sensorgen.models import fem2d, traxels
-from sensorgen.prediction.as_printed import electrode
 
 RESULTS = Path(__file__).parent / "results"
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
