@@ -12,7 +12,7 @@ from sensorgen.asprinted.printed import body, cell, gap_mm, rule7
 from sensorgen.asprinted.window import window
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.models import fem2d, fem3d, traxels
-from sensorgen.prediction.as_printed import comparison, electrode
+from sensorgen.prediction.as_printed import electrode
 from sensorgen.scene.layers import drawn
 from sensorgen.scene.scene import area_mm2
 
