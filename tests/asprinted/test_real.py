@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sensorgen.prediction.as_printed import comparison, electrode
 
 from sensorgen.asprinted.beads import beads, layers
 from sensorgen.asprinted.printed import body, cell, gap_mm, rule7
 from sensorgen.asprinted.window import window
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.models import fem2d, fem3d, traxels
+from sensorgen.prediction.as_printed import electrode
 from sensorgen.scene.layers import drawn
 from sensorgen.scene.scene import area_mm2
 
