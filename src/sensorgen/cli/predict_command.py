@@ -250,7 +250,7 @@ def _pressed(
     from sensorgen.prediction.prediction import csv_blocks, moves, presses
 
     if how["plot"]:
-        _plot(sensed, axes, Path(how["plot"]))
+        _plot(design.name, sensed, axes, Path(how["plot"]))
     elif how["as_csv"]:
         _deliver(csv_blocks(sensed.sensor, *axes), how["output"], len(axes[1]) * len(axes[2]))
     else:
@@ -261,7 +261,7 @@ def _pressed(
     return {"plan": plain(plan)} if plan else {}
 
 
-def _plot(sensed: "Sensed", axes: Axes, folder: Path) -> None:
+def _plot(name: str, sensed: "Sensed", axes: Axes, folder: Path) -> None:
     from sensorgen.analysis import plots
     from sensorgen.core import files as store
     from sensorgen.prediction.prediction import check_presses
@@ -269,11 +269,11 @@ def _plot(sensed: "Sensed", axes: Axes, folder: Path) -> None:
     _, force_n, position_mm = axes
     check_presses(sensed.sensor, force_n, [x * units.M_PER_MM for x in position_mm])
     with show.progress(plots.STEPS) as step:
-        for name, content in plots.files(sensed.sensor, *axes):
-            step(name)
-            store.replace(folder / name, content)
-    for name in plots.STEPS:
-        click.echo(str(folder / name))
+        for file, content in plots.files(sensed.sensor, *axes, name):
+            step(file)
+            store.replace(folder / file, content)
+    for file in plots.STEPS:
+        click.echo(str(folder / file))
 
 
 def _deliver(pieces: Iterator[str], output: str | None, rows: int = 0) -> None:
