@@ -19,8 +19,6 @@ from sensorgen.core import cache as cached
 from sensorgen.core import plugins as registry
 from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
-from sensorgen.design import materials
-from sensorgen.design.design import Design
 from sensorgen.prediction.cost_model import expected
 from sensorgen.prediction.plan import Candidate
 from sensorgen.scene.scene import Scene
@@ -80,38 +78,14 @@ class Answer:
         real, loss = self.capacitance_f, self.loss_f
         return (real.upper - real.lower) / hypot(real.upper + real.lower, loss.upper + loss.lower) * 2
 
+    def times(self, count: float) -> "Answer":
+        """The capacitance of ``count`` such cells side by side."""
+        loss = self.loss_f and self.loss_f.times(count)
+        return replace(self, capacitance_f=self.capacitance_f.times(count), loss_f=loss)
+
     def seconds(self) -> float:
         """Time that all models took together, imports left out [s]."""
         return sum(c.seconds or 0.0 for c in self.plan)
-
-
-@dataclass(frozen=True)
-class Taken:
-    """A material value that a prediction rests on."""
-
-    material: str
-    quantity: str
-    value: float
-    source: str
-
-
-@dataclass(frozen=True)
-class Unloaded:
-    """What is known of a design before anything presses on it.
-
-    Attributes
-    ----------
-    answer : Answer
-        Its capacitance.
-    resistivity_ohm_m : (float, float)
-        Of the top and the bottom electrode [ohm m].
-    taken : tuple of Taken
-        Material values that both rest on.
-    """
-
-    answer: Answer
-    resistivity_ohm_m: tuple[float, float]
-    taken: tuple[Taken, ...]
 
 
 def capacitance(
@@ -335,41 +309,6 @@ def _of_plain(data: dict[str, Any]) -> Answer:
     )  # fmt: skip
 
 
-def unloaded(design: Design, width: float = inf) -> Unloaded:
-    """Capacitance and resistivities of a design, its support gone.
-
-    Parameters
-    ----------
-    design : Design
-        As drawn.
-    width : float
-        How wide the bounds of the capacitance may be, relative to their middle [-].
-
-    Raises
-    ------
-    Unpredictable
-        No model can speak of the scene, as of a short.
-    MissingValue
-        No source gives a material value that is needed.
-    """
-    taken = permittivities(design)
-    answer = capacitance(design.in_use, {t.material: t.value for t in taken}, width)
-    top, bottom = (_take(*design.slot(f"{end}_electrode"), "resistivity_ohm_m") for end in ("top", "bottom"))
-    return Unloaded(answer, (top.value, bottom.value), (*taken, top, bottom))
-
-
 def is_plate(answer: Answer) -> bool:
     """Whether a capacitance is that of a solid plate, which has no other bounds than itself."""
     return answer.capacitance_f.width() < _EXACT
-
-
-def permittivities(design: Design) -> list[Taken]:
-    """Relative permittivity of every dielectric in the sensor, and of air."""
-    used = design.used() | {"air": ""}
-    names = {body.material for body in design.in_use.bodies if not body.terminal} | {"air"}
-    return [_take(design.material(name), used[name], "relative_permittivity") for name in sorted(names)]
-
-
-def _take(material: materials.Material, source: str, quantity: str) -> Taken:
-    value = material.value(quantity, source)
-    return Taken(material.name, quantity, value.value, value.source)

@@ -123,7 +123,7 @@ def _impedances(found: Comparison, recorded: Sequence[Run]) -> Iterator[Kind]:
         of = Movable(found.designs[found.names[run.entry.specimen]]) if run.entry.specimen in found.names else None
         try:
             if of is not None and np.isfinite(run.rest_ohm).all():
-                _ = of.sensed.sensor
+                _ = of.model.sensor
                 known.append((run, of))
         except SensorgenError:
             continue
@@ -137,13 +137,13 @@ def _impedances(found: Comparison, recorded: Sequence[Run]) -> Iterator[Kind]:
 
 def _rest(known: Sequence[tuple[Run, Movable]]) -> Model:
     return lambda parameter, value: np.concatenate(
-        [at_rest(moved(of.sensed.sensor, **_moves(of, parameter, value)), run.recording.tones_hz) for run, of in known]
+        [at_rest(moved(of.model.sensor, **_moves(of, parameter, value)), run.recording.tones_hz) for run, of in known]
     )
 
 
 def _loaded(known: Sequence[tuple[Run, Movable]]) -> Model:
     def of_run(run: Run, of: Movable, parameter: str, value: float) -> Complex:
-        sensor = moved(of.sensed.sensor, **_moves(of, parameter, value))
+        sensor = moved(of.model.sensor, **_moves(of, parameter, value))
         assert run.pairs is not None  # noqa: S101 - chosen so
         stiffness = value if parameter == MODULUS else 1.0
         where = run.pairs.force_n, run.pairs.position_mm * M_PER_MM

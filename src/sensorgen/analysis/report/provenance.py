@@ -45,10 +45,8 @@ def origins(log: Log, found: Comparison) -> Table:
 def _sources(found: Comparison) -> list[Origin]:
     used: dict[str, set[str]] = {}
     for of in found.predictions.values():
-        for value in of.values:
-            used.setdefault(value["source"], set()).add(
-                f"{value['material']} {value['quantity']} = {value['value']:.6g}"
-            )
+        for value in of.prediction.values:
+            used.setdefault(value.source, set()).add(f"{value.material} {value.quantity} = {value.value:.6g}")
     known = citations() | {SET: "by the design itself"}
     return [
         Origin("source of values", name, f"{known.get(name, name)}: {', '.join(sorted(values))}")

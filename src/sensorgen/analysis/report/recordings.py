@@ -8,11 +8,11 @@ from typing import Annotated
 import numpy as np
 
 from sensorgen.analysis.comparison import Comparison, Predicted
-from sensorgen.analysis.comparison.expected import Tone
 from sensorgen.analysis.comparison.runs import Run
 from sensorgen.analysis.plots import recordings as plots
 from sensorgen.analysis.plots.figure import BLUE, ORANGE, Axis, Curve, Figure, Panel
 from sensorgen.analysis.report.tables import Cell, Column, Table
+from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import SensorgenError
 
 _SAME = 1e-6  # relative: frequencies nearer than this are the same
@@ -71,20 +71,23 @@ def _rows(run: Run, of: Predicted | None) -> Iterator[ImpedanceRow]:
     c = of.capacitance_f if of else None
     bounds = (c.lower / _F_PER_PF, c.upper / _F_PER_PF) if c else (None, None)
     for f, z, error in zip(run.recording.tones_hz.tolist(), run.rest_ohm, run.rest_error_ohm, strict=True):
-        tone = next((t for t in of.tones if abs(t.frequency_hz / f - 1) < _SAME), None) if of else None
-        off = (complex(z) - tone.impedance_ohm) / abs(tone.impedance_ohm) if tone else None
+        known = of.prediction.impedance if of else ()
+        expected = next((e for e in known if abs(e.frequency_hz / f - 1) < _SAME), None)
+        off = None
+        if expected:
+            middle = complex(expected.re.value, expected.im.value)
+            off = (complex(z) - middle) / abs(middle)
+        c_pf = float(-1 / (2 * pi * f * z.imag)) / _F_PER_PF
         yield ImpedanceRow(
-            run.name, of.design if of else "", f, float(z.real), float(error.real), *_predicted(tone, "real", "re"),
-            float(z.imag), float(error.imag), *_predicted(tone, "imag", "im"), off.real if off is not None else None,
-            off.imag if off is not None else None, float(-1 / (2 * pi * f * z.imag)) / _F_PER_PF, *bounds,
+            run.name, of.design if of else "", f,
+            float(z.real), float(error.real), *_predicted(expected.re if expected else None),
+            float(z.imag), float(error.imag), *_predicted(expected.im if expected else None),
+            off.real if off is not None else None, off.imag if off is not None else None, c_pf, *bounds,
         )  # fmt: skip
 
 
-def _predicted(tone: Tone | None, part: str, key: str) -> tuple[Cell, Cell, Cell]:
-    if tone is None:
-        return None, None, None
-    low, high = getattr(tone, f"{key}_range")
-    return getattr(tone.impedance_ohm, part), low, high
+def _predicted(of: Bounds | None) -> tuple[Cell, Cell, Cell]:
+    return (of.value, of.lower, of.upper) if of else (None, None, None)
 
 
 def facts(recorded: Sequence[Run]) -> Table:

@@ -72,7 +72,9 @@ def _words(of: Predicted) -> str:
 
 def identifiability(found: Comparison) -> tuple[Table, ...]:
     """A row for each variant with a prediction."""
-    rows = tuple(_row(name, of.card) for name, of in found.predictions.items())
+    rows = tuple(
+        _row(name, of.prediction.identifiability or {"reason": of.reason}) for name, of in found.predictions.items()
+    )
     caption = f"Predicted identifiability of {FORCE_N:g} N in the middle, by seven frequencies (Cramér-Rao)"
     return (Table("identifiability", caption, rows),) if rows else ()
 
@@ -88,7 +90,8 @@ def _row(name: str, card: Mapping[str, Any]) -> IdentifiabilityRow:
 
 def figures(found: Comparison) -> Iterator[Figure]:
     """Standard errors over position for three forces, and the bodies; of every variant, one at a time."""
-    known = {name: errors(of.card) for name, of in found.predictions.items() if of.card.get("map")}
+    cards = {name: of.prediction.identifiability or {} for name, of in found.predictions.items()}
+    known = {name: errors(card) for name, card in cards.items() if card.get("map")}
     if known:
         yield Figure(
             "identifiability-map", "Predicted standard errors of force and position",
