@@ -486,11 +486,10 @@ def test_a_budget_ends_the_ladders(monkeypatch):
 
 
 def test_no_two_models_look_alike():
-    assert len(pictures._SYMBOLS) == len(pictures._MARKERS) == 9
-    assert len({(pictures._colour(k), k % 9) for k in range(30)}) == 30
+    assert len({tuple(pictures.look(k).values()) for k in range(30)}) == 30
     for scene in chart.SCENES:
         alike = [point(1.0, 1.0, scene=scene), SimpleNamespace(scene=scene, model="n", bounded=False)]
-        assert pictures._looks(scene, alike) == {"m": 0, "n": 1}
+        assert pictures.looks(scene, alike) == {"m": 0, "n": 1}
 
 
 def test_the_picture(measured):
@@ -501,7 +500,7 @@ def test_the_picture(measured):
 
 
 def test_the_front_is_drawn_as_a_staircase():
-    steps = list(pictures._steps([point(1.0, 0.5), point(2.0, 0.1), point(4.0, 0.01)]))
+    steps = list(pictures.steps([point(1.0, 0.5), point(2.0, 0.1), point(4.0, 0.01)]))
     assert steps == [(1.0, 0.5), (2.0, 0.5), (2.0, 0.1), (4.0, 0.1), (4.0, 0.01)]
 
 
@@ -510,11 +509,11 @@ const said = [];
 window.addEventListener("error", e => said.push(e.message));
 console.error = (...a) => said.push(a.join(" "));
 window.addEventListener("load", () => setTimeout(() => {
-  const plot = document.getElementById("chart");
   const pre = document.createElement("pre");
   pre.id = "probe";
   pre.textContent = JSON.stringify({said, resources: performance.getEntriesByType("resource").length,
-    names: plot.data.map(t => t.name), marks: document.querySelectorAll("path.point").length});
+    names: [...document.querySelectorAll(".plot")].flatMap(p => p.data.map(t => t.name)).filter(n => n),
+    marks: document.querySelectorAll("path.point").length});
   document.body.replaceChildren(pre);
 }, 500));
 </script>"""

@@ -12,10 +12,10 @@ function dressed(layout) {
     modebar: {bgcolor: clear, color: colour("--faint"), activecolor: ink}};
   for (const name of Object.keys(layout).filter((key) => /^[xy]axis/.test(key)))
     made[name] = {...layout[name], gridcolor: line, linecolor: line};
-  if (layout.scene) {
-    made.scene = {...layout.scene};
+  if (layout.scene) {  // bodies are nearly black: always on light paper
+    Object.assign(made, {paper_bgcolor: "#f3f5f7", font: {color: "#1f2328", size: 12}, scene: {...layout.scene}});
     for (const name of ["xaxis", "yaxis", "zaxis"])
-      made.scene[name] = {...layout.scene[name], gridcolor: line, zerolinecolor: line, backgroundcolor: clear};
+      made.scene[name] = {...layout.scene[name], gridcolor: "#c3cad1", zerolinecolor: "#c3cad1", backgroundcolor: clear};
   }
   return made;
 }
@@ -44,7 +44,7 @@ function places(key, count) {
 }
 
 function draw(figure, choice = 0) {
-  const parts = pieces(figure.layout);
+  const parts = pieces(figure.choices[choice].layout);
   return Promise.all(places(figure.key, parts.length).map((place, k) => {
     const layout = dressed(parts[k]);
     place.style.minHeight = `${layout.height}px`;
@@ -57,6 +57,14 @@ const chosen = (figure) => {
   const select = document.querySelector(`select[data-for="${figure.key}"]`);
   return select ? select.selectedIndex : 0;
 };
+// A choice holds for all figures that have the same ones: all maps show one frequency.
+function choose(figure, choice) {
+  const names = (other) => other.chooser + other.choices.map((one) => one.name).join();
+  for (const other of figures.filter((other) => names(other) === names(figure))) {
+    document.querySelector(`select[data-for="${other.key}"]`).selectedIndex = choice;
+    draw(other, choice);
+  }
+}
 async function all() {
   document.documentElement.removeAttribute("data-drawn");
   await Promise.all(figures.map((figure) => draw(figure, chosen(figure))));
@@ -69,7 +77,7 @@ if (figures.length) {
   paper.addEventListener("change", all);
   for (const figure of figures) {
     const select = document.querySelector(`select[data-for="${figure.key}"]`);
-    if (select) select.addEventListener("change", () => draw(figure, select.selectedIndex));
+    if (select) select.addEventListener("change", () => choose(figure, select.selectedIndex));
   }
 } else document.documentElement.setAttribute("data-drawn", "yes");
 
@@ -84,7 +92,7 @@ function compare(a, b, sign) {
   if (typeof a === "number" && typeof b === "number") return sign * (a - b || 0);
   return sign * String(a).localeCompare(String(b), "en", {numeric: true});
 }
-for (const head of document.querySelectorAll("thead th")) {
+for (const head of document.querySelectorAll("thead th:has(button)")) {
   head.querySelector("button").addEventListener("click", () => {
     const rising = head.getAttribute("aria-sort") !== "ascending";
     for (const other of head.parentNode.children) other.setAttribute("aria-sort", "none");
