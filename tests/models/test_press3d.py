@@ -14,7 +14,6 @@ from sensorgen.models.press3d import Elastic, Held, Pieces
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.contact import (
     brick_air,
-    brick_element,
     brick_factors,
     brick_field,
     brick_touch,
@@ -23,7 +22,7 @@ from sensorgen.solvers.contact import (
     pressed,
 )
 from sensorgen.solvers.contact.brick_field import Orders
-from sensorgen.solvers.contact.bricks import Bricks
+from sensorgen.solvers.contact.bricks import Bricks, mesh_of
 from sensorgen.solvers.contact.cell import Region
 
 EPS = {"x60": 4.68, "air": 1.00059}
@@ -77,12 +76,10 @@ def test_a_block_follows_the_closed_form(nu, period):
 
 
 def noisy(seed, nu):
-    mesh = brick_element.mesh_of(
-        boxes(((0, 1, 1.7), (0, 0.6), (0, 0.5, 2)), np.ones((2, 1, 2), int)), np.ones((2, 1, 2), bool)
-    )
+    mesh = mesh_of(boxes(((0, 1, 1.7), (0, 0.6), (0, 0.5, 2)), np.ones((2, 1, 2), int)), np.ones((2, 1, 2), bool))
     m = len(mesh.nodes)
     e, rng = (
-        brick_element.BrickElements(mesh, element.law(np.full(m, 6.0), np.full(m, nu))),
+        element.Elements(mesh, element.law(np.full(m, 6.0), np.full(m, nu))),
         np.random.default_rng(seed),
     )
     u = rng.normal(size=3 * len(mesh.points_m)) * 2e-5
@@ -98,7 +95,7 @@ def test_the_tangent_is_the_derivative_of_the_residual_and_that_of_the_energy():
     expected = np.einsum("mij,mj->mi", matrix, along)
     assert (up - down) / (2 * h) == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
     assert matrix == pytest.approx(matrix.transpose(0, 2, 1), abs=1e-9 * np.abs(matrix).max())
-    one, other = (e.energy_j_per_m(u + s * du, inner.moved(di, s)) for s in (h, -h))
+    one, other = (e.energy_j(u + s * du, inner.moved(di, s)) for s in (h, -h))
     assert (one - other) / (2 * h) == pytest.approx((residual * along).sum(), rel=1e-6, abs=0)
 
 
@@ -155,14 +152,14 @@ def test_bounds_hold_the_reference_and_close_in():
 
 
 def unmoved(bricks, orders):
-    mesh = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
+    mesh = mesh_of(bricks, np.ones(bricks.fill.shape, bool))
     return brick_field.capacitance(mesh, np.zeros(3 * len(mesh.points_m)), EPS, orders)
 
 
 def test_a_thinner_film_by_displacement_is_one_by_drawing():
     """Everything above the film lowered by 20 um, the film thinned alike: another solver on the drawn cell agrees."""
     bricks = press3d.cell(rect(0.1)).cut(2, 0.3)
-    mesh = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
+    mesh = mesh_of(bricks, np.ones(bricks.fill.shape, bool))
     u = np.zeros((len(mesh.points_m), 3))
     u[:, 2] = -20e-6 * np.clip((mesh.points_m[:, 2] - 0.3e-3) / 0.1e-3, 0, 1)
     moved = brick_field.capacitance(mesh, u.ravel(), EPS, Orders())
@@ -174,7 +171,7 @@ def test_a_thinner_film_by_displacement_is_one_by_drawing():
 def test_bounds_from_the_factors_of_an_earlier_load_hold_those_of_new_ones(monkeypatch):
     """Unfinished solutions are certified too: outside those that are solved anew, and how far is known."""
     bricks = press3d.cell(rect(0.1)).cut(1, 0.3)
-    mesh = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
+    mesh = mesh_of(bricks, np.ones(bricks.fill.shape, bool))
     u = np.zeros((len(mesh.points_m), 3))
     u[:, 2] = -20e-6 * np.clip((mesh.points_m[:, 2] - 0.3e-3) / 0.1e-3, 0, 1)
     for small in (1e-2, 1e-7):
@@ -197,7 +194,7 @@ def test_where_a_plates_inner_places_go_does_not_matter():
     planes = (np.linspace(0, 1, 4), np.linspace(0, 1, 4), (0, 0.1, 0.3, 0.5, 0.7, 0.8))
     fill = np.ones((3, 3, 5), int)
     fill[..., 0], fill[..., -1] = 2, 3
-    mesh = brick_element.mesh_of(boxes(planes, fill), np.ones((3, 3, 5), bool))
+    mesh = mesh_of(boxes(planes, fill), np.ones((3, 3, 5), bool))
     x, y, z = mesh.points_m.T * 1e3
     bump = np.sin(np.pi * x) * np.sin(np.pi * y) * np.sin(np.pi * np.clip((z - 0.1) / 0.6, 0, 1))
     u = 1e-3 * np.column_stack([0.08 * bump, -0.05 * bump, 0.07 * bump])
@@ -234,7 +231,7 @@ def stairs(*widths, lift=0.0, film=0.1):
 def test_a_foot_that_has_landed_and_widened_is_one_drawn_so(slid_mm):
     """Most of a brick's half sideways, onto a film that stays: the field of the drawn foot, by another solver."""
     bricks = press3d.cell(stairs(0.2, lift=0.02)).cut(3, 0.3)
-    whole, solid = (brick_element.mesh_of(bricks, w) for w in (np.ones(bricks.fill.shape, bool), bricks.fill > 0))
+    whole, solid = (mesh_of(bricks, w) for w in (np.ones(bricks.fill.shape, bool), bricks.fill > 0))
     x, _, z = solid.points_m.T * 1e3
     above = z > 0.41
     moved = np.zeros_like(solid.points_m)
@@ -299,9 +296,7 @@ def test_upright_walls_hold_each_other_apart():
 
 def test_points_meet_the_nearest_face_at_the_same_place():
     """A bent sheet over two points: the place on it, its height and slope, are those of the parabola that it is."""
-    mesh = brick_element.mesh_of(
-        boxes(((0, 1, 2), (0, 1), (0, 0.1, 0.3, 0.4)), [[[1, 0, 1]]] * 2), np.ones((2, 1, 3), bool)
-    )
+    mesh = mesh_of(boxes(((0, 1, 2), (0, 1), (0, 0.1, 0.3, 0.4)), [[[1, 0, 1]]] * 2), np.ones((2, 1, 3), bool))
     x, y, z = mesh.points_m.T
     sheet = brick_touch._FACE[2, 0]
     upper, lower = mesh.nodes[mesh.boxes[:, 2] == 2][:, sheet], mesh.nodes[mesh.boxes[:, 2] == 0]
@@ -430,7 +425,7 @@ def test_air_goes_along_evenly_with_what_is_stretched_evenly():
     """Walls, mirrors and a top that move by a linear map take all air along by the same, also where it ends a cell."""
     fill = [[[2, 1, 3]], [[2, 0, 3]], [[2, 1, 3]], [[2, 0, 3]]]
     bricks = boxes(((0, 0.3, 0.6, 1.0, 1.2), (0, 1), (0, 0.2, 0.6, 0.8)), fill).cut(2, 0.5)
-    whole, solid = (brick_element.mesh_of(bricks, w) for w in (np.ones(bricks.fill.shape, bool), bricks.fill > 0))
+    whole, solid = (mesh_of(bricks, w) for w in (np.ones(bricks.fill.shape, bool), bricks.fill > 0))
     stretched = np.array([0.03, 0.02, -0.1])
     found = brick_air.extended(whole, solid, solid.points_m * stretched, []).reshape(-1, 3)
     assert found == pytest.approx(whole.points_m * stretched, abs=1e-12)

@@ -81,7 +81,7 @@ def test_the_residual_is_the_derivative_of_the_energy():
     u = rng.normal(size=2 * len(mesh.points_m)) * 0.02
     inner = element.Inner(rng.normal(size=(8, 2)) * 0.01, rng.normal(size=(8, 3)))
     du, di, h = rng.normal(size=len(u)), rng.normal(size=(8, 5)), 1e-6
-    up, down = (e.energy_j_per_m(u + s * du, inner.moved(di, s)) for s in (h, -h))
+    up, down = (e.energy_j(u + s * du, inner.moved(di, s)) for s in (h, -h))
     residual, _ = e.full(u, inner)
     assert (up - down) / (2 * h) == pytest.approx(
         (residual * np.concatenate([du[e.freedoms], di], axis=1)).sum(), rel=1e-6

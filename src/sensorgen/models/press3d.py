@@ -30,9 +30,9 @@ from sensorgen.solvers.contact.pressed import (
 from sensorgen.solvers.contact.support import Held
 
 if TYPE_CHECKING:
-    from sensorgen.solvers.contact.brick_element import BrickElements
     from sensorgen.solvers.contact.brick_field import Field
     from sensorgen.solvers.contact.brick_touch import BrickFaces
+    from sensorgen.solvers.contact.element import Elements
     from sensorgen.solvers.contact.load import Problem, State
 
 SOURCE = (
@@ -71,7 +71,7 @@ class Pieces:
 class _Run:
     """What was solved, and the equilibria that were found."""
 
-    elements: "BrickElements"
+    elements: "Elements"
     faces: "BrickFaces"
     states: "list[State]"
 
@@ -153,24 +153,24 @@ def _affordable(bricks: Bricks, wanted: Pieces) -> Pieces:
 
 
 def _solved(
-    bricks: Bricks,
+    cut: Bricks,
     solids: Mapping[str, Elastic],
     stress_pa: Sequence[float],
     held: Held,
     step: Callable[[float], None],
 ) -> tuple[Pressed, _Run]:
-    from sensorgen.solvers.contact import brick_element, brick_factors, brick_touch, element, load, support
+    from sensorgen.solvers.contact import brick_factors, brick_touch, bricks, element, load, support
 
-    mesh = brick_element.mesh_of(bricks, bricks.fill > 0)
-    materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in bricks.regions]
+    mesh = bricks.mesh_of(cut, cut.fill > 0)
+    materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in cut.regions]
     moduli, ratios = (
         np.array([getattr(m, key) for m in materials])[mesh.region] for key in ("youngs_modulus_pa", "poisson_ratio")
     )
-    elements = brick_element.BrickElements(mesh, element.law(moduli, ratios))
+    elements = element.Elements(mesh, element.law(moduli, ratios))
     used = np.zeros(len(mesh.points_m), bool)
     used[elements.freedoms // 3] = True
     faces = brick_touch.BrickFaces(mesh, held.contact == "stick")
-    free = support.free_of(mesh.points_m, held, bricks.spans_m(), used)
+    free = support.free_of(mesh.points_m, held, cut.spans_m(), used)
     first = free.tocsc().indices[free.tocsc().indptr[:-1]]
     problem = load.Problem(
         elements,
@@ -197,11 +197,11 @@ def _judged(found: Pressed, problem: "Problem", states: "list[State]", held: Hel
 
 def _with_fields(found: Pressed, run: _Run, permittivity: Mapping[str, float], orders: Orders) -> Pressed:
     """The same with the capacitance of the deformed boxes."""
-    from sensorgen.solvers.contact import brick_element
     from sensorgen.solvers.contact.brick_field import Field
+    from sensorgen.solvers.contact.bricks import mesh_of
 
     bricks = run.elements.mesh.bricks
-    whole = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
+    whole = mesh_of(bricks, np.ones(bricks.fill.shape, bool))
     cell = Field(whole, permittivity, orders)
     return with_capacitances(found, [_bounds(cell, run, s) for s in run.states])
 
@@ -210,7 +210,7 @@ def _bounds(cell: "Field", run: _Run, state: "State") -> Interval | None:
     """Bounds of the capacitance; gaps that are shut are held open by a little."""
     from sensorgen.solvers.contact import brick_air, brick_field
 
-    moved = run.elements.all_nodes(state.u_m, state.inner)
+    moved = run.elements.mesh.all_nodes(state.u_m, state.inner.bubble)
     for share in _OPEN:
         u = brick_air.extended(cell.mesh, run.elements.mesh, *run.faces.opened(moved, share))
         try:

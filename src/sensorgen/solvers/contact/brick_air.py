@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
-from sensorgen.solvers.contact.brick_element import BrickMesh
+from sensorgen.solvers.contact.bricks import BrickMesh
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -73,7 +73,7 @@ def _harmonic(mesh: BrickMesh, matrix: csr_matrix, given: Real, axis: int) -> Re
 
 def _differences(mesh: BrickMesh, air: Whole) -> csr_matrix:
     """Sum over neighbours of (area between them over their distance) times difference."""
-    edges = mesh.edges_m()[mesh.region == 0]
+    edges = mesh.edges_m[mesh.region == 0]
     rows, columns, weights = [], [], []
     for axis in range(3):
         start = np.flatnonzero(_PLACES[:, axis] < 2)

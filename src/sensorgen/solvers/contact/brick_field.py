@@ -19,9 +19,9 @@ from scipy.sparse import coo_matrix, csr_matrix
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M
-from sensorgen.solvers.contact.brick_element import BrickMesh, cofactor, determinant, gradients
 from sensorgen.solvers.contact.brick_factors import Factors, Order, factored, iterations, order_of
-from sensorgen.solvers.contact.bricks import Bricks
+from sensorgen.solvers.contact.bricks import BrickMesh, Bricks
+from sensorgen.solvers.contact.element import brick_gradients, cofactor, determinant
 from sensorgen.solvers.electrostatics.boxes import Element, flux, potential
 
 Real = NDArray[np.float64]
@@ -233,7 +233,7 @@ def system_of(bricks: Bricks, boxes: Whole, ends: list[Mask], kind: Element) -> 
 
 def _stretch(moved: Real, at: Real) -> tuple[Real, Real]:
     """Derivative of the place to that in the brick (m, points, 3, 3) [m], and its determinant [m3]."""
-    f = np.einsum("qnj,mni->mqij", gradients(at), moved, optimize=True)
+    f = np.einsum("qnj,mni->mqij", brick_gradients(at), moved, optimize=True)
     j = determinant(f)
     if j.min() <= 0:
         raise Folded("faces run into each other: the deformed outlines have no capacitance")

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.solvers.contact.brick_element import slopes, values
+from sensorgen.solvers.contact.element import line_slopes as slopes
+from sensorgen.solvers.contact.element import line_values as values
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]

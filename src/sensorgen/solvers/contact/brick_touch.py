@@ -8,15 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, vstack
 
-from sensorgen.solvers.contact.brick_element import BrickMesh, values
 from sensorgen.solvers.contact.brick_meet import Met, facing_points
+from sensorgen.solvers.contact.bricks import BrickMesh
 from sensorgen.solvers.contact.contact import Pairs
+from sensorgen.solvers.contact.element import line_values
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
-_SHAPE = np.einsum("ai,bj->abij", values(_POINTS), values(_POINTS)).reshape(9, 9)  # (points, nodes) of a face
+_SHAPE = np.einsum("ai,bj->abij", line_values(_POINTS), line_values(_POINTS)).reshape(9, 9)  # (points, nodes) of a face
 _SHUT, _OPEN = 0.25, 0.5  # of a gap's width: below and above, its faces' nodes are opposite each other, or as they are
 _THIN = 0.1  # of a gap's width: its air is squeezed evenly
 _WEIGHT = np.outer(_WEIGHTS, _WEIGHTS).ravel() / 4
@@ -28,7 +29,7 @@ _FACE = {
 
 def top_load(mesh: BrickMesh) -> Real:
     """Forces of a unit pressure on the top, downwards, in its first direction and area [m2]."""
-    edges = mesh.edges_m()
+    edges = mesh.edges_m
     on_top = mesh.boxes[:, 2] == mesh.bricks.fill.shape[2] - 1
     share = edges[on_top, 0, None] * edges[on_top, 1, None] * (_WEIGHT @ _SHAPE)
     force = np.zeros(3 * len(mesh.points_m))
@@ -156,7 +157,7 @@ class BrickFaces:
         mesh = self.mesh
         number = np.full(mesh.bricks.fill.shape, -1)
         number[tuple(mesh.boxes.T)] = np.arange(len(mesh.boxes))
-        edges, nodes, axes, sides = mesh.edges_m(), [], [], []
+        edges, nodes, axes, sides = mesh.edges_m, [], [], []
         for axis, below, above in facing(mesh.bricks.fill):
             one, other = (number[tuple(boxes.T)] for boxes in (below, above))
             nodes.append(np.concatenate([mesh.nodes[other][:, _FACE[axis, 0]], mesh.nodes[one][:, _FACE[axis, 1]]], 1))

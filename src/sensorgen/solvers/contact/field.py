@@ -187,10 +187,10 @@ def _energy(points: Real, triangles: Whole, weight: Real, zero: Mask, one: Mask)
 
 def _stiffness(points: Real, triangles: Whole) -> Real:
     """Integrals of grad . grad of the six functions of each triangle (m, 6, 6)."""
-    from sensorgen.solvers.contact.element import gradients
+    from sensorgen.solvers.contact.element import triangle_gradients
 
     a, b, c = (points[triangles[:, k]] for k in range(3))
     jacobian = np.stack([b - a, c - a], axis=2)
-    g = np.einsum("qnk,mki->mqni", gradients(*_MIDS.T)[:, :6], np.linalg.inv(jacobian))
+    g = np.einsum("qnk,mki->mqni", triangle_gradients(_MIDS)[:, :6], np.linalg.inv(jacobian))
     g = g.transpose(0, 2, 1, 3).reshape(len(triangles), 6, 6)
     return np.asarray(np.matmul(g, g.transpose(0, 2, 1)) * (np.linalg.det(jacobian) / 6)[:, None, None])

@@ -58,7 +58,7 @@ class Solid(Protocol):
     def volume_ratio(self, u: Real, inner: Inner) -> Real:
         """J at each quadrature point."""
 
-    def energy_j_per_m(self, u: Real, inner: Inner) -> float:
+    def energy_j(self, u: Real, inner: Inner) -> float:
         """Energy stored, per depth in two dimensions."""
 
     def tangent(self, u: Real, inner: Inner) -> Tangent:
@@ -274,7 +274,7 @@ class Problem:
             return state
         share = (pressure_pa - state.pressure_pa) / gone
         u = state.u_m + share * (state.u_m - before.u_m)
-        inner = state.inner.ahead(before.inner, share)
+        inner = state.inner.extrapolated(before.inner, share)
         inside_out = self.elements.volume_ratio(u, inner).min() <= _LEAST_J
         return state if inside_out else replace(state, u_m=u, inner=inner)
 

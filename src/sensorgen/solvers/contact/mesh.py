@@ -12,6 +12,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Point
 from sensorgen.solvers.contact import rings
 from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Edge
+from sensorgen.solvers.contact.element import TRIANGLE, Reference
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -47,6 +48,22 @@ class Mesh:
     triangles: Whole
     region: Whole
     rim: Whole
+
+    @property
+    def reference(self) -> Reference:
+        """Shape functions."""
+        return TRIANGLE
+
+    @property
+    def outer(self) -> Whole:
+        """Nodes of each triangle but the inner one (m, 6)."""
+        return self.triangles
+
+    @property
+    def jacobians_m(self) -> Real:
+        """Derivative of the place with respect to the reference coordinates, sides 01 and 02 (m, 2, 2) [m]."""
+        a, b, c = (self.points_m[self.triangles[:, k]] for k in range(3))
+        return np.stack([b - a, c - a], axis=2)
 
     def lengths_m(self) -> Real:
         """Length of each side of the rim [m]."""

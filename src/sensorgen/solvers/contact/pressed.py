@@ -105,7 +105,7 @@ def reached(
     down = np.array([problem.load @ s.u_m / width for s in states])
     volume = np.array([problem.elements.volume_ratio(s.u_m, s.inner).min() for s in states])
     depth = np.array([_depth(problem.gaps(s.pairs, s.u_m) / s.pairs.length_m) for s in states])
-    energy = np.array([problem.elements.energy_j_per_m(s.u_m, s.inner) + problem.contact_energy(s) for s in states])
+    energy = np.array([problem.elements.energy_j(s.u_m, s.inner) + problem.contact_energy(s) for s in states])
     stress = np.array([s.pressure_pa for s in states])
     fall = problem.fall_m(states[0])
     imbalance = _imbalance(stress, (down - fall) * width, energy)
