@@ -207,7 +207,7 @@ def said(value, how):
 
 def section(ax, run, state, enlarged):
     """Edges of bricks in the plane y = 0, moved."""
-    elements = run.elements
+    elements = run.problem.elements
     mesh, moved = elements.mesh, elements.mesh.all_nodes(state.u_m, state.inner.bubble)
     places = (mesh.points_m + enlarged * moved) * 1e3
     s = np.linspace(-1, 1, 9)

@@ -10,7 +10,7 @@ from sensorgen.solvers.contact.mesh import of_triangles
 
 
 def none(mesh):
-    return Faces(mesh, np.empty((0, 3), int))
+    return Faces(mesh.points_m, np.empty((0, 3), int), ())
 
 
 def grid(nx, ny, wide=1.0, high=1.0, bend=0.0, shape=None):
@@ -31,7 +31,7 @@ def elements(mesh, e, nu):
 
 def pressed(mesh, e, nu, held, stress, steps=5):
     free = support.free_of(mesh.points_m, held)
-    problem = load.Problem(elements(mesh, e, nu), none(mesh), free, support.top_load(mesh), 1.0)
+    problem = load.Problem(elements(mesh, e, nu), none(mesh), free, support.top_load(mesh.points_m, *mesh.top()), 1.0)
     return problem, list(load.curve(problem, np.linspace(0, stress, steps + 1), stress))[-1]
 
 
@@ -104,7 +104,9 @@ def test_a_bonded_strip_is_as_stiff_as_gent_and_lindley_say(thick, stiffer):
     leader[2 * top + 1] = 2 * top[0] + 1
     kept, column = np.unique(leader[free], return_inverse=True)
     reduce = csr_matrix((np.ones(len(free)), (free, column)), (2 * len(x), len(kept)))
-    problem = load.Problem(elements(mesh, 1.0, 0.5), none(mesh), reduce, support.top_load(mesh), 1.0)
+    problem = load.Problem(
+        elements(mesh, 1.0, 0.5), none(mesh), reduce, support.top_load(mesh.points_m, *mesh.top()), 1.0
+    )
     *_, state = load.curve(problem, [0.0, 1e-3], 1.0)
     strain = problem.load @ state.u_m / np.abs(problem.load).sum() / thick
     assert 1e-3 / strain == pytest.approx(stiffer, rel=0.06)

@@ -19,9 +19,9 @@ from scipy.sparse import coo_matrix, csr_matrix
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M
-from sensorgen.solvers.contact.brick_factors import Factors, Order, factored, iterations, order_of
 from sensorgen.solvers.contact.bricks import BrickMesh, Bricks
 from sensorgen.solvers.contact.element import brick_gradients, cofactor, determinant
+from sensorgen.solvers.contact.factors import Factors, Order, factored, iterations, order_of
 from sensorgen.solvers.electrostatics.boxes import Element, flux, potential
 
 Real = NDArray[np.float64]

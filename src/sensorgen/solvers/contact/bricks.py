@@ -152,6 +152,11 @@ class BrickMesh:
         """Derivative of the place with respect to coordinates from -1 to 1 (m, 3, 3) [m]."""
         return np.asarray(self.edges_m[:, None] / 2 * np.eye(3))
 
+    def top(self) -> tuple[Whole, Real]:
+        """Faces on the top, from line to line (k, 9), and their areas [m2]."""
+        on_top = self.boxes[:, 2] == self.bricks.fill.shape[2] - 1
+        return self.nodes[on_top].reshape(-1, 9, 3)[..., 2], self.edges_m[on_top, :2].prod(axis=1)
+
     def all_nodes(self, u_m: Real, inner_m: Real) -> Real:
         """Displacements of all nodes (n, 3) from those of the outer ones (3n,) and of the inner ones (m, 3) [m]."""
         found = u_m.reshape(-1, 3).copy()

@@ -7,19 +7,19 @@ with 1/eps, its values given on the sides of the cell in place of the electrodes
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.solvers.contact import rings
 from sensorgen.solvers.contact.cell import AIR, OUTSIDE, Cell, Edge
+from sensorgen.solvers.contact.element import triangle_gradients
+from sensorgen.solvers.contact.factors import solved_by_lu
 from sensorgen.solvers.contact.mesh import Mesh, Net, Unmeshed, Whole, nearest, of_triangles, triangulated
 from sensorgen.solvers.contact.wedge import Wedge, filled, wedges
 
@@ -28,13 +28,6 @@ Mask = NDArray[np.bool_]
 Edges = Mapping[Edge, tuple[int, int]]
 
 _ROUNDING = 1e-9
-_SYMMETRIC: dict[str, Any] = {
-    "permc_spec": "MMD_AT_PLUS_A",
-    "diag_pivot_thresh": 0.0,
-    "options": {"SymmetricMode": True},
-    "relax": 1,  # columns one by one: so sparse a factor has no panels worth their room
-    "panel_size": 1,
-}
 _RINGS = 6
 _HOLE = 1e-6  # area that a mesh may miss, as a share
 _MIDS = np.array([[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])  # middles of the sides: exact to degree 2
@@ -179,16 +172,12 @@ def _energy(points: Real, triangles: Whole, weight: Real, zero: Mask, one: Mask)
     used[triangles] = True
     v = one.astype(float)
     free = used & ~zero & ~one
-    inner = matrix[free][:, free].tocsc()
-    solver = splu(inner, **_SYMMETRIC)
-    v[free] = solver.solve(-(matrix @ v)[free])
+    v[free] = solved_by_lu(matrix[free][:, free], -(matrix @ v)[free])
     return float(v @ (matrix @ v))
 
 
 def _stiffness(points: Real, triangles: Whole) -> Real:
     """Integrals of grad . grad of the six functions of each triangle (m, 6, 6)."""
-    from sensorgen.solvers.contact.element import triangle_gradients
-
     a, b, c = (points[triangles[:, k]] for k in range(3))
     jacobian = np.stack([b - a, c - a], axis=2)
     g = np.einsum("qnk,mki->mqni", triangle_gradients(_MIDS)[:, :6], np.linalg.inv(jacobian))

@@ -3,17 +3,15 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix, diags
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
-from sensorgen.solvers.contact import contact
-from sensorgen.solvers.contact.contact import Pairs
-from sensorgen.solvers.contact.element import Inner, Tangent
+from sensorgen.solvers.contact.contact import Faces, Pairs, carrying
+from sensorgen.solvers.contact.element import Elements, Inner, Tangent
+from sensorgen.solvers.contact.factors import solved_by_lu
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -32,53 +30,15 @@ _MOST_CUTS = 4  # failed load steps in all before a cell is given up
 _FLAT = 1e-3  # gaps that differ by less than this share of their side close at once [-]
 _DEEPEST = 0.1  # how far a foot may sink in to begin with, over the length of a side [-]
 _ROUNDING = 1e-9
-_SYMMETRIC: dict[str, Any] = {
-    "permc_spec": "MMD_AT_PLUS_A",
-    "diag_pivot_thresh": 1e-3,
-    "options": {"SymmetricMode": True},
-    "relax": 1,  # columns one by one: so sparse a factor has no panels worth their room
-    "panel_size": 1,
-}
-
-
-class Solid(Protocol):
-    """Elements of a mesh, in two or three dimensions."""
-
-    @property
-    def points_m(self) -> Real:
-        """Places of the nodes (n, d) [m]."""
-
-    @property
-    def freedoms(self) -> Whole:
-        """Numbers of the displacements that each element shares with its neighbours (m, k); x, y (, z) of each node."""
-
-    def start(self) -> Inner:
-        """Unloaded."""
-
-    def volume_ratio(self, u: Real, inner: Inner) -> Real:
-        """J at each quadrature point."""
-
-    def energy_j(self, u: Real, inner: Inner) -> float:
-        """Energy stored, per depth in two dimensions."""
-
-    def tangent(self, u: Real, inner: Inner) -> Tangent:
-        """Residual and its derivative."""
-
-
-class Touching(Protocol):
-    """Faces that may touch."""
-
-    def project(self, places_m: Real, penalty_pa: float, kept: Pairs | None = None) -> Pairs:
-        """Contact partners at given places of the nodes; those of ``kept`` stay."""
+_PIVOT = 1e-3  # share of its column below which a pivot is exchanged [-]
 
 
 def by_lu(stiffness: csr_matrix, right: Real) -> Real | None:
     """The step that a force makes, or None where a piece has nothing that holds it."""
     try:
-        found: Real = splu(stiffness.tocsc(), **_SYMMETRIC).solve(right)
-    except RuntimeError:  # exactly singular
+        return solved_by_lu(stiffness, right, _PIVOT)
+    except RuntimeError:
         return None
-    return found
 
 
 @dataclass(frozen=True)
@@ -98,9 +58,9 @@ class Problem:
 
     Attributes
     ----------
-    elements : Solid
+    elements : Elements
         Its triangles or bricks.
-    faces : Touching
+    faces : Faces
         What may touch.
     free : sparse
         Displacements from the free ones: rows with a one, or empty.
@@ -116,8 +76,8 @@ class Problem:
         Whether places of the nodes may be: a step that ends elsewhere is cut.
     """
 
-    elements: Solid
-    faces: Touching
+    elements: Elements
+    faces: Faces
     free: csr_matrix
     load: Real
     penalty_pa: float
@@ -158,7 +118,7 @@ class Problem:
 
     def _below(self, state: State) -> tuple[Pairs, Real]:
         """Pairs of loose pieces and what is below them, and how far those may fall until each touches [m]."""
-        pairs, share = contact.carrying(state.pairs, self.loose, self.dimension)
+        pairs, share = carrying(state.pairs, self.loose)
         return pairs, self.gaps(pairs, state.u_m) / share
 
     @cached_property
@@ -186,8 +146,9 @@ class Problem:
         return np.asarray(pairs.gap @ self.places(u).ravel())
 
     def slips(self, pairs: Pairs, u: Real) -> Real:
-        """How far the partner of each pair has moved sideways since they hold fast [m]."""
-        return np.asarray(pairs.slip @ self.places(u).ravel() - pairs.slid_m)
+        """Displacement of each pair's partner along the tangents since they stick (k, d - 1) [m]."""
+        places = self.places(u).ravel()
+        return np.column_stack([slip @ places for slip in pairs.slips]) - pairs.slid_m
 
     @cached_property
     def _pattern(self) -> tuple[csr_matrix, Whole, Whole]:
@@ -205,20 +166,26 @@ class Problem:
     def _touching(self, pairs: Pairs, u: Real) -> tuple[Real, csr_matrix]:
         """Forces of the contact, and its stiffness on the free displacements."""
         gap = self.gaps(pairs, u)
-        k, across = pairs.stiffness_pa * (gap < 0), pairs.gap @ self.free
-        force, stiffness = pairs.gap.T @ (k * gap), across.T @ diags(k) @ across
+        springs = [(pairs.gap, gap < 0, gap)]
         if self.stick:
-            k, across = pairs.stiffness_pa * pairs.sticks, pairs.slip @ self.free
-            force = force + pairs.slip.T @ (k * self.slips(pairs, u))
-            stiffness = stiffness + across.T @ diags(k) @ across
+            springs += [
+                (slip, pairs.sticks, way) for slip, way in zip(pairs.slips, self.slips(pairs, u).T, strict=True)
+            ]
+        force, stiffness = np.zeros(len(u)), csr_matrix((self.free.shape[1],) * 2)
+        for rows, which, length in springs:
+            if which.any():
+                row, k = rows[which], pairs.stiffness_pa[which]
+                across = row @ self.free
+                force += row.T @ (k * length[which])
+                stiffness = stiffness + across.T @ diags(k) @ across
         return force, stiffness
 
     def contact_energy(self, state: State) -> float:
         """Energy in the penalty, per depth [J/m]."""
         k = state.pairs.stiffness_pa
         gap = self.gaps(state.pairs, state.u_m)
-        slip = self.slips(state.pairs, state.u_m) * state.pairs.sticks
-        return float(0.5 * (k * ((gap < 0) * gap**2 + slip**2)).sum())
+        slip = (self.slips(state.pairs, state.u_m) ** 2).sum(axis=1) * state.pairs.sticks
+        return float(0.5 * (k * ((gap < 0) * gap**2 + slip)).sum())
 
     def residual(self, u: Real, inner: Inner, pairs: Pairs, pressure_pa: float) -> tuple[Real, csr_matrix, Tangent]:
         """Forces out of balance on the free displacements, their derivative, and the triangles' condensed part."""
@@ -305,12 +272,13 @@ class Problem:
 
     def _held(self, before: Real, state: State) -> Pairs:
         """What touches now and holds fast from where it first did, between the places before and those now."""
-        pairs = state.pairs
-        gaps, slips = ([rows @ self.places(u).ravel() for u in (before, state.u_m)] for rows in (pairs.gap, pairs.slip))
+        pairs, free = state.pairs, replace(state.pairs, slid_m=np.zeros_like(state.pairs.slid_m))
+        gaps, slips = ([of(free, u) for u in (before, state.u_m)] for of in (self.gaps, self.slips))
         touched = gaps[1] < 0
         share = np.clip(gaps[0] / np.where(touched, gaps[0] - gaps[1], np.inf), 0.0, 1.0)
-        since = slips[0] + np.where(gaps[0] > 0, share, 0.0) * (slips[1] - slips[0])
-        return contact.some(replace(pairs, slid_m=np.where(pairs.sticks, pairs.slid_m, since), sticks=touched), touched)
+        since = slips[0] + np.where(gaps[0] > 0, share, 0.0)[:, None] * (slips[1] - slips[0])
+        slid = np.where(pairs.sticks[:, None], pairs.slid_m, since)
+        return replace(pairs, slid_m=slid, sticks=touched).some(touched)
 
 
 def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) -> Iterator[State]:

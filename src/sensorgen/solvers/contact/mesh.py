@@ -65,6 +65,16 @@ class Mesh:
         a, b, c = (self.points_m[self.triangles[:, k]] for k in range(3))
         return np.stack([b - a, c - a], axis=2)
 
+    @property
+    def outline(self) -> Whole:
+        """Straight pieces of the rim, anticlockwise (2k, 2)."""
+        return np.concatenate([self.rim[:, [0, 2]], self.rim[:, [2, 1]]])
+
+    def top(self) -> tuple[Whole, Real]:
+        """Sides on the top, start, middle and end (k, 3), and their lengths [m]."""
+        on_top = (self.points_m[self.rim, 1] == self.points_m[:, 1].max()).all(axis=1)
+        return self.rim[on_top][:, [0, 2, 1]], self.lengths_m()[on_top]
+
     def lengths_m(self) -> Real:
         """Length of each side of the rim [m]."""
         ends = self.points_m[self.rim[:, 1]] - self.points_m[self.rim[:, 0]]

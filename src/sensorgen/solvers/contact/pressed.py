@@ -1,6 +1,6 @@
 """What a pressed cell answers, in two or three dimensions, and the checks that say whether to trust it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from sensorgen.solvers.contact.cell import Cell
 from sensorgen.solvers.contact.support import CHOICES, Held
 
 if TYPE_CHECKING:
+    from sensorgen.solvers.contact.element import Law
     from sensorgen.solvers.contact.load import Problem, State
 
 _PENALTY = 60.0  # over the least Young's modulus of a solid [-]
@@ -26,6 +27,7 @@ _LEVELS = 0.01  # by which two meshes may differ [-]
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)  # of the work between two loads
 
 Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,23 @@ class Pressed:
         return float(self.stress_pa[-1])
 
 
+@dataclass(frozen=True)
+class Run:
+    """A problem and its equilibria, load by load."""
+
+    problem: "Problem"
+    states: "list[State]"
+
+
+def law_of(materials: Sequence[str], region: Whole, solids: Mapping[str, Elastic]) -> "tuple[Law, float]":
+    """Material law of elements by their region's number, and the least Young's modulus [Pa]."""
+    from sensorgen.solvers.contact.element import law
+
+    known = [solids[materials[k]] for k in region.tolist()]
+    moduli, ratios = np.array([[s.youngs_modulus_pa, s.poisson_ratio] for s in known]).T
+    return law(moduli, ratios), float(moduli.min())
+
+
 def penalty_pa(softest_pa: float) -> float:
     """Contact pressure per penetration, times the length of a side [Pa]; ``softest_pa`` is the least modulus."""
     return _PENALTY * softest_pa
@@ -93,7 +112,7 @@ def penalty_pa(softest_pa: float) -> float:
 
 def reached(
     problem: "Problem", stress_pa: Sequence[float], longest_pa: float, step: Callable[[float], None], source: str
-) -> tuple[Pressed, "list[State]"]:
+) -> tuple[Pressed, Run]:
     """Press, as far as it converges in steps of at most ``longest_pa``; ``step`` is told what is reached [Pa]."""
     from sensorgen.solvers.contact import load
 
@@ -111,7 +130,7 @@ def reached(
     imbalance = _imbalance(stress, (down - fall) * width, energy)
     faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance))
     said = (f"feet hang free as drawn: the top falls {fall * 1e6:.4g} um before they carry",) if fall > 0 else ()
-    return Pressed(stress, down, (), (), volume, depth, imbalance, fall, faults, said, source), states
+    return Pressed(stress, down, (), (), volume, depth, imbalance, fall, faults, said, source), Run(problem, states)
 
 
 def with_capacitances(found: Pressed, bounds: Sequence[Interval | None], outlines: tuple[Cell, ...] = ()) -> Pressed:
