@@ -26,7 +26,7 @@ def grid(nx, ny, wide=1.0, high=1.0, bend=0.0, shape=None):
 
 
 def elements(mesh, e, nu):
-    return element.Elements(mesh, element.law(np.full(len(mesh.triangles), e), np.full(len(mesh.triangles), nu)))
+    return element.Elements(mesh, element.law(np.full(len(mesh.outer), e), np.full(len(mesh.outer), nu)))
 
 
 def pressed(mesh, e, nu, held, stress, steps=5):
@@ -142,7 +142,7 @@ def _linear(mesh, modulus, nu, n):
     """The same membrane with linear triangles and displacements only."""
     from scipy.sparse import coo_matrix
 
-    corners = mesh.triangles[:, :3]
+    corners = mesh.outer[:, :3]
     p = mesh.points_m[: (n + 1) ** 2]
     a, b, c = (p[corners[:, k]] for k in range(3))
     jacobian = np.stack([b - a, c - a], axis=2)

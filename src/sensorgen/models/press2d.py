@@ -22,7 +22,6 @@ from sensorgen.solvers.contact.pressed import (
     Pressed,
     check,
     compared,
-    curve_of,
     law_of,
     penalty_pa,
     reached,
@@ -39,7 +38,7 @@ SOURCE = (
 )
 COST = 2
 
-__all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "curve_of", "press", "unfit"]
+__all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "press", "unfit"]
 
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
 _STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid when they touched counts [-]

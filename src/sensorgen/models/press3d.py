@@ -21,7 +21,6 @@ from sensorgen.solvers.contact.pressed import (
     Pressed,
     check,
     compared,
-    curve_of,
     law_of,
     penalty_pa,
     reached,
@@ -39,7 +38,7 @@ SOURCE = (
 )
 COST = 3
 
-__all__ = ["Elastic", "Held", "Pieces", "Pressed", "cell", "compared", "curve_of", "press", "unfit"]
+__all__ = ["Elastic", "Held", "Pieces", "Pressed", "cell", "compared", "press", "unfit"]
 
 _STEP = 1 / 60  # longest load step over the least Young's modulus: 100 kPa for 6 MPa [-]
 _MOST = 4000  # solid bricks: more would take hours

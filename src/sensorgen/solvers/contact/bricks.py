@@ -12,7 +12,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.unit_cell import Band, Slice, mirrored
 from sensorgen.solvers.contact.cell import AIR, Region
-from sensorgen.solvers.contact.element import BRICK, BRICK_CORNERS, BRICK_INNER, BRICK_OUTER, Reference
+from sensorgen.solvers.contact.element import BRICK, BRICK_CORNERS, BRICK_INNER, BRICK_OUTER, ElementMesh
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -109,15 +109,13 @@ def _cut(planes: Real, pieces: int, shrink: float) -> tuple[Real, Whole]:
 
 
 @dataclass(frozen=True)
-class BrickMesh:
+class BrickMesh(ElementMesh):
     """Some boxes of a cell as elements, with nodes at corners, on edges and faces and within.
 
     Attributes
     ----------
     bricks : Bricks
         All boxes, air included.
-    points_m : (n, 3) array
-        Places of the nodes [m].
     boxes : (m, 3) array
         Which box each brick is, along x, y and z.
     nodes : (m, 27) array
@@ -127,30 +125,14 @@ class BrickMesh:
     """
 
     bricks: Bricks
-    points_m: Real
     boxes: Whole
     nodes: Whole
     lattice: Whole
-
-    @property
-    def reference(self) -> Reference:
-        """Shape functions."""
-        return BRICK
-
-    @property
-    def outer(self) -> Whole:
-        """Nodes of each brick but the inner one (m, 26)."""
-        return np.asarray(self.nodes[:, BRICK_OUTER])
 
     @cached_property
     def edges_m(self) -> Real:
         """Edges of each brick (m, 3) [m]."""
         return np.column_stack([np.diff(p)[self.boxes[:, a]] for a, p in enumerate(self.bricks.planes_m)])
-
-    @property
-    def jacobians_m(self) -> Real:
-        """Derivative of the place with respect to coordinates from -1 to 1 (m, 3, 3) [m]."""
-        return np.asarray(self.edges_m[:, None] / 2 * np.eye(3))
 
     def top(self) -> tuple[Whole, Real]:
         """Faces on the top, from line to line (k, 9), and their areas [m2]."""
@@ -163,11 +145,6 @@ class BrickMesh:
         found[self.nodes[:, BRICK_INNER]] = inner_m + found[self.nodes[:, BRICK_CORNERS]].mean(axis=1)
         return np.asarray(found)
 
-    @cached_property
-    def region(self) -> Whole:
-        """Region of each brick."""
-        return np.asarray(self.bricks.fill[tuple(self.boxes.T)])
-
 
 def mesh_of(bricks: Bricks, which: NDArray[np.bool_]) -> BrickMesh:
     """Mesh some of the boxes of a cell."""
@@ -179,4 +156,5 @@ def mesh_of(bricks: Bricks, which: NDArray[np.bool_]) -> BrickMesh:
     lattice = [np.interp(np.arange(2 * len(p) - 1) / 2, np.arange(len(p)), p) for p in bricks.planes_m]
     places = np.column_stack(np.unravel_index(used, tuple(size)))
     points = np.column_stack([line[k] for line, k in zip(lattice, places.T, strict=True)])
-    return BrickMesh(bricks, points, boxes, nodes.reshape(flat.shape), places)
+    nodes = nodes.reshape(flat.shape)
+    return BrickMesh(BRICK, points, nodes[:, BRICK_OUTER], bricks.fill[which], bricks, boxes, nodes, places)

@@ -34,7 +34,7 @@ def deformed(cell: Cell, mesh: Mesh, faces: Faces, u_m: Real) -> Cell:
 def misfit(cell: Cell, mesh: Mesh, u_m: Real) -> float:
     """Largest change of a solid's area by what was closed, over that area [-]; ``cell`` has the closed outlines."""
     places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
-    kept = np.bincount(mesh.region, _areas(places[mesh.triangles[:, _ROUND]]), len(cell.regions) + 1)
+    kept = np.bincount(mesh.region, _areas(places[mesh.outer[:, _ROUND]]), len(cell.regions) + 1)
     found = np.zeros(len(kept))
     for (a, b), sides in cell.edges.items():
         half = (a[0] * b[1] - a[1] * b[0]) / 2
@@ -60,7 +60,7 @@ def _edges(cell: Cell, mesh: Mesh) -> Sides:
     air, walls = _air(cell), _walls(mesh)
     for k in range(3):
         for (a, m, b), region in zip(
-            mesh.triangles[:, [k, k + 3, (k + 1) % 3]].tolist(), mesh.region.tolist(), strict=True
+            mesh.outer[:, [k, k + 3, (k + 1) % 3]].tolist(), mesh.region.tolist(), strict=True
         ):
             for p, q in ((a, b),) if m in walls else ((a, m), (m, b)):
                 if (q, p) in found:

@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import product
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,46 +75,51 @@ BRICK_OUTER = np.delete(np.arange(27), BRICK_INNER)
 
 
 def _triangle() -> Reference:
-    # Six points, exact to degree 4 (Strang and Fix; Cowper 1973): barycentric a, a, 1 - 2a, and weight.
+    """Six points, exact to degree 4 (Strang and Fix; Cowper 1973): barycentric a, a, 1 - 2a, and weight."""
     orbits = ((0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322))
     at = np.array([p for a, _ in orbits for p in ((a, a), (1 - 2 * a, a), (a, 1 - 2 * a))])
-    weights = np.array([w / 2 for _, w in orbits for _ in range(3)])
+    weights = np.repeat([w / 2 for _, w in orbits], 3)
     return Reference(triangle_gradients(at), weights, np.column_stack([np.ones(6), at - 1 / 3]))
 
 
 def _brick() -> Reference:
-    """The inner node's displacement is relative to the mean of the corners'."""
-    at, weights = np.polynomial.legendre.leggauss(3)
+    """Gauss's 27 points; the inner node's displacement is relative to the mean of the corners'."""
+    at, weight = np.polynomial.legendre.leggauss(3)
     gradients = brick_gradients(at)
     gradients[:, BRICK_CORNERS] += gradients[:, [BRICK_INNER]] / 8
-    turned = gradients[:, [*BRICK_OUTER, BRICK_INNER]]
-    lattice = np.array(list(product(at, repeat=3)))
-    return Reference(
-        turned, np.einsum("a,b,c->abc", weights, weights, weights).ravel(), np.column_stack([np.ones(27), lattice])
-    )
+    weights = np.einsum("a,b,c->abc", weight, weight, weight).ravel()
+    pressures = np.column_stack([np.ones(27), np.array(list(product(at, repeat=3)))])
+    return Reference(gradients[:, [*BRICK_OUTER, BRICK_INNER]], weights, pressures)
 
 
 TRIANGLE, BRICK = _triangle(), _brick()
 
 
-class ElementMesh(Protocol):
-    """A mesh of one kind of element, each an affine image of the reference."""
+@dataclass(frozen=True)
+class ElementMesh:
+    """A mesh of one kind of element, each an affine image of the reference.
 
-    @property
-    def points_m(self) -> Real:
-        """Places of the nodes (n, d) [m]."""
+    Attributes
+    ----------
+    reference : Reference
+        Its shape functions.
+    points_m : (n, d) array
+        Places of the nodes [m].
+    outer : (m, k) array
+        Nodes of each element but the inner one, as in the reference.
+    region : (m,) array
+        Region of each element, from 1 on.
+    """
 
-    @property
-    def outer(self) -> Whole:
-        """Nodes of each element but the inner one (m, k), as in the reference."""
+    reference: Reference
+    points_m: Real
+    outer: Whole
+    region: Whole
 
-    @property
+    @cached_property
     def jacobians_m(self) -> Real:
         """Derivative of the place with respect to the reference coordinates (m, d, d) [m]."""
-
-    @property
-    def reference(self) -> Reference:
-        """Its shape functions."""
+        return np.einsum("mni,na->mia", self.points_m[self.outer], self.reference.gradients[0, :-1], optimize=True)
 
 
 @dataclass(frozen=True)
@@ -183,21 +187,16 @@ class Elements:
     law: Law
     _last: list[tuple[Real, Inner, Tangent]] = field(default_factory=list, repr=False, compare=False)
 
-    @property
-    def points_m(self) -> Real:
-        """Places of the nodes (n, d) [m]."""
-        return self.mesh.points_m
-
     @cached_property
     def freedoms(self) -> Whole:
         """Numbers of the displacements that each element shares with its neighbours (m, k): x, y (, z) of each node."""
-        outer, d = self.mesh.outer, self.points_m.shape[1]
+        outer, d = self.mesh.outer, self.mesh.points_m.shape[1]
         return np.asarray((d * outer[:, :, None] + np.arange(d)).reshape(len(outer), -1))
 
     @cached_property
     def _volumes(self) -> Real:
         """Volume of each element over that of the reference (m,) [m^d]."""
-        return np.asarray(np.linalg.det(self.mesh.jacobians_m))
+        return np.asarray(determinant(self.mesh.jacobians_m))
 
     @cached_property
     def _metric(self) -> Real:
@@ -212,19 +211,16 @@ class Elements:
 
     def start(self) -> Inner:
         """Unloaded."""
-        m, d = len(self.mesh.outer), self.points_m.shape[1]
+        m, d = len(self.mesh.outer), self.mesh.points_m.shape[1]
         return Inner(np.zeros((m, d)), np.zeros((m, d + 1)))
 
     def _stretch(self, u: Real, inner: Inner, which: slice) -> Real:
         """Derivative of the deformed place with respect to the reference coordinates, F Jacobian (m, q, d, d) [m]."""
-        gradients, d = self.mesh.reference.gradients, self.points_m.shape[1]
+        gradients, d = self.mesh.reference.gradients, self.mesh.points_m.shape[1]
         local = np.concatenate([u.reshape(-1, d)[self.mesh.outer[which]], inner.bubble[which, None]], axis=1)
-        moved = local.transpose(0, 2, 1).reshape(len(local) * d, -1) @ gradients.transpose(1, 0, 2).reshape(
-            local.shape[1], -1
-        )
-        return np.asarray(
-            moved.reshape(len(local), d, -1, d).transpose(0, 2, 1, 3) + self.mesh.jacobians_m[which, None]
-        )
+        rows = local.transpose(0, 2, 1).reshape(len(local) * d, -1)
+        moved = (rows @ gradients.transpose(1, 0, 2).reshape(rows.shape[1], -1)).reshape(len(local), d, -1, d)
+        return np.asarray(moved.transpose(0, 2, 1, 3) + self.mesh.jacobians_m[which, None])
 
     def volume_ratio(self, u: Real, inner: Inner) -> Real:
         """J at each quadrature point (m, q)."""

@@ -16,6 +16,7 @@ from scipy.sparse.linalg import splu
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
+_PIVOT = 1e-3  # share of its column below which a pivot of an indefinite matrix is exchanged [-]
 _LEAST = 60  # unknowns that are not halved any more
 _MOST_TURNS = 30  # of conjugate gradients, before new factors are made
 _ENOUGH = 1e-4  # residual over right side: Newton's method takes the rest away [-]
@@ -33,6 +34,14 @@ def solved_by_lu(matrix: csr_matrix, right: Real, pivot: float = 0.0) -> Real:
     how = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}, "relax": 1, "panel_size": 1}
     found: Real = splu(matrix.tocsc(), diag_pivot_thresh=pivot, **how).solve(right)
     return found
+
+
+def by_lu(matrix: csr_matrix, right: Real) -> Real | None:
+    """Solution of a symmetric system that may be indefinite, or None where it is singular."""
+    try:
+        return solved_by_lu(matrix, right, _PIVOT)
+    except RuntimeError:
+        return None
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float,
     ends = [_nodes(mesh, terminal == end) for end in ("bottom", "top")]
     if (ends[0] & ends[1]).any():
         raise OutOfRange("the electrodes touch: the capacitance grows without bound")
-    triangles, region = _between(mesh.triangles[terminal == ""], mesh.region[terminal == ""], ends)
+    triangles, region = _between(mesh.outer[terminal == ""], mesh.region[terminal == ""], ends)
     eps = np.array([permittivity.get(r.material, np.nan) for r in cell.regions])[region - 1]
     x = mesh.points_m[:, 0]
     sides = [abs(x - end) < 1e-9 * (x.max() - x.min()) for end in (x.min(), x.max())]
@@ -148,7 +148,7 @@ def _turn(points: Real, tip: int, a: int, b: int) -> float:
 
 def _nodes(mesh: Mesh, which: Mask) -> Mask:
     found = np.zeros(len(mesh.points_m), bool)
-    found[mesh.triangles[which]] = True
+    found[mesh.outer[which]] = True
     return found
 
 
