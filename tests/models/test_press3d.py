@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models import fem2d, fem3d, press2d, press3d, springs
+from sensorgen.models.compression import curve_of
 from sensorgen.models.press3d import Elastic, Held, Pieces
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.contact import (
@@ -393,7 +394,7 @@ def test_what_does_not_converge_ends_with_the_last_load(monkeypatch):
     found = press3d.press(press3d.cell(rect()), solids(), [0.0, 1e4, 2e4], fineness=Pieces(1))
     assert (found.converged_pa, found.faults) == (1e4, ("converged up to 10 of 20 kPa",))
     with pytest.raises(OutOfRange, match="not to be trusted"):
-        press3d.curve_of(found)
+        curve_of(found)
 
 
 def test_what_is_wrong_is_refused():

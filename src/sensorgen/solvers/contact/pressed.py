@@ -172,7 +172,9 @@ def with_capacitances(found: Pressed, bounds: Sequence[Interval | None], outline
     faults, known = list(found.faults), [c.middle() for c in bounds if c]
     if len(known) < len(bounds):
         unknown = len(bounds) - len(known)
-        faults.append(f"no capacitance at {unknown} of {len(bounds)} stresses: the deformed outlines could not be meshed")
+        faults.append(
+            f"no capacitance at {unknown} of {len(bounds)} stresses: the deformed outlines could not be meshed"
+        )
     if any(after < before * (1 - _LEVELS) for before, after in pairwise(known)):
         faults.append("the capacitance falls under pressure: some outlines were closed in the wrong place")
     return replace(found, capacitance_f_per_m2=tuple(bounds), outlines=outlines, faults=tuple(faults))
