@@ -101,9 +101,12 @@ def closed(edges: Sides, air: int, places: Real, faces: Faces) -> Sides:
 
     Points that touch a mirror are moved onto it in ``places`` [mm].
     """
-    border = _border(edges, air, places, faces)
-    if not len(border.runs):
+    depth = dict(zip(map(tuple, _halves(faces).tolist()), np.tile(faces.depth_m, 2) / M_PER_MM, strict=True))
+    known = {run if sides[1] == air else run[::-1]: OUTSIDE in sides for run, sides in edges.items() if air in sides}
+    if not known:
         return edges
+    behind = np.array([depth.get(run, np.inf) for run in known])
+    border = _Air(np.array([*known], int), np.array([*known.values()], bool), behind, places)
     instead, touched = _joined(border, _fixed(edges, air, faces))
     ways = dict(zip(map(tuple, border.runs.tolist()), _ways(border, instead, touched), strict=True))
     found: Sides = {}
@@ -112,16 +115,9 @@ def closed(edges: Sides, air: int, places: Real, faces: Faces) -> Sides:
         for a, b in pairwise(way):
             if a != b:
                 key, here = ((a, b), sides) if a < b else ((b, a), sides[::-1])
-                known = found.get(key, (air, air))
-                found[key] = (known[0] if here[0] == air else here[0], known[1] if here[1] == air else here[1])
+                before = found.get(key, (air, air))
+                found[key] = (before[0] if here[0] == air else here[0], before[1] if here[1] == air else here[1])
     return found
-
-
-def _border(edges: Sides, air: int, places: Real, faces: Faces) -> _Air:
-    depth = dict(zip(map(tuple, _halves(faces).tolist()), np.tile(faces.depth_m, 2) / M_PER_MM, strict=True))
-    known = {run if sides[1] == air else run[::-1]: OUTSIDE in sides for run, sides in edges.items() if air in sides}
-    behind = np.array([depth.get(run, np.inf) for run in known])
-    return _Air(np.array([*known], int).reshape(-1, 2), np.array([*known.values()], bool), behind, places)
 
 
 def _halves(faces: Faces) -> Whole:
