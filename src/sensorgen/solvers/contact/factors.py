@@ -1,7 +1,8 @@
-"""Cholesky factors of sparse matrices whose unknowns have places, and conjugate gradients on factors of a like matrix.
+"""Solution of symmetric sparse systems: LU of planar meshes, multifrontal Cholesky factors of solid ones.
 
-Blocks of unknowns are halved along planes; what lies on a plane is eliminated after both halves, by dense algebra
-(nested dissection and fronts: George 1973; Duff and Reid 1983). The order serves as long as the pattern stays.
+For the latter, blocks of unknowns are halved along planes; what lies on a plane is eliminated after both halves, by
+dense algebra (nested dissection and fronts: George 1973; Duff and Reid 1983). The order serves as long as the pattern
+stays.
 """
 
 from collections.abc import Iterator
@@ -10,13 +11,37 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
+from scipy.sparse.linalg import splu
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
+_PIVOT = 1e-3  # share of its column below which a pivot of an indefinite matrix is exchanged [-]
 _LEAST = 60  # unknowns that are not halved any more
 _MOST_TURNS = 30  # of conjugate gradients, before new factors are made
 _ENOUGH = 1e-4  # residual over right side: Newton's method takes the rest away [-]
+
+
+def solved_by_lu(matrix: csr_matrix, right: Real, pivot: float = 0.0) -> Real:
+    """Solution of a symmetric system; pivots smaller than a share of their column are exchanged.
+
+    Raises
+    ------
+    RuntimeError
+        The matrix is exactly singular.
+    """
+    # columns one by one (relax, panel_size): the factors are too sparse for panels to pay
+    how = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}, "relax": 1, "panel_size": 1}
+    found: Real = splu(matrix.tocsc(), diag_pivot_thresh=pivot, **how).solve(right)
+    return found
+
+
+def by_lu(matrix: csr_matrix, right: Real) -> Real | None:
+    """Solution of a symmetric system that may be indefinite, or None where it is singular."""
+    try:
+        return solved_by_lu(matrix, right, _PIVOT)
+    except RuntimeError:
+        return None
 
 
 @dataclass(frozen=True)
