@@ -171,7 +171,7 @@ def truth():
     with tempfile.TemporaryDirectory() as folder:
         run, _ = joined_run(Path(folder), plan, 7.25, 2.1e-4, creep=0.02, seed=5)
     one, of = run.recording, made.sensor()
-    at = presses.pressed(one.time_s, run.force_n)
+    at = presses.by_force(one.time_s, run.force_n)
     creep = drift.fitted(one.time_s, one.impedance_ohm, one.valid(), run.force_n)
     rest = of.impedance(made.TONES_HZ, 0.0, 0.05)
     raw = presses.pairs(one.time_s, one.impedance_ohm, one.valid(), at, run.force_n, run.set_position_mm)
@@ -229,7 +229,7 @@ def laws():
         every = np.ones(len(run.time_s), bool)
         fit = drift.fitted(run.time_s, run.impedance_ohm, every, run.force_n)
         clean = fit.removed(run.time_s, run.impedance_ohm) * rest / fit.rest_ohm()
-        at = presses.pressed(run.time_s, run.force_n)
+        at = presses.by_force(run.time_s, run.force_n)
         raw, free = (
             presses.pairs(run.time_s, z, every, at, run.force_n, run.position_mm) for z in (run.impedance_ohm, clean)
         )
@@ -310,7 +310,7 @@ def pictures(run, pairs):
         plan = made.presses(40, seed=seed)
         other = made.run(plan, RATE, (1 + seed) * NOISE, creep=0.005, seed=seed)
         every = np.ones(len(other.time_s), bool)
-        at = presses.pressed(other.time_s, other.force_n)
+        at = presses.by_force(other.time_s, other.force_n)
         sets[f"print {seed + 1}"] = presses.pairs(
             other.time_s, other.impedance_ohm, every, at, other.force_n, other.position_mm
         )

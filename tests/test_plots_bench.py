@@ -20,7 +20,7 @@ def run():
     recording = Recording(
         truth.time_s, tones, truth.impedance_ohm, blank(len(every)), Clock(), Source("", "", rate_hz=35)
     )
-    pairs = presses.pairs(truth.time_s, truth.impedance_ohm, every, presses.pressed(truth.time_s, truth.force_n),
+    pairs = presses.pairs(truth.time_s, truth.impedance_ohm, every, presses.by_force(truth.time_s, truth.force_n),
                           truth.force_n, truth.position_mm)  # fmt: skip
     return bench.Run("<b>23 $triX$</b>", tones, truth.time_s, truth.impedance_ohm, *lowpass.filtered(recording), pairs)
 

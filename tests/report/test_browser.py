@@ -8,7 +8,7 @@ from bench_files import HOSTILE
 from browser import Page
 
 from sensorgen.analysis.report import report, written
-from sensorgen.measure.log import Log, words
+from sensorgen.measure.log import Log, notes
 
 OUT = Path(__file__).parents[2] / "out" / "report"  # CI keeps it
 FIGURES = """[...document.querySelectorAll('.plot')].map(p => [p.dataset.key, p.getBoundingClientRect().width,
@@ -81,7 +81,7 @@ def on_paper(browser):
 def test_tall_figures_in_pieces_on_paper(browser, tmp_path):
     """Seventy rows do not fit on a page: every row stands in one piece, none higher than a page."""
     with Log(tmp_path / "log.db", create=True) as log:
-        log.add([words.reading(f"40 triX .1mm {k + 1}", f"{600 + 3 * k}", "30") for k in range(70)])
+        log.add([notes.reading(f"40 triX .1mm {k + 1}", f"{600 + 3 * k}", "30") for k in range(70)])
         (tmp_path / "tall.html").write_text(written(report(log, 40), "html"), "utf-8")
     browser.open(tmp_path / "tall.html")
     whole = browser.run(PIECES)

@@ -21,7 +21,7 @@ from sensorgen.analysis.report import FORMATS, formats, report, written, yields
 from sensorgen.analysis.report.electrodes import MOST_ROWS
 from sensorgen.analysis.report.tables import shown as shown_as
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log import Log, words
+from sensorgen.measure.log import Log, notes
 
 TABLE = Path(__file__).parents[2] / "src" / "sensorgen" / "measure" / "log" / "table_d1.csv"
 FACTOR = {"": 1.0, "k": 1e3, "m": 1e6}
@@ -107,8 +107,8 @@ def test_whether_groups_differ_is_asked_of_films_only(of_thesis, by_hand):
 def test_of_two_questions_each_has_to_be_twice_as_sure(shorted, said, tmp_path):
     """6 and 5 of 10 against 12 of 12: p = 0.029 and 0.010, of which the first would do if only one thing were asked."""
     with Log(tmp_path / "log.db", create=True) as log:
-        first = [words.reading(f"40 triX .1mm {k + 1}", "700", "30" if k < shorted else "OL") for k in range(10)]
-        log.add(first + [words.reading(f"40 triX .2mm {k + 1}", "700", "30") for k in range(12)])
+        first = [notes.reading(f"40 triX .1mm {k + 1}", "700", "30" if k < shorted else "OL") for k in range(10)]
+        log.add(first + [notes.reading(f"40 triX .2mm {k + 1}", "700", "30") for k in range(12)])
         found = of_iteration(log, 40)
     chance = stats.fisher_exact([[shorted, 10 - shorted], [12, 0]]).pvalue
     assert chance < 0.05
@@ -130,8 +130,8 @@ def test_r_z_is_not_compared_where_the_electrodes_touch_as_drawn(of_thesis, by_h
 
 def test_a_specimen_counts_once_and_with_its_last_reading(tmp_path):
     with Log(tmp_path / "log.db", create=True) as log:
-        log.add([words.reading("40 triX .1mm", "0.7k", z) for z in ("10", "12", "OL")])
-        log.add([words.reading("40 triX .1mm 2", "0.7k", "20")])
+        log.add([notes.reading("40 triX .1mm", "0.7k", z) for z in ("10", "12", "OL")])
+        log.add([notes.reading("40 triX .1mm 2", "0.7k", "20")])
         made = report(log, 40)
     assert any(text.startswith("1 of the 2 testable sensors is intact") for text in made.headline)
     assert any(text.startswith("1 of 2 sensors are shorted or leaking") for text in made.findings)
@@ -145,7 +145,7 @@ def test_thousands_of_readings(tmp_path, monkeypatch):
     monkeypatch.setattr(formats, "MOST_ROWS", 50)
     with Log(tmp_path / "log.db", create=True) as log:
         names = [f"40 {shape} .1mm {k + 1}" for k in range(600) for shape in ("triX", "triY")]
-        log.add([words.reading(n, f"{700 + k % 99}", "30" if k % 3 else "OL") for k, n in enumerate(names)])
+        log.add([notes.reading(n, f"{700 + k % 99}", "30" if k % 3 else "OL") for k, n in enumerate(names)])
         made = report(log, 40)
     charts = {chart.key: chart for chart in made.figures}
     assert [len(charts[key].choices[""][0].y.names) for key in ("residuals", "resistance")] == [MOST_ROWS] * 2
@@ -349,7 +349,7 @@ def test_one_reading_makes_a_short_report(tmp_path):
 
 def test_readings_without_a_design_make_a_report(tmp_path):
     with Log(tmp_path / "log.db", create=True) as log:
-        log.add([words.reading("50 tri", "650", "OL"), words.reading("50 sq", "", "")])
+        log.add([notes.reading("50 tri", "650", "OL"), notes.reading("50 sq", "", "")])
         made = report(log, 50)
     assert any("does not tell which design" in row.why for row in table(made, "left_out").rows)
     for how in FORMATS:

@@ -16,7 +16,7 @@ from sensorgen.analysis.report.variants import errors
 from sensorgen.cli import cli
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Log
-from sensorgen.measure.log.bench import take
+from sensorgen.measure.log.bench import log_recording
 
 
 def test_thinned_curves_keep_what_stands_out():
@@ -167,7 +167,7 @@ def test_a_table_with_columns_of_its_own_is_not_left_out(tmp_path):
     columns = {"t": "time_s", "r": "re_ohm_1.1kHz", "x": "im_ohm_1.1kHz"}
     left_out = []
     with Log(tmp_path / "log.db", create=True) as log:
-        take(log, "31 triX .1mm", tmp_path / "own.csv", None, columns=columns)
+        log_recording(log, "31 triX .1mm", tmp_path / "own.csv", None, columns=columns)
         (found,) = runs.runs(log, 31, left_out)
     assert left_out == []
     assert found.rest_ohm[0].real == pytest.approx(1001, abs=0.1)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log.values import MOST_OHM, OVERLOAD, read
+from sensorgen.measure.log.resistances import MOST_OHM, OVERLOAD, parse
 
 PLAIN = {
     "650": 650.0,
@@ -87,12 +87,12 @@ NONE = [
 
 @pytest.mark.parametrize(("words", "ohm"), PLAIN.items())
 def test_plain_values_leave_no_doubt(words, ohm):
-    assert (read(words).ohm, read(words).doubts) == ((ohm,), ())
+    assert (parse(words).ohm, parse(words).doubts) == ((ohm,), ())
 
 
 @pytest.mark.parametrize(("words", "ohm", "doubt"), [(w, *found) for w, found in DOUBTFUL.items()])
 def test_doubtful_values_are_taken_and_flagged(words, ohm, doubt):
-    found = read(words)
+    found = parse(words)
     assert found.ohm == (ohm,)
     assert len(found.doubts) == 1
     assert doubt in found.doubts[0]
@@ -101,50 +101,50 @@ def test_doubtful_values_are_taken_and_flagged(words, ohm, doubt):
 @pytest.mark.parametrize("words", NONE)
 def test_what_is_no_resistance_is_refused(words):
     with pytest.raises(BadInput, match="expected a resistance such as 650"):
-        read(words)
+        parse(words)
 
 
 def test_several_readings_are_several():
-    found = read("0.5k / 1k;1.3k")
+    found = parse("0.5k / 1k;1.3k")
     assert found.ohm == (500.0, 1000.0, 1300.0)
     assert found.doubts == ("3 readings: repeats, or several points of contact",)
-    assert read("5k / 0").ohm == (5000.0, 0.0)
-    assert read("5k / 6k").doubts == ("2 readings: repeats, or several points of contact",)
+    assert parse("5k / 0").ohm == (5000.0, 0.0)
+    assert parse("5k / 6k").doubts == ("2 readings: repeats, or several points of contact",)
 
 
 @pytest.mark.parametrize("words", ["", "  ", "\t"])
 def test_a_blank_is_no_reading_and_not_zero(words):
-    assert (read(words).ohm, read(words).doubts) == ((), ())
+    assert (parse(words).ohm, parse(words).doubts) == ((), ())
 
 
 @pytest.mark.parametrize("words", ["-", "–", "n/a", "NaN", "?"])
 def test_words_for_nothing_are_no_reading(words):
-    assert read(words).ohm == ()
-    assert "taken for no reading" in read(words).doubts[0]
+    assert parse(words).ohm == ()
+    assert "taken for no reading" in parse(words).doubts[0]
 
 
 def test_each_m_is_named_so_that_somebody_can_be_asked():
-    assert read("1.1m / 2k / 0.3 m").mega == ("1.1m", "0.3 m")
-    assert read("1.1M").mega == ()
+    assert parse("1.1m / 2k / 0.3 m").mega == ("1.1m", "0.3 m")
+    assert parse("1.1M").mega == ()
 
 
 @given(st.floats(1, MOST_OHM))
 def test_what_a_program_prints_is_read_as_the_very_same(ohm):
-    assert read(repr(ohm)).ohm == (ohm,)
+    assert parse(repr(ohm)).ohm == (ohm,)
 
 
 @given(st.integers(1, 9999), st.sampled_from([("k", 1000), ("M", 10**6), ("", 1)]))
 def test_prefixes_multiply_exactly(number, prefix):
     letter, factor = prefix
-    assert read(f"{number / 1000!r}{letter}").ohm[0] == pytest.approx(number * factor / 1000, rel=1e-15)
-    assert read(f"{number}{letter}").ohm == (float(number * factor),)
+    assert parse(f"{number / 1000!r}{letter}").ohm[0] == pytest.approx(number * factor / 1000, rel=1e-15)
+    assert parse(f"{number}{letter}").ohm == (float(number * factor),)
 
 
 @settings(max_examples=60)
 @given(st.text(max_size=60) | st.text("0123456789kKmM.,/; ΩeE+-OL", max_size=12))
 def test_any_text_is_read_or_refused(words):
     try:
-        found = read(words)
+        found = parse(words)
     except BadInput:
         return
     assert all(not math.isnan(ohm) for ohm in found.ohm)
