@@ -10,6 +10,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from drawn_sensor import sensor_of
 
 from sensorgen.analysis import plots
 from sensorgen.analysis.plots import inverse, libraries, maps, page, panels
@@ -19,7 +20,6 @@ from sensorgen.design.design import make
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.sensor_of_design import sensor_of
 
 PLATE = {
     "L_m": 0.1, "W_m": 0.01, "H_top_m": 3e-4, "H_bottom_m": 3e-4, "rho_top_ohm_m": 0.07, "rho_bottom_ohm_m": 0.2,

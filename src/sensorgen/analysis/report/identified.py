@@ -20,7 +20,9 @@ _COLOURS = (charts.SKY, charts.BLUE, charts.ORANGE)
 
 def table_of(found: Comparison) -> Table | None:
     """A row for each variant with a prediction; None where there is none."""
-    rows = [_row(name, of.card) for name, of in found.predictions.items()]
+    rows = [
+        _row(name, of.prediction.identifiability or {"reason": of.reason}) for name, of in found.predictions.items()
+    ]
     if not rows:
         return None
     caption = f"Identifiability: what seven tones tell of {FORCE_N:g} N in the middle, by the prediction (Cramér-Rao)"
@@ -39,7 +41,11 @@ def _number(value: object) -> float | None:
 
 def figure(found: Comparison) -> tuple[Chart, ...]:
     """Standard errors over the place of a press, for weak, middling and strong ones, of every variant with a card."""
-    known: dict[str, Content] = {name: _lines(of.card) for name, of in found.predictions.items() if of.card.get("map")}
+    known: dict[str, Content] = {
+        name: _lines(card)
+        for name, of in found.predictions.items()
+        if (card := of.prediction.identifiability or {}).get("map")
+    }
     if not known:
         return ()
     return (
