@@ -11,7 +11,7 @@ DOCS = Path(__file__).parent
 README = DOCS.parent / "README.md"
 FIRST_SCREEN = ["build", "tri", "--dielectric", "0.2"]
 LINES = 30  # of the first screen
-PICTURES = {"trix-d0.2": ["tri"], "sqxy-d0.2": ["rect"], "trix-upside-down": ["tri", "--orientation", "upside-down"]}
+PICTURES = {"trix-d0.2": ["tri", "--drawn"]}
 PAGES = (
     [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"],
     ["slice"], ["slice", "tri"], ["gcode"], ["gcode", "check"], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],

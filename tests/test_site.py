@@ -15,7 +15,7 @@ pytest.importorskip("sphinx")
 def built(tmp_path):
     """Build a site of one page with the settings of ours."""
     (tmp_path / "docs" / "site").mkdir(parents=True)
-    for name in ("conf.py", "site/index.html"):
+    for name in ("conf.py", "site/index.html", "site/site.css"):
         shutil.copy(DOCS / name, tmp_path / "docs" / name)
 
     def build(page):
