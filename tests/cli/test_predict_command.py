@@ -296,9 +296,7 @@ def test_no_plot_library_is_loaded_without_a_plot(real, words):
 
 def test_help_does_not_load_numpy(real):
     said = real("predict", "tri", "--help", before=LOADED)
-    assert not {"numpy", "pydantic", "sensorgen.prediction.evaluate"} & set(
-        said.out.rpartition("loaded: ")[2].split()
-    )
+    assert not {"numpy", "pydantic", "sensorgen.prediction.evaluate"} & set(said.out.rpartition("loaded: ")[2].split())
 
 
 def test_options_are_what_the_planner_knows():
