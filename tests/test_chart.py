@@ -427,7 +427,7 @@ def test_every_scene_has_a_question_and_reasons(name):
 
 
 def test_what_is_known_of_presses(monkeypatch):
-    """Cheap laws are off by what docs/press.md and docs/cells.md say; a budget ends the meshes."""
+    """Cheap laws are off by what docs/compression.md and docs/cells.md say; a budget ends the meshes."""
     monkeypatch.setattr(presses, "_pressed", lambda *_: iter(()))
     down, rise = (
         {p.model: p for p in presses.points(f"tri pressed, 0.1 mm: {w}", 1.0)} for w in ("top down", "rise of C")

@@ -215,7 +215,9 @@ def test_findings_are_ranked_and_the_rest_is_counted() -> None:
     more = [finding(k, layer=1 + k % 13) for k in range(40)]
     shown = len([line for line in words(drawn(scene_of("tri"), *more)) if "It will not print." in line])
     assert shown >= 12
-    assert any(f"40 errors; {40 - shown} not shown, see check.json" in line for line in words(drawn(scene_of("tri"), *more)))
+    assert any(
+        f"40 errors; {40 - shown} not shown, see check.json" in line for line in words(drawn(scene_of("tri"), *more))
+    )
 
 
 def test_a_finding_of_many_layers_stands_once_with_its_count() -> None:

@@ -29,7 +29,7 @@ CAMERA = "JSON.stringify(document.querySelector('[data-key=bodies]')._fullLayout
 def pages(recorded, tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
     with Log(folder / "one.db", create=True) as log:
-        log.add([words.reading("40 triX .1mm", "700", "OL")])
+        log.add([notes.reading("40 triX .1mm", "700", "OL")])
     for name, log, iteration in (("recorded", recorded, 30), ("one", folder / "one.db", 40)):
         with Log(log) as opened:
             (folder / f"{name}.html").write_text(written(report(opened, iteration), "html"), "utf-8")

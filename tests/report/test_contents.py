@@ -339,7 +339,7 @@ def test_an_iteration_without_readings_is_refused(thesis):
 def test_one_reading_makes_a_short_report(tmp_path):
     """No table of a group of one, no yield of one, and no explanation of a single number."""
     with Log(tmp_path / "log.db", create=True) as log:
-        log.add([words.reading("40 triX .1mm", "700", "OL")])
+        log.add([notes.reading("40 triX .1mm", "700", "OL")])
         made = report(log, 40)
     assert made.headline[0].startswith("Electrode resistance of 40 triX .1mm: measured 700 ohm, predicted ")
     assert made.headline[1] == "Verdict of 40 triX .1mm: intact."
