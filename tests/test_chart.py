@@ -412,7 +412,7 @@ def test_every_model_is_on_the_chart():
     assert {(name, model) for name in names for model in registry.names(models)} <= both
     assert not {(p.scene, p.model.partition(":")[0]) for p in found} & set(said)
     assert all(said.values())
-    assert said["tri, 0.1 mm", "fem3d"] == fem3d.unfit(STANDARD["tri, 0.1 mm"]().scene)
+    assert said["tri, 0.1 mm", "fem3d"] == fem3d.why_not_applicable(STANDARD["tri, 0.1 mm"]().scene)
     assert said["tri, 0.1 mm", "line"].endswith("Not the capacitance of a cell at rest.")
     assert "along its depth" in said["block, free all round", "press2d"]
 
@@ -420,7 +420,7 @@ def test_every_model_is_on_the_chart():
 @pytest.mark.parametrize("name", chart.SCENES)
 def test_every_scene_has_a_question_and_reasons(name):
     kind = chart.kind_of(name)
-    reasons = kind.unfit(name)
+    reasons = kind.why_not_applicable(name)
     assert set(reasons) <= set(registry.names(models))
     assert kind.ASKED
     assert len(chart.SCENES) == len(set(chart.SCENES))

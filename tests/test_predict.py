@@ -163,7 +163,7 @@ class Model:
         self.COST, self.reason, self.asked = cost, reason, 0
         self.bounds = Interval(lower, upper)
 
-    def unfit(self, scene):
+    def why_not_applicable(self, scene):
         return self.reason or None
 
     def capacitance(self, scene, permittivity):

@@ -317,8 +317,8 @@ def test_what_it_cannot_speak_of():
         (tri_cell(0.1), "boxes"),
         (rect_cell(0.0), "touch"),
     ):
-        assert words in (fem3d.unfit(scene) or "")
-    assert fem3d.unfit(rect_cell(0.1)) is None
+        assert words in (fem3d.why_not_applicable(scene) or "")
+    assert fem3d.why_not_applicable(rect_cell(0.1)) is None
 
 
 def test_nonsense_is_refused():

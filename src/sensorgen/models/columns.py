@@ -30,7 +30,7 @@ _ROUNDING = 1e-9  # by which exact bounds may seem to cross
 _JUMP = 1e-9  # a potential is continuous when its two sides differ by less, of 1 V
 
 
-def unfit(scene: Scene) -> str | None:
+def why_not_applicable(scene: Scene) -> str | None:
     """Why this model cannot speak of this scene, or None."""
     if len({body.terminal for body in scene.bodies} - {""}) > 2:
         return "more than two electrodes: sensorgen stack speaks of them"
@@ -62,7 +62,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
     Parameters
     ----------
     scene : Scene
-        As drawn, for which :func:`unfit` is None.
+        As drawn, for which :func:`why_not_applicable` is None.
     permittivity : mapping of str to float
         Relative permittivity of each material that lies between the electrodes, and of "air" [-].
 
@@ -76,7 +76,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
     KeyError
         A material between the electrodes has no permittivity.
     ValueError
-        The scene is unfit.
+        The model does not apply to the scene.
     ArithmeticError
         The bounds have crossed, which no geometry can make them do.
     """
@@ -237,7 +237,7 @@ def _graded(left: float, right: float) -> tuple[NDArray[np.float64], NDArray[np.
 def _stack(cell: Column, permittivity: Mapping[str, float]) -> _Stack:
     gap = _gap(cell)
     if gap is None:
-        raise ValueError("an electrode does not cover the whole sensor: ask unfit() first")
+        raise ValueError("an electrode does not cover the whole sensor: ask why_not_applicable() first")
     lines, eps = [gap.bottom_mm], []
     for bottom, top, value in _filled(gap, permittivity):
         if max(top[0] - bottom[0], top[1] - bottom[1]) > 0:

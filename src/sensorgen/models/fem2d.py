@@ -42,7 +42,7 @@ _STEP = 2  # of orders, where the field is complex
 _STALLED = 0.7  # a step that leaves more of the width than this gains nothing
 
 
-def unfit(scene: Scene) -> str | None:
+def why_not_applicable(scene: Scene) -> str | None:
     """Why this model cannot speak of this scene, or None."""
     try:
         _triangles(scene)
@@ -59,7 +59,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     Parameters
     ----------
     scene : Scene
-        As drawn, for which :func:`unfit` is None.
+        As drawn, for which :func:`why_not_applicable` is None.
     permittivity : mapping of str to float
         Relative permittivity of each material that lies between the electrodes, and of "air", above 0 [-].
     width : float
@@ -77,7 +77,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     KeyError
         A material between the electrodes has no permittivity.
     ValueError
-        The scene is unfit.
+        The model does not apply to the scene.
     CrossedBounds
         The lower bound lies above the upper one: a fault of the solver.
     Unsolved
@@ -152,7 +152,7 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     Parameters
     ----------
     scene : Scene
-        As drawn, for which :func:`unfit` is None.
+        As drawn, for which :func:`why_not_applicable` is None.
     permittivity : mapping of str to complex
         Relative permittivity of each material between the electrodes, and of "air"; real part above 0,
         :math:`\varepsilon' (1 - j\tan\delta) - j / (\omega\varepsilon_0\varrho)` [-].
@@ -211,7 +211,9 @@ def _disc(mesh: Cones, permittivity: Mapping[str, complex], turn: Turned, order:
     return disc(found, turn, [share for _, share in mesh.triangles.regions])
 
 
-@lru_cache(maxsize=8)  # unfit() asks before capacitance() does, and a long sensor's cell takes as long as its field
+@lru_cache(
+    maxsize=8
+)  # why_not_applicable() asks before capacitance() does, and a long sensor's cell takes as long as its field
 def _triangles(scene: Scene) -> tuple[Section, Triangles]:
     """The scene's only cross-section, and its repeating cell in few triangles."""
     found = sections(scene)

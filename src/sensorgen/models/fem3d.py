@@ -28,7 +28,7 @@ _RUNGS = ((1, 3, 2), (1, 5, 4), (2, 6, 5), (3, 7, 6))  # layers, order of the po
 _MOST_BRICKS = 2500  # of one rung: more would take hours
 
 
-def unfit(scene: Scene) -> str | None:
+def why_not_applicable(scene: Scene) -> str | None:
     """Why this model cannot speak of this scene, or None."""
     if reason := fem.third_electrode(scene):
         return reason
@@ -70,7 +70,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     Parameters
     ----------
     scene : Scene
-        As drawn, for which :func:`unfit` is None.
+        As drawn, for which :func:`why_not_applicable` is None.
     permittivity : mapping of str to float
         Relative permittivity of each material that lies between the electrodes, and of "air", above 0 [-].
     width : float
@@ -88,7 +88,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     KeyError
         A material between the electrodes has no permittivity.
     ValueError
-        The scene is unfit.
+        The model does not apply to the scene.
     CrossedBounds
         The lower bound lies above the upper one: a fault of the solver.
     """
@@ -126,7 +126,7 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     Parameters
     ----------
     scene : Scene
-        As drawn, for which :func:`unfit` is None.
+        As drawn, for which :func:`why_not_applicable` is None.
     permittivity : mapping of str to complex
         As of :func:`sensorgen.models.fem2d.lossy` [-].
     width : float

@@ -39,7 +39,7 @@ SOURCE = (
 )
 COST = 2
 
-__all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "curve_of", "press", "unfit"]
+__all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "curve_of", "press", "why_not_applicable"]
 
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
 _STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid when they touched counts [-]
@@ -174,7 +174,7 @@ def _refuse_misfit(share: float) -> None:
         raise Unmeshed(f"closing the gaps changed a solid's area by {share:.1%}")
 
 
-def unfit(scene: Scene) -> str | None:
+def why_not_applicable(scene: Scene) -> str | None:
     """Why this model cannot speak of a scene, or None."""
     try:
         cell_of(scene, None)

@@ -204,7 +204,7 @@ def capacitance_models() -> dict[str, ModuleType]:
 
 def _unfit(candidate: Candidate, scene: Scene, kind: str) -> str:
     model = capacitance_models()[candidate.model]
-    return (model.unfit(scene) or "") if hasattr(model, kind) else "it knows no losses"
+    return (model.why_not_applicable(scene) or "") if hasattr(model, kind) else "it knows no losses"
 
 
 def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float]:

@@ -87,10 +87,10 @@ def points(name: str, budget_s: float) -> list[Point]:
     return [*_formulas(name, standard), *_bounds(name, standard, budget_s)]
 
 
-def unfit(name: str) -> dict[str, str]:
+def why_not_applicable(name: str) -> dict[str, str]:
     """Why models of capacitance cannot speak of a scene."""
     scene = STANDARD[name]().scene
-    said = {model: module.unfit(scene) for model, module in planner.capacitance_models().items()}
+    said = {model: module.why_not_applicable(scene) for model, module in planner.capacitance_models().items()}
     only = "it has formulas of tri and rect alone"
     return {model: why for model, why in said.items() if why} | {"thesis_cells": only}
 
@@ -99,7 +99,7 @@ def _bounds(name: str, standard: Standard, budget_s: float) -> Iterator[Point]:
     """Every model with bounds, from coarse to fine."""
     area = standard.scene.size_mm[0] * standard.scene.size_mm[1] * M_PER_MM**2
     for model, module in planner.capacitance_models().items():
-        if module.unfit(standard.scene):
+        if module.why_not_applicable(standard.scene):
             continue
         given = (standard.scene, standard.permittivity)
         for wanted, interval, seconds in _rungs(module.capacitance, given, module, budget_s):

@@ -134,7 +134,7 @@ def _grown(name: str, budget_s: float) -> Iterator[Point]:
                 break
 
 
-def unfit(name: str) -> dict[str, str]:
+def why_not_applicable(name: str) -> dict[str, str]:
     """Why models of lines cannot speak of a scene."""
     if STANDARD[name].profile == "uniform":
         return {"pressure": "a flat tip presses evenly"}

@@ -109,7 +109,7 @@ def points(name: str, budget_s: float) -> list[Point]:
     return list(_points(name, STANDARD[name](), budget_s))
 
 
-def unfit(_: str) -> dict[str, str]:
+def why_not_applicable(_: str) -> dict[str, str]:
     """Why models of networks cannot speak of a scene."""
     other = "this network is of another kind"
     return {"stack": other, "sheet": other, "traxels": other, "line": other}

@@ -45,7 +45,7 @@ def points(name: str, _: float) -> list[Point]:
     return [_point(name, model, *timed(work)) for model, work in ways.items()]
 
 
-def unfit(_: str) -> dict[str, str]:
+def why_not_applicable(_: str) -> dict[str, str]:
     """Why models of the line are not asked: only what turns around is."""
     return {}
 
