@@ -292,14 +292,14 @@ def test_a_press_that_closes_the_film_is_left_out_of_the_map():
     [
         ({"frequency_hz": []}, "at least one frequency"),
         ({"frequency_hz": [0.0]}, "Z is infinite"),
-        ({"frequency_hz": [-1.0]}, "f_Hz"),
-        ({"frequency_hz": [math.nan]}, "f_Hz"),
+        ({"frequency_hz": [-1.0]}, "frequency_hz"),
+        ({"frequency_hz": [math.nan]}, "frequency_hz"),
         ({"noise": 0.0}, "noise is 0; expected a number above 0"),
         ({"noise": math.nan}, "noise is nan"),
         ({"highest_hz": -1.0}, "highest frequency is -1"),
         ({"position_m": 0.2}, "position 200 mm is outside"),
         ({"force_n": 700.0}, "its electrodes touch"),
-        ({"force_n": math.nan}, "F_N has to be a number"),
+        ({"force_n": math.nan}, "force_n has to be a number"),
         ({"sensor": replace(plate(), resistivity_ohm_m=(0.0, 0.0), far_end="short")}, "Z is 0"),
     ],
 )

@@ -210,7 +210,7 @@ def test_lines_are_known_to_the_last_digit(name):
     """The same line by transfer matrices in 60 digits."""
     standard = lines.STANDARD[name]
     for tone, known in standard.known.items():
-        whole, real = off(known, exact_line(60, **standard.inputs() | {"f_Hz": tone}))
+        whole, real = off(known, exact_line(60, **standard.inputs() | {"frequency_hz": tone}))
         assert max(whole, real) < 2e-16
 
 
@@ -219,11 +219,13 @@ def test_the_line_under_a_round_tip_is_known():
     from scipy.integrate import solve_ivp
 
     p = lines.STANDARD[ROUND].inputs()
-    tip, right = p["L_p_m"], p["L_m"] - p["x_p_left_edge_m"] - p["L_p_m"]
-    r = (p["rho_top_ohm_m"] / p["H_top_m"] + p["rho_bottom_ohm_m"] / p["H_bottom_m"]) / p["W_m"]
-    strain = 4 / np.pi * p["F_N"] / (p["W_m"] * tip * p["E_Pa"])
+    tip, right = p["tip_m"], p["length_m"] - p["left_m"] - p["tip_m"]
+    r = (
+        p["top_resistivity_ohm_m"] / p["top_thickness_m"] + p["bottom_resistivity_ohm_m"] / p["bottom_thickness_m"]
+    ) / p["width_m"]
+    strain = 4 / np.pi * p["force_n"] / (p["width_m"] * tip * p["modulus_pa"])
     for tone, known in lines.STANDARD[ROUND].known.items():
-        y = 2j * np.pi * tone * 8.8541878128e-12 * p["eps_r"] * p["W_m"] / p["d_m"]
+        y = 2j * np.pi * tone * 8.8541878128e-12 * p["eps_r"] * p["width_m"] / p["film_m"]
 
         def ahead(admittance, length, y=y):
             g, z = np.sqrt(r * y), np.sqrt(r / y)
@@ -233,7 +235,7 @@ def test_the_line_under_a_round_tip_is_known():
             return (y / (1 - strain * np.sin(t)) - r * admittance**2) * tip / 2 * np.sin(t)
 
         under = solve_ivp(slope, (0, np.pi), [ahead(0, right)], "DOP853", rtol=1e-13, atol=0).y[0, -1]
-        z = 1 / ahead(under, p["x_p_left_edge_m"])
+        z = 1 / ahead(under, p["left_m"])
         assert abs(z - known) < 1e-11 * abs(known)
         assert z.real == pytest.approx(known.real, rel=1e-8)
 

@@ -159,7 +159,7 @@ def test_the_highest_pressure_is_what_counts():
 def test_what_an_uneven_tip_cannot():
     sensor = replace(PLATE, profile="hertz")
     with pytest.raises(OutOfRange, match="makes no single patch"):
-        sensor.line_inputs(1e3, 1.0, 0.05)
+        sensor.pressed_line(1e3, 1.0, 0.05)
     with pytest.raises(OutOfRange, match="electrodes touch"):
         sensor.impedance(1e3, 500.0, 0.05)  # 5 MPa on average, 6.4 in the middle
     soft = replace(sensor, piezoresistance_per_pa=(0.0, -5e-5))

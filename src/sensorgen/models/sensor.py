@@ -5,7 +5,7 @@ rests on the part of the tip that lies on the sensor, spread there as the profil
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -165,8 +165,8 @@ class Sensor:
                     "kPa): press less, or set a piezoresistance nearer to 0"
                 )
 
-    def line_inputs(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> dict[str, Any]:
-        """Inputs of :func:`sensorgen.models.line.impedance` for presses of a uniform tip on this sensor.
+    def pressed_line(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> line.PressedLine:
+        """The sensor under a uniform tip, as :func:`sensorgen.models.line.impedance` takes it.
 
         The film is the plate of relative permittivity 1 that has the same capacitance, and its modulus the secant one.
 
@@ -193,20 +193,18 @@ class Sensor:
         self.check_tracks(stress)
         with np.errstate(divide="ignore", invalid="ignore"):
             secant = np.where(thinning == 0, 1 / slope, stress / thinning)
-        return self._tracks(self.width_m * patch.length_m) | {
-            "f_Hz": frequency_hz, "F_N": force_n, "E_Pa": secant,
-            "x_p_left_edge_m": patch.left_m, "L_p_m": patch.length_m,
-        }  # fmt: skip
-
-    def _tracks(self, area_m2: Real) -> dict[str, Any]:
-        (top_m, bottom_m), (top, bottom) = self.electrode_m, self.resistivity_ohm_m
-        s_top, s_bottom = (rise / area_m2 if rise else 0.0 for rise in self.piezoresistance_per_pa)
-        return {
-            "L_m": self.length_m, "W_m": self.width_m, "H_top_m": top_m, "H_bottom_m": bottom_m, "rho_top_ohm_m": top,
-            "rho_bottom_ohm_m": bottom, "d_m": EPS0_F_PER_M * self.width_m / self.capacitance_f_per_m, "eps_r": 1.0,
-            "tan_delta": self.tan_delta, "G_S_per_m": self.leak_s_per_m, "S_n_top_per_N": s_top,
-            "S_n_bottom_per_N": s_bottom, "far_end": self.far_end,
-        }  # fmt: skip
+        s_top, s_bottom = (
+            rise / (self.width_m * patch.length_m) if rise else 0.0 for rise in self.piezoresistance_per_pa
+        )
+        return line.PressedLine(
+            length_m=self.length_m, width_m=self.width_m,
+            top_thickness_m=self.electrode_m[0], bottom_thickness_m=self.electrode_m[1],
+            top_resistivity_ohm_m=self.resistivity_ohm_m[0], bottom_resistivity_ohm_m=self.resistivity_ohm_m[1],
+            film_m=EPS0_F_PER_M * self.width_m / self.capacitance_f_per_m, eps_r=1.0,
+            frequency_hz=frequency_hz, modulus_pa=secant, force_n=force_n, left_m=patch.left_m, tip_m=patch.length_m,
+            top_piezoresistance_per_n=s_top, bottom_piezoresistance_per_n=s_bottom,
+            tan_delta=self.tan_delta, leak_s_per_m=self.leak_s_per_m, far_end=self.far_end,
+        )  # fmt: skip
 
     def contact_m(self, force_n: ArrayLike) -> tuple[Real, Real]:
         """Length of the contact where it lies on the sensor whole [m], and its derivative by the force [m/N]."""
@@ -235,9 +233,9 @@ class Sensor:
         )  # fmt: skip
 
     def impedance(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> Complex:
-        """Impedance at the contacts [ohm], in the broadcast shape; parameters and errors as :meth:`line_inputs`."""
+        """Impedance at the contacts [ohm], in the broadcast shape; parameters and errors as :meth:`pressed_line`."""
         if self.profile == UNIFORM:
-            return line.impedance(**self.line_inputs(frequency_hz, force_n, position_m))
+            return line.impedance(self.pressed_line(frequency_hz, force_n, position_m))
         tip = self._tip(np.asarray(force_n, float), position_m)
         self.check_tracks(tip.highest_pa())
         return line_tip.impedance(self._track(), tip, self.compression, np.asarray(frequency_hz, float))
@@ -245,7 +243,7 @@ class Sensor:
     def response(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> Response:
         """Impedance and its exact derivatives by force and position, whatever the profile of the pressure.
 
-        Parameters and errors as :meth:`line_inputs`; also OutOfRange where Z is infinite.
+        Parameters and errors as :meth:`pressed_line`; also OutOfRange where Z is infinite.
         """
         if self.profile == UNIFORM:
             return self._uniform_response(frequency_hz, force_n, position_m)
@@ -260,17 +258,21 @@ class Sensor:
         The line knows the derivative at constant E; what is missing is (E s' - 1) of the film's part of it, which -E/F
         times the derivative by E is. Likewise at constant S_n, which falls as a longer patch spreads the pressure.
         """
-        inputs, patch = self.line_inputs(frequency_hz, force_n, position_m), self.patch(position_m)
+        pressed, patch = self.pressed_line(frequency_hz, force_n, position_m), self.patch(position_m)
         moves = bool(np.any(patch.length_slope))
-        soft = [name for name in ("S_n_top_per_N", "S_n_bottom_per_N") if np.any(inputs[name])]
-        of = ("F_N", "x_p_left_edge_m", "E_Pa", *(["L_p_m", *soft] if moves else []))
-        z, by = line.sensitivities(of=of, **inputs)
-        force, secant = np.asarray(force_n, float), inputs["E_Pa"]
+        rises = {
+            "top_piezoresistance_per_n": pressed.top_piezoresistance_per_n,
+            "bottom_piezoresistance_per_n": pressed.bottom_piezoresistance_per_n,
+        }
+        soft = {name: np.asarray(rise) for name, rise in rises.items() if np.any(rise)}
+        of = ("force_n", "left_m", "modulus_pa", *(["tip_m", *soft] if moves else []))
+        z, by = line.sensitivities(pressed, of=of)
+        force, secant = np.asarray(force_n, float), np.asarray(pressed.modulus_pa)
         excess = secant * self.compression.thinning(self.stress_pa(force, position_m))[1] - 1
-        by_force = by["F_N"] - by["E_Pa"] * (excess * secant / np.where(force == 0, 1.0, force))
-        by_position = by["x_p_left_edge_m"] * patch.left_slope
+        by_force = by["force_n"] - by["modulus_pa"] * (excess * secant / np.where(force == 0, 1.0, force))
+        by_position = by["left_m"] * patch.left_slope
         if moves:
-            by_length = by["L_p_m"] + by["E_Pa"] * (excess * secant / patch.length_m)
-            by_length = by_length - sum(by[name] * inputs[name] for name in soft) / patch.length_m
+            by_length = by["tip_m"] + by["modulus_pa"] * (excess * secant / patch.length_m)
+            by_length = by_length - sum(by[name] * rise for name, rise in soft.items()) / patch.length_m
             by_position = by_position + by_length * patch.length_slope
         return Response(z, by_force, by_position)

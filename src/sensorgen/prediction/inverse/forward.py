@@ -45,7 +45,7 @@ class Forward:
         self.track, self.track_per_pascal = sensor.track_ohm_per_m()
 
     def log_impedance(self, force_n: Real, position_m: Real) -> Complex:
-        """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.line_inputs`.
+        """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.pressed_line`.
 
         As :meth:`Sensor.impedance`, but what the tones share and a search would repeat at every step is done once.
         """

@@ -37,7 +37,7 @@ class Scalar:
         self._load = None if cmath.isinf(far_ohm) else far_ohm
 
     def log_impedance(self, force_n: float, position_m: float) -> list[complex]:
-        """Natural logarithm of Z/ohm, tone by tone; errors as :meth:`Sensor.line_inputs`."""
+        """Natural logarithm of Z/ohm, tone by tone; errors as :meth:`Sensor.pressed_line`."""
         sensor, (track, per_pascal) = self._sensor, self._track
         left = max(position_m - sensor.tip_m / 2, 0.0)
         end = min(position_m + sensor.tip_m / 2, sensor.length_m)

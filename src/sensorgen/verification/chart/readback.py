@@ -22,9 +22,9 @@ _LINE = lines.STANDARD["line, seven tones"]
 _TONES = np.array(list(_LINE.known))
 _READING = np.array(list(_LINE.known.values()))
 _FIT_HZ, _FIT = 10.1e3, 3  # tone of the thesis's fit, and its place among all
-_LENGTH_M, _TIP_M = lines.PLATE["L_m"], lines.PLATE["L_p_m"]
+_LENGTH_M, _TIP_M = lines.PLATE["length_m"], lines.PLATE["tip_m"]
 
-STANDARD = {"press read back": (_LINE.force_n, lines.PLATE["x_p_left_edge_m"] + _TIP_M / 2)}  # [N], centre [m]
+STANDARD = {"press read back": (_LINE.force_n, lines.PLATE["left_m"] + _TIP_M / 2)}  # [N], centre [m]
 
 Press = tuple[float, float]
 
@@ -54,7 +54,7 @@ def why_not_applicable(_: str) -> dict[str, str]:
 def _fitted(form: str) -> line_fit.LineFit:
     """The fit to presses all over the plate, by the line's own model."""
     force, x = (a.ravel() for a in np.meshgrid(np.linspace(1, 6, 6), np.linspace(0, _LENGTH_M - _TIP_M, 10)))
-    z = line.impedance(**lines.PLATE | {"F_N": force, "x_p_left_edge_m": x, "f_Hz": _FIT_HZ})
+    z = line.impedance(line.PressedLine(**lines.PLATE | {"force_n": force, "left_m": x, "frequency_hz": _FIT_HZ}))
     return line_fit.fit(force, x + _TIP_M / 2, *line_fit.series(_FIT_HZ, z), form)
 
 
@@ -72,10 +72,13 @@ def _as_printed() -> Press:
 @cache
 def _estimator() -> Estimator:
     p = lines.PLATE
-    film = EPS0_F_PER_M * p["eps_r"] * p["W_m"] / p["d_m"]
-    high, rho = (p["H_top_m"], p["H_bottom_m"]), (p["rho_top_ohm_m"], p["rho_bottom_ohm_m"])
-    law = compression.unconfined(p["E_Pa"])
-    return Estimator(Sensor(_LENGTH_M, p["W_m"], high, rho, film, law, _TIP_M), _TONES)
+    film = EPS0_F_PER_M * p["eps_r"] * p["width_m"] / p["film_m"]
+    high, rho = (
+        (p["top_thickness_m"], p["bottom_thickness_m"]),
+        (p["top_resistivity_ohm_m"], p["bottom_resistivity_ohm_m"]),
+    )
+    law = compression.unconfined(p["modulus_pa"])
+    return Estimator(Sensor(_LENGTH_M, p["width_m"], high, rho, film, law, _TIP_M), _TONES)
 
 
 def _sought() -> Press:
