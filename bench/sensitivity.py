@@ -13,7 +13,7 @@ from pathlib import Path
 from sensorgen.design.design import Design, make
 from sensorgen.models import compression
 from sensorgen.models.compression import Compression
-from sensorgen.models.compression_law import solved
+from sensorgen.prediction.compression_law import solved
 from sensorgen.prediction.prediction import TONES_HZ
 from sensorgen.prediction.sensitivity import HELD, Sensitivity, sensitivity
 

@@ -12,8 +12,8 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.design import make
 from sensorgen.models import compression
-from sensorgen.models.compression_law import law_of
 from sensorgen.prediction.capacitance import Answer
+from sensorgen.prediction.compression_law import law_of
 from sensorgen.prediction.ladder import Press, carried_out, drawn, outlined
 
 GAPS = Answer("columns", Interval(1e-10, 2e-10), ())
@@ -55,8 +55,8 @@ def test_a_prototype_is_known_and_nothing_is_solved(monkeypatch):
 
 def test_a_cell_of_boxes_is_solved_in_three_dimensions(monkeypatch):
     """An unknown one on two bricks per box and axis, held against one; a prototype's is stored."""
-    from sensorgen.models import compression_law as celllaw
     from sensorgen.models import press3d
+    from sensorgen.prediction import compression_law as celllaw
 
     monkeypatch.setattr(press3d, "Pieces", partial(press3d.Pieces, 2))
     monkeypatch.setattr(celllaw, "STRESS_PA", (0.0, 6e4))
@@ -87,8 +87,8 @@ def test_without_the_solver_a_plate_stands_in_and_that_is_said(monkeypatch):
 
 def test_a_curve_ends_where_the_capacitance_is_no_longer_known(monkeypatch):
     pytest.importorskip("netgen", reason="solves a cell: pip install sensorgen[fem]")
-    from sensorgen.models import compression_law as celllaw
     from sensorgen.models import press2d
+    from sensorgen.prediction import compression_law as celllaw
 
     def lost_above_5_kpa(*given, press=press2d.press, **more):
         found = press(*given, **more)

@@ -20,7 +20,7 @@ from sensorgen.design.design import make
 from sensorgen.design.materials import own
 from sensorgen.design.specimen_name import design_of, parse
 from sensorgen.measure.log import Log, bench, words
-from sensorgen.models.losses import lost
+from sensorgen.prediction.losses import lost
 from sensorgen.prediction.prediction import prediction
 from sensorgen.prediction.sensor_of_design import sensor_of
 

@@ -6,8 +6,8 @@ import pytest
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.design import materials
 from sensorgen.design.design import make
-from sensorgen.models.compression_law import elastic
 from sensorgen.prediction.capacitance import permittivities, unloaded
+from sensorgen.prediction.compression_law import elastic
 from sensorgen.prediction.double_layer.designs import stacked
 from sensorgen.prediction.prediction import prediction
 from sensorgen.prediction.sensor_of_design import sensor_of

@@ -17,9 +17,9 @@ from sensorgen.core.errors import MissingValue, OutOfRange
 from sensorgen.design import materials
 from sensorgen.design.design import make
 from sensorgen.models import line
-from sensorgen.models.losses import Lost
 from sensorgen.prediction import capacitance as planner
 from sensorgen.prediction.capacitance import Unpredictable, capacitance
+from sensorgen.prediction.losses import Lost
 from sensorgen.prediction.prediction import (
     FORCES_N,
     LARGEST,

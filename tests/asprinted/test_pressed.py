@@ -8,10 +8,10 @@ import pytest
 
 from sensorgen.asprinted import compared, pressed
 from sensorgen.core.errors import SensorgenError
-from sensorgen.models import compression_law as celllaw
 from sensorgen.models import press2d, press3d
 from sensorgen.models.press2d import Elastic, Fineness, Held
 from sensorgen.prediction import compression as compressed
+from sensorgen.prediction import compression_law as celllaw
 from sensorgen.prediction.compression import Asked
 from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 

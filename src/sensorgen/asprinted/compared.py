@@ -20,6 +20,7 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.findings import Finding
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
+from sensorgen.design.values import permittivities
 from sensorgen.export.gcode.paths import Paths
 from sensorgen.models import traxels
 from sensorgen.prediction import capacitance as planner
@@ -135,7 +136,7 @@ def capacitance_f(design: Design, printed: Printed, width: float = ACCURACY) -> 
     width : float
         How wide the bounds may be, relative to their middle [-].
     """
-    permittivity = {t.material: t.value for t in planner.permittivities(design)}
+    permittivity = {t.material: t.value for t in permittivities(design)}
     found: dict[str, Interval | str] = {}
     for name, made in printed.layers.items():
         scene, times = cell(design, made)

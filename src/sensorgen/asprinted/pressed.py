@@ -6,12 +6,12 @@ from sensorgen.asprinted import compared
 from sensorgen.asprinted.compared import Printed
 from sensorgen.core.bounds import Interval
 from sensorgen.design.design import Design
-from sensorgen.models.compression_law import Law
-from sensorgen.models.mesh_ladder import Piece, drawn
 from sensorgen.models.sensor import UNIFORM
 from sensorgen.prediction import capacitance as planner
 from sensorgen.prediction import sensor_of_design as sensing
 from sensorgen.prediction.capacitance import Unloaded, Unpredictable
+from sensorgen.prediction.compression_law import Law
+from sensorgen.prediction.mesh_ladder import Piece, drawn
 from sensorgen.prediction.sensor_of_design import Sensed
 from sensorgen.scene.sections import sections
 

@@ -8,6 +8,7 @@ from sensorgen.asprinted.compared import ACCURACY, CONTACTS_OHM_M2, Printed, cel
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.design import Design
+from sensorgen.design.values import permittivities
 from sensorgen.prediction import capacitance as planner
 
 
@@ -56,7 +57,7 @@ def _gaps_mm(design: Design, printed: Printed) -> list[float]:
 
 
 def _drawn_f(design: Design, accuracy: float) -> dict[str, float] | str:
-    permittivity = {t.material: t.value for t in planner.permittivities(design)}
+    permittivity = {t.material: t.value for t in permittivities(design)}
     try:
         return _bounds(planner.capacitance(design.in_use, permittivity, accuracy).capacitance_f)
     except planner.Unpredictable as error:

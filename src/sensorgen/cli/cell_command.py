@@ -151,8 +151,8 @@ def _shortfall(data: Data) -> str:
 
 
 def _print_plan(design: "Design", asked: "Asked") -> None:
-    from sensorgen.models import losses
     from sensorgen.prediction import capacitance as planner
+    from sensorgen.prediction import losses
 
     click.echo(f"plan for an accuracy of {asked.width:g}")
     lossy = bool(losses.set_losses(design))

@@ -19,8 +19,8 @@ from sensorgen.core import cache as cached
 from sensorgen.core import plugins as registry
 from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
-from sensorgen.design import materials
 from sensorgen.design.design import Design
+from sensorgen.design.values import MaterialValue, permittivities, resistivities
 from sensorgen.prediction.cost_model import expected
 from sensorgen.prediction.plan import Candidate
 from sensorgen.scene.scene import Scene
@@ -86,16 +86,6 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Taken:
-    """A material value that a prediction rests on."""
-
-    material: str
-    quantity: str
-    value: float
-    source: str
-
-
-@dataclass(frozen=True)
 class Unloaded:
     """What is known of a design before anything presses on it.
 
@@ -105,13 +95,13 @@ class Unloaded:
         Its capacitance.
     resistivity_ohm_m : (float, float)
         Of the top and the bottom electrode [ohm m].
-    taken : tuple of Taken
+    taken : tuple of MaterialValue
         Material values that both rest on.
     """
 
     answer: Answer
     resistivity_ohm_m: tuple[float, float]
-    taken: tuple[Taken, ...]
+    taken: tuple[MaterialValue, ...]
 
 
 def capacitance(
@@ -354,22 +344,10 @@ def unloaded(design: Design, width: float = inf) -> Unloaded:
     """
     taken = permittivities(design)
     answer = capacitance(design.in_use, {t.material: t.value for t in taken}, width)
-    top, bottom = (_take(*design.slot(f"{end}_electrode"), "resistivity_ohm_m") for end in ("top", "bottom"))
+    top, bottom = resistivities(design).values()
     return Unloaded(answer, (top.value, bottom.value), (*taken, top, bottom))
 
 
 def is_plate(answer: Answer) -> bool:
     """Whether a capacitance is that of a solid plate, which has no other bounds than itself."""
     return answer.capacitance_f.width() < _EXACT
-
-
-def permittivities(design: Design) -> list[Taken]:
-    """Relative permittivity of every dielectric in the sensor, and of air."""
-    used = design.used() | {"air": ""}
-    names = {body.material for body in design.in_use.bodies if not body.terminal} | {"air"}
-    return [_take(design.material(name), used[name], "relative_permittivity") for name in sorted(names)]
-
-
-def _take(material: materials.Material, source: str, quantity: str) -> Taken:
-    value = material.value(quantity, source)
-    return Taken(material.name, quantity, value.value, value.source)

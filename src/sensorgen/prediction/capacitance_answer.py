@@ -8,8 +8,8 @@ from typing import Any
 from sensorgen.core.parallel import in_parallel, said
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.models import losses
 from sensorgen.prediction import capacitance as planner
+from sensorgen.prediction import losses
 from sensorgen.prediction.capacitance import Answer, Unpredictable
 from sensorgen.scene.scene import Scene
 

@@ -15,10 +15,13 @@ from sensorgen.asprinted.pressed import width_by
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, NotInstalled, OutOfRange
 from sensorgen.design.design import Design
-from sensorgen.models import closed_form_compression as guesses
+from sensorgen.design.values import permittivities
 from sensorgen.models import press2d
-from sensorgen.models.compression_law import elastic, expected
-from sensorgen.models.mesh_ladder import (
+from sensorgen.models.press2d import Held, Pressed
+from sensorgen.prediction import capacitance_answer as bounds
+from sensorgen.prediction import closed_form_compression as guesses
+from sensorgen.prediction.compression_law import elastic, expected
+from sensorgen.prediction.mesh_ladder import (
     MODELS,
     SAFETY,
     USUAL,
@@ -30,9 +33,6 @@ from sensorgen.models.mesh_ladder import (
     rungs,
     why_not_applicable,
 )
-from sensorgen.models.press2d import Held, Pressed
-from sensorgen.prediction import capacitance_answer as bounds
-from sensorgen.prediction.capacitance import permittivities
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, plain, walked
 from sensorgen.scene.scene import Scene
 

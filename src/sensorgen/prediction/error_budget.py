@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design
 from sensorgen.design.materials import PIEZORESISTANCE, SET, Material
+from sensorgen.design.values import ENDS, MaterialValue, permittivities, piezoresistance
 from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
-from sensorgen.prediction.capacitance import Taken, capacitance, permittivities
-from sensorgen.prediction.sensor_of_design import ENDS, Sensed, piezoresistance
+from sensorgen.prediction.capacitance import capacitance
+from sensorgen.prediction.sensor_of_design import Sensed
 
 MEASURES = ("magnitude", "re", "im", "by_force")
 MODELS = ("cell", "compression", "boundary", "line", "tip")  # the other terms are materials
@@ -196,7 +197,7 @@ def _piezoresistance(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Ter
     taken, tracks = piezoresistance(design), []
     for end in ENDS:
         material, _ = design.slot(f"{end}_electrode")
-        tracks.append(_among(material, taken.get(end, Taken(material.name, PIEZORESISTANCE, 0.0, ""))))
+        tracks.append(_among(material, taken.get(end, MaterialValue(material.name, PIEZORESISTANCE, 0.0, ""))))
     if any(low < high for low, high in tracks):
         ends = [replace(sensed.sensor, piezoresistance_per_pa=(a, b)) for a, b in zip(*tracks, strict=True)]
         yield Term("piezoresistance", f"of the electrodes, {_said(tracks)} 1/Pa", seen.change(*ends))
@@ -252,10 +253,10 @@ def _permittivity(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:
 def _range(material: Material, source: str, quantity: str) -> tuple[float, float]:
     """Lowest and highest of what its sources say; the user's own value is not doubted."""
     value = material.value(quantity, source)
-    return _among(material, Taken(material.name, quantity, value.value, value.source))
+    return _among(material, MaterialValue(material.name, quantity, value.value, value.source))
 
 
-def _among(material: Material, taken: Taken) -> tuple[float, float]:
+def _among(material: Material, taken: MaterialValue) -> tuple[float, float]:
     """Lowest and highest of a value that is taken and of what all sources say."""
     plausible = [v.value for v in material.properties.get(taken.quantity, []) if not v.implausible]
     if taken.source == SET:

@@ -14,12 +14,12 @@ from typing import Any
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.models.compression_law import Law, Option, options
-from sensorgen.models.mesh_ladder import Piece
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.capacitance import Answer, Unloaded, unloaded, weighed
+from sensorgen.prediction.compression_law import Law, Option, options
 from sensorgen.prediction.error_budget import Seen
 from sensorgen.prediction.identifiability import FORCE_N
+from sensorgen.prediction.mesh_ladder import Piece
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, walked
 from sensorgen.prediction.sensor_of_design import Sensed, sensor_of
 

@@ -15,16 +15,17 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.core.units import M_PER_MM, frequency_text
 from sensorgen.design.design import Design
+from sensorgen.design.values import ENDS, MaterialValue, piezoresistance
 from sensorgen.models import line
-from sensorgen.models.losses import Lost, lost
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction import ladder as planned
-from sensorgen.prediction.capacitance import Taken, Unloaded, Unpredictable, unloaded
+from sensorgen.prediction.capacitance import Unloaded, Unpredictable, unloaded
 from sensorgen.prediction.error_budget import budget
 from sensorgen.prediction.identifiability import FORCE_N, card
 from sensorgen.prediction.ladder import Press
+from sensorgen.prediction.losses import Lost, lost
 from sensorgen.prediction.plan import Plan, plain
-from sensorgen.prediction.sensor_of_design import ENDS, TIP_M, Sensed, piezoresistance
+from sensorgen.prediction.sensor_of_design import TIP_M, Sensed
 
 TONES_HZ = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)  # thesis, Table 5.1, its 4990 corrected
 NOISE = 1e-3  # standard deviation of the real and of the imaginary part, relative to the impedance's magnitude [-]
@@ -106,7 +107,7 @@ def _lossless(gone: Lost) -> str:
     )
 
 
-def _pressed(rises: Mapping[str, Taken]) -> str:
+def _pressed(rises: Mapping[str, MaterialValue]) -> str:
     if not rises:
         return "resistivity under the tip as elsewhere: no source says how it moves with pressure"
     said = [

@@ -7,7 +7,7 @@ import numpy as np
 
 from sensorgen.design.design import Design
 from sensorgen.models.compression import Compression
-from sensorgen.models.compression_law import solved
+from sensorgen.prediction.compression_law import solved
 from sensorgen.prediction.identifiability.fisher import bounds, slopes
 from sensorgen.prediction.sensor_of_design import sensor_of
 
@@ -67,7 +67,7 @@ def sensitivity(
     Raises
     ------
     MissingValue, BadInput, OutOfRange
-        As :func:`sensorgen.models.compression_law.solved`; a press beyond the law.
+        As :func:`sensorgen.prediction.compression_law.solved`; a press beyond the law.
 
     Notes
     -----

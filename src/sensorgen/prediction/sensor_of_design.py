@@ -3,19 +3,18 @@
 from dataclasses import dataclass
 from math import inf
 
-from sensorgen.core.errors import BadInput, MissingValue
+from sensorgen.core.errors import BadInput
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.design.materials import PIEZORESISTANCE
+from sensorgen.design.values import MaterialValue, film, of_all_materials, piezoresistance
 from sensorgen.models import pressure
-from sensorgen.models.compression_law import Law, film, gap_m, law_of, values
-from sensorgen.models.losses import Lost, lost
-from sensorgen.models.mesh_ladder import Piece, drawn
 from sensorgen.models.sensor import UNIFORM, Sensor
-from sensorgen.prediction.capacitance import Taken, Unloaded, unloaded
+from sensorgen.prediction.capacitance import Unloaded, unloaded
+from sensorgen.prediction.compression_law import Law, gap_m, law_of
+from sensorgen.prediction.losses import Lost, lost
+from sensorgen.prediction.mesh_ladder import Piece, drawn
 
 TIP_M = 0.01  # thesis, Table C.1: L_press
-ENDS = ("top", "bottom")
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class Sensed:
         What its dielectrics lose, as far as the design sets it.
     piece : Piece
         What of it is pressed: as drawn, or as printed.
-    piezoresistance : tuple of Taken
+    piezoresistance : tuple of MaterialValue
         How its electrodes' resistivity moves with pressure; empty where nobody says.
     caveats : tuple of str
         What else to know of it.
@@ -45,11 +44,11 @@ class Sensed:
     law: Law
     lost: Lost
     piece: Piece
-    piezoresistance: tuple[Taken, ...] = ()
+    piezoresistance: tuple[MaterialValue, ...] = ()
     caveats: tuple[str, ...] = ()
 
     @property
-    def taken(self) -> tuple[Taken, ...]:
+    def taken(self) -> tuple[MaterialValue, ...]:
         """Material values."""
         return (*self.unloaded.taken, *self.piezoresistance, *self.lost.taken, *self.law.taken)
 
@@ -70,8 +69,8 @@ def sensor_of(
     design : Design
         As drawn.
     law : str or Law
-        Of compression: one of :data:`sensorgen.models.compression_law.LAWS`, or "" for the best that is known at once;
-        or itself.
+        Of compression: one of :data:`sensorgen.prediction.compression_law.LAWS`, or "" for the best that is known at
+        once; or itself.
     tip_m : float
         Length of the tip along the sensor [m].
     profile : str
@@ -90,7 +89,7 @@ def sensor_of(
     Unpredictable, MissingValue
         As :func:`sensorgen.prediction.capacitance.unloaded`.
     UnknownName, OutOfRange
-        As :func:`sensorgen.models.compression_law.law_of`; a radius that is not above 0.
+        As :func:`sensorgen.prediction.compression_law.law_of`; a radius that is not above 0.
     BadInput
         A radius of a flat tip.
     """
@@ -115,24 +114,7 @@ def sensor_of(
     return Sensed(sensor, found, how, gone, piece, tuple(rises.values()))
 
 
-def piezoresistance(design: Design) -> dict[str, Taken]:
-    """How resistivity moves with pressure [1/Pa], of the ``ENDS`` whose electrode a value is known for.
-
-    No source that ships gives one: where neither the design nor a source of the user's own does, resistivity is taken
-    to be under the tip as elsewhere.
-    """
-    found = {}
-    for end in ENDS:
-        material, source = design.slot(f"{end}_electrode")
-        try:
-            value = material.value(PIEZORESISTANCE, source)
-        except MissingValue:
-            continue
-        found[end] = Taken(material.name, PIEZORESISTANCE, value.value, value.source)
-    return found
-
-
-def _of(end: str, rises: dict[str, Taken]) -> float:
+def _of(end: str, rises: dict[str, MaterialValue]) -> float:
     return rises[end].value if end in rises else 0.0
 
 
@@ -140,7 +122,7 @@ def _contact(design: Design, how: Law, piece: Piece, profile: str, radius_m: flo
     """How a round tip's contact grows: on the film as a thick body, or on the cell as a bed of springs."""
     if profile == "hertz":
         soft = film(design)
-        modulus, ratio = (values(design, key)[soft].value for key in ("youngs_modulus_pa", "poisson_ratio"))
+        modulus, ratio = (of_all_materials(design, key)[soft].value for key in ("youngs_modulus_pa", "poisson_ratio"))
         return pressure.hertz(radius_m, modulus / (1 - ratio**2))
     if profile == "parabola":
         return pressure.bed(radius_m, how.compression.bed_pa_per_m(gap_m(piece.scene)))

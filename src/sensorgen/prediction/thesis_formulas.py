@@ -13,8 +13,10 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design.design import Design
-from sensorgen.models import losses, thesis_cells, thesis_swept
+from sensorgen.design.values import MaterialValue, permittivities
+from sensorgen.models import thesis_cells, thesis_swept
 from sensorgen.prediction import capacitance as planner
+from sensorgen.prediction import losses
 from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.capacitance_answer import Asked
 
@@ -85,12 +87,12 @@ def _refuse(design: Design, name: str, press_mm: float | None) -> None:
         raise BadInput(f"{name} knows no press; expected {able}, or the command compress")
 
 
-Found = tuple[float, str, list[planner.Taken]]
+Found = tuple[float, str, list[MaterialValue]]
 
 
 def _formula(design: Design, asked: Asked, press_mm: float) -> Found:
     """Of one permittivity, the film's."""
-    taken = [t for t in planner.permittivities(design) if t.material == design.slot("film")[0].name]
+    taken = [t for t in permittivities(design) if t.material == design.slot("film")[0].name]
     value = thesis_cells.NAMED[asked.model].value_f_per_m2(design.params, taken[0].value, press_mm)
     return value, f"{thesis_cells.SOURCE}: a formula alone, without bounds; air is taken for 1", taken
 
@@ -102,7 +104,7 @@ def _field(design: Design, asked: Asked, press_mm: float) -> Found:
     side_mm = ceil(1 / now.period_mm) * now.period_mm
     sizes = asdict(replace(now, length_mm=side_mm, width_mm=side_mm))
     pressed = designs.make(design.model_dump(exclude={"parameters"}) | {"parameters": sizes})
-    taken = planner.permittivities(pressed)
+    taken = permittivities(pressed)
     found = planner.capacitance(pressed.in_use, {t.material: t.value for t in taken}, asked.width, keep=asked.keep)
     value = found.capacitance_f.middle() / (side_mm * M_PER_MM) ** 2 * thesis_swept.stretch(rest, now)
     said = f"{thesis_swept.SOURCE}: sizes changed by hand, their field by {found.model} within {found.width():.2g}"

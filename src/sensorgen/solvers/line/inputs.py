@@ -220,7 +220,7 @@ def numbers(name: str, given: Any, kinds: str = "biuf") -> Real:
         found = np.asarray("")
     if found.dtype.kind not in kinds:
         raise BadInput(f"{name} takes numbers in SI units, not {str(given)[:60]!r}")
-    return found.astype(np.complex128 if "c" in kinds else np.float64, copy=False)  # type: ignore[return-value]
+    return found.astype(np.complex128 if "c" in kinds else np.float64, copy=False)
 
 
 def passive(name: str, given: Any) -> NDArray[Any]:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from sensorgen.core.errors import MissingValue
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
+from sensorgen.design.values import permittivities
 from sensorgen.models import columns
 from sensorgen.prediction import capacitance as planner
 from sensorgen.scene.scene import Body, Scene, box
@@ -57,7 +58,7 @@ def exact_f_per_m2(shape: str) -> float:
         No solver that is installed comes near enough.
     """
     made = designs.make({"shape": shape, "parameters": {"dielectric_mm": FILM_MM}})
-    eps = {taken.material: taken.value for taken in planner.permittivities(made)}
+    eps = {taken.material: taken.value for taken in permittivities(made)}
     found = planner.capacitance(made.in_use, eps, _ACCURACY)
     if not found.reached():
         raise MissingValue(f"no model here comes as near as {_ACCURACY:g}: {'; '.join(found.refused)}")

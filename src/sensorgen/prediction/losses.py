@@ -8,7 +8,8 @@ from sensorgen.core.errors import BadInput, MissingValue
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.materials import FILM_LEAK, SET
-from sensorgen.prediction.capacitance import Taken, capacitance, permittivities
+from sensorgen.design.values import MaterialValue, permittivities
+from sensorgen.prediction.capacitance import capacitance
 
 LOSSES = ("loss_tangent", "resistivity_ohm_m")
 LOWEST_HZ = 1.1e3  # of the bench's tones: a leak is strongest there
@@ -17,7 +18,7 @@ _ACCURACY = 1e-5
 _WEAK = 0.1  # of what is stored: up to here a leak is a conductance within 1 %
 
 
-def set_losses(design: Design) -> list[Taken]:
+def set_losses(design: Design) -> list[MaterialValue]:
     """Loss tangents and resistivities that a design sets for its dielectrics itself.
 
     No source gives a loss tangent, and the one resistivity that a source prints is a slip: what the user does not set
@@ -25,7 +26,7 @@ def set_losses(design: Design) -> list[Taken]:
     """
     dielectrics = {body.material for body in design.in_use.bodies if not body.terminal} | {"air"}
     return [
-        Taken(name, quantity, values[quantity], SET)
+        MaterialValue(name, quantity, values[quantity], SET)
         for name, values in sorted(design.material_values.items())
         if name in dielectrics
         for quantity in LOSSES
@@ -33,7 +34,7 @@ def set_losses(design: Design) -> list[Taken]:
     ]
 
 
-def permittivity(design: Design, frequency_hz: float | None = None) -> tuple[dict[str, complex], list[Taken]]:
+def permittivity(design: Design, frequency_hz: float | None = None) -> tuple[dict[str, complex], list[MaterialValue]]:
     r"""Relative permittivity of every dielectric and of air, complex where one loses or leaks; and what it rests on.
 
     .. math:: \varepsilon = \varepsilon' (1 - j \tan\delta) - j / (\omega \varepsilon_0 \varrho)
@@ -57,7 +58,9 @@ def permittivity(design: Design, frequency_hz: float | None = None) -> tuple[dic
     return found, [*taken, *set_losses(design)]
 
 
-def _with(taken: Sequence[Taken], lost: Sequence[Taken], frequency_hz: float | None) -> dict[str, complex]:
+def _with(
+    taken: Sequence[MaterialValue], lost: Sequence[MaterialValue], frequency_hz: float | None
+) -> dict[str, complex]:
     found: dict[str, complex] = {t.material: t.value for t in taken}
     for loss in lost:
         if loss.quantity == "loss_tangent":
@@ -87,7 +90,7 @@ class Lost:
         Of the whole, the same at every frequency [-].
     leak_s : float
         Conductance between the electrodes, the same at every frequency [S].
-    taken : tuple of Taken
+    taken : tuple of MaterialValue
         What both rest on; empty where nothing is lost.
     doubts : tuple of str
         Why they are to be taken with care.
@@ -95,7 +98,7 @@ class Lost:
 
     tan_delta: float = 0.0
     leak_s: float = 0.0
-    taken: tuple[Taken, ...] = ()
+    taken: tuple[MaterialValue, ...] = ()
     doubts: tuple[str, ...] = ()
 
 
@@ -122,17 +125,17 @@ def lost(design: Design) -> Lost:
     )  # fmt: skip
 
 
-def _film_leak(design: Design) -> list[Taken]:
+def _film_leak(design: Design) -> list[MaterialValue]:
     """Leak of the film per area [S/m2], where one is known."""
     material, source = design.slot("film")
     try:
         value = material.value(FILM_LEAK, source or design.used().get(material.name, ""))
     except MissingValue:
         return []
-    return [Taken(material.name, FILM_LEAK, value.value, value.source)]
+    return [MaterialValue(material.name, FILM_LEAK, value.value, value.source)]
 
 
-def _tangent(design: Design, taken: Sequence[Taken], some: Sequence[Taken]) -> tuple[float, float]:
+def _tangent(design: Design, taken: Sequence[MaterialValue], some: Sequence[MaterialValue]) -> tuple[float, float]:
     """C''/C' [-] and C'' [F] of the sensor with some of its losses."""
     if not some:
         return 0.0, 0.0
@@ -143,7 +146,7 @@ def _tangent(design: Design, taken: Sequence[Taken], some: Sequence[Taken]) -> t
     return loss / found.capacitance_f.middle(), loss
 
 
-def _strong(taken: Sequence[Taken], leaks: Sequence[Taken]) -> Iterator[str]:
+def _strong(taken: Sequence[MaterialValue], leaks: Sequence[MaterialValue]) -> Iterator[str]:
     eps = {t.material: t.value for t in taken}
     for leak in leaks:
         share = _conduction(leak.value, LOWEST_HZ) / eps[leak.material]

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design
+from sensorgen.design.values import film, of_all_materials, permittivities
 from sensorgen.models import press2d, springs
-from sensorgen.models.compression_law import elastic, film, gap_m, law_of, values
-from sensorgen.models.mesh_ladder import Piece, refuse_crushing
-from sensorgen.prediction.capacitance import capacitance, is_plate, permittivities
+from sensorgen.prediction.capacitance import capacitance, is_plate
+from sensorgen.prediction.compression_law import elastic, gap_m, law_of
+from sensorgen.prediction.mesh_ladder import Piece, refuse_crushing
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,9 @@ def _plate(name: str, design: Design, piece: Piece, stress_pa: Sequence[float]) 
     between = {body.material for body in piece.scene.bodies if not body.terminal}
     if not is_plate(known) or between != {film(design)}:
         raise BadInput(f"--model {name} speaks of a solid plate of one material, {design.shape} is none: try springs")
-    refuse_crushing(stress_pa[-1], {n: taken.value for n, taken in values(design, "youngs_modulus_pa").items()})
+    refuse_crushing(
+        stress_pa[-1], {n: taken.value for n, taken in of_all_materials(design, "youngs_modulus_pa").items()}
+    )
     law, gap = law_of(design, known, name, printed=piece).compression, gap_m(piece.scene)
     moved_m = np.asarray(stress_pa) / law.bed_pa_per_m(gap)
     doubts = (

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
+from sensorgen.design.values import MaterialValue, film, of_all_materials, permittivities
 from sensorgen.models import compression
 from sensorgen.models.compression import Compression, Curve
-from sensorgen.models.mesh_ladder import SAFETY, USUAL, Case, Piece, Rung, drawn, model_of, pressed, rungs
-from sensorgen.prediction.capacitance import Answer, Taken, is_plate, permittivities
+from sensorgen.prediction.capacitance import Answer, is_plate
+from sensorgen.prediction.mesh_ladder import SAFETY, USUAL, Case, Piece, Rung, drawn, model_of, pressed, rungs
 from sensorgen.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ class Law:
     ----------
     compression : Compression
         Thinning over stress.
-    taken : tuple of Taken
+    taken : tuple of MaterialValue
         Moduli that it rests on.
     doubts : tuple of str
         Why it is to be taken with care.
@@ -50,7 +51,7 @@ class Law:
     """
 
     compression: Compression
-    taken: tuple[Taken, ...]
+    taken: tuple[MaterialValue, ...]
     doubts: tuple[str, ...] = ()
     others: tuple[Compression, ...] = ()
     held: tuple[Compression, ...] = ()
@@ -80,7 +81,7 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
     """
     if name not in ("", *LAWS):
         raise UnknownName("law of compression", name, LAWS)
-    moduli = values(design, "youngs_modulus_pa")
+    moduli = of_all_materials(design, "youngs_modulus_pa")
     if is_plate(answer):
         return _plate(design, moduli, name, printed or drawn(design))
     if name == "bonded":
@@ -129,13 +130,13 @@ def options(design: Design, answer: Answer, name: str = "", *, printed: Piece | 
 
 def _option(design: Design, printed: Piece | None, rung: Rung) -> Option:
     """A mesh of the cell; until it is solved, it is taken to rise as the nearest prototype does."""
-    law = _cell(expected(design, rung), values(design, "youngs_modulus_pa"))
+    law = _cell(expected(design, rung), of_all_materials(design, "youngs_modulus_pa"))
     return Option(rung.name, rung.seconds, law, lambda: solved(design, printed, rung.level))
 
 
 def expected(design: Design, rung: Rung) -> Curve:
     """What a mesh of an unknown cell should find: the curve of the prototype that it is nearest to."""
-    modulus_pa = values(design, "youngs_modulus_pa")[film(design)].value
+    modulus_pa = of_all_materials(design, "youngs_modulus_pa")[film(design)].value
     stiffer = max(modulus_pa / compression.PROTOTYPE_PA, 1 / compression.REACH)  # softer ones could not be extended
     return replace(compression.prototype(_LIKE[rung.model]).stiffer(stiffer), within=rung.rise)
 
@@ -145,11 +146,11 @@ def _stored(design: Design, youngs_modulus_pa: Mapping[str, float]) -> Curve | N
     known = compression.solved(design.shape, vars(design.params), youngs_modulus_pa)
     if not known:
         return None
-    ratios = (taken.value for taken in values(design, "poisson_ratio").values())
+    ratios = (taken.value for taken in of_all_materials(design, "poisson_ratio").values())
     return known if all(abs(ratio - compression.SOLVED_RATIO) < _SAME_RATIO for ratio in ratios) else None
 
 
-def _plate(design: Design, moduli: Mapping[str, Taken], name: str, piece: Piece) -> Law:
+def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece: Piece) -> Law:
     """Free or bonded, the other one being as good as it."""
     if name == "solved":
         raise OutOfRange(f"{design.shape} is a solid plate: expected the law 'unconfined' or 'bonded'")
@@ -163,13 +164,13 @@ def _plate(design: Design, moduli: Mapping[str, Taken], name: str, piece: Piece)
     )
 
 
-def _as_plate(design: Design, moduli: Mapping[str, Taken], why: str) -> Law:
+def _as_plate(design: Design, moduli: Mapping[str, MaterialValue], why: str) -> Law:
     soft = moduli[film(design)]
     doubt = f"{design.shape} taken to give way as a free solid plate of {soft.material} (B.49): its cell was not solved"
     return Law(compression.unconfined(soft.value), (soft,), (f"{doubt}; {why}",), bounded=False)
 
 
-def _cell(found: Curve, moduli: Mapping[str, Taken], doubts: tuple[str, ...] = ()) -> Law:
+def _cell(found: Curve, moduli: Mapping[str, MaterialValue], doubts: tuple[str, ...] = ()) -> Law:
     """A solved cell: rise and onset known to a share, and what other ways to hold it would make of it."""
     others = tuple(replace(found.rising(1 + sign * found.within), onset=1 + sign * _ONSET) for sign in (-1, 1))
     held = tuple(found.rising(1 + change) for change in found.held)
@@ -186,7 +187,7 @@ def solved(design: Design, printed: Piece | None = None, level: int = USUAL, **h
     printed : Piece, optional
         What is printed of it; as drawn where not given.
     level : int
-        Of the mesh, as of :func:`sensorgen.models.mesh_ladder.pressed`.
+        Of the mesh, as of :func:`sensorgen.prediction.mesh_ladder.pressed`.
     **held : str
         How it is held and touched, as of :class:`sensorgen.solvers.contact.support.Held`.
 
@@ -197,7 +198,7 @@ def solved(design: Design, printed: Piece | None = None, level: int = USUAL, **h
     """
     from sensorgen.models.press2d import Held, curve_of
 
-    moduli, ratios = values(design, "youngs_modulus_pa"), values(design, "poisson_ratio")
+    moduli, ratios = of_all_materials(design, "youngs_modulus_pa"), of_all_materials(design, "poisson_ratio")
     piece = printed or drawn(design)
     model = model_of(piece)
     eps = {t.material: t.value for t in permittivities(design)}
@@ -247,21 +248,9 @@ def elastic(design: Design, scene: Scene) -> "dict[str, Elastic]":
     }
 
 
-def film(design: Design) -> str:
-    """Name of the material between the electrodes."""
-    return design.materials.dielectric.partition("@")[0]
-
-
 def gap_m(scene: Scene) -> float:
     """Distance of the electrodes' plates, whatever stands on them [m]."""
     spans = {
         end: [p.span("z") for b in scene.bodies if b.terminal == end for p in b.prisms] for end in ("top", "bottom")
     }
     return (max(low for low, _ in spans["top"]) - min(high for _, high in spans["bottom"])) * M_PER_MM
-
-
-def values(design: Design, quantity: str) -> dict[str, Taken]:
-    """A quantity of every material in the sensor."""
-    used, names = design.used(), sorted({body.material for body in design.in_use.bodies})
-    found = {name: design.material(name).value(quantity, used[name]) for name in names}
-    return {name: Taken(name, quantity, value.value, value.source) for name, value in found.items()}
