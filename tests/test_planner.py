@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import pytest
 
 from sensorgen import models as model_files
-from sensorgen.core import plugins as registry
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.design.design import make
@@ -236,7 +235,7 @@ def test_bodies_that_only_touch_do_not_overlap():
 
 def test_expectations_are_of_models_that_exist_and_fall():
     found = expectations.measured()
-    assert set(found) <= set(registry.names(model_files))
+    assert set(found) <= set(model_files.names())
     for entry in found.values():
         widths, seconds = zip(*entry.points, strict=True)
         assert list(widths) == sorted(widths, reverse=True)

@@ -24,6 +24,7 @@ from sensorgen.solvers.line.straight import energy as straight
 
 SOURCE = "Thesis 3.2.1 and 3.2.2, Eqs. 3.10 to 3.49, corrected; Dirichlet's and Thomson's principles"
 COST = 1
+WIDTH = inf  # the bounds have the width that they have
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _ROUNDING = 1e-9  # by which exact bounds may seem to cross
@@ -48,7 +49,7 @@ def why_not_applicable(scene: Scene) -> str | None:
     return None
 
 
-def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
+def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:  # noqa: ARG001
     r"""Bounds of the capacitance between the terminals, fringes at the sensor's edge left out.
 
     .. math:: C_{lower} = \varepsilon_0 \int \frac{dA}{s}, \quad s = \sum_k \frac{t_k}{\varepsilon_k}
@@ -65,6 +66,8 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
         As drawn, for which :func:`why_not_applicable` is None.
     permittivity : mapping of str to float
         Relative permittivity of each material that lies between the electrodes, and of "air" [-].
+    width : float
+        Not used: the bounds have one width.
 
     Returns
     -------

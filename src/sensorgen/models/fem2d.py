@@ -211,9 +211,7 @@ def _disc(mesh: Cones, permittivity: Mapping[str, complex], turn: Turned, order:
     return disc(found, turn, [share for _, share in mesh.triangles.regions])
 
 
-@lru_cache(
-    maxsize=8
-)  # why_not_applicable() asks before capacitance() does, and a long sensor's cell takes as long as its field
+@lru_cache(maxsize=8)  # of why_not_applicable() and capacitance(): a long sensor's cell takes as long as its field
 def _triangles(scene: Scene) -> tuple[Section, Triangles]:
     """The scene's only cross-section, and its repeating cell in few triangles."""
     found = sections(scene)

@@ -11,16 +11,14 @@ from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
 from json import dumps
 from math import hypot, inf
-from types import ModuleType
 from typing import Any
 
-from sensorgen import models
 from sensorgen.core import cache as cached
-from sensorgen.core import plugins as registry
 from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.design.design import Design
 from sensorgen.design.values import MaterialValue, permittivities, resistivities
+from sensorgen.models import capacitance_models
 from sensorgen.prediction.cost_model import expected
 from sensorgen.prediction.plan import Candidate
 from sensorgen.scene.scene import Scene
@@ -185,11 +183,6 @@ def _ordered(scene: Scene, width: float, model: str) -> list[Candidate]:
         for name in loaded
     ]
     return sorted(found, key=lambda c: _rank(c, loaded[c.model].COST, width))
-
-
-def capacitance_models() -> dict[str, ModuleType]:
-    """The models of capacitance, by name."""
-    return {name: registry.load(models, name) for name in registry.defining(models, "capacitance")}
 
 
 def _unfit(candidate: Candidate, scene: Scene, kind: str) -> str:

@@ -21,7 +21,7 @@ from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction import ladder as planned
 from sensorgen.prediction.capacitance import Unloaded, Unpredictable, unloaded
 from sensorgen.prediction.error_budget import budget
-from sensorgen.prediction.identifiability import FORCE_N, card
+from sensorgen.prediction.identifiability import FORCE_N, Identifiability, identify
 from sensorgen.prediction.ladder import Press
 from sensorgen.prediction.losses import Lost, lost
 from sensorgen.prediction.plan import Plan, plain
@@ -136,6 +136,8 @@ def _sensed(
 
 def _judged(design: Design, sensed: Sensed, press: Press, accuracy: float, noise: float) -> Data:
     """Identifiability card and error budget of a press; or why there are none."""
+    from pydantic import TypeAdapter
+
     law = sensed.law
     stiffest = (
         replace(sensed.sensor, compression=law.others[0])
@@ -143,13 +145,13 @@ def _judged(design: Design, sensed: Sensed, press: Press, accuracy: float, noise
         else None
     )
     try:
-        made = card(
+        found = identify(
             sensed.sensor, press.frequency_hz, noise, force_n=press.force_n or FORCE_N, position_m=press.position_m,
             stiffest=stiffest, assumed="" if law.bounded else _ASSUMED,
         )  # fmt: skip
-        doubts = [] if stiffest else list(sensed.doubts)  # the stiffest law says it in numbers
+        found = replace(found, doubts=() if stiffest else tuple(sensed.doubts))  # the stiffest law says it in numbers
         return {
-            "identifiability": made | {"doubts": doubts},
+            "identifiability": TypeAdapter(Identifiability).dump_python(found, mode="json"),
             "budget": budget(design, sensed, press.frequency_hz, press.force_n, press.position_m, accuracy),
         }
     except SensorgenError as error:

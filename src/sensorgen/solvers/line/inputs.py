@@ -36,10 +36,10 @@ class PressedLine:
         Relative permittivity of the film [-].
     frequency_hz : float or array
         0 or more [Hz].
-    modulus_pa : float or array, optional
-        Young's modulus of the film [Pa]; needed with a force.
     force_n : float or array
         Force [N]; below 0 it pulls, and the same linear law thickens the film.
+    modulus_pa : float or array, optional
+        Young's modulus of the film [Pa]; needed with a force.
     left_m, tip_m : float or array
         Left edge and length of the pressed patch [m].
     top_piezoresistance_per_n, bottom_piezoresistance_per_n : float or array
@@ -63,8 +63,8 @@ class PressedLine:
     film_m: ArrayLike
     eps_r: ArrayLike
     frequency_hz: ArrayLike
-    modulus_pa: ArrayLike | None = None
     force_n: ArrayLike = 0.0
+    modulus_pa: ArrayLike | None = None
     left_m: ArrayLike = 0.0
     tip_m: ArrayLike = 0.0
     top_piezoresistance_per_n: ArrayLike = 0.0
