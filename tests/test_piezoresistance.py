@@ -18,8 +18,7 @@ from sensorgen.models.pressure import bed, hertz
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.double_layer.designs import stack_of
 from sensorgen.prediction.error_budget import budget
-from sensorgen.prediction.inverse.forward import Forward
-from sensorgen.prediction.inverse.scalar import Scalar
+from sensorgen.prediction.inverse.forward import Forward, Scalar
 from sensorgen.prediction.prediction import check_presses, prediction
 from sensorgen.prediction.sensor_of_design import piezoresistance, sensor_of
 

@@ -26,7 +26,7 @@ from sensorgen.models import traxels
 from sensorgen.prediction import capacitance as planner
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.scene import Scene
-from sensorgen.solvers.network.lines import Lines
+from sensorgen.solvers.network.nodes import Lines
 
 ACCURACY = 0.02  # of the capacitance: the conventions for a line's width differ by more
 CONTACTS_OHM_M2 = (0.0, 1e-6, 1e-5, 1e-4)  # no source gives the contact resistivity of printed eTPU

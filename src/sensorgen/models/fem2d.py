@@ -18,14 +18,12 @@ from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import Section, sections
 from sensorgen.scene.unit_cell import cell
 from sensorgen.solvers.electrostatics import bounds as fem
+from sensorgen.solvers.electrostatics.bounds import Fields, Turned, disc, turned
 from sensorgen.solvers.electrostatics.cones import RATIO
-from sensorgen.solvers.electrostatics.corners import exponents
+from sensorgen.solvers.electrostatics.corners import exponents, graded
 from sensorgen.solvers.electrostatics.fronts import Numbers
-from sensorgen.solvers.electrostatics.grading import graded
-from sensorgen.solvers.electrostatics.lossy import Fields, Turned, disc, turned
 from sensorgen.solvers.electrostatics.mesh import Cones
-from sensorgen.solvers.electrostatics.plane import Plane
-from sensorgen.solvers.electrostatics.problem import Field
+from sensorgen.solvers.electrostatics.plane import Field, Plane
 from sensorgen.solvers.electrostatics.triangles import Triangles, triangles
 
 SOURCE = "Dirichlet's and Thomson's principles; hp finite elements, rings without end at corners"
@@ -162,7 +160,7 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     Returns
     -------
     Disc
-        Capacitance of the whole sensor [F]; see :mod:`sensorgen.solvers.electrostatics.lossy`.
+        Capacitance of the whole sensor [F]; see :mod:`sensorgen.solvers.electrostatics.bounds`.
 
     Raises
     ------

@@ -14,10 +14,10 @@ from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.electrostatics import bounds as fem
+from sensorgen.solvers.electrostatics.bounds import Fields, Turned, disc, turned
+from sensorgen.solvers.electrostatics.boxes import Pair, whole
 from sensorgen.solvers.electrostatics.bricks import grid, layered
 from sensorgen.solvers.electrostatics.dissection import least, unknowns_of
-from sensorgen.solvers.electrostatics.lossy import Fields, Turned, disc, turned
-from sensorgen.solvers.electrostatics.pair import Pair, whole
 
 SOURCE = "Dirichlet's and Thomson's principles; graded boxes, H1 and hybrid H(div), nested dissection"
 COST = 3
@@ -135,7 +135,7 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     Returns
     -------
     Disc
-        Capacitance of the whole sensor [F]; see :mod:`sensorgen.solvers.electrostatics.lossy`.
+        Capacitance of the whole sensor [F]; see :mod:`sensorgen.solvers.electrostatics.bounds`.
 
     Raises
     ------

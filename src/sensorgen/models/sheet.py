@@ -8,11 +8,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from numpy.typing import ArrayLike
 
 from sensorgen.core.errors import UnknownName
-from sensorgen.solvers.sheet.bound import Bounds, bounds, contact_sets
-from sensorgen.solvers.sheet.links import BY
-from sensorgen.solvers.sheet.network import Complex
+from sensorgen.solvers.sheet.network import BY, Complex
 from sensorgen.solvers.sheet.parts import Contact, Patch, Port, Sheet
-from sensorgen.solvers.sheet.solve import Solution, depth_m, solution
+from sensorgen.solvers.sheet.solve import Bounds, Solution, bounds, contact_sets, depth_m, solution
 
 __all__ = [
     "BY", "Bounds", "Contact", "Patch", "Port", "Sheet", "Solution", "contact_sets", "depth_m", "impedance", "localise",

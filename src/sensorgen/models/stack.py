@@ -13,10 +13,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.solvers.line.inputs import check_fit, numbers, passive
-from sensorgen.solvers.multiline.body import Body, Touch, reading, with_body
-from sensorgen.solvers.multiline.bounds import standard_errors
-from sensorgen.solvers.multiline.lines import diagonal, directions, inverse, loops, march, side_by_side
-from sensorgen.solvers.multiline.piece import Line, Matrix
+from sensorgen.solvers.multiline import (
+    Body,
+    Line,
+    Matrix,
+    Touch,
+    diagonal,
+    directions,
+    inverse,
+    loops,
+    march,
+    reading,
+    side_by_side,
+    standard_errors,
+    with_body,
+)
 
 __all__ = [
     "Body", "Film", "Press", "Response", "Stack", "Touch", "Track", "admittance", "impedance", "port",

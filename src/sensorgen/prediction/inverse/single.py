@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sensorgen.prediction.inverse.descent import LOOSE, REACH, ROUNDING, TIGHT
-from sensorgen.prediction.inverse.forward import Forward, Real
-from sensorgen.prediction.inverse.scalar import Scalar
+from sensorgen.prediction.inverse.forward import Forward, Real, Scalar
 from sensorgen.prediction.inverse.table import Index, Table, parts
 from sensorgen.prediction.inverse.verdict import PAIR, Status, chi2_limit
 

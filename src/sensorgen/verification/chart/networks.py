@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sensorgen.asprinted.rectilinear import plate
 from sensorgen.models import line, sheet, stack, traxels
 from sensorgen.models.sheet import Sheet
-from sensorgen.solvers.network.lines import Lines
+from sensorgen.solvers.network.nodes import Lines
 from sensorgen.verification.chart.measured import DIGITS, Point, timed
 
 ASKED = "what a network of tracks, sheets or lines conducts"
