@@ -75,7 +75,7 @@ def impedance(line: PressedLine) -> Complex:
     >>> round(float(z.real), 6), round(float(z.imag), 3)
     (2999.654163, -2094651.586)
     """
-    return in_blocks(read(line), lambda block: [_through(*block.sections(), block.load_ohm)])[0]
+    return read(line).evaluate(lambda block: [_through(*block.sections(), block.load_ohm)])[0]
 
 
 def cascade(
@@ -119,8 +119,14 @@ def cascade(
     lengths, load = [passive("length", value) for value in length_m], far_load(far_end)
     if not len(r) == len(y) == len(lengths):
         raise BadInput(f"{len(r)} resistances, {len(y)} admittances and {len(lengths)} lengths make no sections")
-    check_fit("the sections' values", [*r, *y, *lengths, *([] if load is None else [load])])
-    return _through(r, y, lengths, load)
+    arrays = [*r, *y, *lengths, *([] if load is None else [load])]
+    check_fit("the sections' values", arrays)
+    n = len(r)
+
+    def work(parts: list[NDArray[Any]]) -> list[Complex]:
+        return [_through(parts[:n], parts[n : 2 * n], parts[2 * n : 3 * n], None if load is None else parts[-1])]
+
+    return in_blocks(arrays, work)[0]
 
 
 def sensitivities(line: PressedLine, of: Iterable[str] | None = None) -> tuple[Complex, dict[str, Complex]]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.solvers.line.inputs import Complex, Inputs, PressedLine, in_blocks, read
+from sensorgen.solvers.line.inputs import Complex, Inputs, PressedLine, read
 
 SOURCE = "Thesis Eqs. B.43, B.51 and B.52, for unequal tracks; D. M. Pozar, Microwave Engineering, 4.4"
 COST = 0
@@ -50,7 +50,7 @@ def impedance(line: PressedLine) -> Complex:
     >>> round(float(z.real), 3)
     2997.117
     """
-    return in_blocks(read(line), _block)[0]
+    return read(line).evaluate(_block)[0]
 
 
 def _block(inputs: Inputs) -> list[Complex]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import OutOfRange, UnknownName
-from sensorgen.solvers.line.inputs import Complex, Inputs, PressedLine, in_blocks, read
+from sensorgen.solvers.line.inputs import Complex, Inputs, PressedLine, read
 
 SOURCE = "Thesis appendix B, Eqs. B.39, B.42, B.48, B.51, B.53, and Eqs. 2.24 and B.54"
 COST = 0
@@ -63,7 +63,7 @@ def impedance(line: PressedLine, as_printed: str = "") -> Complex:
     """
     if as_printed and as_printed not in PRINTED:
         raise UnknownName("misprint", as_printed, PRINTED)
-    return in_blocks(_open(line), partial(_product, as_printed))[0]
+    return _open(line).evaluate(partial(_product, as_printed))[0]
 
 
 def uniform(line: PressedLine) -> Complex:
@@ -86,7 +86,7 @@ def uniform(line: PressedLine) -> Complex:
     OutOfRange
         As :func:`impedance`.
     """
-    return in_blocks(_open(line), _uniform)[0]
+    return _open(line).evaluate(_uniform)[0]
 
 
 def series(line: PressedLine) -> Complex:
@@ -107,7 +107,7 @@ def series(line: PressedLine) -> Complex:
     OutOfRange
         A far end that is not open; no current at all.
     """
-    return in_blocks(_open(line), _series)[0]
+    return _open(line).evaluate(_series)[0]
 
 
 def _open(line: PressedLine) -> Inputs:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.solvers.line.inputs import Complex, Inputs, PressedLine, in_blocks, read
+from sensorgen.solvers.line.inputs import Complex, Inputs, PressedLine, read
 
 SOURCE = "Thesis Figs. 2.3, 2.4 and B.4: cells of finite length"
 COST = 1
@@ -57,7 +57,7 @@ def impedance(line: PressedLine, cells: int = 100, *, one_sided: bool = False) -
     found = read(line)
     if found.load_ohm is not None:
         raise OutOfRange("the ladder's far end is open; for others take model 'line'")
-    return in_blocks(found, partial(_block, cells, one_sided))[0]
+    return found.evaluate(partial(_block, cells, one_sided))[0]
 
 
 def _block(cells: int, one_sided: bool, inputs: Inputs) -> list[Complex]:

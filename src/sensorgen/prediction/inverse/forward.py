@@ -47,7 +47,7 @@ class Forward:
         self.track, self.track_per_pascal = sensor.track_ohm_per_m()
 
     def log_impedance(self, force_n: Real, position_m: Real) -> Complex:
-        """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.pressed_line`.
+        """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.impedance`.
 
         As :meth:`Sensor.impedance`, but what the tones share and a search would repeat at every step is done once.
         """
@@ -137,7 +137,7 @@ class Scalar:
         self._load = None if cmath.isinf(far_ohm) else far_ohm
 
     def log_impedance(self, force_n: float, position_m: float) -> list[complex]:
-        """Natural logarithm of Z/ohm, tone by tone; errors as :meth:`Sensor.pressed_line`."""
+        """Natural logarithm of Z/ohm, tone by tone; errors as :meth:`Sensor.impedance`."""
         sensor, (track, per_pascal) = self._sensor, self._track
         left = max(position_m - sensor.tip_m / 2, 0.0)
         end = min(position_m + sensor.tip_m / 2, sensor.length_m)

@@ -115,18 +115,18 @@ class Inputs:
     def __getitem__(self, name: str) -> Real:
         return self.values[name]
 
-    def shape(self) -> tuple[int, ...]:
-        """Shape that the quantities broadcast to."""
-        return np.broadcast_shapes(*{v.shape for v in self.arrays()})
-
     def arrays(self) -> list[Real]:
-        """The quantities that are more than one number."""
-        return [v for v in (*self.values.values(), *([] if self.load_ohm is None else [self.load_ohm])) if v.ndim]
+        """All quantities, the load last if there is one."""
+        return [*self.values.values(), *([] if self.load_ohm is None else [self.load_ohm])]
 
-    def block(self, slices: Slices) -> "Inputs":
-        """The part of every quantity that belongs to one block of the result."""
-        load = None if self.load_ohm is None else _cut(self.load_ohm, slices)
-        return Inputs({name: _cut(v, slices) for name, v in self.values.items()}, load)
+    def evaluate(self, work: Callable[["Inputs"], list[Complex]], count: int = 1) -> list[Complex]:
+        """Broadcast results of ``work``, ``count`` of them; see :func:`in_blocks`."""
+
+        def part(arrays: list[Real]) -> list[Complex]:
+            load = None if self.load_ohm is None else arrays[-1]
+            return work(Inputs(dict(zip(self.values, arrays, strict=False)), load))
+
+        return in_blocks(self.arrays(), part, count)
 
     def strain(self) -> Real:
         """Strain of the film under the patch, F / (W L_p E) [-]; 0 without force."""
@@ -194,14 +194,14 @@ def read(line: PressedLine) -> Inputs:
     for name in NAMES:
         given = getattr(line, name)
         if given is not None:
-            values[name] = _CHECKED[name] if given is _DEFAULTS[name] else _in_range(name, numbers(name, given))
+            values[name] = _CHECKED[name] if given is _DEFAULTS[name] else in_range(name, given)
     if line.modulus_pa is None:
         if values["force_n"].any():
             raise MissingValue("the line needs modulus_pa: a force strains the film")
         values["modulus_pa"] = np.float64(1.0)  # type: ignore[assignment]
     found = Inputs(values, far_load(line.far_end))
     try:
-        found.shape()
+        np.broadcast_shapes(*{v.shape for v in found.arrays()})
     except ValueError:
         shapes = ", ".join(f"{k} {v.shape}" for k, v in values.items() if v.ndim)
         raise BadInput(f"the line's inputs do not broadcast together: {shapes}") from None
@@ -240,8 +240,9 @@ def check_fit(what: str, values: Sequence[NDArray[Any]]) -> None:
         raise BadInput(f"{what} do not broadcast together: {', '.join(map(str, sorted(shapes)))}") from None
 
 
-def _in_range(name: str, given: Real) -> Real:
-    value: Real = given[()]  # a single number as a scalar, which computes in half the time
+def in_range(name: str, given: ArrayLike) -> Real:
+    """A quantity of the line by its name in :class:`PressedLine`, or OutOfRange."""
+    value: Real = numbers(name, given)[()]  # a single number as a scalar, which computes in half the time
     least = -math.inf if name in FREE else 0.0
     low, high = _lowest(value), _highest(value)
     if low > high or (least <= low and high < math.inf and low > -math.inf and not (low == 0 and name in ABOVE_0)):
@@ -262,7 +263,7 @@ def _highest(value: Real) -> float:
 
 
 _CHECKED: dict[str, Real] = {
-    name: _in_range(name, np.asarray(default)) for name, default in _DEFAULTS.items() if isinstance(default, float)
+    name: in_range(name, default) for name, default in _DEFAULTS.items() if isinstance(default, float)
 }
 
 
@@ -273,7 +274,7 @@ def far_load(far_end: ArrayLike) -> Real | None:
             raise UnknownName("far end", far_end, ["open", "short"])
         return None if far_end == "open" else np.asarray(0.0)
     load = numbers("far_end", far_end)
-    return None if load.size and np.isposinf(load).all() else _in_range("far_end", load)
+    return None if load.size and np.isposinf(load).all() else in_range("far_end", load)
 
 
 def _check_patch(found: Inputs) -> None:
@@ -304,15 +305,19 @@ def _check_tracks(found: Inputs) -> None:
             raise OutOfRange(f"{name} times force_n is {rise.min():.3g}: below -1 resistivity is negative")
 
 
-def in_blocks(inputs: Inputs, work: Callable[[Inputs], list[Complex]], count: int = 1) -> list[Complex]:
+def in_blocks(
+    arrays: Sequence[NDArray[Any]], work: Callable[[list[NDArray[Any]]], list[Complex]], count: int = 1
+) -> list[Complex]:
     """Broadcast results, ``count`` of them, evaluated block by block so that temporaries stay small."""
-    shape = inputs.shape()
-    first, *more = blocks(tuple(slice(0, n) for n in shape), [v.shape for v in inputs.arrays()])
+    shapes = [v.shape for v in arrays if v.ndim]
+    shape = np.broadcast_shapes(*set(shapes))
+    first, *more = blocks(tuple(slice(0, n) for n in shape), shapes)
     if not more:
-        return [np.array(np.broadcast_to(v, shape))[()] if np.shape(v) != shape else v[()] for v in work(inputs)]
+        found = work(list(arrays))
+        return [np.array(np.broadcast_to(v, shape))[()] if np.shape(v) != shape else v[()] for v in found]
     results = [np.empty(shape, np.complex128) for _ in range(count)]
     for slices in (first, *more):
-        for result, value in zip(results, work(inputs.block(slices)), strict=True):
+        for result, value in zip(results, work([_cut(v, slices) for v in arrays]), strict=True):
             result[slices] = value
     return results
 

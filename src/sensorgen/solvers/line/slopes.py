@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from sensorgen.core.errors import MissingValue, OutOfRange, UnknownName
-from sensorgen.solvers.line.inputs import HIGHEST_OHM, NAMES, Complex, Inputs, PressedLine, in_blocks, read
+from sensorgen.solvers.line.inputs import HIGHEST_OHM, NAMES, Complex, Inputs, PressedLine, read
 from sensorgen.solvers.line.tanhc import sech_squared, tanhc, tanhc_slope
 
 Array = Any  # of numpy, or one of its scalars
@@ -27,7 +27,7 @@ def slopes(line: PressedLine, of: Iterable[str] | None) -> tuple[Complex, dict[s
     found = read(line)
     if _OF_PATCH & set(names) and not found["tip_m"].all():
         raise OutOfRange("a derivative by force or patch needs a patch: tip_m above 0")
-    first, *rest = in_blocks(found, partial(_block, names), 1 + len(names))
+    first, *rest = found.evaluate(partial(_block, names), 1 + len(names))
     return first, dict(zip(names, rest, strict=True))
 
 

@@ -128,11 +128,12 @@ def _grown(name: str, budget_s: float) -> Iterator[Point]:
     """Ladders, grids and pieces of a tip, from coarse to fine."""
     tip = partial(_tip, profile=STANDARD[name].profile)
     pieces = _PIECES if STANDARD[name].profile != "uniform" else _PIECES[:1]
-    for model, work, cells, kind in (
+    models: list[tuple[str, Model, tuple[int, ...], str]] = [
         ("line_ladder", line_ladder.impedance, _LADDERS, "cells"),
         ("sheet", _sheet, _GRIDS, "cells"),
         ("line_tip", tip, pieces, "pieces"),
-    ):
+    ]
+    for model, work, cells, kind in models:
         for number in cells:
             try:
                 point = _point(name, model, partial(work, **{kind: number}), f"{number} {kind}, ")

@@ -6,6 +6,7 @@ of force, as a share of it, and position, as a share of the sensor's length.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
@@ -54,7 +55,7 @@ def why_not_applicable(_: str) -> dict[str, str]:
 def _fitted(form: str) -> line_fit.LineFit:
     """The fit to presses all over the plate, by the line's own model."""
     force, x = (a.ravel() for a in np.meshgrid(np.linspace(1, 6, 6), np.linspace(0, _LENGTH_M - _TIP_M, 10)))
-    z = line.impedance(line.PressedLine(**lines.PLATE | {"force_n": force, "left_m": x, "frequency_hz": _FIT_HZ}))
+    z = line.impedance(replace(line.PressedLine(**lines.PLATE, frequency_hz=_FIT_HZ), force_n=force, left_m=x))
     return line_fit.fit(force, x + _TIP_M / 2, *line_fit.series(_FIT_HZ, z), form)
 
 
