@@ -11,7 +11,8 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design, make
 from sensorgen.models import press2d
 from sensorgen.models.press2d import Elastic, Held
-from sensorgen.prediction.sensor_of_design import sensor_of
+from sensorgen.prediction.bodies import drawn
+from sensorgen.prediction.sensor_model import Tip, build_sensor
 from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 
 STRESS_PA = [0.0, 1e5]
@@ -147,8 +148,8 @@ def print_tips() -> None:
     for name, profile in (("reference", "hertz"), ("reference", "parabola"), ("tri", "parabola")):
         design = make({"shape": name, "parameters": {} if name == "reference" else {"dielectric_mm": 0.1}})
         for radius_mm in (5.0, 20.0, 100.0, 500.0):
-            round_tip = sensor_of(design, profile=profile, radius_m=radius_mm * 1e-3).sensor
-            flat = sensor_of(design).sensor
+            round_tip = build_sensor(drawn(design), tip=Tip(profile=profile, radius_m=radius_mm * 1e-3)).sensor
+            flat = build_sensor(drawn(design)).sensor
             lengths = [f"{float(round_tip.contact_m(force)[0]) * 1e3:.2f}" for force in (1.0, 6.0)]
             highest = float(round_tip.stress_pa(6.0, 0.05))
             try:

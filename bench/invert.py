@@ -19,9 +19,10 @@ from scipy.optimize import least_squares
 
 from sensorgen.design.design import make
 from sensorgen.models import line_fit
+from sensorgen.prediction.bodies import drawn
+from sensorgen.prediction.evaluate import TONES_HZ
 from sensorgen.prediction.inverse import Estimator, Prior, Status
-from sensorgen.prediction.prediction import TONES_HZ
-from sensorgen.prediction.sensor_of_design import sensor_of
+from sensorgen.prediction.sensor_model import build_sensor
 
 RESULTS = Path(__file__).parent / "results"
 TONES = np.array(TONES_HZ)
@@ -33,8 +34,8 @@ TARGETS = {"batch": 50_000, "stream": 1_500}
 
 def sensors():
     """Sensors that can locate a press at this noise, and the thesis's plate, which cannot."""
-    tri = sensor_of(make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})).sensor
-    plate = sensor_of(make({"shape": "reference"})).sensor
+    tri = build_sensor(drawn(make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}}))).sensor
+    plate = build_sensor(drawn(make({"shape": "reference"}))).sensor
     return {
         "tri 0.1 mm, 0.83 ohm m, tones to 100 kHz": (dataclasses.replace(tri, resistivity_ohm_m=(1 / 1.2,) * 2), TONES),
         "tri 0.1 mm, 5 ohm m, tones to 100 kHz": (dataclasses.replace(tri, resistivity_ohm_m=(5.0,) * 2), TONES),

@@ -10,9 +10,10 @@ import matplotlib as mpl
 import numpy as np
 
 from sensorgen.design.design import make
+from sensorgen.prediction.bodies import drawn
+from sensorgen.prediction.evaluate import TONES_HZ
 from sensorgen.prediction.inverse import Estimator, Prior, Status
-from sensorgen.prediction.prediction import TONES_HZ
-from sensorgen.prediction.sensor_of_design import sensor_of
+from sensorgen.prediction.sensor_model import build_sensor
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -27,7 +28,7 @@ COLOURS = {
 
 
 def tri(resistivity_ohm_m):
-    sensor = sensor_of(make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})).sensor
+    sensor = build_sensor(drawn(make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}}))).sensor
     return dataclasses.replace(sensor, resistivity_ohm_m=(resistivity_ohm_m,) * 2)
 
 
@@ -100,7 +101,7 @@ def two_presses(path):
 
 def prior(path):
     """Error over noise: least squares against a uniform prior, the bound, and a guess."""
-    sensor = sensor_of(make({"shape": "reference"})).sensor
+    sensor = build_sensor(drawn(make({"shape": "reference"}))).sensor
     rng = np.random.default_rng(4)
     n, limit = 1500, 6.0
     force, position = rng.uniform(0, limit, n), rng.uniform(0, 0.1, n)

@@ -13,10 +13,11 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.design import make
 from sensorgen.models.sheet import Patch, Sheet, contact_sets, localise
 from sensorgen.models.stack import Body
+from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.double_layer.designs import press_at, stacked
 from sensorgen.prediction.double_layer.touching import WIRINGS, Touching
-from sensorgen.prediction.prediction import TONES_HZ
-from sensorgen.prediction.sensor_of_design import sensor_of
+from sensorgen.prediction.evaluate import TONES_HZ
+from sensorgen.prediction.sensor_model import build_sensor
 
 PICTURES = DOCS / "pictures"
 SENSORS = {
@@ -29,8 +30,8 @@ PREDICTED = ("resistance", "reactance", "resistance-by-position", "reactance-by-
 def card(name: str) -> None:
     """The identifiability card of one sensor."""
     title, data = SENSORS[name]
-    drawn = figure(sensor_of(make(data)).sensor, TONES_HZ, title=title)
-    drawn.savefig(PICTURES / f"card-{name}.png", dpi=90)
+    card = figure(build_sensor(drawn(make(data))).sensor, TONES_HZ, title=title)
+    card.savefig(PICTURES / f"card-{name}.png", dpi=90)
 
 
 def predictions() -> None:

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-
+from drawn_sensor import sensor_of
 from sensorgen.cli.budget_text import lines
+
 from sensorgen.design.design import make
 from sensorgen.models import line
 from sensorgen.prediction.error_budget import MODELS, budget
-from sensorgen.prediction.sensor_of_design import sensor_of
 
 TONES = (1.1e3, 99.7e3)
 PLATE = {

@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drawn_sensor import sensor_of
 
 from sensorgen.design import materials
 from sensorgen.design.design import make
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.evaluate import TONES_HZ
 from sensorgen.prediction.identifiability import changes, identify
 from sensorgen.prediction.identifiability.changes import CHANGES, most_helpful, together
 from sensorgen.prediction.identifiability.fisher import Setup
 from sensorgen.prediction.identifiability.verdict import required
-from sensorgen.prediction.prediction import TONES_HZ
-from sensorgen.prediction.sensor_of_design import sensor_of
 
 EPS0 = 8.8541878128e-12
 PLATE = Sensor(

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from sensorgen.prediction.ladder import Press, carried_out, drawn, outlined
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import SensorgenError
@@ -14,7 +15,6 @@ from sensorgen.design.design import make
 from sensorgen.models import compression
 from sensorgen.prediction.capacitance import Answer
 from sensorgen.prediction.compression_law import law_of
-from sensorgen.prediction.ladder import Press, carried_out, drawn, outlined
 
 GAPS = Answer("columns", Interval(1e-10, 2e-10), ())
 OTHER = {"shape": "tri", "parameters": {"period_mm": 2.5}}

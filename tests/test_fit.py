@@ -6,7 +6,9 @@ import statistics
 import bench_files
 import pytest
 import yaml
+from drawn_sensor import sensor_of
 from scipy import stats
+from sensorgen.prediction.prediction import prediction
 
 from sensorgen.analysis.comparison.leaky import across_ohm, along_ohm
 from sensorgen.analysis.fit import Fit, Fitted, Untold, fit, text
@@ -21,8 +23,6 @@ from sensorgen.design.materials import own
 from sensorgen.design.specimen_name import design_of, parse
 from sensorgen.measure.log import Log, bench, words
 from sensorgen.prediction.losses import lost
-from sensorgen.prediction.prediction import prediction
-from sensorgen.prediction.sensor_of_design import sensor_of
 
 
 @pytest.fixture(autouse=True)

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from drawn_sensor import sensor_of
+from sensorgen.prediction.prediction import prediction
 
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.design import materials
@@ -9,8 +11,6 @@ from sensorgen.design.design import make
 from sensorgen.prediction.capacitance import permittivities, unloaded
 from sensorgen.prediction.compression_law import elastic
 from sensorgen.prediction.double_layer.designs import stacked
-from sensorgen.prediction.prediction import prediction
-from sensorgen.prediction.sensor_of_design import sensor_of
 
 
 def design(values, shape="reference", **rest):

@@ -5,7 +5,9 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
+from drawn_sensor import sensor_of
 from line_cases import TONES, exact
+from sensorgen.prediction.prediction import check_presses, prediction
 
 from sensorgen.cli.sheet_command import _press
 from sensorgen.core.errors import OutOfRange, UnknownName
@@ -13,14 +15,13 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design import materials
 from sensorgen.design.design import make
 from sensorgen.design.materials import own
+from sensorgen.design.values import piezoresistance
 from sensorgen.models import compression, line
 from sensorgen.models.pressure import bed, hertz
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.double_layer.designs import stack_of
 from sensorgen.prediction.error_budget import budget
 from sensorgen.prediction.inverse.forward import Forward, Scalar
-from sensorgen.prediction.prediction import check_presses, prediction
-from sensorgen.prediction.sensor_of_design import piezoresistance, sensor_of
 
 K = 2e-6  # 1/Pa: 12 % at 60 kPa
 PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), EPS0_F_PER_M * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sensorgen.prediction.ladder import Press
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.prediction import compression_law as celllaw
 from sensorgen.prediction import ladder as planned
-from sensorgen.prediction.ladder import Press
 
 TONES = (1.1e3, 99.7e3)
 PRESS = Press(TONES, 6.0, 0.05)

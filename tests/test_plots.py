@@ -10,6 +10,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from drawn_sensor import sensor_of
 
 from sensorgen.analysis import plots
 from sensorgen.analysis.plots import inverse, libraries, maps, page, panels
@@ -19,7 +20,6 @@ from sensorgen.design.design import make
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.sensor_of_design import sensor_of
 
 PLATE = {
     "length_m": 0.1,

@@ -9,17 +9,9 @@ import tracemalloc
 import mpmath
 import numpy as np
 import pytest
+from drawn_sensor import sensor_of
 from line_cases import PLATE as LINE_PLATE
 from line_cases import exact as exact_line
-
-from sensorgen.core.bounds import Interval
-from sensorgen.core.errors import MissingValue, OutOfRange
-from sensorgen.design import materials
-from sensorgen.design.design import make
-from sensorgen.models import line
-from sensorgen.prediction import capacitance as planner
-from sensorgen.prediction.capacitance import Unpredictable, capacitance
-from sensorgen.prediction.losses import Lost
 from sensorgen.prediction.prediction import (
     FORCES_N,
     LARGEST,
@@ -33,7 +25,15 @@ from sensorgen.prediction.prediction import (
     prediction,
     presses,
 )
-from sensorgen.prediction.sensor_of_design import sensor_of
+
+from sensorgen.core.bounds import Interval
+from sensorgen.core.errors import MissingValue, OutOfRange
+from sensorgen.design import materials
+from sensorgen.design.design import make
+from sensorgen.models import line
+from sensorgen.prediction import capacitance as planner
+from sensorgen.prediction.capacitance import Unpredictable, capacitance
+from sensorgen.prediction.losses import Lost
 
 EPS = {"x60": 4.68, "air": 1.00059}
 TABLE_3_2 = {"top_electrode": "etpu@thesis-3.2", "bottom_electrode": "etpu@thesis-3.2"}  # 1.2 S/m

@@ -1,10 +1,10 @@
 """From a design to its sensor: which law of compression is taken, and what is said of it."""
 
 import pytest
+from drawn_sensor import sensor_of
 
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.design.design import make
-from sensorgen.prediction.sensor_of_design import sensor_of
 
 
 def sensed(shape, law="", **rest):

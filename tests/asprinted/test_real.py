@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sensorgen.asprinted.report import report
 
 from sensorgen.asprinted import compared
 from sensorgen.asprinted.beads import beads, layers
-from sensorgen.asprinted.report import report
 from sensorgen.asprinted.strips import drawn
 from sensorgen.asprinted.tally import rule7
 from sensorgen.core.errors import BadInput, UnknownName

@@ -10,7 +10,9 @@ import pytest
 from sensorgen.core.errors import BadInput, Unprintable, Unwritable
 from sensorgen.design import design
 from sensorgen.design.specimen_name import parse
-from sensorgen.prediction.prediction import prediction
+from sensorgen.prediction.bodies import estimated
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.results import to_json
 from sensorgen.workflows.batch import make
 from sensorgen.workflows.batch.record import RECORD, Differences, differences
 
@@ -40,7 +42,7 @@ def test_every_specimen_is_traced_to_its_design_and_has_what_it_should_measure(s
     assert [s["order"] for s in found.values()] == [1, 2, 3]
     tri = found["26 triX .2mm 2 fine"]
     assert (tri["design_id"], tri["copy"], tri["iteration"]) == (TRI.id(), 2, 26)
-    predicted = prediction(TRI, accuracy=1e-3)
+    predicted = json.loads(to_json(evaluate(estimated(TRI))))
     for name in ("capacitance_f", "electrode_resistance_ohm", "impedance_ohm"):
         assert tri["expected"][name] == json.loads(json.dumps(predicted[name]))
     # The plate's C by hand: eps0 4.68 A/d = 8.854e-12 x 4.68 x 2e-4 / 6e-4, in the middle of the bounds.

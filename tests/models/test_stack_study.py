@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn_sensor import sensor_of
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
@@ -13,8 +14,7 @@ from sensorgen.prediction.double_layer import study
 from sensorgen.prediction.double_layer.designs import halves, press_at, stack_of, stacked
 from sensorgen.prediction.double_layer.differencing import bounds
 from sensorgen.prediction.double_layer.touching import WIRINGS, Touching
-from sensorgen.prediction.prediction import TONES_HZ
-from sensorgen.prediction.sensor_of_design import sensor_of
+from sensorgen.prediction.evaluate import TONES_HZ
 
 TONES = np.array(TONES_HZ)
 PRESS = Press(6.0, 0.04, 0.01)

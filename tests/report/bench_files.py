@@ -6,7 +6,8 @@ import made
 import scipy.io as sio
 
 from sensorgen.analysis.comparison.moved import moved
-from sensorgen.prediction.sensor_of_design import sensor_of
+from sensorgen.prediction.bodies import default_body
+from sensorgen.prediction.evaluate import sensor_model
 
 HOSTILE = "</script><script>document.title='taken'</script><img src=x onerror=alert(1)> \"'&$\\frac{ =cmd|'/c calc'!A1"
 FORMULA = '=HYPERLINK("http://example.org";"x")'
@@ -15,7 +16,7 @@ TRUTH = {"resistivity": 0.5, "capacitance": 1.3, "leak_s": 2e-9, "stiffness": 0.
 
 def truth(design, resistivity=1.0, capacitance=1.0, leak_s=0.0, stiffness=1.0):
     """The sensor as it really is, by factors to what is predicted."""
-    sensor = moved(sensor_of(design).sensor, resistivity, capacitance, leak_s)
+    sensor = moved(sensor_model(default_body(design))[0].sensor, resistivity, capacitance, leak_s)
     return replace(sensor, compression=sensor.compression.stiffer(stiffness))
 
 

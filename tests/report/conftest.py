@@ -7,8 +7,7 @@ import pytest
 
 from sensorgen.design.specimen_name import design_of, parse
 from sensorgen.measure.log import Log, bench, importing, words
-from sensorgen.measure.log.batches import prediction
-from sensorgen.prediction.prediction import prediction as predicted
+from sensorgen.workflows.stored_prediction import predicted_row
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -37,7 +36,7 @@ def recorded(tmp_path_factory):
     design = design_of(parse(names[0]))
     sensor = bench_files.truth(design, **bench_files.TRUTH)
     with Log(folder / "log.db", create=True) as log:
-        log.add([prediction(design.id(), design.name, predicted(design))])
+        log.add([predicted_row(design)])
         for k, name in enumerate(names[:2]):
             bench.take(
                 log,

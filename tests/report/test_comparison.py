@@ -5,6 +5,7 @@ from math import inf, log
 
 import numpy as np
 import pytest
+from sensorgen.prediction.prediction import prediction as plain_prediction
 
 from sensorgen.analysis.comparison import of_iteration, predicted
 from sensorgen.analysis.comparison.expected import electrode_ohm
@@ -18,7 +19,6 @@ from sensorgen.measure.log.batches import prediction
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.prediction import prediction as plain_prediction
 
 
 def ladder(electrode, leak, sections):

@@ -1,20 +1,13 @@
 """A design as drawn and as printed, as lines for the terminal."""
 
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import show
-from sensorgen.cli.show import si
 from sensorgen.cli.words import OneOf
-from sensorgen.core.errors import BadInput
-from sensorgen.export.slicers import SLICERS
 
 if TYPE_CHECKING:
-    from sensorgen.asprinted.compared import Printed
     from sensorgen.design.design import Design
 
 
@@ -25,42 +18,6 @@ def compensate_option() -> click.Option:
         help="Change the design so that what is asked for comes out: whole layers, widths of a line, the electrode "
         "gap; with bake also larger by the 20 % that the bake takes off.",
     )  # fmt: skip
-
-
-def printed_options(about: str = "Hold what is printed against what is drawn.") -> list[click.Parameter]:
-    """``--as-printed`` with whose print is meant, for commands that look at a print beside the drawing."""
-    return [
-        click.Option(["--as-printed"], is_flag=True, help=about),
-        click.Option(
-            ["--slicer"], type=OneOf(SLICERS),
-            help="With --as-printed: slice for real; estimated from each layer's mid-plane if not given.",
-        ),
-        click.Option(
-            ["--walls"], type=OneOf(("arachne", "classic", "cura", "cura-gaps")),
-            help="With --as-printed and no slicer: whose walls are estimated.  [default: arachne]",
-        ),
-    ]  # fmt: skip
-
-
-def refuse_strays(*, as_printed: bool, slicer: str | None, walls: str | None) -> None:
-    """Refuse words on a print that nobody asked about, or two ways at once."""
-    if not as_printed and (slicer or walls):
-        raise BadInput("--slicer and --walls say how it is printed; expected --as-printed with them")
-    if slicer and walls:
-        raise BadInput("--slicer and --walls at once; expected one: the slicer's profile says what walls it makes")
-
-
-def printed(design: "Design", slicer: str | None, walls: str | None) -> "Printed":
-    """What is printed of a design: sliced for real, or estimated."""
-    from sensorgen.asprinted import compared
-
-    if not slicer:
-        return compared.estimated(design, walls or "arachne")
-    from sensorgen.export import slicing
-
-    with tempfile.TemporaryDirectory() as folder, show.progress(slicing.STEPS) as step:
-        made = slicing.sliced([slicing.alone(design)], slicer, Path(folder), step=step)
-    return compared.sliced(design, made.lines, f"{slicer} {made.version}")
 
 
 def compensated(
@@ -79,52 +36,6 @@ def compensated(
         if not changes:
             click.echo("  nothing to change")
     return found, [c.as_dict() for c in changes]
-
-
-def lines(found: Mapping[str, Any]) -> Iterator[str]:
-    """The whole comparison.
-
-    Parameters
-    ----------
-    found : mapping
-        As of :func:`sensorgen.asprinted.report.report`.
-    """
-    yield f"{found['design']}, as drawn and as printed: {found['source']}"
-    if found["estimate"]:
-        yield "an ESTIMATE: no slicer was asked; --slicer prusa or cura does"
-    yield ""
-    yield f"{'':18}{'drawn':>12}   printed"
-    low, high = found["electrode_gap_mm"]["printed"]
-    gap = f"{low:g} mm" if low == high else f"{low:g} .. {high:g} mm"
-    yield f"{'electrode gap':18}{found['electrode_gap_mm']['drawn']:>9g} mm   {gap}"
-    yield from _capacitance(found["capacitance_f"])
-    yield from _resistance(found["electrode_resistance_ohm"], found["contact_ohm_m2"])
-    yield ""
-    yield from table(found["layers"])
-
-
-def _capacitance(c: Mapping[str, Any]) -> Iterator[str]:
-    if isinstance(c["drawn"], str):
-        yield f"{'capacitance':18}{'none':>12}   {c['drawn']}"
-        return
-    drawn = si(c["drawn"]["middle"], "F")
-    if c["printed"] is None:
-        yield f"{'capacitance':18}{drawn:>12}   none: {next(iter(c['by_width'].values()))}"
-        return
-    yield f"{'capacitance':18}{drawn:>12}   {si(c['printed']['lower'], 'F')} .. {si(c['printed']['upper'], 'F')}"
-    for name, value in c["by_width"].items():
-        said = value if isinstance(value, str) else si(value["middle"], "F")
-        yield f"{'  lines by ' + name:30}   {said}"
-
-
-def _resistance(r: Mapping[str, Any], contacts: Sequence[float]) -> Iterator[str]:
-    if r["drawn"] is None:
-        yield f"{'electrodes':18}{'':12}   {r['reason']}"
-        return
-    for end, solid in r["drawn"].items():
-        yield f"{end + ' electrode':18}{si(solid, 'ohm'):>12}"
-        for contact, value in zip(contacts, r["printed"][end], strict=True):
-            yield f"{f'  contacts {contact:g} ohm m2':30}   {si(value, 'ohm')}"
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import asprinted_text, card_text, show
+from sensorgen.cli import asprinted_text, prediction_text, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
@@ -13,20 +13,22 @@ if TYPE_CHECKING:
 
 OWN: list[click.Parameter] = [
     click.Option(["--out"], default="out", show_default=True, metavar="DIR", help="Folder for the designs' folders."),
-    click.Option(["--no-cad"], is_flag=True, help="Leave out the STEP file, and with it the CAD kernel's seconds."),
-    click.Option(["--force"], is_flag=True, help="Write the files in spite of findings of severity error."),
+    click.Option(["--no-cad"], is_flag=True, help="Skip the STEP file (saves about 3 s)."),
+    click.Option(["--force"], is_flag=True, help="Write the files even if checks report errors."),
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
     asprinted_text.compensate_option(),
+    click.Option(["--details"], is_flag=True, help="Print all findings and the whole prediction."),
     click.Option(["--json", "as_json"], is_flag=True, help="Print the result as JSON."),
 ]
 
 
 def _work(
-    design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool, compensate: str | None, as_json: bool
-) -> int:
+    design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool, compensate: str | None, details: bool,
+    as_json: bool,
+) -> int:  # fmt: skip
     from sensorgen.core import files as store
     from sensorgen.core.errors import Unprintable
-    from sensorgen.workflows.build import STEPS, build
+    from sensorgen.workflows.build import STEPS, as_dict, build
 
     design, changes = asprinted_text.compensated(design, compensate, "arachne", silent=as_json)
     try:
@@ -36,28 +38,21 @@ def _work(
         if as_json:
             show.as_json({"name": design.name, "folder": None, "findings": [f.as_dict() for f in error.findings]})
         else:
+            click.echo(f"CHANGE  {design.name}\n")
             show.findings(error.findings)
         raise
     files = sorted([*store.listed(built.folder), store.MANIFEST])
     if as_json:
-        found = [f.as_dict() for f in built.review.findings]
-        show.as_json(
-            {
-                "name": design.name,
-                "folder": str(built.folder),
-                "files": files,
-                "findings": found,
-                "compensated": changes,
-                "prediction": built.prediction,
-            }
-        )
+        show.as_json(as_dict(design, built, files) | {"compensated": changes})
         return 0
-    show.findings(built.review.findings)
-    click.echo()
-    show.prediction(built.prediction)
-    for line in card_text.of_prediction(built.prediction):
-        click.echo(line)
-    click.echo(f"\n{built.folder}: {len(files)} files; {show.summary(built.review)}")
+    click.echo(f"{built.verdict}  {design.name}: {show.summary(built.review)}\n")
+    if details:
+        show.findings(built.review.findings)
+        click.echo("\n".join(("", *prediction_text.whole(built.prediction))))
+    else:
+        click.echo("\n".join(prediction_text.table(built.prediction)) + "\n")
+        show.findings(show.most_severe(built.review.findings, 3))
+    click.echo(f"\n{built.folder}: {len(files)} files; {'' if details else '--details prints all'}".rstrip("; "))
     return 0
 
 

@@ -1,8 +1,8 @@
 """Identifiability as text."""
 
 import textwrap
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import click
 
@@ -25,22 +25,6 @@ def card(found: "Identifiability") -> None:
     """Print in less than thirty lines of at most ``WIDTH`` columns."""
     for line in lines(found):
         click.echo(line)
-
-
-def of_prediction(predicted: Mapping[str, Any]) -> Iterator[str]:
-    """The identifiability in a prediction, as lines; nothing where nothing is predicted."""
-    found = predicted.get("identifiability")
-    if not found:
-        return
-    yield ""
-    if not found["verdict"]:
-        yield f"no identifiability: {found['reason']}"
-        return
-    from pydantic import TypeAdapter
-
-    from sensorgen.prediction.identifiability import Identifiability
-
-    yield from lines(TypeAdapter(Identifiability).validate_python(found))
 
 
 def lines(found: "Identifiability") -> Iterator[str]:

@@ -6,26 +6,26 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, cell_text, plan_text, settings, show, sweeps
+from sensorgen.cli import FOUND_ERRORS, body_options, cell_text, plan_text, settings, show, sweeps
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Ratio, Values, one
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.units import FREQUENCY_HZ, LENGTH_MM
 
 if TYPE_CHECKING:
+    from sensorgen.design.body import Body
     from sensorgen.design.design import Design
     from sensorgen.prediction.capacitance_answer import Asked
 
 Data = dict[str, Any]
 Points = Sequence[tuple[Any, "Design"]]
 
-ACCURACY = 1e-3
 FORMULA = "thesis-"  # how the names of formulas begin
 
 OWN: list[click.Parameter] = [
     click.Option(
-        ["--accuracy"], type=Ratio(), default=str(ACCURACY), show_default=True,
-        help="How far the bounds may be apart, as a share of their middle.",
+        ["--accuracy"], type=Ratio(), default=None,
+        help="Relative width of the bounds; 1e-3 for a cross-section and 1e-2 in 3D if not given, as in all commands.",
     ),
     click.Option(["--model"], metavar="NAME", default="", help="Ask this model only: columns, thesis-3.35."),
     click.Option(
@@ -38,6 +38,7 @@ OWN: list[click.Parameter] = [
     ),
     click.Option(["--explain"], is_flag=True, help="Print the plan, and what came of it."),
     click.Option(["--no-cache"], is_flag=True, help="Solve anew, and keep nothing."),
+    *body_options.body_options(),
     *sweeps.options(),
     click.Option(["--json", "as_json"], is_flag=True, help="Print as JSON."),
     click.Option(["--csv", "as_csv"], is_flag=True, help="Print a sweep as CSV."),
@@ -46,7 +47,8 @@ OWN: list[click.Parameter] = [
 
 
 def _work(
-    design: "Design", *, accuracy: float, model: str, no_cache: bool, frequency: tuple[float, ...] | None,
+    design: "Design", *, accuracy: float | None, model: str, no_cache: bool, frequency: tuple[float, ...] | None,
+    drawn: bool, slicer: str | None, walls: str | None,
     sweep: str | None, jobs: int | None, press_mm: tuple[float, ...] | None, **how: Any,
 ) -> int:  # fmt: skip
     from sensorgen.prediction.capacitance_answer import Asked
@@ -59,7 +61,10 @@ def _work(
         return _formula(key, points, asked, press_mm, how)
     if press_mm:
         raise BadInput("--press is for formulas, as --model thesis-3.1.2; solved, under a stress: sensorgen compress")
-    return _many(key, points, asked, sweeps.at_once(jobs), how) if sweep else _one(design, asked, how)
+    of = body_options.body_of(drawn, slicer, walls)
+    if sweep:
+        return _many(key, [(value, of(each)) for value, each in points], asked, sweeps.at_once(jobs), how)
+    return _one(of(design), asked, how)
 
 
 def _refuse_pairs(how: Data, *, many: bool) -> None:
@@ -71,22 +76,22 @@ def _refuse_pairs(how: Data, *, many: bool) -> None:
         raise BadInput("--explain is for people, and one design; --json holds the plan too")
 
 
-def _one(design: "Design", asked: "Asked", how: Data) -> int:
+def _one(body: "Body", asked: "Asked", how: Data) -> int:
     from sensorgen.prediction import capacitance_answer as bounds
 
     if how["explain"]:
-        _print_plan(design, asked)
-    data = bounds.answer(design, asked)
+        _print_plan(body, asked)
+    data = bounds.answer(body, asked)
     lines = (f"{line}\n" for line in cell_text.lines(data, explain=how["explain"]))
     _deliver([show.json_text(data)] if how["as_json"] else lines, how["output"])
     return _verdict([data])
 
 
-def _many(key: str, points: Points, asked: "Asked", jobs: int, how: Data) -> int:
+def _many(key: str, points: "Sequence[tuple[Any, Body]]", asked: "Asked", jobs: int, how: Data) -> int:
     from sensorgen.prediction import capacitance_answer as bounds
 
     with sweeps.bar(len(points)) as done:
-        found = bounds.answers([design for _, design in points], asked, jobs, done)
+        found = bounds.answers([body for _, body in points], asked, jobs, done)
     rows = [{key: value} | data for (value, _), data in zip(points, found, strict=True)]
     if how["as_json"]:
         _deliver([show.json_text(rows)], how["output"])
@@ -144,21 +149,19 @@ def _verdict(found: Sequence[Data]) -> int:
 def _shortfall(data: Data) -> str:
     """The best that was reached, and what other models said."""
     why = f"; {'; '.join(data['refused'])}" if data["refused"] else ""
-    return (
-        f"an accuracy of {data['accuracy']:g} was not reached; the best is {data['relative_width']:.2g}, "
-        f"by {data['model']}{why}"
-    )
+    return f"accuracy {data['accuracy']:g} not reached: {data['relative_width']:.2g}, by {data['model']}{why}"
 
 
-def _print_plan(design: "Design", asked: "Asked") -> None:
+def _print_plan(body: "Body", asked: "Asked") -> None:
     from sensorgen.prediction import capacitance as planner
     from sensorgen.prediction import losses
+    from sensorgen.prediction.rest_state import default_width
 
-    click.echo(f"plan for an accuracy of {asked.width:g}")
-    lossy = bool(losses.set_losses(design))
-    for c in planner.weighed(design.in_use, asked.width, asked.model, lossy):
-        click.echo(f"  {c.model:10}{plan_text.expectation(vars(c), asked.width):32}{c.passed_over}".rstrip())
-    click.echo("  the first that does is taken; what is asked in any case costs next to nothing")
+    scene = body.cells.first()
+    width = default_width(scene) if asked.width is None else asked.width
+    click.echo(f"plan for a relative width of {width:g}")
+    for c in planner.weighed(scene, width, asked.model, bool(losses.set_losses(body.design))):
+        click.echo(f"  {c.model:10}{plan_text.expectation(c):32}{c.passed_over}".rstrip())
 
 
 def _deliver(pieces: Iterable[str], output: str | None) -> None:

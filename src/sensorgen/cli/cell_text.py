@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from sensorgen.cli import plan_text, show, sweeps
+from sensorgen.cli import show, sweeps
 
 Data = dict[str, Any]
 
@@ -33,12 +33,13 @@ def lines(data: Data, *, explain: bool) -> Iterator[str]:
         yield "measured"
         yield from (f"  {line}" for line in measured(data["plan"]))
         yield ""
-    yield f"{data['design']}: {show.si(low * data['area_m2'], 'F')} to {show.si(high * data['area_m2'], 'F')}"
+    low_f, high_f = (show.si(end * data["area_m2"], "F") for end in (low, high))
+    yield f"{data['design']}, {data['body']}: {low_f} to {high_f}"
     yield f"{'per area':12}{low:.10g} to {high:.10g} F/m2"
     if "loss_lower_f_per_m2" in data:
         yield from _loss(data)
-    yield f"{'apart by':12}{data['relative_width']:.2g} of their middle, {data['accuracy']:g} wanted"
-    when = ", known from before" if data["known"] else ""
+    yield f"{'width':12}{data['relative_width']:.2g} relative (target {data['accuracy']:g})"
+    when = ", stored" if data["known"] else ""
     yield f"{'model':12}{data['model']}, {data['seconds']:.2g} s{when}"
     for quantity in dict.fromkeys(v["quantity"] for v in data["values"]):
         here = [v for v in data["values"] if v["quantity"] == quantity]
@@ -57,12 +58,18 @@ def _loss(data: Data) -> Iterator[str]:
 def measured(plan: Iterable[Data]) -> Iterator[str]:
     """What each model of a plan gave, or why it was not asked."""
     for c in plan:
-        yield f"{c['model']:10}{plan_text.came(c):32}{c['passed_over']}".rstrip()
+        yield f"{c['model']:10}{_reached(c):32}{c['passed_over']}".rstrip()
+
+
+def _reached(c: Data) -> str:
+    return (
+        "not run" if c["seconds"] is None else f"{c['width']:.2g} in {show.si(float(format(c['seconds'], '.2g')), 's')}"
+    )
 
 
 def table(key: str, rows: Sequence[Data]) -> Iterator[str]:
     """A sweep for a person."""
-    yield f"{key:>16}  {'lower [F/m2]':>16}  {'upper [F/m2]':>16}  {'apart by':>9}  {'seconds':>8}  model\n"
+    yield f"{key:>16}  {'lower [F/m2]':>16}  {'upper [F/m2]':>16}  {'width':>9}  {'seconds':>8}  model\n"
     for row in rows:
         if row["model"] is None:
             yield f"{sweeps.cell(row[key]):>16}  no answer: {row['reason']}\n"

@@ -10,18 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, asprinted_text, compress_text, plan_text, settings, show, sweeps
+from sensorgen.cli import FOUND_ERRORS, body_options, compress_text, plan_text, settings, show, sweeps
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf, Ratio, Values
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
-from sensorgen.prediction.plan import plain
 
 if TYPE_CHECKING:
-    from sensorgen.asprinted.compared import Printed
+    from sensorgen.design.body import Body
     from sensorgen.design.design import Design
     from sensorgen.prediction.compression import Asked
-    from sensorgen.prediction.sweep import Point
 
 Data = dict[str, Any]
 
@@ -49,7 +47,7 @@ OWN: list[click.Parameter] = [
         help="How far the bounds of C may be apart, the error of the mesh in them: the coarsest mesh that will do.",
     ),
     click.Option(["--explain"], is_flag=True, help="With --accuracy: print the plan, and what came of it."),
-    *asprinted_text.printed_options("Press what is printed in place of what is drawn; feet that were lost hang free."),
+    *body_options.body_options(),
     click.Option(["--check-mesh"], is_flag=True, help="Solve on a finer mesh too, and compare."),
     click.Option(["--no-cache"], is_flag=True, help="Solve anew, and keep nothing."),
     *sweeps.options(),
@@ -61,12 +59,11 @@ OWN: list[click.Parameter] = [
 
 def _work(
     design: "Design", *, stress: tuple[float, ...], model: str | None, accuracy: float | None, check_mesh: bool,
-    no_cache: bool, as_printed: bool, slicer: str | None, walls: str | None, sweep: str | None, jobs: int | None,
+    no_cache: bool, drawn: bool, slicer: str | None, walls: str | None, sweep: str | None, jobs: int | None,
     **how: Any,
 ) -> int:  # fmt: skip
     from sensorgen.prediction import compression as compressed
 
-    asprinted_text.refuse_strays(as_printed=as_printed, slicer=slicer, walls=walls)
     _refuse_pairs(accuracy, how, check_mesh=check_mesh, swept=bool(sweep))
     _refuse_plot(how["plot"])
     held = compressed.Held(**{f.name: how[f.name] for f in fields(compressed.Held)})
@@ -74,19 +71,20 @@ def _work(
         compressed.stresses_kpa(stress), held, model or "", accuracy or inf, check_mesh=check_mesh, keep=not no_cache
     )
     key, designs = settings.sweep(sweep, design) if sweep else ("", [("", design)])
-    points = [(each, asprinted_text.printed(each, slicer, walls) if as_printed else None) for _, each in designs]
+    of = body_options.body_of(drawn, slicer, walls)
+    points = [of(each) for _, each in designs]
     if sweep:
         return _many(key, [value for value, _ in designs], points, asked, sweeps.at_once(jobs), how)
-    return _one(*points[0], asked, how)
+    return _one(points[0], asked, how)
 
 
-def _one(design: "Design", printed: "Printed | None", asked: "Asked", how: Data) -> int:
+def _one(body: "Body", asked: "Asked", how: Data) -> int:
     from sensorgen.prediction import compression as compressed
 
     if how["explain"]:
-        click.echo("\n".join(plan_text.planned(plain(compressed.planned(design, asked, printed)))) + "\n")
+        click.echo("\n".join(plan_text.lines(compressed.planned(body, asked))) + "\n")
     with _bar(asked.stress_kpa) as step:
-        data = compressed.answer(design, asked, printed=printed, step=step)
+        data = compressed.answer(body, asked, step=step)
     if how["plot"]:
         from sensorgen.analysis.plots import compression
         from sensorgen.core import files as store
@@ -99,14 +97,14 @@ def _one(design: "Design", printed: "Printed | None", asked: "Asked", how: Data)
     return _verdict(data)
 
 
-def _many(key: str, values: Sequence[Any], points: "Sequence[Point]", asked: "Asked", jobs: int, how: Data) -> int:
+def _many(key: str, values: Sequence[Any], points: "Sequence[Body]", asked: "Asked", jobs: int, how: Data) -> int:
     from sensorgen.prediction import sweep as swept
 
     with sweeps.bar(len(points)) as done:
         found = swept.answers(points, asked, jobs, done)
     rows = [
-        {key: value, "design": design.name} | ({"model": None, "reason": data} if isinstance(data, str) else data)
-        for value, (design, _), data in zip(values, points, found, strict=True)
+        {key: value, "design": body.design.name} | ({"model": None, "reason": data} if isinstance(data, str) else data)
+        for value, body, data in zip(values, points, found, strict=True)
     ]
     if how["as_json"]:
         show.as_json(rows)
@@ -169,8 +167,8 @@ def _wrong(data: Data) -> list[str]:
     if data.get("reached", True):
         return wrong
     best = data["relative_width"]
-    said = "nobody knows how near it is" if best is None else f"the best is {best:.2g}"
-    return [*wrong, f"an accuracy of {data['accuracy']:g} was not reached; {said}"]
+    said = "error unknown" if best is None else f"{best:.2g}"
+    return [*wrong, f"accuracy {data['accuracy']:g} not reached: {said}"]
 
 
 @contextmanager

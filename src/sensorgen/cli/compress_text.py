@@ -17,15 +17,15 @@ _HEAD = f"{'stress [kPa]':>12}  {'displacement [um]':>17}  capacitance [pF/m2]"
 def lines(data: Data, *, explain: bool) -> Iterator[str]:
     """An answer for a person, with what came of the plan if asked for."""
     if explain:
-        yield from plan_text.measured(data["plan"])
-        yield ""
+        from sensorgen.prediction.plan import of_plain
+
+        yield from (*plan_text.lines(of_plain(data["plan"])), "")
     yield _HEAD
     yield from (_load(load) for load in loads([data]))
     if "accuracy" in data and data["relative_width"] is not None:
-        yield f"bounds apart by {data['relative_width']:.2g} at worst, {data['accuracy']:g} wanted"
+        yield f"largest relative width {data['relative_width']:.2g} (target {data['accuracy']:g})"
     yield f"{data['model']}, converged up to {data['converged_kpa']:.4g} kPa; {_held(data)}"
-    if "printed" in data:
-        yield f"as printed: {data['printed']}"
+    yield f"body: {data['body']}"
     yield from (f"doubt: {doubt}" for doubt in data["doubts"])
 
 
@@ -49,9 +49,9 @@ def _remarks(data: Data) -> list[str]:
     """How a piece was held, what is wrong with its answer, and what is to be doubted."""
     if data["model"] is None:
         return []
-    printed = [f"as printed: {data['printed']}"] if "printed" in data else []
+    body = [f"body: {data['body']}"]
     wrong = [f"fault: {fault}" for fault in data["faults"]]
-    return [f"{data['model']}: {_held(data)}", *printed, *wrong, *(f"doubt: {doubt}" for doubt in data["doubts"])]
+    return [f"{data['model']}: {_held(data)}", *body, *wrong, *(f"doubt: {doubt}" for doubt in data["doubts"])]
 
 
 def _held(data: Data) -> str:

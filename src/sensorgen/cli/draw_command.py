@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import asprinted_text, show
+from sensorgen.cli import body_options, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
@@ -16,16 +16,15 @@ OWN: list[click.Parameter] = [
     click.Option(
         ["--output", "-o"], metavar="FILE", help="SVG file to write; NAME.svg here if not given, - for the terminal."
     ),
-    *asprinted_text.printed_options(),
+    *body_options.body_options(),
 ]
 
 
-def _work(design: "Design", *, output: str | None, as_printed: bool, slicer: str | None, walls: str | None) -> int:
+def _work(design: "Design", *, output: str | None, drawn: bool, slicer: str | None, walls: str | None) -> int:
     from sensorgen.checks.review import STEPS, draw, review
     from sensorgen.core import files as store
 
-    asprinted_text.refuse_strays(as_printed=as_printed, slicer=slicer, walls=walls)
-    made = asprinted_text.printed(design, slicer, walls) if as_printed else None
+    made = None if drawn else body_options.printed_of(design, slicer, walls)
     with show.progress(STEPS) as step:
         held = review(design, step)
     if made:

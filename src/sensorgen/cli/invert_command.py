@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import show
+from sensorgen.cli import body_options, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Length, OneOf, Share
 from sensorgen.core import files as store
@@ -60,6 +60,7 @@ OWN: list[click.Parameter] = [
         ["--output", "-o"], metavar="FILE.csv",
         help="Write a row per sample, '-' to the terminal; readings from the standard input go there by themselves.",
     ),
+    *body_options.body_options(),
     click.Option(["--json", "as_json"], is_flag=True, help="Print the summary as JSON."),
 ]  # fmt: skip
 
@@ -93,14 +94,17 @@ def _estimator(
     force_limit_n: float | None,
     tip_mm: float,
     compression: str | None,
+    **body: Any,
 ) -> "tuple[Estimator, tuple[str, ...]]":
     """The estimator for this design, and what to doubt about its sensor."""
+    from sensorgen.prediction.evaluate import Query, sensor_model
     from sensorgen.prediction.inverse import FORCE_LIMIT_N, Estimator
-    from sensorgen.prediction.ladder import usual
+    from sensorgen.prediction.sensor_model import Tip
 
-    sensed = usual(design, compression or "", tip_m=tip_mm * units.M_PER_MM)
+    query = Query(tip=Tip(tip_mm * units.M_PER_MM), law=compression or "")
+    model = sensor_model(body_options.body_of(**body)(design), query)[0]
     limit = FORCE_LIMIT_N if force_limit_n is None else force_limit_n
-    return Estimator(sensed.sensor, source.frequency_hz, noise, _prior(prior), limit), sensed.doubts
+    return Estimator(model.sensor, source.frequency_hz, noise, _prior(prior), limit), model.doubts
 
 
 def _prior(text: str | None) -> "Prior | None":

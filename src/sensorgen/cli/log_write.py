@@ -171,11 +171,10 @@ def _bench(
 
 
 def _predict(design: "Design", *, file: str | None, as_json: bool) -> int:
-    from sensorgen.measure.log.batches import prediction
-    from sensorgen.prediction.prediction import prediction as predicted
+    from sensorgen.workflows.stored_prediction import predicted_row
 
     with opened(file, create=True) as log:
-        new = log.add([prediction(design.id(), design.name, predicted(design))])
+        new = log.add([predicted_row(design)])
         _say_logged(new, log, as_json=as_json, known=f"{design.name}: the log has this very prediction")
     return 0
 

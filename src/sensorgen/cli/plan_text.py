@@ -1,66 +1,50 @@
-"""How plans are printed: what is expected of every candidate before, and what came of it after."""
+"""A plan as lines of text: candidate models of each level, expected and reached error and time."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
+from math import inf
+from typing import TYPE_CHECKING
 
-from sensorgen.cli import show
+from sensorgen.cli.show import si
 
-Data = Mapping[str, Any]
-
-
-def planned(plan: Data) -> Iterator[str]:
-    """A plan before anything is asked: :func:`sensorgen.prediction.plan.plain` of one, as lines."""
-    yield f"plan for an accuracy of {plan['accuracy']:g} of {plan['of']}"
-    yield from _levels(plan["levels"], expectation)
-    yield "  the first that should do is taken, or else the one that should come nearest"
+if TYPE_CHECKING:
+    from sensorgen.prediction.plan import Candidate, Plan
 
 
-def measured(plan: Data) -> Iterator[str]:
-    """What came of it."""
-    yield "measured"
-    yield from _levels(plan["levels"], lambda candidate, _: came(candidate))
-    if plan["width"] is not None:
-        yield f"  all levels together: {plan['width']:.2g} of {plan['accuracy']:g}"
+def lines(plan: "Plan") -> Iterator[str]:
+    """The plan, with the results where it was run."""
+    yield f"plan for an accuracy of {plan.accuracy:g} of {plan.of}"
+    yield f"  {'':28}{'expected':26}{'reached':20}"
+    for level in plan.levels:
+        yield f"  {level.name}: {level.measure}, tolerance {level.allowed:.2g}"
+        for c in level.candidates:
+            mark = ">" if c.model == level.chosen else " "
+            reached = _of(c.width, c.seconds) if c.seconds is not None or c.width is not None else "not run"
+            yield f"  {mark} {c.model:26}{expectation(c):26}{reached:20}{c.passed_over}".rstrip()
+    if plan.width is not None:
+        yield f"  all levels together: {_error(plan.width)}"
 
 
-def shares(plan: Data) -> Iterator[str]:
-    """What each level came to, by whom, as far as it is known."""
-    for level in plan["levels"]:
-        for c in level["candidates"]:
-            if c["model"] == level["chosen"]:
-                width = "of no known error" if c["width"] is None else f"{c['width']:.2g}"
-                yield f"{level['name']} {width} ({c['model']})"
+def shares(plan: "Plan") -> Iterator[str]:
+    """Error that the chosen model of each level reached."""
+    for level in plan.levels:
+        for c in level.candidates:
+            if c.model == level.chosen:
+                yield f"{level.name} {_error(c.width)} ({c.model})"
 
 
-def _levels(levels: Iterable[Data], told: Callable[[Data, float], str]) -> Iterator[str]:
-    for level in levels:
-        yield f"  {level['name']}: {level['measure']}, at most {level['allowed']:.2g}"
-        for candidate in level["candidates"]:
-            mark = ">" if candidate["model"] == level["chosen"] else " "
-            words = told(candidate, level["allowed"])
-            yield f"  {mark} {candidate['model']:26}{words:28}{candidate['passed_over']}".rstrip()
+def expectation(candidate: "Candidate") -> str:
+    """Expected error and time."""
+    if candidate.expected_seconds is None:
+        return "" if candidate.passed_over else "always run"
+    return _of(candidate.expected_width, candidate.expected_seconds)
 
 
-def expectation(candidate: Data, wanted: float) -> str:
-    """What is expected of a candidate."""
-    width, seconds = candidate["expected_width"], candidate["expected_seconds"]
-    if seconds is None:
-        return "" if candidate["passed_over"] else "in any case"
-    time = "at once" if seconds == 0 else f"in about {_seconds(seconds)}"
-    if width is None:
-        return f"nobody knows how far, {time}"
-    reach = "exact" if width == 0 else f"within {wanted:.3g}" if width <= wanted else f"about {width:.2g}"
-    return f"{reach} {time}"
+def _of(width: float | None, seconds: float | None) -> str:
+    time = "" if seconds is None else " instant" if seconds == 0 else f" in {si(float(f'{seconds:.2g}'), 's')}"
+    return _error(width) + time
 
 
-def came(candidate: Data) -> str:
-    """What a candidate gave, or that it was not asked."""
-    width, seconds = candidate["width"], candidate["seconds"]
-    if seconds is None:
-        return "not asked" if width is None else f"{width:.2g}"
-    how = "nobody knows how far" if width is None else f"{width:.2g}"
-    return f"{how} in {_seconds(seconds)}"
-
-
-def _seconds(value: float) -> str:
-    return show.si(float(f"{value:.2g}"), "s")
+def _error(width: float | None) -> str:
+    if width in (None, inf):
+        return "error unknown"
+    return "exact" if width == 0 else f"{width:.2g}"

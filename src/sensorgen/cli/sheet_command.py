@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import sheet_text, show
+from sensorgen.cli import body_options, sheet_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf, Share, Values, one, proper
 from sensorgen.core import units
@@ -69,6 +69,7 @@ OWN: list[click.Parameter] = [
         ["--compression"], type=OneOf(("unconfined", "bonded")),
         help="How a plate gives way; the best that is known of the cell if not given.",
     ),
+    *body_options.body_options(),
     click.Option(["--json", "as_json"], is_flag=True, help="Print impedances, bounds, and their maps, as JSON."),
     click.Option(["--plot"], type=click.Path(path_type=Path), metavar="DIR", help="Write maps of the bounds there."),
 ]  # fmt: skip
@@ -77,17 +78,16 @@ OWN: list[click.Parameter] = [
 def _work(
     design: "Design", *, contacts: str | None, pads: tuple[Rectangle, ...], frequencies: tuple[float, ...] | None,
     force: tuple[float, ...], tip: tuple[float, ...], noise: float, compression: str | None, as_json: bool,
-    plot: Path | None,
+    plot: Path | None, drawn: bool, slicer: str | None, walls: str | None,
 ) -> int:  # fmt: skip
     from sensorgen.models.sheet import impedance
-    from sensorgen.prediction.ladder import usual
-    from sensorgen.prediction.prediction import TONES_HZ
+    from sensorgen.prediction.evaluate import TONES_HZ, Query, sensor_model
 
     force_n, tip_mm, tones = one("--force", force), one("--tip", tip), frequencies or TONES_HZ
     proper("--noise", noise)
-    sensed = usual(design, compression or "")
-    film = _sheet(sensed.sensor)
-    press, per_newton = _press(sensed.sensor, tip_mm * units.M_PER_MM, force_n)
+    model = sensor_model(body_options.body_of(drawn, slicer, walls)(design), Query(law=compression or ""))[0]
+    film = _sheet(model.sensor)
+    press, per_newton = _press(model.sensor, tip_mm * units.M_PER_MM, force_n)
     ports = _ports(film, contacts, pads)
     bounds = _bounds(film, ports, tones, press, per_newton, noise)
     if plot is not None:
@@ -98,7 +98,7 @@ def _work(
         store.replace(where, sheet.png(film, bounds, ports))
         if not as_json:
             click.echo(f"wrote {where}")
-    given = {"force_n": force_n, "tip_mm": tip_mm, "noise": noise, "doubts": list(sensed.doubts)}
+    given = {"force_n": force_n, "tip_mm": tip_mm, "noise": noise, "doubts": list(model.doubts)}
     if as_json:
         loose = {name: impedance(film, ports[name], tones, cells=found.cells) for name, found in bounds.items()}
         found = {name: sheet_text.plain_bounds(bounds[name], loose[name]) for name in bounds}

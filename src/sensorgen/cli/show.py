@@ -5,8 +5,9 @@ import shutil
 import sys
 import textwrap
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,10 +15,13 @@ import click
 if TYPE_CHECKING:
     from sensorgen.checks.review import Review
     from sensorgen.core.findings import Finding
+    from sensorgen.prediction.grid import ImpedanceGrid
+    from sensorgen.prediction.results import Prediction
+    from sensorgen.prediction.sensor_model import SensorModel
 
 WIDTH = 80
 _COLOURS = {"error": "red", "warning": "yellow", "info": "blue"}
-_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
 def findings(found: Sequence["Finding"]) -> None:
@@ -32,6 +36,16 @@ def findings(found: Sequence["Finding"]) -> None:
         click.echo(
             textwrap.fill(f"{f.message}{_place(f)} {after}", width, initial_indent=" " * 8, subsequent_indent=" " * 8)
         )
+
+
+def most_severe(found: Sequence["Finding"], count: int) -> list["Finding"]:
+    """The first findings that matter: each rule and body once, with all its places, the severe first."""
+    order = ("error", "warning", "info")
+    merged: dict[tuple[str, str, str], Finding] = {}
+    for f in sorted((f for f in found if not f.waiver), key=lambda f: order.index(f.severity)):
+        key = (f.severity, f.rule, f.advice)
+        merged[key] = replace(merged[key], count=merged[key].count + f.count) if key in merged else f
+    return list(merged.values())[:count]
 
 
 def _where(f: "Finding") -> str:
@@ -57,58 +71,63 @@ def summary(review: "Review") -> str:
     )
 
 
-def prediction(predicted: Mapping[str, Any]) -> None:
-    """Print the main numbers of a prediction."""
-    for line in prediction_lines(predicted):
-        click.echo(line)
+def loaded(found: "Prediction", model: "SensorModel", grid: "ImpedanceGrid", noise: float) -> Iterator[str]:
+    """R and X over force and position, as lines: their ranges, how much they change, and corners at the last frequency.
 
-
-def prediction_lines(predicted: Mapping[str, Any]) -> Iterator[str]:
-    """The main numbers of a prediction, as lines."""
-    if predicted["capacitance_f"] is None:
-        yield f"no capacitance is predicted: {predicted['reason']}"
-        return
-    r = predicted["electrode_resistance_ohm"]
-    rows = {
-        "capacitance": _between(predicted["capacitance_f"], "F"),
-        "electrodes": f"top {si(r['top'], 'ohm')}, bottom {si(r['bottom'], 'ohm')} end to end",
-        "corner frequency": _between(predicted["corner_frequency_hz"], "Hz"),
-    }
-    yield from (f"{name:17}{value}" for name, value in rows.items())
-    yield f"{'impedance at':>17}  {'Re [ohm]':>11}   {'Im [ohm]':>11}   Im at the bounds of C"
-    for tone in predicted["impedance_ohm"]:
-        low, high = tone["im_range"]
-        yield f"{si(tone['frequency_hz'], 'Hz'):>17}  {tone['re']:11.5g}   {tone['im']:11.5g}   {low:.4g} .. {high:.4g}"
-
-
-def presses(predicted: Mapping[str, Any], moves: Sequence[Mapping[str, float | None]]) -> Iterator[str]:
-    """R and X over force and position, as lines: their ranges, how far they move, and corners at the highest tone."""
-    force, at = predicted["force_n"], predicted["position_mm"]
-    law, profile = predicted["model"]["compression"], predicted["profile"]
-    touches = predicted["contact_mm"]
-    grown = f", {touches:.3g} mm of it touch at {force[-1]:g} N" if touches < predicted["tip_mm"] else ""
-    spread = "" if profile == "uniform" else f" ({profile}{grown})"
-    yield f"{predicted['design']}: {_axis(force, 'force', 'N')}, {_axis(at, 'position', 'mm')};"
-    yield f"tip {predicted['tip_mm']:g} mm{spread}, compression {law}"
-    for doubt in predicted["doubts"]:
+    Parameters
+    ----------
+    found, model, grid : Prediction, SensorModel, ImpedanceGrid
+        Of one body.
+    noise : float
+        Standard deviation of a reading, relative to abs(Z) [-].
+    """
+    force, at, sensor = grid.force_n, grid.position_mm, model.sensor
+    touches = float(sensor.contact_m(force[-1])[0])
+    grown = f", contact {touches * 1e3:.3g} mm at {force[-1]:g} N" if touches < sensor.tip_m else ""
+    spread = "" if sensor.profile == "uniform" else f" ({sensor.profile}{grown})"
+    yield f"{found.design}, {found.body}: {_axis(force, 'force', 'N')}, {_axis(at, 'position', 'mm')};"
+    yield f"tip {sensor.tip_m * 1e3:g} mm{spread}, compression {sensor.compression.name}"
+    beyond = sensor.compression.doubt(float(sensor.stress_pa(force[-1], [x * 1e-3 for x in at]).max()))
+    for doubt in (*model.doubts, *([beyond] if beyond else [])):
         yield from textwrap.wrap(f"doubtful: {doubt}", WIDTH)
     yield ""
-    yield f"{'':9} {'R [ohm]':^17}  {'X [ohm]':^25}  R moves by  X moves by"
-    yield f"{'tone':>9} {'least':>8} {'most':>8}  {'least':>12} {'most':>12} force  pos. force  pos."
-    for f, re, im, move in zip(predicted["frequency_hz"], predicted["re_ohm"], predicted["im_ohm"], moves, strict=True):
-        (r, most_r), (x, most_x) = ((min(map(min, v)), max(map(max, v))) for v in (re, im))
-        moved = " ".join(map(_deviations, move.values()))
-        yield f"{si(f, 'Hz'):>9} {r:8.6g} {most_r:8.6g}  {x:12.6g} {most_x:12.6g} {moved}"
+    yield f"{'':9} {'R [ohm]':^17}  {'X [ohm]':^25}  change of R  change of X"
+    yield f"{'frequency':>9} {'least':>8} {'most':>8}  {'least':>12} {'most':>12} force  pos. force  pos."
+    for f, z, change in zip(grid.frequency_hz, grid.impedance_ohm, grid.changes(noise), strict=True):
+        r, x = z.real, z.imag
+        moved = " ".join(map(_deviations, change.values()))
+        yield f"{si(f, 'Hz'):>9} {r.min():8.6g} {r.max():8.6g}  {x.min():12.6g} {x.max():12.6g} {moved}"
     if len(force) > 1 or len(at) > 1:
-        yield f"Moves are in deviations of one reading, {predicted['noise']:.2g} of |Z|: by force at"
-        yield f"{at[len(at) // 2]:g} mm, by position at {force[-1]:g} N. Below about 1 a reading alone does not tell."
+        yield f"Changes in standard deviations of one reading, {noise:.2g} of |Z|: over force at"
+        yield f"{at[len(at) // 2]:g} mm, over position at {force[-1]:g} N."
     yield ""
-    yield f"R and X [ohm] at {si(predicted['frequency_hz'][-1], 'Hz')}"
+    yield f"R and X [ohm] at {si(grid.frequency_hz[-1], 'Hz')}"
     places = _ends_and_middle(at)
     yield f"{'':>7}" + "".join(f"{f'{at[k]:g} mm':^24}" for k in places).rstrip()
     for j in _ends_and_middle(force):
-        cells = ((predicted["re_ohm"][-1][j][k], predicted["im_ohm"][-1][j][k]) for k in places)
-        yield f"{f'{force[j]:g} N':>7}" + "".join(f"  {re:9.7g} {im:12.7g}" for re, im in cells)
+        cells = (grid.impedance_ohm[-1][j][k] for k in places)
+        yield f"{f'{force[j]:g} N':>7}" + "".join(f"  {z.real:9.7g} {z.imag:12.7g}" for z in cells)
+
+
+def grid_json(found: "Prediction", model: "SensorModel", grid: "ImpedanceGrid") -> Iterator[str]:
+    """Prediction and impedances as JSON, a line per key: for long lists of numbers."""
+    from sensorgen.prediction.results import to_json
+
+    data = {
+        "prediction": json.loads(to_json(found)),
+        "tip_mm": model.sensor.tip_m * 1e3,
+        "profile": model.sensor.profile,
+        "compression": model.law.compression.source,
+        "axes": ["frequency_hz", "force_n", "position_mm"],
+        "frequency_hz": list(grid.frequency_hz),
+        "force_n": list(grid.force_n),
+        "position_mm": list(grid.position_mm),
+        "re_ohm": grid.impedance_ohm.real.tolist(),
+        "im_ohm": grid.impedance_ohm.imag.tolist(),
+    }
+    for lead, (key, value) in zip(["{", *[","] * (len(data) - 1)], data.items(), strict=True):
+        yield f"{lead}\n  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False, allow_nan=False)}"
+    yield "\n}\n"
 
 
 def _deviations(value: float | None) -> str:
@@ -127,21 +146,15 @@ def _ends_and_middle(values: Sequence[float]) -> list[int]:
     return sorted({0, len(values) // 2, len(values) - 1})
 
 
-def _between(bounds: Mapping[str, float], unit: str) -> str:
-    if bounds["upper"] == bounds["lower"]:
-        return si(bounds["lower"], unit)
-    return f"{si(bounds['lower'], unit)} to {si(bounds['upper'], unit)}"
-
-
 def si(value: float, unit: str) -> str:
     """A value with an SI prefix, to four digits.
 
     >>> si(6.29e-11, "F"), si(2333.3, "ohm"), si(0.0, "F")
     ('62.9 pF', '2.333 kohm', '0 F')
     """
-    powers = [p for p in _PREFIXES if value and abs(value) >= 10.0**p]
-    power = max(powers, default=0 if not value else min(_PREFIXES))
-    return f"{value / 10.0**power:.4g} {_PREFIXES[power]}{unit}"
+    powers = [p for p in PREFIXES if value and abs(value) >= 10.0**p]
+    power = max(powers, default=0 if not value else min(PREFIXES))
+    return f"{value / 10.0**power:.4g} {PREFIXES[power]}{unit}"
 
 
 def as_json(data: Any) -> None:
@@ -154,11 +167,9 @@ def json_text(data: Any) -> str:
     return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
 
 
-def json_lines(data: Mapping[str, Any]) -> Iterator[str]:
-    """Plain data as JSON, a line per key: for long lists of numbers."""
-    for lead, (key, value) in zip(["{", *[","] * (len(data) - 1)], data.items(), strict=True):
-        yield f"{lead}\n  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False, allow_nan=False)}"
-    yield "\n}\n"
+def indented(text: str) -> str:
+    """JSON text with two spaces per level."""
+    return json_text(json.loads(text))
 
 
 @contextmanager

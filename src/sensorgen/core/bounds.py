@@ -1,6 +1,7 @@
 """A number known to lie between two others, or near one."""
 
 from dataclasses import dataclass
+from math import prod
 
 
 @dataclass(frozen=True)
@@ -41,3 +42,57 @@ class Disc:
     def holds(self, value: complex) -> bool:
         """Whether a value lies in it."""
         return abs(value - self.centre) <= self.radius
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """A predicted quantity with the range it lies in, and what that range holds.
+
+    Attributes
+    ----------
+    value, lower, upper : float
+        Best value, and the range with all of the errors below, each at its worst [unit].
+    unit : str
+        Unit of all values, as "F"; "" for a ratio.
+    model : Interval
+        With the error of the models alone [unit].
+    print : Interval
+        With what slicers, walls and bead widths differ by alone [unit].
+    material : Interval
+        With what the sources of material values differ by alone [unit].
+    certified : bool
+        Whether the model's interval is a proven bound; else an estimate.
+    """
+
+    value: float
+    lower: float
+    upper: float
+    unit: str
+    model: Interval
+    print: Interval
+    material: Interval
+    certified: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        value: float,
+        unit: str,
+        *,
+        model: Interval | None = None,
+        print: Interval | None = None,  # noqa: A002 - the field's own word
+        material: Interval | None = None,
+        certified: bool = False,
+    ) -> "Bounds":
+        """A positive quantity whose relative errors multiply; what is not given adds none."""
+        exact = Interval(value, value)
+        parts = (model or exact, print or exact, material or exact)
+        lower = value * prod(min(part.lower / value, 1.0) for part in parts) if value else 0.0
+        upper = value * prod(max(part.upper / value, 1.0) for part in parts) if value else 0.0
+        return cls(value, lower, upper, unit, *parts, certified)
+
+    def times(self, factor: float, unit: str) -> "Bounds":
+        """The quantity scaled by a positive factor, in another unit."""
+        parts = (self.model.times(factor), self.print.times(factor), self.material.times(factor))
+        ends = (factor * self.value, factor * self.lower, factor * self.upper)
+        return Bounds(*ends, unit, *parts, self.certified)

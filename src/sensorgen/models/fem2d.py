@@ -4,7 +4,7 @@ Triangles shrink towards every corner where the field is singular, and polynomia
 distance of the bounds falls exponentially. See docs/cells.md.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -105,7 +105,7 @@ class Step:
     elements, unknowns : int
         Triangles, and the unknowns that they couple.
     interval : Interval
-        Capacitance of the whole sensor [F].
+        Capacitance of the whole sensor [F], or another quantity of the field.
     """
 
     order: int
@@ -117,18 +117,39 @@ class Step:
 def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[Step]:
     """The orders that :func:`capacitance` goes through, until the interval is narrow enough or gains no more."""
     section, coarse = _triangles(scene)
+    shares = [share for _, share in coarse.regions]
+    whole = EPS0_F_PER_M * M_PER_MM * section.depth_mm
+    return narrowed(coarse, permittivity, lambda found: fem.whole(found, shares).times(whole), width)
+
+
+def narrowed(
+    coarse: Triangles, permittivity: Mapping[str, float], interval: Callable[[fem.Energies], Interval], width: float
+) -> Iterator[Step]:
+    """Meshes and orders on the way to an accuracy of a quantity that the energies of a field give.
+
+    Parameters
+    ----------
+    coarse : Triangles
+        Few, of the same field.
+    permittivity : mapping of str to float
+        Of each material, or whatever else the flux is proportional to.
+    interval : callable
+        From the energies of one mesh and order to bounds of the quantity.
+    width : float
+        How wide these may be, relative to their middle [-].
+    """
     values = {material: permittivity[material] for material, _ in coarse.regions}
     mesh = _graded(coarse, values, width)
     last, order = np.inf, _first(width)
     while order <= _ORDERS[1]:
         try:
-            interval, unknowns = _solved(mesh, values, order)
+            found = _solved(mesh, values, order)
+            here = interval(found)
         except fem.Unsolved:
             if last == np.inf:
                 raise
             return  # doubles end here: what was solved before stands
-        here = interval.times(EPS0_F_PER_M * M_PER_MM * section.depth_mm)
-        yield Step(order, mesh.elements(), unknowns, here)
+        yield Step(order, mesh.elements(), found.unknowns, here)
         if here.width() <= width or here.width() > _STALLED * last:
             return
         order, last = order + _more(here.width(), width), here.width()
@@ -229,15 +250,14 @@ def _graded(coarse: Triangles, permittivity: Mapping[str, float], width: float) 
     return mesh
 
 
-def _solved(mesh: Cones, permittivity: Mapping[str, float], order: int) -> tuple[Interval, int]:
+def _solved(mesh: Cones, permittivity: Mapping[str, float], order: int) -> fem.Energies:
     plane = Plane(mesh, order)
     eps, weight = _by_triangle(mesh, permittivity)
     u, psi = _fields(plane, eps)
     energy = eps * plane.energies(u, u)
     upper, lower = float(energy.sum()), _best_multiple(plane, eps, u, psi)
     off = _rounding(plane, abs(eps), eps, u, psi) / upper
-    found = fem.Energies(lower, upper, float(weight @ energy), plane.unknowns, off)
-    return fem.whole(found, [share for _, share in mesh.triangles.regions]), found.unknowns
+    return fem.Energies(lower, upper, float(weight @ energy), plane.unknowns, off)
 
 
 def _fields(plane: Plane, eps: NDArray[Any]) -> tuple[Field, Field]:

@@ -5,7 +5,7 @@ boxes all matrices are known in closed form, and elimination from the inside out
 docs/cells.md.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from sensorgen.scene.scene import Scene
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.bounds import Fields, Turned, disc, turned
 from sensorgen.solvers.electrostatics.boxes import Pair, whole
-from sensorgen.solvers.electrostatics.bricks import grid, layered
+from sensorgen.solvers.electrostatics.bricks import Grid, grid, layered
 from sensorgen.solvers.electrostatics.dissection import least, unknowns_of
 
 SOURCE = "Dirichlet's and Thomson's principles; graded boxes, H1 and hybrid H(div), nested dissection"
@@ -100,15 +100,20 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
     coarse = grid(scene)
     values = [0.0, 0.0, *(permittivity[name] for name in coarse.names[2:])]
-    for layers, order, flux_order in _RUNGS:
-        pair = Pair.of(layered(coarse, values, layers), values, order, flux_order)
-        interval = _bounds(pair).times(EPS0_F_PER_M * M_PER_MM)
-        yield Step(layers, order, flux_order, len(pair.flux.eps), pair.unknowns(), interval)
+    for rung, pair in zip(_RUNGS, pairs(coarse, values), strict=True):
+        interval = total(pair).times(EPS0_F_PER_M * M_PER_MM)
+        yield Step(*rung, len(pair.flux.eps), pair.unknowns(), interval)
         if interval.width() <= width:
             return
 
 
-def _bounds(pair: Pair) -> Interval:
+def pairs(coarse: Grid, values: Sequence[float]) -> Iterator[Pair]:
+    """Meshes of a grid of boxes from coarse to fine; ``values``: the permittivity of each of its names [-]."""
+    for layers, order, flux_order in _RUNGS:
+        yield Pair.of(layered(coarse, values, layers), values, order, flux_order)
+
+
+def total(pair: Pair) -> Interval:
     """Energy at 1 V over eps0 of all that the sensor holds, cut cells among it [mm]."""
     shares, rho = pair.flux.shares, np.real(pair.flux.eps)
     upper = least(pair.potential.elements).energy

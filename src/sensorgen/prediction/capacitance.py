@@ -16,8 +16,6 @@ from typing import Any
 from sensorgen.core import cache as cached
 from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
-from sensorgen.design.design import Design
-from sensorgen.design.values import MaterialValue, permittivities, resistivities
 from sensorgen.models import capacitance_models
 from sensorgen.prediction.cost_model import expected
 from sensorgen.prediction.plan import Candidate
@@ -78,28 +76,14 @@ class Answer:
         real, loss = self.capacitance_f, self.loss_f
         return (real.upper - real.lower) / hypot(real.upper + real.lower, loss.upper + loss.lower) * 2
 
+    def times(self, count: float) -> "Answer":
+        """The capacitance of ``count`` such cells side by side."""
+        loss = self.loss_f and self.loss_f.times(count)
+        return replace(self, capacitance_f=self.capacitance_f.times(count), loss_f=loss)
+
     def seconds(self) -> float:
         """Time that all models took together, imports left out [s]."""
         return sum(c.seconds or 0.0 for c in self.plan)
-
-
-@dataclass(frozen=True)
-class Unloaded:
-    """What is known of a design before anything presses on it.
-
-    Attributes
-    ----------
-    answer : Answer
-        Its capacitance.
-    resistivity_ohm_m : (float, float)
-        Of the top and the bottom electrode [ohm m].
-    taken : tuple of MaterialValue
-        Material values that both rest on.
-    """
-
-    answer: Answer
-    resistivity_ohm_m: tuple[float, float]
-    taken: tuple[MaterialValue, ...]
 
 
 def capacitance(
@@ -316,29 +300,6 @@ def _of_plain(data: dict[str, Any]) -> Answer:
         inf if data["wanted"] is None else data["wanted"], tuple(Candidate(**c) for c in data["plan"]),
         loss_f=Interval(**data["loss_f"]) if data["loss_f"] else None,
     )  # fmt: skip
-
-
-def unloaded(design: Design, width: float = inf) -> Unloaded:
-    """Capacitance and resistivities of a design, its support gone.
-
-    Parameters
-    ----------
-    design : Design
-        As drawn.
-    width : float
-        How wide the bounds of the capacitance may be, relative to their middle [-].
-
-    Raises
-    ------
-    Unpredictable
-        No model can speak of the scene, as of a short.
-    MissingValue
-        No source gives a material value that is needed.
-    """
-    taken = permittivities(design)
-    answer = capacitance(design.in_use, {t.material: t.value for t in taken}, width)
-    top, bottom = resistivities(design).values()
-    return Unloaded(answer, (top.value, bottom.value), (*taken, top, bottom))
 
 
 def is_plate(answer: Answer) -> bool:

@@ -7,10 +7,11 @@ from typing import Any
 
 from sensorgen.core.parallel import in_parallel, said
 from sensorgen.core.units import M_PER_MM
-from sensorgen.design.design import Design
+from sensorgen.design.body import Body
 from sensorgen.prediction import capacitance as planner
 from sensorgen.prediction import losses
 from sensorgen.prediction.capacitance import Answer, Unpredictable
+from sensorgen.prediction.rest_state import default_width
 from sensorgen.scene.scene import Scene
 
 
@@ -20,8 +21,8 @@ class Asked:
 
     Attributes
     ----------
-    width : float
-        How wide the bounds may be, relative to their middle [-].
+    width : float or None
+        Relative width of the bounds [-]; the default of :mod:`sensorgen.prediction.rest_state` if None.
     model : str
         The only model to ask, or "".
     keep : bool
@@ -30,19 +31,19 @@ class Asked:
         Of the field, where dielectrics leak [Hz].
     """
 
-    width: float = inf
+    width: float | None = None
     model: str = ""
     keep: bool = True
     frequency_hz: float | None = None
 
 
-def answer(design: Design, asked: Asked) -> dict[str, Any]:
-    """Bounds of one design's capacitance per area, unpressed and as drawn.
+def answer(body: Body, asked: Asked) -> dict[str, Any]:
+    """Bounds of the capacitance per area of one body's most likely cell, unloaded.
 
     Parameters
     ----------
-    design : Design
-        Its support is taken to be gone.
+    body : Body
+        Drawn or printed.
     asked : Asked
         Accuracy and model.
 
@@ -53,17 +54,17 @@ def answer(design: Design, asked: Asked) -> dict[str, Any]:
     MissingValue
         A dielectric without a permittivity.
     """
-    return _plain(design, _solved(design.in_use, _permittivity(design, asked), asked), asked)
+    return _plain(body, _solved(*_inputs(body, asked)), asked)
 
 
-def answers(designs: Sequence[Design], asked: Asked, jobs: int, done: Callable[[], None]) -> list[dict[str, Any]]:
-    """The same for many designs, those that are not known from before in several processes.
+def answers(bodies: Sequence[Body], asked: Asked, jobs: int, done: Callable[[], None]) -> list[dict[str, Any]]:
+    """The same for many bodies, those that are not known from before in several processes.
 
     A design that no model can speak of, or at which one fails, has a reason in place of numbers.
 
     Parameters
     ----------
-    designs : sequence of Design
+    bodies : sequence of Body
         In the order of the answers.
     asked : Asked
         Accuracy and model.
@@ -79,27 +80,37 @@ def answers(designs: Sequence[Design], asked: Asked, jobs: int, done: Callable[[
     SensorgenError
         A process ended before its answer, as when the memory is full.
     """
-    inputs = [(design.in_use, _permittivity(design, asked), asked) for design in designs]
+    inputs = [_inputs(body, asked) for body in bodies]
     missing = [
-        k for k, (scene, eps, _) in enumerate(inputs)
-        if not (asked.keep and planner.is_known(scene, eps, asked.width, asked.model))
+        k for k, (scene, eps, of) in enumerate(inputs)
+        if not (asked.keep and planner.is_known(scene, eps, _width(scene, of), of.model))
     ]  # fmt: skip
     found: dict[int, Answer | str] = {}
     for k in sorted(set(range(len(inputs))) - set(missing)):
         found[k] = _said(*inputs[k])
         done()
-    anew = replace(asked, keep=False)  # this process alone writes: the others may be ended at any moment
-    for k, result in in_parallel(_said, [(*inputs[k][:2], anew) for k in missing], jobs):
+    # this process alone writes: the others may be ended at any moment
+    anew = [(*inputs[k][:2], replace(inputs[k][2], keep=False)) for k in missing]
+    for k, result in in_parallel(_said, anew, jobs):
         scene, eps, _ = inputs[missing[k]]
         if asked.keep and isinstance(result, Answer):
             planner.remember(scene, eps, asked.model, result)
         found[missing[k]] = result
         done()
-    return [_plain(design, found[k], asked) for k, design in enumerate(designs)]
+    return [_plain(body, found[k], asked) for k, body in enumerate(bodies)]
+
+
+def _inputs(body: Body, asked: Asked) -> tuple[Scene, dict[str, complex], Asked]:
+    scene = body.cells.first()
+    return scene, losses.permittivity(body.design, asked.frequency_hz)[0], replace(asked, width=_width(scene, asked))
+
+
+def _width(scene: Scene, asked: Asked) -> float:
+    return default_width(scene) if asked.width is None else asked.width
 
 
 def _solved(scene: Scene, permittivity: dict[str, complex], asked: Asked) -> Answer:
-    return planner.capacitance(scene, permittivity, asked.width, asked.model, asked.keep)
+    return planner.capacitance(scene, permittivity, _width(scene, asked), asked.model, asked.keep)
 
 
 def _said(scene: Scene, permittivity: dict[str, complex], asked: Asked) -> Answer | str:
@@ -107,15 +118,19 @@ def _said(scene: Scene, permittivity: dict[str, complex], asked: Asked) -> Answe
     return said(_solved, scene, permittivity, asked, refused=(Unpredictable,))
 
 
-def _permittivity(design: Design, asked: Asked) -> dict[str, complex]:
-    return losses.permittivity(design, asked.frequency_hz)[0]
-
-
-def _plain(design: Design, found: Answer | str, asked: Asked) -> dict[str, Any]:
+def _plain(body: Body, found: Answer | str, asked: Asked) -> dict[str, Any]:
     """What is printed of an answer."""
-    data: dict[str, Any] = {"design": design.name, "model": None, "lower_f_per_m2": None, "upper_f_per_m2": None}
+    design = body.design
+    data: dict[str, Any] = {
+        "design": design.name,
+        "body": body.provenance,
+        "model": None,
+        "lower_f_per_m2": None,
+        "upper_f_per_m2": None,
+    }
     if isinstance(found, str):
         return data | {"reason": found}
+    found = found.times(body.cells.count)
     area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
     per_area = found.capacitance_f.times(1 / area)
     return data | {

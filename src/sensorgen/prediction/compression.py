@@ -9,11 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from sensorgen.asprinted.compared import Printed
-from sensorgen.asprinted.pressed import piece as printed_piece
-from sensorgen.asprinted.pressed import width_by
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, NotInstalled, OutOfRange
+from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.values import permittivities
 from sensorgen.models import press2d
@@ -28,12 +26,12 @@ from sensorgen.prediction.mesh_ladder import (
     Case,
     Piece,
     Rung,
-    drawn,
     pressed,
     rungs,
     why_not_applicable,
 )
-from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, plain, walked
+from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, plain, run_until_within
+from sensorgen.prediction.sensor_model import piece
 from sensorgen.scene.scene import Scene
 
 __all__ = ["ALL", "Asked", "Held", "answer", "planned", "stresses_kpa"]
@@ -49,7 +47,6 @@ _OF_ALL = (
     "of the capacitance of the deformed outlines, moved apart by what the next coarser mesh differs by: an estimate"
 )
 _NO_C = "displacement alone, no capacitance"
-_AT_REST = 1e-3  # how far bounds may be apart where nothing presses and nothing else is known, as in ``sensorgen cell``
 _MEASURE = "bounds of C apart, at the worst stress"
 _BRACKET = {"press2d": 3.4e-4, "press3d": 2e-3}  # how far the outlines' own bounds are apart, on prototypes [-]
 
@@ -83,17 +80,15 @@ class Asked:
     keep: bool = True
 
 
-def answer(design: Design, asked: Asked, *, printed: Printed | None = None, step: Step | None = None) -> Data:
+def answer(body: Body, asked: Asked, *, step: Step | None = None) -> Data:
     """Displacement and bounds of the capacitance per area over stress.
 
     Parameters
     ----------
-    design : Design
-        Its support is taken to be gone.
+    body : Body
+        Drawn or printed.
     asked : Asked
-        Stresses, how it is held, and how near.
-    printed : Printed, optional
-        What is printed of it, to be pressed in place of the drawing.
+        Stresses, boundary conditions and accuracy.
     step : callable, optional
         Told every stress that is reached [Pa].
 
@@ -106,14 +101,14 @@ def answer(design: Design, asked: Asked, *, printed: Printed | None = None, step
         As :func:`sensorgen.models.press2d.press`; other electrodes than two, sides that a bonded base holds, a
         stress above the least modulus; an accuracy of springs, or one that is not above 0.
     """
-    piece = _piece(design, printed)
-    by = {"printed": width_by(printed)} if printed else {}
+    design, pressed = body.design, piece(body)
+    of = {"body": body.provenance}
     try:
-        return _answer(design, piece, asked, step) | by
+        return _answer(design, pressed, asked, step) | of
     except NotInstalled as error:
         if asked.model:
             raise
-        return _unsolved(design, piece, asked, str(error)) | (by or _at_rest(design, asked))
+        return _unsolved(design, pressed, asked, str(error)) | _at_rest(body, asked) | of
 
 
 def _answer(design: Design, piece: Piece, asked: Asked, step: Step | None) -> Data:
@@ -128,13 +123,9 @@ def _answer(design: Design, piece: Piece, asked: Asked, step: Step | None) -> Da
     return _plain(found, case)
 
 
-def planned(design: Design, asked: Asked, printed: Printed | None = None) -> Plan:
+def planned(body: Body, asked: Asked) -> Plan:
     """What an accuracy takes, before anything is pressed; parameters and errors as of :func:`answer`."""
-    return _planned(design, _piece(design, printed), asked)
-
-
-def _piece(design: Design, printed: Printed | None) -> Piece:
-    return printed_piece(design, printed) if printed else drawn(design)
+    return _planned(body.design, piece(body), asked)
 
 
 def _planned(design: Design, piece: Piece, asked: Asked) -> Plan:
@@ -181,7 +172,7 @@ def _as_near(design: Design, piece: Piece, asked: Asked, step: Step | None) -> D
     plan = _planned(design, piece, asked)
     case = _case(design, piece, asked)
     find = {rung.name: partial(_told, case, asked, rung, step) for rung in _rungs(piece, case.model, asked)}
-    (found, off), level = walked(plan.levels[0], find, lambda answer: _width(*answer))
+    (found, off), level = run_until_within(plan.levels[0], find, lambda answer: _width(*answer))
     data = _plain(_widened(found, off), case) | {"bounds": _OF_ALL}
     return data | {
         "accuracy": asked.accuracy,
@@ -296,12 +287,12 @@ def _unasked(level: Level, why: str) -> Level:
     )
 
 
-def _at_rest(design: Design, asked: Asked) -> Data:
-    """What is known of the capacitance as drawn before anything presses, which takes no mesher."""
-    found = bounds.answer(design, bounds.Asked(_AT_REST, keep=asked.keep))
+def _at_rest(body: Body, asked: Asked) -> Data:
+    """The capacitance at rest, which takes no mesher."""
+    found = bounds.answer(body, bounds.Asked(keep=asked.keep))
     unknown = [None] * (len(asked.stress_kpa) - 1)
     ends = {key: [found[key], *unknown] for key in ("lower_f_per_m2", "upper_f_per_m2")}
-    return ends | {"bounds": f"of the capacitance at rest, as drawn, by {found['model']}; none under stress"}
+    return ends | {"bounds": f"of the capacitance at rest, by {found['model']}; none under stress"}
 
 
 def stresses_kpa(found: Sequence[float]) -> tuple[float, ...]:

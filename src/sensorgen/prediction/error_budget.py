@@ -1,269 +1,291 @@
-"""How wrong a prediction may be, term by term: whatever is not known is moved to its ends, and all computed anew.
+"""Error budget: the largest relative change of the impedance when each uncertain quantity moves to its ends.
 
-Terms are ``cell`` (bounds of the capacitance), ``compression`` (the law's own error), ``boundary`` (how the cell is
-held and touched), ``line`` (sections under the tip), ``tip`` (how its pressure is spread) and one per material value
-on which sources disagree. Each is the largest relative change over the tones.
+Terms of the models are ``cell`` (bounds of the capacitance), ``compression`` (error of the law), ``boundary`` (boundary
+and contact conditions of the cell), ``line`` (sections under the tip) and ``tip`` (profile of its pressure); ``print``
+is what slicers and walls differ by; the others are material values on which sources disagree.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from math import inf
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design
-from sensorgen.design.materials import PIEZORESISTANCE, SET, Material
-from sensorgen.design.values import ENDS, MaterialValue, permittivities, piezoresistance
+from sensorgen.design.materials import PIEZORESISTANCE
+from sensorgen.design.values import ENDS, MaterialValue, material_value, piezoresistance, resistivities
 from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
-from sensorgen.prediction.capacitance import capacitance
-from sensorgen.prediction.sensor_of_design import Sensed
+from sensorgen.prediction.rest_state import permittivity_ratios
+from sensorgen.prediction.sensor_model import SensorModel
+from sensorgen.prediction.spread import spread
 
-MEASURES = ("magnitude", "re", "im", "by_force")
-MODELS = ("cell", "compression", "boundary", "line", "tip")  # the other terms are materials
-_NEAR = 1.01  # ratio of stiffnesses that need not be told apart
+_NEAR = 1.01  # ratio of moduli that are not told apart
 _RICHARDSON = 4 / 3  # of what halving changes, where errors fall by four
 
-Shares = dict[str, float]
 Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Load:
+    """A load at which numbers are stated: frequencies [Hz], force [N], centre of the tip [m]."""
+
+    frequency_hz: tuple[float, ...]
+    force_n: float
+    position_m: float
+
+
+@dataclass(frozen=True)
+class Changes:
+    """Largest relative changes over the frequencies [-].
+
+    Attributes
+    ----------
+    magnitude, re, im : float
+        Of abs(Z), Re Z and Im Z.
+    by_force : float
+        Of dZ/dF.
+    """
+
+    magnitude: float = 0.0
+    re: float = 0.0
+    im: float = 0.0
+    by_force: float = 0.0
+
+    def __add__(self, other: "Changes") -> "Changes":
+        return Changes(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    def max(self, other: "Changes") -> "Changes":
+        """The larger of both, each."""
+        return Changes(*(max(a, b) for a, b in zip(astuple(self), astuple(other), strict=True)))
 
 
 @dataclass(frozen=True)
 class Term:
-    """One thing that is not known.
+    """One source of error.
 
     Attributes
     ----------
     name, what : str
-        Which, and in words what was moved where.
-    shares : dict of str to float, or None
-        Largest relative change of each of ``MEASURES`` [-]; None where nobody knows.
+        Which, and what was moved between which ends.
+    kind : str
+        "model", "print" or "material".
+    changes : Changes or None
+        Its effect; None where it is unknown.
     at_least : bool
-        Whether the change may be larger: a press at one end is beyond what the models bear.
+        Whether it may be larger: the load at one end is beyond the models' range.
     """
 
     name: str
     what: str
-    shares: Shares | None
+    kind: Literal["model", "print", "material"]
+    changes: Changes | None
     at_least: bool = False
 
-    def size(self, measure: str) -> float:
-        """Its share, infinite where nobody knows how large it may be."""
-        return inf if self.shares is None or self.at_least else self.shares[measure]
+    def magnitude(self) -> float:
+        """Relative change of abs(Z), infinite where it is unknown [-]."""
+        return inf if self.changes is None or self.at_least else self.changes.magnitude
 
 
-def budget(
-    design: Design,
-    sensed: Sensed,
-    frequency_hz: Sequence[float],
-    force_n: float,
-    position_m: float,
-    accuracy: float = inf,
-) -> dict[str, Any]:
-    """The error budget of a press, as plain data.
+@dataclass(frozen=True)
+class ErrorBudget:
+    """All sources of error of the impedance at a load.
+
+    Attributes
+    ----------
+    force_n, position_m : float
+        The load [N], [m].
+    terms : tuple of Term
+        All of them.
+    total : Changes or None
+        Their sum, as if each were at its worst: bounds do not average out. None where a term is unknown.
+    at_least : bool
+        Whether the sum may be larger.
+    accuracy : float or None
+        Wanted of abs(Z) [-].
+    """
+
+    force_n: float
+    position_m: float
+    terms: tuple[Term, ...]
+    total: Changes | None
+    at_least: bool
+    accuracy: float | None = None
+
+    def largest(self) -> Term:
+        """The term with the largest effect on abs(Z)."""
+        return max(self.terms, key=Term.magnitude)
+
+    def met_by(self, *kinds: str) -> bool:
+        """Whether the terms of some kinds together are within the accuracy."""
+        return sum(t.magnitude() for t in self.terms if t.kind in kinds) <= (self.accuracy or 0.0)
+
+    def beyond(self) -> tuple[str, ...]:
+        """Names of the terms that alone exceed the accuracy."""
+        return tuple(t.name for t in self.terms if t.magnitude() > (self.accuracy or 0.0))
+
+
+def error_budget(model: SensorModel, load: Load, accuracy: float | None = None) -> ErrorBudget:
+    """The error budget of a load.
 
     Parameters
     ----------
-    design, sensed : Design, Sensed
-        As drawn, and its sensor.
-    frequency_hz : sequence of float
-        Tones [Hz].
-    force_n, position_m : float
-        The press [N], [m].
-    accuracy : float
+    model : SensorModel
+        That is loaded.
+    load : Load
+        Frequencies, force and position.
+    accuracy : float, optional
         Wanted of abs(Z), relative [-].
 
     Raises
     ------
     OutOfRange
-        A press that the sensor cannot take.
-
-    Notes
-    -----
-    ``total`` adds all terms, as if each were at its worst: bounds do not average out. It is None where a term is not
-    known at all, and may be more where one is ``at_least``; such a term is the largest.
+        A load that the sensor cannot take.
     """
-    seen = Seen(sensed.sensor, frequency_hz, force_n, position_m)
-    terms = [*_models(sensed, seen), *_materials(design, sensed, seen)]
-    unknown = any(t.shares is None for t in terms)
-    sums = {m: None if unknown else sum((t.shares or {})[m] for t in terms) for m in MEASURES}
-    return {
-        "press": {"force_n": force_n, "position_m": position_m},
-        "terms": [vars(t) for t in terms],
-        "total": sums,
-        "at_least": any(t.at_least for t in terms),
-        "largest": {m: max(terms, key=lambda t: t.size(m)).name for m in MEASURES},
-        "accuracy": _verdict(terms, accuracy) if accuracy < inf else None,
-    }
+    reference = ReferenceLoad(model.sensor, load)
+    terms = (*_models(model, reference), *_print(model, reference), *_materials(model, reference))
+    total = Changes()
+    for term in terms:
+        total = total + (term.changes or Changes())
+    known = all(t.changes for t in terms)
+    at_least = any(t.at_least for t in terms)
+    return ErrorBudget(load.force_n, load.position_m, terms, total if known else None, at_least, accuracy)
 
 
-def _verdict(terms: Sequence[Term], accuracy: float) -> dict[str, Any]:
-    """Whether the models, and everything, meet an accuracy of abs(Z); terms that alone do not."""
-    sizes = {t.name: t.size("magnitude") for t in terms}
-    return {
-        "asked": accuracy,
-        "met_by_models": sum(size for name, size in sizes.items() if name in MODELS) <= accuracy,
-        "met": sum(sizes.values()) <= accuracy,
-        "missed_by": [name for name, size in sizes.items() if size > accuracy],
-    }
-
-
-class Seen:
-    """A press as it is predicted, to hold other predictions against.
-
-    Parameters
-    ----------
-    sensor : Sensor
-        That is pressed.
-    frequency_hz : sequence of float
-        Tones [Hz].
-    force_n, position_m : float
-        The press [N], [m].
+class ReferenceLoad:
+    """The response to a load, to which responses of other sensors are compared.
 
     Raises
     ------
     OutOfRange
-        A press that the sensor cannot take.
+        A load that the sensor cannot take.
     """
 
-    def __init__(self, sensor: Sensor, frequency_hz: Sequence[float], force_n: float, position_m: float) -> None:
-        self._press = np.asarray(frequency_hz, float), force_n, position_m
-        self._z, self._slope = self._read(sensor)
+    def __init__(self, sensor: Sensor, load: Load) -> None:
+        self._load = np.asarray(load.frequency_hz, float), load.force_n, load.position_m
+        self._z, self._slope = self._response(sensor)
 
-    def _read(self, sensor: Sensor) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-        z, by_force, _ = sensor.response(*self._press)
+    def _response(self, sensor: Sensor) -> tuple[Complex, Complex]:
+        z, by_force, _ = sensor.response(*self._load)
         return z, by_force
 
-    def change(self, *others: Sensor, factor: float = 1.0) -> Shares | None:
-        """Largest relative changes over some other sensors; None where one of them cannot take the press."""
-        found = dict.fromkeys(MEASURES, 0.0)
+    def change(self, *others: Sensor, factor: float = 1.0) -> Changes | None:
+        """Largest relative changes over some other sensors; None where one of them cannot take the load."""
+        found = Changes()
         for other in others:
             try:
-                z, slope = self._read(other)
+                z, slope = self._response(other)
             except OutOfRange:
                 return None
-            parts = (np.abs, np.real, np.imag)
-            apart = [_apart(np.asarray(part(z)), np.asarray(part(self._z))) for part in parts]
-            apart.append(_apart(slope, self._slope))
-            found = {m: max(found[m], factor * value) for m, value in zip(MEASURES, apart, strict=True)}
+            parts = [_difference(part(z), part(self._z)) for part in (np.abs, np.real, np.imag)]
+            found = found.max(Changes(*(factor * d for d in (*parts, _difference(slope, self._slope)))))
         return found
 
 
-def _apart(one: NDArray[Any], other: NDArray[Any]) -> float:
+def _difference(one: NDArray[Any], other: NDArray[Any]) -> float:
     """Largest relative difference, 0 where both are 0 and inf where only the other is."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(np.max(np.where(one == other, 0.0, np.abs(one - other) / np.abs(other)), initial=0.0))
 
 
-def _models(sensed: Sensed, seen: Seen) -> Iterator[Term]:
-    sensor, law, bounds = sensed.sensor, sensed.law, sensed.unloaded.answer.capacitance_f
-    middle = sensor.capacitance_f_per_m / bounds.middle()
-    ends = [replace(sensor, capacitance_f_per_m=middle * end) for end in (bounds.lower, bounds.upper)]
-    yield Term("cell", f"capacitance between its bounds ({sensed.unloaded.answer.model})", seen.change(*ends))
-    others = seen.change(*(replace(sensor, compression=c) for c in law.others)) if law.bounded else None
-    why = "the law's own error" if law.bounded else "B.49 knows no gaps: nobody knows how far off it is"
+def _with_capacitances(model: SensorModel, values_f: Sequence[float]) -> list[Sensor]:
+    per_m = model.sensor.capacitance_f_per_m / model.rest.capacitance.value
+    return [replace(model.sensor, capacitance_f_per_m=per_m * value) for value in values_f]
+
+
+def _models(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
+    sensor, law, c = model.sensor, model.law, model.rest.capacitance
+    ends = _with_capacitances(model, (c.model.lower, c.model.upper))
+    yield Term("cell", f"capacitance between its bounds ({model.rest.answer.model})", "model", reference.change(*ends))
+    others = reference.change(*(replace(sensor, compression=o) for o in law.others)) if law.bounded else None
+    why = "error of the law" if law.bounded else "law of a solid plate (B.49) on a cell with gaps: error unknown"
     if law.others and law.others[0].name != law.compression.name:
         why = f"{law.compression.name} or {law.others[0].name}"
-    yield Term("compression", why, others)
+    yield Term("compression", why, "model", others)
     if law.held:
-        held = seen.change(*(replace(sensor, compression=c) for c in law.held))
-        yield Term("boundary", "faces that stick, a stiff tip, or a cell free to widen", held)
+        held = reference.change(*(replace(sensor, compression=o) for o in law.held))
+        yield Term("boundary", "faces that stick, a stiff tip, or a cell free to widen", "model", held)
     if sensor.profile == UNIFORM:
-        yield Term("line", "one section under the tip is exact", seen.change(sensor))
+        yield Term("line", "one section under the tip is exact", "model", reference.change(sensor))
     else:
-        finer = seen.change(replace(sensor, pieces=2 * sensor.pieces), factor=_RICHARDSON)
-        yield Term("line", f"{sensor.pieces} sections under the tip", finer)
-    spread = [replace(sensor, profile=name) for name in PROFILES if name != sensor.profile]
-    yield Term("tip", f"pressure spread like {', '.join(s.profile for s in spread)}", seen.change(*spread))
+        finer = reference.change(replace(sensor, pieces=2 * sensor.pieces), factor=_RICHARDSON)
+        yield Term("line", f"{sensor.pieces} sections under the tip", "model", finer)
+    profiles = [replace(sensor, profile=name) for name in PROFILES if name != sensor.profile]
+    what = f"pressure distributed like {', '.join(s.profile for s in profiles)}"
+    yield Term("tip", what, "model", reference.change(*profiles))
 
 
-def _materials(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:
-    """One term for each value that sources disagree on."""
-    sensor = sensed.sensor
-    tracks = [_range(*design.slot(f"{end}_electrode"), "resistivity_ohm_m") for end in ENDS]
+def _print(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
+    span = model.rest.capacitance.print
+    if span.lower < span.upper:
+        ends = _with_capacitances(model, (span.lower, span.upper))
+        names = ", ".join(model.body.cells.scenes)
+        yield Term("print", f"capacitance by line widths of {names}", "print", reference.change(*ends))
+
+
+def _materials(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
+    """One term for each value on which sources disagree."""
+    design, sensor = model.body.design, model.sensor
+    tracks = [spread(design, value) for value in resistivities(design).values()]
     if any(low < high for low, high in tracks):
         ends = [replace(sensor, resistivity_ohm_m=(a, b)) for a, b in zip(*tracks, strict=True)]
-        yield Term("resistivity", f"of the electrodes, {_said(tracks)} ohm m", seen.change(*ends))
-    yield from _piezoresistance(design, sensed, seen)
-    yield from _stiffness(design, sensed, seen)
-    yield from _permittivity(design, sensed, seen)
+        what = f"of the electrodes, {_range_text(tracks)} ohm m"
+        yield Term("resistivity", what, "material", reference.change(*ends))
+    rises = [_piezoresistance_range(design, end) for end in ENDS]
+    if any(low < high for low, high in rises):
+        ends = [replace(sensor, piezoresistance_per_pa=(a, b)) for a, b in zip(*rises, strict=True)]
+        what = f"of the electrodes, {_range_text(rises)} 1/Pa"
+        yield Term("piezoresistance", what, "material", reference.change(*ends))
+    yield from _stiffness(model, reference)
+    for name, ratios in permittivity_ratios(design, model.body.cells.first()).items():
+        value = next(v for v in model.rest.values if v.material == name and v.quantity == "relative_permittivity")
+        low, high = spread(design, value)
+        ends = [replace(sensor, capacitance_f_per_m=sensor.capacitance_f_per_m * ratio) for ratio in ratios]
+        yield Term(f"permittivity of {name}", f"{low:g} to {high:g}", "material", reference.change(*ends))
 
 
-def _piezoresistance(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:
-    """None where nobody says; a material of which only one of a design's sources speaks may have it in both places."""
-    taken, tracks = piezoresistance(design), []
-    for end in ENDS:
-        material, _ = design.slot(f"{end}_electrode")
-        tracks.append(_among(material, taken.get(end, MaterialValue(material.name, PIEZORESISTANCE, 0.0, ""))))
-    if any(low < high for low, high in tracks):
-        ends = [replace(sensed.sensor, piezoresistance_per_pa=(a, b)) for a, b in zip(*tracks, strict=True)]
-        yield Term("piezoresistance", f"of the electrodes, {_said(tracks)} 1/Pa", seen.change(*ends))
+def _piezoresistance_range(design: Design, end: str) -> tuple[float, float]:
+    """Without a value for one electrode, it may be 0 there."""
+    material, _ = design.slot(f"{end}_electrode")
+    value = piezoresistance(design).get(end, MaterialValue(material.name, PIEZORESISTANCE, 0.0, ""))
+    return spread(design, value)
 
 
-def _stiffness(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:
-    """All moduli at once: a cell gives way between what it would if all changed as much as those that change most."""
-    sensor, used = sensed.sensor, design.used()
-    softest, stiffest, said = inf, 0.0, []
-    for taken in sensed.law.taken:
-        if taken.quantity == "youngs_modulus_pa":
-            low, high = _range(design.material(taken.material), used[taken.material], taken.quantity)
-            softest, stiffest = min(softest, low / taken.value), max(stiffest, high / taken.value)
-            said.append(f"{taken.material} {low / 1e6:g} to {high / 1e6:g} MPa")
+def _stiffness(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
+    """All moduli at once, scaled by the largest change that any of them may have."""
+    design, sensor = model.body.design, model.sensor
+    used, softest, stiffest, parts = design.used(), inf, 0.0, []
+    for value in model.law.taken:
+        if value.quantity == "youngs_modulus_pa":
+            named = material_value(design.material(value.material), used[value.material], value.quantity)
+            low, high = spread(design, named)
+            softest, stiffest = min(softest, low / value.value), max(stiffest, high / value.value)
+            parts.append(f"{value.material} {low / 1e6:g} to {high / 1e6:g} MPa")
     if softest < stiffest:
-        borne = _borne(sensor, softest, seen)
-        ends = [replace(sensor, compression=sensor.compression.stiffer(factor)) for factor in (borne, stiffest)]
-        beyond = f": below {borne:.2g} of it the press is beyond the law of compression" if borne > softest else ""
-        yield Term("stiffness", ", ".join(said) + beyond, seen.change(*ends), at_least=borne > softest)
+        least = _least_modulus(sensor, softest, reference)
+        ends = [replace(sensor, compression=sensor.compression.stiffer(factor)) for factor in (least, stiffest)]
+        beyond = f": below {least:.2g} of it the load exceeds the compression law" if least > softest else ""
+        what = ", ".join(parts) + beyond
+        yield Term("stiffness", what, "material", reference.change(*ends), at_least=least > softest)
 
 
-def _borne(sensor: Sensor, softest: float, seen: Seen) -> float:
-    """The share of the stiffness from which on a press can be borne: ``softest``, or a per cent above what cannot."""
+def _least_modulus(sensor: Sensor, softest: float, reference: ReferenceLoad) -> float:
+    """Factor of the modulus above which the load is within the law: ``softest``, or a per cent above the limit."""
     law = sensor.compression
     low, high = softest, 1.0
-    if seen.change(replace(sensor, compression=law.stiffer(low))):
+    if reference.change(replace(sensor, compression=law.stiffer(low))):
         return low
     while high / low > _NEAR:
         middle = (low * high) ** 0.5
-        bearable = seen.change(replace(sensor, compression=law.stiffer(middle)))
+        bearable = reference.change(replace(sensor, compression=law.stiffer(middle)))
         low, high = (low, middle) if bearable else (middle, high)
     return high
 
 
-def _permittivity(design: Design, sensed: Sensed, seen: Seen) -> Iterator[Term]:
-    """What other permittivities make of the capacitance, by the cheapest model, whose error mostly cancels."""
-    known = {t.material: t for t in permittivities(design)}
-    values = {name: t.value for name, t in known.items()}
-    answer = sensed.unloaded.answer
-    scene = sensed.piece.scene
-    cheap = answer if answer.wanted == inf else capacitance(scene, values)
-    middle = cheap.capacitance_f.middle()
-    used, sensor = design.used() | {"air": ""}, sensed.sensor
-    for name, taken in known.items():
-        low, high = _range(design.material(name), used[name], taken.quantity)
-        if low < high:
-            others = [values | {name: end} for end in (low, high) if end != taken.value]
-            found = [capacitance(scene, other).capacitance_f.middle() for other in others]
-            ends = [replace(sensor, capacitance_f_per_m=sensor.capacitance_f_per_m * c / middle) for c in found]
-            yield Term(f"permittivity of {name}", f"{low:g} to {high:g}", seen.change(*ends))
-
-
-def _range(material: Material, source: str, quantity: str) -> tuple[float, float]:
-    """Lowest and highest of what its sources say; the user's own value is not doubted."""
-    value = material.value(quantity, source)
-    return _among(material, MaterialValue(material.name, quantity, value.value, value.source))
-
-
-def _among(material: Material, taken: MaterialValue) -> tuple[float, float]:
-    """Lowest and highest of a value that is taken and of what all sources say."""
-    plausible = [v.value for v in material.properties.get(taken.quantity, []) if not v.implausible]
-    if taken.source == SET:
-        plausible = []
-    return min([taken.value, *plausible]), max([taken.value, *plausible])
-
-
-def _said(tracks: Sequence[tuple[float, float]]) -> str:
-    low, high = min(a for a, _ in tracks), max(b for _, b in tracks)
+def _range_text(ranges: Sequence[tuple[float, float]]) -> str:
+    low, high = min(a for a, _ in ranges), max(b for _, b in ranges)
     return f"{low:.3g} to {high:.3g}"

@@ -1,4 +1,4 @@
-"""Plans as databases print them: who could be asked at each level, what that should cost and reach, and what it did."""
+"""Plans as databases print them: candidate models of each level, expected cost and error, and what they reached."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -13,19 +13,18 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True)
 class Candidate:
-    """A model in a plan: what was expected of it, and what came of it.
+    """A model in a plan: expected and reached error and time.
 
     Attributes
     ----------
     model : str
         Its name.
     expected_width, expected_seconds : float or None
-        How near it should come, in the terms of its level [-], and time [s], scaled from the scene that it was measured
-        on; None where it never was.
+        Error in the measure of its level [-] and time [s], scaled from the scene of its benchmark; None without one.
     passed_over : str
-        Why it was not asked, or "".
+        Why it was not run, or "".
     width, seconds : float or None
-        What it gave, and how long it took, its imports left out.
+        Error that it reached [-], and run time without imports [s].
     """
 
     model: str
@@ -36,26 +35,26 @@ class Candidate:
     seconds: float | None = None
 
     def reach(self) -> float:
-        """Expected width; 0 where nothing is known, so that it is tried."""
+        """Expected error; 0 without a benchmark, so that it is tried."""
         return self.expected_width or 0.0
 
 
 @dataclass(frozen=True)
 class Level:
-    """One thing that an answer rests on, and who could tell it.
+    """One level of models that a prediction rests on.
 
     Attributes
     ----------
     name : str
         "cell", "compression" or "line".
     measure : str
-        What the widths of its candidates are, in words.
+        What the errors of its candidates are of, in words.
     allowed : float
-        The largest of them that will do [-].
+        Tolerance [-].
     candidates : tuple of Candidate
-        The cheapest first.
+        The least expensive first.
     chosen : str
-        The model whose answer is taken, or that is expected to do; "" where none can speak.
+        The model whose answer is used, or that is expected to meet the tolerance; "" where none applies.
     """
 
     name: str
@@ -67,18 +66,18 @@ class Level:
 
 @dataclass(frozen=True)
 class Plan:
-    """What an answer as near as asked takes, level by level.
+    """How a tolerance is met, level by level.
 
     Attributes
     ----------
     accuracy : float
         Wanted of the answer, relative [-].
     of : str
-        Which answer, in words.
+        Quantity and reference load, in words.
     levels : tuple of Level
-        In the order in which they are worked out.
+        In the order in which they run.
     width : float or None
-        What all of them came to together; infinite where one is not known [-].
+        Error of all levels together; infinite where one is unknown [-].
     """
 
     accuracy: float
@@ -88,44 +87,52 @@ class Plan:
 
 
 def plain(plan: Plan) -> dict[str, Any]:
-    """A plan as plain data; widths that nobody knows are None."""
+    """A plan as plain data; unknown errors are None."""
     data = asdict(plan)
     for part in (data, *(c for level in data["levels"] for c in level["candidates"])):
         part |= {key: None for key in ("width", "expected_width") if part.get(key) == inf}
     return data
 
 
+def of_plain(data: dict[str, Any]) -> Plan:
+    """A plan from :func:`plain` data."""
+    levels = (
+        Level(**level | {"candidates": tuple(Candidate(**c) for c in level["candidates"])}) for level in data["levels"]
+    )
+    return Plan(**data | {"levels": tuple(levels)})
+
+
 def cheapest(candidates: tuple[Candidate, ...], allowed: float) -> str:
-    """Name of the first candidate that should do; of the one that should come nearest where none is near enough."""
+    """Name of the first candidate expected within tolerance; else of the one with the least expected error."""
     able = [c for c in candidates if not c.passed_over]
     enough = [c for c in able if c.reach() <= allowed]
     nearest = sorted(able, key=Candidate.reach)
     return next((c.model for c in (*enough, *nearest)), "")
 
 
-def walked(
+def run_until_within(
     level: Level, find: Mapping[str, Callable[[], Found]], width: Callable[[Found], float]
 ) -> tuple[Found, Level]:
-    """Ask candidates from the chosen one on until one is near enough; if none can answer, those before it.
+    """Run candidates from the planned one upwards until one meets the tolerance, else fall back downwards.
 
     Parameters
     ----------
     level : Level
         As planned.
     find : mapping of str to function
-        What a candidate answers, by its model; a SensorgenError where it cannot.
+        Runs a candidate, by its model; raises SensorgenError where it fails.
     width : function
-        How near an answer is, in the terms of the level; infinite where nobody knows.
+        Error of a result in the measure of the level; infinite where unknown.
 
     Returns
     -------
     (answer, Level)
-        The first that will do, or the nearest; and the level with what came of every candidate.
+        The first result within tolerance, or the most accurate; and the level with every candidate's results.
 
     Raises
     ------
     SensorgenError
-        What the last one said, where none can answer.
+        Of the last candidate, where all fail.
     """
     names = [c.model for c in level.candidates if not c.passed_over]
     start = names.index(level.chosen)
@@ -145,6 +152,6 @@ def walked(
         seconds = time.perf_counter() - begun
         came[name] = replace(came[name], width=found[name][0], seconds=seconds)
     if not found:
-        raise said or SensorgenError(f"{level.name}: no model can speak of it")
+        raise said or SensorgenError(f"{level.name}: no model applies")
     best = min(found, key=lambda name: found[name][0])
     return found[best][1], replace(level, candidates=tuple(came.values()), chosen=best)

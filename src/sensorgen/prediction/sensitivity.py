@@ -7,9 +7,11 @@ import numpy as np
 
 from sensorgen.design.design import Design
 from sensorgen.models.compression import Compression
+from sensorgen.prediction import bodies
 from sensorgen.prediction.compression_law import solved
 from sensorgen.prediction.identifiability.fisher import bounds, slopes
-from sensorgen.prediction.sensor_of_design import sensor_of
+from sensorgen.prediction.rest_state import rest_state
+from sensorgen.prediction.sensor_model import build_sensor
 
 HELD: dict[str, dict[str, Any]] = {"free": {"base": "sliding", "period": "free"}, "bonded": {}}
 NOISE = 1e-3
@@ -74,7 +76,8 @@ def sensitivity(
     "free" slides on its base and widens as it likes, "bonded" can do neither. A plate that is bonded over an unbounded
     area gives way by its bulk modulus alone; over a width of 10 mm it is :func:`sensorgen.models.compression.bonded`.
     """
-    given = sensor_of(design, "unconfined", accuracy=accuracy).sensor
+    body = bodies.drawn(design)
+    given = build_sensor(body, "unconfined", rest=rest_state(body, accuracy)).sensor
     how = solved(design, **HELD[law]).compression if isinstance(law, str) else law
     sensor = replace(given, compression=how)
     if resistivity_ohm_m is not None:

@@ -4,25 +4,23 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from sensorgen.asprinted.compared import Printed
 from sensorgen.core import cache as cached
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange
 from sensorgen.core.parallel import in_parallel, said
-from sensorgen.design.design import Design
+from sensorgen.design.body import Body
 from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.compression import Asked, Data, answer
 
-Point = tuple[Design, Printed | None]
 Kept = list[tuple[Any, Any]]
 
 
-def answers(points: Sequence[Point], asked: Asked, jobs: int, done: Callable[[], None]) -> list[Data | str]:
+def answers(points: Sequence[Body], asked: Asked, jobs: int, done: Callable[[], None]) -> list[Data | str]:
     """How designs give way, those that are not known from before in several processes; a reason where one fails.
 
     Parameters
     ----------
-    points : sequence of (Design, Printed or None)
-        Each with what is printed of it, if that is to be pressed; in the order of the answers.
+    points : sequence of Body
+        In the order of the answers.
     asked : Asked
         As of :func:`sensorgen.prediction.compression.answer`.
     jobs : int
@@ -37,11 +35,11 @@ def answers(points: Sequence[Point], asked: Asked, jobs: int, done: Callable[[],
     SensorgenError
         Bounds that cross; a process that ended before its answer, as when the memory is full.
     """
-    found = {k: known for k, point in enumerate(points) if (known := _known(*point, asked)) is not None}
+    found = {k: known for k, point in enumerate(points) if (known := _known(point, asked)) is not None}
     for _ in found:
         done()
     missing = [k for k in range(len(points)) if k not in found]
-    for n, (result, entries) in in_parallel(_apart, [(*points[k], asked) for k in missing], jobs):
+    for n, (result, entries) in in_parallel(_apart, [(points[k], asked) for k in missing], jobs):
         for entry in entries:  # this process alone writes: the others may be ended at any moment
             cached.keep(*entry)
         found[missing[n]] = result
@@ -49,23 +47,23 @@ def answers(points: Sequence[Point], asked: Asked, jobs: int, done: Callable[[],
     return [found[k] for k in range(len(points))]
 
 
-def _known(design: Design, printed: Printed | None, asked: Asked) -> Data | str | None:
+def _known(body: Body, asked: Asked) -> Data | str | None:
     """The answer of a point, or why there is none, if nothing has to be solved for it."""
     if not asked.keep:
         return None
     try:
         with cached.only_known():
-            return _said(design, printed, asked)
+            return _said(body, asked)
     except cached.Unknown:
         return None
 
 
-def _apart(design: Design, printed: Printed | None, asked: Asked) -> tuple[Data | str, Kept]:
+def _apart(body: Body, asked: Asked) -> tuple[Data | str, Kept]:
     """The answer of a point, or why there is none; and what is to be kept of it."""
     with cached.held_back() as entries:
-        return _said(design, printed, asked), entries
+        return _said(body, asked), entries
 
 
-def _said(design: Design, printed: Printed | None, asked: Asked) -> Data | str:
-    work = partial(answer, design, asked, printed=printed)
+def _said(body: Body, asked: Asked) -> Data | str:
+    work = partial(answer, body, asked)
     return said(work, refused=(BadInput, MissingValue, OutOfRange, Unpredictable))

@@ -19,6 +19,7 @@ from sensorgen.prediction import capacitance as planner
 from sensorgen.prediction import losses
 from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.capacitance_answer import Asked
+from sensorgen.prediction.rest_state import PLANE
 
 NAMES = (*thesis_cells.NAMED, thesis_swept.NAME)
 SHAPES = {name: law.shapes for name, law in thesis_cells.NAMED.items()} | {thesis_swept.NAME: thesis_swept.SHAPES}
@@ -105,7 +106,9 @@ def _field(design: Design, asked: Asked, press_mm: float) -> Found:
     sizes = asdict(replace(now, length_mm=side_mm, width_mm=side_mm))
     pressed = designs.make(design.model_dump(exclude={"parameters"}) | {"parameters": sizes})
     taken = permittivities(pressed)
-    found = planner.capacitance(pressed.in_use, {t.material: t.value for t in taken}, asked.width, keep=asked.keep)
+    found = planner.capacitance(
+        pressed.in_use, {t.material: t.value for t in taken}, asked.width or PLANE, keep=asked.keep
+    )
     value = found.capacitance_f.middle() / (side_mm * M_PER_MM) ** 2 * thesis_swept.stretch(rest, now)
     said = f"{thesis_swept.SOURCE}: sizes changed by hand, their field by {found.model} within {found.width():.2g}"
     return value, f"{said}; how cells really give way: compress", taken

@@ -48,10 +48,19 @@ def sections(scene: Scene) -> list[Section]:
 
 @lru_cache(maxsize=8)
 def _fewest(scene: Scene) -> list[Section]:
-    normals = [n for n in "yx" if all(p.axis == n or p.is_box() for b in scene.bodies for p in b.prisms)]
-    if not normals:
+    found = [_sections(scene, n) for n in "yx" if _is_constant(scene, n)]
+    if not found:
         raise ValueError("no direction in which this scene is made of constant cross-sections")
-    return min((_sections(scene, n) for n in normals), key=len)
+    return min(found, key=len)
+
+
+def square_to(scene: Scene, normal: str) -> list[Section]:
+    """The distinct cross-sections of a scene square to "x" or "y"; none where some prism changes along that axis."""
+    return _sections(scene, normal) if _is_constant(scene, normal) else []
+
+
+def _is_constant(scene: Scene, normal: str) -> bool:
+    return all(p.axis == normal or p.is_box() for b in scene.bodies for p in b.prisms)
 
 
 def _sections(scene: Scene, normal: str) -> list[Section]:

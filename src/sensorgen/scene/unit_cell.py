@@ -90,7 +90,7 @@ class Cell:
 
 
 @lru_cache(maxsize=8)
-def cell(section: Section, height_mm: float) -> Cell:
+def cell(section: Section, height_mm: float, evenly: bool = True) -> Cell:
     """The smallest piece of a section that mirrors at its own two sides continue to the whole.
 
     Parameters
@@ -99,22 +99,24 @@ def cell(section: Section, height_mm: float) -> Cell:
         Polygons of any form.
     height_mm : float
         Up to where air fills what no polygon does [mm].
+    evenly : bool
+        Whether a larger piece that occurs a whole number of times is preferred to a smaller one that the end cuts.
 
     Raises
     ------
     ValueError
         Outlines overlap, or an outline is open.
     """
-    return mirrored([_slice(column, height_mm) for column in columns(section)])
+    return mirrored([_slice(column, height_mm) for column in columns(section)], evenly)
 
 
-def mirrored(slices: list[Slice]) -> Cell:
+def mirrored(slices: list[Slice], evenly: bool = True) -> Cell:
     """The smallest run of slices that mirrors at its own two sides continue to all of them."""
     whole = _straightened(slices)
     places = _candidates(whole)
     end = whole[-1].right_mm
     is_mirror = cache(partial(_is_mirror, whole))
-    for fits in (_is_even, _has_room):
+    for fits in (_is_even, _has_room) if evenly else (_has_room, _is_even):
         for low, high in _pairs(places, end):
             if not fits(low - places[0], high - low, end - places[0]) or not (is_mirror(low) and is_mirror(high)):
                 continue

@@ -18,12 +18,14 @@ from sensorgen.design import materials, printer
 from sensorgen.design.design import Design
 from sensorgen.export import slicing, threemf
 from sensorgen.export.slicers import cura, prusa
-from sensorgen.prediction.prediction import prediction
+from sensorgen.prediction import bodies
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.results import Prediction, to_json
 from sensorgen.scene.geometry.cad import CadProcess
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
 LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")
-STEPS = ("meshes", "checks", "validity", "3MF", "profiles", "drawing", "STEP", "done")
+STEPS = ("meshes", "checks", "validity", "prediction", "3MF", "profiles", "drawing", "STEP", "done")
 
 
 @dataclass(frozen=True)
@@ -36,13 +38,19 @@ class Built:
         Where the files are.
     review : Review
         The findings.
-    prediction : dict
-        As in ``prediction.json``.
+    prediction : Prediction
+        Of the print, with the drawing's beside it.
     """
 
     folder: Path
     review: Review
-    prediction: dict[str, Any]
+    prediction: Prediction
+
+    @property
+    def verdict(self) -> str:
+        """CHANGE where a check reports an error, PRINT WITH WARNINGS, or PRINT."""
+        counts = self.review.counts()
+        return "CHANGE" if counts["error"] else "PRINT WITH WARNINGS" if counts["warning"] else "PRINT"
 
 
 def build(
@@ -88,7 +96,8 @@ def build(
         stage = stack.enter_context(store.staging(folder))
         step_file = stage / f"{design.name}.step"
         job = kernel.submit(design.printed, _colours(design), design.name, step_file) if kernel else None
-        predicted = prediction(design)
+        step("prediction")
+        predicted = evaluate(bodies.default_body(design, folder))
         for name, content in _files(design, held, predicted, step):
             store.write(stage, {name: content})
         if job:
@@ -99,7 +108,7 @@ def build(
     return Built(folder, held, predicted)
 
 
-def _files(design: Design, held: Review, predicted: dict[str, Any], step: Step) -> Iterator[tuple[str, bytes]]:
+def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> Iterator[tuple[str, bytes]]:
     name = design.name
     step("3MF")
     for family in threemf.FAMILIES:
@@ -113,8 +122,20 @@ def _files(design: Design, held: Review, predicted: dict[str, Any], step: Step) 
     step("drawing")
     yield f"{name}.svg", draw(design, held).encode()
     yield "check.json", json_bytes(report(design, held))
-    yield "prediction.json", json_bytes(predicted)
+    yield "prediction.json", json_bytes(json.loads(to_json(predicted)))
     yield "design.json", json_bytes(design.model_dump(mode="json"))
+
+
+def as_dict(design: Design, built: Built, files: list[str]) -> dict[str, Any]:
+    """The result as plain data, for JSON."""
+    return {
+        "name": design.name,
+        "folder": str(built.folder),
+        "files": files,
+        "verdict": built.verdict,
+        "findings": [finding.as_dict() for finding in built.review.findings],
+        "prediction": json.loads(to_json(built.prediction)),
+    }
 
 
 def _await(job: "Future[None]", step: Step) -> None:

@@ -6,12 +6,13 @@ from functools import cached_property
 
 import numpy as np
 
-from sensorgen.core.bounds import Interval
 from sensorgen.design.design import Design, make
 from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.capacitance import unloaded
-from sensorgen.prediction.sensor_of_design import Sensed, sensor_of
+from sensorgen.prediction import bodies
+from sensorgen.prediction.evaluate import sensor_model
+from sensorgen.prediction.rest_state import rest_state
+from sensorgen.prediction.sensor_model import SensorModel
 
 PERMITTIVITY = "relative_permittivity"
 FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)  # of permittivity or film at which the capacitance is worked out
@@ -30,9 +31,9 @@ class Movable:
     design: Design
 
     @cached_property
-    def sensed(self) -> Sensed:
-        """As predicted; raises what :func:`sensorgen.prediction.sensor_of_design.sensor_of` raises."""
-        return sensor_of(self.design)
+    def model(self) -> SensorModel:
+        """Of the print, as predicted; raises as :func:`sensorgen.prediction.evaluate.sensor_model`."""
+        return sensor_model(bodies.default_body(self.design))[0]
 
     @property
     def film(self) -> str:
@@ -42,14 +43,14 @@ class Movable:
     @cached_property
     def permittivity(self) -> float:
         """Of the film, as predicted [-]."""
-        return next(t.value for t in self.sensed.unloaded.taken if t.material == self.film)
+        return next(t.value for t in self.model.rest.values if t.material == self.film)
 
-    def capacitance_f(self, permittivity: float) -> Interval:
+    def capacitance_f(self, permittivity: float) -> float:
         """With another permittivity of the film's material [F]."""
         data = self.design.model_dump(exclude_defaults=True, mode="json")
         values = data.get("material_values", {})
         own = values.get(self.film, {}) | {PERMITTIVITY: permittivity}
-        return unloaded(make(data | {"material_values": values | {self.film: own}})).answer.capacitance_f
+        return _capacitance_f(make(data | {"material_values": values | {self.film: own}}))
 
     @cached_property
     def by_permittivity(self) -> tuple[Real, Real]:
@@ -64,15 +65,19 @@ class Movable:
         if not d:
             return np.log(FACTORS), np.zeros(len(FACTORS))
 
-        def at(factor: float) -> Interval:
+        def at(factor: float) -> float:
             parameters = data.get("parameters", {}) | {"dielectric_mm": d * factor}
-            return unloaded(make(data | {"parameters": parameters})).answer.capacitance_f
+            return _capacitance_f(make(data | {"parameters": parameters}))
 
         return self._curve(at)
 
-    def _curve(self, at: Callable[[float], Interval]) -> tuple[Real, Real]:
-        known = self.sensed.unloaded.answer.capacitance_f.middle()
-        return np.log(FACTORS), np.log([at(k).middle() / known if k != 1 else 1.0 for k in FACTORS])
+    def _curve(self, at: Callable[[float], float]) -> tuple[Real, Real]:
+        known = self.model.rest.capacitance.value
+        return np.log(FACTORS), np.log([at(k) / known if k != 1 else 1.0 for k in FACTORS])
+
+
+def _capacitance_f(design: Design) -> float:
+    return rest_state(bodies.default_body(design)).capacitance.value
 
 
 def moved(sensor: Sensor, resistivity: float = 1.0, capacitance: float = 1.0, leak_s: float = 0.0) -> Sensor:

@@ -151,7 +151,7 @@ def _run_errors(recorded: Sequence[Run], found: Comparison, values: Sequence[Fit
     for run in recorded:
         try:
             design = _design(found, run.entry.specimen)
-            pair = [Movable(d).sensed.sensor for d in (design, with_values(design, values))]
+            pair = [Movable(d).model.sensor for d in (design, with_values(design, values))]
         except SensorgenError:
             continue
         f, measured = run.recording.tones_hz, np.log(run.rest_ohm)

@@ -1,6 +1,6 @@
 r"""Resistivity and leak from a multimeter's readings.
 
-An electrode lies between :math:`\varrho L^2 / V` and :math:`\varrho L / (H W)`, so that each reading allows a range of
+An electrode's resistance over its resistivity is known between bounds, so that each reading allows a range of
 :math:`\varrho`. A film that leaks evenly lets R_Y read less than the electrode has; a bridge at the contacts does not:
 nobody knows which it was, so the range runs from R_Y as it was read to R_Y as an even leak would have it.
 """
@@ -12,13 +12,15 @@ from math import exp, isfinite, log
 import numpy as np
 
 from sensorgen.analysis.comparison import Compared
-from sensorgen.analysis.comparison.expected import ENDS, electrode_ohm
 from sensorgen.analysis.comparison.leaky import electrode_and_leak
 from sensorgen.analysis.fit.results import LEVEL, Fitted, Untold
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.materials import FILM_LEAK
+from sensorgen.design.values import resistivities
 from sensorgen.measure.recording.samples import Real
+from sensorgen.prediction import bodies
+from sensorgen.prediction.electrodes import electrode_resistance
 
 RESISTIVITY = "resistivity_ohm_m"
 LEAST = 3  # readings that a scatter can be told from
@@ -48,11 +50,13 @@ def allowed(row: Compared, design: Design) -> Allowed | None:
 
 def _per_resistivity(design: Design) -> tuple[float, float]:
     """Bounds of an electrode's resistance over its resistivity [1/m]."""
-    p = design.params
-    squares_per_m = p.length_mm / (p.electrode_mm * p.width_mm) / M_PER_MM
-    found = electrode_ohm(design, dict.fromkeys(ENDS, squares_per_m))
-    assert found is not None  # noqa: S101 - plates are given
-    return found.lower, found.upper
+    body, rho = bodies.default_body(design), resistivities(design)
+    found = [
+        end / rho[name].value
+        for name, r in electrode_resistance(body).items()
+        for end in (r.model.lower, r.model.upper, r.print.lower, r.print.upper)
+    ]
+    return min(found), max(found)
 
 
 def resistivity(readings: Sequence[Allowed], material: str, seed: int) -> Fitted | Untold:

@@ -42,7 +42,7 @@ def of_run(run: Run, of: Movable) -> OfRun:
     """
     from scipy.optimize import least_squares
 
-    sensor, f = of.sensed.sensor, run.recording.tones_hz
+    sensor, f = of.model.sensor, run.recording.tones_hz
     measured = np.log(run.rest_ohm)
     weight = 1 / np.maximum(np.abs(run.rest_error_ohm / run.rest_ohm), _FLOOR)
     scale = 2 * pi * float(f.min()) * sensor.capacitance_f()
@@ -119,7 +119,7 @@ def _together(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
 
 def _resistivity(fits: Sequence[OfRun]) -> list[Fitted | Untold]:
     factors = [
-        (fit.resistivity[0] + log(sum(fit.of.sensed.sensor.resistivity_ohm_m) / 2), fit.resistivity[1]) for fit in fits
+        (fit.resistivity[0] + log(sum(fit.of.model.sensor.resistivity_ohm_m) / 2), fit.resistivity[1]) for fit in fits
     ]
     at, error = _together(factors)
     material = fits[0].of.design.slot("top_electrode")[0].name
@@ -145,8 +145,8 @@ def _permittivity(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
             )
         slope = float(np.interp(fit.capacitance[0], curve, np.gradient(curve, factor)))
         at = float(np.interp(fit.capacitance[0], curve, factor))
-        bounds = fit.of.sensed.unloaded.answer.capacitance_f
-        open_ = log(bounds.upper / bounds.lower) / 2 / _SURE  # what the model of the cell leaves open
+        c = fit.of.model.rest.capacitance  # what model and print leave open
+        open_ = log(c.model.upper / c.model.lower * c.print.upper / c.print.lower) / 2 / _SURE
         found.append((log(fit.of.permittivity) + at, sqrt(fit.capacitance[1] ** 2 + open_**2) / slope))
     at, _ = _together(found)
     error = max(_together(found)[1], max(e for _, e in found))  # bounds of a model do not average out
@@ -164,14 +164,14 @@ def _modulus(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
     at, error = _together(found)
     if error > _UNSURE:
         return Untold(quantity, f"{len(found)} recordings leave a factor of {exp(error):.3g} open")
-    law = fits[0].of.sensed.sensor.compression.name
+    law = fits[0].of.model.sensor.compression.name
     note = f"presses of {len(found)} recordings, by the law of compression {law}; all moduli move together"
     return Fitted(film, quantity, *_interval(at, error), note)
 
 
 def _leak(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
     """Per area, where it stands out of its error in every recording."""
-    areas = [fit.of.sensed.sensor.length_m * fit.of.sensed.sensor.width_m for fit in fits]
+    areas = [fit.of.model.sensor.length_m * fit.of.model.sensor.width_m for fit in fits]
     found = [(fit.leak_s[0] / a, fit.leak_s[1] / a) for fit, a in zip(fits, areas, strict=True)]
     if any(at < _SURE * error for at, error in found):
         most = max(at + _SURE * error for at, error in found)
@@ -184,4 +184,4 @@ def _leak(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
 
 
 def _modulus_of(fit: OfRun, film: str) -> float:
-    return next(t.value for t in fit.of.sensed.taken if t.material == film and t.quantity == "youngs_modulus_pa")
+    return next(t.value for t in fit.of.model.values if t.material == film and t.quantity == "youngs_modulus_pa")

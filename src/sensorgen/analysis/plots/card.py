@@ -35,7 +35,7 @@ def figure(
     frequency_hz : sequence of float
         Tones [Hz].
     noise : float
-        As of :func:`sensorgen.prediction.identifiability.card` [-].
+        As of :func:`sensorgen.prediction.identifiability.identify` [-].
     force_n : float
         Greatest press [N].
     title : str

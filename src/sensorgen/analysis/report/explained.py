@@ -118,7 +118,7 @@ def _impedances(found: Comparison, recorded: Sequence[Run]) -> Iterator[Kind]:
         of = Movable(found.designs[found.names[run.entry.specimen]]) if run.entry.specimen in found.names else None
         try:
             if of is not None and np.isfinite(run.rest_ohm).all():
-                _ = of.sensed.sensor
+                _ = of.model.sensor
                 known.append((run, of))
         except SensorgenError:
             continue
@@ -132,13 +132,13 @@ def _impedances(found: Comparison, recorded: Sequence[Run]) -> Iterator[Kind]:
 
 def _rest(known: Sequence[tuple[Run, Movable]]) -> Model:
     return lambda parameter, value: np.concatenate(
-        [at_rest(moved(of.sensed.sensor, **_moves(of, parameter, value)), run.recording.tones_hz) for run, of in known]
+        [at_rest(moved(of.model.sensor, **_moves(of, parameter, value)), run.recording.tones_hz) for run, of in known]
     )
 
 
 def _presses(known: Sequence[tuple[Run, Movable]]) -> Model:
     def of_run(run: Run, of: Movable, parameter: str, value: float) -> Complex:
-        sensor = moved(of.sensed.sensor, **_moves(of, parameter, value))
+        sensor = moved(of.model.sensor, **_moves(of, parameter, value))
         assert run.pairs is not None  # noqa: S101 - chosen so
         stiffness = value if parameter == "E" else 1.0
         return pressed(

@@ -44,9 +44,7 @@ def _counts(names: list[str]) -> dict[str, int]:
 def _sources(found: Comparison) -> list[tuple[str, str]]:
     used: dict[str, set[str]] = {}
     for of in found.predictions.values():
-        for value in of.values:
-            used.setdefault(value["source"], set()).add(
-                f"{value['material']} {value['quantity']} = {value['value']:.6g}"
-            )
+        for value in of.prediction.values:
+            used.setdefault(value.source, set()).add(f"{value.material} {value.quantity} = {value.value:.6g}")
     known = citations() | {SET: "by the design itself"}
     return [(name, f"{known.get(name, name)}: {', '.join(sorted(values))}") for name, values in sorted(used.items())]

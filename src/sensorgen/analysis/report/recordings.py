@@ -6,7 +6,6 @@ from math import hypot, pi
 import numpy as np
 
 from sensorgen.analysis.comparison import Comparison, Predicted
-from sensorgen.analysis.comparison.expected import Tone
 from sensorgen.analysis.comparison.runs import Run
 from sensorgen.analysis.report import charts
 from sensorgen.analysis.report.charts import Axis, Chart, Relief, Trace
@@ -16,6 +15,7 @@ from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import frequency_text
 from sensorgen.measure.recording.samples import Real
 from sensorgen.measure.signal.surfaces import normalised, surface
+from sensorgen.prediction.results import Impedance
 
 _TONES = (
     Column("recording"), Column("design"), Column("tone", "Hz"),
@@ -45,7 +45,7 @@ def tones(recorded: Sequence[Run], found: Comparison) -> Table:
 
 def _rows(run: Run, of: Predicted | None) -> Iterator[list[Cell]]:
     for f, z, error in zip(run.recording.tones_hz.tolist(), run.rest_ohm, run.rest_error_ohm, strict=True):
-        tone = next((t for t in of.tones if abs(t.frequency_hz / f - 1) < _SAME), None) if of else None
+        tone = next((t for t in of.prediction.impedance if abs(t.frequency_hz / f - 1) < _SAME), None) if of else None
         c = of.capacitance_f if of else None
         bounds = (c.lower * 1e12, c.upper * 1e12) if c else (None, None)
         yield [
@@ -55,19 +55,18 @@ def _rows(run: Run, of: Predicted | None) -> Iterator[list[Cell]]:
         ]  # fmt: skip
 
 
-def _part(value: float, error: float, tone: Tone | None, part: str) -> tuple[Cell, ...]:
+def _part(value: float, error: float, tone: Impedance | None, part: str) -> tuple[Cell, ...]:
     if tone is None:
         return float(value), float(error), None, None, None
-    low, high = getattr(tone, f"{part}_range")
-    middle = tone.impedance_ohm.real if part == "re" else tone.impedance_ohm.imag
-    return float(value), float(error), middle, low, high
+    expected = tone.re if part == "re" else tone.im
+    return float(value), float(error), expected.value, expected.lower, expected.upper
 
 
-def _residual(z: complex, tone: Tone | None) -> tuple[Cell, Cell]:
+def _residual(z: complex, tone: Impedance | None) -> tuple[Cell, Cell]:
     if tone is None:
         return None, None
-    size = abs(tone.impedance_ohm)
-    return (z.real - tone.impedance_ohm.real) / size, (z.imag - tone.impedance_ohm.imag) / size
+    size = hypot(tone.re.value, tone.im.value)
+    return (z.real - tone.re.value) / size, (z.imag - tone.im.value) / size
 
 
 def facts(recorded: Sequence[Run]) -> Table:

@@ -36,10 +36,13 @@ def rows(path: Path, file: RawFile) -> Iterator[Entry]:
     yield Batch(uid=file.uid, batch=batch, file=file.uid)
     printed = _as_printed(record, str(path))
     pieces = _mapping(record.get("specimens"), f"{path}: specimens").items()
+    predictions = _mapping(record.get("predictions") or {}, f"{path}: predictions")
     found = (
         row
         for written, piece in pieces
-        for row in _of_piece(file.uid, written, _mapping(piece, f"{path}: specimen {written}"), printed, str(path))
+        for row in _of_piece(
+            file.uid, written, _mapping(piece, f"{path}: specimen {written}"), predictions, printed, str(path)
+        )
     )
     yield from dict.fromkeys(found)  # copies of one design share a prediction
 
@@ -55,7 +58,12 @@ def _as_printed(record: Mapping[str, Any], where: str) -> dict[str, dict[str, An
 
 
 def _of_piece(
-    batch: str, written: str, piece: Mapping[str, Any], printed: Mapping[str, Any], where: str
+    batch: str,
+    written: str,
+    piece: Mapping[str, Any],
+    predictions: Mapping[str, Any],
+    printed: Mapping[str, Any],
+    where: str,
 ) -> Iterator[Entry]:
     design_id, design = piece.get("design_id"), piece.get("design")
     if not isinstance(design_id, str) or not isinstance(design, str) or not design_id:
@@ -66,7 +74,9 @@ def _of_piece(
         raise error.within(where) from None
     uid = f"{batch} {specimen['specimen']}"
     yield Print(uid=uid, batch_uid=batch, design_id=design_id, design=design, **specimen)  # type: ignore[arg-type]
-    if piece.get("expected"):
+    if design_id in predictions:
+        yield prediction(design_id, design, _mapping(predictions[design_id], f"{where}: prediction of {design}"))
+    elif piece.get("expected"):  # of version 0.1.0
         expected = _mapping(piece["expected"], f"{where}: specimen {written}: expected")
         beside = {"printed": printed[design_id]} if design_id in printed else {}
         yield prediction(design_id, design, expected | beside)

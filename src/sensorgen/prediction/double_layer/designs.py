@@ -10,7 +10,9 @@ from sensorgen.design.design import Design, make
 from sensorgen.design.values import MaterialValue
 from sensorgen.models.sensor import Sensor
 from sensorgen.models.stack import Film, Press, Stack, Track
-from sensorgen.prediction.sensor_of_design import TIP_M, sensor_of
+from sensorgen.prediction import bodies
+from sensorgen.prediction.evaluate import Query, sensor_model
+from sensorgen.prediction.sensor_model import TIP_M, Tip
 
 
 @dataclass(frozen=True)
@@ -40,13 +42,14 @@ class Stacked:
 
 
 def stacked(design: Design, law: str = "", tip_m: float = TIP_M) -> Stacked:
-    """The stacks of a design; parameters and errors as :func:`sensorgen.prediction.sensor_of_design.sensor_of`."""
-    found = [sensor_of(half, law, tip_m) for half in halves(design)]
+    """The stacks of a design; parameters and errors as :func:`sensorgen.prediction.evaluate.sensor_model`."""
+    query = Query(tip=Tip(tip_m), law=law)
+    found = [sensor_model(bodies.default_body(half), query)[0] for half in halves(design)]
     lower, upper = found[0], found[-1]
     double = stack_of([lower.sensor, upper.sensor])
     own = double if len(found) > 1 else stack_of([lower.sensor])
     material, source = design.slot("isolation")
-    taken = {value for half in found for value in half.taken}
+    taken = {value for half in found for value in half.values}
     return Stacked(
         own, double, tip_m, material.value("relative_permittivity", source).value,
         tuple(sorted(taken, key=lambda value: tuple(vars(value).values()))),

@@ -1,6 +1,7 @@
 """Results of an identifiability analysis. SI units; None where a number is undefined."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -242,3 +243,29 @@ def finite(value: float | NDArray[np.float64]) -> float | None:
 def cartesian(value: complex) -> Cartesian:
     """A complex number as data."""
     return Cartesian(float(value.real), float(value.imag))
+
+
+def of_schema_1(data: dict[str, Any]) -> Identifiability | None:
+    """The identifiability in a prediction of version 0.1.0; None where it had only a reason."""
+    if not data.get("verdict"):
+        return None
+    from pydantic import TypeAdapter
+
+    def summary(row: dict[str, Any]) -> dict[str, Any]:
+        at = row.pop("worst_at", None) or {"force_n": None, "position_m": None}
+        return row | {"worst_force_n": at["force_n"], "worst_position_m": at["position_m"]}
+
+    def choice(row: dict[str, Any]) -> dict[str, Any]:
+        return row | {"frequency_hz": row["frequency_hz"] or ()}
+
+    press, over, advised = data["press"], data["map"], data["advised_tones"]
+    return TypeAdapter(Identifiability).validate_python(
+        data
+        | {
+            "press": press | {"strain": press["thinning"]},
+            "frequencies": data["tones"],
+            "map": over | {name: summary(over[name]) for name in ("of_force", "of_position")},
+            "best_frequencies": [choice(row) for row in data["best_tones"]],
+            "advised_frequencies": advised | {name: choice(advised[name]) for name in ("single", "pair")},
+        }
+    )

@@ -48,13 +48,38 @@ def grid(scene: Scene) -> Grid:
     ValueError
         A prism is no box, bodies overlap, the electrodes touch, or one does not cover the sensor.
     """
-    planes, fill, names = _raster(scene)
-    across, along = (mirrored(_slices(planes[axis], np.moveaxis(fill, axis, 0))) for axis in (0, 1))
-    at = [_taken(cell, planes[axis]) for axis, cell in ((0, across), (1, along))]
-    shares = np.outer(*(_shares(cell) for cell in (across, along)))
-    cut = Grid((_edges(across), _edges(along), planes[2]), fill[np.ix_(at[0], at[1])], names, shares)
+    cut = _cell(*_raster(scene))
     _refuse_contact(cut.fill)
     return _between(cut)
+
+
+def insulated(scene: Scene, axis: int) -> Grid:
+    """The repeating cell of boxes in air that insulates, with planes at 0 V and 1 V square to x (0) or y (1).
+
+    Raises
+    ------
+    ValueError
+        A prism is no box, bodies overlap, or none reaches from one plane to the other.
+    """
+    cut = _cell(*_raster(scene), evenly=False)
+    planes, sides = list(cut.planes_mm), [(int(k == axis),) * 2 for k in range(3)]
+    planes[axis] = np.pad(planes[axis], 1, mode="reflect", reflect_type="odd")
+    fill = np.pad(np.where(cut.fill == cut.names.index("air"), -1, cut.fill), sides)
+    np.moveaxis(fill, axis, 0)[-1] = 1
+    inside = _reached(fill, 0) & _reached(fill, 1)
+    if not inside.any():
+        raise ValueError("no body reaches from one end to the other")
+    x, y, z = planes
+    shares = np.pad(cut.shares, sides[:2], mode="edge")
+    return Grid((x, y, z), np.where(inside | (fill < 2), fill, -1), cut.names, shares)
+
+
+def _cell(planes: tuple[NDArray[np.float64], ...], fill: Ints, names: list[str], evenly: bool = True) -> Grid:
+    """The part of a raster between its mirrors."""
+    across, along = (mirrored(_slices(planes[axis], np.moveaxis(fill, axis, 0)), evenly) for axis in (0, 1))
+    at = [_taken(cell, planes[axis]) for axis, cell in ((0, across), (1, along))]
+    shares = np.outer(*(_shares(cell) for cell in (across, along)))
+    return Grid((_edges(across), _edges(along), planes[2]), fill[np.ix_(at[0], at[1])], names, shares)
 
 
 def _raster(scene: Scene) -> tuple[tuple[NDArray[np.float64], ...], Ints, list[str]]:

@@ -53,6 +53,7 @@ def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
     lifts: dict[int, list[tuple[int, int]]] = defaultdict(list)
     # a cut ends with an electrode to its left, lest it part a mirror's value
     ends = {a for a, b in rim if a not in cones and _named((a, b)) in mesh.terminals}
+    carrying = {loops[a] for a, b in rim if _named((a, b)) in mesh.terminals}  # a hole whose rim is all mirror does not
     count = HELD
     for piece in _pieces(around):
         ground = min((mirrors[k] for k in piece if k in mirrors), default=-1)
@@ -62,7 +63,8 @@ def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
         zero = {k for k in piece if mirrors.get(k) == ground} or {min((piece & loops.keys()) - set(cones))}
         held |= dict.fromkeys(zero, 0)
         start = loops[min(zero)]
-        for path in _cuts(around, {k: loops[k] for k in piece if k in loops}, start, ends, cones):
+        rims = {k: loops[k] for k in piece if k in loops}
+        for path in _cuts(around, rims, start, carrying & set(rims.values()) | {start}, ends, cones):
             for number, corner in _beside(around, path):
                 lifts[number].append((corner, count))
             count += 1
@@ -103,12 +105,13 @@ def _pieces(around: dict[int, Fan]) -> Iterator[set[int]]:
 
 
 def _cuts(
-    around: dict[int, Fan], loops: dict[int, int], start: int, ends: set[int], cones: Collection[int]
-) -> Iterator[list[int]]:
-    """For each loop of boundary but the first, points from it to another one, all inside but for both ends."""
+    around: dict[int, Fan], loops: dict[int, int], start: int, carrying: set[int], ends: set[int],
+    cones: Collection[int],
+) -> Iterator[list[int]]:  # fmt: skip
+    """For each loop that carries flux but the first, points from it to another one, all inside but for both ends."""
     reached, before = {start}, {k: k for k in loops if loops[k] == start and k in ends}
     todo = deque(before)
-    while todo and len(reached) < len(set(loops.values())):
+    while todo and reached < carrying:
         here = todo.popleft()
         for spoke in _inner(around[here]):
             if spoke in before or spoke in cones:
@@ -116,7 +119,7 @@ def _cuts(
             if spoke not in loops:
                 before[spoke] = here
                 todo.append(spoke)
-            elif loops[spoke] not in reached:
+            elif loops[spoke] in carrying - reached:
                 yield _path(before | {spoke: here}, spoke)
                 reached.add(loops[spoke])
                 new = [k for k in loops if loops[k] == loops[spoke] and k in ends]

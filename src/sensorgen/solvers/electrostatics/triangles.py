@@ -50,6 +50,24 @@ def triangles(cell: Cell) -> Triangles:
     """
     points, found = _all(cell)
     _refuse_contact(points, found)
+    mesh, owners, inside = _triangulated(points, found)
+    _refuse_open(points, owners, inside, cell)
+    return mesh
+
+
+def insulated(cell: Cell) -> Triangles:
+    """Triangulate a cell in which bands of no material are insulators, no matter how far the field reaches.
+
+    Raises
+    ------
+    ValueError
+        None of its materials reaches from the bottom to the top electrode.
+    """
+    return _triangulated(*_all(cell))[0]
+
+
+def _triangulated(points: NDArray[np.float64], found: "_Found") -> tuple[Triangles, dict[Edge, list[int]], set[int]]:
+    """The mesh of all dielectric between the electrodes; the triangles at each edge; those that were kept."""
     owners: dict[Edge, list[int]] = defaultdict(list)
     for number, (corners, _) in enumerate(found):
         for edge in edges_of(corners):
@@ -60,10 +78,10 @@ def triangles(cell: Cell) -> Triangles:
         names = {found[n][1][0] for n in sides}
         if names & {"@top", "@bottom"} and any(n in inside for n in sides):
             terminals[edge] = next(n[1:] for n in names if n.startswith("@"))
-    _refuse_open(points, owners, inside, cell)
     kept = sorted(inside)
     regions = [found[n][1] for n in kept]
-    return apart(Triangles(points, flipped(points, [found[n][0] for n in kept], regions), regions, terminals))
+    mesh = Triangles(points, flipped(points, [found[n][0] for n in kept], regions), regions, terminals)
+    return apart(mesh), owners, inside
 
 
 def apart(mesh: Triangles) -> Triangles:
@@ -181,7 +199,7 @@ def _between(found: _Found, owners: dict[Edge, list[int]]) -> set[int]:
     for pair in (sides for sides in owners.values() if len(sides) == 2):
         beside[pair[0]].append(pair[1])
         beside[pair[1]].append(pair[0])
-    left = {n for n, (_, (what, _)) in enumerate(found) if not what.startswith("@")}
+    left = {n for n, (_, (what, _)) in enumerate(found) if what and not what.startswith("@")}
     inside: set[int] = set()
     while left:
         piece, ends = _piece(found, beside, left)
@@ -200,7 +218,7 @@ def _piece(found: _Found, beside: dict[int, list[int]], left: set[int]) -> tuple
         for n in beside[todo.pop()]:
             if found[n][1][0].startswith("@"):
                 ends.add(found[n][1][0])
-            elif n not in piece:
+            elif n in left and n not in piece:
                 piece.add(n)
                 todo.append(n)
     return piece, ends

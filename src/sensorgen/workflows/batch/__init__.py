@@ -13,14 +13,15 @@ from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
 from sensorgen.export import threemf
 from sensorgen.export.slicers import TIME_LIMIT_S
-from sensorgen.prediction.prediction import prediction
+from sensorgen.prediction import bodies
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.results import Prediction
 from sensorgen.workflows.batch import picture, printing, record, sheet, tab
 from sensorgen.workflows.batch.layout import Plate, Room, Size, column, packed, room
 from sensorgen.workflows.batch.pieces import Piece, pieces, shuffled, tools
 from sensorgen.workflows.batch.plan import Plan, load
 from sensorgen.workflows.build import json_bytes, versions
 
-ACCURACY = 1e-3  # of the expected capacitance: what a print is held against should not be the largest doubt
 STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "as printed", "record", "done")
 
 
@@ -166,7 +167,7 @@ def make(
     held = {key: review(design) for key, design in found.designs.items()}
     _refuse_unprintable(found, held, force=force, strict=strict)
     step("predictions")
-    predicted = {key: prediction(design, accuracy=ACCURACY, judged=False) for key, design in found.designs.items()}
+    predicted = {key: evaluate(bodies.estimated(design)) for key, design in found.designs.items()}
     folder = out / found.plan.name
     with store.staging(folder) as stage:
         step("3MF")
@@ -206,7 +207,7 @@ def _files(found: Arranged) -> Iterator[tuple[str, bytes]]:
 
 
 def _record(
-    found: Arranged, predicted: Mapping[str, Mapping[str, Any]], sliced: Mapping[str, Any], stage: Path
+    found: Arranged, predicted: Mapping[str, Prediction], sliced: Mapping[str, Any], stage: Path
 ) -> dict[str, Any]:
     plan, first = found.plan, found.pieces[0].design
     loaded = record.tools(plan, found.tools)
@@ -221,7 +222,8 @@ def _record(
         "tools": loaded,
         "checklist": record.checklist(plan, loaded),
         "bake": [step.model_dump() for step in plan.bake],
-        "specimens": record.specimens(found.pieces, found.plate, predicted, record.of_prints(sliced)),
+        "specimens": record.specimens(found.pieces, found.plate),
+        "predictions": record.predictions(predicted, sliced),
         "designs": record.designs(found.designs),
         "slicers": dict(sliced),
         "versions": versions(),

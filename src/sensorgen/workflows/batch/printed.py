@@ -1,18 +1,20 @@
 """What is printed of the designs of a plate: one copy of each is read back from the slicer's G-code."""
 
+import json
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from sensorgen.asprinted import compared
-from sensorgen.asprinted.report import report
 from sensorgen.core.errors import SensorgenError
 from sensorgen.export.slicing import Placed, Sliced
-
-CONTACTS_OHM_M2 = (0.0,)  # no source gives another; predict --as-printed shows what others would do
+from sensorgen.prediction import bodies
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.results import to_json
 
 
 def of_designs(found: Sequence[Placed], made: Sliced) -> dict[str, Any]:
-    """Drawn against printed, under each design's hash; why not where a print cannot be read back.
+    """Prediction, printed volumes and findings of each design's print, by its identity; or why there are none.
 
     Parameters
     ----------
@@ -28,8 +30,16 @@ def of_designs(found: Sequence[Placed], made: Sliced) -> dict[str, Any]:
 
 
 def _of(piece: Placed, made: Sliced) -> dict[str, Any]:
+    design, source = piece.design, f"{made.slicer} {made.version}"
     try:
-        printed = compared.sliced(piece.design, made.lines, f"{made.slicer} {made.version}", piece.sensor_mm())
-        return {"specimen": piece.name, **report(piece.design, printed, contacts_ohm_m2=CONTACTS_OHM_M2)}
+        printed = compared.sliced(design, made.lines, source, piece.sensor_mm())
+        body = bodies.sliced(design, partial(lambda: printed), source, made.ready.read_bytes() + piece.name.encode())
+        return {
+            "specimen": piece.name,
+            "design": design.name,
+            "prediction": json.loads(to_json(evaluate(body))),
+            "layers": [row.as_dict() for row in printed.rows(design)],
+            "findings": [finding.as_dict() for finding in printed.findings(design)],
+        }
     except SensorgenError as error:
-        return {"specimen": piece.name, "design": piece.design.name, "findings": [], "reason": str(error)}
+        return {"specimen": piece.name, "design": design.name, "findings": [], "reason": str(error)}

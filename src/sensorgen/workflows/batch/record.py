@@ -12,37 +12,26 @@ from sensorgen.core.errors import BadInput, MissingValue
 from sensorgen.core.records import shown
 from sensorgen.design import materials
 from sensorgen.design.design import Design
+from sensorgen.prediction.results import Prediction, to_json
 from sensorgen.workflows.batch.layout import Plate
 from sensorgen.workflows.batch.pieces import Piece
 from sensorgen.workflows.batch.plan import Plan
 from sensorgen.workflows.build import json_bytes
 
 RECORD = "batch.json"
-PRINTED = ("source", "electrode_gap_mm", "capacitance_f", "electrode_resistance_ohm", "contact_ohm_m2", "reason")
-EXPECTED = (
-    "electrode_resistance_ohm", "capacitance_f", "corner_frequency_hz", "impedance_ohm", "model", "reason",
-)  # fmt: skip
 
 
-def specimens(
-    pieces: Sequence[Piece],
-    plate: Plate,
-    predictions: Mapping[str, Mapping[str, Any]],
-    printed: Mapping[str, Mapping[str, Any]],
-) -> dict[str, Any]:
-    """Every specimen by its name, in the order of the plate: design, place, copy, and what it should measure.
+def specimens(pieces: Sequence[Piece], plate: Plate) -> dict[str, Any]:
+    """Every specimen by its name, in the order of the plate: design, place, copy.
 
     Parameters
     ----------
     pieces, plate : sequence of Piece, mapping of int to Rect
         The specimens, and where they lie.
-    predictions, printed : mapping
-        Prediction for the drawing, and for what each slicer prints of it, under a design's hash.
     """
     found = {}
     for order, (number, place) in enumerate(plate.items(), 1):
         piece = pieces[number]
-        predicted = predictions[piece.design_id]
         found[piece.name] = {
             "order": order,
             "design": piece.design.name,
@@ -51,27 +40,23 @@ def specimens(
             "copy": piece.specimen.replicate,
             "centre_mm": [round(c, 6) for c in place.centre_mm],
             "size_mm": [round(place.x1 - place.x0, 6), round(place.y1 - place.y0, 6)],
-            "expected": {name: predicted[name] for name in EXPECTED if name in predicted} | _as_printed(printed, piece),
         }
     return found
 
 
-def _as_printed(printed: Mapping[str, Mapping[str, Any]], piece: Piece) -> dict[str, Any]:
-    return {"printed": printed[piece.design_id]} if piece.design_id in printed else {}
-
-
-def of_prints(sliced: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """What each slicer's print of a design should measure, under the design's hash and the slicer.
+def predictions(estimated: Mapping[str, Prediction], sliced: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """What each design should measure, by its identity: of the first slicer's print, else of the estimated one.
 
     Parameters
     ----------
+    estimated : mapping of str to Prediction
+        By a design's identity.
     sliced : mapping
-        What every slicer has made, as in ``batch.json``.
+        Results of every slicer, as in ``batch.json``: each with its prints' predictions.
     """
-    found: dict[str, dict[str, Any]] = {}
-    for slicer, made in sliced.items():
-        for key, design in made["printed"].items():
-            found.setdefault(key, {})[slicer] = {name: design[name] for name in PRINTED if name in design}
+    found = {key: json.loads(to_json(predicted)) for key, predicted in estimated.items()}
+    for made in reversed(list(sliced.values())):
+        found |= {key: design["prediction"] for key, design in made["printed"].items() if design.get("prediction")}
     return found
 
 

@@ -7,8 +7,9 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import compression as compressed
-from sensorgen.prediction.prediction import TONES_HZ
-from sensorgen.prediction.sensor_of_design import sensor_of
+from sensorgen.prediction.bodies import drawn
+from sensorgen.prediction.evaluate import TONES_HZ
+from sensorgen.prediction.sensor_model import build_sensor
 from sensorgen.verification.thesis.verdicts import Part
 
 _KPA = 100.0
@@ -25,7 +26,7 @@ def _pressed(
 ) -> compressed.Data:
     """A cell under 100 kPa, of the cache where it was solved before."""
     made = designs.make({"shape": shape, "parameters": parameters})
-    found = compressed.answer(made, compressed.Asked((0.0, _KPA), compressed.Held(base=base, period=period)))
+    found = compressed.answer(drawn(made), compressed.Asked((0.0, _KPA), compressed.Held(base=base, period=period)))
     if found["faults"]:
         raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {found['faults'][0]}")
     return found
@@ -73,7 +74,7 @@ def gain(rise_f: float, film_mm: float) -> list[Part]:
 
 def _plate() -> Sensor:
     """The sensor of Table 3.1, free to give way sideways as in B.49."""
-    return sensor_of(designs.make({"shape": "reference"}), "unconfined").sensor
+    return build_sensor(drawn(designs.make({"shape": "reference"})), "unconfined").sensor
 
 
 def impedance() -> list[Part]:

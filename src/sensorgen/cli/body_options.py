@@ -1,0 +1,82 @@
+"""Options that say which body a command means: the print (by default), its slicer or walls, or the drawing."""
+
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from sensorgen.cli import show
+from sensorgen.cli.words import OneOf
+from sensorgen.core.errors import BadInput
+from sensorgen.export.slicers import SLICERS
+
+if TYPE_CHECKING:
+    from sensorgen.asprinted.compared import Printed
+    from sensorgen.design.body import Body
+    from sensorgen.design.design import Design
+
+OUT = Path("out")  # folder of the designs' folders, where build and slice write
+
+
+def body_options() -> list[click.Parameter]:
+    """``--drawn``, ``--slicer`` and ``--walls``."""
+    return [
+        click.Option(["--drawn"], is_flag=True, help="The drawing, in place of the print."),
+        click.Option(
+            ["--slicer"], type=OneOf(SLICERS),
+            help="Slice now for the print; if not given, the G-code in out/NAME, else an estimate from the layers.",
+        ),
+        click.Option(
+            ["--walls"], type=OneOf(("arachne", "classic", "cura", "cura-gaps")),
+            help="Estimate the print for these walls alone; for all of them if not given, Arachne's as the best value.",
+        ),
+    ]  # fmt: skip
+
+
+def body_of(drawn: bool, slicer: str | None, walls: str | None) -> "Callable[[Design], Body]":
+    """Makes the body of a design that the options ask for; raises BadInput for two of them at once."""
+    given = [name for name, value in (("--drawn", drawn), ("--slicer", slicer), ("--walls", walls)) if value]
+    if len(given) > 1:
+        raise BadInput(f"{' and '.join(given)} at once; expected one of them")
+    from sensorgen.prediction import bodies
+
+    if drawn:
+        return bodies.drawn
+    if slicer:
+        return partial(_sliced, slicer)
+    if walls:
+        return partial(bodies.estimated, walls=walls)
+    return lambda design: bodies.default_body(design, OUT / design.name)
+
+
+def printed_of(design: "Design", slicer: str | None, walls: str | None) -> "Printed":
+    """What is printed of a design, with its layers: sliced now, or estimated."""
+    from sensorgen.asprinted import compared
+
+    if slicer and walls:
+        raise BadInput("--slicer and --walls at once; expected one: the slicer's profile says what walls it makes")
+    if not slicer:
+        return compared.estimated(design, walls or "arachne")
+    return _slice(slicer, design)[0]
+
+
+def _sliced(slicer: str, design: "Design") -> "Body":
+    from sensorgen.prediction import bodies
+
+    printed, source, content = _slice(slicer, design)
+    return bodies.sliced(design, lambda: printed, source, content)
+
+
+def _slice(slicer: str, design: "Design") -> "tuple[Printed, str, bytes]":
+    """What a real slicer prints, its name and version, and its G-code."""
+    from sensorgen.asprinted import compared
+    from sensorgen.export import slicing
+
+    with tempfile.TemporaryDirectory() as folder, show.progress(slicing.STEPS) as step:
+        made = slicing.sliced([slicing.alone(design)], slicer, Path(folder), step=step)
+        content = made.ready.read_bytes()
+    source = f"{made.slicer} {made.version}"
+    return compared.sliced(design, made.lines, source), source, content

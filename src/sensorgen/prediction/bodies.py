@@ -1,0 +1,131 @@
+"""Bodies of a design: the drawing, a print by the rules of slicers, a print by a tool path."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sensorgen.design.body import DRAWN, Body, Cells
+from sensorgen.design.design import Design
+
+if TYPE_CHECKING:
+    from sensorgen.asprinted.compared import Printed
+
+WALLS = ("arachne", "classic", "cura", "cura-gaps")  # rules of slicers, the default of ours first
+
+
+def drawn(design: Design) -> Body:
+    """The body as drawn, support removed."""
+    return Body(design, DRAWN, "drawn", _identity(design, DRAWN), partial(_drawn_cells, design))
+
+
+def _drawn_cells(design: Design) -> Cells:
+    from sensorgen.asprinted.compared import drawn_gap_mm
+
+    return Cells({DRAWN: design.in_use}, 1.0, getattr(design.params, "period_mm", None), {DRAWN: drawn_gap_mm(design)})
+
+
+def estimated(design: Design, walls: str = "") -> Body:
+    """The body as slicers should print it, without a tool path.
+
+    Parameters
+    ----------
+    design : Design
+        What is printed.
+    walls : str
+        One of ``WALLS`` alone; all of them, the first as the most likely, if not given.
+    """
+    rules = (walls,) if walls else WALLS
+    said = f"printed, estimated ({walls or 'PrusaSlicer, Arachne'} walls)"
+    return Body(
+        design, "estimated", said, _identity(design, "estimated", *rules), partial(_estimated_cells, design, rules)
+    )
+
+
+def _estimated_cells(design: Design, rules: Sequence[str]) -> Cells:
+    from sensorgen.asprinted import compared
+
+    return _printed_cells(design, {rule: compared.estimated(design, rule) for rule in rules})
+
+
+def sliced(design: Design, printed: "Callable[[], Printed]", source: str, content: bytes) -> Body:
+    """The body as a tool path prints it.
+
+    Parameters
+    ----------
+    design : Design
+        What is printed.
+    printed : callable
+        Reads the tool path, as :func:`sensorgen.asprinted.compared.sliced`.
+    source : str
+        Of the tool path: slicer, version, file.
+    content : bytes
+        Of the file.
+    """
+    identity = _identity(design, "sliced", sha256(content).hexdigest())
+    return Body(design, "sliced", f"printed, {source}", identity, partial(_sliced_cells, design, printed, source))
+
+
+def _sliced_cells(design: Design, printed: "Callable[[], Printed]", source: str) -> Cells:
+    return _printed_cells(design, {source: printed()})
+
+
+def default_body(design: Design, folder: Path | None = None) -> Body:
+    """The print of a design: by the tool path in its folder where there is one, else by the rules of slicers.
+
+    Parameters
+    ----------
+    design : Design
+        What is printed.
+    folder : Path, optional
+        With the design's files, as ``out/NAME``.
+    """
+    for note in sorted(folder.glob("*.gcode.json")) if folder and folder.is_dir() else ():
+        found = _toolpath(design, note)
+        if found:
+            return found
+    return estimated(design)
+
+
+def _toolpath(design: Design, note: Path) -> Body | None:
+    """The print by a sliced file of this very design, or None."""
+    path = note.with_suffix("")
+    try:
+        made = json.loads(note.read_text("utf-8"))
+        content = path.read_bytes()
+        same = made["design"] == design.id() and made["sha256"] == sha256(content).hexdigest()
+        source = f"{made['slicer']['name']} {made['slicer']['version']}"
+    except (OSError, ValueError, KeyError, TypeError):  # no file of ours
+        return None
+    return sliced(design, partial(_read, design, path, source), f"{source}, {path.name}", content) if same else None
+
+
+def _read(design: Design, path: Path, source: str) -> "Printed":
+    from sensorgen.asprinted import compared
+    from sensorgen.export.gcode import paths
+
+    return compared.sliced(design, paths.read(path, design.machine), source)
+
+
+def _printed_cells(design: Design, prints: "Mapping[str, Printed]") -> Cells:
+    """Cells by every rule: of walls for estimates, of bead widths for a tool path."""
+    from sensorgen.asprinted import compared
+    from sensorgen.scene.sections import sections
+
+    scenes, count, tracks = {}, 1.0, None
+    for rule, printed in prints.items():
+        for name, layers in printed.layers.items():
+            scene, times = compared.cell(design, layers)
+            scenes[rule if len(printed.layers) == 1 else name] = scene
+            count, tracks = times, printed.lines
+    first = next(iter(scenes.values()))
+    period = None
+    if getattr(design.params, "period_mm", None) is not None:
+        period = first.size_mm["xy".index(sections(first)[0].across)]
+    return Cells(scenes, count, period, {name: compared.gap_mm(scene) for name, scene in scenes.items()}, tracks)
+
+
+def _identity(design: Design, *parts: str) -> str:
+    return sha256(json.dumps([design.id(), *parts]).encode()).hexdigest()

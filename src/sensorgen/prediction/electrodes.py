@@ -1,0 +1,62 @@
+"""Resistance of the electrodes of a body, end to end, cogs included."""
+
+from sensorgen.asprinted import compared
+from sensorgen.core.bounds import Bounds, Interval
+from sensorgen.core.errors import OutOfRange
+from sensorgen.design.body import Body
+from sensorgen.design.values import resistivities
+from sensorgen.models import conduction
+from sensorgen.prediction.spread import spread
+from sensorgen.scene.scene import Scene
+
+
+def electrode_resistance(body: Body) -> dict[str, Bounds]:
+    """Resistance of the top and the bottom electrode from end to end [ohm].
+
+    Parameters
+    ----------
+    body : Body
+        Drawn or printed. Cogs conduct as :mod:`sensorgen.models.conduction` says; along a tool path the contacts
+        between extruded lines, of no resistance of their own, add what the network of lines says.
+
+    Raises
+    ------
+    MissingValue
+        No source gives a resistivity.
+    OutOfRange
+        An electrode that does not reach from end to end.
+    """
+    design, found = body.design, {}
+    for end, rho in resistivities(design).items():
+        scene, *others = dict.fromkeys(body.cells.scenes.values())
+        solid = _of_cell(body, scene, end, rho.value)
+        printed = [solid.middle()]
+        for other in others:
+            try:
+                printed.append(_of_cell(body, other, end, rho.value).middle())
+            except OutOfRange:  # by this rule the electrode is interrupted
+                printed.append(float("inf"))
+        lines = _line_factor(body, end)
+        value, (low, high) = solid.middle() * lines, spread(design, rho)
+        relative = Interval(low / rho.value, high / rho.value) if rho.value else Interval(1.0, 1.0)
+        found[end] = Bounds.of(
+            value, "ohm", model=solid.times(lines), print=Interval(min(printed), max(*printed, value)), certified=True,
+            material=relative.times(value),
+        )  # fmt: skip
+    return found
+
+
+def _of_cell(body: Body, scene: Scene, end: str, resistivity_ohm_m: float) -> Interval:
+    """Of the whole sensor, from one unit cell: cells in series along it, in parallel across it [ohm]."""
+    p = body.design.params
+    in_series, in_parallel = p.length_mm / scene.size_mm[0], p.width_mm / scene.size_mm[1]
+    return conduction.electrode_resistance(scene, end, resistivity_ohm_m).times(in_series / in_parallel)
+
+
+def _line_factor(body: Body, end: str) -> float:
+    """Resistance of extruded lines over that of the solid plate, where a tool path is known [-]."""
+    if body.kind != "sliced":
+        return 1.0
+    printed = compared.Printed("", {}, body.cells.tracks)
+    plate = compared.solid_ohm(body.design)[end][0]
+    return compared.resistance_ohm(body.design, printed, (0.0,))[end][0] / plate if plate else 1.0

@@ -1,0 +1,121 @@
+"""A body at rest: capacitance with what its range holds, and resistivities."""
+
+from dataclasses import dataclass
+from math import inf, prod
+
+from sensorgen.core.bounds import Bounds, Interval
+from sensorgen.design.body import Body
+from sensorgen.design.design import Design
+from sensorgen.design.values import MaterialValue, permittivities, resistivities
+from sensorgen.prediction.capacitance import Answer, Unpredictable, capacitance
+from sensorgen.prediction.electrodes import electrode_resistance
+from sensorgen.prediction.spread import spread
+from sensorgen.scene.scene import Scene
+from sensorgen.scene.sections import sections
+
+PLANE, SPATIAL = 1e-3, 1e-2  # relative width of a capacitance's bounds where none is asked for: a cross-section, 3D
+
+
+@dataclass(frozen=True)
+class RestState:
+    """A body before anything presses on it.
+
+    Attributes
+    ----------
+    answer : Answer
+        Capacitance of the most likely cell, counted to the whole sensor.
+    capacitance : Bounds
+        Of the sensor, with models, print and materials [F].
+    resistance : dict of str to Bounds
+        Of the top and the bottom electrode, end to end, cogs included [ohm].
+    resistivity_ohm_m : (float, float)
+        Of the top and the bottom electrode [ohm m].
+    values : tuple of MaterialValue
+        Material values that both rest on.
+    doubts : tuple of str
+        Which other ways to print it have no capacitance, and why.
+    """
+
+    answer: Answer
+    capacitance: Bounds
+    resistance: dict[str, Bounds]
+    resistivity_ohm_m: tuple[float, float]
+    values: tuple[MaterialValue, ...]
+    doubts: tuple[str, ...] = ()
+
+
+def default_width(scene: Scene) -> float:
+    """Relative width of a capacitance's bounds where none is asked for [-]."""
+    try:
+        return PLANE if len(sections(scene)) == 1 else SPATIAL
+    except ValueError:  # no constant cross-section
+        return SPATIAL
+
+
+def rest_state(body: Body, width: float | None = None) -> RestState:
+    """Capacitance and resistivities of a body at rest.
+
+    Parameters
+    ----------
+    body : Body
+        Drawn or printed.
+    width : float, optional
+        Relative width that the bounds of the capacitance may have [-]; as of :func:`default_width` if not given, which
+        a larger one does not coarsen. Infinite: closed-form bounds of the most likely cell alone.
+
+    Raises
+    ------
+    Unpredictable
+        No model applies to the most likely cell, as to a short.
+    MissingValue
+        No source gives a material value that is needed.
+    """
+    values, rho = permittivities(body.design), resistivities(body.design)
+    eps = {v.material: v.value for v in values}
+    cells = body.cells
+    scene, *others = dict.fromkeys(cells.scenes.values())
+    rough = width == inf
+    wanted = inf if rough else min(width or inf, default_width(scene))
+    answer = capacitance(scene, eps, wanted).times(cells.count)
+    c = answer.capacitance_f
+    found, doubts = [c.middle()], []
+    for other in () if rough else others:
+        try:
+            found.append(capacitance(other, eps, wanted).capacitance_f.middle() * cells.count)
+        except Unpredictable as error:
+            rule = next(name for name, cell in cells.scenes.items() if cell == other)
+            doubts.append(f"printed by the rule {rule!r} it has no capacitance: {error}")
+    bounds = Bounds.of(
+        c.middle(), "F", model=c, print=Interval(min(found), max(found)), certified=True,
+        material=Interval(c.middle(), c.middle()) if rough else _permittivity_range(body.design, scene, c.middle()),
+    )  # fmt: skip
+    ends = (rho["top"].value, rho["bottom"].value)
+    resistance = electrode_resistance(body)
+    return RestState(answer, bounds, resistance, ends, (*values, *rho.values()), tuple(doubts))
+
+
+def _permittivity_range(design: Design, scene: Scene, middle: float) -> Interval:
+    """The capacitance with every permittivity at the lowest and at the highest of its sources [F].
+
+    Ratios by the closed-form bounds of the cell, whose error mostly cancels.
+    """
+    ratios = permittivity_ratios(design, scene)
+    return Interval(
+        middle * prod(low for low, _ in ratios.values()), middle * prod(high for _, high in ratios.values())
+    )
+
+
+def permittivity_ratios(design: Design, scene: Scene) -> dict[str, tuple[float, float]]:
+    """Capacitance over that with the permittivity taken, at the lowest and the highest value of each material [-]."""
+    values = permittivities(design)
+    eps = {v.material: v.value for v in values}
+    usual = capacitance(scene, eps).capacitance_f.middle()
+    found = {}
+    for value in values:
+        low, high = spread(design, value)
+        if low < high:
+            ends = (
+                capacitance(scene, eps | {value.material: end}).capacitance_f.middle() / usual for end in (low, high)
+            )
+            found[value.material] = (next(ends), next(ends))
+    return found

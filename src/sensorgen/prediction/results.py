@@ -1,0 +1,177 @@
+"""A prediction, as commands, log, report and fit read it: typed, frozen, with a published schema."""
+
+import json
+from dataclasses import dataclass, field
+from functools import cache
+from math import nan
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+from sensorgen.core.bounds import Bounds, Interval
+from sensorgen.core.errors import BadInput
+from sensorgen.design.values import MaterialValue
+from sensorgen.prediction.error_budget import ErrorBudget
+from sensorgen.prediction.identifiability.results import Identifiability, of_schema_1
+from sensorgen.prediction.plan import Plan
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+
+SCHEMA = 2  # 1 was a JSON of the drawing alone, of versions up to 0.1.0
+
+
+@dataclass(frozen=True)
+class Impedance:
+    """Impedance at one frequency, at rest.
+
+    Attributes
+    ----------
+    frequency_hz : float
+        Frequency [Hz].
+    re, im : Bounds
+        Real and imaginary part [ohm].
+    """
+
+    frequency_hz: float
+    re: Bounds
+    im: Bounds
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a sensor should measure.
+
+    Attributes
+    ----------
+    schema : int
+        Version of this record.
+    design, design_id : str
+        Name and identity of the design.
+    body : str
+        What is predicted: "drawn", or how it is printed.
+    status : str
+        "predicted"; "short" where electrodes touch; "not predicted" where no model applies or a value is missing.
+    reason : str
+        Why nothing is predicted, or no load; "" otherwise.
+    gap : Bounds or None
+        Smallest distance of two electrodes [m].
+    capacitance : Bounds or None
+        Between the electrodes, at rest [F].
+    resistance : dict of str to Bounds
+        Of each electrode, end to end [ohm].
+    corner_frequency : Bounds or None
+        Frequency above which the current no longer reaches the far end [Hz].
+    impedance : tuple of Impedance
+        At rest.
+    sensitivity : Bounds or None
+        Relative change of capacitance per pressure, from rest to the reference load [1/kPa].
+    force_n, position_m : float
+        The reference load [N], [m].
+    force_resolution_n, position_resolution_m : float or None
+        Standard errors of force and position there, from one reading [N], [m]; None where undefined.
+    identifiability : Identifiability or None
+        How precisely impedance determines force and position.
+    budget : ErrorBudget or None
+        Error of the impedance at the reference load.
+    plan : Plan or None
+        Which models were used, their cost and error, and which were not and why.
+    values : tuple of MaterialValue
+        Material values that it rests on.
+    assumptions : tuple of str
+        What is taken for granted, and what is doubtful.
+    drawn : Prediction or None
+        The drawing's, beside that of a print.
+    """
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
+
+    schema: int
+    design: str
+    design_id: str
+    body: str
+    status: Literal["predicted", "short", "not predicted"]
+    force_n: float
+    position_m: float
+    reason: str = ""
+    gap: Bounds | None = None
+    capacitance: Bounds | None = None
+    resistance: dict[str, Bounds] = field(default_factory=dict)
+    corner_frequency: Bounds | None = None
+    impedance: tuple[Impedance, ...] = ()
+    sensitivity: Bounds | None = None
+    force_resolution_n: float | None = None
+    position_resolution_m: float | None = None
+    identifiability: Identifiability | None = None
+    budget: ErrorBudget | None = None
+    plan: Plan | None = None
+    values: tuple[MaterialValue, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    drawn: "Prediction | None" = None
+
+
+@cache
+def adapter() -> "TypeAdapter[Prediction]":
+    """Conversion of a prediction to JSON and back, and its schema."""
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(Prediction)
+
+
+def to_json(prediction: Prediction) -> str:
+    """A prediction as JSON; infinities are the strings "Infinity"."""
+    return adapter().dump_json(prediction).decode()
+
+
+def from_json(text: str) -> Prediction:
+    """A prediction from JSON of this or an older schema.
+
+    Raises
+    ------
+    BadInput
+        Not a prediction, or one of a newer version of sensorgen.
+    """
+    try:
+        data = json.loads(text)
+        if isinstance(data, dict) and "schema" not in data:
+            return _of_schema_1(data)
+        if isinstance(data, dict) and data["schema"] != SCHEMA:
+            raise BadInput(f"a prediction of schema {data['schema']}; this version reads {SCHEMA} and older: update")
+        return adapter().validate_json(text)
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise BadInput(f"not a prediction: {str(error).splitlines()[0]}") from None
+
+
+def _of_schema_1(data: dict[str, Any]) -> Prediction:
+    """A prediction of version 0.1.0: of the drawing, its capacitance between bounds of the model alone."""
+    reason = data.get("reason") or ""
+    touches = "electrodes touch" in reason
+    status: Literal["predicted", "short", "not predicted"] = "short" if touches else "not predicted"
+    capacitance = data.get("capacitance_f")
+    if capacitance:
+        status = "predicted"
+    press = (data.get("identifiability") or {}).get("press") or {}
+    return Prediction(
+        1, "", "", "drawn", status, press.get("force_n", nan), press.get("position_m", nan), reason,
+        capacitance=_old_bounds(capacitance, "F"),
+        resistance={end: Bounds.of(ohm, "ohm") for end, ohm in (data.get("electrode_resistance_ohm") or {}).items()},
+        corner_frequency=_old_bounds(data.get("corner_frequency_hz"), "Hz"),
+        impedance=tuple(_old_impedance(tone) for tone in data.get("impedance_ohm") or ()),
+        identifiability=of_schema_1(data.get("identifiability") or {}),
+        values=tuple(MaterialValue(**value) for value in data.get("values") or ()),
+        assumptions=tuple(data.get("assumptions") or ()),
+    )  # fmt: skip
+
+
+def _old_bounds(data: dict[str, float] | None, unit: str) -> Bounds | None:
+    if not data:
+        return None
+    lower, upper = data["lower"], data.get("upper", data["lower"])
+    return Bounds.of(data.get("middle", (lower * upper) ** 0.5), unit, model=Interval(lower, upper), certified=True)
+
+
+def _old_impedance(data: dict[str, Any]) -> Impedance:
+    def part(name: str) -> Bounds:
+        value, (low, high) = data[name], data[f"{name}_range"]
+        exact = Interval(value, value)
+        return Bounds(value, low, high, "ohm", Interval(low, high), exact, exact, certified=True)
+
+    return Impedance(data["frequency_hz"], part("re"), part("im"))

@@ -1,0 +1,155 @@
+"""The line-sensor model of a body: what the line and all that rests on it need, in numbers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from sensorgen.core.errors import BadInput
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design.body import Body
+from sensorgen.design.values import ENDS, MaterialValue, of_all_materials, piezoresistance
+from sensorgen.design.values import film as film_of
+from sensorgen.models import pressure
+from sensorgen.models.sensor import UNIFORM, Sensor
+from sensorgen.prediction.compression_law import Law, gap_m, law_of
+from sensorgen.prediction.losses import Lost, lost
+from sensorgen.prediction.mesh_ladder import Piece
+from sensorgen.prediction.rest_state import RestState, rest_state
+
+TIP_M = 0.01  # thesis, Table C.1: L_press
+
+
+@dataclass(frozen=True)
+class Tip:
+    """What presses.
+
+    Attributes
+    ----------
+    length_m : float
+        Along the sensor [m].
+    profile : str
+        How its pressure is spread: one of :data:`sensorgen.models.pressure.PROFILES`.
+    radius_m : float or None
+        Of a hard round tip, whose contact grows with the force up to ``length_m`` [m]; None where all of it touches.
+    """
+
+    length_m: float = TIP_M
+    profile: str = UNIFORM
+    radius_m: float | None = None
+
+
+FLAT = Tip()  # the default
+
+
+@dataclass(frozen=True)
+class SensorModel:
+    """A body's sensor in numbers, and what they rest on.
+
+    Attributes
+    ----------
+    body : Body
+        Drawn or printed.
+    sensor : Sensor
+        With the best value of the capacitance.
+    rest : RestState
+        Capacitance with its range, and resistivities.
+    law : Law
+        How the cell deforms under pressure, and its error.
+    lost : Lost
+        Dielectric losses, as far as the design sets them.
+    piezoresistance : mapping of str to MaterialValue
+        Rise of the electrodes' resistivity with pressure, where a value is known.
+    """
+
+    body: Body
+    sensor: Sensor
+    rest: RestState
+    law: Law
+    lost: Lost
+    piezoresistance: Mapping[str, MaterialValue]
+
+    @property
+    def values(self) -> tuple[MaterialValue, ...]:
+        """Material values, each once."""
+        found = (*self.rest.values, *self.piezoresistance.values(), *self.lost.taken, *self.law.taken)
+        return tuple(dict.fromkeys(found))
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why its numbers are to be taken with care."""
+        return (*self.rest.doubts, *self.law.doubts, *self.lost.doubts)
+
+
+def piece(body: Body) -> Piece:
+    """What is pressed of a body: its most likely cell, and the period of the pattern."""
+    return Piece(body.cells.first(), body.cells.period_mm)
+
+
+def build_sensor(
+    body: Body, law: str | Law = "", tip: Tip = FLAT, *, rest: RestState | None = None
+) -> SensorModel:  # fmt: skip
+    """The line-sensor model of a body.
+
+    Parameters
+    ----------
+    body : Body
+        Drawn or printed.
+    law : str or Law
+        Of compression: one of :data:`sensorgen.prediction.compression_law.LAWS`, or "" for the best that is known
+        without solving a field; or itself.
+    tip : Tip
+        What presses.
+    rest : RestState, optional
+        What :func:`sensorgen.prediction.rest_state.rest_state` says, if it is at hand.
+
+    Raises
+    ------
+    Unpredictable, MissingValue
+        As :func:`sensorgen.prediction.rest_state.rest_state`.
+    UnknownName, OutOfRange
+        As :func:`sensorgen.prediction.compression_law.law_of`; a radius that is not above 0.
+    BadInput
+        A radius of a flat tip.
+    """
+    rest = rest or rest_state(body)
+    p, gone, rises = body.design.params, lost(body.design), piezoresistance(body.design)
+    pressed = piece(body)
+    if not isinstance(law, Law):
+        law = law_of(body.design, rest.answer, law, printed=None if body.is_drawn else pressed)
+    sensor = Sensor(
+        length_m=p.length_mm * M_PER_MM,
+        width_m=p.width_mm * M_PER_MM,
+        electrode_m=_thickness_m(body, rest),
+        resistivity_ohm_m=rest.resistivity_ohm_m,
+        capacitance_f_per_m=rest.capacitance.value / (p.length_mm * M_PER_MM),
+        compression=law.compression,
+        tip_m=tip.length_m,
+        profile=tip.profile,
+        contact=None if tip.radius_m is None else _contact(body, law, pressed, tip.profile, tip.radius_m),
+        tan_delta=gone.tan_delta,
+        leak_s_per_m=gone.leak_s / (p.length_mm * M_PER_MM),
+        piezoresistance_per_pa=tuple(rises[end].value if end in rises else 0.0 for end in ENDS),  # type: ignore[arg-type]
+    )
+    return SensorModel(body, sensor, rest, law, gone, rises)
+
+
+def _thickness_m(body: Body, rest: RestState) -> tuple[float, float]:
+    """Of plates that have the electrodes' resistance, cogs included [m]."""
+    p = body.design.params
+    found = [
+        rho * p.length_mm / (p.width_mm * rest.resistance[end].value) if rho else p.electrode_mm * M_PER_MM
+        for end, rho in zip(ENDS, rest.resistivity_ohm_m, strict=True)
+    ]
+    return found[0], found[1]
+
+
+def _contact(body: Body, law: Law, pressed: Piece, profile: str, radius_m: float) -> pressure.Contact:
+    """Growth of a round tip's contact: on the film as a thick body, or on the cell as a foundation of springs."""
+    if profile == "hertz":
+        soft = film_of(body.design)
+        modulus, ratio = (of_all_materials(body.design, q)[soft].value for q in ("youngs_modulus_pa", "poisson_ratio"))
+        return pressure.hertz(radius_m, modulus / (1 - ratio**2))
+    if profile == "parabola":
+        return pressure.bed(radius_m, law.compression.bed_pa_per_m(gap_m(pressed.scene)))
+    raise BadInput(
+        f"a tip with a pressure like a {profile!r} one is flat and has no radius; expected hertz or parabola"
+    )

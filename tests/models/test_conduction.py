@@ -1,0 +1,263 @@
+"""Electrodes with cogs: closed forms, scikit-fem, limits, bricks beside triangles, planted faults, bad input."""
+
+from itertools import pairwise
+from math import log, pi
+
+import numpy as np
+import pytest
+
+from sensorgen.core.errors import OutOfRange
+from sensorgen.design.shapes import double, rect, reference, tri
+from sensorgen.models import conduction, fem2d
+from sensorgen.models.conduction import electrode_resistance
+from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
+from sensorgen.solvers.electrostatics import bounds
+
+COMB = 0.845676971  # by scikit-fem, below, and by an independent program at orders 6 and 8
+
+
+def ratio(scene: Scene, terminal: str = "top", plate_mm: float = 0.3, axis: str = "x", width: float = 1e-3):
+    """Resistance as a share of the plate's alone."""
+    along, across = scene.size_mm[:2] if axis == "x" else scene.size_mm[1::-1]
+    plate = 0.07 * along / (plate_mm * across) * 1e3
+    return electrode_resistance(scene, terminal, 0.07, axis, width).times(1 / plate)
+
+
+def tri_scene(**options) -> Scene:
+    return tri.scene(tri.Params(**options), Fill())
+
+
+def rect_scene(**options) -> Scene:
+    return rect.scene(rect.Params(**options), Fill())
+
+
+def metal(*prisms: Prism, size_mm=(10.0, 1.0, 3.0)) -> Scene:
+    return Scene((Body("electrode", "etpu", prisms, "top"),), size_mm)
+
+
+def close(expected, rel):
+    return pytest.approx(expected, rel=rel, abs=0)
+
+
+def holds(found, value: float) -> bool:
+    return found.lower <= value * (1 + 1e-12) and value * (1 - 1e-12) <= found.upper
+
+
+def test_cogs_along_the_current_carry_it_in_parallel():
+    found = ratio(tri_scene(along="y"))
+    assert (found.lower, found.upper) == close((1 / (1 + 0.125 / 0.3),) * 2, 1e-12)
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-3, 1e-5, 1e-7])
+def test_cogs_across_the_current_as_the_independent_program_has_them(width):
+    found = ratio(tri_scene(), width=width)
+    assert found.width() <= width
+    assert holds(found, COMB)
+    assert found.middle() == close(COMB, max(width / 20, 1e-8))
+
+
+def test_scikit_fem_has_the_same_two_bounds():
+    """P2 elements, refined towards the corner of tooth and plate: potential from below, stream function from above."""
+    skfem = pytest.importorskip("skfem")
+    from skfem.helpers import dot, grad
+
+    points = np.array([(0, -0.5), (0, 0), (0.5, 0), (1, 0), (0, 0.3), (0.5, 0.3), (1, 0.3)], float)
+    corners = [(0, 2, 1), (1, 2, 5), (1, 5, 4), (2, 3, 6), (2, 6, 5)]
+    mesh = skfem.MeshTri(points.T.copy(), np.array(corners).T.copy()).refined(3)
+    for _ in range(40):
+        near = np.hypot(mesh.p[0] - 0.5, mesh.p[1])[mesh.t].min(0)
+        mesh = mesh.refined(np.flatnonzero(near < 1e-14))
+    basis = skfem.Basis(mesh.refined(1), skfem.ElementTriP2())
+    matrix = skfem.BilinearForm(lambda u, v, _: dot(grad(u), grad(v))).assemble(basis)
+
+    def energy(ones, zeros) -> float:
+        x, z = basis.doflocs
+        held = [np.flatnonzero(where(x, z)) for where in (ones, zeros)]
+        start = np.zeros(basis.N)
+        start[held[0]] = 1.0
+        u = skfem.solve(*skfem.condense(matrix, x=start, D=np.concatenate(held)))
+        return float(u @ matrix @ u)
+
+    def below(x, z):
+        return np.isclose(z, np.where(x < 0.5, x - 0.5, 0.0), atol=1e-12)
+
+    lower = 0.3 / energy(lambda x, z: x < 1e-12, lambda x, z: x > 1 - 1e-12)
+    upper = 0.3 * energy(lambda x, z: z > 0.3 - 1e-12, below)
+    assert upper - lower < 2e-6
+    assert lower <= COMB <= upper
+    found = ratio(tri_scene(), width=1e-7)
+    assert lower <= found.upper
+    assert found.lower <= upper
+
+
+def test_a_step_in_thickness_as_conformal_mapping_has_it():
+    """Plates of 0.3 and 0.6 mm in turn, 5 mm each: squares, and for each step what its corner adds."""
+    k = 0.5
+    step = ((k * k + 1) / k * log((1 + k) / (1 - k)) - 2 * log(4 * k / (1 - k * k))) / pi
+    teeth = [box(10 * n + 5, 10 * n + 10, 0, 1, 0.0, 0.3) for n in range(4)]
+    scene = metal(box(0, 40, 0, 1, 0.3, 0.6), *teeth, size_mm=(40.0, 1.0, 0.6))
+    exact = 20 / 0.3 + 20 / 0.6 + 8 * step
+    found = electrode_resistance(scene, "top", 1e-3, width=1e-8)
+    assert found.width() < 1e-8
+    assert found.middle() == close(exact, 1e-8)
+
+
+def test_bounds_narrow_exponentially_and_nest():
+    found = [ratio(tri_scene(), width=w) for w in (1e-2, 1e-3, 1e-5, 1e-7)]
+    for wide, narrow in pairwise(found):
+        assert wide.lower <= narrow.lower * (1 + 1e-9)
+        assert narrow.upper <= wide.upper * (1 + 1e-9)
+        assert narrow.width() < wide.width()
+
+
+def test_the_width_falls_by_a_factor_with_each_order(monkeypatch):
+    taken = []
+    monkeypatch.setattr(conduction, "_best", lambda steps, simple: [taken.append(s.width()) for s in steps] and simple)
+    monkeypatch.setattr(fem2d, "_first", lambda width: 3)
+    monkeypatch.setattr(fem2d, "_more", lambda now, width: 2)
+    ratio(tri_scene(), width=1.1e-8)
+    assert len(taken) > 3
+    assert all(b < a / 4 for a, b in pairwise(taken))
+
+
+@pytest.mark.parametrize("height", [1e-2, 3e-2, 0.1])
+def test_teeth_that_get_flat_change_nothing(height):
+    found = ratio(tri_scene(hang_height_mm=height, lower_height_mm=height / 2), width=1e-6)
+    mean = height / 4 / 0.3  # of the teeth, as a share of the plate
+    assert 1 / (1 + mean) < found.lower < found.upper < 1
+    assert found.middle() == close(1 - mean, 8 * mean**1.5)
+
+
+def test_teeth_that_get_thin_change_nothing():
+    values = []
+    for width in (0.2, 0.05, 0.0125):
+        teeth = [Prism("y", ((k, 1.0), (k + width / 2, 0.5), (k + width, 1.0)), 0.0, 1.0) for k in range(1, 9)]
+        values.append(ratio(metal(box(0, 10, 0, 1, 1.0, 1.3), *teeth, size_mm=(10.0, 1.0, 1.3))).middle())
+    assert values == sorted(values)
+    assert 1 - values[-1] < 1e-3
+    gains = 1 - np.array(values)
+    assert gains[:-1] / gains[1:] == pytest.approx([16, 16], rel=0.3)  # as the square of the width
+
+
+def test_teeth_that_touch_come_near_the_thicker_plate():
+    """Bars of 0.5 mm, ever nearer: from above, to a plate of 0.8 mm, and their volume bounds them from below."""
+    values = []
+    for gap in (0.2, 0.02, 0.002):
+        teeth = [box(k + gap / 2, k + 1 - gap / 2, 0, 1, 0.0, 0.5) for k in range(10)]
+        scene = metal(box(0, 10, 0, 1, 0.5, 0.8), *teeth, size_mm=(10.0, 1.0, 0.8))
+        found = ratio(scene)
+        assert 0.3 / 0.8 < found.lower < found.upper < 1
+        values.append(found.middle())
+    assert values == sorted(values, reverse=True)
+    solid = metal(box(0, 10, 0, 1, 0.5, 0.8), box(0, 10, 0, 1, 0.0, 0.5), size_mm=(10.0, 1.0, 0.8))
+    assert ratio(solid).middle() == close(0.3 / 0.8, 1e-12)
+
+
+@pytest.mark.parametrize(("shape", "end"), [(reference, "top"), (double, "middle"), (tri, "bottom"), (rect, "bottom")])
+def test_a_plate_without_cogs_is_exact(shape, end):
+    found = ratio(shape.scene(shape.Params(), Fill()), end)
+    assert (found.lower, found.upper) == close((1.0, 1.0), 1e-12)
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize("along", ["xy", "yx"])
+def test_crossed_strips_lie_between_rayleighs_bounds(along, axis):
+    found = ratio(rect_scene(along=along), axis=axis)
+    if axis == along[0]:  # the upper strips run along the current, 0.35 of the width, the lower ones across
+        slices, tubes = 0.3 * (0.65 / 0.405 + 0.35 / 0.705), 0.3 / 0.405
+    else:  # equal layers, so that only the order along z differs
+        slices, tubes = 0.3 * (0.65 / 0.405 + 0.35 / 0.705), 1.0
+    assert found.width() < 1e-3
+    assert slices < found.lower < found.upper < tubes
+
+
+def test_crossed_strips_turned_by_a_quarter_are_the_same():
+    one = ratio(rect_scene(length_mm=20.0, width_mm=10.0), axis="x")
+    other = ratio(rect_scene(length_mm=10.0, width_mm=20.0, along="yx"), axis="y")
+    assert (one.lower, one.upper) == close((other.lower, other.upper), 1e-9)
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-4])
+def test_crossed_strips_nest(width):
+    wide, narrow = (ratio(rect_scene(), width=w) for w in (10 * width, width))
+    assert wide.lower <= narrow.lower <= narrow.upper <= wide.upper
+    assert narrow.width() <= width
+
+
+@pytest.mark.parametrize("channels", [False, True])
+def test_bricks_and_triangles_agree(channels):
+    """Of bars under a plate; with channels that no current enters, around which a stream function must not jump."""
+    parts = [box(0, 10, 0, 1, 0.5, 0.8), box(0, 10, 0, 1, 0.3, 0.4)]
+    for k in range(10):
+        parts += [box(k + a, k + b, 0, 1, 0.4, 0.5) for a, b in ((0, 0.1), (0.3, 0.7), (0.9, 1))]
+        parts += [box(k + 0.3, k + 0.7, 0, 1, 0.0, 0.3)]
+    scene = metal(*(parts if channels else [parts[0], *parts[3::4], *parts[5::4]]), size_mm=(10.0, 1.0, 0.8))
+    flat = ratio(scene, width=1e-5)
+    alone = Scene((Body("electrode", "electrode", scene.bodies[0].prisms),), scene.size_mm)
+    (*_, deep) = conduction._in_space(alone, "x", 1e-3)
+    plate = 10 / 0.3
+    assert flat.width() < 1e-5
+    assert deep.lower / plate <= flat.lower <= flat.upper <= deep.upper / plate
+    assert deep.width() < 1e-3
+
+
+def test_an_end_amid_a_period_takes_the_patterns_resistance_per_length():
+    whole, cut = (electrode_resistance(tri_scene(length_mm=length), "top", 0.07) for length in (100.0, 97.3))
+    assert cut.times(100 / 97.3).lower <= whole.upper
+    assert whole.lower <= cut.times(100 / 97.3).upper
+    assert cut.width() < 1e-3
+    strips = [ratio(rect_scene(**sides)) for sides in ({}, {"length_mm": 97.3}, {"width_mm": 8.7})]
+    assert all(found.width() < 1e-3 for found in strips)
+    assert strips[1].middle() == close(strips[0].middle(), 1e-3)
+    assert strips[2].middle() < strips[0].middle()  # half a strip more at the edge
+
+
+def test_a_tooth_that_hangs_free_carries_nothing():
+    teeth = [box(2 * k, 2 * k + 1, 0, 1, 0.0, 0.49) for k in range(5)]
+    found = ratio(metal(box(0, 10, 0, 1, 0.5, 0.8), *teeth, size_mm=(10.0, 1.0, 0.8)))
+    assert holds(found, 1.0)
+    assert found.width() < 1e-8
+
+
+def test_round_cogs_have_rayleighs_bounds():
+    ring = [(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * pi, 8, endpoint=False)]
+    pins = [Prism("z", tuple((2 * k + 1 + 0.5 * c, 1 + 0.5 * s) for c, s in ring), 0.0, 0.5) for k in range(5)]
+    scene = metal(box(0, 10, 0, 2, 0.5, 0.8), *pins, size_mm=(10.0, 2.0, 0.8))
+    found = ratio(scene)
+    volume = 10 * 2 * 0.3 + sum(p.volume_mm3() for p in pins)
+    assert (found.lower, found.upper) == close((6.0 / volume, 1.0), 1e-12)
+
+
+def test_a_solver_that_fails_is_seen(monkeypatch):
+    """Planted: a flux of one part in a hundred too much."""
+    right = fem2d._best_multiple
+    monkeypatch.setattr(fem2d, "_best_multiple", lambda *given: 1.01 * right(*given))
+    conduction._per_resistivity.cache_clear()
+    with pytest.raises(bounds.CrossedBounds, match="lower bound"):
+        ratio(tri_scene(), width=1.01e-3)
+
+
+def test_a_slit_cog_is_seen():
+    """Planted: a slit of 1 um across each foot leaves the plate alone, which the reference excludes."""
+    k = np.arange(50)
+    teeth = [Prism("y", ((2 * n, 0.499), (2 * n + 0.5, 0.0), (2 * n + 1, 0.499)), 0.0, 10.0) for n in k]
+    found = ratio(metal(box(0, 100, 0, 10, 0.5, 0.8), *teeth, size_mm=(100.0, 10.0, 0.8)))
+    assert not holds(found, COMB)
+    assert holds(found, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("scene", "terminal", "options", "words"),
+    [
+        (metal(box(0, 10, 0, 1, 0, 1)), "bottom", {}, "no bottom electrode"),
+        (metal(box(1, 10, 0, 1, 0, 1)), "top", {}, "runs from 1 to 10 mm along x; expected 0 to 10 mm"),
+        (metal(box(0, 4, 0, 1, 0, 1), box(5, 10, 0, 1, 0, 1)), "top", {}, "does not conduct along x"),
+        (metal(box(0, 4, 0, 1, 0, 1), box(5, 10, 0, 0.5, 0, 1)), "top", {}, "does not conduct along x"),
+        (metal(box(0, 10, 0, 1, 0, 1)), "top", {"resistivity_ohm_m": -1.0}, "resistivity of the top electrode is -1"),
+        (metal(box(0, 10, 0, 1, 0, 1)), "top", {"resistivity_ohm_m": float("nan")}, "expected 0 ohm m or more"),
+        (metal(box(0, 10, 0, 1, 0, 1)), "top", {"width": 0.0}, "accuracy is 0"),
+    ],
+)
+def test_what_has_no_resistance_is_refused(scene, terminal, options, words):
+    with pytest.raises(OutOfRange, match=words):
+        electrode_resistance(scene, terminal, **{"resistivity_ohm_m": 1.0} | options)
