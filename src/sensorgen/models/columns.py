@@ -1,4 +1,4 @@
-"""Vertical columns side by side: a certified lower bound, and an upper one from the columns' own field.
+"""Vertical columns side by side: certified lower bound, and upper bound from the columns' own potential.
 
 Flux that may only run straight up is admissible for Thomson's principle, so the columns in parallel bound the
 capacitance from below. Any potential that is right on the electrodes bounds it from above (Dirichlet): we try
@@ -32,9 +32,9 @@ _JUMP = 1e-9  # a potential is continuous when its two sides differ by less, of 
 
 
 def why_not_applicable(scene: Scene) -> str | None:
-    """Why this model cannot speak of this scene, or None."""
+    """Why the model does not apply to a scene, or None."""
     if len({body.terminal for body in scene.bodies} - {""}) > 2:
-        return "more than two electrodes: sensorgen stack speaks of them"
+        return "more than two electrodes: use sensorgen stack"
     try:
         gaps = [_gap(column) for part in parts(scene) for column in _distinct(part).values()]
     except ValueError as error:
@@ -195,7 +195,7 @@ class _Stack:
 
 @dataclass(frozen=True)
 class _Row:
-    """The stacks of a part, those that look alike once: ``names`` tells which stands where."""
+    """The stacks of a part, equal ones once: ``names`` has the number of each in its order."""
 
     depth_mm: float
     names: tuple[int, ...]

@@ -1,4 +1,4 @@
-"""Finite elements on the cross-section: a potential from above, a flux from below, as near as asked.
+"""Finite elements on the cross-section: bounds from a potential above and a flux below, to a given width.
 
 Triangles shrink towards every corner where the field is singular, and polynomials of rising order fill them: the
 distance of the bounds falls exponentially. See docs/cells.md.
@@ -29,7 +29,7 @@ from sensorgen.solvers.electrostatics.triangles import Triangles, triangles
 SOURCE = "Dirichlet's and Thomson's principles; hp finite elements, rings without end at corners"
 COST = 2
 
-WIDTH = 1e-4  # of the interval, where the caller does not say
+WIDTH = 1e-4  # of the interval unless given
 
 _ORDERS = (3, 20)  # of polynomials: the lowest and the highest
 _CORNER_SHARE = 0.01  # of the wanted width: what may stay unresolved at a corner
@@ -41,7 +41,7 @@ _STALLED = 0.7  # a step that leaves more of the width than this gains nothing
 
 
 def why_not_applicable(scene: Scene) -> str | None:
-    """Why this model cannot speak of this scene, or None."""
+    """Why the model does not apply to a scene, or None."""
     try:
         _triangles(scene)
     except ValueError as error:
@@ -61,7 +61,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     permittivity : mapping of str to float
         Relative permittivity of each material that lies between the electrodes, and of "air", above 0 [-].
     width : float
-        How wide the interval may be, relative to its middle; it is wider where doubles or orders end [-].
+        Relative width of the interval; wider where double precision or the highest order limits it [-].
 
     Returns
     -------
@@ -83,8 +83,8 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
 
     Notes
     -----
-    Where a sensor ends amid a period, the pattern is thought to go on beyond its ends, and the sensor gets the energy
-    that lies within its own length; see :func:`sensorgen.solvers.electrostatics.bounds.whole`.
+    Where a sensor ends amid a period, the pattern is continued periodically beyond its ends; only the energy
+    within the sensor's length counts; see :func:`sensorgen.solvers.electrostatics.bounds.whole`.
     """
     fem.check(permittivity, width)
     best = Interval(0.0, np.inf)
@@ -176,7 +176,7 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
         Relative permittivity of each material between the electrodes, and of "air"; real part above 0,
         :math:`\varepsilon' (1 - j\tan\delta) - j / (\omega\varepsilon_0\varrho)` [-].
     width : float
-        How wide the disc may be, relative to its centre's modulus; wider where doubles or orders end [-].
+        Relative width of the disc; wider where double precision or the highest order limits it [-].
 
     Returns
     -------
@@ -246,7 +246,9 @@ def _graded(coarse: Triangles, permittivity: Mapping[str, float], width: float) 
     doublings = {c: int(np.clip(np.ceil(np.log2(max(n, 1.0))), 0, _MOST_DOUBLINGS)) for c, n in rings.items()}
     mesh = Cones(graded(coarse, found), doublings)
     if mesh.areas().min() <= 0:
-        raise fem.Unsolved("a piece of the scene is too thin for its length: doubles tell no such triangles")
+        raise fem.Unsolved(
+            "a piece of the scene is too thin for its length: double precision does not resolve such triangles"
+        )
     return mesh
 
 
@@ -269,7 +271,7 @@ def _fields(plane: Plane, eps: NDArray[Any]) -> tuple[Field, Field]:
 
 
 def _thomson(plane: Plane, eps: NDArray[Any], u: Field, psi: Field) -> Any:
-    """Twice what flows into the top, which any potential tells by its own 1 V, less the flux's energy."""
+    """Twice the flux into the top, evaluated with any potential of 1 V there, less the flux's energy."""
     return 2 * plane.crossings(u, psi).sum() - (plane.energies(psi, psi) / eps).sum()
 
 

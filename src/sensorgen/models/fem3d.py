@@ -22,14 +22,14 @@ from sensorgen.solvers.electrostatics.dissection import least, unknowns_of
 SOURCE = "Dirichlet's and Thomson's principles; graded boxes, H1 and hybrid H(div), nested dissection"
 COST = 3
 
-WIDTH = 1e-3  # of the interval, where the caller does not say
+WIDTH = 1e-3  # of the interval unless given
 
 _RUNGS = ((1, 3, 2), (1, 5, 4), (2, 6, 5), (3, 7, 6))  # layers, order of the potential, order of the flux
 _MOST_BRICKS = 2500  # of one rung: more would take hours
 
 
 def why_not_applicable(scene: Scene) -> str | None:
-    """Why this model cannot speak of this scene, or None."""
+    """Why the model does not apply to a scene, or None."""
     if reason := fem.third_electrode(scene):
         return reason
     try:
@@ -74,7 +74,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     permittivity : mapping of str to float
         Relative permittivity of each material that lies between the electrodes, and of "air", above 0 [-].
     width : float
-        How wide the interval may be, relative to its middle; it is wider where the finest mesh is reached [-].
+        Relative width of the interval; wider where the finest mesh is reached [-].
 
     Returns
     -------
@@ -135,7 +135,7 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     permittivity : mapping of str to complex
         As of :func:`sensorgen.models.fem2d.lossy` [-].
     width : float
-        How wide the disc may be, relative to its centre's modulus; it is wider where the finest mesh is reached [-].
+        Relative width of the disc; wider where the finest mesh is reached [-].
 
     Returns
     -------

@@ -215,7 +215,7 @@ def _march(
 
 
 def _finite(z: Complex, current: NDArray[Any]) -> Complex:
-    """Z, infinite where no current flows; one sum tells whether there is anything to look for."""
+    """Z, infinite where no current flows; one sum decides whether any value has to be checked."""
     if abs(z.sum()) < HIGHEST_OHM:  # neither part of Z changes its sign: nothing cancels
         return z
     idle = np.asarray(current == 0)

@@ -150,7 +150,7 @@ class Film(NamedTuple):
     capacitance_f_per_m : float
         Unloaded, per length [F/m].
     thinning : callable
-        Stress [Pa] to the share by which it is thinner [-] and that share's derivative [1/Pa], as
+        Pressure [Pa] to capacitive strain [-] and its derivative [1/Pa], as
         :meth:`sensorgen.models.compression.Plate.thinning`.
     tan_delta : float
         Loss tangent [-].
@@ -231,7 +231,7 @@ class Stack:
         Parameters
         ----------
         frequency_hz : float or array
-            Tones, above 0 [Hz].
+            Frequencies, above 0 [Hz].
         touch, body : Touch, Body
             Where and through what it touches; how it is tied to the ground of the instrument.
         driven, low : int
@@ -297,7 +297,7 @@ class Stack:
         Parameters
         ----------
         frequency_hz : float or array
-            Tones, above 0 [Hz].
+            Frequencies, above 0 [Hz].
         press : Press
             What presses, and where; the derivative by position is by ``left_m``.
 

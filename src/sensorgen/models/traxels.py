@@ -28,7 +28,7 @@ COST = 2
 
 @dataclass(frozen=True)
 class Resistance:
-    """What a network of lines says.
+    """Result of a network of lines.
 
     Attributes
     ----------

@@ -321,7 +321,7 @@ def reading(admittance_s: Matrix, across: Real, tie: Real, body_s: Complex, brid
     return np.asarray(voltages @ across / (1 - past))
 
 
-_UNRELATED = 1e-12  # of the largest: singular values below it are rounding, and what they stand for is not told
+_UNRELATED = 1e-12  # of the largest: singular values below it are rounding, and their directions undetermined
 
 
 def standard_errors(slopes: NDArray[np.complex128], noise: Real) -> Real:
@@ -340,7 +340,7 @@ def standard_errors(slopes: NDArray[np.complex128], noise: Real) -> Real:
     Returns
     -------
     (quantities,) array
-        Standard errors, in the quantities' units; inf where the readings do not tell them apart.
+        Standard errors, in the quantities' units; inf where the readings do not determine them.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The forward model of one sensor at fixed tones: everything that no press changes is worked out once."""
+"""Forward model of one sensor at fixed frequencies, for arrays of presses and for one press in plain numbers."""
 
 import cmath
 
@@ -17,14 +17,14 @@ _HALVINGS = 40
 
 
 class Forward:
-    """Exact ln Z of a sensor at its tones, for one press per row.
+    """Exact ln Z of a sensor at its frequencies, for one press per row.
 
     Attributes
     ----------
     sensor : Sensor
         The sensor.
     frequency_hz : (n_tones,) array
-        Tones [Hz].
+        Frequencies [Hz].
     susceptance, loose : (n_tones,) array
         Per length, unpressed: omega C', and the whole admittance of the film [S/m].
     track, track_per_pascal : float
@@ -40,7 +40,7 @@ class Forward:
 
     def __init__(self, sensor: Sensor, frequency_hz: ArrayLike) -> None:
         if sensor.profile != UNIFORM:
-            raise OutOfRange(f"a pressure like a {sensor.profile!r}; the way back is known for a uniform one only")
+            raise OutOfRange(f"a tip of profile {sensor.profile!r}: only uniform pressure can be inverted")
         self.sensor, self.frequency_hz = sensor, tones(frequency_hz)
         self.susceptance: Real = 2 * np.pi * self.frequency_hz * sensor.capacitance_f_per_m
         self.loose = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * self.susceptance
@@ -49,7 +49,7 @@ class Forward:
     def log_impedance(self, force_n: Real, position_m: Real) -> Complex:
         """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.impedance`.
 
-        As :meth:`Sensor.impedance`, but what the tones share and a search would repeat at every step is done once.
+        As :meth:`Sensor.impedance`, with everything that does not depend on the press computed once.
         """
         sensor, force = self.sensor, force_n[:, None]
         patch = sensor.patch(position_m[:, None])
@@ -86,7 +86,7 @@ class Forward:
 
 
 def tones(frequency_hz: ArrayLike) -> Real:
-    """Tones as an array, or an error that says which one is none.
+    """Frequencies as an array, checked.
 
     Raises
     ------
@@ -96,14 +96,14 @@ def tones(frequency_hz: ArrayLike) -> Real:
     try:
         found = np.atleast_1d(np.asarray(frequency_hz, np.float64))
     except (TypeError, ValueError):
-        raise BadInput(f"tones are numbers in Hz, not {str(frequency_hz)[:60]!r}") from None
+        raise BadInput(f"frequencies are numbers in Hz, not {str(frequency_hz)[:60]!r}") from None
     if found.ndim != 1 or not found.size:
-        raise BadInput(f"expected a list of tones in Hz, not an array of shape {found.shape}")
+        raise BadInput(f"expected a list of frequencies in Hz, not an array of shape {found.shape}")
     bad = ~((found > 0) & (found < np.inf))
     if bad.any():
-        raise OutOfRange(f"a tone of {found[bad][0]:g} Hz; expected a number above 0")
+        raise OutOfRange(f"a frequency of {found[bad][0]:g} Hz; expected a number above 0")
     if len(np.unique(found)) < len(found):
-        raise OutOfRange("the same tone twice: give each tone once")
+        raise OutOfRange("the same frequency twice: give each once")
     return found
 
 
@@ -137,7 +137,7 @@ class Scalar:
         self._load = None if cmath.isinf(far_ohm) else far_ohm
 
     def log_impedance(self, force_n: float, position_m: float) -> list[complex]:
-        """Natural logarithm of Z/ohm, tone by tone; errors as :meth:`Sensor.impedance`."""
+        """Natural logarithm of Z/ohm, per frequency; errors as :meth:`Sensor.impedance`."""
         sensor, (track, per_pascal) = self._sensor, self._track
         left = max(position_m - sensor.tip_m / 2, 0.0)
         end = min(position_m + sensor.tip_m / 2, sensor.length_m)

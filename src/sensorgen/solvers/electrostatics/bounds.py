@@ -51,9 +51,9 @@ class Energies:
 
 
 def third_electrode(scene: Scene) -> str | None:
-    """Why bounds between two terminals cannot speak of a scene of more, or None."""
+    """Why bounds between two terminals do not apply to a scene of more, or None."""
     if {body.terminal for body in scene.bodies} - {"", "top", "bottom"}:
-        return "more than two electrodes: sensorgen stack speaks of them"
+        return "more than two electrodes: use sensorgen stack"
     return None
 
 

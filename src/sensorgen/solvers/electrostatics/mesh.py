@@ -197,7 +197,7 @@ class Cones:
         return np.minimum(a, b) * len(self.triangles.points) + np.maximum(a, b)
 
     def areas(self) -> Numbers:
-        """Of all triangles, twice; 0 or less where doubles tell no triangle [mm2]."""
+        """Of all triangles, twice; 0 or less where double precision does not resolve it [mm2]."""
         a, b, c = self.triangles.points[self.corners].transpose(1, 2, 0)
         return np.asarray((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0])
 

@@ -1,4 +1,4 @@
-"""One function on a graded mesh: numbers for its unknowns, blocks for the solver, and the way back to all triangles."""
+"""Potential and stream function on a graded mesh: unknowns, blocks for the solver, energies."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

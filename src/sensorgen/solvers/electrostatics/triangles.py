@@ -225,7 +225,7 @@ def _piece(found: _Found, beside: dict[int, list[int]], left: set[int]) -> tuple
 
 
 def _refuse_open(points: NDArray[np.float64], owners: dict[Edge, list[int]], inside: set[int], cell: Cell) -> None:
-    """Refuse a field that would reach the box's floor or lid: beyond them lies more than the scene says."""
+    """Refuse a field that would reach the box's floor or lid: the scene does not describe what is beyond them."""
     last = cell.slices[0].bands
     ends = (last[0].bottom_mm[0], last[-1].top_mm[0])
     for edge, sides in owners.items():

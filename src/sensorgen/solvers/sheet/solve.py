@@ -67,7 +67,7 @@ def depth_m(sheet: Sheet, frequency_hz: float, patch: Patch | None = None) -> fl
 
 
 def frequencies(given: ArrayLike) -> NDArray[np.float64]:
-    """Tones as an array [Hz], or an error that names them."""
+    """Frequencies as an array [Hz], checked."""
     found = np.atleast_1d(np.asarray(given))
     if found.dtype.kind not in "iuf" or found.ndim != 1 or not found.size:
         raise BadInput(f"frequency_hz takes numbers in Hz, not {str(given)[:60]!r}")
@@ -174,7 +174,7 @@ Real = NDArray[np.float64]
 ACCURACY = 3e-2  # of the impedances behind a bound [-]
 SHALLOWEST = 1 / 20  # depth of the current over the longer side, under which places would take hours [-]
 _ROUNDING = 1e-11  # relative change of an impedance across the sheet [-] below which a derivative is only rounding
-_SINGULAR = 1e-13  # smallest eigenvalue of a correlation of derivatives that is told from 0 [-]
+_SINGULAR = 1e-13  # smallest eigenvalue of a correlation of derivatives that is distinct from 0 [-]
 
 
 @dataclass(frozen=True)
@@ -186,9 +186,9 @@ class Bounds:
     x_m, y_m : (nx,) and (ny,) array
         Centres of the patch [m].
     frequency_hz : (n,) array
-        Tones [Hz].
+        Frequencies [Hz].
     information : (nx, ny, n, 3, 3) array
-        Fisher's information of each tone on force, x and y [1/N2 and 1/m2].
+        Fisher information of each frequency on force, x and y [1/N2 and 1/m2].
     guess_m : tuple of float
         Standard error of a place on the sheet without any reading, length and width over sqrt(12) [m].
     cells : int
@@ -203,15 +203,15 @@ class Bounds:
     cells: int
 
     def sigma(self, tones: Sequence[int] | None = None, *, outline: bool = False) -> Real:
-        """Standard errors of force [N], x and y [m] on the last axis, from all tones or some; inf where nothing tells.
+        """Standard errors of force [N], x and y [m] on the last axis, from all frequencies or some; inf if undetermined.
 
         Parameters
         ----------
         tones : sequence of int
-            Which tones, counted from 0; all unless given.
+            Which frequencies, counted from 0; all unless given.
         outline : bool
             Whether it is known that the press is on the sheet, as a prior of its spread (van Trees): errors of place
-            then never exceed a guess, and a place that the readings leave open does not spoil what they tell.
+            then never exceed a guess, and an undetermined position does not affect the other errors.
         """
         chosen = self.information if tones is None else self.information[:, :, list(tones)]
         known = np.diag([0.0, *(1 / spread**2 for spread in self.guess_m)]) if outline else 0.0
@@ -223,7 +223,7 @@ class Bounds:
         return float(np.mean((sigma[..., 1] < self.guess_m[0] / 2) & (sigma[..., 2] < self.guess_m[1] / 2)))
 
     def best_tones(self) -> list[int]:
-        """Tones, counted from 0, by how much worse the median error of a place is without them; the best first."""
+        """Frequencies, counted from 0, by how much the median position error rises without them; the best first."""
         everyone = range(len(self.frequency_hz))
         missed = [
             float(np.median(np.hypot(s[..., 1], s[..., 2])))
@@ -307,7 +307,7 @@ def _moved(press: Patch, x_m: float, y_m: float) -> Patch:
 
 
 def _information(relative: NDArray[np.complex128], sheet: Sheet, noise: float) -> Real:
-    """Of each tone, from relative derivatives (3, tones, ports): noise is relative to the magnitude in both parts."""
+    """Of each frequency, from relative derivatives (3, tones, ports); noise relative to the magnitude in both parts."""
     scale = np.array([1.0, sheet.length_m, sheet.width_m])[:, None, None]
     rows = np.concatenate([relative.real, relative.imag], axis=2) / noise
     rows[np.abs(rows) * noise * scale < _ROUNDING] = 0.0
