@@ -146,8 +146,8 @@ class Summary:
         excess = _middle(self._excess)
         if self._most(Status.NO_FIT) and excess is not None:
             yield (
-                f"most readings fit no press: residuals are {excess:.3g} times the noise; set a larger --noise if it is "
-                "noise, or another design or material source if it is not"
+                f"most readings fit no press: residuals are {excess:.3g} times the noise; set a larger --noise if it "
+                "is noise, or another design or material source if it is not"
             )
         if self._most(Status.NOT_IDENTIFIABLE, Status.FORCE_ONLY):
             yield (

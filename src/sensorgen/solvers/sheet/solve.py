@@ -203,7 +203,7 @@ class Bounds:
     cells: int
 
     def sigma(self, tones: Sequence[int] | None = None, *, outline: bool = False) -> Real:
-        """Standard errors of force [N], x and y [m] on the last axis, from all frequencies or some; inf if undetermined.
+        """Standard errors of force [N], x and y [m] on the last axis, from all frequencies or some; inf if unknown.
 
         Parameters
         ----------
