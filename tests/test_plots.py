@@ -31,9 +31,17 @@ from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
 
 PLATE = {
-    "L_m": 0.1, "W_m": 0.01, "H_top_m": 3e-4, "H_bottom_m": 3e-4, "rho_top_ohm_m": 0.07, "rho_bottom_ohm_m": 0.2,
-    "d_m": 6e-4, "eps_r": 4.68, "E_Pa": 6e6, "L_p_m": 0.01,
-}  # fmt: skip
+    "length_m": 0.1,
+    "width_m": 0.01,
+    "top_thickness_m": 3e-4,
+    "bottom_thickness_m": 3e-4,
+    "top_resistivity_ohm_m": 0.07,
+    "bottom_resistivity_ohm_m": 0.2,
+    "film_m": 6e-4,
+    "eps_r": 4.68,
+    "modulus_pa": 6e6,
+    "tip_m": 0.01,
+}
 TONES, FORCES, AT = (10.1e3, 99.7e3), (0.0, 2.0, 4.0, 6.0), (0.0, 20.0, 40.0, 60.0, 100.0)
 
 
@@ -49,7 +57,7 @@ def answer(sensor):
 
 def at_point(f, force, x_mm):
     """The plate of the reference design, pressed with the whole tip on it, straight from the line."""
-    return complex(line.impedance(**PLATE, f_Hz=f, F_N=force, x_p_left_edge_m=x_mm / 1e3 - 0.005))
+    return complex(line.impedance(line.PressedLine(**PLATE, frequency_hz=f, force_n=force, left_m=x_mm / 1e3 - 0.005)))
 
 
 def test_values_are_those_of_the_line(answer):

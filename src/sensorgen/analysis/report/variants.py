@@ -1,9 +1,9 @@
 """The variants of an iteration: drawings, bodies, and whether each can sense force and position."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import nan
-from typing import Annotated, Any
+from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison, Predicted
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, Body, Curve, Figure, Panel
@@ -12,7 +12,7 @@ from sensorgen.checks.review import draw, review
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import materials
 from sensorgen.design.design import Design
-from sensorgen.prediction.identifiability import FORCE_N
+from sensorgen.prediction.identifiability import FORCE_N, Identifiability
 from sensorgen.scene.geometry.meshes import mesh
 
 _STRETCH = (1.0, 1.0, 10.0)
@@ -72,26 +72,24 @@ def _words(of: Predicted) -> str:
 
 def identifiability(found: Comparison) -> tuple[Table, ...]:
     """A row for each variant with a prediction."""
-    rows = tuple(
-        _row(name, of.prediction.identifiability or {"reason": of.reason}) for name, of in found.predictions.items()
-    )
+    rows = tuple(_row(name, of.prediction.identifiability, of.reason) for name, of in found.predictions.items())
     caption = f"Predicted identifiability of {FORCE_N:g} N in the middle, by seven frequencies (Cramér-Rao)"
     return (Table("identifiability", caption, rows),) if rows else ()
 
 
-def _row(name: str, card: Mapping[str, Any]) -> IdentifiabilityRow:
+def _row(name: str, found: Identifiability | None, reason: str) -> IdentifiabilityRow:
+    if found is None:
+        return IdentifiabilityRow(name, nan, nan, nan, reason or "no prediction")
     force, place, together = (
-        float(value) if isinstance(value := card.get(key), int | float) else nan
-        for key in ("sigma_force_n", "sigma_position_m", "correlation")
+        nan if value is None else value for value in (found.sigma_force_n, found.sigma_position_m, found.correlation)
     )
-    verdict = card.get("verdict") or card.get("reason") or "no prediction"
-    return IdentifiabilityRow(name, force, place / M_PER_MM, together, str(verdict))
+    return IdentifiabilityRow(name, force, place / M_PER_MM, together, found.verdict)
 
 
 def figures(found: Comparison) -> Iterator[Figure]:
     """Standard errors over position for three forces, and the bodies; of every variant, one at a time."""
-    cards = {name: of.prediction.identifiability or {} for name, of in found.predictions.items()}
-    known = {name: errors(card) for name, card in cards.items() if card.get("map")}
+    cards = {name: of.prediction.identifiability for name, of in found.predictions.items()}
+    known = {name: errors(card) for name, card in cards.items() if card}
     if known:
         yield Figure(
             "identifiability-map", "Predicted standard errors of force and position",
@@ -109,21 +107,20 @@ def figures(found: Comparison) -> Iterator[Figure]:
         )  # fmt: skip
 
 
-def errors(card: Mapping[str, Any]) -> tuple[Panel, Panel]:
-    """Standard errors of an identifiability card over position [mm], for a weak, a middling and the greatest force."""
-    over, required = card["map"], card["required"]
-    forces, place = over["force_n"], [x / M_PER_MM for x in over["position_m"]]
-    panels = []
-    for quantity, unit, key, per in (
-        ("force", "N", "sigma_force_n", 1.0),
-        ("position", "mm", "sigma_position_m", M_PER_MM),
+def errors(found: Identifiability) -> tuple[Panel, Panel]:
+    """Standard errors over position [mm], for a weak, a middling and the greatest force."""
+    over, required = found.map, found.required
+    place, panels = [x / M_PER_MM for x in over.position_m], []
+    for quantity, unit, sigma, needed, per in (
+        ("force", "N", over.sigma_force_n, required.sigma_force_n, 1.0),
+        ("position", "mm", over.sigma_position_m, required.sigma_position_m, M_PER_MM),
     ):
         curves = [
-            Curve("line", f"{forces[k]:g} N", place, [nan if v is None else v / per for v in over[key][k]],
+            Curve("line", f"{over.force_n[k]:g} N", place, [nan if v is None else v / per for v in sigma[k]],
                   colour=colour)
-            for k, colour in zip((1, len(forces) // 2, len(forces) - 1), (SKY, BLUE, ORANGE), strict=True)
+            for k, colour in zip((1, len(sigma) // 2, len(sigma) - 1), (SKY, BLUE, ORANGE), strict=True)
         ]  # fmt: skip
-        need = [required[key] / per] * 2
+        need = [nan if needed is None else needed / per] * 2
         curves.append(Curve("line", "required", [place[0], place[-1]], need, colour=GREY, dash="dash"))
         y = Axis(f"error of {quantity} [{unit}]", log=True)
         panels.append(Panel(tuple(curves), Axis("position of the tip's centre [mm]"), y))

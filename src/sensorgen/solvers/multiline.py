@@ -4,12 +4,14 @@ Film voltages v and loop currents i (a loop runs out on the track above a film a
 v' = A v - R i, i' = -Y v - A^T i. A is 0 on every real line; its derivative is what a moving patch needs.
 """
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.errors import OutOfRange
+from sensorgen.solvers.line.inputs import check_fit, passive
 
 Matrix = NDArray[np.complex128]  # (..., n, n)
 
@@ -188,3 +190,172 @@ class Meeting:
 
 def _turned(matrix: Matrix) -> Matrix:
     return np.swapaxes(matrix, -1, -2)
+
+
+Real = NDArray[np.float64]
+
+
+def march(lines: Sequence[Line], lengths: Sequence[Real]) -> tuple[Matrix, Matrix]:
+    """Admittance at the contacts and its derivative, from the open far end; the stack may be of any sections."""
+    n = lines[0].series.shape[-1]
+    w = by = np.zeros((n, n), complex)
+    with np.errstate(all="ignore"):
+        for line, length in zip(reversed(lines), reversed(lengths), strict=True):
+            w, by = ahead(piece(line, length[..., None, None]), w, by)
+    if not (np.isfinite(w).all() and np.isfinite(by).all()):
+        raise OutOfRange("the stack's numbers are too extreme for double precision")
+    return w, by
+
+
+def inverse(admittance_s: Matrix) -> Matrix:
+    """Z = 1/W with scaled unknowns; inf + 0j where a film carries no current."""
+    size = np.abs(np.einsum("...kk->...k", admittance_s))
+    idle = (size == 0).any(axis=-1)[..., None, None]
+    scale = np.exp2(-np.rint(np.log2(np.where(size > 0, size, 1.0)) / 2))
+    both = scale[..., :, None] * scale[..., None, :]
+    safe = np.where(idle, np.eye(admittance_s.shape[-1]), admittance_s * both)
+    return np.where(idle, complex(np.inf, 0.0), np.linalg.inv(safe) * both)
+
+
+def side_by_side(name: str, values: Sequence[ArrayLike]) -> NDArray[Any]:
+    """The tracks' or films' values along a last axis."""
+    found = [passive(name, value) for value in values]
+    check_fit(f"the values of {name} in a section", found)
+    return np.stack(np.broadcast_arrays(*found), axis=-1)
+
+
+def loops(r: NDArray[Any]) -> NDArray[Any]:
+    """Resistance matrix of the loops: each runs through its two tracks, neighbours share one in opposite directions."""
+    n = r.shape[-1] - 1
+    own, shared = r[..., 1:] + r[..., :-1], r[..., 1:-1]
+    found = np.zeros((*r.shape[:-1], n, n))
+    k = np.arange(n)
+    found[..., k, k] = own
+    found[..., k[1:], k[:-1]] = found[..., k[:-1], k[1:]] = -shared
+    return found
+
+
+def diagonal(values: NDArray[Any]) -> Matrix:
+    """Admittance matrix of the films, which do not see each other."""
+    return np.asarray(np.eye(values.shape[-1]) * values[..., None, :], complex)
+
+
+def directions(deep: int, *changes: Matrix | float) -> Matrix:
+    """The directions of interest along one axis in front of ``deep`` others."""
+    found = np.stack(np.broadcast_arrays(*(np.asarray(change, complex) for change in changes)))
+    return found.reshape(len(changes), *(1,) * (deep + 1 - found.ndim), *found.shape[1:])
+
+
+Complex = NDArray[np.complex128]
+
+
+class Body(NamedTuple):
+    """What ties a body to the ground of the instrument: a resistor and a capacitor in series.
+
+    The defaults are the human body model of ANSI/ESDA/JEDEC JS-001, 1.5 kohm and 100 pF: an assumption, made for
+    discharges, that stands here for a person on an isolating floor. The resistor lies in the skin, over the touch.
+
+    Attributes
+    ----------
+    resistance_ohm : float
+        Of the skin under the touch [ohm], above 0.
+    capacitance_f : float
+        From the body to ground [F].
+    """
+
+    resistance_ohm: float = 1500.0
+    capacitance_f: float = 100e-12
+
+    def admittance_s(self, frequency_hz: ArrayLike) -> Complex:
+        """Admittance from behind the skin to ground [S]."""
+        return np.asarray(2j * np.pi * np.asarray(frequency_hz, float) * self.capacitance_f)
+
+
+class Touch(NamedTuple):
+    """Where a body lies on the top, over the whole width, and what is between.
+
+    Attributes
+    ----------
+    left_m, length_m : float
+        Left edge and length of the touched stretch [m].
+    isolation_f_per_m : float
+        Capacitance of the isolation per length [F/m], above 0; inf where the body lies on the bare electrode.
+    force_n : float
+        With which it presses, its stress shared by the whole touch [N].
+    """
+
+    left_m: ArrayLike
+    length_m: ArrayLike
+    isolation_f_per_m: float
+    force_n: ArrayLike = 0.0
+
+    def admittance_s_per_m(self, frequency_hz: ArrayLike, body: Body) -> Complex:
+        """Admittance from the top track through isolation and skin, where they touch [S/m]."""
+        skin = body.resistance_ohm * np.asarray(self.length_m, float)
+        susceptance = 2 * np.pi * np.asarray(frequency_hz, float) * self.isolation_f_per_m
+        return np.asarray(1 / (skin + 1 / (1j * susceptance)) if np.isfinite(self.isolation_f_per_m) else 1 / skin + 0j)
+
+
+def with_body(r: list[Any], y: list[Any], touching: Complex) -> tuple[list[Any], list[Any]]:
+    """The sections of a touched stack: the body is a track without resistance, coupled under the touch alone."""
+    return [[*section, 0.0] for section in r], [[*section, touching * (k == 1)] for k, section in enumerate(y)]
+
+
+def reading(admittance_s: Matrix, across: Real, tie: Real, body_s: Complex, bridge: bool) -> Complex:
+    """What the instrument reads between driven and low track [ohm].
+
+    Parameters
+    ----------
+    admittance_s : array (..., n, n)
+        Of the stack and its body [S].
+    across, tie : array (n,)
+        The films between low and driven track, and between low track and body; -1 where they lie against it [-].
+    body_s : array
+        Admittance from the body to ground [S].
+    bridge : bool
+        Whether what flows to ground through the body goes past the ammeter.
+    """
+    tied = inverse(admittance_s + body_s[..., None, None] * np.outer(tie, tie))
+    voltages = tied @ across
+    past = body_s * (voltages @ tie) if bridge else 0.0
+    return np.asarray(voltages @ across / (1 - past))
+
+
+_UNRELATED = 1e-12  # of the largest: singular values below it are rounding, and their directions undetermined
+
+
+def standard_errors(slopes: NDArray[np.complex128], noise: Real) -> Real:
+    r"""Smallest standard errors of an unbiased estimate, none of the quantities being known beforehand.
+
+    .. math:: \sigma_a^2 = (F^{-1})_{aa}, \quad
+              F_{ab} = \sum_k \frac{\mathrm{Re}(\overline{s_{ak}}\, s_{bk})}{\sigma_k^2}
+
+    Parameters
+    ----------
+    slopes : (quantities, readings) complex array
+        Derivatives of each reading [ohm per the quantity's unit].
+    noise : (readings,) array
+        Standard deviation of the real and of the imaginary part of each reading, independent and normal [ohm].
+
+    Returns
+    -------
+    (quantities,) array
+        Standard errors, in the quantities' units; inf where the readings do not determine them.
+
+    Examples
+    --------
+    One real reading that rises by 2 ohm/N, with 0.1 ohm of noise:
+
+    >>> standard_errors(np.array([[2.0 + 0j]]), np.array([0.1])).tolist()
+    [0.05]
+    """
+    weighted = slopes / noise
+    jacobian = np.concatenate([weighted.real, weighted.imag], axis=1).T
+    size = np.linalg.norm(jacobian, axis=0)
+    _, values, rows = np.linalg.svd(jacobian / np.where(size > 0, size, 1.0), full_matrices=False)
+    told = values > _UNRELATED * values.max(initial=0.0)
+    spread = np.where(told[:, None], rows / np.where(told, values, 1.0)[:, None], 0.0)
+    errors = np.linalg.norm(spread, axis=0) / np.where(size > 0, size, 1.0)
+    untold = np.linalg.norm(rows[~told], axis=0) > np.sqrt(_UNRELATED)
+    missing = len(rows) < len(size)
+    return np.where(untold | (size == 0) | missing, np.inf, errors)
