@@ -219,7 +219,7 @@ def test_other_tones():
 
 @pytest.fixture(scope="module")
 def plate():
-    """The plate of Table 3.1, free to give way (B.49), and its design."""
+    """The plate of Table 3.1, free to expand (B.49), and its design."""
     design = make({"shape": "reference"})
     return design, sensor_of(design)
 
@@ -310,7 +310,7 @@ def test_presses_as_plain_data(plate):
     assert found["im_ohm"][1][2][1] == close(exact(2e3, 2, 50).imag, 1e-12)
     assert found["model"] == {"capacitance": "columns", "line": "line", "compression": "unconfined"}
     assert (found["design"], found["design_id"], found["tip_mm"]) == (design.name, design.id(), 10.0)
-    assert "free to give way" in found["compression"]
+    assert "free to expand sideways" in found["compression"]
     assert found["doubts"] == list(sensed.doubts) != []
     assert {v["quantity"] for v in found["values"]} == {
         "relative_permittivity",

@@ -9,7 +9,7 @@ import pytest
 from sensorgen.asprinted import compared, pressed
 from sensorgen.core.errors import SensorgenError
 from sensorgen.models import press2d, press3d
-from sensorgen.models.press2d import Elastic, Fineness, Held
+from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction import compression_law as celllaw
 from sensorgen.prediction.compression import Asked
@@ -59,7 +59,7 @@ def built(widths, film=0.1):
 
 
 def answered(design, printed, *kpa, **more):
-    return compressed.answer(design, Asked((0.0, *kpa), Held()), printed=printed, **more)
+    return compressed.answer(design, Asked((0.0, *kpa), BoundaryConditions()), printed=printed, **more)
 
 
 @needs_mesher
@@ -84,7 +84,7 @@ def test_a_printed_cell_gives_way_like_one_built_by_hand(walls, fall_um):
 def test_a_foot_of_a_lines_width_is_stiffer_than_a_sharp_one():
     """At 10 kPa as drawn 6.13 um, by other programs; on feet of 0.34 mm less than a third of it."""
     design = small()
-    drawn = compressed.answer(design, Asked((0.0, 10.0), Held()))
+    drawn = compressed.answer(design, Asked((0.0, 10.0), BoundaryConditions()))
     found = answered(design, compared.estimated(design), 10.0)
     assert drawn["displacement_um"][1] == pytest.approx(6.13, rel=0.02)
     assert found["displacement_um"][1] < drawn["displacement_um"][1] / 3
@@ -99,7 +99,7 @@ def test_the_printed_sensor_has_the_law_of_its_own_cell():
     sensed = pressed.sensor_of(design, printed, "solved")
     found = answered(design, printed, 10.0, 20.0)
     middle = (np.array(found["lower_f_per_m2"]) + np.array(found["upper_f_per_m2"])) / 2
-    thinning, _ = sensed.sensor.compression.thinning(np.array([1e4, 2e4]))
+    thinning, _ = sensed.sensor.compression.capacitive_strain(np.array([1e4, 2e4]))
     assert 1 / (1 - thinning) == pytest.approx(middle[1:] / middle[0], rel=1e-4)
     assert sensed.law.bounded
     span = sensed.unloaded.answer.capacitance_f
@@ -123,7 +123,10 @@ def test_crossed_strips_are_pressed_in_three_dimensions(monkeypatch):
     monkeypatch.setattr(press3d, "Pieces", partial(press3d.Pieces, 1))
     design = small("rect")
     printed = compared.estimated(design)
-    found, drawn = answered(design, printed, 100.0), compressed.answer(design, Asked((0.0, 100.0), Held()))
+    found, drawn = (
+        answered(design, printed, 100.0),
+        compressed.answer(design, Asked((0.0, 100.0), BoundaryConditions())),
+    )
     assert (found["model"], found["faults"]) == ("press3d", [])
     assert 1.0 < found["displacement_um"][1] / drawn["displacement_um"][1] < 1.15
     assert found["lower_f_per_m2"][0] * 4e-6 < 0.79334e-12 < found["upper_f_per_m2"][0] * 4e-6  # found by hand
@@ -151,7 +154,7 @@ def test_support_takes_no_place_from_what_stays(walls):
 def test_the_staircase_whose_cog_ends_short_of_the_film():
     """Published: 47 um, C' from 88 to 112 pF/m; feet of X60 at mid-layer, the cog narrowest, base and sides free."""
     bars = {"cog": (0, 0, 0.2, 0.3, 0.4), "feet": (0.05, 0.15, 0.25, 0.35, 0.45), "low": (0.3958,)}
-    free = Held(base="sliding", period="free")
+    free = BoundaryConditions(base="sliding", period="free")
     found = press2d.press(built(bars), SOLIDS, [0.0, 1e5], EPS, free, QUICK)
     assert found.faults == ()
     assert found.displacement_m[1] * 1e6 == pytest.approx(47, rel=0.03)

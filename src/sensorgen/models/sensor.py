@@ -189,7 +189,7 @@ class Sensor:
                 f"a tip with a pressure like a {self.profile!r} makes no single patch; expected a uniform one"
             )
         patch, stress = self.patch(position_m), self.stress_pa(force_n, position_m)
-        thinning, slope = self.compression.thinning(stress)
+        thinning, slope = self.compression.capacitive_strain(stress)
         self.check_tracks(stress)
         with np.errstate(divide="ignore", invalid="ignore"):
             secant = np.where(thinning == 0, 1 / slope, stress / thinning)
@@ -266,7 +266,7 @@ class Sensor:
         of = ("F_N", "x_p_left_edge_m", "E_Pa", *(["L_p_m", *soft] if moves else []))
         z, by = line.sensitivities(of=of, **inputs)
         force, secant = np.asarray(force_n, float), inputs["E_Pa"]
-        excess = secant * self.compression.thinning(self.stress_pa(force, position_m))[1] - 1
+        excess = secant * self.compression.capacitive_strain(self.stress_pa(force, position_m))[1] - 1
         by_force = by["F_N"] - by["E_Pa"] * (excess * secant / np.where(force == 0, 1.0, force))
         by_position = by["x_p_left_edge_m"] * patch.left_slope
         if moves:

@@ -90,7 +90,7 @@ def stack_of(sensors: Sequence[Sensor]) -> Stack:
     """
     first = sensors[0]
     tracks = [_track(first, 1), *(_track(sensor, 0) for sensor in sensors)]
-    films = [Film(s.capacitance_f_per_m, s.compression.thinning, s.tan_delta, s.leak_s_per_m) for s in sensors]
+    films = [Film(s.capacitance_f_per_m, s.compression.capacitive_strain, s.tan_delta, s.leak_s_per_m) for s in sensors]
     return Stack(first.length_m, first.width_m, tuple(tracks), tuple(films))
 
 

@@ -120,7 +120,7 @@ def _press(setup: Setup) -> dict[str, float]:
         "position_m": setup.position_m,
         "tip_m": setup.sensor.tip_m,
         "stress_pa": float(stress),
-        "thinning": float(setup.sensor.compression.thinning(stress)[0]),
+        "thinning": float(setup.sensor.compression.capacitive_strain(stress)[0]),
     }
 
 

@@ -163,7 +163,7 @@ def bearable(sensor: Sensor, force_n: Real, position_m: Real) -> NDArray[np.bool
     """Which presses the law of compression speaks of, in the broadcast shape of forces [N] and positions [m]."""
     stress = sensor.stress_pa(force_n, position_m)
     try:
-        sensor.compression.thinning(stress)
+        sensor.compression.capacitive_strain(stress)
     except OutOfRange:
         return np.array([_thins(sensor, one) for one in stress.ravel()]).reshape(stress.shape)
     return np.ones(stress.shape, bool)
@@ -171,7 +171,7 @@ def bearable(sensor: Sensor, force_n: Real, position_m: Real) -> NDArray[np.bool
 
 def _thins(sensor: Sensor, stress_pa: np.float64) -> bool:
     try:
-        sensor.compression.thinning(np.asarray(stress_pa))
+        sensor.compression.capacitive_strain(np.asarray(stress_pa))
     except OutOfRange:
         return False
     return True

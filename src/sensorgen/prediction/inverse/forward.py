@@ -52,7 +52,7 @@ class Forward:
         sensor, force = self.sensor, force_n[:, None]
         patch = sensor.patch(position_m[:, None])
         stress = force / (sensor.width_m * patch.length_m)
-        thinning, _ = sensor.compression.thinning(stress)
+        thinning, _ = sensor.compression.capacitive_strain(stress)
         pressed = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * (self.susceptance / (1 - thinning))
         under = self.track + stress * self.track_per_pascal
         right = np.maximum(sensor.length_m - patch.left_m - patch.length_m, 0.0)

@@ -42,7 +42,7 @@ class Scalar:
         left = max(position_m - sensor.tip_m / 2, 0.0)
         end = min(position_m + sensor.tip_m / 2, sensor.length_m)
         stress = force_n / (sensor.width_m * (end - left))
-        stiffer = (sensor.tan_delta + 1j) / (1 - float(sensor.compression.thinning(np.asarray(stress))[0]))
+        stiffer = (sensor.tan_delta + 1j) / (1 - float(sensor.compression.capacitive_strain(np.asarray(stress))[0]))
         pressed = [sensor.leak_s_per_m + stiffer * b for b in self._susceptance]
         right = sensor.length_m - end, self._loose, track
         return self._from_far_end(right, (end - left, pressed, track + stress * per_pascal), (left, self._loose, track))
