@@ -400,7 +400,7 @@ def test_what_does_not_converge_ends_with_the_last_load(monkeypatch):
 def test_what_is_wrong_is_refused():
     with pytest.raises(BadInput, match="needs a scene of boxes"):
         press3d.cell(make({"shape": "tri"}).in_use)
-    assert "needs a scene of boxes" in press3d.unfit(make({"shape": "tri"}).in_use)
+    assert "needs a scene of boxes" in press3d.why_not_applicable(make({"shape": "tri"}).in_use)
     over = Scene((Body("a", "x60", (box(0, 1, 0, 1, 0, 1),)), Body("b", "etpu", (box(0, 1, 0, 1, 0.5, 2),))), (1, 1, 2))
     with pytest.raises(BadInput, match="b overlaps"):
         press3d.cell(over)

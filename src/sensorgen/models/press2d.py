@@ -35,7 +35,7 @@ SOURCE = (
 )
 COST = 2
 
-__all__ = ["BoundaryConditions", "Elastic", "Fineness", "Pressed", "cell", "compared", "press", "unfit"]
+__all__ = ["BoundaryConditions", "Elastic", "Fineness", "Pressed", "cell", "compared", "press", "why_not_applicable"]
 
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
 _STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid when they touched counts [-]
@@ -156,7 +156,7 @@ def _field(cell: Cell, run: Run[Mesh], u_m: Real, permittivity: Mapping[str, flo
         return None, outline
 
 
-def unfit(scene: Scene) -> str | None:
+def why_not_applicable(scene: Scene) -> str | None:
     """Why this model cannot speak of a scene, or None."""
     try:
         cell_of(scene, None)

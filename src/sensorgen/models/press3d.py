@@ -39,7 +39,7 @@ SOURCE = (
 )
 COST = 3
 
-__all__ = ["BoundaryConditions", "Elastic", "Pieces", "Pressed", "cell", "compared", "press", "unfit"]
+__all__ = ["BoundaryConditions", "Elastic", "Pieces", "Pressed", "cell", "compared", "press", "why_not_applicable"]
 
 _STEP = 1 / 60  # longest load step over the least Young's modulus: 100 kPa for 6 MPa [-]
 _MOST = 4000  # solid bricks: more would take hours
@@ -65,7 +65,7 @@ class Pieces:
         return replace(self, pieces=self.pieces - 1)
 
 
-def unfit(scene: Scene) -> str | None:
+def why_not_applicable(scene: Scene) -> str | None:
     """Why this model cannot speak of a scene, or None."""
     try:
         cell(scene)

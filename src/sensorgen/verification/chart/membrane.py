@@ -42,7 +42,7 @@ def points(name: str, budget_s: float) -> list[Point]:
     return found
 
 
-def unfit(_: str) -> dict[str, str]:
+def why_not_applicable(_: str) -> dict[str, str]:
     """Why models of compression cannot speak of it."""
     return {"press3d": "its bricks have upright walls", "springs": "nothing presses it", "compression": "it is no film"}
 

@@ -44,7 +44,7 @@ def points(name: str, budget_s: float) -> list[Point]:
     return found
 
 
-def unfit(_: str) -> dict[str, str]:
+def why_not_applicable(_: str) -> dict[str, str]:
     """Why models of compression cannot speak of it."""
     no_film = "it tells how far the top comes down, and not where bodies touch"
     return {"press2d": "the mesher is not installed (extra fem)", "press3d": "a prism is no box",
