@@ -7,14 +7,16 @@ from functools import partial
 
 import numpy as np
 import pytest
-from sensorgen.prediction.ladder import Press, carried_out, drawn, outlined
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.design import make
 from sensorgen.models import compression
+from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.capacitance import Answer
 from sensorgen.prediction.compression_law import law_of
+from sensorgen.prediction.error_budget import Load
+from sensorgen.prediction.planning import execute, plan
 
 GAPS = Answer("columns", Interval(1e-10, 2e-10), ())
 OTHER = {"shape": "tri", "parameters": {"period_mm": 2.5}}
@@ -78,11 +80,10 @@ def test_without_the_solver_a_plate_stands_in_and_that_is_said(monkeypatch):
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(SensorgenError, match="pip install"):
         law_of(make(OTHER), GAPS, "solved")
-    design, press = make(OTHER), Press((1e3,), 1.0, 0.05)
-    sensed, plan = carried_out(outlined(design, drawn(design), press, 1e-2))
+    sensed, found = execute(plan(drawn(make(OTHER)), Load((1e3,), 1.0, 0.05), 1e-2))
     assert not sensed.law.bounded
     assert "pip install" in sensed.doubts[-1]
-    assert plan.width == math.inf
+    assert found.width == math.inf
 
 
 def test_a_curve_ends_where_the_capacitance_is_no_longer_known(monkeypatch):
