@@ -232,7 +232,7 @@ def test_other_tones():
 
 @pytest.fixture(scope="module")
 def plate():
-    """The plate of Table 3.1, free to give way (B.49), and its design."""
+    """The plate of Table 3.1, free to expand (B.49), and its design."""
     design = make({"shape": "reference"})
     return design, sensor_of(design)
 
