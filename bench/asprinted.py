@@ -14,6 +14,7 @@ import numpy as np
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
+from sensorgen.prediction.as_printed import electrode
 
 from sensorgen.asprinted.printed import body, gap_mm
 from sensorgen.asprinted.rectilinear import plate
@@ -22,7 +23,6 @@ from sensorgen.design.design import make
 from sensorgen.export import slicing
 from sensorgen.export.gcode import paths
 from sensorgen.models import fem2d, traxels
-from sensorgen.prediction.as_printed import electrode
 
 RESULTS = Path(__file__).parent / "results"
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
@@ -161,7 +161,7 @@ def main():
     (RESULTS / "asprinted.md").write_text("\n\n".join(parts) + "\n")
     (RESULTS / "asprinted.json").write_text(json.dumps(found, indent=1) + "\n")
     draw_directions(found["directions"])
-    if not fem2d.unfit(make({"shape": "reference"}).drawn):
+    if not fem2d.why_not_applicable(make({"shape": "reference"}).drawn):
         draw_walls()
     print("\n\n".join(parts))
 

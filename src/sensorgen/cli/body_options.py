@@ -58,9 +58,7 @@ def printed_of(design: "Design", slicer: str | None, walls: str | None) -> "Prin
 
     if slicer and walls:
         raise BadInput("--slicer and --walls at once; expected one: the slicer's profile says what walls it makes")
-    if not slicer:
-        return body(design, walls=walls or "arachne")
-    return _slice(slicer, design)[0]
+    return _slice(slicer, design)[0] if slicer else body(design, walls=walls or "arachne")
 
 
 def _sliced(slicer: str, design: "Design") -> "Body":

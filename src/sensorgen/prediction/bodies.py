@@ -47,7 +47,7 @@ def estimated(design: Design, walls: str = "") -> Body:
 def _estimated_cells(design: Design, rules: Sequence[str]) -> Cells:
     from sensorgen.asprinted import printed
 
-    return _printed_cells(design, {rule: printed.body(design, walls=rule) for rule in rules})
+    return _printed_cells({rule: printed.body(design, walls=rule) for rule in rules})
 
 
 def sliced(design: Design, printed: "Callable[[], Printed]", source: str, content: bytes) -> Body:
@@ -65,11 +65,11 @@ def sliced(design: Design, printed: "Callable[[], Printed]", source: str, conten
         Of the file.
     """
     identity = _identity(design, "sliced", sha256(content).hexdigest())
-    return Body(design, "sliced", f"printed, {source}", identity, partial(_sliced_cells, design, printed, source))
+    return Body(design, "sliced", f"printed, {source}", identity, partial(_sliced_cells, printed, source))
 
 
-def _sliced_cells(design: Design, printed: "Callable[[], Printed]", source: str) -> Cells:
-    return _printed_cells(design, {source: printed()})
+def _sliced_cells(printed: "Callable[[], Printed]", source: str) -> Cells:
+    return _printed_cells({source: printed()})
 
 
 def default_body(design: Design, folder: Path | None = None) -> Body:
@@ -109,21 +109,22 @@ def _read(design: Design, path: Path, source: str) -> "Printed":
     return printed.body(design, paths.read(path, design.machine), slicer=source)
 
 
-def _printed_cells(design: Design, prints: "Mapping[str, Printed]") -> Cells:
+def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
     """Cells by every rule: of walls for estimates, of bead widths for a tool path."""
     from sensorgen.asprinted.printed import gap_mm
     from sensorgen.scene.sections import sections
 
-    scenes, count, tracks = {}, 1.0, None
-    for rule, printed in prints.items():
-        for name, cell in printed.cells.items():
-            scenes[rule if len(printed.layers) == 1 else name] = cell.scene
-            count, tracks = cell.count, printed.lines
-    first = next(iter(scenes.values()))
+    cells = {
+        rule if len(printed.cells) == 1 else name: cell
+        for rule, printed in prints.items()
+        for name, cell in printed.cells.items()
+    }
+    first, (printed, *_) = next(iter(cells.values())), prints.values()
     period = None
-    if getattr(design.params, "period_mm", None) is not None:
-        period = first.size_mm["xy".index(sections(first)[0].across)]
-    return Cells(scenes, count, period, {name: gap_mm(scene) for name, scene in scenes.items()}, tracks)
+    if getattr(printed.design.params, "period_mm", None) is not None:
+        period = first.scene.size_mm["xy".index(sections(first.scene)[0].across)]
+    gaps = {name: gap_mm(cell.scene) for name, cell in cells.items()}
+    return Cells({name: cell.scene for name, cell in cells.items()}, first.count, period, gaps, printed.lines)
 
 
 def _identity(design: Design, *parts: str) -> str:

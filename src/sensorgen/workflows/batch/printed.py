@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from sensorgen.asprinted.printed import body
+from sensorgen.asprinted import printed as asprinted
 from sensorgen.core.errors import SensorgenError
 from sensorgen.export.slicing import Placed, Sliced
 from sensorgen.prediction import bodies
@@ -32,14 +32,12 @@ def of_designs(found: Sequence[Placed], made: Sliced) -> dict[str, Any]:
 def _of(piece: Placed, made: Sliced) -> dict[str, Any]:
     design, source = piece.design, f"{made.slicer} {made.version}"
     try:
-        printed = body(design, made.lines, slicer=source, centre_mm=piece.sensor_mm())
-        made_body = bodies.sliced(
-            design, partial(lambda: printed), source, made.ready.read_bytes() + piece.name.encode()
-        )
+        printed = asprinted.body(design, made.lines, slicer=source, centre_mm=piece.sensor_mm())
+        body = bodies.sliced(design, partial(lambda: printed), source, made.ready.read_bytes() + piece.name.encode())
         return {
             "specimen": piece.name,
             "design": design.name,
-            "prediction": json.loads(to_json(evaluate(made_body))),
+            "prediction": json.loads(to_json(evaluate(body))),
             "layers": [row.as_dict() for row in printed.rows()],
             "findings": [finding.as_dict() for finding in printed.findings()],
         }
