@@ -162,7 +162,12 @@ def test_not_utf8(run, tmp_path, content):
 
 
 @pytest.mark.parametrize(
-    "content", [b"\xef\xbb\xbfshape: reference", b"shape: reference\r\nquality: fine\r\n", b"shape: reference # gr\xc3\xb6\xc3\x9fe"]
+    "content",
+    [
+        b"\xef\xbb\xbfshape: reference",
+        b"shape: reference\r\nquality: fine\r\n",
+        b"shape: reference # gr\xc3\xb6\xc3\x9fe",
+    ],
 )
 def test_bom_and_windows_line_ends_and_umlauts_in_comments_are_fine(run, tmp_path, content):
     (tmp_path / "ok.yaml").write_bytes(content)
