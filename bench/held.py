@@ -5,9 +5,8 @@ Run with NGSolve installed: python bench/held.py
 
 from collections.abc import Iterator, Sequence
 
-from sensorgen.asprinted.rules import RULES
-
-from sensorgen.asprinted import compared, pressed
+from sensorgen.asprinted.printed import body, gap_mm
+from sensorgen.checks.estimate import RULES
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design, make
 from sensorgen.models import press2d
@@ -84,11 +83,11 @@ def print_printed() -> None:
     for film in (0.1, 0.2):
         for walls in RULES:
             design = tri(film)
-            scene = pressed.piece(design, compared.estimated(design, walls)).scene
+            scene = body(design, walls=walls).cell.scene
             found = pressed_cell(scene)
             moved, before, after = answer(found)
             fall = found.fall_m * 1e6
-            gap = compared.gap_mm(scene)
+            gap = gap_mm(scene)
             numbers = f"{gap:g}", f"{fall:.0f}", f"{moved - fall:.2f}", f"{before:.1f}", f"{after:.1f}"
             print(row(f"{film:g}", walls, *numbers), flush=True)
 
