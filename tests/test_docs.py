@@ -72,7 +72,7 @@ def test_every_command_of_the_pages_works(words, tmp_path, program, kept, monkey
     done = subprocess.run(
         [sys.executable, "-m", "sensorgen", *words, *extra], cwd=tmp_path, capture_output=True, text=True
     )
-    finds_faults = {"--strict", "--as-printed", "slice"} & set(words)  # and says so by its exit code
+    finds_faults = words[0] in ("build", "check", "slice", "batch")  # and says so by its exit code
     assert done.returncode in ({0, 1} if finds_faults else {0}), done.stderr
 
 
