@@ -7,8 +7,8 @@ import numpy as np
 from generate import DOCS, sensorgen
 from matplotlib.figure import Figure
 
-from sensorgen.analysis.plots import sheet
-from sensorgen.analysis.plots.card import figure
+from sensorgen.analysis.plots import sheet, static
+from sensorgen.analysis.plots.identifiability import figure
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.design import make
 from sensorgen.models.sheet import Patch, Sheet, contact_sets, localise
@@ -31,7 +31,7 @@ def identifiability(name: str) -> None:
     """Resolution of force and position of one sensor."""
     title, data = SENSORS[name]
     shown = figure(build_sensor(drawn(make(data))).sensor, TONES_HZ, title=title)
-    shown.savefig(PICTURES / f"identifiability-{name}.png", dpi=90)
+    (PICTURES / f"identifiability-{name}.png").write_bytes(static.png(shown))
 
 
 def predictions() -> None:

@@ -73,7 +73,7 @@ def test_capacitance_by_every_convention(printed, walls):
 @pytest.mark.parametrize("walls", ["cura", "cura-gaps"])
 @pytest.mark.parametrize("convention", ["vol", "deposit"])
 def test_with_the_feet_as_drawn_curas_capacitance_is_that_found_by_hand(printed, walls, convention):
-    if fem2d.unfit(small().drawn):
+    if fem2d.why_not_applicable(small().drawn):
         pytest.skip("NGSolve is not installed")
     variant, made = printed(walls)
     found = list(made.layers[convention])
