@@ -21,7 +21,7 @@ from sensorgen.export.gcode.paths import Paths
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.layers import LayerRegions, drawn, scene_of
 from sensorgen.scene.scene import Body, Point, Scene, rectangle
-from sensorgen.solvers.network.lines import Lines
+from sensorgen.solvers.network.nodes import Lines
 
 _JOINED_MM = 1e-4
 

@@ -6,7 +6,6 @@ and position (6.30 to 6.32), and normalised differences of several recordings (6
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -32,6 +31,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.measure.signal.hysteresis import Hysteresis
 from sensorgen.measure.signal.presses import Pairs
+from sensorgen.measure.signal.schedule import Step
 from sensorgen.measure.signal.surfaces import Surface, normalised, surface
 
 PARTS = {"resistance": ("R", "real"), "reactance": ("X", "imag")}
@@ -63,15 +63,6 @@ class Run:
     filtered_s: Real
     filtered_ohm: Complex
     pairs: Pairs | None
-
-
-class Step(Protocol):
-    """A load of a planned run."""
-
-    start_s: float
-    dwell_s: float
-    force_n: float
-    position_mm: float
 
 
 def series(run: Run, key: str = "time") -> Figure:
