@@ -1,5 +1,6 @@
 """The documents say what the program does."""
 
+import importlib.util
 import re
 import runpy
 import shlex
@@ -80,6 +81,27 @@ def test_links_between_the_pages_lead_somewhere():
     for page in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]:
         for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text("utf-8")):
             assert (page.parent / target).exists(), f"{page.name} links to {target}"
+
+
+def test_modules_and_files_that_the_pages_name_exist():
+    pages = [page for page in (ROOT / "docs").rglob("*.md") if page.name not in ("reference.md", "thesis.md")]
+    missing = []
+    for page in [*ROOT.glob("*.md"), *pages]:
+        text = page.read_text("utf-8")
+        for name in re.findall(r"\bsensorgen(?:\.[a-z]\w*)+(?=[\s`(])", text):
+            module, _, last = name.rpartition(".")
+            if not _importable(name) and not hasattr(importlib.import_module(module), last):
+                missing.append(f"{page.name}: {name}")
+        files = re.findall(r"`((?:\w+/)+\w+\.(?:py|yaml))", text)
+        missing += [f for f in files if not any((ROOT / top / f).is_file() for top in (".", "src/sensorgen"))]
+    assert not missing
+
+
+def _importable(name):
+    try:
+        return importlib.util.find_spec(name) is not None
+    except ModuleNotFoundError:
+        return False
 
 
 def test_packages_are_named_in_the_contributing_guide():
