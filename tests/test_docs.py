@@ -83,6 +83,14 @@ def test_links_between_the_pages_lead_somewhere():
             assert (page.parent / target).exists(), f"{page.name} links to {target}"
 
 
+def test_the_pages_stay_short():
+    """Words as `wc -w` counts them; generated parts left out."""
+    readme, _, rest = (ROOT / "README.md").read_text("utf-8").partition("<!-- first screen")
+    assert len((readme + rest.partition("<!-- end of first screen -->")[2]).split()) < 700
+    pages = [page for page in (ROOT / "docs").rglob("*.md") if page.name not in ("reference.md", "thesis.md")]
+    assert sum(len(page.read_text("utf-8").split()) for page in [*ROOT.glob("*.md"), *pages]) < 25_000
+
+
 def test_modules_and_files_that_the_pages_name_exist():
     pages = [page for page in (ROOT / "docs").rglob("*.md") if page.name not in ("reference.md", "thesis.md")]
     missing = []
