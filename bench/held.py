@@ -5,8 +5,9 @@ Run with NGSolve installed: python bench/held.py
 
 from collections.abc import Iterator, Sequence
 
-from sensorgen.asprinted import compared, pressed
 from sensorgen.asprinted.rules import RULES
+
+from sensorgen.asprinted import compared, pressed
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design, make
 from sensorgen.models import press2d

@@ -11,7 +11,9 @@ from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.design.design import make
 from sensorgen.prediction import capacitance as planner
 from sensorgen.prediction import cost_model as expectations
+from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.capacitance import Contradiction, Unpredictable, capacitance
+from sensorgen.prediction.rest_state import rest_state
 from sensorgen.scene.scene import Body, Prism, Scene, box
 from sensorgen.verification.chart.cells import STANDARD
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from sensorgen.asprinted.compared import cell, drawn_gap_mm, estimated, gap_mm
+from sensorgen.asprinted.printed import body, drawn_gap_mm
 from sensorgen.checks.widths import GAP_CLOSES
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.design import Design, fields, make, name_of
@@ -54,14 +54,14 @@ def compensated(design: Design, walls: str = "arachne", *, bake: bool = False) -
     design : Design
         As it should come out.
     walls : str
-        As of :func:`sensorgen.asprinted.estimate.estimate`.
+        One of :data:`sensorgen.checks.estimate.RULES`.
     bake : bool
         Also print larger by what the bake takes off, where the design does not say by how much.
 
     Raises
     ------
-    NoStrips, UnknownName
-        As :func:`sensorgen.asprinted.estimate.estimate`.
+    UnknownName
+        No such walls.
     """
     changes: list[Change] = []
     now = design
@@ -157,7 +157,7 @@ def _printed_gap_mm(design: Design, walls: str) -> float:
     enough = _ENOUGH * float(getattr(design.params, "period_mm", 1.0))
     sides = {name: min(getattr(design.params, name), max(enough, 1.0)) for name in ("length_mm", "width_mm")}
     few = _with(design, **sides)
-    return gap_mm(cell(few, estimated(few, walls).layers["mid-plane"])[0])
+    return body(few, walls=walls).gap_mm[0]
 
 
 def _gap_kept(design: Design, asked: float, printed: float, walls: str) -> tuple[Design, list[Change]]:

@@ -17,7 +17,7 @@ def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> 
 
     Of three electrodes or more, neighbours are held apart by plates: there the distance is that of their faces.
     """
-    pairs = list(pairwise(_electrodes(slices.scene)))
+    pairs = [pair for pair in pairwise(_electrodes(slices.scene)) if pair[0].terminal != pair[1].terminal]
     for pair in pairs:
         yield from _between_two(pair, slices, printer, quality, gap_mm if len(pairs) == 1 else _apart_mm(pair))
 
@@ -65,19 +65,19 @@ def _film(
         below, above = max(1, int(count)) * layer, (int(count) + 1) * layer
         yield Finding(
             "2-film", "warning", names,
-            f"the film of {gap_mm:g} mm is {count:.3g} layers of {layer:g} mm: it prints as {printed_mm:g} mm",
+            f"the film of {gap_mm:g} mm is {count:.3g} layers of {layer:g} mm: it will print {printed_mm:g} mm thick",
             f"use {below:g} or {above:g} mm", round(gap_mm, 9), printed_mm, place_mm=place,
         )  # fmt: skip
     if printed_mm < 2 * layer - TOUCH_MM:
         yield Finding(
             "2-film", "warning", names,
-            "the film is a single layer: one pinhole or zit makes a short",
+            "the film is a single layer: one pinhole shorts the electrodes",
             f"use {2 * layer:g} mm or more, or thinner layers", printed_mm, round(2 * layer, 9), place_mm=place,
         )  # fmt: skip
 
 
 def _printed(pair: Pair, slices: Slices, printer: Printer, gap_mm: float) -> Iterator[Finding]:
-    """What the gap becomes when narrow features vanish."""
+    """The gap as printed, where narrow parts vanish."""
     tracks = {
         "Arachne": VANISHES * printer.nozzle_mm,
         "classic walls or plain Cura": printer.line_mm() - 2 * TOUCH_MM,  # a whole line prints
@@ -86,13 +86,16 @@ def _printed(pair: Pair, slices: Slices, printer: Printer, gap_mm: float) -> Ite
     gaps = {slicer: printed_gap_mm(pair, slices, least) for slicer, least in tracks.items()}
     if all(gap is not None and abs(gap - gap_mm) <= TOUCH_MM for gap in gaps.values()):
         return
-    said = ", ".join(f"{slicer}: {'nothing prints' if gap is None else f'{gap:g} mm'}" for slicer, gap in gaps.items())
+    by_gap = {gap: [slicer for slicer, other in gaps.items() if other == gap] for gap in gaps.values()}
+    said = ", ".join(
+        f"{'nothing' if gap is None else f'{gap:g} mm'} ({', '.join(slicers)})" for gap, slicers in by_gap.items()
+    )
     low, high = pair
     worst = max((gap for gap in gaps.values() if gap is not None), default=None)
     yield Finding(
         "2-printed-gap", "warning", f"{low.name} / {high.name}",
-        f"as printed the electrodes stand apart by another distance than drawn ({gap_mm:g} mm): {said}",
-        "blunt the tips to a line width, use thinner layers, or put the faces on layer boundaries",
+        f"electrode gap: {gap_mm:g} mm drawn, as printed {said}",
+        "widen narrow parts to a line, use thinner layers, or put the faces on layer boundaries",
         worst, round(gap_mm, 9), place_mm=(0.0, 0.0, max(p.span("z")[1] for p in low.prisms)),
     )  # fmt: skip
 

@@ -42,7 +42,7 @@ def _samples(body: Body, layers: Layers) -> Iterator[Finding]:
     for low, high in lost:
         yield Finding(
             "4-unsampled", "error", body.name,
-            f"{high - low:g} mm from {low:g} to {high:g} mm miss every mid-layer sample: this part is not printed",
+            f"{low:g} to {high:g} mm ({high - low:g} mm) lies between the slicer's sampling planes and is not printed",
             "make it a layer thick, or move it onto the layer grid",
             round(high - low, 9), layers.boundaries_mm[1] / 2, place_mm=_place(body, (low + high) / 2),
             count=sum(p.span("z") == (low, high) for p in body.prisms),
@@ -51,10 +51,11 @@ def _samples(body: Body, layers: Layers) -> Iterator[Finding]:
         here = [s for s in spans if s not in lost and min(s[1], high) - max(s[0], low) > TOUCH_MM]
         if here and not any(_within(mid, span) for span in here):
             height = max(min(s[1], high) - max(s[0], low) for s in here)
+            end, side = ("top", "below") if min(s[1] for s in here) < high else ("lowest", "above")
             yield Finding(
                 "4-unsampled", "warning", body.name,
-                f"its last {height:.3g} mm in this layer ({low:g} to {high:g} mm) end short of mid-height: not printed",
-                "put the end on a layer boundary", round(height, 9), round((high - low) / 2, 9), number + 1,
+                f"the {end} {height:.3g} mm lies {side} the slicer's sampling plane and is not printed",
+                "move the face to a layer boundary", round(height, 9), round((high - low) / 2, 9), number + 1,
                 _place(body, (max(low, min(s[0] for s in here)) + min(high, max(s[1] for s in here))) / 2),
             )  # fmt: skip
 

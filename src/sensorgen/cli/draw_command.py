@@ -28,8 +28,8 @@ def _work(design: "Design", *, output: str | None, drawn: bool, slicer: str | No
     with show.progress(STEPS) as step:
         held = review(design, step)
     if made:
-        held = replace(held, findings=[*made.findings(design), *held.findings])
-    text = draw(design, held, made.scene(design), made.source) if made else draw(design, held)
+        held = replace(held, findings=[*made.findings(), *held.sliced().findings])
+    text = draw(design, held, made.scene, made.provenance) if made else draw(design, held)
     if output == "-":
         click.echo(text, nl=False)
         return 0

@@ -47,7 +47,7 @@ class Sensor:
     length_m, width_m : float
         Outline [m].
     electrode_m : (float, float)
-        Thickness of the top and the bottom electrode [m].
+        Thickness of the top and the bottom electrode; of one with cogs, of the plain plate of the same resistance [m].
     resistivity_ohm_m : (float, float)
         Of the top and the bottom electrode [ohm m].
     capacitance_f_per_m : float
@@ -177,6 +177,10 @@ class Sensor:
         """Both electrodes together, per length: not pressed [ohm/m], and its rise per pressure [ohm/m/Pa]."""
         per_m = [rho / (h * self.width_m) for rho, h in zip(self.resistivity_ohm_m, self.electrode_m, strict=True)]
         return sum(per_m), sum(r * rise for r, rise in zip(per_m, self.piezoresistance_per_pa, strict=True))
+
+    def common_resistivity_ohm_m(self) -> float:
+        """The one resistivity of both electrodes at which they together have the resistance that they have [ohm m]."""
+        return self.track_ohm_per_m()[0] / sum(1 / (h * self.width_m) for h in self.electrode_m)
 
     def _pressed(
         self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike

@@ -257,6 +257,9 @@ def _moduli(model: SensorModel) -> list[Compression]:
 def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
     """What is taken for granted."""
     yield "electrodes are equipotential for the capacitance, and the field has no fringe at the sensor's edge"
+    yield "electrode resistance from end face to end face, cogs included"
+    if not body.is_drawn:
+        yield "contacts between extruded lines cost no resistance: no source gives their resistivity"
     gone = lost(body.design).taken
     said = " and ".join(f"{t.quantity} of {t.material}" for t in gone)
     yield f"dielectric losses: {said} as given" if gone else "no dielectric loss and no leak: the sources give none"
