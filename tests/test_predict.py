@@ -395,7 +395,8 @@ def test_losses_reach_the_line():
     for row in found.impedance:
         z = exact_line(
             60, **LINE_PLATE | {
-                "frequency_hz": row.frequency_hz, "tan_delta": 0.02, "leak_s_per_m": 0.01 / (1e9 * FILM_M), "force_n": 0,
+                "frequency_hz": row.frequency_hz, "tan_delta": 0.02, "leak_s_per_m": 0.01 / (1e9 * FILM_M),
+                "force_n": 0,
             }
         )  # fmt: skip
         assert row.re.value == pytest.approx(float(z.real), rel=1e-6)
