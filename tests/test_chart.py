@@ -430,7 +430,7 @@ def test_every_scene_has_a_question_and_reasons(name):
 
 
 def test_what_is_known_of_presses(monkeypatch):
-    """Cheap laws are off by what docs/press.md and docs/cells.md say; a budget ends the meshes."""
+    """Cheap laws are off by what docs/compression.md and docs/cells.md say; a budget ends the meshes."""
     monkeypatch.setattr(presses, "_pressed", lambda *_: iter(()))
     down, rise = (
         {p.model: p for p in presses.points(f"tri pressed, 0.1 mm: {w}", 1.0)} for w in ("top down", "rise of C")
@@ -489,11 +489,10 @@ def test_a_budget_ends_the_ladders(monkeypatch):
 
 
 def test_no_two_models_look_alike():
-    assert len(pictures._SYMBOLS) == len(pictures._MARKERS) == 9
-    assert len({(pictures._colour(k), k % 9) for k in range(30)}) == 30
+    assert len({tuple(pictures.look(k).values()) for k in range(30)}) == 30
     for scene in chart.SCENES:
         alike = [point(1.0, 1.0, scene=scene), SimpleNamespace(scene=scene, model="n", bounded=False)]
-        assert pictures._looks(scene, alike) == {"m": 0, "n": 1}
+        assert pictures.looks(scene, alike) == {"m": 0, "n": 1}
 
 
 def test_the_picture(measured):
@@ -504,7 +503,7 @@ def test_the_picture(measured):
 
 
 def test_the_front_is_drawn_as_a_staircase():
-    steps = list(pictures._steps([point(1.0, 0.5), point(2.0, 0.1), point(4.0, 0.01)]))
+    steps = list(pictures.steps([point(1.0, 0.5), point(2.0, 0.1), point(4.0, 0.01)]))
     assert steps == [(1.0, 0.5), (2.0, 0.5), (2.0, 0.1), (4.0, 0.1), (4.0, 0.01)]
 
 
@@ -513,11 +512,11 @@ const said = [];
 window.addEventListener("error", e => said.push(e.message));
 console.error = (...a) => said.push(a.join(" "));
 window.addEventListener("load", () => setTimeout(() => {
-  const plot = document.getElementById("chart");
   const pre = document.createElement("pre");
   pre.id = "probe";
   pre.textContent = JSON.stringify({said, resources: performance.getEntriesByType("resource").length,
-    names: plot.data.map(t => t.name), marks: document.querySelectorAll("path.point").length});
+    names: [...document.querySelectorAll(".plot")].flatMap(p => p.data.map(t => t.name)).filter(n => n),
+    marks: document.querySelectorAll("path.point").length});
   document.body.replaceChildren(pre);
 }, 500));
 </script>"""

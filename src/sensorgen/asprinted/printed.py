@@ -13,7 +13,7 @@ from sensorgen.asprinted.beads import layers as printed_layers
 from sensorgen.asprinted.window import Window, cut, evened, window
 from sensorgen.checks import estimate, volumes
 from sensorgen.checks.volumes import Row
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.findings import Finding
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
