@@ -39,7 +39,7 @@ class Size(NamedTuple):
 
 
 def expected(model: str, scene: Scene, width: float) -> tuple[float | None, float | None]:
-    """Width and seconds of the cheapest measurement that did, or of the one that came nearest, scaled to a scene.
+    """Width and seconds of the fastest measurement that did, or of the one that came nearest, scaled to a scene.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def expected(model: str, scene: Scene, width: float) -> tuple[float | None, floa
 
     Notes
     -----
-    In a cross-section that is cut amid a cell the energy of its own length counts; its bounds are apart by the root of
+    In a cross-section that is cut amid a cell the energy of its own length counts; the relative width is the root of
     the cell's.
     """
     if model not in measured():

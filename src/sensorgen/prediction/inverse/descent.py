@@ -1,4 +1,4 @@
-"""Weighted least squares on the unit square: Gauss-Newton, damped where it fails, for many samples at once."""
+"""Weighted least squares on the unit square: Gauss-Newton, damped where it fails, for many samples together."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
