@@ -14,14 +14,15 @@ import numpy as np
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
+from sensorgen.prediction.as_printed import electrode
 
-from sensorgen.asprinted import compared
-from sensorgen.asprinted.rectilinear import plate
-from sensorgen.asprinted.rules import RULES
+from sensorgen.asprinted.printed import body, gap_mm
+from sensorgen.checks.estimate import RULES
 from sensorgen.design.design import make
 from sensorgen.export import slicing
 from sensorgen.export.gcode import paths
 from sensorgen.models import fem2d, traxels
+from sensorgen.verification.chart.rectilinear import plate
 
 RESULTS = Path(__file__).parent / "results"
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
@@ -79,8 +80,8 @@ def _read_back(slicer, design):
     with tempfile.TemporaryDirectory() as folder:
         made = slicing.sliced([slicing.alone(design)], slicer, Path(folder))
         lines, reading = spent(lambda: paths.read(made.raw, design.machine, "slicer"))
-        printed, layering = spent(lambda: compared.sliced(design, lines, slicer))
-    top = compared.electrode(design, printed.lines, "top")
+        printed, layering = spent(lambda: body(design, lines, slicer=slicer))
+    top = electrode(design, printed.lines, "top")
     _, solving = spent(lambda: traxels.resistance(top, 0.07, 1e-5, (-48.9e-3, 48.9e-3), 3e-6))
     return {
         "slicer": f"{slicer} {made.version}", "design": design.name, "slicing_s": made.seconds, "lines": len(lines),
@@ -118,16 +119,16 @@ def draw_walls():
     one = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1, "length_mm": 4.0}}).drawn
     scenes = {"as drawn": (one, 1.5)}
     for walls in RULES:
-        scenes[walls] = (compared.cell(design, compared.estimated(design, walls).layers["mid-plane"])[0], 0.0)
+        scenes[walls] = (body(design, walls=walls).cell.scene, 0.0)
     figure, panels = plt.subplots(len(scenes), 1, figsize=(3.6, 9.2), layout="constrained")
     for axes, (name, (scene, start)) in zip(panels, scenes.items(), strict=True):
-        for body in scene.bodies:
-            for prism in body.prisms:
+        for each in scene.bodies:
+            for prism in each.prisms:
                 for outline in prism.cut("y", scene.size_mm[1] / 2):
                     x, z = np.array(outline).T
-                    axes.fill(x - start, z, color=COLOURS[body.material], lw=0.3, ec="white")
+                    axes.fill(x - start, z, color=COLOURS[each.material], lw=0.3, ec="white")
         at = 0.159652 if name == "as drawn" else per_m(scene)
-        gap = 0.1 if name == "as drawn" else compared.gap_mm(scene)
+        gap = 0.1 if name == "as drawn" else gap_mm(scene)
         axes.set(xlim=(0, 2), ylim=(0, 1.2), aspect="equal")
         axes.set_title(f"{name}: gap {gap:g} mm, {at * 1e3:.1f} pF/m", fontsize=8, loc="left")
         axes.set_ylabel("z [mm]", fontsize=8)
@@ -143,8 +144,8 @@ def per_m(scene):
 
 def table(rows):
     heads = list(rows[0])
-    body = [[f"{row[h]:.3g}" if isinstance(row[h], float) else str(row[h]) for h in heads] for row in rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in (heads, ["---"] * len(heads), *body))
+    lines = [[f"{row[h]:.3g}" if isinstance(row[h], float) else str(row[h]) for h in heads] for row in rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in (heads, ["---"] * len(heads), *lines))
 
 
 def main():
@@ -160,7 +161,7 @@ def main():
     (RESULTS / "asprinted.md").write_text("\n\n".join(parts) + "\n")
     (RESULTS / "asprinted.json").write_text(json.dumps(found, indent=1) + "\n")
     draw_directions(found["directions"])
-    if not fem2d.unfit(make({"shape": "reference"}).drawn):
+    if not fem2d.why_not_applicable(make({"shape": "reference"}).drawn):
         draw_walls()
     print("\n\n".join(parts))
 

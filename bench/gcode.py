@@ -14,7 +14,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from sensorgen.asprinted.tally import rule7
+from sensorgen.asprinted.printed import rule7
 from sensorgen.checks.review import review
 from sensorgen.design import design
 from sensorgen.export.gcode.check import check

@@ -21,6 +21,17 @@ def _cache(monkeypatch, tmp_path_factory):
     monkeypatch.setenv("SENSORGEN_MATERIALS", str(tmp_path_factory.mktemp("materials")))
 
 
+@pytest.fixture(scope="session")
+def _session_cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("session-cache")
+
+
+@pytest.fixture
+def shared_cache(monkeypatch, _session_cache):
+    """Stored predictions are read again by later tests: for tests of what is made of them, not of how they are made."""
+    monkeypatch.setenv("SENSORGEN_CACHE", str(_session_cache))
+
+
 @pytest.fixture(autouse=True, scope="module")
 def one_kernel():
     """build123d and NGSolve bring two versions of one CAD kernel, which crash together: tests load one or the other."""

@@ -13,11 +13,11 @@ import pytest
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SlicerFailed, UnknownName
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names
+from sensorgen.design.tower import MARGIN_MM, tower
 from sensorgen.export.gcode import extruded
 from sensorgen.export.slicers import cura, curaengine, prusa
 from sensorgen.export.slicers.loads import Load, recipes
 from sensorgen.export.slicers.run import run
-from sensorgen.export.slicers.tower import MARGIN_MM, tower
 
 FINE = load_quality("fine")
 DIABASE = load_printer("diabase-h5")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.asprinted import compared
+from sensorgen.asprinted.printed import body
 from sensorgen.design import design
 from sensorgen.export import slicing
 from sensorgen.export.gcode import paths
@@ -48,7 +48,7 @@ def printed(real):
         variant, lines, version = real(walls, variant)
         key = (walls, variant.id())
         if key not in known:
-            known[key] = compared.sliced(variant, lines, f"{walls} {version}")
+            known[key] = body(variant, lines, slicer=f"{walls} {version}")
         return variant, known[key]
 
     return read

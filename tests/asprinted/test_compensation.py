@@ -2,9 +2,8 @@
 
 import pytest
 
-from sensorgen.asprinted import compared
 from sensorgen.asprinted.compensation import BAKE, compensated
-from sensorgen.asprinted.tally import rule7
+from sensorgen.asprinted.printed import body, gap_mm, rule7
 from sensorgen.design import design
 
 from .conftest import small
@@ -15,7 +14,7 @@ def changed(found):
 
 
 def estimated_gap(variant, walls):
-    return compared.gap_mm(compared.cell(variant, compared.estimated(variant, walls).layers["mid-plane"])[0])
+    return body(variant, walls=walls).gap_mm[0]
 
 
 @pytest.mark.parametrize(
@@ -90,7 +89,7 @@ def test_a_real_slicer_prints_the_asked_gap(printed, real, film):
     asked = small(parameters={"dielectric_mm": film})
     made, _ = compensated(asked)
     variant, found = printed("arachne", made)
-    assert compared.gap_mm(compared.cell(variant, found.layers["vol"])[0]) == pytest.approx(film, abs=1e-9)
-    plain, before = printed("arachne", asked)
-    assert compared.gap_mm(compared.cell(plain, before.layers["vol"])[0]) == pytest.approx(film + 0.1, abs=1e-9)
+    assert gap_mm(found.cell.scene) == pytest.approx(film, abs=1e-9)
+    _, before = printed("arachne", asked)
+    assert gap_mm(before.cell.scene) == pytest.approx(film + 0.1, abs=1e-9)
     assert rule7(variant, real("arachne", made)[1])[0]

@@ -1,17 +1,20 @@
 """The mid-plane estimate against sections drawn by hand, and against what the slicers were found to print."""
 
 from dataclasses import replace
+from math import cos, pi, sin
 
 import pytest
+import shapely
 
 from sensorgen.asprinted import window
-from sensorgen.asprinted.estimate import estimate, layers
-from sensorgen.asprinted.strips import NoStrips, Strips, drawn, scene_of
+from sensorgen.checks.estimate import layers
 from sensorgen.core.errors import UnknownName
 from sensorgen.design import design
 from sensorgen.models import columns
+from sensorgen.scene.layers import LayerRegions, drawn, scene_of
 from sensorgen.scene.scene import Body, Prism, Scene, area_mm2, box
 
+RING = ((1, 4, 1, 2), (1, 4, 3, 4), (1, 2, 2, 3), (3, 4, 2, 3))  # 3 x 3 mm around a hole of 1 x 1
 COG = "top_electrode_with_cogs"
 EPS = {"air": 1.00059, "x60": 4.68}
 
@@ -35,9 +38,13 @@ def tri(quality="fine", orientation="as-drawn", **more):
 
 def one_period(d, walls):
     scene = d.printed
-    plan = window.window(drawn(scene, d.layers), scene)
+    plan = window.window(drawn(scene, d.layers.boundaries_mm(scene.size_mm[2])), scene)
     found = window.cut(layers(scene, d.machine, d.layers, walls), plan)
     return scene_of(found, replace(scene, size_mm=(*plan.sides_mm(), scene.size_mm[2]))), plan
+
+
+def estimate(scene, printer, quality, walls="arachne"):
+    return scene_of(layers(scene, printer, quality, walls), scene)
 
 
 def half_widths(scene):
@@ -118,14 +125,40 @@ def test_where_bodies_swell_into_each_other_the_electrode_keeps_the_place():
     assert rib.span("x") == pytest.approx((3.93, 4.13))
 
 
-def test_slanted_plans_are_refused():
-    corner = Prism("z", ((0, 0), (5, 0), (0, 5)), 0, 0.1)
-    scene = Scene((Body("corner", "x60", (corner,)),), (5.0, 5.0, 0.1))
-    with pytest.raises(NoStrips, match=r"layer 1, from 0 to 0.1 mm"):
-        estimate(scene, tri().machine, tri().layers)
+def test_a_slanted_part_is_narrower_by_a_rounding_all_round():
+    corner = Prism("z", ((1, 1), (4, 1), (1, 4)), 0, 0.1)
+    made = estimate(Scene((Body("corner", "x60", (corner,)),), (5.0, 5.0, 0.1)), tri().machine, tri().layers)
+    less = 0.1 * (1 - pi / 4) / 2
+    side = 3 - less * (2 + 2**0.5)
+    assert made.body("corner").volume_mm3() == pytest.approx(0.1 * side**2 / 2, rel=1e-9)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, pi / 4])
+@pytest.mark.parametrize(("walls", "width", "printed"), [
+    ("arachne", 0.11, 0.0), ("arachne", 0.2, 0.34), ("arachne", 0.7, 0.7 - 0.1 * (1 - pi / 4)), ("classic", 0.43, 0.0),
+    ("cura", 0.43, 0.0), ("cura", 0.5, 0.5), ("cura-gaps", 0.05, 0.05),
+])  # fmt: skip
+def test_a_strip_in_any_direction_is_as_wide_as_its_walls_print_it(walls, width, printed, turn):
+    c, s = cos(turn), sin(turn)
+    corners = [(2, width / 2), (-2, width / 2), (-2, -width / 2), (2, -width / 2)]
+    strip = Prism("z", tuple((3 + c * u - s * v, 3 + s * u + c * v) for u, v in corners), 0, 0.1)
+    made = layers(Scene((Body("strip", "x60", (strip,)),), (6.0, 6.0, 0.1)), tri().machine, tri().layers, walls)
+    length = 4 + printed - width
+    assert made[0].region("strip").area == pytest.approx(printed * length if printed else 0.0, rel=1e-9)
+
+
+def test_strips_both_ways_in_a_layer_are_boxes():
     crossed = Scene((Body("plate", "x60", (box(0, 2, 0, 5, 0, 0.1), box(2, 5, 0, 2, 0, 0.1))),), (5.0, 5.0, 0.1))
-    with pytest.raises(NoStrips):
-        estimate(crossed, tri().machine, tri().layers)
+    made = estimate(crossed, tri().machine, tri().layers, "cura-gaps")
+    assert all(p.is_box() for p in made.body("plate").prisms)
+    assert made.body("plate").volume_mm3() == pytest.approx(1.6, rel=1e-12)
+
+
+def test_an_outline_with_a_hole_keeps_its_hole():
+    ring = Scene((Body("plate", "x60", tuple(box(*s, 0, 0.1) for s in RING)),), (5.0, 5.0, 0.1))
+    made = estimate(ring, tri().machine, tri().layers, "cura-gaps")
+    assert made.body("plate").volume_mm3() == pytest.approx(0.8, rel=1e-12)
+    assert all(p.is_box() for p in made.body("plate").prisms)
 
 
 def test_an_unknown_way_of_walls():
@@ -135,30 +168,34 @@ def test_an_unknown_way_of_walls():
 
 def test_a_window_is_the_whole_where_nothing_repeats():
     d = design.make({"shape": "tri", "parameters": {"length_mm": 2.0}})
-    plan = window.window(drawn(d.printed, d.layers), d.printed)
+    plan = window.window(drawn(d.printed, d.layers.boundaries_mm(d.printed.size_mm[2])), d.printed)
     assert (plan.x_mm, plan.y_mm) == ((0.0, 2.0), (0.0, 10.0))
 
 
+def strips(bottom, top, *runs):
+    """A layer of strips along y, 1 mm long, of one body."""
+    return LayerRegions(bottom, top, {"a": shapely.multipolygons([shapely.box(a, 0.0, b, 1.0) for a, b in runs])}, "y")
+
+
+def edges(layer):
+    return layer.region("a").bounds[0::2]
+
+
 def test_edges_that_rounding_parted_become_one():
-    lines = [{"along": "y", "bottom_mm": 0.0, "top_mm": 0.1}, {"along": "y", "bottom_mm": 0.1, "top_mm": 0.2}]
-    found = window.cut(
-        [Strips(**lines[0], runs={"a": ((1.0, 2.0005),)}), Strips(**lines[1], runs={"a": ((1.001, 2.4),)})],
-        window.Window((1.0, 3.0), (0.0, 1.0)),
-    )
-    assert found[0].runs["a"] == ((0.0, 1.0005),)
-    assert found[1].runs["a"] == ((0.0, 1.4),)
+    given = [strips(0.0, 0.1, (1.0, 2.0005)), strips(0.1, 0.2, (1.001, 2.4))]
+    found = window.cut(given, window.Window((1.0, 3.0), (0.0, 1.0)))
+    assert [edges(layer) for layer in found] == [(0.0, 1.0005), (0.0, 1.4)]
 
 
 def test_edges_that_rounding_parted_within_a_window_meet_in_their_middle():
-    found = window.cut(
-        [Strips("y", 0.0, 0.1, {"a": ((1.2, 2.0),)}), Strips("y", 0.1, 0.2, {"a": ((1.2, 2.001),)})],
-        window.Window((1.0, 3.0), (0.0, 1.0)),
-    )
-    assert {f.runs["a"][0][1] for f in found} == {1.0005}
+    given = [strips(0.0, 0.1, (1.2, 2.0)), strips(0.1, 0.2, (1.2, 2.001))]
+    found = window.cut(given, window.Window((1.0, 3.0), (0.0, 1.0)))
+    assert {edges(layer)[1] for layer in found} == {1.0005}
 
 
 def test_a_layer_that_is_lost_parts_what_is_above_from_what_is_below():
     like = Scene((Body("a", "x60", (box(0, 1, 0, 1, 0, 0.3),)),), (2.0, 1.0, 0.3))
-    run = {"a": ((0.5, 1.0),)}
-    found = scene_of([Strips("y", 0.0, 0.1, run), Strips("y", 0.1, 0.2, {}), Strips("y", 0.2, 0.3, run)], like)
+    found = scene_of(
+        [strips(0.0, 0.1, (0.5, 1.0)), LayerRegions(0.1, 0.2, {}, "y"), strips(0.2, 0.3, (0.5, 1.0))], like
+    )
     assert sorted(p.span("z") for p in found.body("a").prisms) == [(0.0, 0.1), (0.2, 0.3)]

@@ -6,13 +6,13 @@ import shutil
 from pathlib import Path
 
 import pytest
-from sensorgen.prediction.bodies import estimated
-from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.results import to_json
 
 from sensorgen.core.errors import BadInput, Unprintable, Unwritable
 from sensorgen.design import design
 from sensorgen.design.specimen_name import parse
+from sensorgen.prediction.bodies import estimated
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.results import to_json
 from sensorgen.workflows.batch import make
 from sensorgen.workflows.batch.record import RECORD, Differences, differences
 

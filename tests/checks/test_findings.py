@@ -30,8 +30,7 @@ def test_findings_come_with_the_worst_first_and_complete():
         assert f.body
         assert f.message
         assert f.advice
-        assert f.value_mm is not None
-        assert f.limit_mm is not None
+        assert f.rule == "7-printed" or None not in (f.value_mm, f.limit_mm)  # that one compares volumes
         assert f.layer is not None or f.place_mm is not None
 
 
@@ -81,7 +80,7 @@ def test_a_waiver_silences_only_what_it_names(waiver, covers):
 
 
 def test_what_is_waived_stops_nothing():
-    with_all = review(make(BAD | {"waivers": [{"rule": r, "reason": "tried on the bench"} for r in "23459"]}))
+    with_all = review(make(BAD | {"waivers": [{"rule": r, "reason": "tried on the bench"} for r in "234579"]}))
     assert with_all.errors(strict=True) == []
     assert with_all.counts() == {"error": 0, "warning": 0, "info": 0, "waived": len(with_all.findings)}
     assert review(make(BAD)).errors() != []

@@ -71,7 +71,7 @@ def test_a_film_between_two_samples_is_an_error_though_thicker_than_half_a_layer
 def test_a_film_of_broken_layers_is_told_with_its_printed_value(sensor, findings, bottom_mm, film_mm, printed_mm):
     found = findings(sensor(film_mm=film_mm, bottom_mm=bottom_mm), "2-film")
     assert found[0].severity == "warning"
-    assert f"prints as {printed_mm:g} mm" in found[0].message
+    assert f"will print {printed_mm:g} mm thick" in found[0].message
     assert found[0].margin_mm() == pytest.approx(-abs(film_mm - printed_mm))
 
 
@@ -85,7 +85,7 @@ def test_extra_fine_layers_print_the_film_and_the_stack_of_the_spec(findings, ex
     scene = rect.scene(rect.Params(length_mm=8.0, width_mm=4.0, dielectric_mm=0.1), Fill())
     assert scene.size_mm[2] == pytest.approx(1.3)
     (film,) = findings(scene, "2-film", quality=extrafine)
-    assert "prints as 0.12 mm" in film.message
+    assert "will print 0.12 mm thick" in film.message
     assert Layers(tuple(extrafine.boundaries_mm(1.3))).printed_mm(1.3) == 1.32
 
 
@@ -103,7 +103,7 @@ def test_the_printed_gap_is_the_measured_one(findings, along, turned):
     scene = tri_scene(0.1, along=along)
     (found,) = findings(scene.turned_over() if turned else scene, "2-printed-gap")
     assert found.severity == "warning"
-    assert "Arachne: 0.2 mm, classic walls or plain Cura: 0.3 mm, Cura filling outline gaps: 0.1 mm" in found.message
+    assert "0.2 mm (Arachne), 0.3 mm (classic walls or plain Cura), 0.1 mm (Cura filling outline gaps)" in found.message
     assert (found.value_mm, found.limit_mm) == (0.3, 0.1)
     assert found.advice
 
@@ -111,8 +111,8 @@ def test_the_printed_gap_is_the_measured_one(findings, along, turned):
 def test_extra_fine_arachne_cannot_tell_the_two_films_apart(findings, extrafine):
     """As-printed.md: "At 0.06 mm layers Arachne cannot tell d = 0.1 from d = 0.2"."""
     thin, thick = (findings(tri_scene(d), "2-printed-gap", quality=extrafine)[0].message for d in (0.1, 0.2))
-    assert "Arachne: 0.18 mm" in thin
-    assert "Arachne: 0.24 mm" in thick  # one layer of 0.06 between them, where the drawing has 0.1
+    assert "0.18 mm (Arachne)" in thin
+    assert "0.24 mm (Arachne)" in thick  # one layer of 0.06 between them, where the drawing has 0.1
 
 
 @pytest.mark.parametrize("film_mm", [0.1, 0.2])
@@ -135,5 +135,5 @@ def test_another_nozzle_prints_another_gap(findings, printer):
     """A nozzle of 0.25 mm loses what is under 0.075 (Arachne) and 0.275 mm (classic): the tip of 0.1 stays in one."""
     small = printer.model_copy(update={"nozzle_mm": 0.25})
     (found,) = findings(tri_scene(0.1), "2-printed-gap", printer=small)
-    assert "classic walls or plain Cura: 0.2 mm" in found.message
-    assert "Arachne: 0.1 mm" in found.message
+    assert "0.2 mm (classic walls or plain Cura)" in found.message
+    assert "0.1 mm (Arachne, Cura filling outline gaps)" in found.message

@@ -11,7 +11,8 @@ from sensorgen.design import design, shapes
 
 
 def errors(**data):
-    return {f.rule for f in review(design.make(data)).findings if f.severity == "error"}
+    """Of the drawing; what a slicer loses of it (rule 7) is another matter."""
+    return {f.rule for f in review(design.make(data)).findings if f.severity == "error"} - {"7-printed"}
 
 
 @pytest.mark.parametrize("quality", ["fine", "extrafine"])

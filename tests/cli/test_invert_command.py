@@ -10,12 +10,12 @@ import threading
 
 import numpy as np
 import pytest
-from sensorgen.prediction.bodies import default_body
-from sensorgen.prediction.evaluate import sensor_model
 
 from sensorgen import cli
 from sensorgen.cli import main  # noqa: F401 - the fixtures run it
 from sensorgen.design.design import make
+from sensorgen.prediction.bodies import default_body
+from sensorgen.prediction.evaluate import sensor_model
 
 TONES = {"1.1kHz": 1.1e3, "10.1kHz": 10.1e3, "99.7kHz": 99.7e3, "0.5MHz": 5e5}
 DESIGN = ["tri", "--dielectric", "0.1", "--material", "electrode=etpu@thesis-3.2"]
@@ -137,7 +137,7 @@ def test_what_to_do_is_said(run, tmp_path):
 def test_one_tone_says_so(run, tmp_path):
     z = sensor_model(default_body(make(PLAIN)))[0].sensor.impedance(99.7e3, 3.0, 0.05)
     (tmp_path / "m.csv").write_text(f"re_ohm_99.7kHz,im_ohm_99.7kHz\n{z.real},{z.imag}\n")
-    assert "note: one tone gives two numbers for two unknowns" in run("invert", *DESIGN, "m.csv").out
+    assert "note: one frequency gives two numbers for two unknowns" in run("invert", *DESIGN, "m.csv").out
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from sensorgen.scene.sections import columns, sections
 
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d
-from sensorgen.models.press2d import Elastic, Fineness, Held
+from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.solvers.contact import cell as cells
 from sensorgen.solvers.contact import contact
 
@@ -44,7 +44,7 @@ def pillars(gap, count):
 
 
 def solved(cell, stresses, held=None):
-    return press2d._solved(cell, SOFT, stresses, held or Held(), Fineness(), lambda _: None)
+    return press2d._solved(cell, SOFT, stresses, held or BoundaryConditions(), Fineness(), lambda _: None)
 
 
 def with_field(cell, stresses, solids=SOFT, fineness=None):
@@ -87,7 +87,7 @@ def test_faces_that_run_through_each_other_are_caught(monkeypatch):
 
     def blind(self, places_m, penalty_pa, kept=None):
         pairs = project(self, places_m, penalty_pa, kept)
-        return contact.some(pairs, np.zeros(len(pairs.point), bool))
+        return pairs.some(np.zeros(len(pairs.point), bool))
 
     monkeypatch.setattr(contact.Faces, "project", blind)
     for count in (1, 2):
@@ -118,7 +118,7 @@ def test_an_upright_gap_that_is_shut_is_none():
 
 def forces(run, state):
     """Of the contact on each node (n, 2) [N/m], and where the nodes are."""
-    force, _ = run.problem._touching(state.pairs, state.u_m)
+    force, _ = run.problem.contact_forces(state.pairs, state.u_m)
     return force.reshape(-1, 2), run.problem.places(state.u_m)
 
 
@@ -161,7 +161,8 @@ def test_a_sloping_joint_hands_an_even_pressure_on(drop):
     filled, _ = press2d._field(cell, run, run.states[-1].u_m, EPS)
     assert filled.middle() == pytest.approx(EPS["x60"] * EPS0 / (0.6e-3 - found.displacement_m[-1]), rel=1e-4, abs=0)
     off = np.abs(-run.states[-1].inner.pressure[:, 0] / 1e5 - 1)
-    corners = run.mesh.points_m[run.mesh.triangles[:, :3]]
+    mesh = run.problem.elements.mesh
+    corners = mesh.points_m[mesh.outer[:, :3]]
     sides = corners[:, 1:] - corners[:, :1]
     area = np.abs(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0])
     assert (off * area).sum() / area.sum() < 1.2e-3
@@ -174,7 +175,7 @@ def test_a_sloping_joint_that_sticks_is_none():
     whole = cell_of(0.6, 0, 0.7, box(0, 0.7, 0, 0.6))
     one = press2d.press(whole, solids, [0.0, 1e4, 2e4]).displacement_m
     held, loose = (
-        press2d.press(slope(0.4), solids, [0.0, 1e4, 2e4], None, Held(contact=kind)).displacement_m
+        press2d.press(slope(0.4), solids, [0.0, 1e4, 2e4], None, BoundaryConditions(contact=kind)).displacement_m
         for kind in ("stick", "frictionless")
     )
     assert np.diff(held)[1] == pytest.approx(np.diff(one)[1], rel=0.02)
@@ -183,15 +184,15 @@ def test_a_sloping_joint_that_sticks_is_none():
 
 def test_the_energy_of_the_contact_is_that_of_its_forces():
     """Gap and slip: the energy's differences along a motion are the forces' work."""
-    _, run = solved(slope(0.4), [0.0, 1e4], Held(contact="stick"))
+    _, run = solved(slope(0.4), [0.0, 1e4], BoundaryConditions(contact="stick"))
     problem, state = run.problem, run.states[-1]
     assert state.pairs.sticks.any()
     ways = np.random.default_rng(1).normal(size=(2, len(state.u_m)))
     state, motion = replace(state, u_m=state.u_m + 1e-8 * ways[0]), 1e-13 * ways[1]
     there = [replace(state, u_m=state.u_m + share * motion) for share in (-1, 0, 1)]
     before, _, after = (problem.contact_energy(s) for s in there)
-    force, _ = problem._touching(state.pairs, state.u_m)
-    slid = problem.slips(state.pairs, state.u_m) * state.pairs.sticks
+    force, _ = problem.contact_forces(state.pairs, state.u_m)
+    slid = problem.slips(state.pairs, state.u_m)[:, 0] * state.pairs.sticks
     assert (state.pairs.stiffness_pa * slid**2).sum() > 0.1 * problem.contact_energy(state)
     assert (after - before) / 2 == pytest.approx(force @ motion, rel=1e-4, abs=0)
 
@@ -202,7 +203,9 @@ def test_steps_of_any_length_stick_alike():
     solids = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
     cell = press2d.cell(drawn.in_use, drawn.params.period_mm)
     moved = [
-        press2d.press(cell, solids, np.linspace(0, 1e4, n + 1), None, Held(contact="stick")).displacement_m[-1]
+        press2d.press(
+            cell, solids, np.linspace(0, 1e4, n + 1), None, BoundaryConditions(contact="stick")
+        ).displacement_m[-1]
         for n in (1, 4)
     ]
     assert moved[0] == pytest.approx(moved[1], rel=0.03)

@@ -10,6 +10,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models.compression import unconfined
 from sensorgen.models.stack import Body, Film, Press, Stack, Track
+from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.double_layer import study
 from sensorgen.prediction.double_layer.designs import halves, press_at, stack_of, stacked
 from sensorgen.prediction.double_layer.differencing import bounds
@@ -19,37 +20,42 @@ from sensorgen.prediction.evaluate import TONES_HZ
 TONES = np.array(TONES_HZ)
 PRESS = Press(6.0, 0.04, 0.01)
 EVEN = (Track(45e3),) * 3
-TWINS = Stack(0.1, 0.01, EVEN, (Film(6.9e-10, unconfined(6e6).thinning),) * 2)
-STIFF_BELOW = Stack(0.1, 0.01, EVEN, (Film(6.9e-10, unconfined(6e9).thinning), Film(6.9e-10, unconfined(6e6).thinning)))
+TWINS = Stack(0.1, 0.01, EVEN, (Film(6.9e-10, unconfined(6e6).capacitive_strain),) * 2)
+STIFF_BELOW = Stack(
+    0.1,
+    0.01,
+    EVEN,
+    (Film(6.9e-10, unconfined(6e9).capacitive_strain), Film(6.9e-10, unconfined(6e6).capacitive_strain)),
+)
 
 
 def by_name(stack):
-    return {row["reading"]: row for row in bounds(stack, TONES, PRESS, 1e-3, 0.1)}
+    return {row.reading: row for row in bounds(stack, TONES, PRESS, 1e-3, 0.1)}
 
 
 def test_one_film_has_the_bound_that_is_known_of_the_plate():
     """2.2 N for Table 3.1 at 0.1 % noise per tone."""
-    found = study(make({"shape": "reference"}), TONES_HZ, 6.0, 0.045, 1e-3, 0.1, 0.1)["bounds"]
-    assert found[0]["force_n"]["known"] == pytest.approx(2.25, rel=0.02)
+    found = study(make({"shape": "reference"}), TONES_HZ, 6.0, 0.045, 1e-3, 0.1, 0.1).bounds
+    assert found[0].force_n.known == pytest.approx(2.25, rel=0.02)
 
 
 def test_equal_films_cancel_the_force_in_their_difference():
     found = by_name(TWINS)
-    assert found["difference alone"]["force_n"]["known"] is None
-    assert found["both readings"]["force_n"]["known"] == pytest.approx(
-        found["upper film alone"]["force_n"]["known"] / np.sqrt(2), rel=1e-3
+    assert found["difference alone"].force_n.known is None
+    assert found["both readings"].force_n.known == pytest.approx(
+        found["upper film alone"].force_n.known / np.sqrt(2), rel=1e-3
     )
 
 
 def test_a_stiff_second_film_takes_the_drift_away():
     found = by_name(STIFF_BELOW)
-    alone, both = found["upper film alone"]["force_n"], found["both readings"]["force_n"]
+    alone, both = found["upper film alone"].force_n, found["both readings"].force_n
     rise = 1 / 6e6 / (0.01 * 0.1) / 0.99**2 / 1.001  # of ln C per newton; the drift is a rise of 0.1
-    assert alone["drifting"] == pytest.approx(0.1 / rise, rel=0.2)
-    assert both["drifting"] < 1.5 * both["known"]
-    difference = found["difference alone"]["force_n"]
-    assert difference["drifting"] == pytest.approx(np.hypot(difference["known"], 0.1 * 6.0), rel=0.05)
-    assert found["difference alone"]["force_n"]["known"] == pytest.approx(np.sqrt(2) * alone["known"], rel=0.02)
+    assert alone.drifting == pytest.approx(0.1 / rise, rel=0.2)
+    assert both.drifting < 1.5 * both.known
+    difference = found["difference alone"].force_n
+    assert difference.drifting == pytest.approx(np.hypot(difference.known, 0.1 * 6.0), rel=0.05)
+    assert found["difference alone"].force_n.known == pytest.approx(np.sqrt(2) * alone.known, rel=0.02)
 
 
 def touching(stack=TWINS):
@@ -131,10 +137,12 @@ def test_the_table_of_what_a_second_film_tells():
     rows = [row for row in ROWS if row[0] in stiffer]
     assert len(rows) == len(stiffer)
     for name, *cells in rows:
-        films = tuple(Film(6.9e-10, unconfined(6e6 * times).thinning) for times in (stiffer[name], 1))
+        films = tuple(Film(6.9e-10, unconfined(6e6 * times).capacitive_strain) for times in (stiffer[name], 1))
         found = by_name(Stack(0.1, 0.01, EVEN, films))
-        ways = [found[way]["force_n"] for way in ("upper film alone", "both readings", "difference alone")]
-        for cell, force in zip(cells, [way[case] for case in ("known", "drifting") for way in ways], strict=True):
+        ways = [found[way].force_n for way in ("upper film alone", "both readings", "difference alone")]
+        for cell, force in zip(
+            cells, [getattr(way, case) for case in ("known", "drifting") for way in ways], strict=True
+        ):
             assert (
                 force is None if cell == "nothing" else float(cell.removesuffix(" N")) == pytest.approx(force, rel=3e-3)
             )
@@ -146,7 +154,7 @@ def test_the_table_of_what_a_touch_does():
     assert len(rows) == 2 * len(WIRINGS)
     for row, wiring in zip(rows, 2 * WIRINGS, strict=True):
         if row[0]:
-            found = stacked(make(next(designs)))
+            found = stacked(make(next(designs)), body=drawn)
             of = Touching(found.own, found.isolation_eps_r, TONES, press_at(found, 6.0, 0.045), 1e-3, Body())
         assert row[1] == wiring.words
         for cell, thickness in zip(row[2:6], (0.0, 0.1, 0.5, 1.0), strict=True):

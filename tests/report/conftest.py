@@ -4,11 +4,10 @@ import os
 
 import bench_files
 import pytest
-from sensorgen.workflows.stored_prediction import predicted_row
 
 from sensorgen.design.specimen_name import design_of, parse
 from sensorgen.measure.log import Log, bench, importing, notes
-from sensorgen.measure.log.batches import prediction
+from sensorgen.workflows.stored_prediction import predicted_row
 
 
 @pytest.fixture(autouse=True, scope="session")

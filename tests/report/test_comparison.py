@@ -131,10 +131,23 @@ def test_moved_parameters_are_those_of_the_line():
     """Straight from the line's formula, with the parameter itself changed."""
     other = moved(PLATE, 2.0, 1.5, 1e-6)
     z = line.impedance(
-        L_m=0.1, W_m=0.01, H_top_m=3e-4, H_bottom_m=3e-4, rho_top_ohm_m=10.0, rho_bottom_ohm_m=10.0,
-        d_m=8.8541878128e-12 * 0.01 / (7.6e-10 * 1.5), eps_r=1.0, E_Pa=6e5, L_p_m=0.01, x_p_left_edge_m=0.045, F_N=0.0,
-        f_Hz=TONES, G_S_per_m=1e-5,
-    )  # fmt: skip
+        line.PressedLine(
+            length_m=0.1,
+            width_m=0.01,
+            top_thickness_m=3e-4,
+            bottom_thickness_m=3e-4,
+            top_resistivity_ohm_m=10.0,
+            bottom_resistivity_ohm_m=10.0,
+            film_m=8.8541878128e-12 * 0.01 / (7.6e-10 * 1.5),
+            eps_r=1.0,
+            modulus_pa=6e5,
+            tip_m=0.01,
+            left_m=0.045,
+            force_n=0.0,
+            frequency_hz=TONES,
+            leak_s_per_m=1e-5,
+        )
+    )
     assert np.exp(at_rest(other, TONES)) == pytest.approx(z, rel=1e-9)
 
 

@@ -12,9 +12,9 @@ import pytest
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design import design
 from sensorgen.design.printer import load_printer
+from sensorgen.design.tower import tower
 from sensorgen.export.gcode import paths
 from sensorgen.export.slicers import run
-from sensorgen.export.slicers.tower import tower
 from sensorgen.measure.log import batches
 from sensorgen.measure.log.entries import Prediction, RawFile
 from sensorgen.workflows.batch import make, tab

@@ -16,10 +16,10 @@ import pytest
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names
+from sensorgen.design.tower import tower
 from sensorgen.export.gcode import extruded
 from sensorgen.export.slicers import cura, curaengine, prusa
 from sensorgen.export.slicers.loads import Load
-from sensorgen.export.slicers.tower import tower
 
 DIABASE = load_printer("diabase-h5")
 FINE = load_quality("fine")

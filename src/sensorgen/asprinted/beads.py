@@ -1,20 +1,17 @@
-"""The printed scene from a slicer's G-code: per layer what each tool really fills.
+"""Layer regions from a slicer's G-code: lines, the body that each belongs to, and the polygons that they fill."""
 
-A layer of strips is cut across, near the middle of the sensor, and what the cut shows is taken along the whole strip.
-"""
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
-from sensorgen.asprinted.intervals import Intervals, distances_mm, length_mm, united, within, without
-from sensorgen.asprinted.rules import ROUND
-from sensorgen.asprinted.strips import Strips, drawn
+from sensorgen.checks.estimate import ROUND
 from sensorgen.core.errors import UnknownName
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.paths import Paths
+from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, parts
 from sensorgen.scene.scene import SLIVER_MM, Point, Scene
 
 CONVENTIONS = ("vol", "deposit", "stadium")
@@ -52,6 +49,19 @@ class Beads:
     body: NDArray[np.int64]
     tool: NDArray[np.int64]
     number: NDArray[np.int64]
+
+    def corners_mm(self, convention: str) -> Floats:
+        """Each line as a rectangle in plan, (n, 4, 2): half a width longer at both ends, wide by a convention [mm]."""
+        middle, way = (self.start_mm + self.end_mm) / 2, self.end_mm - self.start_mm
+        length = np.hypot(*way.T)
+        along = way * ((length + self.width_mm) / (2 * length))[:, None]
+        aside = way[:, ::-1] * [-1, 1] * (self.widths_mm(convention) / (2 * length))[:, None]
+        corners = (middle + along + aside, middle + along - aside, middle - along - aside, middle - along + aside)
+        return np.stack(corners, axis=1)
+
+    def widths_mm(self, convention: str) -> Floats:
+        """Width of each line by a convention [mm]."""
+        return self.width_mm + ROUND * self.height_mm if convention == "stadium" else self.width_mm
 
     def of(self, rows: NDArray[np.bool_]) -> "Beads":
         """The lines of a mask."""
@@ -94,27 +104,31 @@ def _owners(
     design: Design, scene: Scene, tool: NDArray[np.int64], layer: NDArray[np.int64], middle: Floats
 ) -> NDArray[np.int64]:
     """The body that each line belongs to: of its tool's, the one that is drawn nearest in its layer, or near it."""
-    layers = drawn(scene, design.layers)
+    layers = drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))
     owner = np.zeros(len(tool), np.int64)
     for one in {design.tool(body.material) for body in scene.bodies}:
-        mine = [k for k, body in enumerate(scene.bodies) if design.tool(body.material) == one]
+        mine = {body.name: k for k, body in enumerate(scene.bodies) if design.tool(body.material) == one}
         for number in np.unique(layer[tool == one]):
             rows = np.flatnonzero((tool == one) & (layer == number))
-            shown = _nearest(layers, int(number), {scene.bodies[k].name: k for k in mine})
-            axis = "xy".index(layers[number].across)
-            away = np.array([distances_mm(runs, middle[rows, axis]) for runs in shown.values()])
-            owner[rows] = np.array(list(shown))[away.argmin(0)]
+            near = sorted(layers, key=lambda each: abs(each.bottom_mm - layers[number].bottom_mm))
+            each = next(each for each in near if mine.keys() & each.regions.keys())
+            shown = {name: region for name, region in each.regions.items() if name in mine}
+            numbers = np.array([mine[name] for name in shown])
+            owner[rows] = numbers[0] if len(shown) == 1 else numbers[_nearest(list(shown.values()), middle[rows])]
     return owner
 
 
-def _nearest(layers: Sequence[Strips], number: int, mine: Mapping[str, int]) -> dict[int, Intervals]:
-    """What some bodies show in a layer, or in the nearest one that shows any of them."""
-    order = sorted(range(len(layers)), key=lambda k: abs(k - number))
-    found = ({mine[n]: r for n, r in layers[k].runs.items() if n in mine} for k in order)
-    return next(filter(None, found))
+def _nearest(regions: Sequence[Region], places_mm: Floats) -> NDArray[np.intp]:
+    """Which region is nearest to each place."""
+    places = shapely.points(places_mm)
+    found = [parts(region) for region in regions]
+    tree = shapely.STRtree([part for each in found for part in each])
+    return np.asarray(np.repeat(np.arange(len(found)), [len(each) for each in found])[tree.nearest(places)])
 
 
-def layers(design: Design, lines: Beads, convention: str = "vol", *, electrode_wins: bool = False) -> list[Strips]:
+def layers(
+    design: Design, lines: Beads, convention: str = "vol", *, electrode_wins: bool = False
+) -> list[LayerRegions]:
     """What every layer of a print holds.
 
     Parameters
@@ -131,34 +145,88 @@ def layers(design: Design, lines: Beads, convention: str = "vol", *, electrode_w
 
     Raises
     ------
-    NoStrips
-        A layer is not made of strips along x or y.
     UnknownName
         No such convention.
+
+    Notes
+    -----
+    A layer that is drawn as strips is cut across near the middle of the sensor, and the median cut is taken along the
+    whole strip. Of any other layer the union of all lines is taken, with slits between touching lines closed.
     """
     if convention not in CONVENTIONS:
         raise UnknownName("convention for a line's width", convention, CONVENTIONS)
     scene = design.printed
-    plan = drawn(scene, design.layers)
+    plan = drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))
     return [
         _printed(layer, scene, lines.of(lines.layer == k), convention, electrode_wins=electrode_wins)
         for k, layer in enumerate(plan)
     ]
 
 
-def _printed(layer: Strips, scene: Scene, lines: Beads, convention: str, *, electrode_wins: bool) -> Strips:
-    axis = "xy".index(layer.across)
-    end, long = scene.size_mm[axis], scene.size_mm[1 - axis]
-    runs: dict[str, Intervals] = {}
-    taken: Intervals = ()
+def _printed(layer: LayerRegions, scene: Scene, lines: Beads, convention: str, *, electrode_wins: bool) -> LayerRegions:
+    cover = _strips if layer.along else _union
+    regions: dict[str, Region] = {}
     for k in _order(scene, lines, electrode_wins=electrode_wins):
-        name, mine = scene.bodies[k].name, lines.of(lines.body == k)
-        seen = [_cut(mine, axis, long / 2 + share * long / 10, convention) for share in _CUTS]
-        filled = sorted(seen, key=length_mm)[len(seen) // 2]
-        filled = _whole(within(filled, 0.0, end), layer.runs.get(name, ()), end)
-        runs[name] = without(filled, taken)
-        taken = united((*taken, *runs[name]))
-    return Strips(layer.along, layer.bottom_mm, layer.top_mm, {n: found for n, found in runs.items() if found})
+        name = scene.bodies[k].name
+        filled = cover(lines.of(lines.body == k), layer, scene.size_mm, convention)
+        if layer.along and len(plan := parts(layer.region(name))) == 1:
+            filled = plan[0] if filled.area > FULL * scene.size_mm[0] * scene.size_mm[1] else filled
+        regions[name] = cleaned(shapely.difference(filled, shapely.union_all(list(regions.values()))))
+    return layer.mapped(regions)
+
+
+def _strips(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convention: str) -> Region:
+    """The median of some cuts near the middle, along the whole sensor."""
+    axis = "yx".index(layer.along)
+    long, end = size_mm[1 - axis], size_mm[axis]
+    cuts = [_cut(lines, axis, long / 2 + share * long / 10, convention).clip(0.0, end) for share in _CUTS]
+    low, high = sorted(cuts, key=lambda cut: float(np.diff(cut).sum()))[len(cuts) // 2].T
+    return shapely.multipolygons(shapely.box(low, 0.0, high, long) if axis == 0 else shapely.box(0.0, low, long, high))
+
+
+def _cut(lines: Beads, axis: int, at_mm: float, convention: str) -> Floats:
+    """Runs along an axis, (n, 2), in which a line square to it meets the beads [mm]."""
+    here = lines.corners_mm(convention)
+    u, v = here[:, :, axis], here[:, :, 1 - axis] - at_mm
+    u_next, v_next = np.roll(u, -1, axis=1), np.roll(v, -1, axis=1)
+    crossed = (v < 0) != (v_next < 0)
+    met = u + v / np.where(crossed, v - v_next, 1.0) * (u_next - u)
+    hit = crossed.any(1)
+    runs = np.stack([np.where(crossed, met, np.inf).min(1), np.where(crossed, met, -np.inf).max(1)], axis=1)[hit]
+    runs, taken = _merged(runs)
+    if convention == "deposit":
+        more = (taken - (runs[:, 1] - runs[:, 0])).clip(0.0)[:, None] / 2
+        runs, _ = _merged(runs + more * [-1, 1])
+    return runs
+
+
+def _merged(runs: Floats) -> tuple[Floats, Floats]:
+    """Union of runs, (n, 2), and the sum of the lengths of those in each [mm]."""
+    runs = runs[runs[:, 0].argsort()]
+    if not len(runs):
+        return runs, runs[:, 0]
+    reach = np.maximum.accumulate(runs[:, 1])
+    starts = np.flatnonzero(np.append(True, runs[1:, 0] > reach[:-1] + SLIVER_MM))
+    ends = reach[np.append(starts[1:], len(runs)) - 1]
+    return np.column_stack([runs[starts, 0], ends]), np.add.reduceat(runs[:, 1] - runs[:, 0], starts)
+
+
+def _union(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convention: str) -> Region:
+    """All lines with round ends, slits between touching ones closed."""
+    ways = shapely.linestrings(np.stack([lines.start_mm, lines.end_mm], axis=1))
+    region = shapely.union_all(shapely.buffer(ways, lines.widths_mm(convention) / 2, quad_segs=4))
+    if convention == "deposit":
+        region = shapely.union_all([_pushed(part, lines) for part in parts(region)])
+    slit = ROUND * layer.height_mm
+    closed = region.buffer(slit, join_style="mitre").buffer(-slit, join_style="mitre")
+    return shapely.clip_by_rect(closed, 0.0, 0.0, size_mm[0], size_mm[1])
+
+
+def _pushed(part: Region, lines: Beads) -> Region:
+    """A connected part, wider by what its lines overlap."""
+    inside = shapely.contains_xy(part, (lines.start_mm + lines.end_mm) / 2)
+    deposited = float((lines.volume_mm3[inside] / lines.height_mm[inside]).sum())
+    return part.buffer(max(deposited - part.area, 0.0) / part.length, join_style="mitre")
 
 
 def _order(scene: Scene, lines: Beads, *, electrode_wins: bool) -> list[int]:
@@ -166,47 +234,3 @@ def _order(scene: Scene, lines: Beads, *, electrode_wins: bool) -> list[int]:
     here = np.unique(lines.body).tolist()
     first = {k: lines.number[lines.tool == lines.tool[lines.body == k][0]].min() for k in here}
     return sorted(here, key=lambda k: (electrode_wins and not scene.bodies[k].terminal, first[k], k))
-
-
-def _whole(filled: Intervals, plan: Intervals, end: float) -> Intervals:
-    """A plate that is all but full is full: its lines touch below their rounded edges."""
-    is_plate = len(plan) == 1 and plan[0][1] - plan[0][0] > end - SLIVER_MM
-    return plan if is_plate and length_mm(filled) > FULL * end else filled
-
-
-def _cut(lines: Beads, axis: int, at_mm: float, convention: str) -> Intervals:
-    """What a cut square to the strips meets, along one axis [mm]."""
-    low, high = _met(lines, axis, at_mm, ROUND * lines.height_mm if convention == "stadium" else 0.0 * lines.height_mm)
-    hit = high > low
-    runs = united(zip(low[hit].tolist(), high[hit].tolist(), strict=True))
-    if convention != "deposit":
-        return runs
-    lines_here = np.column_stack([low[hit], high[hit]])
-    return united(_pushed(run, lines_here) for run in runs)
-
-
-def _met(lines: Beads, axis: int, at_mm: float, wider: Floats) -> tuple[Floats, Floats]:
-    """Where each line's rectangle, half a width longer at both ends, meets the cut; nothing where low is above high."""
-    middle, way = (lines.start_mm + lines.end_mm) / 2, lines.end_mm - lines.start_mm
-    length = np.hypot(*way.T)
-    t = way / length[:, None]
-    low, high = np.full(len(length), -np.inf), np.full(len(length), np.inf)
-    off = at_mm - middle[:, 1 - axis]
-    for u, v, half in (
-        (t[:, axis], t[:, 1 - axis], (length + lines.width_mm) / 2),
-        (t[:, 1 - axis], -t[:, axis], (lines.width_mm + wider) / 2),
-    ):
-        level = np.abs(u) < 1e-9
-        slope = np.where(level, 1.0, u)
-        a, b = (-half - v * off) / slope, (half - v * off) / slope
-        outside = np.abs(v * off) > half
-        low = np.where(level, np.where(outside, np.inf, low), np.maximum(low, np.minimum(a, b)))
-        high = np.where(level, np.where(outside, -np.inf, high), np.minimum(high, np.maximum(a, b)))
-    return middle[:, axis] + low, middle[:, axis] + high
-
-
-def _pushed(run: Point, lines: Floats) -> Point:
-    """A run of lines, as wide as all of them side by side."""
-    inside = (lines[:, 0] >= run[0] - SLIVER_MM) & (lines[:, 1] <= run[1] + SLIVER_MM)
-    more = max(float((lines[inside, 1] - lines[inside, 0]).sum()) - (run[1] - run[0]), 0.0) / 2
-    return run[0] - more, run[1] + more

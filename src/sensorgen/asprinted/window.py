@@ -1,18 +1,24 @@
-"""The piece of a printed scene that stands for all of it: one period of the drawing, from its middle.
+"""The unit cell of a print: one period of the drawing, from the middle of the sensor.
 
 G-code is rounded to a micrometre, so that no printed period repeats another exactly: a model that looks for mirrors
 would have to solve the whole sensor. The drawing's mirrors say where a period starts and ends.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
-from sensorgen.asprinted.intervals import Intervals, within
-from sensorgen.asprinted.strips import Strips
-from sensorgen.scene.scene import SLIVER_MM, Point, Scene
-from sensorgen.scene.unit_cell import Band, Slice, mirrored
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.affinity import translate
 
+from sensorgen.scene.layers import LayerRegions, Region, cleaned, outlines, parts
+from sensorgen.scene.scene import SLIVER_MM, Body, Outline, Point, Scene, rectangle
+from sensorgen.scene.sections import Section
+from sensorgen.scene.unit_cell import Band, Slice, cell, mirrored
+
+Floats = NDArray[np.float64]
 ROUNDED_MM = 2e-3  # edges nearer than this are one: G-code has three decimals
 
 
@@ -32,119 +38,127 @@ class Window:
         x, y = self.sides_mm()
         return x * y
 
-    def of(self, axis: str) -> Point:
-        """Where it starts and ends on an axis [mm]."""
-        return self.x_mm if axis == "x" else self.y_mm
 
-
-def window(layers: Sequence[Strips], scene: Scene) -> Window:
+def window(layers: Sequence[LayerRegions], scene: Scene) -> Window:
     """One period of a drawing near its middle, along x and y.
 
     It starts and ends where least conducts in the patterned layers, so that a cog that is printed lopsided is whole.
-    Along an axis without a pattern that repeats it is the whole sensor.
+    Along an axis without mirrors that repeat it is the whole sensor.
 
     Parameters
     ----------
-    layers : sequence of Strips
+    layers : sequence of LayerRegions
         The drawing's layers.
     scene : Scene
         The drawing.
     """
     conducting = {body.name for body in scene.bodies if body.terminal}
-    x, y = (
-        _period([layer for layer in layers if layer.across == axis], conducting, scene.size_mm["xy".index(axis)])
-        for axis in "xy"
-    )
+    x, y = (_period(layers, conducting, scene.size_mm, axis) for axis in (0, 1))
     return Window(x, y)
 
 
-def _period(layers: Sequence[Strips], conducting: set[str], end: float) -> Point:
-    piece = mirrored(list(_columns(layers, end))).slices
+def _period(layers: Sequence[LayerRegions], conducting: set[str], size_mm: Sequence[float], axis: int) -> Point:
+    end, wide = size_mm[axis], size_mm[1 - axis]
+    patterned = [layer for layer in layers if layer.along != "xy"[axis]]
+    if all(layer.along for layer in patterned):
+        piece = mirrored(_level(patterned, axis, end, wide)).slices
+    else:
+        piece = cell(_stacked(patterned, axis, end, wide), (len(patterned) + 1) * (wide + 1.0)).slices
     low, width = piece[0].left_mm, piece[-1].right_mm - piece[0].left_mm
     middle = int((end / 2 - low) // width)
     starts = [low + k * width for k in range(middle - 3, middle + 3)]
     inside = [s for s in starts if s > -SLIVER_MM and s + 2 * width < end + SLIVER_MM]
     if not inside:
         return 0.0, end
-    start = min(inside, key=lambda s: (_conductors(layers, conducting, s), abs(s + width - end / 2)))
+    conductors = [layer.region(name) for layer in patterned for name in conducting]
+
+    def crossed(at: float) -> int:
+        strip = [at - SLIVER_MM, 0.0, at + SLIVER_MM, wide]
+        return int(shapely.intersects(conductors, shapely.box(*(strip if axis == 0 else np.roll(strip, 1)))).sum())
+
+    start = min(inside, key=lambda s: (crossed(s), abs(s + width - end / 2)))
     return start, start + 2 * width
 
 
-def _columns(layers: Sequence[Strips], end: float) -> Iterable[Slice]:
-    """The pattern as a walk across the strips meets it: one level band, named by all that stands on a place."""
-    edges = {edge for layer in layers for runs in layer.runs.values() for run in runs for edge in run}
-    looks: dict[tuple[object, ...], str] = {}
-    for start, stop in pairwise(sorted({0.0, end} | edges)):
-        if stop - start > SLIVER_MM:
-            here = tuple(_there(layer, (start + stop) / 2) for layer in layers)
-            name = looks.setdefault(here, str(len(looks)))
-            yield Slice(start, stop, (Band(name, "", (0.0, 0.0), (1.0, 1.0)),))
+def _level(layers: Sequence[LayerRegions], axis: int, end: float, wide: float) -> list[Slice]:
+    """The pattern of strips as slices of one level band each, named by all that stands there."""
+    regions = list({region for layer in layers for region in layer.regions.values()})
+    places = np.unique(np.append(shapely.get_coordinates(regions)[:, axis], [0.0, end]))
+    places = places[np.append(True, np.diff(places) > SLIVER_MM)]
+    middles = (places[:-1] + places[1:]) / 2
+    x, y = (middles, wide / 2) if axis == 0 else (wide / 2, middles)
+    looks = np.array([shapely.contains_xy(region, x, y) for region in regions], dtype=bool).T.reshape(len(middles), -1)
+    bands = [(Band(look.tobytes().hex(), "", (0.0, 0.0), (1.0, 1.0)),) for look in looks]
+    return [Slice(a, b, band) for (a, b), band in zip(pairwise(places.tolist()), bands, strict=True)]
 
 
-def _there(layer: Strips, place: float) -> frozenset[str]:
-    """Names of the bodies at a place."""
-    return frozenset(name for name, runs in layer.runs.items() if any(a < place < b for a, b in runs))
+def _stacked(layers: Sequence[LayerRegions], axis: int, end: float, wide: float) -> Section:
+    """Patterned layers beside each other as one section, whose mirrors are those of all of them."""
+    looks = {tuple(layer.regions.items()): layer for layer in layers}
+    regions = [(Body("", "edge", ()), rectangle(0.0, end, 0.0, 0.5))]
+    for number, layer in enumerate(looks.values()):
+        for name, region in layer.regions.items():
+            body = Body(name, name, ())
+            regions += [(body, _shifted(outline, axis, 1.0 + number * (wide + 1.0))) for outline in outlines(region)]
+    return Section("xy"[axis], wide, 0.0, tuple(regions))
 
 
-def _conductors(layers: Sequence[Strips], conducting: set[str], place: float) -> int:
-    """How many layers conduct at a place or beside it [-]."""
-    return sum(
-        any(a - SLIVER_MM < place < b + SLIVER_MM for a, b in layer.runs.get(name, ()))
-        for layer in layers
-        for name in conducting
-    )
+def _shifted(outline: Outline, axis: int, by_mm: float) -> Outline:
+    return tuple((p[axis], p[1 - axis] + by_mm) for p in outline)
 
 
-def cut(layers: Sequence[Strips], to: Window) -> list[Strips]:
+def cut(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:
     """The part of some layers within a window, moved to the origin, with edges that rounding parted made one [mm]."""
-    found = [_cut(layer, *to.of(layer.across)) for layer in layers]
-    places = {axis: _snapped(found, axis, side) for axis, side in zip("xy", to.sides_mm(), strict=True)}
-    return [replace(layer, runs=_moved(layer, places[layer.across])) for layer in found]
+    (x0, x1), (y0, y1) = to.x_mm, to.y_mm
+    found = [
+        layer.mapped(
+            {n: translate(shapely.clip_by_rect(r, x0, y0, x1, y1), -x0, -y0) for n, r in layer.regions.items()}
+        )
+        for layer in layers
+    ]
+    strips = [region for layer in found if layer.along for region in layer.regions.values()]
+    edges = shapely.get_coordinates(strips)
+    places = [_snapped(edges[:, axis], side) for axis, side in enumerate(to.sides_mm())]
+    return [layer.mapped({n: _moved(r, places, layer.along) for n, r in layer.regions.items()}) for layer in found]
 
 
-def evened(layers: Sequence[Strips], to: Window) -> list[Strips]:
-    """Layers of a window with each run as far to one side as its mirror image is to the other [mm].
+def _snapped(edges: Floats, side: float) -> tuple[Floats, Floats]:
+    """Edges, rising, and where each goes: to the middle of those that rounding parted, or to the window's side."""
+    edges = np.unique(np.append(edges, [0.0, side]))
+    groups = np.split(edges, np.flatnonzero(np.diff(edges) >= ROUNDED_MM) + 1)
+    middles = [np.full(len(g), round(float(g.mean()), 6)) for g in groups[1:-1]]
+    return edges, np.concatenate([0.0 * groups[0], *middles, 0.0 * groups[-1] + side])
+
+
+def _moved(region: Region, places: list[tuple[Floats, Floats]], along: str) -> Region:
+    """A region with its edges where they belong; slanted ones on a grid of the file's decimals."""
+    if along:
+        sides = zip(places * 2, shapely.bounds(parts(region)).T, strict=True)
+        x0, y0, x1, y1 = (to[np.searchsorted(of, at)] for (of, to), at in sides)
+        wide = (x1 > x0) & (y1 > y0)
+        return shapely.union_all(shapely.box(x0, y0, x1, y1)[wide])
+    high = np.array([to[-1] for _, to in places])
+
+    def to_sides(at: Floats) -> Floats:
+        return np.where(at < ROUNDED_MM, 0.0, np.where(at > high - ROUNDED_MM, high, at))
+
+    return cleaned(shapely.transform(shapely.set_precision(region, ROUNDED_MM / 2), to_sides))
+
+
+def evened(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:
+    """Layers of a window with each strip as far to one side as its mirror image is to the other [mm].
 
     For crossed strips, whose lopsided cell would take sixteen times the bricks. Widths stay; a strip that is printed a
     little aside moves to its place, which changes the field in second order.
     """
-    sides = dict(zip("xy", to.sides_mm(), strict=True))
+    sides = np.array([*to.sides_mm(), *to.sides_mm()])
     return [
-        replace(layer, runs={name: _evened(runs, sides[layer.across]) for name, runs in layer.runs.items()})
+        layer.mapped({n: _evened(r, sides) for n, r in layer.regions.items()}) if layer.along else layer
         for layer in layers
     ]
 
 
-def _evened(runs: Intervals, side: float) -> Intervals:
-    mirrored_runs = [(side - b, side - a) for a, b in reversed(runs)]
-    return tuple(
-        (round((a + c) / 2, 6), round((b + d) / 2, 6)) for (a, b), (c, d) in zip(runs, mirrored_runs, strict=True)
-    )
-
-
-def _cut(layer: Strips, low: float, high: float) -> Strips:
-    runs = {name: within(old, low, high) for name, old in layer.runs.items()}
-    return replace(layer, runs={n: tuple((a - low, b - low) for a, b in new) for n, new in runs.items() if new})
-
-
-def _snapped(layers: Sequence[Strips], axis: str, side: float) -> dict[float, float]:
-    """Where each edge across an axis goes: to the middle of those that rounding parted, or to the window's side."""
-    edges = sorted({e for layer in layers if layer.across == axis for rs in layer.runs.values() for r in rs for e in r})
-    groups: list[list[float]] = []
-    for edge in edges:
-        if groups and edge - groups[-1][-1] < ROUNDED_MM:
-            groups[-1].append(edge)
-        else:
-            groups.append([edge])
-    return {edge: _place(group, side) for group in groups for edge in group}
-
-
-def _place(group: Sequence[float], side: float) -> float:
-    if group[0] < ROUNDED_MM:
-        return 0.0
-    return side if group[-1] > side - ROUNDED_MM else round(sum(group) / len(group), 6)
-
-
-def _moved(layer: Strips, places: dict[float, float]) -> dict[str, tuple[Point, ...]]:
-    runs = {n: tuple((places[a], places[b]) for a, b in rs) for n, rs in layer.runs.items()}
-    return {name: tuple(run for run in found if run[1] > run[0]) for name, found in runs.items()}
+def _evened(region: Region, sides: Floats) -> Region:
+    bounds = shapely.bounds(parts(region))
+    mirrored = (sides - bounds)[::-1][:, [2, 3, 0, 1]]
+    return shapely.union_all(shapely.box(*((bounds + mirrored) / 2).round(6).T))

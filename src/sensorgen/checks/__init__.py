@@ -1,19 +1,19 @@
-"""Will this nozzle and this layer height make that scene? One rule, or two that belong together, per file.
+"""Design rules: whether a printer's nozzle and layers can make a scene as it lies on the bed; one or two per file.
 
-The scene is taken as it lies on the bed. Rule 7, printed against exact volume, needs a slicer's G-code.
+Rule 7, printed against drawn volume, is estimated here; after slicing it is taken from the G-code.
 """
 
 from collections.abc import Iterable
 from dataclasses import replace
 
-from sensorgen.checks import bed, bridges, gap, grid, widths
-from sensorgen.checks.slices import Slices, slanted
+from sensorgen.checks import bed, bridges, estimate, gap, grid, volumes, widths
+from sensorgen.checks.slices import Slices
 from sensorgen.core.findings import SEVERITIES, Finding
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.scene.scene import Scene
 
 
-def findings(scene: Scene, printer: Printer, quality: Quality, gap_mm: float) -> list[Finding]:
+def findings(scene: Scene, printer: Printer, quality: Quality, gap_mm: float, walls: str = "arachne") -> list[Finding]:
     """All findings about a scene, the most severe first.
 
     Parameters
@@ -24,15 +24,18 @@ def findings(scene: Scene, printer: Printer, quality: Quality, gap_mm: float) ->
         What prints it.
     gap_mm : float
         Smallest distance of the electrodes, exact [mm].
+    walls : str
+        Of the slicer, one of :data:`sensorgen.checks.estimate.RULES`.
     """
     slices = Slices(scene, quality)
+    printed = volumes.findings(volumes.rows(scene, estimate.layers(scene, printer, quality, walls)), scene)
     found = [
         *gap.check(slices, printer, quality, gap_mm),
         *grid.check(scene, slices.layers),
         *widths.check(slices, printer),
         *bed.check(scene, printer),
         *bridges.check(slices, printer, quality),
-        *_unchecked(scene),
+        *(f for f in printed if f.severity == "error"),  # rules 4 and 5 have its warnings
     ]
     return sorted(_merged(found), key=lambda f: (SEVERITIES.index(f.severity), int(f.rule.partition("-")[0])))
 
@@ -48,17 +51,3 @@ def _merged(found: Iterable[Finding]) -> Iterable[Finding]:
         else:
             alike.append(finding)
     return (finding for alike in merged.values() for finding in alike)
-
-
-def _unchecked(scene: Scene) -> list[Finding]:
-    return [
-        Finding(
-            "5-width",
-            "info",
-            body.name,
-            "slanted outlines in plan: widths and bridges not checked",
-            "look at the slices",
-        )
-        for body in scene.bodies
-        if any(slanted(p) for p in body.prisms)
-    ]

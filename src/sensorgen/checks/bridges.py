@@ -1,15 +1,18 @@
-"""Rule 9: what is printed over air. Any body below supports, whatever its material."""
+"""Rule 9: bridges, overhangs and islands over air. Any body below supports, whatever its material."""
 
 from collections.abc import Iterator
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
-from sensorgen.checks.slices import TOUCH_MM, Rectangle, Slice, Slices, stretches
+from sensorgen.checks.slices import TOUCH_MM, Slices
 from sensorgen.checks.widths import VANISHES
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer, Quality
+from sensorgen.scene.layers import Region, cleaned, is_rectilinear
 from sensorgen.scene.scene import Body
 
 Mask = NDArray[np.bool_]
@@ -25,15 +28,15 @@ class _Span(NamedTuple):
 
 
 def check(slices: Slices, printer: Printer, quality: Quality) -> Iterator[Finding]:
-    """Findings about bridges (held at both ends), overhangs (at one) and islands (at none)."""
+    """Findings about bridges (supported at both ends), overhangs (at one) and islands (at none)."""
     line, least = printer.line_mm(), VANISHES * printer.nozzle_mm
-    known: dict[object, dict[str, _Span]] = {}
+    known: dict[tuple[Region, Region], dict[str, _Span]] = {}
     for layer in range(1, len(slices.layers)):
         # What vanishes in the slicer neither needs support nor gives any.
-        ground = frozenset().union(*(slices.printed(b, layer - 1, least) for b in slices.scene.bodies))
+        ground = shapely.union_all([slices.printed(b, layer - 1, least) for b in slices.scene.bodies])
         for body in slices.scene.bodies:
             shape = slices.printed(body, layer, least)
-            if not shape or shape <= ground:
+            if cleaned(shapely.difference(shape, ground)).is_empty:
                 continue
             if (shape, ground) not in known:
                 known[shape, ground] = _spans(shape, ground, least)
@@ -63,24 +66,36 @@ def _judged(
         )  # fmt: skip
 
 
-def _spans(shape: frozenset[Rectangle], ground: frozenset[Rectangle], least_mm: float) -> dict[str, _Span]:
-    """Longest bridge, overhang and island of a layer's shape above a ground.
+def _grid(shape: Region, ground: Region, step_mm: float) -> tuple[tuple[Lengths, Lengths], Mask, Mask]:
+    """Lines along x and y, and which cells between them the shape fills, and the ground.
+
+    The lines are those of all edges; where some are slanted, lines a step apart.
+    """
+    x, y = (np.unique(at.round(9)) for at in shapely.get_coordinates([shape, ground]).T)
+    if not (is_rectilinear(shape) and is_rectilinear(ground)):
+        x, y = (np.linspace(at[0], at[-1], ceil((at[-1] - at[0]) / step_mm) + 1) for at in (x, y))
+    middles = np.meshgrid((x[:-1] + x[1:]) / 2, (y[:-1] + y[1:]) / 2, indexing="ij")
+    return (x, y), shapely.contains_xy(shape, *middles), shapely.contains_xy(ground, *middles)
+
+
+def _spans(shape: Region, ground: Region, least_mm: float) -> dict[str, _Span]:
+    """Longest bridge, overhang and island of a shape above a ground, along x or y.
 
     Every unsupported place is held along x or along y; the better way counts. Places that are held neither way,
     as the corners of a roof that juts out on two sides, hold on to those that are.
     """
-    piece = Slice(shape, ground)
-    air = piece.filled & ~Slice(ground, shape).filled
+    lines, filled, below = _grid(shape, ground, least_mm / 2)
+    air = filled & ~below
     found = dict.fromkeys(("bridge", "overhang", "island"), _Span())
 
     def note(kind: str, lengths: Lengths, where: Mask) -> None:
         i, j = np.unravel_index(np.argmax(np.where(where, lengths, 0.0)), where.shape)
         if where[i, j] and lengths[i, j] > found[kind].mm:
-            x, y = (float(line[k] + line[k + 1]) / 2 for line, k in zip(piece.lines, (i, j), strict=True))
+            x, y = (float(line[k] + line[k + 1]) / 2 for line, k in zip(lines, (i, j), strict=True))
             found[kind] = _Span(float(lengths[i, j]), round(x, 9), round(y, 9))
 
     while air.any():
-        ends, lengths, narrow = _best(piece, air)
+        ends, lengths, narrow = _best(filled, lines, air)
         note("bridge", lengths, ends == 2)
         note("overhang", lengths, ends == 1)
         if not ends.any():
@@ -90,10 +105,9 @@ def _spans(shape: frozenset[Rectangle], ground: frozenset[Rectangle], least_mm: 
     return found
 
 
-def _best(piece: Slice, air: Mask) -> tuple[NDArray[np.int64], Lengths, Lengths]:
-    """How every unsupported place is held best: at how many ends, over which length, and its narrower stretch [mm]."""
-    filled, (x, y) = piece.filled, piece.lines
-    ways = [_held(filled, air, x), tuple(m.T for m in _held(filled.T, air.T, y))]
+def _best(filled: Mask, lines: tuple[Lengths, Lengths], air: Mask) -> tuple[NDArray[np.int64], Lengths, Lengths]:
+    """Best support of every unsupported place: number of ends, length, and its narrower stretch [mm]."""
+    ways = [_held(filled, air, lines[0]), tuple(m.T for m in _held(filled.T, air.T, lines[1]))]
     ends, lengths = (np.stack([way[k] for way in ways]) for k in (0, 1))
     # A bridge beats an overhang beats an island; among equals the shorter.
     best = np.argmin(np.where(ends == 2, lengths, np.where(ends == 1, 2 * lengths, np.inf)), axis=0)[None]
@@ -101,11 +115,13 @@ def _best(piece: Slice, air: Mask) -> tuple[NDArray[np.int64], Lengths, Lengths]
 
 
 def _held(filled: Mask, air: Mask, line: Lengths) -> tuple[NDArray[np.int64], Lengths]:
-    """Along the first axis: at how many ends each unsupported stretch is held, and how long it is [mm]."""
+    """Along the first axis: number of supported ends of each unsupported stretch, and its length [mm]."""
     ends = np.zeros(filled.shape, np.int64)
     lengths = np.zeros(filled.shape)
     padded = np.pad(filled, ((1, 1), (0, 0)))
-    starts, stops, rows = stretches(air)
+    edges = np.diff(np.pad(air, ((1, 1), (0, 0))).astype(np.int8), axis=0).T
+    rows, starts = np.nonzero(edges == 1)
+    stops = np.nonzero(edges == -1)[1]
     for start, stop, row in zip(starts, stops, rows, strict=True):
         ends[start:stop, row] = int(padded[start, row]) + int(padded[stop + 1, row])
         lengths[start:stop, row] = line[stop] - line[start]

@@ -1,4 +1,4 @@
-"""Rules 3 and 4: faces on layer boundaries, and bodies that every sample misses."""
+"""Rules 3 and 4: faces on layer boundaries, and bodies between the sampling planes."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -9,14 +9,14 @@ from sensorgen.scene.scene import Body, Scene
 
 
 def check(scene: Scene, layers: Layers) -> Iterator[Finding]:
-    """Findings about where bodies lie on the layer grid."""
+    """Findings about bodies and the layer grid."""
     for body in scene.bodies:
         yield from _faces(body, layers)
         yield from _samples(body, layers)
 
 
 def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
-    levels = {z for p in body.prisms for z in _levels(p.axis, p.outline, p.span("z"))}
+    levels = {z for p in body.prisms for z in (p.span("z") if p.axis == "z" else (round(z, 9) for _, z in p.outline))}
     off = sorted(z for z in levels if layers.off_grid_mm(z) > TOUCH_MM)
     if not off:
         return
@@ -32,17 +32,13 @@ def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
     )  # fmt: skip
 
 
-def _levels(axis: str, outline: tuple[tuple[float, float], ...], span: tuple[float, float]) -> set[float]:
-    return set(span) if axis == "z" else {round(z, 9) for _, z in outline}
-
-
 def _samples(body: Body, layers: Layers) -> Iterator[Finding]:
     spans = {p.span("z"): p for p in body.prisms}
     lost = [span for span in spans if not any(_within(mid, span) for mid in layers.mids_mm)]
     for low, high in lost:
         yield Finding(
             "4-unsampled", "error", body.name,
-            f"{high - low:g} mm from {low:g} to {high:g} mm miss every mid-layer sample: this part is not printed",
+            f"{low:g} to {high:g} mm ({high - low:g} mm) lies between the slicer's sampling planes and is not printed",
             "make it a layer thick, or move it onto the layer grid",
             round(high - low, 9), layers.boundaries_mm[1] / 2, place_mm=_place(body, (low + high) / 2),
             count=sum(p.span("z") == (low, high) for p in body.prisms),
@@ -51,10 +47,11 @@ def _samples(body: Body, layers: Layers) -> Iterator[Finding]:
         here = [s for s in spans if s not in lost and min(s[1], high) - max(s[0], low) > TOUCH_MM]
         if here and not any(_within(mid, span) for span in here):
             height = max(min(s[1], high) - max(s[0], low) for s in here)
+            end, side = ("top", "below") if min(s[1] for s in here) < high else ("lowest", "above")
             yield Finding(
                 "4-unsampled", "warning", body.name,
-                f"its last {height:.3g} mm in this layer ({low:g} to {high:g} mm) end short of mid-height: not printed",
-                "put the end on a layer boundary", round(height, 9), round((high - low) / 2, 9), number + 1,
+                f"the {end} {height:.3g} mm lies {side} the slicer's sampling plane and is not printed",
+                "move the face to a layer boundary", round(height, 9), round((high - low) / 2, 9), number + 1,
                 _place(body, (max(low, min(s[0] for s in here)) + min(high, max(s[1] for s in here))) / 2),
             )  # fmt: skip
 

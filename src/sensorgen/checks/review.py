@@ -1,14 +1,14 @@
-"""A design held against its printer: exact gap, valid bodies, and the findings of every rule."""
+"""Design rule check: exact gap, valid bodies, and the findings of every rule about a design on its printer."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 from sensorgen import checks
+from sensorgen.core.display import Displayed
 from sensorgen.core.findings import Finding
 from sensorgen.design import materials
-from sensorgen.design.design import Design
-from sensorgen.export.slicers.tower import tower
+from sensorgen.design.design import Design, fields
+from sensorgen.design.tower import tower
 from sensorgen.scene import drawing
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.geometry.mesh import Mesh
@@ -16,10 +16,12 @@ from sensorgen.scene.scene import Scene
 
 Step = Callable[[str], None]
 STEPS = ("meshes", "checks", "validity")
+LOST = "7-printed"
+_WIDENED = ("2-printed-gap", "5-width", LOST)  # rules that larger widths or a longer period satisfy
 
 
 @dataclass(frozen=True, eq=False)
-class Review:
+class Review(Displayed):
     """The printed bodies as meshes, by name, and all findings about them."""
 
     meshes: dict[str, Mesh]
@@ -30,9 +32,22 @@ class Review:
         return self if self.meshes else Review(_meshes(design), self.findings)
 
     def errors(self, strict: bool = False) -> list[Finding]:
-        """Findings that stop a build: errors, and when ``strict`` warnings, that the design does not waive."""
-        stops = ("error", "warning") if strict else ("error",)
-        return [f for f in self.findings if f.severity in stops and not f.waiver]
+        """Findings that stop a build: errors, and when ``strict`` warnings, that the design does not waive.
+
+        What is lost in slicing stops nothing unless ``strict``: the files are written, as G-code is; see :meth:`lost`.
+        """
+        open_ones = [f for f in self.findings if not f.waiver]
+        if strict:
+            return [f for f in open_ones if f.severity in ("error", "warning")]
+        return [f for f in open_ones if f.severity == "error" and f.rule != LOST]
+
+    def lost(self) -> list[Finding]:
+        """Errors of rule 7 that the design does not waive: bodies that are missing from a printed layer."""
+        return [f for f in self.findings if f.rule == LOST and f.severity == "error" and not f.waiver]
+
+    def sliced(self) -> "Review":
+        """The review without the estimate of rule 7, which G-code replaces."""
+        return replace(self, findings=[f for f in self.findings if f.rule != LOST])
 
     def counts(self) -> dict[str, int]:
         """How many findings there are of each severity, and how many are waived."""
@@ -42,7 +57,7 @@ class Review:
         }
 
 
-def review(design: Design, step: Step = lambda _: None) -> Review:
+def review(design: Design, step: Step = lambda _: None, walls: str = "arachne") -> Review:
     """Check a design as it lies on the bed.
 
     Whether bodies overlap is looked at last, and only when nothing else is wrong: it takes longest.
@@ -52,7 +67,9 @@ def review(design: Design, step: Step = lambda _: None) -> Review:
     design : Design
         What to check.
     step : callable
-        Told what comes next, for a progress display.
+        Called with the next step, for a progress display.
+    walls : str
+        Of the slicer, one of :data:`sensorgen.checks.estimate.RULES`; those of PrusaSlicer's profile if not given.
 
     Raises
     ------
@@ -63,20 +80,30 @@ def review(design: Design, step: Step = lambda _: None) -> Review:
     if any(not f.waiver for f in misfit):  # a sensor that no bed holds may be too large to mesh, too
         step("checks")
         return Review({}, misfit)
-    return _full(design, step)
+    return _full(design, step, walls)
 
 
-def _full(design: Design, step: Step) -> Review:
+def _full(design: Design, step: Step, walls: str) -> Review:
     scene = design.printed
     step("meshes")
     made = _meshes(design)
     step("checks")
     gap_mm = validity.electrode_gap_mm(scene, made)
-    found = checks.findings(scene, design.machine, design.layers, gap_mm) + _crowding(design)
-    if not any(f.severity == "error" for f in found):
+    found = checks.findings(scene, design.machine, design.layers, gap_mm, walls) + _crowding(design)
+    found = [_advised(f, list(fields(design.shape))) for f in found]
+    if not any(f.severity == "error" and f.rule != LOST for f in found):
         step("validity")
         found = [_fault(*fault) for fault in validity.faults(scene, made)] + found
     return Review(made, design.waived(found) + design.idle_waivers(found))
+
+
+def _advised(finding: Finding, parameters: list[str]) -> Finding:
+    """A finding whose advice names parameters that the shape has."""
+    wider = [name for name in parameters if name == "period_mm" or name.endswith("_width_mm")]
+    if finding.rule in _WIDENED and finding.severity != "info" and wider:
+        return replace(finding, advice=f"{finding.advice} (increase {' or '.join(wider)})")
+    films = " or ".join(name for name in parameters if name.endswith("dielectric_mm"))
+    return replace(finding, advice=finding.advice.replace("dielectric_mm", films)) if films else finding
 
 
 def _meshes(design: Design) -> dict[str, Mesh]:
@@ -114,7 +141,7 @@ def _fault(body: str, what: str) -> Finding:
     )
 
 
-def report(design: Design, held: Review) -> dict[str, Any]:
+def report(design: Design, held: Review) -> dict[str, object]:
     """The findings as plain data for ``check.json``."""
     return {
         "name": design.name,

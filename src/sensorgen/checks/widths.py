@@ -1,22 +1,30 @@
 """Rules 5 and 6: what is too narrow at mid-layer vanishes or swells, and narrow gaps close.
 
 The limits were found by slicing (PrusaSlicer 2.5 with Arachne and with classic walls, CuraEngine 4.13; nozzle
-0.4 mm, line 0.44 mm) and scale with the nozzle.
+0.4 mm, line 0.44 mm) and scale with the nozzle. A width is the distance from the middle of an edge, square to it, to
+the edge across.
 """
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
 
-from sensorgen.checks.slices import TOUCH_MM, Layers, Run, Slice, Slices, shown
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from sensorgen.checks.slices import TOUCH_MM, Slices
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer
-from sensorgen.scene.scene import Body, Prism
+from sensorgen.scene.layers import Region, is_rectilinear
+from sensorgen.scene.scene import Body, Point
 
 # As shares of the nozzle.
 VANISHES = 0.12 / 0.4  # only Cura filling outline gaps prints a stretch this narrow
 SWELLS = 0.34 / 0.4  # Arachne prints anything narrower at this width
 OVERFILLED = 0.70 / 0.4  # classic walls put 1.8 to 1.17 times the material into anything narrower
 GAP_CLOSES = 0.10 / 0.4
+_NEAR = 1e-3  # of half a layer: a step in height within which flanks are straight
 
 
 @dataclass(frozen=True)
@@ -25,25 +33,45 @@ class _Band:
 
     upto_mm: float
     severity: str
-    message: str
+    effect: str
     advice: str
+    noun: str = "stretch"
+
+
+@dataclass(frozen=True)
+class _Narrow:
+    """The narrow stretches of one body, layer and band, or its closing gaps."""
+
+    band: _Band
+    layer: int
+    z_mm: float
+    stretches: "Sequence[Stretch]"
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A straight way across a region, or across a gap in it [mm]."""
+
+    width_mm: float
+    middle_mm: Point
+    way: Point
 
 
 def _bands(printer: Printer) -> tuple[_Band, ...]:
     """What a printer's nozzle makes of narrow stretches, from the narrowest on; a whole line prints."""
     line, swells = printer.line_mm(), SWELLS * printer.nozzle_mm
+    widen = f"widen it to {line:.2g} mm"
     return (
         _Band(
             VANISHES * printer.nozzle_mm, "error", "vanishes (Cura filling outline gaps prints it 1.7 times too full)",
-            f"widen it to {line:.2g} mm",
+            widen,
         ),
         _Band(
-            swells, "warning", f"prints {swells:.2g} mm wide (Arachne) or not at all (classic walls, plain Cura)",
-            f"widen it to {line:.2g} mm",
+            swells, "warning", f"prints {swells:.2g} mm wide (Arachne) or not at all (classic walls, plain Cura)", widen
         ),
         _Band(
             line - 2 * TOUCH_MM, "warning", "is narrower than a line: classic walls and plain Cura drop it",
-            f"widen it to {line:.2g} mm, or slice with Arachne",
+            f"{widen}, or slice with Arachne",
         ),
         _Band(
             OVERFILLED * printer.nozzle_mm, "info", "gets 1.2 to 1.8 times its material with classic walls",
@@ -53,80 +81,104 @@ def _bands(printer: Printer) -> tuple[_Band, ...]:
 
 
 def check(slices: Slices, printer: Printer) -> Iterator[Finding]:
-    """Findings about widths and gaps at mid-layer, one per body, layer and width."""
-    layers = slices.layers
+    """Findings about widths and gaps at mid-layer, one per body, band and run of layers."""
+    bands, closes = _bands(printer), GAP_CLOSES * printer.nozzle_mm
+    gap = _Band(closes, "warning", "closes when sliced", f"widen it to {closes:.2g} mm or more", "gap")
+    known: dict[Region, list[list[Stretch]]] = {}
     for body in slices.scene.bodies:
-        pieces = {shape: Slice(shape) for shape in (slices.body(body, k) for k in range(len(layers))) if shape}
-        for number in range(len(layers)):
-            if slices.body(body, number):
-                piece = pieces[slices.body(body, number)]
-                yield from _narrow(body, piece, number, printer, layers)
-                yield from _closing(body, piece, number, printer, layers)
+        narrow, gaps = [], []
+        for layer, mid in enumerate(slices.layers.mids_mm):
+            region = slices.body(body, layer)
+            if region not in known:
+                limits = (bands[-1].upto_mm, False), (closes - 3 * TOUCH_MM, True)
+                known[region] = [stretches(region, limit, gaps=between) for limit, between in limits]
+            for band, here in _by_band(bands, body, layer, known[region][0], slices):
+                narrow.append(_Narrow(band, layer, mid, here))
+            gaps += [_Narrow(gap, layer, mid, known[region][1])] if known[region][1] else []
+        yield from _findings("5-width", body, narrow)
+        yield from _findings("6-gap", body, gaps)
 
 
-def _narrow(body: Body, piece: Slice, number: int, printer: Printer, layers: Layers) -> Iterator[Finding]:
-    bands = _bands(printer)
-    tips = None
-    for width, runs in _by_width(piece.runs(piece.filled), bands[-1].upto_mm).items():
-        band = next(b for b in bands if width <= b.upto_mm + TOUCH_MM)
-        if band.severity == "error" and tips is None:
-            tips = _tips(body, number, layers)
-        tip = band.severity == "error" and all((r.axis, r.start, r.end) in (tips or ()) for r in runs)
-        severity = "warning" if tip or (band.severity == "error" and body.is_support()) else band.severity
-        yield Finding(
-            "5-width", severity, body.name,
-            f"a {'tip' if tip else 'stretch'} {width:.3g} mm wide at mid-layer {band.message}",
-            f"blunt the tip to {printer.line_mm():.2g} mm" if tip else band.advice,
-            width, round(band.upto_mm, 6), number + 1, _place(runs[0], layers.mids_mm[number]), len(runs),
-        )  # fmt: skip
+def _by_band(
+    bands: Sequence[_Band], body: Body, layer: int, found: Sequence[Stretch], slices: Slices
+) -> Iterator[tuple[_Band, list[Stretch]]]:
+    """Stretches by band. What vanishes is no error at tips, which taper out within their layer, and in support."""
+    for below, band in zip((None, *bands), bands, strict=False):
+        here = [s for s in found if s.width_mm <= band.upto_mm + TOUCH_MM]
+        here = [s for s in here if below is None or s.width_mm > below.upto_mm + TOUCH_MM]
+        if band.severity == "error" and here:
+            half = slices.layers.mids_mm[layer] - slices.layers.boundaries_mm[layer]
+            near = [slices.near(body, layer, sign * _NEAR * half) for sign in (-1, 1)]
+            tips = [s for s in here if _tapers(s, near)]
+            here = [s for s in here if s not in tips]
+            if tips:
+                yield replace(band, severity="warning", noun="tip"), tips
+        if here:
+            yield replace(band, severity="warning") if band.severity == "error" and body.is_support() else band, here
 
 
-def _closing(body: Body, piece: Slice, number: int, printer: Printer, layers: Layers) -> Iterator[Finding]:
-    limit = GAP_CLOSES * printer.nozzle_mm
-    for width, runs in _by_width(piece.enclosed(), limit - 2 * TOUCH_MM).items():
-        yield Finding(
-            "6-gap", "warning", body.name, f"a gap of {width:.3g} mm within the body closes when sliced",
-            f"widen it to {limit:.2g} mm or more", width, round(limit, 9), number + 1,
-            _place(runs[0], layers.mids_mm[number]), len(runs),
-        )  # fmt: skip
+def _tapers(stretch: Stretch, near: list[Region]) -> bool:
+    """Whether a stretch loses half of its width up to the layer's boundary, and so all of it up to the next sample."""
+    middle, way = np.array(stretch.middle_mm), np.array(stretch.way)
+    line = shapely.LineString([middle - 0.75 * stretch.width_mm * way, middle + 0.75 * stretch.width_mm * way])
+    below, above = shapely.length(shapely.intersection(line, near))
+    return bool(abs(above - below) / 2 / _NEAR > 0.49 * stretch.width_mm)
 
 
-def _by_width(runs: Iterable[Run], limit_mm: float) -> dict[float, list[Run]]:
-    """Runs up to a width, by width; those along x first, so that a square counts once."""
-    found: dict[float, list[Run]] = {}
-    for run in sorted(runs):
-        if run.width <= limit_mm + TOUCH_MM:
-            found.setdefault(run.width, []).append(run)
-    return {w: [r for r in rs if r.axis == rs[0].axis] for w, rs in sorted(found.items())}
+def _findings(rule: str, body: Body, found: Sequence[_Narrow]) -> Iterator[Finding]:
+    """One finding for a band in neighbouring layers."""
+    for band in dict.fromkeys(each.band for each in found):
+        numbered = list(enumerate(each for each in found if each.band == band))
+        for _, group in groupby(numbered, key=lambda pair: pair[1].layer - pair[0]):
+            run = [each for _, each in group]
+            worst = min(run, key=lambda each: each.stretches[0].width_mm)
+            least, most = worst.stretches[0].width_mm, max(each.stretches[-1].width_mm for each in run)
+            wide = f"{least:.3g}" if f"{least:.3g}" == f"{most:.3g}" else f"{least:.3g} to {most:.3g}"
+            yield Finding(
+                rule, band.severity, body.name, f"a {band.noun} {wide} mm wide at mid-layer {band.effect}", band.advice,
+                least, round(band.upto_mm, 6), run[0].layer + 1, (*worst.stretches[0].middle_mm, worst.z_mm),
+                max(len(each.stretches) for each in run), run[-1].layer + 1 if len(run) > 1 else None,
+            )  # fmt: skip
 
 
-def _tips(body: Body, number: int, layers: Layers) -> set[tuple[str, float, float]]:
-    """Stretches that run out before the next sample, by axis, start and end [mm]: no thin walls or strips.
+def stretches(region: Region, limit_mm: float, *, gaps: bool = False) -> list[Stretch]:
+    """Stretches across a region up to a width, the narrowest first; or, with ``gaps``, those across gaps in it.
 
-    Such a stretch loses half of its width or more between mid-layer and boundary, and so all of it up to the
-    next sample, twice as far away.
+    Rectilinear regions are also looked at from the ends of their edges, where other widths may face them.
     """
-    mid, half = layers.mids_mm[number], layers.mids_mm[number] - layers.boundaries_mm[number]
-    near = 1e-3 * half
-    found = set()
-    for prism in body.prisms:
-        if prism.is_box() or prism.axis == "z":
-            continue
-        axis = "x" if prism.axis == "y" else "y"
-        below, here, above = (_runs(prism, z, axis) for z in (mid - near, mid, mid + near))
-        if len(below) == len(here) == len(above):  # the same pieces, each a little wider or narrower
-            for (a0, a1), (start, end), (b0, b1) in zip(below, here, above, strict=True):
-                loss = abs((b1 - b0) - (a1 - a0)) / 2 * half / near
-                if end - start - loss < 0.51 * (end - start):
-                    found.add((axis, start, end))
-    return found
+    starts, ends = _edges(region)
+    if not len(starts):
+        return []
+    way = (ends - starts)[:, ::-1] * [1.0, -1.0]
+    way /= np.hypot(*way.T)[:, None] * (-1.0 if gaps else 1.0)
+    tree = shapely.STRtree(shapely.boundary(shapely.get_parts(region)))
+    found: dict[tuple[float, ...], Stretch] = {}
+    for share in (0.5, 1e-6, 1 - 1e-6) if is_rectilinear(region) else (0.5,):
+        known = {stretch.width_mm for stretch in found.values()}
+        places = starts + share * (ends - starts)
+        for k, width in _across(tree, places, way, limit_mm):
+            if share == 0.5 or width not in known:
+                middle = (places[k] + way[k] * width / 2).round(9).tolist()
+                found.setdefault((width, *np.round(middle, 6)), Stretch(width, (middle[0], middle[1]), tuple(way[k])))
+    return sorted(found.values(), key=lambda s: (s.width_mm, abs(s.way[1]), s.middle_mm))
 
 
-def _runs(prism: Prism, z_mm: float, axis: str) -> list[tuple[float, float]]:
-    """Where a prism starts and ends along an axis at a height, in order [mm]."""
-    return sorted((r.x0, r.x1) if axis == "x" else (r.y0, r.y1) for r in shown(prism, z_mm))
+def _edges(region: Region) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Start and end of every edge, the region on its right."""
+    rings = shapely.get_rings(shapely.get_parts(shapely.normalize(shapely.simplify(region, 0.0))))
+    corners, ring = shapely.get_coordinates(rings, return_index=True)
+    same = ring[1:] == ring[:-1]
+    return corners[:-1][same], corners[1:][same]
 
 
-def _place(run: Run, z_mm: float) -> tuple[float, float, float]:
-    middle = round((run.start + run.end) / 2, 9)
-    return (middle, run.across, z_mm) if run.axis == "x" else (run.across, middle, z_mm)
+def _across(
+    tree: shapely.STRtree, places: NDArray[np.float64], way: NDArray[np.float64], limit_mm: float
+) -> Iterator[tuple[int, float]]:
+    """Numbers of places from which an edge is met within a distance, and that distance [mm]."""
+    rays = shapely.linestrings(np.stack([places + 1e-8 * way, places + (limit_mm + 2 * TOUCH_MM) * way], axis=1))
+    ray, edge = tree.query(rays, predicate="intersects")
+    met = shapely.intersection(rays[ray], tree.geometries[edge])
+    nearest = np.full(len(places), np.inf)
+    np.minimum.at(nearest, ray, shapely.distance(shapely.points(places[ray]), met))
+    for k in np.flatnonzero(nearest <= limit_mm + TOUCH_MM).tolist():
+        yield k, round(float(nearest[k]), 9)

@@ -1,6 +1,6 @@
 """A design as drawn and as printed, as lines for the terminal."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -8,6 +8,7 @@ import click
 from sensorgen.cli.words import OneOf
 
 if TYPE_CHECKING:
+    from sensorgen.checks.volumes import Row
     from sensorgen.design.design import Design
 
 
@@ -38,18 +39,12 @@ def compensated(
     return found, [c.as_dict() for c in changes]
 
 
-def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Printed over exact volume of every body, layer by layer from the top.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        As of :class:`sensorgen.asprinted.tally.Row`, with "ratio".
-    """
-    bodies = list(dict.fromkeys(row["body"] for row in rows))
-    cells = {(row["layer"], row["body"]): _cell(row) for row in rows}
-    spans = {row["layer"]: f"{row['bottom_mm']:g}-{row['top_mm']:g}" for row in rows}
-    yield "printed over exact volume (strips lost or fused)"
+def table(rows: "Sequence[Row]") -> Iterator[str]:
+    """Printed over drawn volume of every body, layer by layer from the top."""
+    bodies = list(dict.fromkeys(row.body for row in rows))
+    cells = {(row.layer, row.body): _cell(row) for row in rows}
+    spans = {row.layer: f"{row.bottom_mm:g}-{row.top_mm:g}" for row in rows}
+    yield "printed over drawn volume (-n: missing parts, +n: merged parts)"
     yield f"{'layer':>5} {'mm':11}" + " ".join(f"{name:>{_wide(name)}}" for name in bodies)
     for layer in sorted(spans, reverse=True):
         row = " ".join(f"{cells.get((layer, name), ''):>{_wide(name)}}" for name in bodies)
@@ -60,7 +55,7 @@ def _wide(name: str) -> int:
     return max(len(name), 12)
 
 
-def _cell(row: Mapping[str, Any]) -> str:
-    lost = f" -{row['vanished']}" if row["vanished"] else ""
-    fused = f" +{row['fused']}" if row["fused"] else ""
-    return f"{'extra' if row['ratio'] is None else format(row['ratio'], '.2f')}{lost}{fused}"
+def _cell(row: "Row") -> str:
+    lost = f" -{row.vanished}" if row.vanished else ""
+    fused = f" +{row.fused}" if row.fused else ""
+    return f"{format(row.ratio, '.2f') if row.exact_mm3 > 0 else 'extra'}{lost}{fused}"

@@ -92,12 +92,12 @@ def _plan(
 
 
 def _draw(plan: "Plan", picture: str) -> None:
-    from sensorgen.analysis.plots import bench
+    from sensorgen.analysis.plots import recordings
     from sensorgen.core import files as store
 
     if not picture.lower().endswith(".png"):
         raise BadInput(f"--picture {picture}: expected a file that ends in .png")
-    store.replace(Path(picture), bench.schedule(plan.steps(), plan.seconds()))
+    store.replace(Path(picture), recordings.schedule(plan.steps(), plan.seconds()))
 
 
 def _lasting(seconds: float) -> str:

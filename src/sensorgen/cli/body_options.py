@@ -14,7 +14,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.export.slicers import SLICERS
 
 if TYPE_CHECKING:
-    from sensorgen.asprinted.compared import Printed
+    from sensorgen.asprinted.printed import Printed
     from sensorgen.design.body import Body
     from sensorgen.design.design import Design
 
@@ -54,13 +54,11 @@ def body_of(drawn: bool, slicer: str | None, walls: str | None) -> "Callable[[De
 
 def printed_of(design: "Design", slicer: str | None, walls: str | None) -> "Printed":
     """What is printed of a design, with its layers: sliced now, or estimated."""
-    from sensorgen.asprinted import compared
+    from sensorgen.asprinted.printed import body
 
     if slicer and walls:
         raise BadInput("--slicer and --walls at once; expected one: the slicer's profile says what walls it makes")
-    if not slicer:
-        return compared.estimated(design, walls or "arachne")
-    return _slice(slicer, design)[0]
+    return _slice(slicer, design)[0] if slicer else body(design, walls=walls or "arachne")
 
 
 def _sliced(slicer: str, design: "Design") -> "Body":
@@ -72,11 +70,11 @@ def _sliced(slicer: str, design: "Design") -> "Body":
 
 def _slice(slicer: str, design: "Design") -> "tuple[Printed, str, bytes]":
     """What a real slicer prints, its name and version, and its G-code."""
-    from sensorgen.asprinted import compared
+    from sensorgen.asprinted.printed import body
     from sensorgen.export import slicing
 
     with tempfile.TemporaryDirectory() as folder, show.progress(slicing.STEPS) as step:
         made = slicing.sliced([slicing.alone(design)], slicer, Path(folder), step=step)
         content = made.ready.read_bytes()
     source = f"{made.slicer} {made.version}"
-    return compared.sliced(design, made.lines, source), source, content
+    return body(design, made.lines, slicer=source), source, content

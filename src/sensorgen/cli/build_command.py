@@ -41,10 +41,11 @@ def _work(
             click.echo(f"CHANGE  {design.name}\n")
             show.findings(error.findings)
         raise
+    code = 1 if built.review.lost() and not force else 0
     files = sorted([*store.listed(built.folder), store.MANIFEST])
     if as_json:
         show.as_json(as_dict(design, built, files) | {"compensated": changes})
-        return 0
+        return code
     click.echo(f"{built.verdict}  {design.name}: {show.summary(built.review)}\n")
     if details:
         show.findings(built.review.findings)
@@ -53,7 +54,7 @@ def _work(
         click.echo("\n".join(prediction_text.table(built.prediction)) + "\n")
         show.findings(show.most_severe(built.review.findings, 3))
     click.echo(f"\n{built.folder}: {len(files)} files; {'' if details else '--details prints all'}".rstrip("; "))
-    return 0
+    return code
 
 
 command = DesignGroup(

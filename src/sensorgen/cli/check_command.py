@@ -26,7 +26,7 @@ def _work(design: "Design", *, strict: bool, as_json: bool) -> int:
     else:
         show.findings(held.findings)
         click.echo(f"{design.name}: {show.summary(held)}")
-    return 1 if held.errors(strict) else 0
+    return 1 if held.errors(strict) or held.lost() else 0
 
 
 command = DesignGroup(_work, OWN, name="check", help="Check a design against nozzle, layers and bed.")

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from sensorgen.prediction.error_budget import Changes, ErrorBudget
     from sensorgen.prediction.results import Prediction
 
-_LABEL, _CELL = 22, 28
+_LABEL, _CELL = 21, 33
 
 
 def table(found: "Prediction") -> Iterator[str]:

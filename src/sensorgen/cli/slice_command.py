@@ -9,7 +9,7 @@ from sensorgen.cli import asprinted_text, gcode_text, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf
 from sensorgen.core.errors import OutOfRange
-from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
+from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S, WALLS
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
@@ -50,8 +50,7 @@ def _work(
 
     if not 0 < time_limit_s < float("inf"):
         raise OutOfRange(f"--time-limit {time_limit_s:g}; expected seconds above 0")
-    walls = "arachne" if slicer == "prusa" else "cura-gaps"
-    design, changes = asprinted_text.compensated(design, compensate, walls, silent=as_json)
+    design, changes = asprinted_text.compensated(design, compensate, WALLS[slicer], silent=as_json)
     try:
         with show.progress(("checks", *STEPS)) as step:
             made = printfile.slice_design(
@@ -73,7 +72,7 @@ def _work(
     click.echo(f"{design.name}: {show.summary(made.review)} (sensorgen check tells them)")
     for line in (*gcode_text.findings(made.checked), *gcode_text.report(made.checked.report)):
         click.echo(line)
-    for line in asprinted_text.table([row.as_dict() for row in made.rows]):
+    for line in asprinted_text.table(made.rows):
         click.echo(line)
     show.findings(made.printed)
     click.echo(f"{made.gcode}: {made.slicer} {made.version}, {made.seconds:.1f} s; {gcode_text.summary(made.checked)}")

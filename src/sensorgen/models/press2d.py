@@ -5,8 +5,7 @@ is checked: load reached, volume kept, faces not run into each other, work equal
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,24 +13,21 @@ from numpy.typing import NDArray
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Scene
-from sensorgen.solvers.contact.cell import AIR, Cell, cell_of
+from sensorgen.solvers.contact.boundary import BoundaryConditions
+from sensorgen.solvers.contact.cell import Cell, cell_of
 from sensorgen.solvers.contact.mesh import Fineness, Mesh, Unmeshed, mesh_of
 from sensorgen.solvers.contact.pressed import (
     DEEPEST,
     Elastic,
     Pressed,
+    Run,
     check,
     compared,
-    curve_of,
+    law_of,
     penalty_pa,
     reached,
     with_capacitances,
 )
-from sensorgen.solvers.contact.support import Held
-
-if TYPE_CHECKING:
-    from sensorgen.solvers.contact.contact import Faces
-    from sensorgen.solvers.contact.load import Problem, State
 
 SOURCE = (
     "neo-Hookean plane strain, displacement with bubble and pressure (Crouzeix and Raviart 1973), penalty contact with "
@@ -39,7 +35,7 @@ SOURCE = (
 )
 COST = 2
 
-__all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "curve_of", "press", "unfit"]
+__all__ = ["BoundaryConditions", "Elastic", "Fineness", "Pressed", "cell", "compared", "press", "why_not_applicable"]
 
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
 _STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid when they touched counts [-]
@@ -55,7 +51,7 @@ def press(
     solids: Mapping[str, Elastic],
     stress_pa: Sequence[float],
     permittivity: Mapping[str, float] | None = None,
-    held: Held | None = None,
+    boundary: BoundaryConditions | None = None,
     fineness: Fineness | None = None,
     step: Callable[[float], None] | None = None,
 ) -> Pressed:
@@ -71,7 +67,7 @@ def press(
         Pressures, from 0 on and rising [Pa].
     permittivity : mapping of str to float, optional
         Relative permittivity by material, with "air"; without it no capacitance is computed [-].
-    held : Held, optional
+    boundary : BoundaryConditions, optional
         Base, period, top and contact.
     fineness : Fineness, optional
         Of the mesh.
@@ -81,19 +77,19 @@ def press(
     Raises
     ------
     OutOfRange
-        Pressures do not rise from 0, or a choice of ``held`` is unknown.
+        Pressures do not rise from 0, or a choice of ``boundary`` is unknown.
     MissingValue
         The mesher is not installed.
     """
-    held, fineness = held or Held(), fineness or Fineness()
-    check(stress_pa, held)
+    boundary, fineness = boundary or BoundaryConditions(), fineness or Fineness()
+    check(stress_pa, boundary)
     told = step or (lambda _: None)
-    first, _ = best, run = _solved(cell, solids, stress_pa, held, fineness, told)
+    first, _ = best, run = _solved(cell, solids, stress_pa, boundary, fineness, told)
     for factor in _COARSER:
         if not best.faults:
             break
         coarser = replace(fineness, apex_mm=factor * fineness.apex_mm)
-        again, other = _solved(cell, solids, stress_pa, held, coarser, told)
+        again, other = _solved(cell, solids, stress_pa, boundary, coarser, told)
         if (again.converged_pa, -len(again.faults)) > (best.converged_pa, -len(best.faults)):
             best, run = replace(again, doubts=(*again.doubts, _coarsened(first, again, coarser))), other
     return _with_fields(best, cell, run, permittivity) if permittivity else best
@@ -107,74 +103,60 @@ def _coarsened(first: Pressed, again: Pressed, coarser: Fineness) -> str:
     return f"triangles of {coarser.apex_mm * 1e3:.3g} um at the apex, because finer ones do not converge: {known}"
 
 
-@dataclass(frozen=True)
-class _Run:
-    """What was solved, and the equilibria that were found."""
-
-    problem: "Problem"
-    faces: "Faces"
-    mesh: Mesh
-    states: "list[State]"
-
-
 def _solved(
     cell: Cell,
     solids: Mapping[str, Elastic],
     stress_pa: Sequence[float],
-    held: Held,
+    boundary: BoundaryConditions,
     fineness: Fineness,
     step: Callable[[float], None],
-) -> tuple[Pressed, _Run]:
-    from sensorgen.solvers.contact import contact, element, load, support
+) -> tuple[Pressed, Run[Mesh]]:
+    from sensorgen.solvers.contact.boundary import free_of, top_load
+    from sensorgen.solvers.contact.contact import faces_of
+    from sensorgen.solvers.contact.element import Elements
+    from sensorgen.solvers.contact.load import Problem
 
     mesh = mesh_of(cell, fineness)
-    materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in cell.regions]
-    moduli, ratios = (
-        np.array([getattr(m, key) for m in materials])[mesh.region - 1]
-        for key in ("youngs_modulus_pa", "poisson_ratio")
-    )
-    softest, faces = float(moduli.min()), contact.faces_of(mesh)
-    problem = load.Problem(
-        element.Elements(mesh, element.law(moduli, ratios)),
+    law, softest_pa = law_of(["", *(r.material for r in cell.regions)], mesh.region, solids)
+    faces = faces_of(mesh)
+    problem = Problem(
+        Elements(mesh, law),
         faces,
-        support.free_of(mesh.points_m, held),
-        support.top_load(mesh),
-        penalty_pa(softest),
-        held.contact == "stick",
-        sound=lambda places_m: not faces.crossed(places_m, DEEPEST),
+        free_of(mesh.points_m, boundary),
+        top_load(mesh.points_m, *mesh.top()),
+        penalty_pa(softest_pa),
+        boundary.contact == "stick",
+        sound=lambda places_m: not faces.crossed(places_m, mesh.outline, DEEPEST),
     )
-    longest = softest * (_STICKING_STEP if problem.stick else _STEP)
-    found, states = reached(problem, stress_pa, longest, step, SOURCE)
+    longest_pa = softest_pa * (_STICKING_STEP if problem.stick else _STEP)
+    found, states = reached(problem, stress_pa, longest_pa, step, SOURCE)
     if not cell.mirrored:
         said = "mirrors stand at both ends of the period, though it is not its own mirror image"
         found = replace(found, doubts=(said, *found.doubts))
-    return found, _Run(problem, faces, mesh, states)
+    return found, Run(problem, mesh, states)
 
 
-def _with_fields(found: Pressed, cell: Cell, run: _Run, permittivity: Mapping[str, float]) -> Pressed:
+def _with_fields(found: Pressed, cell: Cell, run: Run[Mesh], permittivity: Mapping[str, float]) -> Pressed:
     """The same with the capacitance of the deformed outlines."""
     fields = [_field(cell, run, s.u_m, permittivity) for s in run.states]
     return with_capacitances(found, [c for c, _ in fields], tuple(outline for _, outline in fields))
 
 
-def _field(cell: Cell, run: _Run, u_m: Real, permittivity: Mapping[str, float]) -> tuple[Interval | None, Cell]:
+def _field(cell: Cell, run: Run[Mesh], u_m: Real, permittivity: Mapping[str, float]) -> tuple[Interval | None, Cell]:
     """Capacitance and outlines of a deformed cell; None where no sound mesh of them was found."""
     from sensorgen.solvers.contact import deformed, field
 
-    outline = deformed.deformed(cell, run.mesh, run.faces, u_m)
+    mesh = run.mesh
+    outline = deformed.deformed(cell, mesh, run.problem.faces, u_m)
+    if deformed.misfit(outline, mesh, u_m) > _MISFIT:
+        return None, outline
     try:
-        _refuse_misfit(deformed.misfit(outline, run.mesh, u_m))
         return field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH), outline
     except Unmeshed:
         return None, outline
 
 
-def _refuse_misfit(share: float) -> None:
-    if share > _MISFIT:
-        raise Unmeshed(f"closing the gaps changed a solid's area by {share:.1%}")
-
-
-def unfit(scene: Scene) -> str | None:
+def why_not_applicable(scene: Scene) -> str | None:
     """Why this model cannot speak of a scene, or None."""
     try:
         cell_of(scene, None)

@@ -11,7 +11,7 @@ from sensorgen.design.body import DRAWN, Body, Cells
 from sensorgen.design.design import Design
 
 if TYPE_CHECKING:
-    from sensorgen.asprinted.compared import Printed
+    from sensorgen.asprinted.printed import Printed
 
 WALLS = ("arachne", "classic", "cura", "cura-gaps")  # rules of slicers, the default of ours first
 
@@ -22,7 +22,7 @@ def drawn(design: Design) -> Body:
 
 
 def _drawn_cells(design: Design) -> Cells:
-    from sensorgen.asprinted.compared import drawn_gap_mm
+    from sensorgen.asprinted.printed import drawn_gap_mm
 
     return Cells({DRAWN: design.in_use}, 1.0, getattr(design.params, "period_mm", None), {DRAWN: drawn_gap_mm(design)})
 
@@ -45,9 +45,9 @@ def estimated(design: Design, walls: str = "") -> Body:
 
 
 def _estimated_cells(design: Design, rules: Sequence[str]) -> Cells:
-    from sensorgen.asprinted import compared
+    from sensorgen.asprinted import printed
 
-    return _printed_cells(design, {rule: compared.estimated(design, rule) for rule in rules})
+    return _printed_cells({rule: printed.body(design, walls=rule) for rule in rules})
 
 
 def sliced(design: Design, printed: "Callable[[], Printed]", source: str, content: bytes) -> Body:
@@ -58,18 +58,18 @@ def sliced(design: Design, printed: "Callable[[], Printed]", source: str, conten
     design : Design
         What is printed.
     printed : callable
-        Reads the tool path, as :func:`sensorgen.asprinted.compared.sliced`.
+        Reads the tool path, as :func:`sensorgen.asprinted.printed.body`.
     source : str
         Of the tool path: slicer, version, file.
     content : bytes
         Of the file.
     """
     identity = _identity(design, "sliced", sha256(content).hexdigest())
-    return Body(design, "sliced", f"printed, {source}", identity, partial(_sliced_cells, design, printed, source))
+    return Body(design, "sliced", f"printed, {source}", identity, partial(_sliced_cells, printed, source))
 
 
-def _sliced_cells(design: Design, printed: "Callable[[], Printed]", source: str) -> Cells:
-    return _printed_cells(design, {source: printed()})
+def _sliced_cells(printed: "Callable[[], Printed]", source: str) -> Cells:
+    return _printed_cells({source: printed()})
 
 
 def default_body(design: Design, folder: Path | None = None) -> Body:
@@ -103,28 +103,28 @@ def _toolpath(design: Design, note: Path) -> Body | None:
 
 
 def _read(design: Design, path: Path, source: str) -> "Printed":
-    from sensorgen.asprinted import compared
+    from sensorgen.asprinted import printed
     from sensorgen.export.gcode import paths
 
-    return compared.sliced(design, paths.read(path, design.machine), source)
+    return printed.body(design, paths.read(path, design.machine), slicer=source)
 
 
-def _printed_cells(design: Design, prints: "Mapping[str, Printed]") -> Cells:
+def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
     """Cells by every rule: of walls for estimates, of bead widths for a tool path."""
-    from sensorgen.asprinted import compared
+    from sensorgen.asprinted.printed import gap_mm
     from sensorgen.scene.sections import sections
 
-    scenes, count, tracks = {}, 1.0, None
-    for rule, printed in prints.items():
-        for name, layers in printed.layers.items():
-            scene, times = compared.cell(design, layers)
-            scenes[rule if len(printed.layers) == 1 else name] = scene
-            count, tracks = times, printed.lines
-    first = next(iter(scenes.values()))
+    cells = {
+        rule if len(printed.cells) == 1 else name: cell
+        for rule, printed in prints.items()
+        for name, cell in printed.cells.items()
+    }
+    first, (printed, *_) = next(iter(cells.values())), prints.values()
     period = None
-    if getattr(design.params, "period_mm", None) is not None:
-        period = first.size_mm["xy".index(sections(first)[0].across)]
-    return Cells(scenes, count, period, {name: compared.gap_mm(scene) for name, scene in scenes.items()}, tracks)
+    if getattr(printed.design.params, "period_mm", None) is not None:
+        period = first.scene.size_mm["xy".index(sections(first.scene)[0].across)]
+    gaps = {name: gap_mm(cell.scene) for name, cell in cells.items()}
+    return Cells({name: cell.scene for name, cell in cells.items()}, first.count, period, gaps, printed.lines)
 
 
 def _identity(design: Design, *parts: str) -> str:

@@ -1,6 +1,5 @@
 """Resistance of the electrodes of a body, end to end, cogs included."""
 
-from sensorgen.asprinted import compared
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body
@@ -16,8 +15,7 @@ def electrode_resistance(body: Body) -> dict[str, Bounds]:
     Parameters
     ----------
     body : Body
-        Drawn or printed. Cogs conduct as :mod:`sensorgen.models.conduction` says; along a tool path the contacts
-        between extruded lines, of no resistance of their own, add what the network of lines says.
+        Drawn or printed; a print is solid where it is printed, as contacts between lines cost nothing.
 
     Raises
     ------
@@ -36,11 +34,10 @@ def electrode_resistance(body: Body) -> dict[str, Bounds]:
                 printed.append(_of_cell(body, other, end, rho.value).middle())
             except OutOfRange:  # by this rule the electrode is interrupted
                 printed.append(float("inf"))
-        lines = _line_factor(body, end)
-        value, (low, high) = solid.middle() * lines, spread(design, rho)
+        value, (low, high) = solid.middle(), spread(design, rho)
         relative = Interval(low / rho.value, high / rho.value) if rho.value else Interval(1.0, 1.0)
         found[end] = Bounds.of(
-            value, "ohm", model=solid.times(lines), print=Interval(min(printed), max(*printed, value)), certified=True,
+            value, "ohm", model=solid, print=Interval(min(printed), max(printed)), certified=True,
             material=relative.times(value),
         )  # fmt: skip
     return found
@@ -51,12 +48,3 @@ def _of_cell(body: Body, scene: Scene, end: str, resistivity_ohm_m: float) -> In
     p = body.design.params
     in_series, in_parallel = p.length_mm / scene.size_mm[0], p.width_mm / scene.size_mm[1]
     return conduction.electrode_resistance(scene, end, resistivity_ohm_m).times(in_series / in_parallel)
-
-
-def _line_factor(body: Body, end: str) -> float:
-    """Resistance of extruded lines over that of the solid plate, where a tool path is known [-]."""
-    if body.kind != "sliced":
-        return 1.0
-    printed = compared.Printed("", {}, body.cells.tracks)
-    plate = compared.solid_ohm(body.design)[end][0]
-    return compared.resistance_ohm(body.design, printed, (0.0,))[end][0] / plate if plate else 1.0

@@ -20,7 +20,7 @@ from sensorgen.models.compression import Compression
 from sensorgen.prediction import bodies, planning
 from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.error_budget import Load, error_budget
-from sensorgen.prediction.identifiability import FORCE_N, NOISE, card
+from sensorgen.prediction.identifiability import FORCE_N, NOISE, identify
 from sensorgen.prediction.losses import Lost, lost
 from sensorgen.prediction.plan import Plan
 from sensorgen.prediction.rest_state import RestState, rest_state
@@ -206,14 +206,14 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
         else None
     )
     try:
-        made = card(
+        made = identify(
             model.sensor, load.frequency_hz, query.noise, force_n=load.force_n or FORCE_N, position_m=load.position_m,
             stiffest=stiffest, assumed="" if law.bounded else _ASSUMED,
         )  # fmt: skip
         return replace(
             found, identifiability=made, budget=error_budget(model, load, query.accuracy),
             sensitivity=_sensitivity(model, load),
-            force_resolution_n=made["sigma_force_n"], position_resolution_m=made["sigma_position_m"],
+            force_resolution_n=made.sigma_force_n, position_resolution_m=made.sigma_position_m,
         )  # fmt: skip
     except SensorgenError as error:
         return replace(found, reason=str(error))
@@ -224,7 +224,7 @@ def _sensitivity(model: SensorModel, load: Load) -> Bounds:
     pressure_pa = float(model.sensor.stress_pa(load.force_n or FORCE_N, load.position_m))
 
     def of(law: Compression) -> float:
-        strain = float(law.thinning(np.asarray(pressure_pa))[0])
+        strain = float(law.capacitive_strain(np.asarray(pressure_pa))[0])
         return strain / (1 - strain) / pressure_pa * _PA_PER_KPA
 
     value = of(model.law.compression)
@@ -251,12 +251,15 @@ def _moduli(model: SensorModel) -> list[Compression]:
         if value.quantity == "youngs_modulus_pa"
         for end in spread(design, material_value(design.material(value.material), used[value.material], value.quantity))
     }
-    return [model.law.compression.stiffer(factor) for factor in sorted(factors) if factor != 1]
+    return [model.law.compression.scaled_modulus(factor) for factor in sorted(factors) if factor != 1]
 
 
 def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
     """What is taken for granted."""
     yield "electrodes are equipotential for the capacitance, and the field has no fringe at the sensor's edge"
+    yield "electrode resistance from end face to end face, cogs included"
+    if not body.is_drawn:
+        yield "contacts between extruded lines cost no resistance: no source gives their resistivity"
     gone = lost(body.design).taken
     said = " and ".join(f"{t.quantity} of {t.material}" for t in gone)
     yield f"dielectric losses: {said} as given" if gone else "no dielectric loss and no leak: the sources give none"

@@ -1,23 +1,20 @@
-"""What lies over what: the pieces of a scene in which all layers are the same, be they seen from a side or from above.
+"""Overlay: the pieces of a scene over which all layers are the same, in cross-section or in plan.
 
 Scenes of one extrusion, or of boxes, fall into columns of their cross-sections. Upright prisms of any outline, as round
-or octagonal pillars, are laid over each other in plan: strips between neighbouring corners and crossings, in each of
-which no two edges cross, and trapezoids between neighbouring edges. All of it is exact to rounding.
+or octagonal pillars, are overlaid in plan with shapely: faces between all their edges, exact to rounding.
 """
 
-from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
+import shapely
 
-from sensorgen.scene.scene import Body, Outline, Point, Prism, Scene, rectangle
+from sensorgen.scene.scene import Body, Point, Prism, Scene, rectangle
 from sensorgen.scene.sections import ROUNDING_MM, Column, Layer, alike, columns, sections
-
-_OUTSIDE = -1  # number of the sensor's own edge among the outlines
 
 
 @dataclass(frozen=True)
@@ -56,28 +53,6 @@ def parts(scene: Scene) -> list[Part]:
     return [Part(1.0, found, tuple(range(len(found))), in_plan=True)]
 
 
-@dataclass(frozen=True)
-class _Edge:
-    """A side of an outline, from left to right, and the number of the prism that it belongs to."""
-
-    start: Point
-    end: Point
-    prism: int
-
-    def at(self, x_mm: float) -> float:
-        (xa, ya), (xb, yb) = self.start, self.end
-        return yb if x_mm == xb else ya + (x_mm - xa) / (xb - xa) * (yb - ya)
-
-
-@dataclass(frozen=True)
-class _Strip:
-    """What of the plan lies between two lines of constant x; ``lines`` are edges there, as heights left and right."""
-
-    left_mm: float
-    right_mm: float
-    lines: tuple[tuple[float, float, int], ...]
-
-
 @lru_cache(maxsize=8)
 def _patches(scene: Scene) -> tuple[Column, ...]:
     """Pieces of the plan over which the same layers lie, those of one look as one."""
@@ -88,69 +63,26 @@ def _patches(scene: Scene) -> tuple[Column, ...]:
     numbers: dict[tuple[str, Point], int] = {}
     kinds = [numbers.setdefault((body.name, p.span("z")), len(numbers)) for body, p in prisms]
     first = {kind: prisms[k] for k, kind in reversed(list(enumerate(kinds)))}
+    plans = np.array([_plan(body, p) for body, p in prisms])
+    edges = shapely.boundary([*plans, shapely.box(0.0, 0.0, *scene.size_mm[:2])])
+    faces = shapely.get_parts(shapely.polygonize([shapely.union_all(edges)]))
+    places = shapely.point_on_surface(faces)
+    over: list[list[int]] = [[] for _ in faces]
+    for face, prism in shapely.STRtree(plans).query(places, predicate="within").T.tolist():
+        over[face].append(prism)
     areas: dict[tuple[int, ...], float] = defaultdict(float)
-    for strip in _strips(_edges(scene, [p for _, p in prisms])):
-        for over, area in _trapezoids(strip):
-            areas[tuple(sorted(kinds[k] for k in over))] += area
-    return tuple(Column(0.0, area, _layers([first[kind] for kind in look])) for look, area in areas.items())
+    for here, area in zip(over, shapely.area(faces).tolist(), strict=True):
+        areas[tuple(sorted(kinds[k] for k in here))] += area
+    looks = ((look, area) for look, area in areas.items() if area > ROUNDING_MM**2)
+    return tuple(Column(0.0, area, _layers([first[kind] for kind in look])) for look, area in looks)
 
 
-def _edges(scene: Scene, prisms: Sequence[Prism]) -> list[_Edge]:
-    """All sides that are not square to x, of the prisms and of the sensor itself."""
-    length, width, _ = scene.size_mm
-    outlines = [(_OUTSIDE, rectangle(0.0, length, 0.0, width)), *enumerate(map(_from_above, prisms))]
-    return [
-        _Edge(min(a, b), max(a, b), number)
-        for number, outline in outlines
-        for a, b in pairwise((*outline, outline[0]))
-        if a[0] != b[0]
-    ]
-
-
-def _from_above(prism: Prism) -> Outline:
-    return prism.outline if prism.axis == "z" else rectangle(*prism.span("x"), *prism.span("y"))
-
-
-def _strips(edges: Sequence[_Edge]) -> Iterator[_Strip]:
-    """Strips in which no two edges cross."""
-    corners = {x for edge in edges for x in (edge.start[0], edge.end[0])}
-    crossings = {x for strip in _between(edges, corners) for x in _crossings(strip)}
-    return _between(edges, corners | crossings)
-
-
-def _between(edges: Sequence[_Edge], places_mm: Iterable[float]) -> Iterator[_Strip]:
-    cuts = sorted(places_mm)
-    here: list[list[_Edge]] = [[] for _ in cuts[1:]]
-    for edge in edges:
-        for k in range(bisect_left(cuts, edge.start[0]), bisect_left(cuts, edge.end[0])):
-            here[k].append(edge)
-    for (left, right), found in zip(pairwise(cuts), here, strict=True):
-        if right - left > ROUNDING_MM:
-            yield _Strip(left, right, tuple((e.at(left), e.at(right), e.prism) for e in found))
-
-
-def _crossings(strip: _Strip) -> list[float]:
-    """Where edges cross within a strip [mm]."""
-    left, right, prism = np.array(sorted(strip.lines)).T
-    if (np.diff(right) > -ROUNDING_MM).all():
-        return []
-    above, below = left - left[:, None], right[:, None] - right
-    crossed = (above > ROUNDING_MM) & (below > ROUNDING_MM)
-    share = above[crossed] / (above[crossed] + below[crossed])
-    if (crossed & (prism == prism[:, None])).any():
-        raise ValueError(f"an outline crosses itself near x = {strip.left_mm:g} to {strip.right_mm:g} mm")
-    return [float(x) for x in strip.left_mm + share * (strip.right_mm - strip.left_mm)]
-
-
-def _trapezoids(strip: _Strip) -> Iterator[tuple[set[int], float]]:
-    """The prisms over each piece between two neighbouring edges, and its area [mm2]."""
-    over: set[int] = set()
-    width = strip.right_mm - strip.left_mm
-    for below, above in pairwise(sorted(strip.lines, key=lambda line: line[0] + line[1])):
-        over ^= {below[2]}
-        height = (above[0] + above[1] - below[0] - below[1]) / 2
-        if over and height > ROUNDING_MM:
-            yield over - {_OUTSIDE}, width * height
+def _plan(body: Body, prism: Prism) -> shapely.Polygon:
+    """A prism seen from above."""
+    plan = shapely.Polygon(prism.outline if prism.axis == "z" else rectangle(*prism.span("x"), *prism.span("y")))
+    if not plan.is_valid:
+        raise ValueError(f"an outline of {body.name} crosses itself: {shapely.is_valid_reason(plan)} mm")
+    return plan
 
 
 def _layers(found: Sequence[tuple[Body, Prism]]) -> tuple[Layer, ...]:

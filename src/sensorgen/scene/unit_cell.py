@@ -116,7 +116,7 @@ def mirrored(slices: list[Slice], evenly: bool = True) -> Cell:
     places = _candidates(whole)
     end = whole[-1].right_mm
     is_mirror = cache(partial(_is_mirror, whole))
-    for fits in (_is_even, _has_room) if evenly else (_has_room, _is_even):
+    for fits in (_is_even, _has_room) if evenly else (_shows_periods, _is_even, _has_room):
         for low, high in _pairs(places, end):
             if not fits(low - places[0], high - low, end - places[0]) or not (is_mirror(low) and is_mirror(high)):
                 continue
@@ -196,6 +196,11 @@ def _is_even(start_mm: float, piece_mm: float, whole_mm: float) -> bool:
 def _has_room(start_mm: float, piece_mm: float, whole_mm: float) -> bool:
     """Whether two whole pieces follow each other: one alone would not show that it repeats."""
     return start_mm + 2 * piece_mm <= whole_mm + ROUNDING_MM
+
+
+def _shows_periods(start_mm: float, piece_mm: float, whole_mm: float) -> bool:
+    """Whether there are two whole periods: in one alone, any place within its level ends may be the mirror."""
+    return start_mm + 4 * piece_mm <= whole_mm + ROUNDING_MM
 
 
 def _pairs(places: list[float], end_mm: float) -> Iterator[Point]:

@@ -7,14 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from sensorgen import __version__
-from sensorgen.asprinted.tally import Row, rule7
+from sensorgen.asprinted.printed import rule7
 from sensorgen.checks.review import Review, review
+from sensorgen.checks.volumes import Row
 from sensorgen.core import files as store
 from sensorgen.core.errors import Unprintable
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.check import Checked, check
-from sensorgen.export.slicers import TIME_LIMIT_S
+from sensorgen.export.slicers import TIME_LIMIT_S, WALLS
 from sensorgen.export.slicing import Sliced, Step, alone, sliced
 
 
@@ -123,7 +124,7 @@ def slice_design(
         The place cannot be written to, or the disk is full.
     """
     step("checks")
-    held = review(design)
+    held = review(design, walls=WALLS.get(slicer, "arachne"))
     if held.errors(strict) and not force:
         raise Unprintable(held.findings)
     folder = out / design.name
@@ -132,6 +133,7 @@ def slice_design(
         made = sliced([alone(design)], slicer, Path(stage), program=program, time_limit_s=time_limit_s, step=step)
         content = made.ready.read_bytes()
         loaded = {design.tool(name): name for name in design.used()}
+        held = held.sliced()
         checked = check(made.ready, design.machine, loaded, others_empty=True)
         rows = rule7(design, made.lines)
     result = _printed(design, target, made, held, (checked, *rows), content, forced=force)

@@ -72,7 +72,7 @@ def resistivity(readings: Sequence[Allowed], material: str, seed: int) -> Fitted
     return Fitted(
         material, RESISTIVITY, exp(middle), exp(low), exp(high),
         f"R_Y of {len(readings)} specimens, along the electrode; scatter alone x {scatter[0]:.3g} to {scatter[1]:.3g}, "
-        "the rest of the interval: cogs, which electrode was measured, and how much of R_Y the film carried",
+        "the rest of the interval: which electrode was measured, how it is printed, and how much of R_Y the film took",
     )  # fmt: skip
 
 

@@ -118,15 +118,14 @@ def _together(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
 
 
 def _resistivity(fits: Sequence[OfRun]) -> list[Fitted | Untold]:
-    factors = [
-        (fit.resistivity[0] + log(sum(fit.of.model.sensor.resistivity_ohm_m) / 2), fit.resistivity[1]) for fit in fits
-    ]
+    factors = [(fit.resistivity[0] + log(fit.of.model.sensor.common_resistivity_ohm_m()), fit.resistivity[1])
+               for fit in fits]  # fmt: skip
     at, error = _together(factors)
     material = fits[0].of.design.slot("top_electrode")[0].name
     if error > _UNSURE:
         return [Untold("resistivity_ohm_m", f"Re Z of {len(fits)} recordings leaves a factor of {exp(error):.3g} open")]
     return [Fitted(material, "resistivity_ohm_m", *_interval(at, error),
-                   f"Re Z of {len(fits)} recordings: mean of both electrodes, along them")]  # fmt: skip
+                   f"Re Z of {len(fits)} recordings: one value for both electrodes, along them")]  # fmt: skip
 
 
 def _interval(at: float, error: float) -> tuple[float, float, float]:

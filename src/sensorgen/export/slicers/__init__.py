@@ -1,4 +1,5 @@
 """The slicers: their profiles, in their own formats."""
 
 SLICERS = ("prusa", "cura")  # those that can be run: PrusaSlicer and CuraEngine
+WALLS = {"prusa": "arachne", "cura": "cura-gaps"}  # by slicer, the walls that our profiles make
 TIME_LIMIT_S = 1800.0  # that a slicer may take when nobody says otherwise

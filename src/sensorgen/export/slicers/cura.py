@@ -12,8 +12,8 @@ from string import Template
 
 from sensorgen.core.errors import MissingValue, OutOfRange
 from sensorgen.design.printer import Printer, Quality, folder
+from sensorgen.design.tower import PRIME_MM3, tower
 from sensorgen.export.slicers.loads import Load, Recipe, by_hand, number, recipes
-from sensorgen.export.slicers.tower import PRIME_MM3, tower
 
 FLAVOURS = {"reprapfirmware": "RepRap (RepRap)", "marlin": "RepRap (Marlin/Sprinter)"}
 PATTERNS = {"rectilinear": "lines", "grid": "grid", "concentric": "concentric", "triangles": "triangles"}

@@ -7,9 +7,9 @@ from string import Template
 
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design.printer import Printer, Quality, folder
+from sensorgen.design.tower import PRIME_MM3, Tower, tower
 from sensorgen.export.slicers.loads import Load, Recipe, by_hand, number, recipe, recipes
 from sensorgen.export.slicers.run import USUAL, Runner, find, run
-from sensorgen.export.slicers.tower import PRIME_MM3, Tower, tower
 
 FLAVOURS = {"reprapfirmware": "reprapfirmware", "marlin": "marlin2"}
 UNUSED = "unused"

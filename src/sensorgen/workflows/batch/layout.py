@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.printer import Printer, Quality
-from sensorgen.export.slicers.tower import tower
+from sensorgen.design.tower import tower
 
 EDGE_MM = 5.0  # to the edge of the bed: the skirt runs 3 mm round everything, a line or two wide
 TOWER_BRIM_MM = 2.0

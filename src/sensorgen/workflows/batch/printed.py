@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from sensorgen.asprinted import compared
+from sensorgen.asprinted import printed as asprinted
 from sensorgen.core.errors import SensorgenError
 from sensorgen.export.slicing import Placed, Sliced
 from sensorgen.prediction import bodies
@@ -32,14 +32,14 @@ def of_designs(found: Sequence[Placed], made: Sliced) -> dict[str, Any]:
 def _of(piece: Placed, made: Sliced) -> dict[str, Any]:
     design, source = piece.design, f"{made.slicer} {made.version}"
     try:
-        printed = compared.sliced(design, made.lines, source, piece.sensor_mm())
+        printed = asprinted.body(design, made.lines, slicer=source, centre_mm=piece.sensor_mm())
         body = bodies.sliced(design, partial(lambda: printed), source, made.ready.read_bytes() + piece.name.encode())
         return {
             "specimen": piece.name,
             "design": design.name,
             "prediction": json.loads(to_json(evaluate(body))),
-            "layers": [row.as_dict() for row in printed.rows(design)],
-            "findings": [finding.as_dict() for finding in printed.findings(design)],
+            "layers": [row.as_dict() for row in printed.rows()],
+            "findings": [finding.as_dict() for finding in printed.findings()],
         }
     except SensorgenError as error:
         return {"specimen": piece.name, "design": design.name, "findings": [], "reason": str(error)}

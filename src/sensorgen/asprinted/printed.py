@@ -1,0 +1,246 @@
+"""A design as printed: its layers, estimated or from G-code, as a scene with electrode gap, volumes and lost parts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+import shapely
+
+from sensorgen.asprinted.beads import CONVENTIONS, Beads, beads
+from sensorgen.asprinted.beads import layers as printed_layers
+from sensorgen.asprinted.window import Window, cut, evened, window
+from sensorgen.checks import estimate, volumes
+from sensorgen.checks.volumes import Row
+from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.core.findings import Finding
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design.design import Design
+from sensorgen.export.gcode.paths import Paths
+from sensorgen.scene.geometry import meshes, validity
+from sensorgen.scene.layers import LayerRegions, drawn, scene_of
+from sensorgen.scene.scene import Body, Point, Scene, rectangle
+from sensorgen.solvers.network.nodes import Lines
+
+_JOINED_MM = 1e-4
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The unit cell of a print.
+
+    Attributes
+    ----------
+    scene : Scene
+        One period, bottom electrode down, without support, shrunk as the sensor in use.
+    count : float
+        How many of its plan the sensor has [-].
+    """
+
+    scene: Scene
+    count: float
+
+
+@dataclass(frozen=True, eq=False)
+class Printed:
+    """A design as printed.
+
+    Attributes
+    ----------
+    design : Design
+        As drawn.
+    provenance : str
+        "printed, estimated (Arachne)", or "printed, " with slicer and version.
+    layers : mapping of str to sequence of LayerRegions
+        By the convention for a line's width; that of the first is the print's scene.
+    lines : Beads or None
+        The lines; None for an estimate.
+    """
+
+    design: Design
+    provenance: str
+    layers: Mapping[str, Sequence[LayerRegions]]
+    lines: Beads | None = None
+
+    @property
+    def scene(self) -> Scene:
+        """The whole print as it lies on the bed."""
+        return scene_of(self.first, self.design.printed)
+
+    @property
+    def first(self) -> Sequence[LayerRegions]:
+        """The layers by the first convention."""
+        return next(iter(self.layers.values()))
+
+    @cached_property
+    def cells(self) -> dict[str, Cell]:
+        """The unit cell by every convention."""
+        scene = self.design.printed
+        plan = window(drawn(scene, self.design.layers.boundaries_mm(scene.size_mm[2])), scene)
+        return {name: cell(self.design, layers, plan) for name, layers in self.layers.items()}
+
+    @property
+    def cell(self) -> Cell:
+        """The unit cell by the first convention."""
+        return next(iter(self.cells.values()))
+
+    @property
+    def gap_mm(self) -> Point:
+        """Smallest and largest electrode gap of the conventions [mm]."""
+        gaps = [gap_mm(cell.scene) for cell in self.cells.values()]
+        return min(gaps), max(gaps)
+
+    def rows(self) -> list[Row]:
+        """Printed and drawn volume per body and layer."""
+        extruded = None if self.lines is None else _extruded(self.lines, self.design.printed)
+        return volumes.rows(self.design.printed, self.first, extruded)
+
+    def findings(self) -> list[Finding]:
+        """Rule 7, with the design's waivers."""
+        return self.design.waived(volumes.findings(self.rows(), self.design.printed))
+
+
+def body(
+    design: Design,
+    paths: Paths | None = None,
+    *,
+    walls: str = "arachne",
+    slicer: str = "",
+    centre_mm: Point | None = None,
+) -> Printed:
+    """A design as printed.
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    paths : Paths, optional
+        Lines of a slicer's file, with the printer's own tool numbers; estimated if not given.
+    walls : str
+        For an estimate, one of :data:`sensorgen.checks.estimate.RULES`.
+    slicer : str
+        Name and version of the slicer, for the provenance.
+    centre_mm : (float, float), optional
+        Middle of the piece on the printer's bed [mm]; the middle of the bed if not given.
+
+    Raises
+    ------
+    BadInput
+        The file prints nothing at the design's place.
+    UnknownName
+        No such walls.
+    """
+    if paths is None:
+        layers = estimate.layers(design.printed, design.machine, design.layers, walls)
+        return Printed(design, f"printed, estimated ({estimate.TITLES[walls]})", {"mid-plane": layers})
+    lines = beads(design, paths, centre_mm)
+    if not len(lines.number):
+        tools = sorted({design.tool(body.material) for body in design.printed.bodies})
+        raise BadInput(
+            f"no line of {design.name} in this G-code: expected tools {tools} in layers of "
+            f"{design.layers.layer_mm:g} mm at its place on the bed; was it sliced from this design?"
+        )
+    found = {name: printed_layers(design, lines, name) for name in CONVENTIONS}
+    return Printed(design, f"printed, {slicer or 'from G-code'}", found, lines)
+
+
+def rule7(design: Design, paths: Paths, centre_mm: Point | None = None) -> tuple[list[Row], list[Finding]]:
+    """Printed against drawn volume per body and layer of a slicer's G-code, and what rule 7 says, waivers applied.
+
+    Parameters
+    ----------
+    design, paths, centre_mm : Design, Paths, (float, float)
+        As of :func:`body`; here a file that prints nothing of the design is no error.
+    """
+    lines = beads(design, paths, centre_mm)
+    made = Printed(design, "printed", {"vol": printed_layers(design, lines)}, lines)
+    rows = made.rows()
+    return rows, design.waived(volumes.findings(rows, design.printed))
+
+
+def _extruded(lines: Beads, scene: Scene) -> dict[tuple[int, str], float]:
+    """Volume by layer and body [mm3]."""
+    total = np.zeros((int(lines.layer.max(initial=0)) + 1, len(scene.bodies)))
+    np.add.at(total, (lines.layer, lines.body), lines.volume_mm3)
+    return {(k, body.name): float(row[n]) for k, row in enumerate(total) for n, body in enumerate(scene.bodies)}
+
+
+def cell(design: Design, layers: Sequence[LayerRegions], plan: Window) -> Cell:
+    """The unit cell of printed layers.
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    layers : sequence of LayerRegions
+        Its whole print.
+    plan : Window
+        The drawing's.
+    """
+    scene = design.printed
+    inside = cut(layers, plan)
+    if all(side < whole for side, whole in zip(plan.sides_mm(), scene.size_mm[:2], strict=True)):
+        inside = evened(inside, plan)
+    found = scene_of(inside, replace(scene, size_mm=(*plan.sides_mm(), scene.size_mm[2])))
+    if design.orientation == "upside-down":
+        found = found.turned_over()
+    kept = replace(found, bodies=tuple(b for b in found.bodies if not b.is_support()))
+    smaller = kept.stretched(1.0 - design.shrinkage) if design.shrinkage else kept
+    return Cell(smaller, scene.size_mm[0] * scene.size_mm[1] / plan.area_mm2())
+
+
+def gap_mm(scene: Scene) -> float:
+    """Smallest distance of two electrodes in a scene of upright prisms; infinite where there are no two [mm]."""
+    found: dict[str, list[Body]] = {}
+    for body in filter(lambda b: b.terminal, scene.bodies):
+        found.setdefault(body.terminal, []).append(body)
+    return min((_apart_mm(one, other) for one, other in combinations(found.values(), 2)), default=float("inf"))
+
+
+def _apart_mm(one: Sequence[Body], other: Sequence[Body]) -> float:
+    """Smallest distance of the prisms of two electrodes [mm]."""
+    (plans, z), (others, other_z) = (_upright(bodies) for bodies in (one, other))
+    height = np.maximum(z[:, None, 0] - other_z[:, 1], other_z[:, 0] - z[:, None, 1]).clip(0.0)
+    return float(np.round(np.hypot(shapely.distance(plans[:, None], others), height).min(), 9))
+
+
+def _upright(bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray]:
+    """Plans, (n,), and heights, (n, 2), of all prisms [mm]."""
+    prisms = [p for body in bodies for p in body.prisms]
+    plans = [p.outline if p.axis == "z" else rectangle(*p.span("x"), *p.span("y")) for p in prisms]
+    return np.array([shapely.Polygon(plan) for plan in plans]), np.array([p.span("z") for p in prisms])
+
+
+def drawn_gap_mm(design: Design) -> float:
+    """Smallest distance of the electrodes as drawn, exact [mm]."""
+    scene = design.in_use
+    return round(validity.electrode_gap_mm(scene, {b.name: meshes.mesh(b) for b in scene.bodies}), 9)
+
+
+def electrode_lines(design: Design, lines: Beads, end: str) -> Lines:
+    """The extruded lines of one electrode as a network, its middle at the origin: for studies of contact resistance.
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    lines : Beads
+        Of the whole sensor.
+    end : str
+        "top" or "bottom".
+
+    Raises
+    ------
+    OutOfRange
+        None of it is printed.
+    """
+    mine = [k for k, body in enumerate(design.printed.bodies) if body.terminal == end]
+    found = lines.of(np.isin(lines.body, mine))
+    if not len(found.number):
+        raise OutOfRange(f"no line prints the {end} electrode")
+    middle = np.array(design.printed.size_mm[:2]) / 2
+    start, stop = ((p - middle) * M_PER_MM for p in (found.start_mm, found.end_mm))
+    meets = np.append(False, (np.abs(start[1:] - stop[:-1]) < _JOINED_MM * M_PER_MM).all(1))
+    meets[1:] &= found.layer[1:] == found.layer[:-1]
+    return Lines(start, stop, found.width_mm * M_PER_MM, found.height_mm * M_PER_MM, found.layer, meets)

@@ -1,0 +1,157 @@
+"""Rule 7: printed against drawn volume of every body in every layer, and the parts that are lost or merged."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import groupby
+
+import numpy as np
+import shapely
+
+from sensorgen.core.findings import Finding
+from sensorgen.scene.layers import LayerRegions, Region, drawn, parts
+from sensorgen.scene.scene import PLANE, SLIVER_MM, Body, Point, Prism, Scene
+
+LOW, HIGH = 0.9, 1.1  # printed over drawn volume, within which nothing is said
+VANISHED = 0.1  # a part of which less than this share is printed is lost
+_LEAST = 1e-6  # of the sensor's plan, in one layer: less is rounding
+
+
+@dataclass(frozen=True)
+class Row:
+    """One body in one layer.
+
+    Attributes
+    ----------
+    body : str
+        Its name.
+    layer : int
+        From 1 at the bed [-].
+    bottom_mm, top_mm : float
+        Where the layer starts and ends [mm].
+    exact_mm3, printed_mm3 : float
+        Volume as drawn, and as printed [mm3].
+    strips, vanished, fused : int
+        Separate parts as drawn, those that are lost, and those that merge with a neighbour [-].
+    place_mm : (float, float)
+        Middle of the first lost part, or else of the first, at its front or left edge [mm].
+    """
+
+    body: str
+    layer: int
+    bottom_mm: float
+    top_mm: float
+    exact_mm3: float
+    printed_mm3: float
+    strips: int
+    vanished: int
+    fused: int
+    place_mm: Point
+
+    @property
+    def ratio(self) -> float:
+        """Printed over drawn volume; infinite where nothing is drawn [-]."""
+        return self.printed_mm3 / self.exact_mm3 if self.exact_mm3 > 0 else float("inf")
+
+    def as_dict(self) -> dict[str, object]:
+        """The row with its ratio, for JSON; None where nothing is drawn."""
+        return asdict(self) | {"ratio": self.ratio if self.exact_mm3 > 0 else None}
+
+
+def rows(
+    scene: Scene, printed: Sequence[LayerRegions], volumes_mm3: Mapping[tuple[int, str], float] | None = None
+) -> list[Row]:
+    """Rows for all bodies and layers in which something is drawn or printed, from the bed up.
+
+    Parameters
+    ----------
+    scene : Scene
+        As drawn, on its bed.
+    printed : sequence of LayerRegions
+        As printed.
+    volumes_mm3 : mapping, optional
+        Volume extruded by layer, from 0, and body [mm3]; area times height of what is printed if not given.
+    """
+    boundaries = [printed[0].bottom_mm, *(layer.top_mm for layer in printed)]
+    found = []
+    for number, (meant, made) in enumerate(zip(drawn(scene, boundaries), printed, strict=True)):
+        least = _LEAST * scene.size_mm[0] * scene.size_mm[1] * meant.height_mm
+        for body in scene.bodies:
+            exact = sum(_between(prism, meant.bottom_mm, meant.top_mm) for prism in body.prisms)
+            area = made.region(body.name).area * made.height_mm
+            volume = area if volumes_mm3 is None else volumes_mm3.get((number, body.name), 0.0)
+            if max(exact, volume) > least:
+                found.append(_row(body.name, number + 1, meant, made, (exact, volume)))
+    return found
+
+
+def _row(body: str, number: int, meant: LayerRegions, made: LayerRegions, volumes_mm3: tuple[float, float]) -> Row:
+    plan = parts(meant.region(body))
+    lost, merged = _lost(plan, parts(made.region(body)))
+    x0, y0, x1, y1 = plan[lost[0] if lost else 0].bounds if plan else (0.0, 0.0, 0.0, 0.0)
+    place = (x0, (y0 + y1) / 2) if meant.along == "x" else ((x0 + x1) / 2, y0)
+    return Row(body, number, meant.bottom_mm, meant.top_mm, *volumes_mm3, len(plan), len(lost), merged, place)
+
+
+def _between(prism: Prism, low_mm: float, high_mm: float) -> float:
+    """Volume of a prism between two heights, exact [mm3]."""
+    bottom, top = prism.span("z")
+    if top <= low_mm or bottom >= high_mm:
+        return 0.0
+    if prism.axis == "z" or (low_mm <= bottom and top <= high_mm):
+        return prism.volume_mm3() * (min(top, high_mm) - max(bottom, low_mm)) / (top - bottom)
+    side = PLANE[prism.axis][0]
+    low, high = prism.span(side)
+    clipped = shapely.clip_by_rect(shapely.Polygon(prism.outline), low - 1.0, low_mm, high + 1.0, high_mm)
+    return float(clipped.area) * (prism.end_mm - prism.start_mm)
+
+
+def _lost(plan: Sequence[Region], made: Sequence[Region]) -> tuple[list[int], int]:
+    """Numbers of the parts that are lost, and how many merge with their neighbours."""
+    pairs = shapely.STRtree(made).query(plan) if plan and made else np.empty((2, 0), np.intp)
+    shared = shapely.area(shapely.intersection(np.take(plan, pairs[0]), np.take(made, pairs[1]))) if pairs.size else []
+    kept = np.bincount(pairs[0], weights=shared, minlength=len(plan))
+    lost = np.flatnonzero(kept < VANISHED * shapely.area(plan)).tolist() if plan else []
+    met = np.bincount(pairs[1][np.asarray(shared) > SLIVER_MM], minlength=1)
+    return lost, int((met - 1).clip(0).sum())
+
+
+def findings(found: Iterable[Row], scene: Scene) -> list[Finding]:
+    """Rule 7: an error where a sampled body is not printed at all, else a warning outside ``LOW`` to ``HIGH``.
+
+    Parameters
+    ----------
+    found : iterable of Row
+        Of one print.
+    scene : Scene
+        The sensor on its bed.
+    """
+    outside = [row for row in found if row.exact_mm3 > 0 and not LOW <= row.ratio <= HIGH]
+    return [finding for body in scene.bodies for finding in _of_body(body, [r for r in outside if r.body == body.name])]
+
+
+def _of_body(body: Body, outside: Sequence[Row]) -> Iterator[Finding]:
+    """One finding for neighbouring layers with the same fault."""
+    numbered = list(enumerate(outside))
+    for (_, fault, _), group in groupby(numbered, key=lambda p: (p[1].layer - p[0], _fault(p[1]), p[1].ratio > 1)):
+        here = [row for _, row in group]
+        first, last = here[0], here[-1]
+        severe = fault == "is not printed at all" and not body.is_support()
+        ratios = sorted({f"{row.ratio:.2f}" for row in here})
+        what = fault or f"prints {' to '.join(ratios[:: max(len(ratios) - 1, 1)])} times its volume"
+        vanished = max(here, key=lambda row: row.vanished)
+        more = [f"{vanished.vanished} of {vanished.strips} strips vanish"] if vanished.vanished and not fault else []
+        more += [f"{max(row.fused for row in here)} fuse"] if any(row.fused for row in here) else []
+        yield Finding(
+            "7-printed", "error" if severe else "warning", body.name,
+            f"from {first.bottom_mm:g} to {last.top_mm:g} mm it {', '.join([what, *more])}",
+            "make narrow parts at least a line wide, or use other walls or thinner layers",
+            layer=first.layer, place_mm=(*first.place_mm, round((first.bottom_mm + first.top_mm) / 2, 9)),
+            count=max(vanished.vanished, 1), last_layer=last.layer if len(here) > 1 else None,
+        )  # fmt: skip
+
+
+def _fault(row: Row) -> str:
+    """What happens to a body that is absent from a layer; "" where it is there."""
+    if row.printed_mm3 > 0:
+        return ""
+    return "is not printed at all" if row.strips else "ends below mid-layer and is not printed"

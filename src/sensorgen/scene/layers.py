@@ -1,0 +1,189 @@
+"""Layers as regions in plan: what every body covers at one height, as polygons [mm]."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import pairwise
+from typing import TypeAlias
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+
+from sensorgen.scene.scene import SLIVER_MM, Body, Outline, Prism, Scene, box, rectangle, rounded
+
+Region: TypeAlias = Polygon | MultiPolygon
+
+
+@dataclass(frozen=True)
+class LayerRegions:
+    """One layer.
+
+    Attributes
+    ----------
+    bottom_mm, top_mm : float
+        Where the layer starts and ends [mm].
+    regions : mapping of str to Region
+        What each body covers, by its name; bodies that cover nothing are left out.
+    along : str
+        "x" or "y" where the layer is drawn as strips along that axis, from edge to edge of the sensor; else "".
+    """
+
+    bottom_mm: float
+    top_mm: float
+    regions: Mapping[str, Region]
+    along: str = ""
+
+    @property
+    def height_mm(self) -> float:
+        """Height of the layer [mm]."""
+        return self.top_mm - self.bottom_mm
+
+    def region(self, body: str) -> Region:
+        """What a body covers; empty where it is absent."""
+        return self.regions.get(body, MultiPolygon())
+
+    def mapped(self, regions: Mapping[str, Region]) -> "LayerRegions":
+        """The layer with other regions, empty ones left out."""
+        return replace(self, regions={name: region for name, region in regions.items() if not region.is_empty})
+
+
+def parts(region: Region) -> list[Polygon]:
+    """Separate polygons of a region, from left to right."""
+    found = shapely.get_parts(region)
+    found = found[shapely.area(found) > 0]
+    order: list[Polygon] = found[np.lexsort(shapely.bounds(found).T[::-1])].tolist()
+    return order
+
+
+def cleaned(region: Region) -> Region:
+    """A region without parts narrower than a sliver, which are rounding."""
+    found = shapely.get_parts(region)
+    low, high = shapely.bounds(found).reshape(-1, 2, 2).swapaxes(0, 1)
+    wide = (high - low > SLIVER_MM).all(1)
+    if wide.all():
+        return region
+    return shapely.multipolygons(found[wide])
+
+
+def is_box(part: Polygon) -> bool:
+    """Whether a polygon is a rectangle along the axes."""
+    x0, y0, x1, y1 = part.bounds
+    return bool(abs((x1 - x0) * (y1 - y0) - part.area) < SLIVER_MM**2)
+
+
+def is_rectilinear(region: Region) -> bool:
+    """Whether all edges run along x or y."""
+    rings = shapely.get_rings(shapely.get_parts(region))
+    corners, ring = shapely.get_coordinates(rings, return_index=True)
+    steps = np.abs(np.diff(corners, axis=0)).min(1)
+    return bool((steps[ring[1:] == ring[:-1]] < SLIVER_MM).all())
+
+
+def narrow_mm(part: Polygon) -> float:
+    """Smaller side of the smallest rectangle around a polygon [mm]."""
+    x0, y0, x1, y1 = part.bounds
+    if is_box(part):
+        return float(min(x1 - x0, y1 - y0))
+    around = np.diff(shapely.get_coordinates(shapely.minimum_rotated_rectangle(part))[:3], axis=0)
+    return float(np.hypot(*around.T).min())
+
+
+def drawn(scene: Scene, boundaries_mm: Sequence[float]) -> tuple[LayerRegions, ...]:
+    """Every layer of a scene as a slicer samples it, at mid-height.
+
+    Parameters
+    ----------
+    scene : Scene
+        As it lies on the bed.
+    boundaries_mm : sequence of float
+        Of its layers, from the bed up [mm].
+    """
+    return _drawn(scene, tuple(boundaries_mm))
+
+
+@lru_cache(maxsize=16)
+def _drawn(scene: Scene, boundaries_mm: tuple[float, ...]) -> tuple[LayerRegions, ...]:
+    layers = []
+    for bottom, top in pairwise(boundaries_mm):
+        found = {body.name: region_at(body, rounded((bottom + top) / 2)) for body in scene.bodies}
+        regions = {name: region for name, region in found.items() if not region.is_empty}
+        layers.append(LayerRegions(bottom, top, regions, _along(regions, scene)))
+    return tuple(layers)
+
+
+def region_at(body: Body, z_mm: float) -> Region:
+    """Region of a body at a height."""
+    return _united(frozenset(o for p in body.prisms for o in p.cut("z", z_mm)))
+
+
+@lru_cache(maxsize=64)
+def _united(outlines: frozenset[Outline]) -> Region:
+    """Union of outlines; equal layers share one."""
+    polygons = [Polygon(outline) for outline in outlines]
+    return polygons[0] if len(polygons) == 1 else shapely.union_all(polygons)
+
+
+def _along(regions: Mapping[str, Region], scene: Scene) -> str:
+    """The axis along which everything runs from edge to edge, "y" first; "" where there is none."""
+    found = [part for region in regions.values() for part in parts(region)]
+    if not all(map(is_box, found)):
+        return ""
+    low, high = np.array([part.bounds for part in found]).reshape(-1, 2, 2).swapaxes(0, 1)
+    whole = np.asarray((low < SLIVER_MM) & (high > np.array(scene.size_mm[:2]) - SLIVER_MM))
+    return "y" if whole[:, 1].all() else "x" if whole[:, 0].all() else ""
+
+
+def scene_of(layers: Sequence[LayerRegions], like: Scene) -> Scene:
+    """Layers as a scene: the bodies of another scene, filled with upright prisms; equal ones above each other are one.
+
+    Rectilinear regions become boxes, regions with holes are cut through their holes.
+    """
+    bodies = (replace(body, prisms=tuple(_prisms(layers, body))) for body in like.bodies)
+    return Scene(tuple(bodies), (*like.size_mm[:2], layers[-1].top_mm if layers else 0.0))
+
+
+def _prisms(layers: Sequence[LayerRegions], body: Body) -> list[Prism]:
+    growing: dict[Outline, tuple[float, float]] = {}
+    found = []
+    for layer in layers:
+        for outline in outlines(layer.region(body.name)):
+            bottom, top = growing.get(outline, (layer.bottom_mm, layer.bottom_mm))
+            if top < layer.bottom_mm - SLIVER_MM:
+                found.append(_prism(outline, bottom, top))
+                bottom = layer.bottom_mm
+            growing[outline] = (bottom, layer.top_mm)
+    found += [_prism(outline, *span) for outline, span in growing.items()]
+    return sorted(found, key=lambda p: (p.start_mm, p.outline))
+
+
+def _prism(outline: Outline, bottom_mm: float, top_mm: float) -> Prism:
+    (x0, y0), (x1, y1) = outline[0], outline[len(outline) // 2]
+    if outline == rectangle(x0, x1, y0, y1):
+        return box(x0, x1, y0, y1, bottom_mm, top_mm)
+    return Prism("z", outline, rounded(bottom_mm), rounded(top_mm))
+
+
+def outlines(region: Region) -> Iterator[Outline]:
+    """Outlines without holes that together are a region: rectangles where all its edges run along the axes."""
+    for part in parts(region):
+        x0, y0, x1, y1 = part.bounds
+        at = None if is_box(part) else _cut_at(part)
+        if at is not None:
+            for left, right in ((x0, at), (at, x1)):
+                yield from outlines(shapely.clip_by_rect(part, left, y0, right, y1))
+        elif is_box(part):
+            yield rectangle(x0, x1, y0, y1)
+        else:
+            corners = shapely.get_coordinates(shapely.simplify(part, SLIVER_MM))[:-1]
+            yield tuple((rounded(x), rounded(y)) for x, y in corners.tolist())
+
+
+def _cut_at(part: Polygon) -> float | None:
+    """Where to cut a polygon that is rectilinear or has holes; None where it is neither."""
+    if part.interiors:
+        hole = part.interiors[0]
+        return float(hole.bounds[0] if is_rectilinear(part) else hole.centroid.x)
+    x = shapely.get_coordinates(part)[:, 0]
+    inside = x[(x > part.bounds[0] + SLIVER_MM) & (x < part.bounds[2] - SLIVER_MM)]
+    return float(inside.min()) if is_rectilinear(part) and len(inside) else None

@@ -1,0 +1,88 @@
+"""Lines of a solid plate without a slicer: walls around, infill to and fro within them, turned from layer to layer."""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from math import cos, radians, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.units import M_PER_MM
+from sensorgen.solvers.network.nodes import Lines
+
+WALLS = 2
+OVERLAP = 0.25  # of a line's width, by which infill reaches into the walls (PrusaSlicer's own)
+
+Path = list[NDArray[np.float64]]
+
+
+def plate(
+    length_mm: float, width_mm: float, line_mm: float, layer_mm: float, degrees: Sequence[float], walls: int = WALLS
+) -> Lines:
+    """All lines of a plate around the origin.
+
+    Parameters
+    ----------
+    length_mm, width_mm : float
+        Along x and y [mm].
+    line_mm, layer_mm : float
+        Width of a line and height of a layer [mm].
+    degrees : sequence of float
+        Direction of each layer's infill, from x, from below [deg].
+    walls : int
+        How many lines run around it [-].
+    """
+    pieces = []
+    for layer, angle in enumerate(degrees):
+        for path in _paths(np.array([length_mm, width_mm]), line_mm, angle, walls):
+            steps = ((a, b, k > 0) for k, (a, b) in enumerate(pairwise(path)))
+            pieces += [(*a, *b, layer, joined) for a, b, joined in steps]
+    found = np.array(pieces)
+    full = np.full(len(found), M_PER_MM)
+    return Lines(
+        found[:, :2] * M_PER_MM, found[:, 2:4] * M_PER_MM, full * line_mm, full * layer_mm,
+        found[:, 4].astype(np.int64), found[:, 5].astype(bool),
+    )  # fmt: skip
+
+
+def _paths(size: NDArray[np.float64], line: float, degrees: float, walls: int) -> Iterator[Path]:
+    for k in range(walls):
+        x, y = size / 2 - (k + 0.5) * line
+        yield [np.array(p) for p in ((x, y), (-x, y), (-x, -y), (x, -y), (x, y))]
+    inset = (walls + 0.5 - OVERLAP) * line if walls else line / 2
+    yield from _infill(size / 2 - inset, line, radians(degrees))
+
+
+def _infill(half: NDArray[np.float64], line: float, angle: float) -> Iterator[Path]:
+    """Lines a width apart through a rectangle, joined along its sides where two ends lie on the same one."""
+    way, across = np.array([cos(angle), sin(angle)]), np.array([-sin(angle), cos(angle)])
+    reach = float(np.abs(across) @ half)
+    count = int(2 * reach / line + 1 + 1e-9)
+    path: Path = []
+    for k in range(count):
+        ends = _through(half, way, across * ((k - (count - 1) / 2) * line))
+        if ends is None:
+            continue
+        first, last = ends if k % 2 == 0 else ends[::-1]
+        if path and not _same_side(path[-1], first, half):
+            yield path
+            path = []
+        path += [first, last]
+    if path:
+        yield path
+
+
+def _through(half: NDArray[np.float64], way: NDArray[np.float64], at: NDArray[np.float64]) -> Path | None:
+    """Where a line enters and leaves a rectangle; None where it only touches a corner."""
+    low, high = -np.inf, np.inf
+    for axis in (0, 1):
+        if abs(way[axis]) > 1e-12:
+            a, b = sorted(((-half[axis] - at[axis]) / way[axis], (half[axis] - at[axis]) / way[axis]))
+            low, high = max(low, a), min(high, b)
+    return [at + low * way, at + high * way] if high - low > 1e-6 else None
+
+
+def _same_side(a: NDArray[np.float64], b: NDArray[np.float64], half: NDArray[np.float64]) -> bool:
+    """Whether two places lie on one side of a rectangle, and apart."""
+    on = np.isclose(np.abs(a), half, atol=1e-9) & np.isclose(a, b, atol=1e-9)
+    return bool(on.any())
