@@ -5,7 +5,7 @@ BIN = $(VENV)/bin
 READY = $(VENV)/.ready
 READY_DEV = $(VENV)/.ready-dev
 
-.PHONY: help demo test lint docs bench clean
+.PHONY: help demo test lint docs site words size bench clean
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 8
@@ -19,14 +19,23 @@ test: $(READY_DEV) ## set up, with slicers, ngspice and Chromium where apt may, 
 	$(BIN)/python -m pytest -m kernel tests/geometry $(ARGS)
 
 lint: $(READY_DEV) ## style, types, and which module may import which
-	$(BIN)/ruff format --check src tests bench docs
-	$(BIN)/ruff check src tests bench docs
+	$(BIN)/ruff format --check src tests bench docs scripts
+	$(BIN)/ruff check src tests bench docs scripts
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 
 docs: $(READY_DEV) ## write docs/reference.md from the --help texts, and the pictures of README and docs
 	$(BIN)/python docs/generate.py
 	$(BIN)/python docs/pictures.py
+
+site: $(READY_DEV) ## build the documentation as a site that works offline, out/site/index.html; a broken link fails
+	$(BIN)/sphinx-build -q -W --keep-going -c docs . out/site
+
+words: $(READY_DEV) ## list words that docs/words.yaml has retired, with file, line and the better word
+	$(BIN)/python scripts/words.py $(ARGS)
+
+size: ## print code lines, functions and the longest function of each package
+	@$(PYTHON) scripts/size.py
 
 bench: $(READY_DEV) ## measure speed, memory and accuracy; write bench/results
 	set -e; for program in bench/*.py; do $(BIN)/python $$program; done

@@ -161,7 +161,7 @@ def main():
     (RESULTS / "asprinted.md").write_text("\n\n".join(parts) + "\n")
     (RESULTS / "asprinted.json").write_text(json.dumps(found, indent=1) + "\n")
     draw_directions(found["directions"])
-    if not fem2d.unfit(make({"shape": "reference"}).drawn):
+    if not fem2d.why_not_applicable(make({"shape": "reference"}).drawn):
         draw_walls()
     print("\n\n".join(parts))
 

@@ -35,7 +35,7 @@ from line_cases import PLATE, TONES, cases, exact, off  # noqa: E402
 
 from sensorgen.core.errors import OutOfRange  # noqa: E402
 from sensorgen.models import line, line_abcd, line_closed, line_ladder  # noqa: E402
-from sensorgen.solvers.line.inputs import read  # noqa: E402
+from sensorgen.solvers.line.inputs import PressedLine, read  # noqa: E402
 
 ROUNDS = 7
 Inputs = dict[str, Any]
@@ -45,24 +45,24 @@ NGSPICE = shutil.which("ngspice")
 
 def grid(forces: int = 61, positions: int = 101) -> Inputs:
     """Tones, forces and positions, each on its own axis."""
-    axes = {"f_Hz": np.array(TONES)[:, None, None], "F_N": np.linspace(0, 6, forces)[:, None]}
-    return PLATE | axes | {"x_p_left_edge_m": np.linspace(0, 0.09, positions)}
+    axes = {"frequency_hz": np.array(TONES)[:, None, None], "force_n": np.linspace(0, 6, forces)[:, None]}
+    return PLATE | axes | {"left_m": np.linspace(0, 0.09, positions)}
 
 
 def triples(count: int) -> Inputs:
     """Force, position and tone of every sample by itself."""
     draw = np.random.default_rng(5)
-    of = {"f_Hz": draw.choice(TONES, count), "F_N": draw.uniform(0, 6, count)}
-    return PLATE | of | {"x_p_left_edge_m": draw.uniform(0, 0.09, count)}
+    of = {"frequency_hz": draw.choice(TONES, count), "force_n": draw.uniform(0, 6, count)}
+    return PLATE | of | {"left_m": draw.uniform(0, 0.09, count)}
 
 
 def scikit_rf(**inputs: Any) -> Any:
     """One force and position, all tones in one call: three lines and an open end, against ports of 50 ohm."""
     import skrf
 
-    tones = np.atleast_1d(inputs["f_Hz"])
+    tones = np.atleast_1d(inputs["frequency_hz"])
     frequency = skrf.Frequency.from_f(tones, unit="Hz")
-    r, y, lengths = read(inputs).sections()
+    r, y, lengths = read(PressedLine(**inputs)).sections()
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         media = [
@@ -76,8 +76,8 @@ def scikit_rf(**inputs: Any) -> Any:
 
 def ngspice(cells: int, **inputs: Any) -> Any:
     """One force and position as a circuit of three times so many cells, all tones in one run."""
-    r, y, lengths = read(inputs).sections()
-    tones = np.atleast_1d(inputs["f_Hz"])
+    r, y, lengths = read(PressedLine(**inputs)).sections()
+    tones = np.atleast_1d(inputs["frequency_hz"])
     lines, node = ["ladder", "I1 0 n0 AC 1", "Rdc n0 0 1e18"], 0
     for rs, ys, length in zip(r, y, lengths, strict=True):
         step = float(length) / cells if length > 1e-12 else 0.0  # what rounding leaves is no section to a circuit
@@ -100,37 +100,42 @@ def ngspice(cells: int, **inputs: Any) -> Any:
 
 def one_by_one(method: Method, **inputs: Any) -> Any:
     """A method that takes one force and position with all their tones, over the reference cases."""
-    keys = [k for k, v in inputs.items() if np.ndim(v) and k != "f_Hz"]
-    columns = np.broadcast_arrays(inputs["f_Hz"], *(inputs[k] for k in keys))
+    keys = [k for k, v in inputs.items() if np.ndim(v) and k != "frequency_hz"]
+    columns = np.broadcast_arrays(inputs["frequency_hz"], *(inputs[k] for k in keys))
     return np.array(
         [
-            complex(method(**inputs | dict(zip(("f_Hz", *keys), row, strict=True)))[0])
+            complex(method(**inputs | dict(zip(("frequency_hz", *keys), row, strict=True)))[0])
             for row in zip(*columns, strict=True)
         ]
     )
 
 
-SPOT = PLATE | {"f_Hz": np.array(TONES)}
-SWEEP = PLATE | {"f_Hz": np.geomspace(1e3, 1e5, 2000)}
+SPOT = PLATE | {"frequency_hz": np.array(TONES)}
+SWEEP = PLATE | {"frequency_hz": np.geomspace(1e3, 1e5, 2000)}
+
+
+def by_name(method: Method, **options: Any) -> Method:
+    """A method of a line that takes the line's quantities by name."""
+    return lambda **inputs: method(PressedLine(**inputs), **options)
 
 
 def methods() -> Iterator[tuple[str, Method, Inputs, Method | None]]:
     """Name, what is timed, on which inputs, and what is held against the references where that differs."""
     per_call = partial(one_by_one, scikit_rf)
-    yield "recursion, grid", line.impedance, grid(), None
-    yield "recursion, 10^5 triples", line.impedance, triples(10**5), None
-    yield "recursion, 10^6 triples", line.impedance, triples(10**6), None
-    by = {"of": ["F_N", "x_p_left_edge_m"]}
-    yield "recursion with dZ/dF and dZ/dx, 10^5 triples", line.sensitivities, triples(10**5) | by, line.impedance
-    yield "exponentials, corrected", line_closed.impedance, grid(), None
-    yield "exponentials, B.48 as printed", partial(line_closed.impedance, "B.48"), grid(), None
-    yield "ABCD matrices", line_abcd.impedance, grid(), None
+    yield "recursion, grid", by_name(line.impedance), grid(), None
+    yield "recursion, 10^5 triples", by_name(line.impedance), triples(10**5), None
+    yield "recursion, 10^6 triples", by_name(line.impedance), triples(10**6), None
+    slopes = by_name(line.sensitivities, of=["force_n", "left_m"])
+    yield "recursion with dZ/dF and dZ/dx, 10^5 triples", slopes, triples(10**5), by_name(line.impedance)
+    yield "exponentials, corrected", by_name(line_closed.impedance), grid(), None
+    yield "exponentials, B.48 as printed", by_name(line_closed.impedance, as_printed="B.48"), grid(), None
+    yield "ABCD matrices", by_name(line_abcd.impedance), grid(), None
     for cells, size in ((10, 61), (100, 61), (1000, 21), (10_000, 11)):
-        yield f"pi ladder, {cells}", partial(line_ladder.impedance, cells), grid(size, size), None
+        yield f"pi ladder, {cells}", by_name(line_ladder.impedance, cells=cells), grid(size, size), None
     for cells, size in ((10, 61), (100, 61), (1000, 21)):
         yield (
             f"one-sided ladder, {cells}",
-            partial(line_ladder.impedance, cells, one_sided=True),
+            by_name(line_ladder.impedance, cells=cells, one_sided=True),
             grid(size, size),
             None,
         )
@@ -147,9 +152,9 @@ def methods() -> Iterator[tuple[str, Method, Inputs, Method | None]]:
 def together() -> Iterator[tuple[Inputs, list[Any]]]:
     """The reference cases, those of one geometry as arrays, and their impedances with 25 digits."""
     known = cases()
-    for width in {inputs["W_m"] for inputs, _ in known}:
-        part = [(inputs, z) for inputs, z in known if inputs["W_m"] == width]
-        columns = {k: np.array([inputs[k] for inputs, _ in part]) for k in ("f_Hz", "F_N", "x_p_left_edge_m")}
+    for width in {inputs["width_m"] for inputs, _ in known}:
+        part = [(inputs, z) for inputs, z in known if inputs["width_m"] == width]
+        columns = {k: np.array([inputs[k] for inputs, _ in part]) for k in ("frequency_hz", "force_n", "left_m")}
         with mpmath.workdps(40):
             yield part[0][0] | columns, [mpmath.mpc(*z) for _, z in part]
 
@@ -205,21 +210,21 @@ TARGETS = {  # impedances/s, and times scikit-rf's
 def swept() -> dict[str, Method]:
     """Methods whose errors are looked at over frequency and length."""
     return {
-        "recursion": line.impedance,
-        "ABCD matrices": line_abcd.impedance,
-        "exponentials, corrected": line_closed.impedance,
-        "exponentials, B.48 as printed": partial(line_closed.impedance, "B.48"),
-        "pi ladder, 100 cells": partial(line_ladder.impedance, 100),
+        "recursion": by_name(line.impedance),
+        "ABCD matrices": by_name(line_abcd.impedance),
+        "exponentials, corrected": by_name(line_closed.impedance),
+        "exponentials, B.48 as printed": by_name(line_closed.impedance, as_printed="B.48"),
+        "pi ladder, 100 cells": by_name(line_ladder.impedance, cells=100),
         "scikit-rf": lambda **inputs: scikit_rf(**inputs)[0],
     }
 
 
 ALONG: dict[str, tuple[Any, Callable[[float], Inputs]]] = {
-    "f_Hz": (np.geomspace(1e-9, 1e9, 73), lambda f: PLATE | {"f_Hz": f}),
-    "L_m": (
+    "frequency_hz": (np.geomspace(1e-9, 1e9, 73), lambda f: PLATE | {"frequency_hz": f}),
+    "length_m": (
         np.geomspace(1e-3, 1e3, 49),
         lambda length: (
-            PLATE | {"L_m": length, "L_p_m": 0.1 * length, "x_p_left_edge_m": 0.45 * length, "F_N": 30 * length}
+            PLATE | {"length_m": length, "tip_m": 0.1 * length, "left_m": 0.45 * length, "force_n": 30 * length}
         ),
     ),
 }
@@ -271,9 +276,12 @@ def misprints() -> list[dict[str, Any]]:
     rows = []
     for printed in line_closed.PRINTED:
         for tone in TONES:
-            inputs = grid(5, 5) | {"f_Hz": tone}
-            z, wrong = line.impedance(**inputs), line_closed.impedance(printed, **inputs)
-            entry: dict[str, Any] = {"equation": printed, "f_Hz": tone}
+            inputs = grid(5, 5) | {"frequency_hz": tone}
+            z, wrong = (
+                line.impedance(line.PressedLine(**inputs)),
+                line_closed.impedance(line.PressedLine(**inputs), printed),
+            )
+            entry: dict[str, Any] = {"equation": printed, "frequency_hz": tone}
             for what, value in (
                 ("off", np.abs(wrong / z - 1)),
                 ("Re", wrong.real / z.real),
@@ -306,7 +314,7 @@ def table(rows: list[dict[str, Any]], wrong: list[dict[str, Any]]) -> str:
     lines += ["", "| as printed | f [Hz] | abs(Z'/Z - 1) | Re Z'/Re Z | Im Z'/Im Z |", "|---|---|---|---|---|"]
     for w in wrong:
         spans = " | ".join(" .. ".join(f"{v:.3g}" for v in w[k]) for k in ("off", "Re", "Im"))
-        lines.append(f"| {w['equation']} | {w['f_Hz']:g} | {spans} |")
+        lines.append(f"| {w['equation']} | {w['frequency_hz']:g} | {spans} |")
     return "\n".join(lines) + "\n"
 
 
@@ -353,7 +361,9 @@ def draw_stability(found: dict[str, Any]) -> None:
     import matplotlib.pyplot as plt
 
     figure, panels = plt.subplots(2, 2, figsize=(9, 6.6), sharex="col", sharey=True, layout="constrained")
-    for column, (along, label) in enumerate((("f_Hz", "frequency [Hz]"), ("L_m", "length at 99.7 kHz [m]"))):
+    for column, (along, label) in enumerate(
+        (("frequency_hz", "frequency [Hz]"), ("length_m", "length at 99.7 kHz [m]"))
+    ):
         at, errors_, last = (found[along][key] for key in ("at", "errors", "ends"))
         for row, part in enumerate(("Z", "Re Z")):
             axes = panels[row, column]

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.io
 
 from sensorgen.measure.log import Log
-from sensorgen.measure.log.words import reading
+from sensorgen.measure.log.notes import reading
 
 HERE = Path(__file__).parent
 TESTS = HERE.parent / "tests" / "log"

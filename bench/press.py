@@ -88,7 +88,7 @@ def moved(name, materials, fineness, stresses=STRESSES):
     u = [np.interp(p, found.stress_pa, found.displacement_m, right=np.nan) * 1e6 for p in (1e4, 1e5)]
     said = "; ".join(found.faults)
     shown = [f"{v:.3f}" if np.isfinite(v) else "not reached" for v in u]
-    return f"| {name} | {shown[0]} | {shown[1]} | {len(run.mesh.triangles)} | {seconds:.1f} | {said} |"
+    return f"| {name} | {shown[0]} | {shown[1]} | {len(run.problem.elements.mesh.outer)} | {seconds:.1f} | {said} |"
 
 
 def mesh_table():
@@ -446,9 +446,9 @@ def draw_pressed(ax, run, state):
     places = run.problem.places(state.u_m) * 1e3
     softest = run.problem.elements.law.mu_pa.min()
     rubber = run.problem.elements.law.mu_pa == softest
-    for corners, soft in zip(run.mesh.triangles[:, [0, 3, 1, 4, 2, 5]], rubber, strict=True):
+    for corners, soft in zip(run.problem.elements.mesh.outer[:, [0, 3, 1, 4, 2, 5]], rubber, strict=True):
         ax.fill(*places[corners].T, fc="#cfe3f5" if soft else "0.9", ec="0.7", lw=0.2)
-    for side in run.faces.sides[:, [0, 2, 1]]:
+    for side in run.problem.faces.nodes:
         ax.plot(*places[side].T, color=ORANGE, lw=1)
     ax.set(aspect="equal", xlabel="x [mm]", title=f"{state.pressure_pa / 1e3:g} kPa")
     ax.locator_params(axis="x", nbins=3)

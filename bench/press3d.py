@@ -19,7 +19,7 @@ from sensorgen.design.design import make
 from sensorgen.models import press2d, press3d
 from sensorgen.models.press3d import Elastic, Held, Pieces
 from sensorgen.scene.scene import Body, Scene, box
-from sensorgen.solvers.contact import brick_element
+from sensorgen.solvers.contact import element
 
 HERE = Path(__file__).parent
 PICTURES = HERE.parent / "docs" / "pictures"
@@ -207,11 +207,11 @@ def said(value, how):
 
 def section(ax, run, state, enlarged):
     """Edges of bricks in the plane y = 0, moved."""
-    elements = run.elements
-    mesh, moved = elements.mesh, elements.all_nodes(state.u_m, state.inner)
+    elements = run.problem.elements
+    mesh, moved = elements.mesh, elements.mesh.all_nodes(state.u_m, state.inner.bubble)
     places = (mesh.points_m + enlarged * moved) * 1e3
     s = np.linspace(-1, 1, 9)
-    shape = brick_element.values(s)
+    shape = element.line_values(s)
     here = mesh.nodes[mesh.boxes[:, 1] == 0].reshape(-1, 3, 3, 3)[:, :, 0, :]
     region = mesh.region[mesh.boxes[:, 1] == 0]
     for k, known in enumerate(mesh.bricks.regions):

@@ -20,7 +20,8 @@ sys.path.insert(0, str(HERE.parent / "tests" / "recording"))
 
 import made  # noqa: E402 - the truth is made as for the tests
 
-from sensorgen.analysis.plots import bench, ways  # noqa: E402
+from sensorgen.analysis.plots import recordings as plots  # noqa: E402
+from sensorgen.analysis.plots import static  # noqa: E402
 from sensorgen.measure.recording import joined, read, rig  # noqa: E402
 from sensorgen.measure.signal import drift, hysteresis, lowpass, presses, waveform  # noqa: E402
 from sensorgen.measure.signal.run import processed  # noqa: E402
@@ -170,7 +171,7 @@ def truth():
     with tempfile.TemporaryDirectory() as folder:
         run, _ = joined_run(Path(folder), plan, 7.25, 2.1e-4, creep=0.02, seed=5)
     one, of = run.recording, made.sensor()
-    at = presses.pressed(one.time_s, run.force_n)
+    at = presses.by_force(one.time_s, run.force_n)
     creep = drift.fitted(one.time_s, one.impedance_ohm, one.valid(), run.force_n)
     rest = of.impedance(made.TONES_HZ, 0.0, 0.05)
     raw = presses.pairs(one.time_s, one.impedance_ohm, one.valid(), at, run.force_n, run.set_position_mm)
@@ -228,7 +229,7 @@ def laws():
         every = np.ones(len(run.time_s), bool)
         fit = drift.fitted(run.time_s, run.impedance_ohm, every, run.force_n)
         clean = fit.removed(run.time_s, run.impedance_ohm) * rest / fit.rest_ohm()
-        at = presses.pressed(run.time_s, run.force_n)
+        at = presses.by_force(run.time_s, run.force_n)
         raw, free = (
             presses.pairs(run.time_s, z, every, at, run.force_n, run.position_mm) for z in (run.impedance_ohm, clean)
         )
@@ -297,23 +298,23 @@ def pulls(of, z, noise, plan):
 def pictures(run, pairs):
     one = run.recording
     valid = one.valid()
-    shown = bench.Run(
+    shown = plots.Run(
         "synthetic run of known truth", made.TONES_HZ, one.time_s[valid], one.impedance_ohm[valid],
         *lowpass.filtered(one), pairs,
     )  # fmt: skip
-    (PICTURES / "recordings-time.png").write_bytes(bench.over_time(shown))
-    for part in bench.PARTS:
-        (PICTURES / f"recordings-{part}.png").write_bytes(bench.surfaces(shown, part))
+    (PICTURES / "recordings-time.png").write_bytes(plots.over_time(shown))
+    for part in plots.PARTS:
+        (PICTURES / f"recordings-{part}.png").write_bytes(plots.surfaces(shown, part))
     sets = {}
     for seed in range(4):
         plan = made.presses(40, seed=seed)
         other = made.run(plan, RATE, (1 + seed) * NOISE, creep=0.005, seed=seed)
         every = np.ones(len(other.time_s), bool)
-        at = presses.pressed(other.time_s, other.force_n)
+        at = presses.by_force(other.time_s, other.force_n)
         sets[f"print {seed + 1}"] = presses.pairs(
             other.time_s, other.impedance_ohm, every, at, other.force_n, other.position_mm
         )
-    (PICTURES / "recordings-normalised.png").write_bytes(bench.normalised_differences(sets, made.TONES_HZ))
+    (PICTURES / "recordings-normalised.png").write_bytes(plots.normalised_differences(sets, made.TONES_HZ))
 
 
 def ways_picture():
@@ -323,7 +324,7 @@ def ways_picture():
         run, _ = joined_run(Path(folder), plan, 7.25, 0.0, law=made.answering(0.01, 3.0), ramp_s=6.0)
     found = hysteresis.of_presses(processed(run.recording, run, law="smooth"))
     name = "synthetic film that answers within 3 s"
-    (PICTURES / "recordings-ways.png").write_bytes(ways.ways(found.ways, made.TONES_HZ, name))
+    (PICTURES / "recordings-ways.png").write_bytes(static.png(plots.hysteresis(found.ways, made.TONES_HZ, name)))
 
 
 def main():

@@ -15,7 +15,7 @@ import bench_files  # noqa: E402 - it is among the tests
 
 from sensorgen.analysis.report import report, written  # noqa: E402
 from sensorgen.design.specimen_name import design_of, parse  # noqa: E402
-from sensorgen.measure.log import Log, bench, words  # noqa: E402
+from sensorgen.measure.log import Log, bench, notes  # noqa: E402
 
 RATE_HZ, PERIOD_S, NAME = 140.0, 20.0, "23 triX .1mm"
 
@@ -27,9 +27,9 @@ def filled(folder: Path, samples: int) -> Path:
     files = bench_files.write(folder, "run", sensor, count, RATE_HZ, dwell_s=8.0, rest_s=10.4)
     with Log(folder / "log.db", create=True) as log:
         start = time.process_time()
-        bench.take(log, NAME, *files)
+        bench.log_recording(log, NAME, *files)
         print(f"import: {time.process_time() - start:.1f} s of processor time")
-        log.add([words.reading(NAME, "0.74k", "28")])
+        log.add([notes.reading(NAME, "0.74k", "28")])
     return folder / "log.db"
 
 

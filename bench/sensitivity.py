@@ -18,7 +18,7 @@ from sensorgen.prediction.evaluate import TONES_HZ
 from sensorgen.prediction.sensitivity import HELD, Sensitivity, sensitivity
 
 FORCE_N, RHO_OHM_M = 6.0, 0.135
-RECT_MESH = 1.022  # rise in the limit of fine meshes over that of the default mesh: docs/press3d.md
+RECT_MESH = 1.022  # rise in the limit of fine meshes over that of the default mesh: docs/compression.md
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "sensitivity.png"
 DESIGNS = {
     "plate": {"shape": "reference"},

@@ -41,9 +41,22 @@ SPOT = Patch(0.0413, 0.0227, 0.02, 0.02, 1.2)
 
 def exact_line():
     return line.impedance(
-        L_m=0.1, W_m=0.1, H_top_m=3e-4, H_bottom_m=3e-4, rho_top_ohm_m=0.135, rho_bottom_ohm_m=0.135, d_m=FILM_M,
-        eps_r=EPS_R, f_Hz=TONES, F_N=1 - 1 / 1.2, E_Pa=1 / 0.002, L_p_m=0.02, x_p_left_edge_m=0.0413,
-    )[:, None, None]  # fmt: skip
+        line.PressedLine(
+            length_m=0.1,
+            width_m=0.1,
+            top_thickness_m=3e-4,
+            bottom_thickness_m=3e-4,
+            top_resistivity_ohm_m=0.135,
+            bottom_resistivity_ohm_m=0.135,
+            film_m=FILM_M,
+            eps_r=EPS_R,
+            frequency_hz=TONES,
+            force_n=1 - 1 / 1.2,
+            modulus_pa=1 / 0.002,
+            tip_m=0.02,
+            left_m=0.0413,
+        )
+    )[:, None, None]
 
 
 CASES = {

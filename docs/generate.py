@@ -1,13 +1,17 @@
 """Write what can be derived: docs/reference.md from the --help texts, docs/thesis.md, and pictures from the designs."""
 
+import os
+import re
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 DOCS = Path(__file__).parent
-DESIGNS = DOCS.parent / "designs"
-PICTURES = {"trix-d0.2": ["tri"], "sqxy-d0.2": ["rect"], "trix-upside-down": ["tri", "--orientation", "upside-down"]}
+README = DOCS.parent / "README.md"
+FIRST_SCREEN = ["build", "tri", "--dielectric", "0.2"]
+LINES = 30  # of the first screen
+PICTURES = {"trix-d0.2": ["tri", "--drawn"]}
 PAGES = (
     [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"],
     ["slice"], ["slice", "tri"], ["gcode"], ["gcode", "check"], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
@@ -20,11 +24,13 @@ PAGES = (
 )  # fmt: skip
 
 
-def sensorgen(*words: str) -> str:
-    """What the command prints, on a terminal of 100 columns."""
+def sensorgen(*words: str, folder: str = ".") -> str:
+    """Output of a command in a folder, on a terminal of 100 columns."""
     command = [sys.executable, "-m", "sensorgen", *words]
     environment = {"COLUMNS": "100", "TERMINAL_WIDTH": "100", "PYTHONIOENCODING": "utf-8", "PATH": ""}
-    return subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout
+    environment["PYTHONPATH"] = os.environ.get("PYTHONPATH", "")
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment, cwd=folder)
+    return done.stdout
 
 
 def reference() -> str:
@@ -34,8 +40,19 @@ def reference() -> str:
     return "\n".join([head, *pages])
 
 
+def first_screen() -> str:
+    """README.md with what its first command prints, at most 30 lines of it."""
+    with tempfile.TemporaryDirectory() as folder:
+        lines = sensorgen(*FIRST_SCREEN, "--no-cad", folder=folder).rstrip().splitlines()
+    shown = "\n".join(lines if len(lines) <= LINES else [*lines[:12], "..."])
+    block = f"\n```text\n$ sensorgen {' '.join(FIRST_SCREEN)}\n{shown}\n```\n"
+    marks = re.compile(r"(<!-- first screen.*?-->\n).*?(<!-- end of first screen -->)", re.DOTALL)
+    return marks.sub(lambda mark: mark[1] + block + mark[2], README.read_text("utf-8"))
+
+
 def main() -> None:
     """Write reference, the thesis's page and pictures."""
+    README.write_text(first_screen(), "utf-8")
     sensorgen("thesis", "--format", "md", "--output", str(DOCS))
     (DOCS / "reference.md").write_text(reference(), "utf-8")
     (DOCS / "pictures").mkdir(exist_ok=True)

@@ -1,4 +1,4 @@
-"""Write the pictures of the docs that predictions, cards, sheets and stacks are shown with; run by `make docs`."""
+"""Write the pictures of predictions, resolution, sheets and double layers in the docs; run by `make docs`."""
 
 import tempfile
 from pathlib import Path
@@ -7,8 +7,8 @@ import numpy as np
 from generate import DOCS, sensorgen
 from matplotlib.figure import Figure
 
-from sensorgen.analysis.plots import sheet
-from sensorgen.analysis.plots.card import figure
+from sensorgen.analysis.plots import sheet, static
+from sensorgen.analysis.plots.identifiability import figure
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.design import make
 from sensorgen.models.sheet import Patch, Sheet, contact_sets, localise
@@ -24,26 +24,26 @@ SENSORS = {
     "plate": ("solid plate, 0.6 mm", {"shape": "reference"}),
     "tri": ("triangles over 0.1 mm", {"shape": "tri", "parameters": {"dielectric_mm": 0.1}}),
 }
-PREDICTED = ("resistance", "reactance", "resistance-by-position", "reactance-by-force", "inverse-position")
+PREDICTED = ("inverse-position",)
 
 
-def card(name: str) -> None:
-    """The identifiability card of one sensor."""
+def identifiability(name: str) -> None:
+    """Resolution of force and position of one sensor."""
     title, data = SENSORS[name]
-    card = figure(build_sensor(drawn(make(data))).sensor, TONES_HZ, title=title)
-    card.savefig(PICTURES / f"card-{name}.png", dpi=90)
+    shown = figure(build_sensor(drawn(make(data))).sensor, TONES_HZ, title=title)
+    (PICTURES / f"identifiability-{name}.png").write_bytes(static.png(shown))
 
 
 def predictions() -> None:
-    """R and X of the triangular sensor over force, position and tone."""
+    """R and X of the triangular sensor over force, position and frequency."""
     with tempfile.TemporaryDirectory() as folder:
-        sensorgen("predict", "tri", "--dielectric", "0.1", "--force", "0:6:0.1", "--plot", folder)
+        sensorgen("predict", "tri", "--dielectric", "0.1", "--force", "0:6:0.1", "--drawn", "--plot", folder)
         for name in PREDICTED:
             (PICTURES / f"predict-{name}.png").write_bytes((Path(folder) / f"{name}.png").read_bytes())
 
 
 def bounds_on_a_sheet() -> None:
-    """Where on a sheet of 100 x 100 mm and 5 ohm m a press of 6 N is located, by contacts."""
+    """Resolution of position on a sheet of 100 x 100 mm and 5 ohm m under 6 N, by contacts."""
     film = Sheet(0.1, 0.1, (5.0 / 3e-4,) * 2, EPS0_F_PER_M * 4.68 / 6e-4)
     factor = 1 / (1 - 0.05)
     press, per_newton = Patch(0.0, 0.0, 0.02, 0.02, factor), {"capacitance_factor": factor**2 * 0.05 / 6}
@@ -54,7 +54,7 @@ def bounds_on_a_sheet() -> None:
 
 
 def touch() -> None:
-    """What an isolation layer of X60 leaves of a finger's touch, by wiring."""
+    """Apparent force of a touch through an isolation layer of X60, by wiring."""
     drawn = Figure(figsize=(9, 3.6), layout="constrained")
     thickness_mm = np.geomspace(0.02, 10, 40)
     for axes, (title, data) in zip(drawn.subplots(1, 2, sharey=True), SENSORS.values(), strict=True):
@@ -68,7 +68,7 @@ def touch() -> None:
         axes.set(title=title, xlabel="isolation (X60) [mm]", ylim=(3e-4, 1e4))
         axes.grid(alpha=0.3)
     first, second = drawn.axes
-    first.set_ylabel("force that a touch is mistaken for [N]")
+    first.set_ylabel("apparent force of a touch [N]")
     first.legend(fontsize=8)
     second.text(10, 0.11, "0.1 N", ha="right", fontsize=8, color="0.4")
     second.text(0.105, 3e3, "thesis: 0.1 mm", fontsize=8, color="0.4")
@@ -77,7 +77,7 @@ def touch() -> None:
 
 if __name__ == "__main__":
     for each in SENSORS:
-        card(each)
+        identifiability(each)
     predictions()
     bounds_on_a_sheet()
     touch()

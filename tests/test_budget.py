@@ -13,9 +13,19 @@ from sensorgen.prediction.error_budget import Load, error_budget
 
 TONES = (1.1e3, 99.7e3)
 PLATE = {
-    "L_m": 0.1, "W_m": 0.01, "H_top_m": 3e-4, "H_bottom_m": 3e-4, "d_m": 6e-4, "eps_r": 4.68, "E_Pa": 6e6, "F_N": 6.0,
-    "L_p_m": 0.01, "x_p_left_edge_m": 0.045, "rho_top_ohm_m": 0.07, "rho_bottom_ohm_m": 0.2,
-}  # fmt: skip
+    "length_m": 0.1,
+    "width_m": 0.01,
+    "top_thickness_m": 3e-4,
+    "bottom_thickness_m": 3e-4,
+    "film_m": 6e-4,
+    "eps_r": 4.68,
+    "modulus_pa": 6e6,
+    "force_n": 6.0,
+    "tip_m": 0.01,
+    "left_m": 0.045,
+    "top_resistivity_ohm_m": 0.07,
+    "bottom_resistivity_ohm_m": 0.2,
+}
 
 
 def budget(model, tones=TONES, force=6.0, accuracy=None):
@@ -30,17 +40,20 @@ def shares(got, name):
     return next(term.changes for term in got.terms if term.name == name)
 
 
+RESISTIVITIES = ("top_resistivity_ohm_m", "bottom_resistivity_ohm_m")
+
+
 def z(**changes):
-    return line.impedance(**PLATE | changes, f_Hz=np.array(TONES))
+    return line.impedance(line.PressedLine(**PLATE | changes, frequency_hz=np.array(TONES)))
 
 
 @pytest.mark.parametrize(
     ("term", "ends"),
     [
-        ("resistivity", [dict.fromkeys(("rho_top_ohm_m", "rho_bottom_ohm_m"), rho) for rho in (0.07, 1 / 1.2)]),
-        ("stiffness", [{"E_Pa": 1e6}, {"E_Pa": 6e6}]),
+        ("resistivity", [dict.fromkeys(RESISTIVITIES, rho) for rho in (0.07, 1 / 1.2)]),
+        ("stiffness", [{"modulus_pa": 1e6}, {"modulus_pa": 6e6}]),
         ("permittivity of x60", [{"eps_r": 4.68}, {"eps_r": 6.33}]),
-        ("compression", [{"E_Pa": 6e6 * 4 / 3 * (1 + (10 / 1.2) ** 2)}]),
+        ("compression", [{"modulus_pa": 6e6 * 4 / 3 * (1 + (10 / 1.2) ** 2)}]),
     ],
 )  # fmt: skip
 def test_terms_of_the_plate_by_hand(term, ends):
@@ -51,7 +64,9 @@ def test_terms_of_the_plate_by_hand(term, ends):
         assert getattr(got, measure) == pytest.approx(expected, rel=1e-9)
 
     def slope(**end):
-        return line.sensitivities(of=["F_N"], **PLATE | end, f_Hz=np.array(TONES))[1]["F_N"]
+        return line.sensitivities(line.PressedLine(**PLATE | end, frequency_hz=np.array(TONES)), of=["force_n"])[1][
+            "force_n"
+        ]
 
     assert got.by_force == pytest.approx(max(abs(slope(**e) / slope() - 1).max() for e in ends), rel=1e-9)
 

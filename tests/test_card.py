@@ -10,15 +10,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 from scipy.optimize import least_squares
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.evaluate import TONES_HZ
-from sensorgen.prediction.identifiability import card, surface
+from sensorgen.prediction.identifiability import Identifiability, identify, surface
 from sensorgen.prediction.identifiability.fisher import Setup, Slopes, bearable, bounds, shares, slopes
-from sensorgen.prediction.identifiability.tones import spread
+from sensorgen.prediction.identifiability.frequencies import spread
 from sensorgen.prediction.identifiability.verdict import Required, bracket, metres, newtons, required, verdict
 
 EPS0 = 8.8541878128e-12
@@ -110,8 +111,8 @@ def test_the_rule_of_thumb_in_the_middle(force, noise):
     ("rho", "corner_khz"), [((0.07, 0.07), 493.8), ((0.2, 0.2), 172.8), ((0.07, 0.2), 256.06), ((1 / 1.2,) * 2, 41.5)]
 )
 def test_corner_frequencies(rho, corner_khz):
-    found = card(replace(plate(), resistivity_ohm_m=rho), TONES_HZ)
-    assert found["corner_frequency_hz"] / 1e3 == pytest.approx(corner_khz, rel=1e-3)
+    found = identify(replace(plate(), resistivity_ohm_m=rho), TONES_HZ)
+    assert found.corner_frequency_hz / 1e3 == pytest.approx(corner_khz, rel=1e-3)
 
 
 def test_the_highest_tone_carries_nearly_all_that_is_told_of_position():
@@ -119,7 +120,7 @@ def test_the_highest_tone_carries_nearly_all_that_is_told_of_position():
     seven, alone, others = (sigmas(plate(), tones)[1] for tones in (TONES_HZ, TONES_HZ[-1:], TONES_HZ[:-1]))
     assert alone == pytest.approx(seven, rel=0.15)
     assert others > 2 * seven
-    share = [tone["share_of_position_information"] for tone in card(plate(), TONES_HZ)["tones"]]
+    share = [row.share_of_position_information for row in identify(plate(), TONES_HZ).frequencies]
     assert share[-1] > 0.75
     assert share[-1] + share[-2] > 0.95
     assert share == sorted(share)
@@ -241,29 +242,29 @@ def test_more_tones_never_hurt(sensor):
 
 
 def test_without_a_force_position_is_undefined_and_force_is_not():
-    found = card(plate(), TONES_HZ, force_n=0.0)
-    assert found["sigma_position_m"] is None
-    assert found["correlation"] is None
-    assert found["sigma_force_n"] == pytest.approx(2.25, rel=0.02)
-    assert "without a force" in found["reason"]
-    assert "without a force there is no press to locate" in found["verdict"]
-    json.dumps(found, allow_nan=False)
+    found = identify(plate(), TONES_HZ, force_n=0.0)
+    assert found.sigma_position_m is None
+    assert found.correlation is None
+    assert found.sigma_force_n == pytest.approx(2.25, rel=0.02)
+    assert "without a force" in found.reason
+    assert "without a force there is no press to locate" in found.verdict
+    plain(found)
 
 
 def test_electrodes_without_resistance_tell_force_alone():
     """The sensor is a capacitor: C of the patch over C of all, so sigma = n C (1-s)^2 / (C_p ds/dF) / sqrt(7)."""
-    found = card(replace(plate(), resistivity_ohm_m=(0.0, 0.0)), TONES_HZ)
-    assert (found["corner_frequency_hz"], found["sigma_position_m"]) == (None, None)
-    assert "no trace" in found["reason"]
+    found = identify(replace(plate(), resistivity_ohm_m=(0.0, 0.0)), TONES_HZ)
+    assert (found.corner_frequency_hz, found.sigma_position_m) == (None, None)
+    assert "does not depend on position" in found.reason
     strain, per_newton = 0.01, 0.01 / 6
     relative = 0.1 * per_newton / (1 - strain) ** 2 / (0.9 + 0.1 / (1 - strain))
-    assert found["sigma_force_n"] == pytest.approx(1e-3 / relative / math.sqrt(7), rel=1e-9)
-    assert found["map"]["of_position"]["median"] is None
-    assert [tone["share_of_position_information"] for tone in found["tones"]] == [None] * 7
-    assert found["best_tones"][0]["frequency_hz"] is None
-    assert found["advised_tones"]["pair"]["frequency_hz"] is None
-    assert found["changes"][0]["kind"] == "electrodes"
-    json.dumps(found, allow_nan=False)
+    assert found.sigma_force_n == pytest.approx(1e-3 / relative / math.sqrt(7), rel=1e-9)
+    assert found.map.of_position.median is None
+    assert [row.share_of_position_information for row in found.frequencies] == [None] * 7
+    assert found.best_frequencies[0].frequency_hz == ()
+    assert found.advised_frequencies.pair.frequency_hz == ()
+    assert found.changes[0].kind == "electrodes"
+    plain(found)
 
 
 def test_directions_that_are_one_tell_nothing_apart():
@@ -280,11 +281,11 @@ def test_a_press_that_closes_the_film_is_left_out_of_the_map():
     sensor = replace(table_c1(), width_m=0.01)
     force, place = np.array([55.0]), np.array([0.0, 0.089, 0.178])
     assert bearable(sensor, force[:, None], place).tolist() == [[False, True, False]]
-    found = card(sensor, TONES_HZ, force_n=55.0)
-    assert found["map"]["sigma_force_n"][-1][0] is None
-    assert found["map"]["sigma_force_n"][-1][10] > 0
-    assert found["map"]["sigma_force_n"][1][0] > 0
-    json.dumps(found, allow_nan=False)
+    found = identify(sensor, TONES_HZ, force_n=55.0)
+    assert found.map.sigma_force_n[-1][0] is None
+    assert found.map.sigma_force_n[-1][10] > 0
+    assert found.map.sigma_force_n[1][0] > 0
+    plain(found)
 
 
 @pytest.mark.parametrize(
@@ -292,123 +293,123 @@ def test_a_press_that_closes_the_film_is_left_out_of_the_map():
     [
         ({"frequency_hz": []}, "at least one frequency"),
         ({"frequency_hz": [0.0]}, "Z is infinite"),
-        ({"frequency_hz": [-1.0]}, "f_Hz"),
-        ({"frequency_hz": [math.nan]}, "f_Hz"),
+        ({"frequency_hz": [-1.0]}, "frequency_hz"),
+        ({"frequency_hz": [math.nan]}, "frequency_hz"),
         ({"noise": 0.0}, "noise is 0; expected a number above 0"),
         ({"noise": math.nan}, "noise is nan"),
         ({"highest_hz": -1.0}, "highest frequency is -1"),
         ({"position_m": 0.2}, "position 200 mm is outside"),
         ({"force_n": 700.0}, "its electrodes touch"),
-        ({"force_n": math.nan}, "F_N has to be a number"),
+        ({"force_n": math.nan}, "force_n has to be a number"),
         ({"sensor": replace(plate(), resistivity_ohm_m=(0.0, 0.0), far_end="short")}, "Z is 0"),
     ],
 )
 def test_what_it_refuses(changes, words):
     with pytest.raises(SensorgenError, match=words):
-        card(**({"sensor": plate(), "frequency_hz": TONES_HZ} | changes))
+        identify(**({"sensor": plate(), "frequency_hz": TONES_HZ} | changes))
 
 
 # ---- what the card holds ----
 
 
 def test_slopes_per_tone_are_those_of_the_sensor():
-    found, sensor = card(tri(), TONES_HZ, force_n=3.0, position_m=0.03), tri()
-    for row in found["tones"]:
-        z, by_force, by_place = sensor.response(row["frequency_hz"], 3.0, 0.03)
-        assert row["magnitude_ohm"] == pytest.approx(abs(z))
+    found, sensor = identify(tri(), TONES_HZ, force_n=3.0, position_m=0.03), tri()
+    for row in found.frequencies:
+        z, by_force, by_place = sensor.response(row.frequency_hz, 3.0, 0.03)
+        assert row.magnitude_ohm == pytest.approx(abs(z))
         for name, value in (("by_force_ohm_per_n", by_force), ("by_position_ohm_per_m", by_place)):
-            assert complex(row[name]["re"], row[name]["im"]) == pytest.approx(complex(value))
-        log_slope = (np.log(sensor.impedance(row["frequency_hz"], 3.001, 0.03)) - np.log(z)) / 1e-3
-        assert row["relative_by_force_per_n"]["re"] == pytest.approx(log_slope.real, rel=1e-3)
-        moved = np.log(sensor.impedance(row["frequency_hz"], 3.0, 0.03 + 1e-5)) - np.log(z)
-        assert row["relative_by_position_per_m"]["im"] == pytest.approx(moved.imag / 1e-5, rel=1e-3)
+            assert complex(getattr(row, name).re, getattr(row, name).im) == pytest.approx(complex(value))
+        log_slope = (np.log(sensor.impedance(row.frequency_hz, 3.001, 0.03)) - np.log(z)) / 1e-3
+        assert row.relative_by_force_per_n.re == pytest.approx(log_slope.real, rel=1e-3)
+        moved = np.log(sensor.impedance(row.frequency_hz, 3.0, 0.03 + 1e-5)) - np.log(z)
+        assert row.relative_by_position_per_m.im == pytest.approx(moved.imag / 1e-5, rel=1e-3)
 
 
 def test_press_is_stated():
-    press = card(plate(), TONES_HZ)["press"]
-    assert press == pytest.approx(
-        {"force_n": 6.0, "position_m": 0.05, "tip_m": 0.01, "stress_pa": 6e4, "thinning": 0.01}
+    press = identify(plate(), TONES_HZ).press
+    assert vars(press) == pytest.approx(
+        {"force_n": 6.0, "position_m": 0.05, "tip_m": 0.01, "stress_pa": 6e4, "strain": 0.01}
     )
 
 
 def test_the_map_holds_the_bounds():
     sensor = tri()
-    found = card(sensor, TONES_HZ)["map"]
-    assert found["force_n"] == pytest.approx([0, 1, 2, 3, 4, 5, 6])
-    assert found["position_m"] == pytest.approx(np.arange(21) * 0.005)
-    assert found["sigma_position_m"][0] == [None] * 21
+    found = identify(sensor, TONES_HZ).map
+    assert found.force_n == pytest.approx([0, 1, 2, 3, 4, 5, 6])
+    assert found.position_m == pytest.approx(np.arange(21) * 0.005)
+    assert found.sigma_position_m[0] == (None,) * 21
     for row, column in ((1, 4), (3, 15), (6, 10)):
-        force_n, place = found["force_n"][row], found["position_m"][column]
+        force_n, place = found.force_n[row], found.position_m[column]
         expected = sigmas(sensor, force=force_n, place=place)
-        assert found["sigma_force_n"][row][column] == pytest.approx(expected[0], rel=1e-9)
-        assert 1e3 * found["sigma_position_m"][row][column] == pytest.approx(expected[1], rel=1e-9)
+        assert found.sigma_force_n[row][column] == pytest.approx(expected[0], rel=1e-9)
+        assert 1e3 * found.sigma_position_m[row][column] == pytest.approx(expected[1], rel=1e-9)
     for name, of, serves in (("sigma_force_n", "of_force", 0.6), ("sigma_position_m", "of_position", 0.01)):
-        pressed, of = np.array(found[name][1:], float), found[of]
-        assert of["median"] == pytest.approx(np.median(pressed))
-        assert of["worst"] == pytest.approx(pressed.max())
-        at = of["worst_at"]
-        row, column = found["force_n"].index(at["force_n"]), found["position_m"].index(at["position_m"])
-        assert found[name][row][column] == of["worst"]
-        assert of["share_known"] == pytest.approx((pressed <= serves).mean())
-        assert of["from_force_n"] == 1.0
+        rows, of = getattr(found, name), getattr(found, of)
+        pressed = np.array(rows[1:], float)
+        assert of.median == pytest.approx(np.median(pressed))
+        assert of.worst == pytest.approx(pressed.max())
+        row, column = found.force_n.index(of.worst_force_n), found.position_m.index(of.worst_position_m)
+        assert rows[row][column] == of.worst
+        assert of.share_known == pytest.approx((pressed <= serves).mean())
+        assert of.from_force_n == 1.0
 
 
 def test_light_presses_do_not_count_as_unlocated():
     """Of a map up to 12 N in steps of 2 N all count; up to 3 N those of 0.5 N do not."""
-    assert card(tri(), TONES_HZ, force_n=12.0)["map"]["of_force"]["from_force_n"] == 2.0
-    found = card(tri(), TONES_HZ, force_n=3.0)["map"]
-    assert found["of_force"]["from_force_n"] == 1.0
-    counted = np.array(found["sigma_position_m"][2:], float)
-    assert found["of_position"]["share_known"] == pytest.approx((counted <= 0.01).mean())
-    assert card(tri(), TONES_HZ, force_n=0.5)["map"]["of_force"]["from_force_n"] == 0.5
+    assert identify(tri(), TONES_HZ, force_n=12.0).map.of_force.from_force_n == 2.0
+    found = identify(tri(), TONES_HZ, force_n=3.0).map
+    assert found.of_force.from_force_n == 1.0
+    counted = np.array(found.sigma_position_m[2:], float)
+    assert found.of_position.share_known == pytest.approx((counted <= 0.01).mean())
+    assert identify(tri(), TONES_HZ, force_n=0.5).map.of_force.from_force_n == 0.5
 
 
 def test_a_map_beyond_the_solved_curve_says_so():
     """6 N on the half of a tip that lies on the sensor is 120 kPa; the curve ends at 100."""
-    assert "above 100 kPa the curve is extended" in card(tri(), TONES_HZ)["map"]["doubt"]
-    assert card(plate(), TONES_HZ)["map"]["doubt"] == ""
+    assert "above 100 kPa the curve is extended" in identify(tri(), TONES_HZ).map.doubt
+    assert identify(plate(), TONES_HZ).map.doubt == ""
 
 
 def test_best_tones_are_the_best_of_all_combinations():
     sensor, need = tri(), required(setup(tri()))
-    found = card(sensor, TONES_HZ)["best_tones"]
-    assert [len(best["frequency_hz"]) for best in found] == [1, 2, 3]
+    found = identify(sensor, TONES_HZ).best_frequencies
+    assert [len(best.frequency_hz) for best in found] == [1, 2, 3]
     pairs = {(a, b): setup(sensor, (a, b)).bounds() for a in TONES_HZ for b in TONES_HZ if a < b}
     best = min(pairs, key=lambda pair: float(need.shortfall(pairs[pair])))
-    assert tuple(found[1]["frequency_hz"]) == best
-    assert found[1]["sigma_force_n"] == pytest.approx(float(pairs[best].force_n), rel=1e-9)
-    assert found[1]["sigma_position_m"] == pytest.approx(float(pairs[best].position_m), rel=1e-9)
-    assert found[0]["frequency_hz"] == [99.7e3]
+    assert tuple(found[1].frequency_hz) == best
+    assert found[1].sigma_force_n == pytest.approx(float(pairs[best].force_n), rel=1e-9)
+    assert found[1].sigma_position_m == pytest.approx(float(pairs[best].position_m), rel=1e-9)
+    assert found[0].frequency_hz == (99.7e3,)
 
 
 def test_advised_tones_are_at_least_as_good_as_any_given_ones():
     sensor, need = plate(), required(setup(plate()))
-    found = card(sensor, TONES_HZ)["advised_tones"]
-    assert found["highest_hz"] == pytest.approx(1e6)
-    assert found["lowest_hz"] == pytest.approx(2560.56, rel=1e-4)
+    found = identify(sensor, TONES_HZ).advised_frequencies
+    assert found.highest_hz == pytest.approx(1e6)
+    assert found.lowest_hz == pytest.approx(2560.56, rel=1e-4)
 
     def short(tones):
         return float(need.shortfall(setup(sensor, tones).bounds()))
 
-    assert short(found["single"]["frequency_hz"]) < min(short([f]) for f in TONES_HZ)
-    assert short(found["pair"]["frequency_hz"]) < min(short([a, b]) for a in TONES_HZ for b in TONES_HZ)
+    assert short(found.single.frequency_hz) < min(short([f]) for f in TONES_HZ)
+    assert short(found.pair.frequency_hz) < min(short([a, b]) for a in TONES_HZ for b in TONES_HZ)
     around = [short([f]) for f in np.geomspace(1e4, 1e6, 200)]
-    assert short(found["single"]["frequency_hz"]) == pytest.approx(min(around), rel=0.03)
+    assert short(found.single.frequency_hz) == pytest.approx(min(around), rel=0.03)
 
 
 def test_the_instruments_limit_bounds_the_advice_but_not_the_tones():
-    found = card(plate(), TONES_HZ, highest_hz=5e4)
-    assert found["advised_tones"]["highest_hz"] == pytest.approx(99.7e3)
-    assert max(found["advised_tones"]["pair"]["frequency_hz"]) <= 99.7e3 * (1 + 1e-9)
+    found = identify(plate(), TONES_HZ, highest_hz=5e4)
+    assert found.advised_frequencies.highest_hz == pytest.approx(99.7e3)
+    assert max(found.advised_frequencies.pair.frequency_hz) <= 99.7e3 * (1 + 1e-9)
 
 
 def test_many_tones_are_searched_evenly():
     tones = np.geomspace(1e3, 1e6, 300)
-    best = card(tri(), tones)["best_tones"]
-    assert [len(row["frequency_hz"]) for row in best] == [1, 2, 3]
+    best = identify(tri(), tones).best_frequencies
+    assert [len(row.frequency_hz) for row in best] == [1, 2, 3]
     need = required(setup(tri()))
     exact = min(float(need.shortfall(setup(tri(), [f]).bounds())) for f in tones)
-    assert max(best[0]["sigma_force_n"] / 0.6, best[0]["sigma_position_m"] / 0.01) == pytest.approx(exact, rel=0.05)
+    assert max(best[0].sigma_force_n / 0.6, best[0].sigma_position_m / 0.01) == pytest.approx(exact, rel=0.05)
 
 
 def test_tones_spread_about_the_corner():
@@ -420,9 +421,15 @@ def test_tones_spread_about_the_corner():
     assert spread(setup(plate()))[-1] == pytest.approx(1e6)
 
 
-def test_it_is_plain_data():
-    found = card(plate(), TONES_HZ, stiffest=bonded())
-    assert json.loads(json.dumps(found, allow_nan=False)) == found
+def plain(found: Identifiability):
+    """As JSON and back."""
+    kind = TypeAdapter(Identifiability)
+    text = json.dumps(kind.dump_python(found, mode="json"), allow_nan=False)
+    assert kind.validate_json(text) == found
+
+
+def test_it_goes_to_json_and_back():
+    plain(identify(plate(), TONES_HZ, stiffest=bonded()))
 
 
 def test_it_needs_neither_scipy_nor_matplotlib():
@@ -472,18 +479,18 @@ def test_shortfall_is_the_worse_of_both():
 
 
 def test_the_verdict_on_the_plate_and_on_the_cell():
-    found = card(plate(), TONES_HZ, stiffest=bonded())
-    assert (found["senses_force"], found["locates"]) == ("no", "no")
-    assert found["verdict"] == (
+    found = identify(plate(), TONES_HZ, stiffest=bonded())
+    assert (found.senses_force, found.locates) == ("no", "no")
+    assert found.verdict == (
         "at 0.1 % noise this design cannot sense force and cannot locate a press: at 6 N and 50 mm force is known to "
         "2.2 N, position to 225 mm; the sensor is 100 mm long"
     )
-    assert "what it cannot do is certain" in found["stiffest"]["verdict"]
-    assert "213 N, 21 m" in found["stiffest"]["verdict"]
-    assert found["stiffest"]["sigma_force_n"] == pytest.approx(214, rel=0.01)
-    cell = card(tri(), TONES_HZ)
-    assert "this design senses force and locates a press" in cell["verdict"]
-    assert cell["stiffest"] is None
+    assert "what it cannot do is certain" in found.stiffest.verdict
+    assert "213 N, 21 m" in found.stiffest.verdict
+    assert found.stiffest.sigma_force_n == pytest.approx(214, rel=0.01)
+    cell = identify(tri(), TONES_HZ)
+    assert "this design senses force and locates a press" in cell.verdict
+    assert cell.stiffest is None
 
 
 def test_the_verdict_in_between():

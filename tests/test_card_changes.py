@@ -11,7 +11,7 @@ from sensorgen.design.design import make
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.evaluate import TONES_HZ
-from sensorgen.prediction.identifiability import card, changes
+from sensorgen.prediction.identifiability import changes, identify
 from sensorgen.prediction.identifiability.changes import CHANGES, most_helpful, together
 from sensorgen.prediction.identifiability.fisher import Setup
 from sensorgen.prediction.identifiability.verdict import required
@@ -107,9 +107,9 @@ def test_tips_stay_on_the_sensor():
 
 
 def test_tones_stay_within_the_instrument():
-    assert changes.higher_tones(setup()).frequency_hz == pytest.approx([10 * f for f in TONES_HZ])
-    assert changes.higher_tones(setup(highest=9e5)) == setup(highest=9e5)
-    assert max(changes.tones_at_corner(setup(highest=9e5)).frequency_hz) == pytest.approx(9e5)
+    assert changes.higher_frequencies(setup()).frequency_hz == pytest.approx([10 * f for f in TONES_HZ])
+    assert changes.higher_frequencies(setup(highest=9e5)) == setup(highest=9e5)
+    assert max(changes.frequencies_at_corner(setup(highest=9e5)).frequency_hz) == pytest.approx(9e5)
 
 
 def test_quieter_is_a_tenth_of_the_noise():
@@ -133,15 +133,15 @@ def test_the_best_of_each_kind_in_order():
 
 
 def test_the_microstructure_helps_the_plate_most():
-    first = card(PLATE, TONES_HZ)["changes"][0]
-    assert "tri" in first["change"]
-    assert (first["sigma_force_n"], first["sigma_position_m"]) == pytest.approx((0.17, 0.0088), rel=0.15)
+    first = identify(PLATE, TONES_HZ).changes[0]
+    assert "tri" in first.change
+    assert (first.sigma_force_n, first.sigma_position_m) == pytest.approx((0.17, 0.0088), rel=0.15)
 
 
 def test_position_asks_for_resistance_where_force_is_known():
     """On the cell, tones and electrodes bring 8.3 mm below 2.5 mm at the same force."""
     found = {t.change.kind: t for t in helped(setup(cell_sensor()))}
-    for kind in ("electrodes", "tones"):
+    for kind in ("electrodes", "frequencies"):
         assert float(found[kind].bounds.position_m) < 2.5e-3
         assert float(found[kind].bounds.force_n) < 0.2
     assert "film" not in found
@@ -186,7 +186,7 @@ def test_noise_alone_scales_both():
 
 def test_changes_together_are_all_made():
     tried = helped(setup())
-    assert {t.change.kind for t in tried} == {"film", "noise", "tones"}
+    assert {t.change.kind for t in tried} == {"film", "noise", "frequencies"}
     all_made = setup(cell_sensor(), [10 * f for f in TONES_HZ], noise=1e-4).bounds()
     found = together(setup(), tried)
     assert float(found.force_n) == pytest.approx(float(all_made.force_n))
@@ -197,9 +197,9 @@ def test_tones_go_by_the_corner_of_the_changed_sensor():
     by_name = {c.apply: c for c in CHANGES}
     pair = [
         changes.Tried(by_name[apply], apply(setup()), setup().bounds(), 1.0)
-        for apply in (changes.tones_at_corner, changes.worse_filament)
+        for apply in (changes.frequencies_at_corner, changes.worse_filament)
     ]
-    expected = changes.tones_at_corner(changes.worse_filament(setup())).bounds()
+    expected = changes.frequencies_at_corner(changes.worse_filament(setup())).bounds()
     assert float(together(setup(), pair).position_m) == pytest.approx(float(expected.position_m))
 
 
@@ -211,7 +211,7 @@ def test_together_has_no_answer_where_the_film_closes():
 
 
 def test_names_hold_the_tones():
-    for row in card(PLATE, TONES_HZ)["changes"]:
-        assert "{" not in row["change"]
-        assert row["risk"]
-    assert any("11 kHz to 997 kHz" in row["change"] for row in card(PLATE, TONES_HZ)["changes"])
+    for row in identify(PLATE, TONES_HZ).changes:
+        assert "{" not in row.change
+        assert row.risk
+    assert any("11 kHz to 997 kHz" in row.change for row in identify(PLATE, TONES_HZ).changes)

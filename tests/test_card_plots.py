@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sensorgen.analysis.plots import card as plots
+from sensorgen.analysis.plots import identifiability as plots
+from sensorgen.analysis.plots.static import drawn as drawn_by
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.evaluate import TONES_HZ
@@ -14,18 +15,25 @@ from sensorgen.prediction.identifiability.fisher import Setup
 PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), 8.8541878128e-12 * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))
 
 
+def drawn_of(*given, **how):
+    """The card as matplotlib has it."""
+    figure = plots.figure(*given, **how)
+    return drawn_by(figure, figure.choices[""], figure.title)
+
+
 def test_it_has_maps_of_both_errors_and_single_tones(tmp_path):
-    drawn = plots.figure(PLATE, TONES_HZ, title="plate")
+    drawn = drawn_of(PLATE, TONES_HZ, title="plate")
     labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in drawn.axes]
-    assert labels.count(("position, centre of the tip [mm]", "force [N]")) == 2
+    assert [x for x, _ in labels].count("position, centre of the tip [mm]") == 2
+    assert labels[0][1] == "force [N]"
     assert ("frequency [kHz]", "standard error of force [N]") in labels
-    assert drawn.get_suptitle() == "plate, 7 tones, noise 0.1 %"
+    assert drawn.get_suptitle().endswith("plate, 7 frequencies, noise 0.1 %")
     drawn.savefig(tmp_path / "card.png")
     assert (tmp_path / "card.png").stat().st_size > 10_000
 
 
 def test_the_maps_are_in_newtons_and_millimetres():
-    meshes = [axes.collections[0].get_array() for axes in plots.figure(PLATE, TONES_HZ).axes[:2]]
+    meshes = [axes.collections[0].get_array() for axes in drawn_of(PLATE, TONES_HZ).axes[:2]]
     here = Setup(PLATE, TONES_HZ, 1e-3, 6.0, 0.05, 1e6).bounds()
     for mesh, expected in zip(meshes, (float(here.force_n), 1e3 * float(here.position_m)), strict=True):
         middle = np.asarray(mesh).reshape(plots.FORCES, plots.POSITIONS)[-1, plots.POSITIONS // 2]
@@ -33,7 +41,7 @@ def test_the_maps_are_in_newtons_and_millimetres():
 
 
 def test_marks_of_the_tones_are_what_each_tells_alone():
-    force, position = (axes for axes in plots.figure(PLATE, TONES_HZ).axes if axes.get_xscale() == "log")
+    force, position = (axes for axes in drawn_of(PLATE, TONES_HZ).axes if axes.get_xscale() == "log")
     for axes, pick, scale in ((force, "force_n", 1.0), (position, "position_m", 1e3)):
         marks = next(line for line in axes.lines if line.get_marker() == "o")
         assert np.asarray(marks.get_xdata()) == pytest.approx(np.array(TONES_HZ) / 1e3)
@@ -42,4 +50,4 @@ def test_marks_of_the_tones_are_what_each_tells_alone():
 
 
 def test_a_sensor_without_a_position_is_drawn_all_the_same(tmp_path):
-    plots.figure(replace(PLATE, resistivity_ohm_m=(0.0, 0.0)), TONES_HZ).savefig(tmp_path / "card.png")
+    drawn_of(replace(PLATE, resistivity_ohm_m=(0.0, 0.0)), TONES_HZ).savefig(tmp_path / "card.png")

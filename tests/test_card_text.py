@@ -8,7 +8,7 @@ from sensorgen.cli import card_text
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.evaluate import TONES_HZ
-from sensorgen.prediction.identifiability import card
+from sensorgen.prediction.identifiability import identify
 
 PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), 8.8541878128e-12 * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))
 BONDED = replace(PLATE, compression=compression.bonded(6e6, 0.01, 6e-4))
@@ -16,7 +16,7 @@ CAPACITOR = replace(PLATE, resistivity_ohm_m=(0.0, 0.0))
 
 
 def printed(capsys, sensor=PLATE, tones=TONES_HZ, **more) -> str:
-    card_text.card(card(sensor, tones, **more))
+    card_text.card(identify(sensor, tones, **more))
     return capsys.readouterr().out
 
 
@@ -45,7 +45,7 @@ def test_it_says_what_the_plate_cannot_do(capsys):
     assert "all at once:" in text
     assert "99.7 kHz (6 N, 258 mm); 49.9 + 99.7 kHz" in text
     assert "of all up to 1 MHz:" in text
-    assert "of the presses from 1 N on 0 % are known to 0.6 N, 0 % to 10 mm" in text
+    assert "above 1 N, force is resolved to 0.6 N in 0 % of presses, position to 10 mm in 0 %" in text
 
 
 def test_a_tone_is_held_against_the_noise(capsys):
@@ -66,8 +66,8 @@ def test_what_is_undefined_is_said_in_words(capsys):
     text = printed(capsys, CAPACITOR)
     assert "nan" not in text
     assert "None" not in text
-    assert "position leaves no trace in Z" in " ".join(text.split())
-    assert "no tones tell both force and position" in text
+    assert "Z does not depend on position" in " ".join(text.split())
+    assert "no frequencies determine both force and position" in text
 
 
 def test_where_nothing_helps_it_says_so(capsys):

@@ -23,7 +23,6 @@ from test_sheet import two_stretches
 from test_stack import exact as exact_stack
 
 from sensorgen import models
-from sensorgen.core import plugins as registry
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import SensorgenError
 from sensorgen.models import fem3d
@@ -152,7 +151,9 @@ def test_rungs_end_where_nothing_is_gained(monkeypatch):
     model = type("Model", (), {"WIDTH": 1e-3})
     assert len(list(cells._rungs(lambda wanted: Interval(0.9, 1.1), (), model, 1.0))) == 1
     assert len(list(cells._rungs(lambda wanted: Interval(1.0, 1.0), (), model, 1.0))) == 1
-    assert [w for w, _, _ in cells._rungs(lambda: Interval(0.9, 1.1), (), object(), 1.0)] == [None]
+    assert [
+        w for w, _, _ in cells._rungs(lambda: Interval(0.9, 1.1), (), type("Model", (), {"WIDTH": math.inf}), 1.0)
+    ] == [None]
 
 
 def test_rungs_go_on_where_the_first_one_fails(monkeypatch):
@@ -210,7 +211,7 @@ def test_lines_are_known_to_the_last_digit(name):
     """The same line by transfer matrices in 60 digits."""
     standard = lines.STANDARD[name]
     for tone, known in standard.known.items():
-        whole, real = off(known, exact_line(60, **standard.inputs() | {"f_Hz": tone}))
+        whole, real = off(known, exact_line(60, **vars(standard.line()) | {"frequency_hz": tone}))
         assert max(whole, real) < 2e-16
 
 
@@ -218,12 +219,14 @@ def test_the_line_under_a_round_tip_is_known():
     """Its equation under an ellipse of pressure, over the angle along the tip, by another program's Runge-Kutta."""
     from scipy.integrate import solve_ivp
 
-    p = lines.STANDARD[ROUND].inputs()
-    tip, right = p["L_p_m"], p["L_m"] - p["x_p_left_edge_m"] - p["L_p_m"]
-    r = (p["rho_top_ohm_m"] / p["H_top_m"] + p["rho_bottom_ohm_m"] / p["H_bottom_m"]) / p["W_m"]
-    strain = 4 / np.pi * p["F_N"] / (p["W_m"] * tip * p["E_Pa"])
+    p = vars(lines.STANDARD[ROUND].line())
+    tip, right = p["tip_m"], p["length_m"] - p["left_m"] - p["tip_m"]
+    r = (
+        p["top_resistivity_ohm_m"] / p["top_thickness_m"] + p["bottom_resistivity_ohm_m"] / p["bottom_thickness_m"]
+    ) / p["width_m"]
+    strain = 4 / np.pi * p["force_n"] / (p["width_m"] * tip * p["modulus_pa"])
     for tone, known in lines.STANDARD[ROUND].known.items():
-        y = 2j * np.pi * tone * 8.8541878128e-12 * p["eps_r"] * p["W_m"] / p["d_m"]
+        y = 2j * np.pi * tone * 8.8541878128e-12 * p["eps_r"] * p["width_m"] / p["film_m"]
 
         def ahead(admittance, length, y=y):
             g, z = np.sqrt(r * y), np.sqrt(r / y)
@@ -233,7 +236,7 @@ def test_the_line_under_a_round_tip_is_known():
             return (y / (1 - strain * np.sin(t)) - r * admittance**2) * tip / 2 * np.sin(t)
 
         under = solve_ivp(slope, (0, np.pi), [ahead(0, right)], "DOP853", rtol=1e-13, atol=0).y[0, -1]
-        z = 1 / ahead(under, p["x_p_left_edge_m"])
+        z = 1 / ahead(under, p["left_m"])
         assert abs(z - known) < 1e-11 * abs(known)
         assert z.real == pytest.approx(known.real, rel=1e-8)
 
@@ -406,13 +409,13 @@ def test_every_model_is_on_the_chart():
     found = chart.points(names, 0.0, lambda _: None)
     spoke = {p.model.partition(":")[0] for p in found}
     missing = set() if presses.has_mesher() else {"press2d"}
-    assert set(registry.names(models)) - spoke == missing
+    assert set(models.names()) - spoke == missing
     said = {(s.scene, s.model): s.why for s in chart.silent(names, found)}
     both = {(p.scene, p.model.partition(":")[0]) for p in found} | set(said)
-    assert {(name, model) for name in names for model in registry.names(models)} <= both
+    assert {(name, model) for name in names for model in models.names()} <= both
     assert not {(p.scene, p.model.partition(":")[0]) for p in found} & set(said)
     assert all(said.values())
-    assert said["tri, 0.1 mm", "fem3d"] == fem3d.unfit(STANDARD["tri, 0.1 mm"]().scene)
+    assert said["tri, 0.1 mm", "fem3d"] == fem3d.why_not_applicable(STANDARD["tri, 0.1 mm"]().scene)
     assert said["tri, 0.1 mm", "line"].endswith("Not the capacitance of a cell at rest.")
     assert "along its depth" in said["block, free all round", "press2d"]
 
@@ -420,14 +423,14 @@ def test_every_model_is_on_the_chart():
 @pytest.mark.parametrize("name", chart.SCENES)
 def test_every_scene_has_a_question_and_reasons(name):
     kind = chart.kind_of(name)
-    reasons = kind.unfit(name)
-    assert set(reasons) <= set(registry.names(models))
+    reasons = kind.why_not_applicable(name)
+    assert set(reasons) <= set(models.names())
     assert kind.ASKED
     assert len(chart.SCENES) == len(set(chart.SCENES))
 
 
 def test_what_is_known_of_presses(monkeypatch):
-    """Cheap laws are off by what docs/press.md and docs/cells.md say; a budget ends the meshes."""
+    """Cheap laws are off by what docs/compression.md and docs/cells.md say; a budget ends the meshes."""
     monkeypatch.setattr(presses, "_pressed", lambda *_: iter(()))
     down, rise = (
         {p.model: p for p in presses.points(f"tri pressed, 0.1 mm: {w}", 1.0)} for w in ("top down", "rise of C")
@@ -486,11 +489,10 @@ def test_a_budget_ends_the_ladders(monkeypatch):
 
 
 def test_no_two_models_look_alike():
-    assert len(pictures._SYMBOLS) == len(pictures._MARKERS) == 9
-    assert len({(pictures._colour(k), k % 9) for k in range(30)}) == 30
+    assert len({tuple(pictures.look(k).values()) for k in range(30)}) == 30
     for scene in chart.SCENES:
         alike = [point(1.0, 1.0, scene=scene), SimpleNamespace(scene=scene, model="n", bounded=False)]
-        assert pictures._looks(scene, alike) == {"m": 0, "n": 1}
+        assert pictures.looks(scene, alike) == {"m": 0, "n": 1}
 
 
 def test_the_picture(measured):
@@ -501,7 +503,7 @@ def test_the_picture(measured):
 
 
 def test_the_front_is_drawn_as_a_staircase():
-    steps = list(pictures._steps([point(1.0, 0.5), point(2.0, 0.1), point(4.0, 0.01)]))
+    steps = list(pictures.steps([point(1.0, 0.5), point(2.0, 0.1), point(4.0, 0.01)]))
     assert steps == [(1.0, 0.5), (2.0, 0.5), (2.0, 0.1), (4.0, 0.1), (4.0, 0.01)]
 
 
@@ -510,11 +512,11 @@ const said = [];
 window.addEventListener("error", e => said.push(e.message));
 console.error = (...a) => said.push(a.join(" "));
 window.addEventListener("load", () => setTimeout(() => {
-  const plot = document.getElementById("chart");
   const pre = document.createElement("pre");
   pre.id = "probe";
   pre.textContent = JSON.stringify({said, resources: performance.getEntriesByType("resource").length,
-    names: plot.data.map(t => t.name), marks: document.querySelectorAll("path.point").length});
+    names: [...document.querySelectorAll(".plot")].flatMap(p => p.data.map(t => t.name)).filter(n => n),
+    marks: document.querySelectorAll("path.point").length});
   document.body.replaceChildren(pre);
 }, 500));
 </script>"""
@@ -557,7 +559,7 @@ def test_the_command(tmp_path):
     told = [row for row in rows if row["why"]]
     assert all(math.isfinite(float(row["seconds"])) for row in rows if row not in told)
     assert {row["model"] for row in told} >= {"line", "traxels", "press3d"}
-    assert len({row["model"].partition(":")[0] for row in rows}) == len(registry.names(models))
+    assert len({row["model"].partition(":")[0] for row in rows}) == len(models.names())
 
 
 def test_the_command_refuses_other_scenes():

@@ -32,6 +32,11 @@ def test_the_reference_is_what_the_help_texts_say():
     assert (ROOT / "docs" / "reference.md").read_text("utf-8") == generate["reference"](), "run `make docs`"
 
 
+def test_the_first_screen_of_the_readme_is_what_the_command_prints():
+    generate = runpy.run_path(str(ROOT / "docs" / "generate.py"))
+    assert (ROOT / "README.md").read_text("utf-8") == generate["first_screen"](), "run `make docs`"
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_each_command_has_help_and_is_in_the_documents(name):
     assert cli.get_command(None, name).get_short_help_str()
@@ -77,8 +82,15 @@ def test_links_between_the_pages_lead_somewhere():
             assert (page.parent / target).exists(), f"{page.name} links to {target}"
 
 
-def test_shape_files_are_named_in_the_contributing_guide():
+def test_packages_are_named_in_the_contributing_guide():
     guide = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
-    modules = {p.stem for p in (ROOT / "src" / "sensorgen").iterdir() if not p.name.startswith(("_", "."))}
-    missing = {m for m in modules if f"`{m}`" not in guide and f"`{m}/`" not in guide and m != "py"}
-    assert not missing
+    packages = {p.stem for p in (ROOT / "src" / "sensorgen").iterdir() if not p.name.startswith(("_", "."))} - {"py"}
+    drawing = re.search(r"```text\n(.*?)```", guide, re.DOTALL)[1]
+    assert {p for p in packages if f"| `{p}` |" not in guide or p not in drawing} == set()
+
+
+def test_ten_places_to_change_something_are_where_the_contributing_guide_says():
+    _, _, after = (ROOT / "CONTRIBUTING.md").read_text("utf-8").partition("## Where would I change")
+    paths = re.findall(r"^\|.*\| `(\S+)` \|$", after.partition("\n## ")[0], re.MULTILINE)
+    assert len(paths) == 10
+    assert [path for path in paths if not (ROOT / path).is_file()] == []

@@ -211,8 +211,30 @@ def test_findings_are_ranked_and_the_rest_is_counted() -> None:
     ranked = markers.ranked(found)
     assert [mark.kind for mark in ranked] == ["error"] * 3 + ["warning"] * 4 + ["info"] * 4 + ["waived"]
     page = drawn(scene_of("tri"), *found)
-    assert set(spots(page)) == set(range(1, 11))
-    assert any("and 2 more in check.json" in line for line in words(page))
+    assert set(spots(page)) == set(range(1, 13))
+    more = [finding(k, layer=1 + k % 13) for k in range(40)]
+    shown = len([line for line in words(drawn(scene_of("tri"), *more)) if "It will not print." in line])
+    assert shown >= 12
+    assert any(
+        f"40 errors; {40 - shown} not shown, see check.json" in line for line in words(drawn(scene_of("tri"), *more))
+    )
+
+
+def test_a_finding_of_many_layers_stands_once_with_its_count() -> None:
+    found = [finding(layer=k, message=f"a strip of {k / 10:g} mm is narrower than a line") for k in (3, 5, 4)]
+    (mark,) = markers.ranked([*found])
+    assert (mark.finding.count, mark.finding.layer, mark.finding.last_layer) == (3, 3, 5)
+    said = " ".join(words(drawn(scene_of("tri"), *found)))
+    assert "layers 3 to 5, 3 places" in said
+    assert said.count("narrower than a line") == 1
+    assert len(markers.ranked([*found, finding(body="top")])) == 2
+
+
+def test_the_text_of_a_finding_is_whole() -> None:
+    message = " ".join(f"word{k}" for k in range(60))
+    said = " ".join(words(drawn(scene_of("tri"), finding(message=message, advice=message[::-1]))))
+    assert message in said
+    assert message[::-1] in said
 
 
 def test_no_findings_are_said_to_be_none() -> None:

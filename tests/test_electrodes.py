@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 
 from sensorgen.analysis.fit.resistance import _per_resistivity
-from sensorgen.asprinted import compared
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body, Cells
 from sensorgen.design.design import make
@@ -84,16 +83,6 @@ def test_the_fit_divides_by_the_same_geometry():
         assert low <= per["top"] < per["bottom"] <= high
         assert low > 0.9 * per["top"]
         assert high == pytest.approx(per["bottom"], rel=1e-3)
-
-
-def test_contacts_between_lines_add_to_the_solid_print():
-    printed = compared.estimated(design(length_mm=20.0))
-    found = compared.resistance_ohm(design(length_mm=20.0), printed, (0.0, 1e-6, 1e-4))
-    solid = compared.solid_ohm(design(length_mm=20.0), printed)
-    for end in ("top", "bottom"):
-        assert found[end][0] == solid[end]
-        assert found[end] == sorted(found[end])
-        assert found[end][2] > 1.2 * found[end][0]
 
 
 def test_an_electrode_that_is_not_printed_through_is_refused():

@@ -21,7 +21,7 @@ from sensorgen.design import materials
 from sensorgen.design.design import make
 from sensorgen.design.materials import own
 from sensorgen.design.specimen_name import design_of, parse
-from sensorgen.measure.log import Log, bench, words
+from sensorgen.measure.log import Log, bench, notes
 from sensorgen.prediction.losses import lost
 
 
@@ -53,7 +53,7 @@ def test_a_known_resistivity_and_leak_come_back(tmp_path):
         for k in range(8):
             g = 2e-4 * 1.1 ** (k - 4)
             name = f"60 triX .1mm {k + 1}"
-            log.add([words.reading(name, f"{along_ohm(r, g):.9g}", f"{across_ohm(r, g):.9g}")])
+            log.add([notes.reading(name, f"{along_ohm(r, g):.9g}", f"{across_ohm(r, g):.9g}")])
         made = fit(log, 60)
     rho = value(made, "resistivity_ohm_m")
     assert rho.low < 0.05 < rho.high
@@ -112,7 +112,7 @@ def test_specimens_held_back_have_no_say(tmp_path):
         with Log(tmp_path / f"{factor}.db", create=True) as log:
             for k, name in enumerate(names):
                 ohm = (600 + 30 * k) * (factor if name in kept_back else 1.0)
-                log.add([words.reading(name, f"{ohm:g}", "OL")])
+                log.add([notes.reading(name, f"{ohm:g}", "OL")])
             made.append(fit(log, 60))
     assert set(made[0].held_back) == set(made[1].held_back) == kept_back
     assert made[0].values == made[1].values
@@ -198,7 +198,7 @@ def test_recordings_give_back_what_they_were_made_with(tmp_path):
     sensor = bench_files.truth(design, **bench_files.TRUTH)
     with Log(tmp_path / "log.db", create=True) as log:
         for k, name in enumerate(names):
-            bench.take(log, name, *bench_files.write(tmp_path, f"run{k}", sensor, count=5, seed=k + 1))
+            bench.log_recording(log, name, *bench_files.write(tmp_path, f"run{k}", sensor, count=5, seed=k + 1))
         made = fit(log, 30)
     assert value(made, "resistivity_ohm_m").value == pytest.approx(0.5 * (0.07 + 0.2) / 2, rel=3e-3)
     assert value(made, "youngs_modulus_pa").value == pytest.approx(0.5 * 6e6, rel=5e-3)
@@ -223,7 +223,7 @@ def test_a_leak_comes_back_in_the_next_prediction(tmp_path):
     design, name = design_of(parse("30 triX .1mm")), "30 triX .1mm 1"
     sensor = bench_files.truth(design, resistivity=0.5, capacitance=1.2, leak_s=4e-7)
     with Log(tmp_path / "log.db", create=True) as log:
-        bench.take(log, name, *bench_files.write(tmp_path, "run", sensor, count=3))
+        bench.log_recording(log, name, *bench_files.write(tmp_path, "run", sensor, count=3))
         made = fit(log, 30)
     own.place().mkdir()
     own.path("fit-30").write_text(text(made), "utf-8")
@@ -263,7 +263,7 @@ def test_the_command(tmp_path, capsys):
     place = str(tmp_path / "log.db")
     with Log(tmp_path / "log.db", create=True) as log:
         for k in range(6):
-            log.add([words.reading(f"60 triX .1mm {k + 1}", f"{600 + 10 * k}", "OL")])
+            log.add([notes.reading(f"60 triX .1mm {k + 1}", f"{600 + 10 * k}", "OL")])
     assert not cli.main(["fit", "--iteration", "60", "--log", place, "--dry-run"], standalone_mode=False)
     assert own.names() == []
     cli.main(["fit", "--iteration", "60", "--log", place], standalone_mode=False)

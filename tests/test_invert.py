@@ -422,10 +422,10 @@ def test_a_prior_does_not_matter_where_the_data_speak():
 @pytest.mark.parametrize(
     ("tones", "noise", "error", "words"),
     [
-        ([1e3, 1e3], 1e-3, OutOfRange, "the same tone twice"), ([0.0], 1e-3, OutOfRange, "a tone of 0 Hz"),
+        ([1e3, 1e3], 1e-3, OutOfRange, "the same frequency twice"), ([0.0], 1e-3, OutOfRange, "a frequency of 0 Hz"),
         ([np.nan], 1e-3, OutOfRange, "nan"), ([], 1e-3, BadInput, "expected a list"), (["a"], 1e-3, BadInput, "Hz"),
         ([1e3], 0.0, OutOfRange, "a noise of 0"), ([1e3], -1.0, OutOfRange, "noise"), ([1e3], 2.0, OutOfRange, "noise"),
-        ([1e3], [1e-3, 1e-3], BadInput, "one per tone"), ([1e3], np.nan, OutOfRange, "noise"),
+        ([1e3], [1e-3, 1e-3], BadInput, "one per frequency"), ([1e3], np.nan, OutOfRange, "noise"),
     ],
 )  # fmt: skip
 def test_what_is_refused(tones, noise, error, words):
@@ -455,5 +455,5 @@ def test_the_force_limit_is_what_the_sensor_bears():
 
 def test_a_pressure_that_is_not_uniform_is_refused():
     sensor, tones = SENSORS["5 ohm m"]
-    with pytest.raises(OutOfRange, match="a pressure like a 'hertz'; the way back is known for a uniform one only"):
+    with pytest.raises(OutOfRange, match="a tip of profile 'hertz': only uniform pressure can be inverted"):
         Estimator(dataclasses.replace(sensor, profile="hertz"), tones)

@@ -75,7 +75,7 @@ def test_compression_of_cells_gets_them():
 def test_the_halves_of_a_double_sensor_get_them():
     own = design({"x60": {"relative_permittivity": 3.0}}, "double")
     assert stacked(own).isolation_eps_r == 3.0
-    values = {(v["material"], v["value"]) for v in stacked(own).taken if v["quantity"] == "relative_permittivity"}
+    values = {(v.material, v.value) for v in stacked(own).taken if v.quantity == "relative_permittivity"}
     assert {value for material, value in values if material == "x60"} == {3.0}
 
 

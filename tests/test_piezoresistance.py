@@ -21,16 +21,22 @@ from sensorgen.models.pressure import bed, hertz
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.double_layer.designs import stack_of
 from sensorgen.prediction.error_budget import budget
-from sensorgen.prediction.inverse.forward import Forward
-from sensorgen.prediction.inverse.scalar import Scalar
+from sensorgen.prediction.inverse.forward import Forward, Scalar
 
 K = 2e-6  # 1/Pa: 12 % at 60 kPa
 PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), EPS0_F_PER_M * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))
 TONE = np.array(TONES)
 BY_HAND = {
-    "L_m": 0.1, "W_m": 0.01, "H_top_m": 3e-4, "H_bottom_m": 3e-4, "rho_top_ohm_m": 0.07, "rho_bottom_ohm_m": 0.2,
-    "d_m": 6e-4, "eps_r": 4.68, "E_Pa": 6e6,
-}  # fmt: skip
+    "length_m": 0.1,
+    "width_m": 0.01,
+    "top_thickness_m": 3e-4,
+    "bottom_thickness_m": 3e-4,
+    "top_resistivity_ohm_m": 0.07,
+    "bottom_resistivity_ohm_m": 0.2,
+    "film_m": 6e-4,
+    "eps_r": 4.68,
+    "modulus_pa": 6e6,
+}
 
 
 def by_hand(force, position, top, bottom):
@@ -38,15 +44,15 @@ def by_hand(force, position, top, bottom):
     left, right = max(position - 0.005, 0), min(position + 0.005, 0.1)
     area = (right - left) / 100
     return BY_HAND | {
-        "F_N": force, "x_p_left_edge_m": left, "L_p_m": right - left,
-        "S_n_top_per_N": top / area, "S_n_bottom_per_N": bottom / area,
+        "force_n": force, "left_m": left, "tip_m": right - left,
+        "top_piezoresistance_per_n": top / area, "bottom_piezoresistance_per_n": bottom / area,
     }  # fmt: skip
 
 
 @pytest.mark.parametrize("position", [0.0, 0.002, 0.05, 0.0976, 0.1])
 def test_one_patch_is_the_lines_own(position):
     found = replace(PLATE, piezoresistance_per_pa=(K, -K / 4)).impedance(TONE, 3.0, position)
-    expected = line.impedance(**by_hand(3.0, position, K, -K / 4), f_Hz=TONE)
+    expected = line.impedance(line.PressedLine(**by_hand(3.0, position, K, -K / 4), frequency_hz=TONE))
     assert found.real == pytest.approx(expected.real, rel=1e-11)
     assert found.imag == pytest.approx(expected.imag, rel=1e-13)
     away = PLATE.impedance(TONE, 3.0, position)
@@ -60,7 +66,7 @@ def test_slopes_against_mpmath(force, position):
     found = replace(PLATE, piezoresistance_per_pa=(K, -K / 4)).response(99.7e3, force, position)
 
     def z(f, x):
-        return exact(digits=200, **by_hand(f, x, K, -K / 4), f_Hz=99.7e3)
+        return exact(digits=200, **by_hand(f, x, K, -K / 4), frequency_hz=99.7e3)
 
     with mpmath.workdps(50):
         by_force = complex(mpmath.diff(lambda f: z(f, mpmath.mpf(position)), force))
@@ -198,10 +204,10 @@ def test_the_budget_has_what_sources_disagree_on(top, bottom, ends):
     drawn = design(materials=named)
     sensed = sensor_of(drawn)
     terms = {term["name"]: term for term in budget(drawn, sensed, TONES, 6.0, 0.05)["terms"]}
-    rho = dict(zip(("rho_top_ohm_m", "rho_bottom_ohm_m"), sensed.sensor.resistivity_ohm_m, strict=True))
+    rho = dict(zip(("top_resistivity_ohm_m", "bottom_resistivity_ohm_m"), sensed.sensor.resistivity_ohm_m, strict=True))
 
     def z(rises):
-        return line.impedance(**by_hand(6.0, 0.05, *rises) | rho, f_Hz=TONE)
+        return line.impedance(line.PressedLine(**by_hand(6.0, 0.05, *rises) | rho, frequency_hz=TONE))
 
     ref, found = z(sensed.sensor.piezoresistance_per_pa), terms["piezoresistance"]["shares"]
     for measure, part in {"magnitude": np.abs, "re": np.real, "im": np.imag}.items():

@@ -141,7 +141,8 @@ def test_an_accuracy_is_above_0(accuracy):
 @pytest.mark.parametrize("force_n", [0.1, 0.2, 0.5])
 def test_a_light_press_below_the_first_stress_of_a_curve_is_within_what_is_claimed(force_n):
     """A contact grows from nothing: the stored curve begins at 10 kPa, the same cell is solved at 1, 2 and 5."""
-    from sensorgen.models.press2d import Held, curve_of
+    from sensorgen.models.compression import curve_of
+    from sensorgen.models.press2d import Held
     from sensorgen.prediction.mesh_ladder import Case, drawn, pressed
 
     design = tri(0.1)

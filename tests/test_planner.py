@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import pytest
 
 from sensorgen import models as model_files
-from sensorgen.core import plugins as registry
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.design.design import make
@@ -37,13 +36,13 @@ class Fake:
         monkeypatch.setattr(planner, "capacitance_models", lambda: dict(self.models))
         monkeypatch.setattr(expectations, "measured", lambda: self.expected)
 
-    def add(self, name, cost, width, *points, unfit=None, middle=1.0):
+    def add(self, name, cost, width, *points, why_not_applicable=None, middle=1.0):
         def work(scene, permittivity, wanted=None):
             self.asked.append((name, wanted))
             apart = (1 - 1e-9) * (width(wanted) if callable(width) else width)
             return Interval(middle - apart / 2, middle + apart / 2)
 
-        model = SimpleNamespace(COST=cost, unfit=lambda scene: unfit, capacitance=work)
+        model = SimpleNamespace(COST=cost, why_not_applicable=lambda scene: why_not_applicable, capacitance=work)
         if cost > 1:
             model.WIDTH = 1e-3
         self.models[name] = model
@@ -131,18 +130,18 @@ def test_what_is_expected_is_the_quickest_measurement_that_does(fake):
 
 def test_refusals_are_told_and_others_answer(fake):
     ladder(fake)
-    fake.models["mid"].unfit = lambda scene: "it is not installed"
+    fake.models["mid"].why_not_applicable = lambda scene: "it is not installed"
     found = capacitance(PLATE, EPS, 1e-2)
     assert (found.model, found.refused) == ("dear", ("mid: it is not installed",))
     assert {c.model: c.passed_over for c in found.plan}["mid"] == "it is not installed"
 
 
 def test_nobody_can_speak(fake):
-    fake.add("one", 1, 0.1, unfit="too round")
-    fake.add("two", 2, 0.1, unfit="too flat")
+    fake.add("one", 1, 0.1, why_not_applicable="too round")
+    fake.add("two", 2, 0.1, why_not_applicable="too flat")
     with pytest.raises(Unpredictable, match=r"^one: too round; two: too flat$"):
         capacitance(PLATE, EPS, 1e-3)
-    fake.add("three", 2, 0.1, unfit="too round")
+    fake.add("three", 2, 0.1, why_not_applicable="too round")
     with pytest.raises(Unpredictable, match=r"^one, three: too round; two: too flat$"):
         capacitance(PLATE, EPS, 1e-3)
 
@@ -153,7 +152,7 @@ def test_a_model_by_name(fake):
     assert (fake.names, found.model, found.reached()) == (["dear"], "dear", False)
     with pytest.raises(UnknownName, match="model of capacitance 'deer'; did you mean 'dear'"):
         capacitance(PLATE, EPS, 1e-3, "deer")
-    fake.models["dear"].unfit = lambda scene: "too round"
+    fake.models["dear"].why_not_applicable = lambda scene: "too round"
     with pytest.raises(Unpredictable, match=r"^dear: too round$"):
         capacitance(PLATE, EPS, 1e-3, "dear")
 
@@ -238,7 +237,7 @@ def test_bodies_that_only_touch_do_not_overlap():
 
 def test_expectations_are_of_models_that_exist_and_fall():
     found = expectations.measured()
-    assert set(found) <= set(registry.names(model_files))
+    assert set(found) <= set(model_files.names())
     for entry in found.values():
         widths, seconds = zip(*entry.points, strict=True)
         assert list(widths) == sorted(widths, reverse=True)

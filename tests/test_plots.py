@@ -13,8 +13,17 @@ import pytest
 from drawn_sensor import sensor_of
 
 from sensorgen.analysis import plots
-from sensorgen.analysis.plots import inverse, libraries, maps, page, panels
-from sensorgen.analysis.plots.field import LARGEST, MOST_TONES, QUANTITIES, field, scale, tone
+from sensorgen.analysis.plots import libraries, pages, static
+from sensorgen.analysis.plots.figure import frequency, scale
+from sensorgen.analysis.plots.response import (
+    LARGEST,
+    MOST_FREQUENCIES,
+    QUANTITIES,
+    figures,
+    inverse,
+    quantity,
+    response,
+)  # fmt: skip
 from sensorgen.core.errors import MissingValue, OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models import line
@@ -22,9 +31,17 @@ from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
 
 PLATE = {
-    "L_m": 0.1, "W_m": 0.01, "H_top_m": 3e-4, "H_bottom_m": 3e-4, "rho_top_ohm_m": 0.07, "rho_bottom_ohm_m": 0.2,
-    "d_m": 6e-4, "eps_r": 4.68, "E_Pa": 6e6, "L_p_m": 0.01,
-}  # fmt: skip
+    "length_m": 0.1,
+    "width_m": 0.01,
+    "top_thickness_m": 3e-4,
+    "bottom_thickness_m": 3e-4,
+    "top_resistivity_ohm_m": 0.07,
+    "bottom_resistivity_ohm_m": 0.2,
+    "film_m": 6e-4,
+    "eps_r": 4.68,
+    "modulus_pa": 6e6,
+    "tip_m": 0.01,
+}
 TONES, FORCES, AT = (10.1e3, 99.7e3), (0.0, 2.0, 4.0, 6.0), (0.0, 20.0, 40.0, 60.0, 100.0)
 
 
@@ -35,12 +52,12 @@ def sensor():
 
 @pytest.fixture(scope="module")
 def answer(sensor):
-    return field(sensor, TONES, FORCES, AT)
+    return response(sensor, TONES, FORCES, AT)
 
 
 def at_point(f, force, x_mm):
     """The plate of the reference design, pressed with the whole tip on it, straight from the line."""
-    return complex(line.impedance(**PLATE, f_Hz=f, F_N=force, x_p_left_edge_m=x_mm / 1e3 - 0.005))
+    return complex(line.impedance(line.PressedLine(**PLATE, frequency_hz=f, force_n=force, left_m=x_mm / 1e3 - 0.005)))
 
 
 def test_values_are_those_of_the_line(answer):
@@ -70,10 +87,10 @@ def test_slopes_are_differences_of_the_line_per_newton_and_per_millimetre(answer
 
 def test_where_the_whole_tip_rests_on_the_sensor(sensor):
     """Where it just reaches the end, the slope by position is that of neither side."""
-    assert field(sensor, TONES, FORCES, (0, 5, 5.1, 50, 94.9, 95, 100)).on_sensor().tolist() == [
+    assert response(sensor, TONES, FORCES, (0, 5, 5.1, 50, 94.9, 95, 100)).on_sensor().tolist() == [
         False, False, True, True, True, False, False,
     ]  # fmt: skip
-    assert field(sensor, TONES, FORCES, (0, 4)).on_sensor().all()
+    assert response(sensor, TONES, FORCES, (0, 4)).on_sensor().all()
 
 
 def test_a_map_that_folds_and_one_that_does_not(answer):
@@ -96,15 +113,21 @@ def test_a_map_that_folds_and_one_that_does_not(answer):
     [
         ((TONES, (3.0,), AT), "1 force.s. and 5 position.s. make no map; expected two or more of each"),
         ((TONES, FORCES, (3.0,)), "4 force.s. and 1 position.s. make no map"),
-        ((range(1, MOST_TONES + 2), FORCES, AT), f"{MOST_TONES + 1} tones, 4 forces and 5 positions are too much"),
-        (((1e3,), range(1000), np.linspace(0, 100, LARGEST // 1000 + 1)), f"expected up to {MOST_TONES} tones"),
+        (
+            (range(1, MOST_FREQUENCIES + 2), FORCES, AT),
+            f"{MOST_FREQUENCIES + 1} frequencies, 4 forces and 5 positions are too much",
+        ),
+        (
+            ((1e3,), range(1000), np.linspace(0, 100, LARGEST // 1000 + 1)),
+            f"expected up to {MOST_FREQUENCIES} frequencies",
+        ),
         ((TONES, FORCES, (0.0, 100.5)), "position 100.5 mm is outside the sensor"),
         ((TONES, (0.0, 500.0), AT), "the stress thins the film by 1.67: at 1 its electrodes touch"),
     ],
 )
 def test_what_makes_no_picture(sensor, axes, said):
     with pytest.raises(OutOfRange, match=said):
-        field(sensor, *axes)
+        response(sensor, *axes)
 
 
 @pytest.mark.parametrize(
@@ -115,8 +138,8 @@ def test_scale(largest, divisor, unit):
     assert scale(np.array([0.0, -largest]), "Ω") == (divisor, unit)
 
 
-def test_tone():
-    assert [tone(f) for f in (0.5, 1e3, 99.7e3, 2.5e6)] == ["500 mHz", "1 kHz", "99.7 kHz", "2.5 MHz"]
+def test_frequency():
+    assert [frequency(f) for f in (0.5, 1e3, 99.7e3, 2.5e6)] == ["500 mHz", "1 kHz", "99.7 kHz", "2.5 MHz"]
 
 
 def size_of(png):
@@ -136,21 +159,18 @@ def test_all_files_and_the_same_bytes_every_time(sensor):
 
 
 def test_seven_tones_fit_in_1200_pixels(sensor):
-    seven = field(sensor, [k * 1e4 for k in range(1, 8)], FORCES, AT)
-    assert size_of(maps.png(seven, "resistance"))[0] == size_of(inverse.png(seven, "force"))[0] == 1200
+    seven = response(sensor, [k * 1e4 for k in range(1, 8)], FORCES, AT)
+    assert {size_of(static.png(of))[0] for of in (quantity(seven, "resistance"), inverse(seven, "force"))} == {1200}
 
 
-def shown(monkeypatch, draw):
-    """The figure that a picture is of."""
-    figures = []
-    monkeypatch.setattr(panels, "png", lambda figure: figures.append(figure) or b"")
-    draw()
-    return figures[0]
+def shown(figure):
+    """All panels of a figure as matplotlib has them."""
+    return static.drawn(figure, [p for panels in figure.choices.values() for p in panels], figure.title)
 
 
 @pytest.mark.parametrize("name", QUANTITIES)
-def test_maps_show_the_field_with_units(monkeypatch, answer, name):
-    figure = shown(monkeypatch, lambda: maps.png(answer, name))
+def test_maps_show_the_response_with_units(answer, name):
+    figure = shown(quantity(answer, name))
     assert figure.get_suptitle() == QUANTITIES[name].title
     divisors = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
     assert len(figure.axes) == 4  # two tones, two scales
@@ -161,23 +181,23 @@ def test_maps_show_the_field_with_units(monkeypatch, answer, name):
         drawn = panel.collections[0].get_array() * divisors[unit.removesuffix(QUANTITIES[name].unit)]
         assert np.allclose(drawn, answer.values(name)[k], rtol=1e-12, atol=0)
         assert 1 <= np.abs(panel.collections[0].get_array()[:, answer.on_sensor()]).max() < 1000
-        assert panel.get_xlabel() == "position x [mm]"
-        assert panel.get_ylabel() == ("force F [N]" if k == 0 else "")
+        assert panel.get_xlabel() == "position [mm]"
+        assert panel.get_ylabel() == ("force [N]" if k == 0 else "")
         low, high = panel.collections[0].get_clim()
         signed = panel.collections[0].get_cmap().name == "PuOr"
         assert (low == -high) is signed
 
 
 @pytest.mark.parametrize(("of", "values"), [("position", AT), ("force", FORCES)])
-def test_inverse_maps_lie_over_r_and_x(monkeypatch, answer, of, values):
-    figure = shown(monkeypatch, lambda: inverse.png(answer, of))
+def test_inverse_maps_lie_over_r_and_x(answer, of, values):
+    figure = shown(inverse(answer, of))
     panel = figure.axes[1]
     mesh = panel.collections[0]
     assert (mesh.get_clim()) == (min(values), max(values))
     corners = mesh.get_coordinates()
     assert np.allclose(corners[..., 0], answer.values("resistance")[1] / 1e3, rtol=1e-12, atol=0)
     assert np.allclose(corners[..., 1], answer.values("reactance")[1] / 1e3, rtol=1e-12, atol=0)
-    assert (panel.get_xlabel(), panel.get_ylabel()) == ("R [kΩ]", "X [kΩ]")
+    assert (panel.get_xlabel(), figure.axes[0].get_ylabel()) == ("R [kΩ]", "X [kΩ]")
     assert "solid lines: 0, 2, 4, 6 N; dashed: 0, 20, 40, 60, 100 mm" in figure.get_suptitle()
     by_force, by_position = panel.lines[1], panel.lines[len(FORCES) + 1]
     assert np.allclose(by_force.get_xdata(), answer.values("resistance")[1, 1] / 1e3, rtol=1e-12, atol=0)
@@ -205,29 +225,30 @@ def decoded(values):
     return found.reshape([int(n) for n in str(values.get("shape", found.size)).split(",")])
 
 
-def test_the_page_holds_the_field_and_its_script_once(answer):
-    text = page.html(answer)
-    assert not re.search(r"<(script|link|img)[^>]+(src|href)=", text)
+def written(answer):
+    return pages.page("A <b>sensor</b> & more", ["some words"], list(figures(answer)))
+
+
+def test_the_page_holds_the_response_and_its_script_once(answer):
+    text = written(answer)
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=\"(?!data:)", text)
     assert len(re.findall(r"plotly\.js v[0-9.]+", text)) == 1
-    start = text.index("[", text.index("Plotly.newPlot(", text.rindex("<script")))
-    traces = json.JSONDecoder().raw_decode(text, start)[0]
-    assert len(traces) == 8 * len(TONES)
-    assert [t["visible"] for t in traces] == [True] * 8 + [False] * 8
-    names = ["resistance", "resistance-by-force", "resistance-by-position"]
-    names += [name.replace("resistance", "reactance") for name in names]
-    for k in range(len(TONES)):
-        for name, trace in zip(names, traces[8 * k :], strict=False):
-            expected = answer.values(name)[k].copy()
-            if name.endswith("position"):
-                expected[:, [0, -1]] = np.nan
-            assert np.array_equal(decoded(trace["z"]), expected, equal_nan=True), name
-            assert QUANTITIES[name].unit in trace["hovertemplate"]
+    assert "<h1>A &lt;b&gt;sensor&lt;/b&gt; &amp; more</h1>" in text
+    held = {f["key"]: f for f in json.loads(re.search(r'id="figures">(.*?)</script>', text)[1])}
+    assert list(held) == [*QUANTITIES, "inverse-position", "inverse-force"]
+    for k, f in enumerate(("10.1 kHz", "99.7 kHz")):
+        for name, about in QUANTITIES.items():
+            choice = held[name]["choices"][k]
+            (trace,) = choice["data"]
+            assert choice["name"] == f
+            divisor, unit = scale(answer.values(name)[k][:, answer.on_sensor()], about.unit)
+            assert trace["colorbar"]["title"]["text"] == f"{about.symbol} [{unit}]"
+            assert decoded(trace["z"]) * divisor == pytest.approx(answer.values(name)[k], rel=1e-6, abs=1e-12)
             assert decoded(trace["x"]).tolist() == list(AT)
             assert decoded(trace["y"]).tolist() == list(FORCES)
-        for trace in traces[8 * k + 6 : 8 * k + 8]:
-            assert np.array_equal(decoded(trace["x"]), answer.values("resistance")[k].ravel())
-            assert np.array_equal(decoded(trace["y"]), answer.values("reactance")[k].ravel())
-            assert decoded(trace["customdata"])[5].tolist() == [2.0, 0.0]
+        plane = held["inverse-force"]["choices"][k]["data"][0]
+        assert decoded(plane["x"]) * 1e3 == pytest.approx(answer.values("resistance")[k].ravel(), rel=1e-6)
+        assert decoded(plane["marker"]["color"])[5] == 2.0
 
 
 PROBE = """<head><script>
@@ -236,22 +257,25 @@ console.error = (...words) => said.push(words.join(" "));
 addEventListener("error", e => said.push(String(e.message || e.target.src)), true);
 addEventListener("securitypolicyviolation", e => said.push(e.blockedURI));
 addEventListener("load", () => setTimeout(async () => {
-  const page = document.getElementById("predict");
-  const seen = () => page._fullData.map(t => t.visible === true);
+  const plots = [...document.querySelectorAll(".plot")];
+  const titles = () => plots.map(p => p._fullData[0].colorbar?.title.text ?? p._fullData[0].marker.colorbar.title.text);
   const report = {
-    said, first: seen(), z: Array.from(page._fullData[0].z, row => Array.from(row)),
-    scenes: page.querySelectorAll(".gl-container canvas").length,
-    plots: page.querySelectorAll(".subplot.xy, .subplot.x2y2").length,
+    said, first: titles(), z: Array.from(plots[0]._fullData[0].z, row => Array.from(row)),
+    drawn: plots.map(p => p.querySelectorAll(".heatmaplayer image, path.point").length),
     resources: performance.getEntriesByType("resource").map(e => e.name),
-    labels: Array.from(page.querySelectorAll(".slider-label"), e => e.textContent),
+    labels: Array.from(document.querySelector("select").options, e => e.textContent),
   };
-  await Plotly.restyle(page, ...page.layout.sliders[0].steps[1].args);
-  report.second = seen();
+  const select = document.querySelector("select");
+  select.selectedIndex = 1;
+  select.dispatchEvent(new Event("change"));
+  await new Promise(done => setTimeout(done, 1000));
+  report.chosen = [...document.querySelectorAll("select")].map(s => s.selectedIndex);
+  report.second = Array.from(plots[1]._fullData[0].z, row => Array.from(row));
   const pre = document.createElement("pre");
   pre.id = "probe";
   pre.textContent = JSON.stringify(report);
   document.body.replaceChildren(pre);
-}, 500));
+}, 1500));
 </script>"""
 
 
@@ -261,8 +285,8 @@ def chromium(program):
 
 
 def test_the_page_in_a_browser(chromium, answer, tmp_path):
-    """Surfaces and planes are there, the slider changes the tone, nothing is complained of or fetched."""
-    (tmp_path / "page.html").write_text(page.html(answer).replace("<head>", PROBE, 1), "utf-8")
+    """All figures are drawn, a frequency chosen at one holds for all, nothing is complained of or fetched."""
+    (tmp_path / "page.html").write_text(written(answer).replace("<head>", PROBE, 1), "utf-8")
     done = subprocess.run(
         [
             chromium, "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
@@ -276,9 +300,10 @@ def test_the_page_in_a_browser(chromium, answer, tmp_path):
     report = json.loads(entities.unescape(found[1]))
     assert report["said"] == []
     assert report["resources"] == []
-    assert report["scenes"] >= 6
-    assert report["plots"] == 2
-    assert report["labels"] == ["tone: 10.1 kHz", "10.1 kHz", "99.7 kHz"]
-    assert report["first"] == [True] * 8 + [False] * 8
-    assert report["second"] == [False] * 8 + [True] * 8
-    assert np.array_equal(report["z"], answer.values("resistance")[0])
+    assert len(report["drawn"]) == 8
+    assert all(report["drawn"])
+    assert report["labels"] == ["10.1 kHz", "99.7 kHz"]
+    assert report["first"][:2] == ["R [kΩ]", "X [kΩ]"]
+    assert report["chosen"] == [1] * 8
+    assert np.array(report["z"]) * 1e3 == pytest.approx(answer.values("resistance")[0], rel=1e-6)
+    assert np.array(report["second"]) * 1e3 == pytest.approx(answer.values("reactance")[1], rel=1e-6)

@@ -179,7 +179,7 @@ class Model:
         self.COST, self.reason, self.asked = cost, reason, 0
         self.bounds = Interval(lower, upper)
 
-    def unfit(self, scene):
+    def why_not_applicable(self, scene):
         return self.reason or None
 
     def capacitance(self, scene, permittivity):
@@ -271,7 +271,7 @@ def test_the_grid_is_the_line_with_forty_digits(plate):
 def test_at_the_ends_the_tip_overhangs_and_presses_on_what_is_left(plate):
     z = grid(plate[1].sensor, [99.7e3], [3.0], [0.0, 0.1])[0, 0]
     for value, left in zip(z, (0.0, 0.095), strict=True):
-        alone = line.impedance(**LINE_PLATE | {"L_p_m": 0.005, "x_p_left_edge_m": left})
+        alone = line.impedance(line.PressedLine(**LINE_PLATE | {"tip_m": 0.005, "left_m": left}))
         assert (value.real, value.imag) == (close(alone.real, 1e-12), close(alone.imag, 1e-12))
 
 
@@ -395,7 +395,7 @@ def test_losses_reach_the_line():
     for row in found.impedance:
         z = exact_line(
             60, **LINE_PLATE | {
-                "f_Hz": row.frequency_hz, "tan_delta": 0.02, "G_S_per_m": 0.01 / (1e9 * FILM_M), "F_N": 0,
+                "frequency_hz": row.frequency_hz, "tan_delta": 0.02, "leak_s_per_m": 0.01 / (1e9 * FILM_M), "force_n": 0,
             }
         )  # fmt: skip
         assert row.re.value == pytest.approx(float(z.real), rel=1e-6)

@@ -24,14 +24,24 @@ def plate_inputs(force, position):
     """The plate of PLATE for the line, its tip clipped by hand; numbers may be mpmath's."""
     left, right = max(position - 0.005, 0), min(position + 0.005, 0.1)
     return {
-        "L_m": 0.1, "W_m": 0.01, "H_top_m": 3e-4, "H_bottom_m": 3e-4, "rho_top_ohm_m": 0.07, "rho_bottom_ohm_m": 0.2,
-        "d_m": 6e-4, "eps_r": 4.68, "E_Pa": 6e6, "F_N": force, "x_p_left_edge_m": left, "L_p_m": right - left,
-    }  # fmt: skip
+        "length_m": 0.1,
+        "width_m": 0.01,
+        "top_thickness_m": 3e-4,
+        "bottom_thickness_m": 3e-4,
+        "top_resistivity_ohm_m": 0.07,
+        "bottom_resistivity_ohm_m": 0.2,
+        "film_m": 6e-4,
+        "eps_r": 4.68,
+        "modulus_pa": 6e6,
+        "force_n": force,
+        "left_m": left,
+        "tip_m": right - left,
+    }
 
 
 @pytest.mark.parametrize("position", [0.0, 0.002, 0.05, 0.0976, 0.1])
 def test_the_plate_is_the_lines_own(position):
-    expected = line.impedance(**plate_inputs(3.0, position), f_Hz=TONE)
+    expected = line.impedance(line.PressedLine(**plate_inputs(3.0, position), frequency_hz=TONE))
     found = PLATE.impedance(TONE, 3.0, position)
     assert found.real == pytest.approx(expected.real, rel=1e-11)
     assert found.imag == pytest.approx(expected.imag, rel=1e-13)
@@ -43,9 +53,11 @@ def test_slopes_against_mpmath(force, position):
     """Also where the tip overhangs, and the patch's length moves with it."""
     found = PLATE.response(99.7e3, force, position)
     with mpmath.workdps(50):
-        by_force = mpmath.diff(lambda f: exact(digits=200, **plate_inputs(f, mpmath.mpf(position)), f_Hz=99.7e3), force)
+        by_force = mpmath.diff(
+            lambda f: exact(digits=200, **plate_inputs(f, mpmath.mpf(position)), frequency_hz=99.7e3), force
+        )
         by_position = mpmath.diff(
-            lambda x: exact(digits=200, **plate_inputs(force, x), f_Hz=99.7e3), mpmath.mpf(position)
+            lambda x: exact(digits=200, **plate_inputs(force, x), frequency_hz=99.7e3), mpmath.mpf(position)
         )
     assert complex(found.by_force_ohm_per_n) == pytest.approx(complex(by_force), rel=1e-8, abs=1e-9)
     assert complex(found.by_position_ohm_per_m) == pytest.approx(complex(by_position), rel=1e-8, abs=1e-6)

@@ -11,10 +11,11 @@ from sensorgen.checks.estimate import TITLES
 from sensorgen.core.errors import SensorgenError
 from sensorgen.models import press2d, press3d
 from sensorgen.models.press2d import Elastic, Fineness, Held
-from sensorgen.prediction import as_printed
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction import compression_law as celllaw
+from sensorgen.prediction.bodies import drawn, estimated, sliced
 from sensorgen.prediction.compression import Asked
+from sensorgen.prediction.sensor_model import build_sensor, piece
 from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 
 from .conftest import small
@@ -60,8 +61,8 @@ def built(widths, film=0.1):
     return press2d.cell(Scene(bodies, (2.0, 8.0, roof + 0.3)), 2.0)
 
 
-def answered(design, printed, *kpa, **more):
-    return compressed.answer(design, Asked((0.0, *kpa), Held()), printed=printed, **more)
+def answered(body, *kpa):
+    return compressed.answer(body, Asked((0.0, *kpa), Held()))
 
 
 @needs_mesher
@@ -69,7 +70,7 @@ def answered(design, printed, *kpa, **more):
 def test_a_printed_cell_gives_way_like_one_built_by_hand(walls, fall_um):
     """Classic walls lose the foot's lowest layer too: it hangs free, and falls by what was lost."""
     design = small()
-    found = answered(design, body(design, walls=walls), 20.0)
+    found = answered(estimated(design, walls), 20.0)
     both, low = BY_HAND[walls]
     hand = press2d.press(built({"cog": both, "feet": both, "low": low}), SOLIDS, [0.0, 2e4], EPS, fineness=QUICK)
     assert (found["model"], found["faults"], hand.faults) == ("press2d", [], ())
@@ -79,43 +80,39 @@ def test_a_printed_cell_gives_way_like_one_built_by_hand(walls, fall_um):
     assert (f"falls {fall_um:g} um" in "".join(found["doubts"])) == (fall_um > 0)
     middle = (np.array(found["lower_f_per_m2"]) + np.array(found["upper_f_per_m2"])) / 2
     assert middle == pytest.approx([c.middle() for c in hand.capacitance_f_per_m2], rel=0.01)
-    assert TITLES[walls] in found["printed"]
+    assert TITLES[walls] in found["body"]
 
 
 @needs_mesher
 def test_a_foot_of_a_lines_width_is_stiffer_than_a_sharp_one():
     """At 10 kPa as drawn 6.13 um, by other programs; on feet of 0.34 mm less than a third of it."""
     design = small()
-    drawn = compressed.answer(design, Asked((0.0, 10.0), Held()))
-    found = answered(design, body(design), 10.0)
-    assert drawn["displacement_um"][1] == pytest.approx(6.13, rel=0.02)
-    assert found["displacement_um"][1] < drawn["displacement_um"][1] / 3
-    assert "printed" not in drawn
+    sharp, found = answered(drawn(design), 10.0), answered(estimated(design, "arachne"), 10.0)
+    assert sharp["displacement_um"][1] == pytest.approx(6.13, rel=0.02)
+    assert found["displacement_um"][1] < sharp["displacement_um"][1] / 3
+    assert sharp["body"] == "drawn"
 
 
 @needs_mesher
 def test_the_printed_sensor_has_the_law_of_its_own_cell():
     """Its rise is what compressing the print says, and its capacitance lies between all widths of a line."""
-    design = small()
-    printed = body(design)
-    sensed = as_printed.sensor_of(printed, "solved")
-    found = answered(design, printed, 10.0, 20.0)
+    printed = estimated(small(), "arachne")
+    sensed = build_sensor(printed, "solved")
+    found = answered(printed, 10.0, 20.0)
     middle = (np.array(found["lower_f_per_m2"]) + np.array(found["upper_f_per_m2"])) / 2
     thinning, _ = sensed.sensor.compression.thinning(np.array([1e4, 2e4]))
     assert 1 / (1 - thinning) == pytest.approx(middle[1:] / middle[0], rel=1e-4)
     assert sensed.law.bounded
-    span = sensed.unloaded.answer.capacitance_f
-    expected = as_printed.capacitances_f(printed)["mid-plane"]
-    assert (span.lower, span.upper) == (expected.lower, expected.upper)
-    assert sensed.sensor.capacitance_f() == pytest.approx(span.middle(), rel=1e-12, abs=0)
-    assert sensed.piece.period_mm == 2.0
-    assert "printed, estimated (Arachne)" in sensed.doubts[0]
+    c = sensed.rest.capacitance
+    assert sensed.sensor.capacitance_f() == pytest.approx(c.value, rel=1e-12, abs=0)
+    assert c.model.lower < c.value < c.model.upper
+    assert piece(printed).period_mm == 2.0
 
 
 @needs_mesher
 def test_feet_that_land_are_told_of():
     design = small(parameters={"dielectric_mm": 0.2})
-    sensed = as_printed.sensor_of(body(design, walls="classic"), "solved")
+    sensed = build_sensor(estimated(design, "classic"), "solved")
     assert any("mostly their fall" in doubt for doubt in sensed.doubts)
     assert sensed.sensor.compression.ratio[1] > 1.9  # the cog stands on the film where 0.1 mm of air was
 
@@ -124,10 +121,9 @@ def test_crossed_strips_are_pressed_in_three_dimensions(monkeypatch):
     """On one brick per box: printed strips of 0.68 mm in place of 0.70 give way a little more than drawn."""
     monkeypatch.setattr(press3d, "Pieces", partial(press3d.Pieces, 1))
     design = small("rect")
-    printed = body(design)
-    found, drawn = answered(design, printed, 100.0), compressed.answer(design, Asked((0.0, 100.0), Held()))
+    found, sharp = answered(estimated(design, "arachne"), 100.0), answered(drawn(design), 100.0)
     assert (found["model"], found["faults"]) == ("press3d", [])
-    assert 1.0 < found["displacement_um"][1] / drawn["displacement_um"][1] < 1.15
+    assert 1.0 < found["displacement_um"][1] / sharp["displacement_um"][1] < 1.15
     assert found["lower_f_per_m2"][0] * 4e-6 < 0.79334e-12 < found["upper_f_per_m2"][0] * 4e-6  # found by hand
 
 
@@ -142,9 +138,7 @@ def test_a_print_is_the_same_scene_in_every_process():
 @pytest.mark.parametrize("walls", ["arachne", "classic", "cura", "cura-gaps"])
 def test_support_takes_no_place_from_what_stays(walls):
     """It swells too where it is narrow; PrusaSlicer prints the same feet with it as without."""
-    bare, held = (
-        as_printed.piece(body(design, walls=walls)) for design in (small(), small(materials={"support": "bvoh"}))
-    )
+    bare, held = (piece(estimated(design, walls)) for design in (small(), small(materials={"support": "bvoh"})))
     assert held == bare
 
 
@@ -161,9 +155,9 @@ def test_the_staircase_whose_cog_ends_short_of_the_film():
 
 def test_a_plate_has_no_period():
     design = small("reference", {"length_mm": 20.0, "width_mm": 8.0})
-    printed = body(design)
-    assert as_printed.piece(printed).period_mm is None
-    sensed = as_printed.sensor_of(printed)
+    printed = estimated(design)
+    assert piece(printed).period_mm is None
+    sensed = build_sensor(printed)
     assert sensed.sensor.compression.modulus_pa == 6e6
     assert sensed.sensor.capacitance_f() == pytest.approx(69.06266e-12 * 20 * 8 / 1000, rel=1e-6, abs=0)
 
@@ -171,16 +165,17 @@ def test_a_plate_has_no_period():
 def test_a_print_that_no_model_can_speak_of_is_refused():
     design = small("double", {"length_mm": 12.0, "width_mm": 8.0})
     with pytest.raises(SensorgenError, match="two electrodes"):
-        as_printed.sensor_of(body(design))
+        build_sensor(estimated(design))
 
 
 @needs_mesher
-def test_what_prusaslicer_prints_is_pressed(printed):
+def test_what_prusaslicer_prints_is_pressed(real):
     """Against the estimate by the same walls, whose widths differ by 2 %."""
-    design, made = printed("arachne")
-    found, guess = (answered(design, p, 20.0) for p in (made, body(design)))
+    design, lines, version = real("arachne")
+    made = sliced(design, lambda: body(design, lines, slicer=version), version, b"file")
+    found, guess = (answered(b, 20.0) for b in (made, estimated(design, "arachne")))
     assert found["faults"] == []
-    assert found["printed"].endswith("lines by vol")
+    assert version in found["body"]
     assert found["displacement_um"][1] == pytest.approx(guess["displacement_um"][1], rel=0.05)
     assert found["upper_f_per_m2"][0] == pytest.approx(guess["upper_f_per_m2"][0], rel=0.01)
     json.dumps(found, allow_nan=False)

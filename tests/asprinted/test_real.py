@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sensorgen.prediction.as_printed import comparison, electrode
 
 from sensorgen.asprinted.beads import beads, layers
-from sensorgen.asprinted.printed import body, cell, gap_mm, rule7
+from sensorgen.asprinted.printed import body, cell, electrode_lines, gap_mm, rule7
 from sensorgen.asprinted.window import window
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.models import fem2d, fem3d, traxels
+from sensorgen.prediction.bodies import sliced
+from sensorgen.prediction.evaluate import evaluate
 from sensorgen.scene.layers import drawn
 from sensorgen.scene.scene import area_mm2
 
@@ -72,7 +73,7 @@ def test_capacitance_by_every_convention(printed, walls):
 @pytest.mark.parametrize("walls", ["cura", "cura-gaps"])
 @pytest.mark.parametrize("convention", ["vol", "deposit"])
 def test_with_the_feet_as_drawn_curas_capacitance_is_that_found_by_hand(printed, walls, convention):
-    if fem2d.unfit(small().drawn):
+    if fem2d.why_not_applicable(small().drawn):
         pytest.skip("NGSolve is not installed")
     variant, made = printed(walls)
     found = list(made.layers[convention])
@@ -164,18 +165,16 @@ def test_the_first_to_be_printed_keeps_its_place_or_the_electrode(real):
     assert won.region(COG).area == pytest.approx(max(width.values()), rel=0.05)
 
 
-def test_report_is_plain_and_complete(printed):
-    _, made = printed("arachne", small(parameters={"length_mm": 16.0}))
-    found = comparison(made).as_dict()
-    json.dumps(found, allow_nan=False)
-    assert found["electrode_gap_mm"] == {"drawn": 0.1, "printed": (0.2, 0.2)}
-    assert not found["estimate"]
-    assert found["capacitance_f"]["printed"]["lower"] < found["capacitance_f"]["drawn"]["middle"]
-    drawn = found["electrode_resistance_ohm"]["drawn"]
-    for end, values in found["electrode_resistance_ohm"]["printed"].items():
-        assert values == sorted(values)
-        assert 0.85 < values[0] / drawn[end] < 1.05
-    assert found["electrode_resistance_ohm"]["printed"]["bottom"][0] == pytest.approx(drawn["bottom"], rel=0.02)
+def test_a_print_is_predicted_beside_its_drawing(real):
+    variant, lines, version = real("arachne", small(parameters={"length_mm": 16.0}))
+    made = sliced(variant, lambda: body(variant, lines, slicer=version), version, b"file")
+    found = evaluate(made)
+    assert (found.gap.value, found.gap.lower, found.gap.upper) == pytest.approx((2e-4, 2e-4, 2e-4))
+    assert found.drawn.gap.value == pytest.approx(1e-4)
+    assert version in found.body
+    assert found.capacitance.print.upper < found.drawn.capacitance.value
+    for end, drawn_ in found.drawn.resistance.items():
+        assert found.resistance[end].value == pytest.approx(drawn_.value, rel=0.1)
 
 
 def test_g_code_of_another_place_or_piece(real):
@@ -197,7 +196,7 @@ def test_an_unknown_convention(real):
 def test_resistance_of_the_sliced_electrode(real, degrees):
     """PrusaSlicer's 100 x 10 x 0.3 mm electrode against another network of its lines."""
     variant, lines, _ = real(f"angle-{degrees}", PLATE)
-    lines = electrode(variant, beads(variant, lines), "bottom")
+    lines = electrode_lines(variant, beads(variant, lines), "bottom")
     wanted = REFERENCE["electrode_ratio"]
     for contact, ratio in zip(wanted["contact_ohm_m2"], wanted[degrees], strict=True):
         found = traxels.resistance(lines, 0.2, contact, (-48.9e-3, 48.9e-3), 3e-6).ratio

@@ -183,7 +183,7 @@ def test_predict_takes_an_accuracy(run):
 
 
 def test_predict_says_when_an_accuracy_is_not_reached(run, monkeypatch):
-    monkeypatch.setattr(fem2d, "unfit", lambda scene: "not today")
+    monkeypatch.setattr(fem2d, "why_not_applicable", lambda scene: "not today")
     said = run("predict", "tri", "--accuracy", "1e-4")
     assert said.code == 1
     assert "was not reached; the best is 0.29; cell 0.5 (columns); compression" in said.line

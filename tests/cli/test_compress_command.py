@@ -166,7 +166,7 @@ def test_without_the_mesher_it_answers_with_what_it_has(run, no_mesher):
     said = run("compress", "tri", "--dielectric", "0.1", "--stress", "10", "--json")
     found = json.loads(said.out)
     assert (said.code, said.err, found["model"], found["faults"]) == (0, "", "springs", [])
-    assert found["displacement_um"] == pytest.approx([0.0, 18.49], rel=1e-3)  # docs/press.md, cheap rungs
+    assert found["displacement_um"] == pytest.approx([0.0, 18.49], rel=1e-3)  # docs/compression.md, closed forms
     (low, _), (high, none) = found["lower_f_per_m2"], found["upper_f_per_m2"]
     assert low * 2e9 < 159.65204 < high * 2e9
     assert none is None

@@ -117,7 +117,7 @@ def test_every_source_is_explained(run):
         ("materials", materials.names()),
         ("printers", printer.printer_names()),
         ("qualities", printer.quality_names()),
-        ("models", registry.names(models)),
+        ("models", list(models.names())),
     ],
 )
 def test_lists_are_complete(run, kind, names):

@@ -137,7 +137,7 @@ def test_what_to_do_is_said(run, tmp_path):
 def test_one_tone_says_so(run, tmp_path):
     z = sensor_model(default_body(make(PLAIN)))[0].sensor.impedance(99.7e3, 3.0, 0.05)
     (tmp_path / "m.csv").write_text(f"re_ohm_99.7kHz,im_ohm_99.7kHz\n{z.real},{z.imag}\n")
-    assert "note: one tone gives two numbers for two unknowns" in run("invert", *DESIGN, "m.csv").out
+    assert "note: one frequency gives two numbers for two unknowns" in run("invert", *DESIGN, "m.csv").out
 
 
 @pytest.mark.parametrize(

@@ -11,17 +11,24 @@ from sensorgen.models import line
 
 PRESSES = ["--force", "0:6:3N", "--position", "20,50", "--frequencies", "1.1kHz,99.7kHz"]
 PLATE = {
-    "L_m": 0.1, "W_m": 0.01, "H_top_m": 3e-4, "H_bottom_m": 3e-4, "rho_top_ohm_m": 0.07, "rho_bottom_ohm_m": 0.2,
-    "d_m": 6e-4, "eps_r": 4.68, "E_Pa": 6e6,
-}  # fmt: skip
+    "length_m": 0.1,
+    "width_m": 0.01,
+    "top_thickness_m": 3e-4,
+    "bottom_thickness_m": 3e-4,
+    "top_resistivity_ohm_m": 0.07,
+    "bottom_resistivity_ohm_m": 0.2,
+    "film_m": 6e-4,
+    "eps_r": 4.68,
+    "modulus_pa": 6e6,
+}
 LOADED = "import atexit; atexit.register(lambda: print('loaded:', *sys.modules))"
 BONDED = 4 / 3 * (1 + (10 / 1.2) ** 2)  # times E, Gent and Lindley
 
 
 def at_point(f, force, x_mm, tip_mm=10.0, stiffer=1.0):
     """The pressed plate straight from the line."""
-    press = {"F_N": force, "L_p_m": tip_mm / 1e3, "x_p_left_edge_m": (x_mm - tip_mm / 2) / 1e3}
-    return complex(line.impedance(**PLATE | {"E_Pa": 6e6 * stiffer}, **press, f_Hz=f))
+    press = {"force_n": force, "tip_m": tip_mm / 1e3, "left_m": (x_mm - tip_mm / 2) / 1e3}
+    return complex(line.impedance(line.PressedLine(**PLATE | {"modulus_pa": 6e6 * stiffer}, **press, frequency_hz=f)))
 
 
 def close(z):
@@ -37,9 +44,15 @@ def test_piezoresistance_in_words_reaches_the_line(run):
     said = run(
         "predict", "reference", "--set", "piezoresistance_etpu=2e-6", "--force", "6", "--position", "50", "--json"
     )
-    data, press = json.loads(said.out), {"F_N": 6.0, "L_p_m": 0.01, "x_p_left_edge_m": 0.045}
+    data, press = json.loads(said.out), {"force_n": 6.0, "tip_m": 0.01, "left_m": 0.045}
     for f, re, im in zip(data["frequency_hz"], data["re_ohm"], data["im_ohm"], strict=True):
-        z = complex(line.impedance(**PLATE, **press, f_Hz=f, S_n_top_per_N=0.02, S_n_bottom_per_N=0.02))
+        z = complex(
+            line.impedance(
+                line.PressedLine(
+                    **PLATE, **press, frequency_hz=f, top_piezoresistance_per_n=0.02, bottom_piezoresistance_per_n=0.02
+                )
+            )
+        )
         assert (re[0][0], im[0][0]) == close(z)
     own = {"material": "etpu", "quantity": "piezoresistance_per_pa", "value": 2e-6, "source": "set by the user"}
     assert own in data["values"]

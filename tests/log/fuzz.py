@@ -11,7 +11,7 @@ from collections import Counter
 from pathlib import Path
 
 from sensorgen.core.errors import SensorgenError
-from sensorgen.measure.log import TABLES, Log, exporting, importing, verify
+from sensorgen.measure.log import TABLES, Log, exchange, importing, verify
 from sensorgen.measure.log.tables import thesis
 
 ODD = (
@@ -76,7 +76,7 @@ def samples(folder):
     with Log(folder / "sound.db", create=True) as log:
         log.add(rows)
         for name in ("table.csv", "table.parquet"):
-            exporting.export(log, folder / name)
+            exchange.export(log, folder / name)
     words = "\n".join(f"{r.written},{r.y_words},{r.z_words},{r.remark}" for r in rows)
     (folder / "words.csv").write_text(f"Design,Resistance in Y,Resistance in Z,Remarks\n{words}\n", "utf-8")
     (folder / "batch.json").write_text(json.dumps(BATCH), "utf-8")
@@ -116,7 +116,7 @@ def main(folder, count, seed):
                 if path.suffix == ".db":
                     read_through(path)
                 else:
-                    importing.take(log, path, {})
+                    importing.import_file(log, path, {})
                 seen[f"{name} taken"] += 1
                 before = state(log)
             except SensorgenError as error:

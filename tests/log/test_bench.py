@@ -11,7 +11,7 @@ import scipy.io
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.measure.log import Log, RawFile, files, verify
-from sensorgen.measure.log.bench import take
+from sensorgen.measure.log.bench import log_recording
 from sensorgen.measure.recording import read
 
 MADE = made.presses(8)
@@ -34,7 +34,7 @@ def run_files(tmp_path_factory):
 
 def test_files_are_kept_whole_and_what_was_counted_beside_them(log, run_files):
     mat, rig = run_files
-    (run,) = take(log, "26 triX .1mm", mat, rig, remark="first of the day")
+    (run,) = log_recording(log, "26 triX .1mm", mat, rig, remark="first of the day")
     assert log.recordings(iteration=26) == (run,)
     assert (run.file, run.rig_file) == tuple(sha256(path.read_bytes()).hexdigest() for path in run_files)
     for kept, path in zip(log.entries(RawFile), run_files, strict=True):
@@ -47,7 +47,7 @@ def test_files_are_kept_whole_and_what_was_counted_beside_them(log, run_files):
 
 
 def test_counts_and_clocks_are_those_of_the_run(log, run_files):
-    (run,) = take(log, "26 triX .1mm", *run_files)
+    (run,) = log_recording(log, "26 triX .1mm", *run_files)
     facts = json.loads(run.facts)
     (lockin,) = facts["lockins"]
     assert lockin["tones_hz"] == pytest.approx(made.TONES_HZ.tolist())
@@ -68,7 +68,7 @@ def test_every_lock_in_is_joined_with_the_rig(log, run_files, tmp_path):
     tones = (made.TONES_HZ[:2], made.TONES_HZ)
     tree = made.tree([dead, lived.impedance_ohm], [lived.time_s] * 2, made.stamps(lived.time_s), tones)
     scipy.io.savemat(tmp_path / "two.mat", tree)
-    (run,) = take(log, "26 triX .1mm", tmp_path / "two.mat", run_files[1])
+    (run,) = log_recording(log, "26 triX .1mm", tmp_path / "two.mat", run_files[1])
     facts = json.loads(run.facts)
     assert facts["rig"]["offset_s"] == pytest.approx(OFFSET_S + 0.03, abs=4 * facts["rig"]["offset_error_s"])
     marked = [lockin["counts"]["rig error"] for lockin in facts["lockins"]]
@@ -99,10 +99,10 @@ def test_columns_of_csv_by_other_names_are_kept_to_read_it_again(run, path, run_
 
 
 def test_without_a_rig_and_twice(log, run_files):
-    (run,) = take(log, "26 triX .1mm", run_files[0])
+    (run,) = log_recording(log, "26 triX .1mm", run_files[0])
     assert (run.rig_file, "rig" in json.loads(run.facts)) == ("", False)
-    assert take(log, "26-trix-d0.1", run_files[0]) == []
-    assert len(take(log, "26 triX .1mm 2", run_files[0])) == 1
+    assert log_recording(log, "26-trix-d0.1", run_files[0]) == []
+    assert len(log_recording(log, "26 triX .1mm 2", run_files[0])) == 1
     assert (len(log.recordings()), log.count(RawFile)) == (2, 1)
 
 
@@ -121,13 +121,13 @@ def test_a_bad_recording_is_told_and_nothing_is_kept(log, tmp_path, run_files, n
     (tmp_path / name).write_bytes(content)
     for pair in ((tmp_path / name, None), (tmp_path / name, run_files[1])):
         with pytest.raises(SensorgenError) as told:
-            take(log, "26 triX", *pair)
+            log_recording(log, "26 triX", *pair)
         assert message in str(told.value)
     with pytest.raises(SensorgenError):
-        take(log, "26 triX", run_files[0], tmp_path / name)
+        log_recording(log, "26 triX", run_files[0], tmp_path / name)
     for path in (tmp_path / "none.mat", tmp_path):
         with pytest.raises(SensorgenError, match=r"cannot read|no file"):
-            take(log, "26 triX", path)
+            log_recording(log, "26 triX", path)
     assert log.recordings() == log.specimens() == ()
     assert not [path for path in log.files.rglob("*") if path.is_file()]
     assert not (tmp_path / "pwned").exists()
@@ -139,25 +139,25 @@ def test_a_huge_file_is_refused_before_it_is_read(log, tmp_path, run_files, monk
     monkeypatch.setattr(files, "raw_file", lambda path: pytest.fail(f"{path} is read"))
     for pair in ((tmp_path / "huge.mat", None), (run_files[0], tmp_path / "huge.mat")):
         with pytest.raises(SensorgenError, match=r"huge.mat': 4.1e\+03 GB; expected up to 2 GB"):
-            take(log, "26 triX", *pair)
+            log_recording(log, "26 triX", *pair)
 
 
 def test_a_recording_that_grows_while_it_is_read_is_refused(log, tmp_path, monkeypatch):
-    from sensorgen.measure.log import bench
+    from sensorgen.measure.log import facts
 
     path = tmp_path / "run.csv"
     rows = "".join(f"{k},-{k},{k}\n" for k in range(1, 99))
     path.write_text(f"re_ohm_1kHz,im_ohm_1kHz,time_s\n{rows}")
 
-    def growing(*paths, facts=bench._facts):
-        found = facts(*paths)
+    def growing(*paths, summarised=facts.summarised):
+        found = summarised(*paths)
         with path.open("a") as file:
             file.write("99,-99,99\n")
         return found
 
-    monkeypatch.setattr(bench, "_facts", growing)
-    with pytest.raises(SensorgenError, match="changes while it is read: log it when it is complete"):
-        take(log, "26 triX", path)
+    monkeypatch.setattr(facts, "summarised", growing)
+    with pytest.raises(SensorgenError, match="changed while it was read: log it when it is complete"):
+        log_recording(log, "26 triX", path)
     assert log.recordings() == ()
 
 

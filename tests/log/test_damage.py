@@ -146,7 +146,7 @@ def test_a_prediction_that_was_tuned_is_found(log, path):
     connection.execute("UPDATE prediction SET data = replace(data, '1', '2')")
     connection.execute(sql)
     connection.close()
-    assert list(verify.faults(log)) == ["prediction 1 is not what was made then"]
+    assert list(verify.faults(log)) == ["prediction 1 is not what was logged"]
 
 
 def test_a_row_that_refers_to_nothing_is_found(sound):

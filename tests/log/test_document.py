@@ -11,7 +11,7 @@ import scipy.io
 
 from sensorgen.cli import cli
 from sensorgen.measure.log import Log
-from sensorgen.measure.log.values import read
+from sensorgen.measure.log.resistances import parse
 
 pytest.importorskip("pyvisa_sim")
 ROOT = Path(__file__).parents[2]
@@ -59,7 +59,7 @@ def test_a_day_at_the_bench(run, path, tmp_path, monkeypatch):
 @pytest.mark.parametrize("line", re.findall(r"\n\| (`.*?) \| (.*?) \|", PAGE.partition("written | read as")[2]))
 def test_the_table_of_values(line):
     for words in re.findall("`(.*?)`", line[0]):
-        found = read(words)
+        found = parse(words)
         said = line[1].replace("1 200 000", "1200000").replace("1.1 Mohm", "1100000 ohm")
         assert len(found.ohm) == (2 if "two readings" in said else 1)
         if "two" not in said and "infinite" not in said:

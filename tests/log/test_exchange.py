@@ -18,16 +18,15 @@ from sensorgen.measure.log import (
     Print,
     RawFile,
     Reading,
-    codec,
     exchange,
-    exporting,
+    fields,
     files,
     importing,
     verify,
 )
 from sensorgen.measure.log.batches import prediction
+from sensorgen.measure.log.notes import reading
 from sensorgen.measure.log.tables import parsed
-from sensorgen.measure.log.words import reading
 
 REMARKS = [
     "=1+1",
@@ -90,10 +89,10 @@ def full(log, tmp_path):
 
 
 def test_the_whole_log_comes_back(full, tmp_path):
-    rows = exporting.export(full, tmp_path / "out")
+    rows = exchange.export(full, tmp_path / "out")
     assert rows == sum(map(len, everything(full).values())) == len(REMARKS) + 8
     with Log(tmp_path / "new.db", create=True) as new:
-        done = importing.take(new, tmp_path / "out", {})
+        done = importing.import_file(new, tmp_path / "out", {})
         assert (done.rows, done.new) == (rows, rows)
         assert everything(new) == everything(full)
         assert new.specimens() == full.specimens()
@@ -101,21 +100,21 @@ def test_the_whole_log_comes_back(full, tmp_path):
         kept = next(new.entries(RawFile))
         assert files.place(new.files, kept).read_bytes() == b"raw" * 99
         assert files.place(new.files, kept).suffix == ".mat"
-        assert importing.take(new, tmp_path / "out", {}).new == 0
+        assert importing.import_file(new, tmp_path / "out", {}).new == 0
 
 
 @pytest.mark.parametrize("form", exchange.FORMATS)
 def test_readings_alone_come_back(full, tmp_path, form):
-    exporting.export(full, tmp_path / f"r.{form}")
+    exchange.export(full, tmp_path / f"r.{form}")
     with Log(tmp_path / "new.db", create=True) as new:
-        importing.take(new, tmp_path / f"r.{form}", {})
+        importing.import_file(new, tmp_path / f"r.{form}", {})
         assert new.readings(superseded=True) == full.readings(superseded=True)
 
 
 def test_parquet_holds_types_that_others_read(full, tmp_path):
     import pyarrow.parquet
 
-    exporting.export(full, tmp_path / "r.parquet")
+    exchange.export(full, tmp_path / "r.parquet")
     table = pyarrow.parquet.read_table(tmp_path / "r.parquet")
     assert table.column("y_ohm").to_pylist()[2] == [1234.56789, math.inf]
     assert table.column("baked").to_pylist()[1:3] == [True, False]
@@ -124,7 +123,7 @@ def test_parquet_holds_types_that_others_read(full, tmp_path):
 
 
 def test_no_cell_is_a_formula(full, tmp_path):
-    exporting.export(full, tmp_path / "out")
+    exchange.export(full, tmp_path / "out")
     for file in (tmp_path / "out").glob("*.csv"):
         with file.open(encoding="utf-8", newline="") as text:
             cells = [cell for row in csv.reader(text) for cell in row]
@@ -139,7 +138,7 @@ def test_any_text_comes_back_from_csv(words):
         Reading(uid=f"u{k}", specimen=word, written=word, remark=word, doubts=(word, "="))
         for k, word in enumerate(words)
     ]
-    text = "".join(exchange.csv_pieces(Reading, rows))
+    text = "".join(exchange.csv_lines(Reading, rows))
     assert list(exchange.from_sheet(Reading, parsed(text.encode(), "x"))) == rows
 
 
@@ -150,9 +149,8 @@ def test_any_text_comes_back_from_csv(words):
 )
 def test_any_numbers_come_back(ohm, baked, number):
     for annotation, value in ((tuple[float, ...], ohm), (bool | None, baked), (int | None, number)):
-        held = codec.CODECS[annotation]
-        assert held.from_text(held.text(value)) == value
-        assert held.from_sql(int(value) if isinstance(value, bool) else held.sql(value)) == value
+        assert fields.from_cell(annotation, fields.to_cell(value)) == value
+        assert fields.FROM_SQL[annotation](fields.to_sql(value)) == value
 
 
 @pytest.mark.parametrize(
@@ -173,7 +171,7 @@ def test_any_numbers_come_back(ohm, baked, number):
     ],
 )
 def test_a_cell_that_the_log_did_not_write_is_refused(full, tmp_path, column, cell):
-    exporting.export(full, tmp_path / "r.csv")
+    exchange.export(full, tmp_path / "r.csv")
     with (tmp_path / "r.csv").open(encoding="utf-8", newline="") as text:
         rows = list(csv.DictReader(text))
     rows[2][column] = cell
@@ -183,20 +181,20 @@ def test_a_cell_that_the_log_did_not_write_is_refused(full, tmp_path, column, ce
         table.writerows(rows)
     with Log(tmp_path / "new.db", create=True) as new:
         with pytest.raises(BadInput, match=f"bad.csv, row 4, column {column}: .* is not what the log writes there"):
-            importing.take(new, tmp_path / "bad.csv", {})
+            importing.import_file(new, tmp_path / "bad.csv", {})
         assert new.readings() == ()
 
 
 def test_an_export_that_was_tuned_is_refused(full, tmp_path):
-    exporting.export(full, tmp_path / "r.csv")
+    exchange.export(full, tmp_path / "r.csv")
     text = (tmp_path / "r.csv").read_text("utf-8")
     (tmp_path / "tuned.csv").write_text(text.replace("0.1", "0.2"), "utf-8")
-    with pytest.raises(BadInput, match="is in the log and says something else there"):
-        importing.take(full, tmp_path / "tuned.csv", {})
+    with pytest.raises(BadInput, match="has other content in the log"):
+        importing.import_file(full, tmp_path / "tuned.csv", {})
 
 
 def test_raw_files_of_an_export_are_checked(full, tmp_path):
-    exporting.export(full, tmp_path / "out")
+    exchange.export(full, tmp_path / "out")
     (file,) = (tmp_path / "out" / "files").iterdir()
     with Log(tmp_path / "new.db", create=True) as new:
         for content in (b"other", None):
@@ -204,33 +202,33 @@ def test_raw_files_of_an_export_are_checked(full, tmp_path):
             if content:
                 file.write_bytes(content)
             with pytest.raises((BadInput, Unwritable), match=r"is not the file of that SHA-256|No such file"):
-                importing.take(new, tmp_path / "out", {})
+                importing.import_file(new, tmp_path / "out", {})
         table = tmp_path / "out" / "raw-files.csv"
         table.write_text(table.read_text("utf-8").replace(file.name, "../../../etc/passwd"), "utf-8")
         with pytest.raises(BadInput, match="is no SHA-256 of a raw file"):
-            importing.take(new, tmp_path / "out", {})
+            importing.import_file(new, tmp_path / "out", {})
         assert all(not rows for rows in everything(new).values())
 
 
 def test_folders_that_are_no_export(full, tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(BadInput, match=r"has no raw-files.csv; expected the folder of an exported log"):
-        importing.take(full, tmp_path / "empty", {})
-    exporting.export(full, tmp_path / "out")
+        importing.import_file(full, tmp_path / "empty", {})
+    exchange.export(full, tmp_path / "out")
     (tmp_path / "out" / "readings.csv").replace(tmp_path / "out" / "batches.csv")
     with pytest.raises(BadInput, match="columns of another table; expected those of batches"):
-        importing.take(full, tmp_path / "out", {})
+        importing.import_file(full, tmp_path / "out", {})
     for place in ("out", "r.xlsx"):
         with pytest.raises(BadInput, match=r"expected a .csv or .parquet file, or a folder that is not there"):
-            exporting.export(full, tmp_path / place)
+            exchange.export(full, tmp_path / place)
     assert not [p for p in tmp_path.iterdir() if p.name.endswith(".part")]
 
 
 def test_without_pyarrow_parquet_is_refused_and_csv_is_not(full, tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
     with pytest.raises(MissingValue, match=r"pip install 'sensorgen\[parquet\]', or export CSV"):
-        exporting.export(full, tmp_path / "r.parquet")
-    assert exporting.export(full, tmp_path / "r.csv") == len(REMARKS) + 3
+        exchange.export(full, tmp_path / "r.parquet")
+    assert exchange.export(full, tmp_path / "r.csv") == len(REMARKS) + 3
 
 
 def test_every_kind_has_every_column():

@@ -13,7 +13,7 @@ import pytest
 
 from sensorgen.core.errors import Unwritable
 from sensorgen.measure.log import Log, Reading, verify
-from sensorgen.measure.log.words import reading
+from sensorgen.measure.log.notes import reading
 
 HERE = Path(__file__).parent
 KILLS, FILES = 200, 600

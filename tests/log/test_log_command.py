@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from sensorgen.measure.log import Log, Reading
-from sensorgen.measure.log.words import reading
+from sensorgen.measure.log.notes import reading
 
 
 def test_a_reading_with_everything(run, path):
@@ -145,7 +145,7 @@ def test_a_prediction_ahead_of_the_measurement(run, path, tmp_path):
     first = run("multimeter", "23 triX .2mm", "--y", "1k", "--predict", "--json")
     assert json.loads(first.out)[0]["number"] == 3
     assert "logged prediction 2" in first.err
-    assert "does not tell its design" in run("multimeter", "22 triY 10mm", "--y", "1", "--predict").line
+    assert "names no design" in run("multimeter", "22 triY 10mm", "--y", "1", "--predict").line
     failed = run("multimeter", "26 triY .1mm", "--visa", "nowhere", "--axis", "y", "--predict")
     assert failed.code == 2  # no meter, but what it should have read is on record
     with Log(path) as log:
@@ -165,7 +165,7 @@ def test_a_print_beds_own_design_is_the_one_that_is_predicted(run, path, tmp_pat
     (tmp_path / "batch.json").write_text(json.dumps(bare))
     run("import", "batch.json", "--log", "other.db")
     words = ("multimeter", "26 triX .1mm", "--y", "650", "--predict", "--log", "other.db")
-    assert "sensorgen log predict takes the design's file" in run(*words).line
+    assert "log a prediction of its file: sensorgen log predict FILE" in run(*words).line
     with Log(path) as log, Log(tmp_path / "other.db") as other:
         assert len(log.predictions()) == 1
         assert other.predictions() == other.readings() == ()
@@ -180,9 +180,9 @@ def test_what_slicers_print_is_kept_beside_what_was_drawn(run, path, tmp_path):
         (kept,) = log.predictions()
     assert json.loads(kept.data) == {"capacitance_f": {"lower": 1e-11}, "printed": {"prusa": report}}
     for slicers, message in (
-        (3, "slicers holds 3"),
-        ({"prusa": []}, "slicer prusa holds []"),
-        ({"prusa": {"printed": "x"}}, "printed by prusa holds 'x'"),
+        (3, "slicers is 3; expected a mapping"),
+        ({"prusa": []}, "slicers.prusa is []; expected a mapping"),
+        ({"prusa": {"printed": "x"}}, "slicers.prusa.printed is 'x'; expected a mapping"),
     ):
         (tmp_path / "batch.json").write_text(json.dumps(BATCH | {"slicers": slicers}))
         said = run("import", "batch.json", "--log", "new.db")
@@ -216,10 +216,10 @@ def test_a_print_bed_ties_its_specimens(run, path, tmp_path):
     assert "print 2:" in shown
     assert "prediction 1:" in shown
     for text, message in (
-        ("{}", "specimens holds None; expected a mapping"),
+        ("{}", "specimens is missing"),
         ('{"specimens": {"x": {"design": "a", "design_id": "b"}}}', "'x' is no specimen's name"),
-        ('{"specimens": {"26 triX": {"design": "a"}}}', "specimen 26 triX: design_id is None; expected text"),
-        ('{"specimens": {"26 triX": 3}}', "specimen 26 triX holds 3"),
+        ('{"specimens": {"26 triX": {"design": "a"}}}', "specimens.26 triX.design_id is missing"),
+        ('{"specimens": {"26 triX": 3}}', "specimens.26 triX is 3; expected a mapping"),
         ("[" * 9999, "not the record of a batch"),
         ("", "not the record of a batch"),
     ):

@@ -20,11 +20,11 @@ from sensorgen.measure.log import (
     RawFile,
     Reading,
     database,
-    leftovers,
+    durable,
     schema,
     verify,
 )
-from sensorgen.measure.log.words import reading
+from sensorgen.measure.log.notes import reading
 
 HERE = Path(__file__).parent
 SHA = "0" * 64
@@ -138,7 +138,7 @@ def test_all_rows_of_one_call_or_none(log):
 def test_a_known_row_that_says_something_else_is_refused(log):
     (row,) = log.add([reading("23 triX", "650", uid="1")])
     assert log.add([row]) == []
-    with pytest.raises(BadInput, match="row 1 is in the log and says something else"):
+    with pytest.raises(BadInput, match="row 1 has other content in the log"):
         log.add([dataclasses.replace(row, remark="tuned")])
 
 
@@ -164,7 +164,7 @@ def test_the_bake_is_what_is_said_or_remarked(remark, said, baked):
 
 def test_a_remark_that_contradicts_is_doubtful():
     row = reading("23 triX .1mm", "650", remark="not baked", baked=True)
-    assert (row.baked, row.doubts) == (True, ("said to be baked, and the remark says that it is not",))
+    assert (row.baked, row.doubts) == (True, ("baked, but the remark says that it is not",))
 
 
 HOSTILE = [
@@ -215,7 +215,7 @@ def test_a_log_of_version_1_is_taken_along(version1):
         filled(log)
         assert [fault.partition(" (")[0] for fault in verify.faults(log)] == [
             "raw file run.mat",
-            "prediction 1 is not what was made then",
+            "prediction 1 is not what was logged",
         ]
     assert sql(version1, held)[0][:3] == before[0]
 
@@ -297,8 +297,8 @@ def test_a_log_is_made_where_there_are_no_links(path, monkeypatch):
 def test_parts_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path):
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
-    mine = leftovers.part_of(tmp_path / "log.db")
-    assert mine != leftovers.part_of(tmp_path / "log.db")
+    mine = durable.part_of(tmp_path / "log.db")
+    assert mine != durable.part_of(tmp_path / "log.db")
     stay = [mine.name, f".log.db.ab.{os.getppid()}.part", "log.db.1.part", ".log.db.part", f".x.{dead.pid}.part.txt"]
     go = [f".log.db.ab.{dead.pid}.part", f".log.db.ab.{os.getpid()}.part"]
     for name in (*stay, *go):
@@ -319,7 +319,7 @@ def test_rows_by_columns_that_there_are(log):
 WRITER = """
 import sys
 from pathlib import Path
-from sensorgen.log import Log, Reading
+from sensorgen.measure.log import Log, Reading
 for k in range(int(sys.argv[3])):
     with Log(Path(sys.argv[1]), create=True) as log:
         log.add(Reading(uid=f"{sys.argv[2]}-{k}-{j}", specimen="23 triX", written="23 triX") for j in range(10))
@@ -343,7 +343,10 @@ def test_a_writer_who_does_not_end_is_told(log, path, monkeypatch):
     monkeypatch.setattr(database, "WAIT_S", 0.05)
     other = sqlite3.connect(path, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
-    with Log(path) as late, pytest.raises(Unwritable, match=r"another program keeps the log .* nothing was logged"):
+    with (
+        Log(path) as late,
+        pytest.raises(Unwritable, match=r"another program has locked the log .* nothing was logged"),
+    ):
         late.add([reading("23 triX", "650")])
     assert log.readings() == ()  # readers do not wait
     other.close()

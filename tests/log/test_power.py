@@ -9,7 +9,7 @@ import pytest
 import scipy.io
 
 from sensorgen.measure.log import Log
-from sensorgen.measure.log.bench import take
+from sensorgen.measure.log.bench import log_recording
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="asks the kernel for the names of open files")
 
@@ -57,7 +57,7 @@ def test_everything_is_on_the_disk_before_it_is_acknowledged(tmp_path, pending):
             return real(entries)
 
         log.add = add
-        assert take(log, "26 triX .1mm", tmp_path / "run.mat")
+        assert log_recording(log, "26 triX .1mm", tmp_path / "run.mat")
         assert not pending
 
 

@@ -18,7 +18,7 @@ def take(log, tmp_path):
     def call(content, name="t.csv", **columns):
         path = tmp_path / name
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return importing.take(log, path, columns)
+        return importing.import_file(log, path, columns)
 
     return call
 
@@ -89,7 +89,7 @@ WRONG = {
     "zero byte": (HEAD + "23 triX,1,2,\0\n", "row 2: a zero byte"),
     "zero byte elsewhere": ("specimen,y,who\n23 triX,1,\0\n", "row 2: a zero byte"),
     "huge cell": (HEAD + "23 triX,1,2," + "x" * 200_000 + "\n", "row 2: not CSV (field larger than field limit"),
-    "long remark": (HEAD + "23 triX,1,2," + "x" * 20_000 + "\n", "row 2: a remark of 20000 letters"),
+    "long remark": (HEAD + "23 triX,1,2," + "x" * 20_000 + "\n", "row 2: a remark of 20000 characters"),
     "long name": (HEAD + "23 triX" + "x" * 9_000 + ",1,2,\n", "row 2:"),
 }
 
@@ -115,13 +115,13 @@ def test_a_huge_table_is_refused_unread(log, tmp_path, monkeypatch):
     with (tmp_path / "big.csv").open("wb") as file:
         file.truncate(tables.MOST_BYTES + 1)
     with pytest.raises(SensorgenError, match="64000001 bytes; expected at most 64000000: split it"):
-        importing.take(log, tmp_path / "big.csv", {})
+        importing.import_file(log, tmp_path / "big.csv", {})
 
 
 @pytest.mark.parametrize("place", ["none.csv", "/dev/zero", "/dev/tty", "none.json", "none.parquet", "none", "a\0b"])
 def test_what_is_no_file(log, tmp_path, place):
     with pytest.raises(SensorgenError, match=r"cannot read|no file|no Parquet file"):
-        importing.take(log, tmp_path / place, {})
+        importing.import_file(log, tmp_path / place, {})
 
 
 def test_a_zip_or_pickle_given_as_anything_is_not_executed(log, tmp_path):
@@ -135,14 +135,14 @@ def test_a_zip_or_pickle_given_as_anything_is_not_executed(log, tmp_path):
         for content in (pickle.dumps(Evil()), (tmp_path / "t.zip").read_bytes()):
             (tmp_path / f"t.{suffix}").write_bytes(content)
             with pytest.raises(SensorgenError):
-                importing.take(log, tmp_path / f"t.{suffix}", {})
+                importing.import_file(log, tmp_path / f"t.{suffix}", {})
     assert not (tmp_path / "pwned").exists()
     assert log.readings() == ()
 
 
 def test_a_table_as_log_and_a_log_as_table(log, path, tmp_path):
     with pytest.raises(SensorgenError, match="is a database; expected a table as CSV"):
-        importing.take(log, path, {})
+        importing.import_file(log, path, {})
     (tmp_path / "t.csv").write_text(HEAD + "x" * 200)
     with pytest.raises(SensorgenError, match="is no SQLite file; expected a log"):
         Log(tmp_path / "t.csv")

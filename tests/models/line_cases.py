@@ -9,16 +9,27 @@ import mpmath
 FILE = json.loads((Path(__file__).parents[1] / "reference" / "line_all.json").read_text("utf-8"))
 TONES = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)
 PLATE = {
-    "L_m": 0.1, "W_m": 0.01, "H_top_m": 3e-4, "H_bottom_m": 3e-4, "rho_top_ohm_m": 0.07, "rho_bottom_ohm_m": 0.2,
-    "d_m": 6e-4, "eps_r": 4.68, "E_Pa": 6e6, "L_p_m": 0.01, "F_N": 3.0, "x_p_left_edge_m": 0.045, "f_Hz": 99.7e3,
-}  # fmt: skip
+    "length_m": 0.1,
+    "width_m": 0.01,
+    "top_thickness_m": 3e-4,
+    "bottom_thickness_m": 3e-4,
+    "top_resistivity_ohm_m": 0.07,
+    "bottom_resistivity_ohm_m": 0.2,
+    "film_m": 6e-4,
+    "eps_r": 4.68,
+    "modulus_pa": 6e6,
+    "tip_m": 0.01,
+    "force_n": 3.0,
+    "left_m": 0.045,
+    "frequency_hz": 99.7e3,
+}
 
 
 def cases() -> list[tuple[dict[str, Any], tuple[str, str]]]:
     """Inputs, and Z as two strings of 25 digits."""
     found = []
     for geometry, f, force, x, re, im in FILE["cases"]:
-        where = {"f_Hz": f, "F_N": force, "x_p_left_edge_m": x}
+        where = {"frequency_hz": f, "force_n": force, "left_m": x}
         found.append(({**FILE["common"], **FILE["geometries"][geometry], **where}, (re, im)))
     return found
 
@@ -31,26 +42,35 @@ def exact(digits: int = 60, **inputs: Any) -> Any:
 
 def _exact(given: dict[str, Any]) -> Any:
     defaults = {
-        "tan_delta": 0, "G_S_per_m": 0, "F_N": 0, "x_p_left_edge_m": 0, "L_p_m": 0, "E_Pa": 1, "S_n_top_per_N": 0,
-        "S_n_bottom_per_N": 0, "eps0_F_per_m": 8.8541878128e-12,
-    }  # fmt: skip
+        "tan_delta": 0,
+        "leak_s_per_m": 0,
+        "force_n": 0,
+        "left_m": 0,
+        "tip_m": 0,
+        "modulus_pa": 1,
+        "top_piezoresistance_per_n": 0,
+        "bottom_piezoresistance_per_n": 0,
+        "eps0_f_per_m": 8.8541878128e-12,
+    }
     far_end = given.get("far_end", "open")
     p = {k: mpmath.mpmathify(v) for k, v in (defaults | given).items() if k != "far_end"}
-    strain = p["F_N"] / (p["W_m"] * p["L_p_m"] * p["E_Pa"]) if p["F_N"] else mpmath.mpf(0)
+    strain = p["force_n"] / (p["width_m"] * p["tip_m"] * p["modulus_pa"]) if p["force_n"] else mpmath.mpf(0)
 
     def section(length, pressed):
-        rise = p["F_N"] if pressed else 0
+        rise = p["force_n"] if pressed else 0
         r = sum(
-            p[f"rho_{e}_ohm_m"] * (1 + p[f"S_n_{e}_per_N"] * rise) / (p[f"H_{e}_m"] * p["W_m"])
+            p[f"{e}_resistivity_ohm_m"]
+            * (1 + p[f"{e}_piezoresistance_per_n"] * rise)
+            / (p[f"{e}_thickness_m"] * p["width_m"])
             for e in ("top", "bottom")
         )
-        gap = p["d_m"] * (1 - strain) if pressed else p["d_m"]
-        c = p["eps0_F_per_m"] * p["eps_r"] * p["W_m"] / gap
-        y = p["G_S_per_m"] + (p["tan_delta"] + 1j) * 2 * mpmath.pi * p["f_Hz"] * c
+        gap = p["film_m"] * (1 - strain) if pressed else p["film_m"]
+        c = p["eps0_f_per_m"] * p["eps_r"] * p["width_m"] / gap
+        y = p["leak_s_per_m"] + (p["tan_delta"] + 1j) * 2 * mpmath.pi * p["frequency_hz"] * c
         return matrix(r, y, length)
 
-    right = p["L_m"] - p["x_p_left_edge_m"] - p["L_p_m"]
-    parts = [section(p["x_p_left_edge_m"], False), section(p["L_p_m"], True), section(right, False)]
+    right = p["length_m"] - p["left_m"] - p["tip_m"]
+    parts = [section(p["left_m"], False), section(p["tip_m"], True), section(right, False)]
     return terminated(parts[0] * parts[1] * parts[2], far_end)
 
 

@@ -16,7 +16,7 @@ from scipy.integrate import quad
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import rect, reference, tri
 from sensorgen.models import fem2d
-from sensorgen.models.columns import _mean_min, capacitance, unfit
+from sensorgen.models.columns import _mean_min, capacitance, why_not_applicable
 from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 from sensorgen.scene.sections import sections
 from sensorgen.scene.unit_cell import cell
@@ -366,12 +366,12 @@ def interlocked() -> Scene:
     ],
 )
 def test_it_says_what_it_cannot_speak_of(scene, reason):
-    assert reason in (unfit(scene) or "")
+    assert reason in (why_not_applicable(scene) or "")
 
 
 @pytest.mark.parametrize("scene", [tri_cell(0.1), rect_cell(0.1), tri_cell(1e-6), plates(RIDGE), plates()])
 def test_it_speaks_of_the_rest(scene):
-    assert unfit(scene) is None
+    assert why_not_applicable(scene) is None
 
 
 def test_a_material_without_permittivity_is_missing():

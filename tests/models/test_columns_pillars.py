@@ -8,7 +8,7 @@ import pytest
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import fem3d
-from sensorgen.models.columns import capacitance, unfit
+from sensorgen.models.columns import capacitance, why_not_applicable
 from sensorgen.models.springs import displacement_m
 from sensorgen.scene.scene import Body, Outline, Prism, Scene, box
 
@@ -143,7 +143,7 @@ def test_a_step_of_the_lower_electrode_is_no_hindrance():
     ],
 )
 def test_what_is_no_plan_is_told(outlines, reason):
-    assert reason in (unfit(pillars(*outlines)) or "")
+    assert reason in (why_not_applicable(pillars(*outlines)) or "")
 
 
 def test_springs_of_pillars_give_way_by_what_stands():

@@ -205,8 +205,8 @@ def test_what_it_cannot_speak_of():
     overlap = plates(Body("a", "x60", (box(0, 2, 0, 1, 0.2, 0.6),)), Body("b", "pva", (box(0, 2, 0, 1, 0.5, 0.8),)))
     half = Scene((plates().bodies[0], Body("high", "etpu", (box(0, 1, 0, 1, 1.2, 1.4),), "top")), (2.0, 1.0, 1.4))
     middle = plates(Body("mid", "etpu", (box(0, 2, 0, 1, 0.5, 0.6),), "middle"))
-    assert "overlap" in (fem2d.unfit(overlap) or "")
-    assert "does not cover" in (fem2d.unfit(half) or "")
-    assert "three directions" in (fem2d.unfit(rect_cell(0.1)) or "")
-    assert "two electrodes" in (fem2d.unfit(middle) or "")
-    assert fem2d.unfit(tri_cell(0.1)) is None
+    assert "overlap" in (fem2d.why_not_applicable(overlap) or "")
+    assert "does not cover" in (fem2d.why_not_applicable(half) or "")
+    assert "three directions" in (fem2d.why_not_applicable(rect_cell(0.1)) or "")
+    assert "two electrodes" in (fem2d.why_not_applicable(middle) or "")
+    assert fem2d.why_not_applicable(tri_cell(0.1)) is None

@@ -16,10 +16,9 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import rect
 from sensorgen.models import columns, fem3d
 from sensorgen.scene.scene import Body, Fill, Scene, box
-from sensorgen.solvers.electrostatics.boxes import flux, potential
+from sensorgen.solvers.electrostatics.boxes import Pair, boxes_of, flux, potential, whole
 from sensorgen.solvers.electrostatics.bricks import grid, layered
 from sensorgen.solvers.electrostatics.dissection import least
-from sensorgen.solvers.electrostatics.pair import Pair, boxes_of, whole
 
 CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
 
@@ -317,8 +316,8 @@ def test_what_it_cannot_speak_of():
         (tri_cell(0.1), "boxes"),
         (rect_cell(0.0), "touch"),
     ):
-        assert words in (fem3d.unfit(scene) or "")
-    assert fem3d.unfit(rect_cell(0.1)) is None
+        assert words in (fem3d.why_not_applicable(scene) or "")
+    assert fem3d.why_not_applicable(rect_cell(0.1)) is None
 
 
 def test_nonsense_is_refused():

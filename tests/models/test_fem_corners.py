@@ -5,8 +5,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 from sensorgen.solvers.electrostatics.corners import exponent, exponents
-from sensorgen.solvers.electrostatics.flips import flipped
-from sensorgen.solvers.electrostatics.triangles import Triangles, apart
+from sensorgen.solvers.electrostatics.triangles import Triangles, apart, flipped
 
 
 def close(expected: float, rel: float):

@@ -10,7 +10,7 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import tri
 from sensorgen.models import fem2d, fem3d
 from sensorgen.scene.scene import Body, Fill, box
-from sensorgen.solvers.electrostatics.lossy import Fields, disc, turned
+from sensorgen.solvers.electrostatics.bounds import Fields, disc, turned
 
 BOTH = pytest.mark.parametrize("model", [fem2d, fem3d])
 LOSSY = {"x60": 4.68 * (1 - 0.3j), "air": 1.00059}

@@ -60,8 +60,8 @@ def test_symmetries(seed):
     """Left for right, upside down, three times the permittivity, and the losses' own solver: all hold one value."""
     quilt, eps = Quilt.random(seed), permittivity(seed, 3.0)
     scene = quilt.scene()
-    if fem2d.unfit(scene):
-        assert "touch" in fem2d.unfit(scene)
+    if fem2d.why_not_applicable(scene):
+        assert "touch" in fem2d.why_not_applicable(scene)
         return
     found = fem2d.capacitance(scene, eps, 1e-4)
     real = fem2d.lossy(scene, {m: complex(e) for m, e in eps.items()}, 1e-4)

@@ -12,9 +12,8 @@ from sensorgen.models import columns, fem2d
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.electrostatics import bounds as _fem_bounds
 from sensorgen.solvers.electrostatics.mesh import Cones
-from sensorgen.solvers.electrostatics.plane import Plane
+from sensorgen.solvers.electrostatics.plane import Field, Plane
 from sensorgen.solvers.electrostatics.polynomials import SIDES
-from sensorgen.solvers.electrostatics.problem import Field
 from sensorgen.solvers.electrostatics.triangles import Triangles
 
 AIR_AT_1E4 = {"x60": 1e4, "air": 1.0}

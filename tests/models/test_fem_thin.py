@@ -51,7 +51,7 @@ def test_slanted_films_cost_no_digits(film_mm):
 
 
 def test_no_film_is_refused():
-    assert "touch" in (fem2d.unfit(tri_cell(0.0)) or "")
+    assert "touch" in (fem2d.why_not_applicable(tri_cell(0.0)) or "")
     with pytest.raises(ValueError, match="touch"):
         fem2d.capacitance(tri_cell(0.0), EPS)
 

@@ -8,19 +8,19 @@ from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.models import line, line_fit
 
 OLDER = {
-    **PLATE, "L_m": 0.178, "W_m": 0.0084, "eps_r": 6.33, "E_Pa": 1e6,
+    **PLATE, "length_m": 0.178, "width_m": 0.0084, "eps_r": 6.33, "modulus_pa": 1e6,
 }  # fmt: skip
 """Table C.1."""
 
 
 def presses(plate):
-    force, x = np.meshgrid(np.linspace(0, 6, 61), np.linspace(0, plate["L_m"] - 0.01, 101), indexing="ij")
+    force, x = np.meshgrid(np.linspace(0, 6, 61), np.linspace(0, plate["length_m"] - 0.01, 101), indexing="ij")
     return force.ravel(), x.ravel()
 
 
 def measured(plate, tone):
     force, x = presses(plate)
-    z = line.impedance(**{**plate, "f_Hz": tone, "F_N": force, "x_p_left_edge_m": x})
+    z = line.impedance(line.PressedLine(**{**plate, "frequency_hz": tone, "force_n": force, "left_m": x}))
     return force, x, *line_fit.series(tone, z)
 
 
@@ -36,7 +36,7 @@ def test_the_printed_basis_is_off_by_centimetres_even_with_c5_corrected(plate, t
     force, x, c, r = measured(plate, tone)
     found = line_fit.fit(force, x, c, r, "printed").presses(c, r)
     pressed = force > 0.5
-    off = (found.choice(plate["L_m"]) - x)[pressed]
+    off = (found.choice(plate["length_m"]) - x)[pressed]
     assert 0.009 < np.sqrt(np.mean(off**2)) < 0.028
     assert 0.05 < np.isnan(found.position_m).all(1)[pressed].mean() < 0.125
 

@@ -67,7 +67,9 @@ def test_the_table_of_misprints_in_the_docs():
     text = (Path(__file__).parents[2] / "docs" / "line.md").read_text("utf-8")
     rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in text.splitlines() if row.startswith("| B.")]
     rows = [row for row in rows if ".." in row[-1]]
-    assert [(row[0], float(row[1])) for row in rows] == [(p, f / 1e3) for p in line_closed.PRINTED for f in TONES]
+    assert [(row[0], float(row[1])) for row in rows] == [
+        (p, f / 1e3) for p in line_closed.PRINTED for f in (TONES[0], TONES[-1])
+    ]
     places = {"F_N": np.linspace(0, 6, 5)[:, None], "x_p_left_edge_m": np.linspace(0, 0.09, 5)}
     for printed, kilohertz, *spans in rows:
         inputs = PLATE | places | {"f_Hz": float(kilohertz) * 1e3}

@@ -68,14 +68,12 @@ def test_against_mpmath(profile, position, far_end):
 
 
 @pytest.mark.parametrize("sensor", [PLATE, SOFT, replace(SOFT, far_end="short")])
-@pytest.mark.parametrize("count", [1, 5])
-def test_pieces_of_even_pressure_are_one_patch(sensor, count):
-    one = sensor.response(TONE[:, None], 3.0, np.array(PLACES))
-    cut = replace(sensor, pieces=count)._tip(np.asarray(3.0), np.array(PLACES))
-    many = line_tip.response(sensor._track(), cut, sensor.compression, TONE[:, None])
-    assert line_tip.impedance(sensor._track(), cut, sensor.compression, TONE[:, None]) == pytest.approx(
-        one[0], rel=1e-14
-    )
+def test_pieces_of_even_pressure_are_one_patch(sensor):
+    one, places, force = sensor.response(TONE[:, None], 3.0, np.array(PLACES)), np.array(PLACES), np.asarray(3.0)
+    track, _, law, tone = sensor._pressed(TONE[:, None], force, places)
+    cut = line_tip.resting(0.1, 0.01, ("uniform", 5), force, places, sensor.contact_m(force))
+    many = line_tip.response(track, cut, law, tone)
+    assert line_tip.impedance(track, cut, law, tone) == pytest.approx(one[0], rel=1e-14)
     for found, expected in zip(many, one, strict=True):
         assert found.real == pytest.approx(expected.real, rel=1e-7, abs=1e-12)  # up to 50 times below the whole
         assert found.imag == pytest.approx(expected.imag, rel=1e-9, abs=1e-12)
@@ -158,8 +156,6 @@ def test_the_highest_pressure_is_what_counts():
 
 def test_what_an_uneven_tip_cannot():
     sensor = replace(PLATE, profile="hertz")
-    with pytest.raises(OutOfRange, match="makes no single patch"):
-        sensor.line_inputs(1e3, 1.0, 0.05)
     with pytest.raises(OutOfRange, match="electrodes touch"):
         sensor.impedance(1e3, 500.0, 0.05)  # 5 MPa on average, 6.4 in the middle
     soft = replace(sensor, piezoresistance_per_pa=(0.0, -5e-5))

@@ -11,6 +11,7 @@ from sensorgen.design.design import make
 
 pytest.importorskip("netgen")
 from sensorgen.models import press2d
+from sensorgen.models.compression import curve_of
 from sensorgen.models.press2d import Fineness, Held
 from sensorgen.solvers.contact import closing, deformed, load, pressed
 
@@ -117,7 +118,7 @@ def test_a_plate_between_fixed_sides_is_confined():
 
 
 def test_a_curve_for_the_sensor():
-    law = press2d.curve_of(press2d.press(tri(), solids(), STRESSES[:3], EPS))
+    law = curve_of(press2d.press(tri(), solids(), STRESSES[:3], EPS))
     thinning, slope = law.thinning(np.asarray(2e4))
     assert 1 / (1 - thinning) == pytest.approx(1 + 18.21 / 159.65204, rel=0.002)
     assert slope > 0
@@ -134,7 +135,7 @@ def test_too_much_is_told_with_the_last_load(monkeypatch):
     assert found.faults == ("converged up to 10 of 20 kPa",)
     assert len(found.stress_pa) == len(found.displacement_m) == 2
     with pytest.raises(OutOfRange, match="not to be trusted"):
-        press2d.curve_of(found)
+        curve_of(found)
 
 
 def test_coarser_triangles_take_over_where_finer_ones_fail(monkeypatch):

@@ -10,20 +10,20 @@ from scipy.sparse import csr_matrix
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models import fem2d, fem3d, press2d, press3d, springs
+from sensorgen.models.compression import curve_of
 from sensorgen.models.press3d import Elastic, Held, Pieces
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.contact import (
-    brick_air,
-    brick_element,
-    brick_factors,
+    air,
     brick_field,
-    brick_touch,
+    contact,
     element,
+    factors,
     load,
     pressed,
 )
 from sensorgen.solvers.contact.brick_field import Orders
-from sensorgen.solvers.contact.bricks import Bricks
+from sensorgen.solvers.contact.bricks import Bricks, mesh_of
 from sensorgen.solvers.contact.cell import Region
 
 EPS = {"x60": 4.68, "air": 1.00059}
@@ -77,12 +77,10 @@ def test_a_block_follows_the_closed_form(nu, period):
 
 
 def noisy(seed, nu):
-    mesh = brick_element.mesh_of(
-        boxes(((0, 1, 1.7), (0, 0.6), (0, 0.5, 2)), np.ones((2, 1, 2), int)), np.ones((2, 1, 2), bool)
-    )
+    mesh = mesh_of(boxes(((0, 1, 1.7), (0, 0.6), (0, 0.5, 2)), np.ones((2, 1, 2), int)), np.ones((2, 1, 2), bool))
     m = len(mesh.nodes)
     e, rng = (
-        brick_element.BrickElements(mesh, element.law(np.full(m, 6.0), np.full(m, nu))),
+        element.Elements(mesh, element.law(np.full(m, 6.0), np.full(m, nu))),
         np.random.default_rng(seed),
     )
     u = rng.normal(size=3 * len(mesh.points_m)) * 2e-5
@@ -98,7 +96,7 @@ def test_the_tangent_is_the_derivative_of_the_residual_and_that_of_the_energy():
     expected = np.einsum("mij,mj->mi", matrix, along)
     assert (up - down) / (2 * h) == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
     assert matrix == pytest.approx(matrix.transpose(0, 2, 1), abs=1e-9 * np.abs(matrix).max())
-    one, other = (e.energy_j_per_m(u + s * du, inner.moved(di, s)) for s in (h, -h))
+    one, other = (e.energy_j(u + s * du, inner.moved(di, s)) for s in (h, -h))
     assert (one - other) / (2 * h) == pytest.approx((residual * along).sum(), rel=1e-6, abs=0)
 
 
@@ -155,17 +153,17 @@ def test_bounds_hold_the_reference_and_close_in():
 
 
 def unmoved(bricks, orders):
-    mesh = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
-    return brick_field.capacitance(mesh, np.zeros(3 * len(mesh.points_m)), EPS, orders)
+    mesh = mesh_of(bricks, np.ones(bricks.fill.shape, bool))
+    return brick_field.Field(mesh, EPS, orders).capacitance(np.zeros(3 * len(mesh.points_m)))
 
 
 def test_a_thinner_film_by_displacement_is_one_by_drawing():
     """Everything above the film lowered by 20 um, the film thinned alike: another solver on the drawn cell agrees."""
     bricks = press3d.cell(rect(0.1)).cut(2, 0.3)
-    mesh = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
+    mesh = mesh_of(bricks, np.ones(bricks.fill.shape, bool))
     u = np.zeros((len(mesh.points_m), 3))
     u[:, 2] = -20e-6 * np.clip((mesh.points_m[:, 2] - 0.3e-3) / 0.1e-3, 0, 1)
-    moved = brick_field.capacitance(mesh, u.ravel(), EPS, Orders())
+    moved = brick_field.Field(mesh, EPS, Orders()).capacitance(u.ravel())
     drawn = fem3d.capacitance(rect(0.08), EPS, 1e-2).times(1 / 1e-3)
     assert max(moved.lower, drawn.lower) < min(moved.upper, drawn.upper)
     assert moved.middle() == pytest.approx(drawn.middle(), rel=4e-3)
@@ -174,22 +172,22 @@ def test_a_thinner_film_by_displacement_is_one_by_drawing():
 def test_bounds_from_the_factors_of_an_earlier_load_hold_those_of_new_ones(monkeypatch):
     """Unfinished solutions are certified too: outside those that are solved anew, and how far is known."""
     bricks = press3d.cell(rect(0.1)).cut(1, 0.3)
-    mesh = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
+    mesh = mesh_of(bricks, np.ones(bricks.fill.shape, bool))
     u = np.zeros((len(mesh.points_m), 3))
     u[:, 2] = -20e-6 * np.clip((mesh.points_m[:, 2] - 0.3e-3) / 0.1e-3, 0, 1)
     for small in (1e-2, 1e-7):
         monkeypatch.setattr(brick_field, "_SMALL", small)
         cell = brick_field.Field(mesh, EPS, Orders())
         cell.capacitance(0 * u.ravel())
-        made = {name: kept.factors for name, kept in cell._earlier.items()}
+        made = {name: kept.factors for name, kept in cell.systems.items()}
         for share in (0.5, 1.0, -1.0):
             found = cell.capacitance(share * u.ravel())
             monkeypatch.setattr(brick_field, "_SMALL", 1e-12)
-            new = brick_field.capacitance(mesh, share * u.ravel(), EPS, Orders())
+            new = brick_field.Field(mesh, EPS, Orders()).capacitance(share * u.ravel())
             monkeypatch.setattr(brick_field, "_SMALL", small)
             assert new.lower * (1 - 2 * small) < found.lower <= new.lower * (1 + 1e-12)
             assert new.upper * (1 - 1e-12) <= found.upper < new.upper * (1 + 2 * small)
-        assert all(kept.factors is made[name] for name, kept in cell._earlier.items())
+        assert all(kept.factors is made[name] for name, kept in cell.systems.items())
 
 
 def test_where_a_plates_inner_places_go_does_not_matter():
@@ -197,19 +195,19 @@ def test_where_a_plates_inner_places_go_does_not_matter():
     planes = (np.linspace(0, 1, 4), np.linspace(0, 1, 4), (0, 0.1, 0.3, 0.5, 0.7, 0.8))
     fill = np.ones((3, 3, 5), int)
     fill[..., 0], fill[..., -1] = 2, 3
-    mesh = brick_element.mesh_of(boxes(planes, fill), np.ones((3, 3, 5), bool))
+    mesh = mesh_of(boxes(planes, fill), np.ones((3, 3, 5), bool))
     x, y, z = mesh.points_m.T * 1e3
     bump = np.sin(np.pi * x) * np.sin(np.pi * y) * np.sin(np.pi * np.clip((z - 0.1) / 0.6, 0, 1))
     u = 1e-3 * np.column_stack([0.08 * bump, -0.05 * bump, 0.07 * bump])
     exact = 8.8541878128e-12 * 4.68 / 0.6e-3
     widths = []
     for orders in (Orders(2, 1), Orders(4, 3)):
-        found = brick_field.capacitance(mesh, u.ravel(), EPS, orders)
+        found = brick_field.Field(mesh, EPS, orders).capacitance(u.ravel())
         assert found.lower < exact < found.upper
         widths.append(found.width())
     assert widths[1] < 0.02 * widths[0]
     with pytest.raises(brick_field.Folded):
-        brick_field.capacitance(mesh, 12 * u.ravel(), EPS, Orders(2, 1))
+        brick_field.Field(mesh, EPS, Orders(2, 1)).capacitance(12 * u.ravel())
 
 
 def stairs(*widths, lift=0.0, film=0.1):
@@ -234,14 +232,14 @@ def stairs(*widths, lift=0.0, film=0.1):
 def test_a_foot_that_has_landed_and_widened_is_one_drawn_so(slid_mm):
     """Most of a brick's half sideways, onto a film that stays: the field of the drawn foot, by another solver."""
     bricks = press3d.cell(stairs(0.2, lift=0.02)).cut(3, 0.3)
-    whole, solid = (brick_element.mesh_of(bricks, w) for w in (np.ones(bricks.fill.shape, bool), bricks.fill > 0))
+    whole, solid = (mesh_of(bricks, w) for w in (np.ones(bricks.fill.shape, bool), bricks.fill > 0))
     x, _, z = solid.points_m.T * 1e3
     above = z > 0.41
     moved = np.zeros_like(solid.points_m)
     moved[above, 0] = 1e-3 * np.interp(x[above], [0.5, 0.7, 1.5], [0.0, slid_mm, 0.0])
     moved[above, 2] = -2e-5
-    u = brick_air.extended(whole, solid, *brick_touch.BrickFaces(solid).opened(moved, 1e-4))
-    found = brick_field.capacitance(whole, u, EPS, Orders())
+    u = air.AirMap(whole, solid).displacements_m(moved, 1e-4)
+    found = brick_field.Field(whole, EPS, Orders()).capacitance(u)
     drawn = fem2d.capacitance(stairs(0.2 + slid_mm), EPS, 1e-5).times(1 / 32e-6)
     assert found.width() < 2e-3
     assert found.lower < drawn.upper * (1 + 1e-4)
@@ -268,13 +266,13 @@ def test_feet_that_stick_are_stiffer_by_as_much_as_in_a_cross_section():
     """By how much sticking stiffens, against a fine mesh of the plane model: its first one is 4 % off in that."""
     scene, stress = stairs(0.3, lift=0.02), [0.0, 1e4, 2e4, 5e4]
     moved = {}
-    for contact in ("frictionless", "stick"):
-        held = Held(contact=contact)
+    for kind in ("frictionless", "stick"):
+        held = Held(contact=kind)
         flat = press2d.press(press2d.cell(scene, 2.0), solids(), stress, EPS, held, press2d.Fineness().finer())
         solid = press3d.press(press3d.cell(scene), solids(), stress, EPS, held, Pieces(2, 0.4))
         assert flat.faults == solid.faults == ()
         assert abs(solid.imbalance[-1]) < 2e-3
-        moved[contact] = flat, solid
+        moved[kind] = flat, solid
     less = [moved["stick"][k].displacement_m[1:] / moved["frictionless"][k].displacement_m[1:] - 1 for k in range(2)]
     assert less[1] == pytest.approx(less[0], rel=0.03)
     assert all(less[1] < -1e-3)
@@ -297,50 +295,75 @@ def test_upright_walls_hold_each_other_apart():
     assert 0 < found.penetration[-1] < 0.02
 
 
-def test_points_meet_the_nearest_face_at_the_same_place():
-    """A bent sheet over two points: the place on it, its height and slope, are those of the parabola that it is."""
-    mesh = brick_element.mesh_of(
-        boxes(((0, 1, 2), (0, 1), (0, 0.1, 0.3, 0.4)), [[[1, 0, 1]]] * 2), np.ones((2, 1, 3), bool)
-    )
+def test_points_meet_the_nearest_face_along_their_normal():
+    """A bent sheet over a flat one: the place on it, its distance and normal, are those of the parabola that it is."""
+    gap = boxes(((0, 1, 2), (0, 1), (0, 0.1, 0.3, 0.4)), [[[1, 0, 1]]] * 2)
+    mesh = mesh_of(gap, gap.fill > 0)
     x, y, z = mesh.points_m.T
-    sheet = brick_touch._FACE[2, 0]
-    upper, lower = mesh.nodes[mesh.boxes[:, 2] == 2][:, sheet], mesh.nodes[mesh.boxes[:, 2] == 0]
     moved = mesh.points_m.copy()
     above = z > 0.2e-3
     moved[above, 2] += 100 * x[above] ** 2 - 1e-4 * y[above] * 1e3
     moved[above, 0] += 2e-4 + 50 * x[above] * y[above]
-    own = lower[:, brick_touch._FACE[2, 1]]
-    met = brick_touch.facing_points(moved, own, brick_touch._SHAPE[[0, 8]], upper, 2)
-    here = np.einsum("kn,knd->kd", brick_touch._SHAPE[[0, 8]], moved[own])
-    drawn = (here[:, 0] - 2e-4) / (1 + 50 * here[:, 1])
-    assert met.found.tolist() == [drawn[0] > 0, True]
-    height = 0.3e-3 + 100 * drawn**2 - 0.1 * here[:, 1]
-    assert met.gap_m[1] == pytest.approx((height - here[:, 2])[1], rel=1e-9)
+    faces = contact.brick_faces_of(mesh)
+    rays = faces.rays(moved)
+    point, face, s, distance = contact.hit(rays, moved[faces.nodes], np.full(len(rays.here_m), 1e-3))
+    flat = np.abs(rays.here_m[:, 2] - 1e-4) < 1e-9
+    drawn = (rays.here_m[:, 0] - 2e-4) / (1 + 50 * rays.here_m[:, 1])
+    up = flat[point]
+    assert point[up].tolist() == np.flatnonzero(flat & (drawn > 0)).tolist()
+    here, drawn, distance = rays.here_m[point[up]], drawn[point[up]], distance[up]
+    assert distance == pytest.approx(0.3e-3 + 100 * drawn**2 - 0.1 * here[:, 1] - here[:, 2], rel=1e-9, abs=0)
+    place, normal = contact.on_faces(s[up], moved[faces.nodes[face[up]]])
+    assert place == pytest.approx(here + np.outer(distance, [0, 0, 1]), abs=1e-15)
     sideways = 200 * drawn / (1 + 50 * here[:, 1])
-    slopes = [sideways[1], -0.1 - sideways[1] * 50 * drawn[1]]
-    assert met.slopes[1] == pytest.approx(slopes, rel=1e-9)
-    level = np.einsum("kn,knd->kd", met.weights, moved[met.nodes])
-    assert level[1] == pytest.approx([0, 0, met.gap_m[1]], abs=1e-15)
-    moved[above, 2] -= 0.15e-3  # within a side's length: slopes count
-    pairs = brick_touch.BrickFaces(mesh, sticks=True).project(moved, 1e6)
-    assert pairs.slip @ moved.ravel() == pytest.approx(0, abs=1e-15)
-    assert np.bincount(pairs.point)[np.unique(pairs.point)].tolist() == [2] * len(np.unique(pairs.point))
+    slopes = np.column_stack([sideways, -0.1 - sideways * 50 * drawn])
+    assert normal[:, :2] / -normal[:, 2:] == pytest.approx(slopes, rel=1e-9)
+
+
+def test_frozen_partners_follow_a_slide_to_first_order():
+    """A flat sheet slides under a bent one: gap and slip from the partners of before, and from those found anew."""
+    gap = boxes(((0, 1, 2), (0, 1), (0, 0.1, 0.3, 0.4)), [[[1, 0, 1]]] * 2)
+    mesh = mesh_of(gap, gap.fill > 0)
+    x, y, z = mesh.points_m.T
+    moved = mesh.points_m.copy()
+    above = z > 0.2e-3
+    moved[above, 2] += 100 * x[above] ** 2 - 1e-4 * y[above] * 1e3 - 0.15e-3
+    faces = contact.brick_faces_of(mesh)
+    flat = np.flatnonzero(np.abs(faces.rays(moved).here_m[:, 2] - 1e-4) < 1e-9)
+    pairs = faces.project(moved, 1e6)
+    pairs = pairs.some(np.isin(pairs.point, flat))
+    assert len(pairs.point) == 18
     slid = moved + np.where(above, 0.0, 1e-7)[:, None] * [1, -1, 0]
-    again = brick_touch.BrickFaces(mesh, sticks=True).project(slid, 1e6)
-    both = np.isin(again.point, pairs.point), np.isin(pairs.point, again.point)
-    expected = (again.gap @ slid.ravel())[both[0]]
-    assert (pairs.gap @ slid.ravel())[both[1]] == pytest.approx(expected, rel=0, abs=2e-12)
-    assert np.abs(expected - (pairs.gap @ moved.ravel())[both[1]]).max() > 1e-9
-    assert np.abs(pairs.slip @ slid.ravel()) == pytest.approx(np.sqrt(2) * 1e-7, rel=1e-6)
+    again = faces.project(slid, 1e6)
+    again = again.some(np.isin(again.point, pairs.point))
+    before, frozen, expected = pairs.gap @ moved.ravel(), pairs.gap @ slid.ravel(), again.gap @ slid.ravel()
+    assert np.abs(frozen - expected).max() < 2e-12 + 1e-4 * np.abs(expected).max()
+    assert np.abs(expected - before).max() > 1e-8
+    level = np.array([slip @ slid.ravel() for slip in pairs.slips])
+    assert np.hypot(*level) == pytest.approx(np.sqrt(2) * 1e-7, rel=1e-6)
+    assert np.array([slip @ moved.ravel() for slip in pairs.slips]) == pytest.approx(0, abs=1e-15)
+
+
+def test_a_block_that_bulges_to_a_mirror_meets_its_image():
+    """Two soft blocks beside a slot, and one of them beside the mirror in its middle."""
+    soft = {"x60": Elastic(1e6, 0.49), "etpu": Elastic(1e9, 0.3)}
+    stress = [0.0, 1e5, 2e5, 3e5]
+    twice = boxes(((0, 0.4, 0.404, 0.804), (0, 0.2), (0, 0.1, 0.5, 0.6)), [[[2, 1, 3]], [[2, 0, 3]], [[2, 1, 3]]])
+    once = boxes(((0, 0.4, 0.402), (0, 0.2), (0, 0.1, 0.5, 0.6)), [[[2, 1, 3]], [[2, 0, 3]]])
+    both, half = (press3d.press(cell, soft, stress, None, fineness=Pieces(2, 0.6)) for cell in (twice, once))
+    assert both.faults == half.faults == ()
+    assert half.displacement_m == pytest.approx(both.displacement_m, rel=2e-3, abs=1e-15)
+    moved = np.diff(half.displacement_m)
+    assert moved[2] < 0.65 * moved[0]
 
 
 def test_gaps_are_runs_of_air_between_solids_along_each_axis():
     fill = np.array([[[1, 0, 1, 1]], [[1, 0, 0, 1]], [[0, 0, 0, 1]]])
-    found = {axis: (below.tolist(), above.tolist()) for axis, below, above in brick_touch.facing(fill)}
+    found = {axis: (below.tolist(), above.tolist()) for axis, below, above in air.facing(fill)}
     assert found[2] == ([[0, 0, 0], [1, 0, 0]], [[0, 0, 2], [1, 0, 3]])
     assert found[0] == found[1] == ([], [])
     slot = np.array([[[1]], [[0]], [[2]]])
-    assert [len(below) for _, below, _ in brick_touch.facing(slot)] == [1, 0, 0]
+    assert [len(below) for _, below, _ in air.facing(slot)] == [1, 0, 0]
 
 
 def test_moduli_scale_and_incompressible_is_the_limit():
@@ -371,13 +394,13 @@ def test_what_does_not_converge_ends_with_the_last_load(monkeypatch):
     found = press3d.press(press3d.cell(rect()), solids(), [0.0, 1e4, 2e4], fineness=Pieces(1))
     assert (found.converged_pa, found.faults) == (1e4, ("converged up to 10 of 20 kPa",))
     with pytest.raises(OutOfRange, match="not to be trusted"):
-        press3d.curve_of(found)
+        curve_of(found)
 
 
 def test_what_is_wrong_is_refused():
     with pytest.raises(BadInput, match="needs a scene of boxes"):
         press3d.cell(make({"shape": "tri"}).in_use)
-    assert "needs a scene of boxes" in press3d.unfit(make({"shape": "tri"}).in_use)
+    assert "needs a scene of boxes" in press3d.why_not_applicable(make({"shape": "tri"}).in_use)
     over = Scene((Body("a", "x60", (box(0, 1, 0, 1, 0, 1),)), Body("b", "etpu", (box(0, 1, 0, 1, 0.5, 2),))), (1, 1, 2))
     with pytest.raises(BadInput, match="b overlaps"):
         press3d.cell(over)
@@ -404,7 +427,7 @@ def test_conjugate_gradients_make_new_factors_where_the_old_ones_do_not_serve():
     rng = np.random.default_rng(3)
     places = np.array(list(product(range(0, 12, 2), repeat=3)))
     near = abs(places[:, None] - places[None]).max(axis=2) <= 2
-    solver = brick_factors.Solver(places, 1e-9)
+    solver = factors.Solver(places, 1e-9)
     for scale in (1.0, 1.01, 1e4):
         full = np.where(near, -1.0, 0.0) + np.diag(27 + rng.random(216) * scale)
         right = rng.normal(size=216)
@@ -418,11 +441,11 @@ def test_factors_are_those_of_the_whole_matrix():
     near = abs(places[:, None] - places[None]).max(axis=2) <= 1
     half = np.where(near, rng.normal(size=near.shape), 0.0)
     matrix = csr_matrix(half @ half.T + np.eye(len(places)))
-    order = brick_factors.order_of(matrix, places)
+    order = factors.order_of(matrix, places)
     assert len(order.fronts) > 5
     assert sorted(order.turn) == list(range(len(places)))
     right = rng.normal(size=len(places))
-    found = brick_factors.factored(matrix, order).solve(right)
+    found = factors.factored(matrix, order).solve(right)
     assert found == pytest.approx(np.linalg.solve(matrix.toarray(), right), rel=1e-8, abs=1e-10)
 
 
@@ -430,9 +453,9 @@ def test_air_goes_along_evenly_with_what_is_stretched_evenly():
     """Walls, mirrors and a top that move by a linear map take all air along by the same, also where it ends a cell."""
     fill = [[[2, 1, 3]], [[2, 0, 3]], [[2, 1, 3]], [[2, 0, 3]]]
     bricks = boxes(((0, 0.3, 0.6, 1.0, 1.2), (0, 1), (0, 0.2, 0.6, 0.8)), fill).cut(2, 0.5)
-    whole, solid = (brick_element.mesh_of(bricks, w) for w in (np.ones(bricks.fill.shape, bool), bricks.fill > 0))
+    whole, solid = (mesh_of(bricks, w) for w in (np.ones(bricks.fill.shape, bool), bricks.fill > 0))
     stretched = np.array([0.03, 0.02, -0.1])
-    found = brick_air.extended(whole, solid, solid.points_m * stretched, []).reshape(-1, 3)
+    found = air.AirMap(whole, solid).displacements_m(solid.points_m * stretched, 1e-4).reshape(-1, 3)
     assert found == pytest.approx(whole.points_m * stretched, abs=1e-12)
 
 

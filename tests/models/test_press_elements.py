@@ -10,7 +10,7 @@ from sensorgen.solvers.contact.mesh import of_triangles
 
 
 def none(mesh):
-    return Faces(mesh, np.empty((0, 3), int))
+    return Faces(mesh.points_m, np.empty((0, 3), int), ())
 
 
 def grid(nx, ny, wide=1.0, high=1.0, bend=0.0, shape=None):
@@ -26,12 +26,12 @@ def grid(nx, ny, wide=1.0, high=1.0, bend=0.0, shape=None):
 
 
 def elements(mesh, e, nu):
-    return element.Elements(mesh, element.law(np.full(len(mesh.triangles), e), np.full(len(mesh.triangles), nu)))
+    return element.Elements(mesh, element.law(np.full(len(mesh.outer), e), np.full(len(mesh.outer), nu)))
 
 
 def pressed(mesh, e, nu, held, stress, steps=5):
     free = support.free_of(mesh.points_m, held)
-    problem = load.Problem(elements(mesh, e, nu), none(mesh), free, support.top_load(mesh), 1.0)
+    problem = load.Problem(elements(mesh, e, nu), none(mesh), free, support.top_load(mesh.points_m, *mesh.top()), 1.0)
     return problem, list(load.curve(problem, np.linspace(0, stress, steps + 1), stress))[-1]
 
 
@@ -81,7 +81,7 @@ def test_the_residual_is_the_derivative_of_the_energy():
     u = rng.normal(size=2 * len(mesh.points_m)) * 0.02
     inner = element.Inner(rng.normal(size=(8, 2)) * 0.01, rng.normal(size=(8, 3)))
     du, di, h = rng.normal(size=len(u)), rng.normal(size=(8, 5)), 1e-6
-    up, down = (e.energy_j_per_m(u + s * du, inner.moved(di, s)) for s in (h, -h))
+    up, down = (e.energy_j(u + s * du, inner.moved(di, s)) for s in (h, -h))
     residual, _ = e.full(u, inner)
     assert (up - down) / (2 * h) == pytest.approx(
         (residual * np.concatenate([du[e.freedoms], di], axis=1)).sum(), rel=1e-6
@@ -104,7 +104,9 @@ def test_a_bonded_strip_is_as_stiff_as_gent_and_lindley_say(thick, stiffer):
     leader[2 * top + 1] = 2 * top[0] + 1
     kept, column = np.unique(leader[free], return_inverse=True)
     reduce = csr_matrix((np.ones(len(free)), (free, column)), (2 * len(x), len(kept)))
-    problem = load.Problem(elements(mesh, 1.0, 0.5), none(mesh), reduce, support.top_load(mesh), 1.0)
+    problem = load.Problem(
+        elements(mesh, 1.0, 0.5), none(mesh), reduce, support.top_load(mesh.points_m, *mesh.top()), 1.0
+    )
     *_, state = load.curve(problem, [0.0, 1e-3], 1.0)
     strain = problem.load @ state.u_m / np.abs(problem.load).sum() / thick
     assert 1e-3 / strain == pytest.approx(stiffer, rel=0.06)
@@ -140,7 +142,7 @@ def _linear(mesh, modulus, nu, n):
     """The same membrane with linear triangles and displacements only."""
     from scipy.sparse import coo_matrix
 
-    corners = mesh.triangles[:, :3]
+    corners = mesh.outer[:, :3]
     p = mesh.points_m[: (n + 1) ** 2]
     a, b, c = (p[corners[:, k]] for k in range(3))
     jacobian = np.stack([b - a, c - a], axis=2)

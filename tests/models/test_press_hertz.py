@@ -8,7 +8,6 @@ from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d
 from sensorgen.models.press2d import Elastic, Fineness, Held
-from sensorgen.solvers.contact import rays
 
 RADIUS_MM, HALF_WIDTH_MM, E_PA = 1.0, 0.02, 6e6
 
@@ -38,8 +37,8 @@ def over_hertz(side_mm, nu):
     assert found.faults == ()
     state, places = run.states[-1], run.problem.places(run.states[-1].u_m)
     push = np.maximum(-run.problem.gaps(state.pairs, state.u_m), 0) * state.pairs.stiffness_pa
-    side, point = np.divmod(state.pairs.point % (len(rays.POINTS) * len(run.faces.sides)), len(rays.POINTS))
-    x = (rays.shapes(rays.POINTS[point]) * places[run.faces.sides[side], 0]).sum(axis=1) - places[:, 0].max()
+    here = run.problem.faces.rays(places).here_m
+    x = here[state.pairs.point % len(here), 0] - places[:, 0].max()
     half_width = 2 * np.sqrt((push * x**2).sum() / push.sum())  # of a half ellipse
     approach = force / (np.pi * plane) * (2 * np.log(4 * RADIUS_MM * 1e-3 / wide) - 1)
     return np.array([half_width / wide, found.displacement_m[-1] / approach]) - 1

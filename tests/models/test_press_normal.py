@@ -87,7 +87,7 @@ def test_faces_that_run_through_each_other_are_caught(monkeypatch):
 
     def blind(self, places_m, penalty_pa, kept=None):
         pairs = project(self, places_m, penalty_pa, kept)
-        return contact.some(pairs, np.zeros(len(pairs.point), bool))
+        return pairs.some(np.zeros(len(pairs.point), bool))
 
     monkeypatch.setattr(contact.Faces, "project", blind)
     for count in (1, 2):
@@ -118,7 +118,7 @@ def test_an_upright_gap_that_is_shut_is_none():
 
 def forces(run, state):
     """Of the contact on each node (n, 2) [N/m], and where the nodes are."""
-    force, _ = run.problem._touching(state.pairs, state.u_m)
+    force, _ = run.problem.contact_forces(state.pairs, state.u_m)
     return force.reshape(-1, 2), run.problem.places(state.u_m)
 
 
@@ -161,7 +161,8 @@ def test_a_sloping_joint_hands_an_even_pressure_on(drop):
     filled, _ = press2d._field(cell, run, run.states[-1].u_m, EPS)
     assert filled.middle() == pytest.approx(EPS["x60"] * EPS0 / (0.6e-3 - found.displacement_m[-1]), rel=1e-4, abs=0)
     off = np.abs(-run.states[-1].inner.pressure[:, 0] / 1e5 - 1)
-    corners = run.mesh.points_m[run.mesh.triangles[:, :3]]
+    mesh = run.problem.elements.mesh
+    corners = mesh.points_m[mesh.outer[:, :3]]
     sides = corners[:, 1:] - corners[:, :1]
     area = np.abs(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0])
     assert (off * area).sum() / area.sum() < 1.2e-3
@@ -190,8 +191,8 @@ def test_the_energy_of_the_contact_is_that_of_its_forces():
     state, motion = replace(state, u_m=state.u_m + 1e-8 * ways[0]), 1e-13 * ways[1]
     there = [replace(state, u_m=state.u_m + share * motion) for share in (-1, 0, 1)]
     before, _, after = (problem.contact_energy(s) for s in there)
-    force, _ = problem._touching(state.pairs, state.u_m)
-    slid = problem.slips(state.pairs, state.u_m) * state.pairs.sticks
+    force, _ = problem.contact_forces(state.pairs, state.u_m)
+    slid = problem.slips(state.pairs, state.u_m)[:, 0] * state.pairs.sticks
     assert (state.pairs.stiffness_pa * slid**2).sum() > 0.1 * problem.contact_energy(state)
     assert (after - before) / 2 == pytest.approx(force @ motion, rel=1e-4, abs=0)
 

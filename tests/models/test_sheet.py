@@ -13,8 +13,13 @@ from sensorgen.models import line, sheet
 from sensorgen.models.sheet import BY, Contact, Patch, Sheet, impedance, solve
 
 TONES = np.array([1e-3, 1.1e3, 99.7e3, 1e6])
-C = EPS0_F_PER_M * PLATE["eps_r"] / PLATE["d_m"]
-STRIP = Sheet(PLATE["L_m"], PLATE["W_m"], (PLATE["rho_top_ohm_m"] / 3e-4, PLATE["rho_bottom_ohm_m"] / 3e-4), C)
+C = EPS0_F_PER_M * PLATE["eps_r"] / PLATE["film_m"]
+STRIP = Sheet(
+    PLATE["length_m"],
+    PLATE["width_m"],
+    (PLATE["top_resistivity_ohm_m"] / 3e-4, PLATE["bottom_resistivity_ohm_m"] / 3e-4),
+    C,
+)
 PAIR = (STRIP.edge("top", "left"), STRIP.edge("bottom", "left"))
 SQUARE = Sheet(0.1, 0.08, (450.0, 700.0), 7e-8, tan_delta=0.02, leak_s_per_m2=1e-6)
 TIP = Patch(0.0213, 0.0371, 0.015, 0.022, 1.3, (1.2, 1.1))
@@ -34,9 +39,15 @@ MIXED = [
 def strip_press(x, factor, s_n):
     """A press across the whole strip, for the line and for the sheet."""
     strain = 1 - 1 / factor
-    force = strain * PLATE["W_m"] * PLATE["L_p_m"] * PLATE["E_Pa"]
-    inputs = PLATE | {"f_Hz": TONES, "F_N": force, "x_p_left_edge_m": x, "S_n_top_per_N": s_n, "S_n_bottom_per_N": s_n}
-    return inputs, Patch(x, 0.0, PLATE["L_p_m"], PLATE["W_m"], factor, (1 + s_n * force,) * 2)
+    force = strain * PLATE["width_m"] * PLATE["tip_m"] * PLATE["modulus_pa"]
+    inputs = PLATE | {
+        "frequency_hz": TONES,
+        "force_n": force,
+        "left_m": x,
+        "top_piezoresistance_per_n": s_n,
+        "bottom_piezoresistance_per_n": s_n,
+    }
+    return inputs, Patch(x, 0.0, PLATE["tip_m"], PLATE["width_m"], factor, (1 + s_n * force,) * 2)
 
 
 def rates(errors):
@@ -47,7 +58,7 @@ def rates(errors):
 @pytest.mark.parametrize("s_n", [0.0, 0.005])
 def test_with_edge_contacts_it_is_the_line_in_second_order(part, s_n):
     inputs, press = strip_press(0.043, 1.4, s_n)
-    true = line.impedance(**inputs)
+    true = line.impedance(line.PressedLine(**inputs))
     errors = [
         np.abs(part(impedance(STRIP, [PAIR], TONES, press, cells=n)[:, 0, 0] - true) / part(true)).max()
         for n in (20, 40, 80)
@@ -61,19 +72,21 @@ def test_with_edge_contacts_it_is_the_line_in_second_order(part, s_n):
 def test_derivatives_are_those_of_the_line(x):
     inputs, press = strip_press(x, 1.4, 0.0)
     tones = TONES[1:3]
-    names = ["x_p_left_edge_m", "S_n_top_per_N", "S_n_bottom_per_N", "E_Pa"]
-    _, by = line.sensitivities(of=names, **(inputs | {"f_Hz": tones}))
+    names = ["left_m", "top_piezoresistance_per_n", "bottom_piezoresistance_per_n", "modulus_pa"]
+    _, by = line.sensitivities(line.PressedLine(**inputs | {"frequency_hz": tones}), of=names)
     got = {name: value[:, 0, 0] for name, value in solve(STRIP, [PAIR], tones, press, of=BY, cells=80).by.items()}
-    force, strain = inputs["F_N"], 1 - 1 / press.capacitance_factor
-    assert got["x_m"] == pytest.approx(by["x_p_left_edge_m"], rel=1e-3)
-    assert -got["capacitance_factor"] / (1 - strain) ** 2 * strain / inputs["E_Pa"] == pytest.approx(
-        by["E_Pa"], rel=1e-3
+    force, strain = inputs["force_n"], 1 - 1 / press.capacitance_factor
+    assert got["x_m"] == pytest.approx(by["left_m"], rel=1e-3)
+    assert -got["capacitance_factor"] / (1 - strain) ** 2 * strain / inputs["modulus_pa"] == pytest.approx(
+        by["modulus_pa"], rel=1e-3
     )
     for end in ("top", "bottom"):
         near = (
-            1e-3 * np.abs(by[f"S_n_{end}_per_N"]).max()
+            1e-3 * np.abs(by[f"{end}_piezoresistance_per_n"]).max()
         )  # at the far end, where no current is, there is little to see
-        assert got[f"{end}_resistance_factor"] * force == pytest.approx(by[f"S_n_{end}_per_N"], abs=10 * near)
+        assert got[f"{end}_resistance_factor"] * force == pytest.approx(
+            by[f"{end}_piezoresistance_per_n"], abs=10 * near
+        )
     assert np.abs(got["y_m"]).max() < 1e-9 * np.abs(got["x_m"]).max()
 
 
@@ -85,7 +98,7 @@ def test_the_derivative_by_place_converges_wherever_the_patch_lies(s_n, least, w
         found = []
         for x in 0.04 + np.linspace(0, 0.005, 5):
             inputs, press = strip_press(x, 1.4, s_n)
-            true = line.sensitivities(of=["x_p_left_edge_m"], **(inputs | {"f_Hz": 99.7e3}))[1]["x_p_left_edge_m"]
+            true = line.sensitivities(line.PressedLine(**inputs | {"frequency_hz": 99.7e3}), of=["left_m"])[1]["left_m"]
             got = solve(STRIP, [PAIR], 99.7e3, press, of=["x_m"], cells=n).by["x_m"][0, 0, 0]
             found.append(abs(got - true) / abs(true))
         errors.append(max(found))
@@ -231,7 +244,7 @@ def test_turned_upside_down_and_with_ports_reversed(ports):
 def test_sheets_that_change_differently_are_not_folded():
     inputs, press = strip_press(0.043, 1.4, 0.005)
     press = replace(press, resistance_factor=(press.resistance_factor[0], 1.0))
-    true = line.impedance(**(inputs | {"S_n_bottom_per_N": 0.0}))
+    true = line.impedance(line.PressedLine(**inputs | {"bottom_piezoresistance_per_n": 0.0}))
     z = impedance(STRIP, [PAIR], TONES, press, cells=80)[:, 0, 0]
     assert z.real == pytest.approx(true.real, rel=1e-3)
 
@@ -316,7 +329,7 @@ def test_pads_converge_in_second_order(ports):
 
 def test_the_estimated_error_covers_the_true_one():
     inputs, press = strip_press(0.043, 1.4, 0.005)
-    true = line.impedance(**inputs)
+    true = line.impedance(line.PressedLine(**inputs))
     for accuracy in (1e-2, 1e-3):
         got = solve(STRIP, [PAIR], TONES, press, accuracy=accuracy)
         z = got.impedance_ohm[:, 0, 0]

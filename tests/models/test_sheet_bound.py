@@ -13,7 +13,7 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line
 from sensorgen.models.sheet import Bounds, Patch, Sheet, contact_sets, depth_m, impedance, localise, solve
 
-C = EPS0_F_PER_M * PLATE["eps_r"] / PLATE["d_m"]
+C = EPS0_F_PER_M * PLATE["eps_r"] / PLATE["film_m"]
 FILM = Sheet(0.1, 0.1, (450.0, 450.0), C)
 SETS = contact_sets(FILM)
 TIP = Patch(0.0, 0.0, 0.02, 0.02, 1 / 0.95)
@@ -27,7 +27,7 @@ def found(name, tones=TONES, places=5, noise=1e-3, film=FILM):
 def test_on_a_strip_pressed_across_it_is_the_bound_of_the_line():
     strip = Sheet(0.1, 0.01, (0.07 / 3e-4, 0.2 / 3e-4), C)
     strain, tones = 0.05, np.array(TONES) * 10
-    force = strain * 1e-4 * PLATE["E_Pa"]
+    force = strain * 1e-4 * PLATE["modulus_pa"]
     tip = Patch(0.0, 0.0, 0.01, 0.01, 1 / (1 - strain))
     got = localise(
         strip,
@@ -39,9 +39,9 @@ def test_on_a_strip_pressed_across_it_is_the_bound_of_the_line():
         5,
     )
     at = got.x_m - 0.005
-    inputs = PLATE | {"F_N": force, "f_Hz": tones, "x_p_left_edge_m": at[:, None]}
-    z, by = line.sensitivities(of=["F_N", "x_p_left_edge_m"], **inputs)
-    g = np.stack([by["F_N"], by["x_p_left_edge_m"]], axis=-1) / z[..., None]
+    inputs = PLATE | {"force_n": force, "frequency_hz": tones, "left_m": at[:, None]}
+    z, by = line.sensitivities(line.PressedLine(**inputs), of=["force_n", "left_m"])
+    g = np.stack([by["force_n"], by["left_m"]], axis=-1) / z[..., None]
     rows = np.concatenate([g.real, g.imag], axis=1) / 1e-3
     covariance = np.linalg.inv(np.einsum("pka,pkb->pab", rows, rows))
     sigma = got.sigma()[:, 2]

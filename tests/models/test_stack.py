@@ -83,11 +83,11 @@ def assert_entries(found, expected, tolerance=EXACT):
 @pytest.mark.parametrize("which", range(0, 224, 3))
 def test_one_film_is_the_line(which):
     inputs, (re, im) = cases()[which]
-    sections = read(inputs).sections()
+    sections = read(line.PressedLine(**inputs)).sections()
     r = [[0.25 * rs, 0.75 * rs] for rs in sections.r_ohm_per_m]
     z = stack.impedance(r, [[y] for y in sections.y_s_per_m], sections.length_m)
     assert z.shape == (1, 1)
-    theirs = complex(line.impedance(**inputs))
+    theirs = complex(line.impedance(line.PressedLine(**inputs)))
     assert abs(z[0, 0] - theirs) < 1e-12 * abs(theirs)
     assert abs(z[0, 0].real - theirs.real) < 1e-12 * theirs.real
     assert abs(z[0, 0].real - float(re)) < 1e-11 * float(re)

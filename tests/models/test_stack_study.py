@@ -24,32 +24,32 @@ STIFF_BELOW = Stack(0.1, 0.01, EVEN, (Film(6.9e-10, unconfined(6e9).thinning), F
 
 
 def by_name(stack):
-    return {row["reading"]: row for row in bounds(stack, TONES, PRESS, 1e-3, 0.1)}
+    return {row.reading: row for row in bounds(stack, TONES, PRESS, 1e-3, 0.1)}
 
 
 def test_one_film_has_the_bound_that_is_known_of_the_plate():
     """2.2 N for Table 3.1 at 0.1 % noise per tone."""
-    found = study(make({"shape": "reference"}), TONES_HZ, 6.0, 0.045, 1e-3, 0.1, 0.1)["bounds"]
-    assert found[0]["force_n"]["known"] == pytest.approx(2.25, rel=0.02)
+    found = study(make({"shape": "reference"}), TONES_HZ, 6.0, 0.045, 1e-3, 0.1, 0.1).bounds
+    assert found[0].force_n.known == pytest.approx(2.25, rel=0.02)
 
 
 def test_equal_films_cancel_the_force_in_their_difference():
     found = by_name(TWINS)
-    assert found["difference alone"]["force_n"]["known"] is None
-    assert found["both readings"]["force_n"]["known"] == pytest.approx(
-        found["upper film alone"]["force_n"]["known"] / np.sqrt(2), rel=1e-3
+    assert found["difference alone"].force_n.known is None
+    assert found["both readings"].force_n.known == pytest.approx(
+        found["upper film alone"].force_n.known / np.sqrt(2), rel=1e-3
     )
 
 
 def test_a_stiff_second_film_takes_the_drift_away():
     found = by_name(STIFF_BELOW)
-    alone, both = found["upper film alone"]["force_n"], found["both readings"]["force_n"]
+    alone, both = found["upper film alone"].force_n, found["both readings"].force_n
     rise = 1 / 6e6 / (0.01 * 0.1) / 0.99**2 / 1.001  # of ln C per newton; the drift is a rise of 0.1
-    assert alone["drifting"] == pytest.approx(0.1 / rise, rel=0.2)
-    assert both["drifting"] < 1.5 * both["known"]
-    difference = found["difference alone"]["force_n"]
-    assert difference["drifting"] == pytest.approx(np.hypot(difference["known"], 0.1 * 6.0), rel=0.05)
-    assert found["difference alone"]["force_n"]["known"] == pytest.approx(np.sqrt(2) * alone["known"], rel=0.02)
+    assert alone.drifting == pytest.approx(0.1 / rise, rel=0.2)
+    assert both.drifting < 1.5 * both.known
+    difference = found["difference alone"].force_n
+    assert difference.drifting == pytest.approx(np.hypot(difference.known, 0.1 * 6.0), rel=0.05)
+    assert found["difference alone"].force_n.known == pytest.approx(np.sqrt(2) * alone.known, rel=0.02)
 
 
 def touching(stack=TWINS):
@@ -133,8 +133,10 @@ def test_the_table_of_what_a_second_film_tells():
     for name, *cells in rows:
         films = tuple(Film(6.9e-10, unconfined(6e6 * times).thinning) for times in (stiffer[name], 1))
         found = by_name(Stack(0.1, 0.01, EVEN, films))
-        ways = [found[way]["force_n"] for way in ("upper film alone", "both readings", "difference alone")]
-        for cell, force in zip(cells, [way[case] for case in ("known", "drifting") for way in ways], strict=True):
+        ways = [found[way].force_n for way in ("upper film alone", "both readings", "difference alone")]
+        for cell, force in zip(
+            cells, [getattr(way, case) for case in ("known", "drifting") for way in ways], strict=True
+        ):
             assert (
                 force is None if cell == "nothing" else float(cell.removesuffix(" N")) == pytest.approx(force, rel=3e-3)
             )

@@ -16,8 +16,8 @@ ALL = np.ones(len(RUN.time_s), bool)
 
 def test_presses_are_found_by_force_and_by_the_readings_alone():
     noisy = RUN.force_n + 0.03 * np.random.default_rng(0).standard_normal(len(RUN.force_n))
-    by_force = presses.pressed(RUN.time_s, noisy)
-    by_readings = presses.found(RUN.time_s, RUN.impedance_ohm)
+    by_force = presses.by_force(RUN.time_s, noisy)
+    by_readings = presses.by_readings(RUN.time_s, RUN.impedance_ohm)
     truth = [(start, end) for start, end, f, _ in MADE if f > 0.3]
     assert len(by_force) == len(truth)
     np.testing.assert_allclose(by_force, truth, atol=0.21)
@@ -32,7 +32,7 @@ def test_noise_and_creep_are_no_presses():
     noise = 1e-3 * (rng.standard_normal((20_000, 7)) + 1j * rng.standard_normal((20_000, 7)))
     t = np.arange(20_000) / 140
     for course in (0 * t, 0.02 * np.log1p(t / 20), 0.02 * np.sqrt(t / 60), -1e-4 * t):
-        assert presses.found(t, (100 - 50j) * np.exp(course)[:, None] * (1 + noise)) == []
+        assert presses.by_readings(t, (100 - 50j) * np.exp(course)[:, None] * (1 + noise)) == []
 
 
 # also from the midst of the first press on; or presses that are all alike, which only the first step tells from rests
@@ -41,7 +41,7 @@ def test_presses_are_found_in_readings_that_creep(begins_s, least_n):
     plan = made.presses(20, seed=2, least_n=least_n)
     run = made.run(plan, rate_hz=70, creep=0.02)
     late = run.time_s >= begins_s
-    found = presses.found(run.time_s[late], run.impedance_ohm[late])
+    found = presses.by_readings(run.time_s[late], run.impedance_ohm[late])
     felt = [m for m in plan if m[0] > begins_s]
     assert len(found) <= len(felt)
     right = [any(abs(p.start_s - s) < 0.3 and abs(p.end_s - e) < 0.3 for p in found) for s, e, *_ in felt]
@@ -54,17 +54,17 @@ def test_a_press_ends_where_the_force_is_not_known_and_short_ones_are_none():
     force = np.where((t > 2) & (t < 6), 3.0, 0.0)
     force[45:50] = np.nan
     force[80] = 5.0
-    assert [(round(p.start_s, 6), round(p.end_s, 6)) for p in presses.pressed(t, force)] == [(2.1, 4.4), (5.0, 5.9)]
-    assert presses.pressed(t, force * 0) == []
+    assert [(round(p.start_s, 6), round(p.end_s, 6)) for p in presses.by_force(t, force)] == [(2.1, 4.4), (5.0, 5.9)]
+    assert presses.by_force(t, force * 0) == []
     dithering = np.where((t > 2) & (t < 6), 0.15 + 0.1 * (np.arange(100) % 2), 0.0)  # about the threshold
-    assert len(presses.pressed(t, dithering)) == 1
+    assert len(presses.by_force(t, dithering)) == 1
 
 
 def test_pairs_are_the_means_and_their_errors_are_what_they_say():
     pulls, errors = [], []
     for seed in range(6):
         run = made.run(MADE, rate_hz=70, seed=seed)
-        found = presses.pairs(run.time_s, run.impedance_ohm, ALL, presses.pressed(run.time_s, run.force_n),
+        found = presses.pairs(run.time_s, run.impedance_ohm, ALL, presses.by_force(run.time_s, run.force_n),
                               run.force_n, run.position_mm)  # fmt: skip
         at = [np.searchsorted(run.time_s, s + 2) for s in found.time_s]
         truth = run.clean_ohm[at] - run.clean_ohm[0]
@@ -82,7 +82,7 @@ def test_pairs_are_the_means_and_their_errors_are_what_they_say():
 
 
 def test_readings_that_do_not_count_are_not_counted():
-    spans = presses.pressed(RUN.time_s, RUN.force_n)
+    spans = presses.by_force(RUN.time_s, RUN.force_n)
     z, valid = RUN.impedance_ohm.copy(), ALL.copy()
     inside = (RUN.time_s > spans[0].end_s - 1.3) & (RUN.time_s < spans[0].end_s - 0.8)
     z[inside], valid[inside] = np.nan, False
@@ -105,7 +105,7 @@ def test_means_of_readings_that_hang_together_have_larger_errors():
     for k in range(1, 200):
         smooth[k] = 0.6 * smooth[k - 1] + white[k]
     for values in (white, smooth):
-        said = np.sqrt((presses._error(t, values) ** 2).mean())
+        said = np.sqrt((presses._mean_error(t, values) ** 2).mean())
         assert said == pytest.approx(values.mean(axis=0).std(), rel=0.15)
 
 
@@ -174,7 +174,7 @@ def test_time_constants_of_a_film_come_back():
     force = run.force_n.copy()
     force[500:600] = np.nan  # the rig was silent
     found = drift.fitted(run.time_s, run.impedance_ohm, valid, force)
-    taus = sorted(term.tau_s for term in found.fit.terms if isinstance(term, laws.Memory))
+    taus = sorted(term.tau_s for term in found.fit.terms if isinstance(term, laws.Relaxation))
     assert taus[:2] == pytest.approx([2, 30], rel=0.05)
     off = (found.at(run.time_s) - run.drift)[force > 0.4]
     assert np.quantile(np.abs(off - off.mean(axis=0)), 0.95) < 5e-4 < 0.03 < np.abs(run.drift).max()
@@ -212,7 +212,7 @@ def test_hysteresis_of_two_known_ways():
     spans = np.array([np.ptp(np.vstack([way.up, way.down]), axis=0) for way in several]).mean(axis=0)
     np.testing.assert_allclose(np.mean([way.error for way in several], axis=0), apart.std(axis=0) / spans, rtol=0.35)
     assert hysteresis(force, values + noise).share == pytest.approx([2 / 16, 0], abs=0.06)
-    with pytest.raises(BadInput, match="goes up and down again"):
+    with pytest.raises(BadInput, match="expected a press with loading and unloading"):
         hysteresis(force[:200], values[:200])
 
 

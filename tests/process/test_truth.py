@@ -33,7 +33,7 @@ def pairs(run):
     one = run.recording
     found = drift.fitted(one.time_s, one.impedance_ohm, one.valid(), run.force_n)
     clean = found.removed(one.time_s, one.impedance_ohm)
-    spans = presses.pressed(one.time_s, run.force_n)
+    spans = presses.by_force(one.time_s, run.force_n)
     # relative to the rest: what the model of the sensor has there
     clean *= made.sensor().impedance(made.TONES_HZ, 0.0, 0.05) / found.rest_ohm()
     return presses.pairs(one.time_s, clean, one.valid(), spans, run.force_n, run.set_position_mm)
@@ -66,7 +66,7 @@ def test_force_and_position_come_back_as_well_as_they_can(pairs):
 
 def test_without_taking_the_drift_out_they_do_not(run):
     one = run.recording
-    spans = presses.pressed(one.time_s, run.force_n)
+    spans = presses.by_force(one.time_s, run.force_n)
     raw = presses.pairs(one.time_s, one.impedance_ohm, one.valid(), spans, run.force_n, run.set_position_mm)
     noise = NOISE / np.sqrt(WINDOW_S * RATE)
     force, at_m = np.array([m[2] for m in MADE]), np.array([m[3] for m in MADE]) * 1e-3
@@ -78,7 +78,7 @@ def test_without_taking_the_drift_out_they_do_not(run):
 def test_quotients_of_pairs_are_free_of_most_of_the_drift_without_a_fit(run):
     """Between before and under a press drift has moved little, though more than the noise."""
     one = run.recording
-    spans = presses.pressed(one.time_s, run.force_n)
+    spans = presses.by_force(one.time_s, run.force_n)
     raw = presses.pairs(one.time_s, one.impedance_ohm, one.valid(), spans, run.force_n, run.set_position_mm)
     z = made.sensor().impedance(made.TONES_HZ, 0.0, 0.05) * raw.pressed_ohm / raw.before_ohm
     noise = NOISE * np.sqrt(2 / (WINDOW_S * RATE))
@@ -114,7 +114,7 @@ def off_over_bound(law, among=tuple(drift.LAWS)):
     every = np.ones(len(truth.time_s), bool)
     fit = drift.fitted(truth.time_s, truth.impedance_ohm, every, truth.force_n, among=among)
     clean = fit.removed(truth.time_s, truth.impedance_ohm) * truth.clean_ohm[0] / fit.rest_ohm()
-    spans = presses.pressed(truth.time_s, truth.force_n)
+    spans = presses.by_force(truth.time_s, truth.force_n)
     found = presses.pairs(truth.time_s, clean, every, spans, truth.force_n, truth.position_mm)
     noise = NOISE / np.sqrt(WINDOW_S * RATE)
     force, at_m = np.array([m[2] for m in MADE]), np.array([m[3] for m in MADE]) * 1e-3

@@ -16,10 +16,27 @@ from sensorgen.models import line
 def test_the_leak_is_that_of_the_line_model(leak):
     rho, length, thickness, width = 0.07, 0.1, 0.4e-3, 0.02
     z = line.impedance(
-        f_Hz=1e-9, F_N=0.0, E_Pa=1e6, x_p_left_edge_m=0.0, L_p_m=0.01, L_m=length, W_m=width, H_top_m=thickness,
-        H_bottom_m=thickness, rho_top_ohm_m=rho, rho_bottom_ohm_m=rho, d_m=1e-4, eps_r=4.0, tan_delta=0.0,
-        G_S_per_m=leak / length, S_n_top_per_N=0.0, S_n_bottom_per_N=0.0, far_end="open",
-    )  # fmt: skip
+        line.PressedLine(
+            frequency_hz=1e-9,
+            force_n=0.0,
+            modulus_pa=1e6,
+            left_m=0.0,
+            tip_m=0.01,
+            length_m=length,
+            width_m=width,
+            top_thickness_m=thickness,
+            bottom_thickness_m=thickness,
+            top_resistivity_ohm_m=rho,
+            bottom_resistivity_ohm_m=rho,
+            film_m=1e-4,
+            eps_r=4.0,
+            tan_delta=0.0,
+            leak_s_per_m=leak / length,
+            top_piezoresistance_per_n=0.0,
+            bottom_piezoresistance_per_n=0.0,
+            far_end="open",
+        )
+    )
     ry = electrode_ohm(rho, length, thickness, width)
     assert leak_s(float(z.real), ry) == pytest.approx(leak, rel=1e-6)
 

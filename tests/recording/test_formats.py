@@ -133,7 +133,7 @@ def test_a_run_that_stopped_half_way_keeps_what_is_whole(tmp_path):
     tree = made.tree([SHORT.impedance_ohm[:290]], [SHORT.time_s[BEFORE]], made.stamps(SHORT.time_s[:295]))
     found = read(save(tmp_path / "half.mat", tree))
     assert found.counts()["samples"] == 290
-    assert "10 samples at the end are not whole" in found.source.notes[0]
+    assert "10 incomplete samples at the end" in found.source.notes[0]
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ def test_the_offset_is_found_within_its_error(tmp_path, run, offset_s):
     assert found.offset_error_s < 0.01
     assert found.offset_s == pytest.approx(offset_s + 0.03, abs=3 * found.offset_error_s)
     assert found.skew == 0
-    assert f"{found.offset_s:.4f} +- " in found.words()
+    assert f"{found.offset_s:.4f} +- " in found.clock_text()
     truth, _ = made.force_at(run.time_s, MADE)
     told = np.isfinite(found.force_n)
     assert told.mean() > 0.99
@@ -112,7 +112,7 @@ def test_a_sensor_that_does_not_answer_leaves_the_clocks_as_they_are(tmp_path, r
     found = joined(recording(dead), log)
     assert (found.offset_s, found.skew) == (0, 0)
     assert np.isnan(found.offset_error_s)
-    assert "believed" in found.words()
+    assert "assumed to agree" in found.clock_text()
 
     with pytest.raises(BadInput, match="too little to find the offset"):
         joined(recording(dead, stamped=False), log)
@@ -132,8 +132,8 @@ def test_a_rigs_log_in_other_words(tmp_path):
     assert np.diff(found.time_s).tolist() == [1.5, -0.5]
     assert found.set_force_n.tolist() == [1.5, 2, 2]
     assert found.error.tolist() == [False, True, True]
-    assert any("not after" in note for note in found.notes)
-    assert "not whole" in found.notes[0]
+    assert any("not later" in note for note in found.notes)
+    assert "incomplete" in found.notes[0]
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def test_a_rigs_log_in_other_words(tmp_path):
         ("time_s,set_force_n,set_position_mm\n2023-05-04T12:00:00,1,3\n", "is not a number"),
         ("time_s,set_force_n,set_position_mm\n1,2,3,4\n", "row 2: 4 cells, but the header has 3"),
         ("time_s,set_force_n,set_position_mm\n", "no rows"),
-        ("time_s,set_force_n,set_position_mm\n1,inf,3\n", "not a number"),
+        ("time_s,set_force_n,set_position_mm\n1,inf,3\n", "is not finite"),
         ("x" * 70_000, "row 1: longer than"),
     ],
 )

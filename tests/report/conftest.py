@@ -6,7 +6,7 @@ import bench_files
 import pytest
 
 from sensorgen.design.specimen_name import design_of, parse
-from sensorgen.measure.log import Log, bench, importing, words
+from sensorgen.measure.log import Log, bench, importing, notes
 from sensorgen.workflows.stored_prediction import predicted_row
 
 
@@ -38,12 +38,12 @@ def recorded(tmp_path_factory):
     with Log(folder / "log.db", create=True) as log:
         log.add([predicted_row(design)])
         for k, name in enumerate(names[:2]):
-            bench.take(
+            bench.log_recording(
                 log,
                 name,
                 *bench_files.write(folder, f"run{k}", sensor, count=7, seed=k + 1),
                 remark=bench_files.HOSTILE,
             )
-        log.add([words.reading(name, "1.2k", "OL", remark=bench_files.HOSTILE) for name in names[:2]])
-        log.add([words.reading(name, "1.25k / 1.4k", "2.5M", remark=bench_files.FORMULA) for name in names[2:]])
+        log.add([notes.reading(name, "1.2k", "OL", remark=bench_files.HOSTILE) for name in names[:2]])
+        log.add([notes.reading(name, "1.25k / 1.4k", "2.5M", remark=bench_files.FORMULA) for name in names[2:]])
     return folder / "log.db"

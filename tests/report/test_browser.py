@@ -8,27 +8,29 @@ from bench_files import HOSTILE
 from browser import Page
 
 from sensorgen.analysis.report import report, written
-from sensorgen.measure.log import Log, words
+from sensorgen.measure.log import Log, notes
 
 OUT = Path(__file__).parents[2] / "out" / "report"  # CI keeps it
 FIGURES = """[...document.querySelectorAll('.plot')].map(p => [p.dataset.key, p.getBoundingClientRect().width,
     p.querySelectorAll('.trace, .trace.bars, canvas').length > 0])"""
 SORTED = """(() => {
-  const table = document.getElementById('table-specimens'), rows = [...table.tBodies[0].rows];
-  const at = [...table.tHead.rows[0].cells].findIndex(c => c.textContent.startsWith('R_Z measured'));
+  const table = document.getElementById('table-readings'), rows = [...table.tBodies[0].rows];
+  const at = [...table.tHead.rows[0].cells].findIndex(c => c.textContent.startsWith('film resistance measured'));
   return [table.tHead.rows[0].cells[at].getAttribute('aria-sort'), rows.map(r => r.cells[at].dataset.value)];
 })()"""
-BUTTONS = "[...document.querySelectorAll('#table-specimens thead button')]"
-HEAD = f"{BUTTONS}.find(b => b.textContent.startsWith('R_Z measured'))"
+BUTTONS = "[...document.querySelectorAll('#table-readings thead button')]"
+HEAD = f"{BUTTONS}.find(b => b.textContent.startsWith('film resistance measured'))"
 PIECES = """[...document.getElementById('figure-residuals').querySelectorAll('.plot')].map(p => ({
     x: p._fullLayout.xaxis.range, y: p._fullLayout.yaxis.range, height: p.getBoundingClientRect().height}))"""
 CAMERA = "JSON.stringify(document.querySelector('[data-key=bodies]')._fullLayout.scene._scene.getCamera().eye)"
 
 
 @pytest.fixture(scope="module")
-def pages(recorded, thesis, tmp_path_factory):
+def pages(recorded, tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
-    for name, log, iteration in (("recorded", recorded, 30), ("empty", thesis, 99)):
+    with Log(folder / "one.db", create=True) as log:
+        log.add([notes.reading("40 triX .1mm", "700", "OL")])
+    for name, log, iteration in (("recorded", recorded, 30), ("one", folder / "one.db", 40)):
         with Log(log) as opened:
             (folder / f"{name}.html").write_text(written(report(opened, iteration), "html"), "utf-8")
     return folder
@@ -79,7 +81,7 @@ def on_paper(browser):
 def test_tall_figures_in_pieces_on_paper(browser, tmp_path):
     """Seventy rows do not fit on a page: every row stands in one piece, none higher than a page."""
     with Log(tmp_path / "log.db", create=True) as log:
-        log.add([words.reading(f"40 triX .1mm {k + 1}", f"{600 + 3 * k}", "30") for k in range(70)])
+        log.add([notes.reading(f"40 triX .1mm {k + 1}", f"{600 + 3 * k}", "30") for k in range(70)])
         (tmp_path / "tall.html").write_text(written(report(log, 40), "html"), "utf-8")
     browser.open(tmp_path / "tall.html")
     whole = browser.run(PIECES)
@@ -130,11 +132,13 @@ def another_choice(browser):
     for k in (0, 6):
         browser.run(f"(s => {{ s.selectedIndex = {k}; s.dispatchEvent(new Event('change')); }})"
                     "(document.querySelector('[data-for=\"series-1-1\"]'))")  # fmt: skip
-        levels.append(browser.run(f"Math.abs({place}._fullData[2]._extremes.y2.min[0].val)"))
+        unit = browser.run(f"{place}._fullLayout.yaxis2.title.text").partition("[")[2].rstrip("]")
+        level = browser.run(f"Math.abs({place}._fullData[4]._extremes.y2.min[0].val)")
+        levels.append(level * {"Ω": 1.0, "kΩ": 1e3, "MΩ": 1e6}[unit])
     assert levels[0] / levels[1] == pytest.approx(99.7 / 1.1, rel=0.2)
 
 
-@pytest.mark.parametrize("name", ["recorded", "empty"])
+@pytest.mark.parametrize("name", ["recorded", "one"])
 def test_narrow_and_dark(browser, pages, name):
     browser.size(360)
     browser.media("dark")
@@ -154,13 +158,13 @@ def test_narrow_and_dark(browser, pages, name):
 
 def test_the_keyboard_reaches_the_report_first(browser, pages):
     browser.size(1920)
-    browser.open(pages / "empty.html")
+    browser.open(pages / "one.html")
     browser.key("Tab", 9)
     assert browser.run("document.activeElement.className") == "skip"
     assert browser.run("document.activeElement.getBoundingClientRect().left") >= 0
     browser.key("Enter", 13)
     browser.until("document.activeElement.id === 'main'")
-    assert "no readings of iteration 99" in browser.run("document.body.innerText")
-    browser.picture(OUT / "empty-1920.png")
-    assert struct.unpack(">I", (OUT / "empty-1920.png").read_bytes()[16:20]) == (1920,)
+    assert "measured 700 ohm" in browser.run("document.body.innerText")
+    browser.picture(OUT / "one-1920.png")
+    assert struct.unpack(">I", (OUT / "one-1920.png").read_bytes()[16:20]) == (1920,)
     quiet(browser)

@@ -14,7 +14,7 @@ from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.design.specimen_name import design_of, parse
-from sensorgen.measure.log import Log, words
+from sensorgen.measure.log import Log, notes
 from sensorgen.measure.log.batches import prediction
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
@@ -90,7 +90,7 @@ def test_the_earliest_stored_prediction_is_taken_as_it_was(tmp_path):
     first = tuned | {"electrode_resistance_ohm": {"top": 1000.0, "bottom": 3000.0}}
     with Log(tmp_path / "log.db", create=True) as book:
         book.add([prediction(design.id(), design.name, data) for data in (first, tuned)])
-        book.add([words.reading("40 triX .1mm", "0.65k", "40")])
+        book.add([notes.reading("40 triX .1mm", "0.65k", "40")])
         row = of_iteration(book, 40).rows[0]
     assert row.predicted.ry_ohm.upper == 3000.0
     assert row.predicted.stored_at
@@ -103,8 +103,8 @@ def test_the_earliest_stored_prediction_is_taken_as_it_was(tmp_path):
 
 def test_corrected_readings_count_for_nothing_and_are_told(tmp_path):
     with Log(tmp_path / "log.db", create=True) as book:
-        old = book.add([words.reading("40 triX .1mm", "65", "40")])[0]
-        book.add([words.reading("40 triX .1mm", "0.65k", "40", supersedes=old.uid)])
+        old = book.add([notes.reading("40 triX .1mm", "65", "40")])[0]
+        book.add([notes.reading("40 triX .1mm", "0.65k", "40", supersedes=old.uid)])
         found = of_iteration(book, 40)
     assert [row.verdict.ry_ohm for row in found.rows] == [650.0]
     assert ("reading 1, 40 triX .1mm", "a later reading corrects it") in found.left_out
@@ -112,8 +112,8 @@ def test_corrected_readings_count_for_nothing_and_are_told(tmp_path):
 
 def test_readings_below_nought_and_blanks_are_left_out_and_told(tmp_path):
     with Log(tmp_path / "log.db", create=True) as book:
-        book.add([words.reading("40 triX .1mm", "-650", "40"), words.reading("40 triX .2mm", "650", "")])
-        book.add([words.reading("40 tri .1mm", "650", "40")])
+        book.add([notes.reading("40 triX .1mm", "-650", "40"), notes.reading("40 triX .2mm", "650", "")])
+        book.add([notes.reading("40 tri .1mm", "650", "40")])
         found = of_iteration(book, 40)
     told = dict(found.left_out)
     assert "below 0" in " ".join(told.values())
@@ -131,10 +131,23 @@ def test_moved_parameters_are_those_of_the_line():
     """Straight from the line's formula, with the parameter itself changed."""
     other = moved(PLATE, 2.0, 1.5, 1e-6)
     z = line.impedance(
-        L_m=0.1, W_m=0.01, H_top_m=3e-4, H_bottom_m=3e-4, rho_top_ohm_m=10.0, rho_bottom_ohm_m=10.0,
-        d_m=8.8541878128e-12 * 0.01 / (7.6e-10 * 1.5), eps_r=1.0, E_Pa=6e5, L_p_m=0.01, x_p_left_edge_m=0.045, F_N=0.0,
-        f_Hz=TONES, G_S_per_m=1e-5,
-    )  # fmt: skip
+        line.PressedLine(
+            length_m=0.1,
+            width_m=0.01,
+            top_thickness_m=3e-4,
+            bottom_thickness_m=3e-4,
+            top_resistivity_ohm_m=10.0,
+            bottom_resistivity_ohm_m=10.0,
+            film_m=8.8541878128e-12 * 0.01 / (7.6e-10 * 1.5),
+            eps_r=1.0,
+            modulus_pa=6e5,
+            tip_m=0.01,
+            left_m=0.045,
+            force_n=0.0,
+            frequency_hz=TONES,
+            leak_s_per_m=1e-5,
+        )
+    )
     assert np.exp(at_rest(other, TONES)) == pytest.approx(z, rel=1e-9)
 
 

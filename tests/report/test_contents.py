@@ -16,12 +16,12 @@ from bench_files import FORMULA, HOSTILE
 from scipy import stats
 
 from sensorgen.analysis.comparison import of_iteration
-from sensorgen.analysis.report import FORMATS, report, written, yields
-from sensorgen.analysis.report import page as page_of
-from sensorgen.analysis.report.figures import MOST_ROWS
-from sensorgen.analysis.report.pictures import files
-from sensorgen.analysis.report.tables import said
-from sensorgen.measure.log import Log, words
+from sensorgen.analysis.plots.static import files
+from sensorgen.analysis.report import FORMATS, formats, report, written, yields
+from sensorgen.analysis.report.electrodes import MOST_ROWS
+from sensorgen.analysis.report.tables import shown as shown_as
+from sensorgen.core.errors import BadInput
+from sensorgen.measure.log import Log, notes
 
 TABLE = Path(__file__).parents[2] / "src" / "sensorgen" / "measure" / "log" / "table_d1.csv"
 FACTOR = {"": 1.0, "k": 1e3, "m": 1e6}
@@ -57,12 +57,12 @@ def table(made, key):
 
 def column(found, name):
     at = [c.name for c in found.columns].index(name)
-    return [row[at] for row in found.rows]
+    return [row[at] for row in found.cells]
 
 
 def test_every_reading_is_there_once_with_its_numbers(of_thesis, by_hand):
-    found = table(of_thesis, "specimens")
-    pairs = zip(column(found, "R_Y measured"), column(found, "R_Z measured"), strict=True)
+    found = table(of_thesis, "readings")
+    pairs = zip(column(found, "electrode resistance measured"), column(found, "film resistance measured"), strict=True)
     ours = sorted((y if y is not None else -1.0, z if z is not None else -1.0) for y, z in pairs)
     theirs = sorted((-1.0 if math.isnan(y) else y, -1.0 if math.isnan(z) else z) for y, z, _ in by_hand)
     assert ours == theirs
@@ -71,24 +71,24 @@ def test_every_reading_is_there_once_with_its_numbers(of_thesis, by_hand):
 def test_how_many_have_a_z_of_the_order_of_their_y(of_thesis, by_hand):
     both = [(y, z) for y, z, _ in by_hand if not math.isnan(y + z)]
     shorted = sum(z <= 10 * y for y, z in both)
-    said_so = next(text for text in of_thesis.findings if "of the order of R_Y" in text)
-    assert said_so.startswith(f"{shorted} of {len(both)} specimens")
+    said_so = next(text for text in of_thesis.findings if "sensors are shorted or leaking" in text)
+    assert said_so.startswith(f"{shorted} of {len(both)} sensors")
     film = [(y, z) for y, z, name in by_hand if not math.isnan(y + z) and "mm" in name]
-    assert f"{len(both) - len(film)} of them shorts by design" in said_so
-    shares = table(of_thesis, "yield_by_film")
-    assert sum(column(shares, "R_Z of the order of R_Y")) == sum(z <= 10 * y for y, z in film)
-    assert column(shares, "of") == [0, 16, 16]
-    assert column(shares, "share")[0] is column(shares, "from")[0] is None
+    assert f"{len(both) - len(film)} by design" in said_so
+    shares = [row for row in table(of_thesis, "yield").rows if row.by == "film"]
+    assert sum(row.shorted for row in shares) == sum(z <= 10 * y for y, z in film)
+    assert [row.total for row in shares] == [0, 16, 16]
+    assert shares[0].share_percent is shares[0].yield_from is None
 
 
 def test_shorts_by_design_say_nothing_of_the_yield(of_thesis, by_hand):
     """What touches as drawn cannot be intact: 0 of the others is an upper bound of 1 - 0.025^(1/32)."""
     film = [(y, z) for y, z, name in by_hand if not math.isnan(y + z) and "mm" in name]
-    said_so = next(text for text in of_thesis.findings if "intact" in text)
-    assert said_so.startswith(f"0 of {len(film)} specimens")
-    assert said_so.endswith(f"a yield of 0 to {100 * (1 - 0.025 ** (1 / len(film))):.3g} %.")
+    said_so = next(text for text in of_thesis.headline if "intact" in text)
+    assert said_so.startswith(f"None of the {len(film)} testable sensors is intact")
+    assert f"yield 0 to {100 * (1 - 0.025 ** (1 / len(film))):.2g} %" in said_so
     exact = stats.binomtest(sum(z <= 10 * y for y, z in film), len(film)).proportion_ci(0.95, "exact")
-    assert any(f"{100 * exact.low:.3g} to {100 * exact.high:.3g} %" in text for text in of_thesis.findings)
+    assert any(f"{100 * exact.low:.2g} to {100 * exact.high:.2g} %" in text for text in of_thesis.findings)
 
 
 def test_whether_groups_differ_is_asked_of_films_only(of_thesis, by_hand):
@@ -97,22 +97,22 @@ def test_whether_groups_differ_is_asked_of_films_only(of_thesis, by_hand):
         return [[sum(s for s, n in rows if g in n), sum(not s for s, n in rows if g in n)] for g in groups]
 
     for by, groups in (("film", (".1mm", "2mm")), ("shape", ("tri", "sq"))):
-        said_so = next(text for text in of_thesis.findings if text.startswith(f"By {by}:"))
+        said_so = next(text for text in of_thesis.findings if f" by {by}:" in text)
         chance = stats.fisher_exact(table_by(groups)).pvalue
         assert f"p = {chance:.2g}" in said_so
-        assert "do not differ" in said_so
+        assert "no significant difference" in said_so
 
 
-@pytest.mark.parametrize(("shorted", "said"), [(6, "do not differ more"), (5, "differ (p")])
+@pytest.mark.parametrize(("shorted", "said"), [(6, "; no significant difference"), (5, "; a significant difference")])
 def test_of_two_questions_each_has_to_be_twice_as_sure(shorted, said, tmp_path):
     """6 and 5 of 10 against 12 of 12: p = 0.029 and 0.010, of which the first would do if only one thing were asked."""
     with Log(tmp_path / "log.db", create=True) as log:
-        first = [words.reading(f"40 triX .1mm {k + 1}", "700", "30" if k < shorted else "OL") for k in range(10)]
-        log.add(first + [words.reading(f"40 triX .2mm {k + 1}", "700", "30") for k in range(12)])
+        first = [notes.reading(f"40 triX .1mm {k + 1}", "700", "30" if k < shorted else "OL") for k in range(10)]
+        log.add(first + [notes.reading(f"40 triX .2mm {k + 1}", "700", "30") for k in range(12)])
         found = of_iteration(log, 40)
     chance = stats.fisher_exact([[shorted, 10 - shorted], [12, 0]]).pvalue
     assert chance < 0.05
-    text = next(text for text in yields.findings(found) if text.startswith("By film"))
+    text = next(text for text in yields.findings(found) if " by film:" in text)
     assert said in text
     assert f"p = {chance:.2g}" in text
 
@@ -120,105 +120,113 @@ def test_of_two_questions_each_has_to_be_twice_as_sure(shorted, said, tmp_path):
 def test_r_z_is_not_compared_where_the_electrodes_touch_as_drawn(of_thesis, by_hand):
     """One leak for all: ln of the meter's highest range and of the readings, without those of 0 ohm and of no film."""
     known = [z for y, z, name in by_hand if "mm" in name and z > 0 and 1 < y < 5e4]
-    row = next(r for r in table(of_thesis, "explained").rows if r[:2] == ("R_Z", "leak"))
+    row = next(
+        r for r in table(of_thesis, "explained").rows if (r.kind, r.parameter) == ("film resistance", "film leakage")
+    )
     mean = sum(map(math.log, known)) / len(known)
     left = sum((math.log(z) - mean) ** 2 for z in known) / sum((math.log(z) - math.log(1e8)) ** 2 for z in known)
-    assert row[7] == pytest.approx(100 * (1 - left), abs=0.2)
+    assert row.share_percent == pytest.approx(100 * (1 - left), abs=0.2)
 
 
 def test_a_specimen_counts_once_and_with_its_last_reading(tmp_path):
     with Log(tmp_path / "log.db", create=True) as log:
-        log.add([words.reading("40 triX .1mm", "0.7k", z) for z in ("10", "12", "OL")])
-        log.add([words.reading("40 triX .1mm 2", "0.7k", "20")])
+        log.add([notes.reading("40 triX .1mm", "0.7k", z) for z in ("10", "12", "OL")])
+        log.add([notes.reading("40 triX .1mm 2", "0.7k", "20")])
         made = report(log, 40)
-    assert any(text.startswith("1 of 2 specimens that allow") for text in made.findings)
-    assert any(text.startswith("1 of 2 specimens with both") for text in made.findings)
-    assert "2 earlier readings count for nothing" in " ".join(w for s in made.sections for w in s.words)
-    assert len(table(made, "specimens").rows) == 4
-    assert column(table(made, "yield_by_shape"), "specimens") == [2]
+    assert any(text.startswith("1 of the 2 testable sensors is intact") for text in made.headline)
+    assert any(text.startswith("1 of 2 sensors are shorted or leaking") for text in made.findings)
+    assert "2 earlier readings are not counted" in " ".join(w for s in made.sections for w in s.notes)
+    assert len(table(made, "readings").rows) == 4
+    assert [(row.by, row.specimens) for row in table(made, "yield").rows] == [("all", 2)]
 
 
 def test_thousands_of_readings(tmp_path, monkeypatch):
     """Of so many only what a browser can bear is drawn and listed, and it says so; the files for programs hold all."""
-    monkeypatch.setattr(page_of, "MOST_ROWS", 50)
+    monkeypatch.setattr(formats, "MOST_ROWS", 50)
     with Log(tmp_path / "log.db", create=True) as log:
         names = [f"40 {shape} .1mm {k + 1}" for k in range(600) for shape in ("triX", "triY")]
-        log.add([words.reading(n, f"{700 + k % 99}", "30" if k % 3 else "OL") for k, n in enumerate(names)])
+        log.add([notes.reading(n, f"{700 + k % 99}", "30" if k % 3 else "OL") for k, n in enumerate(names)])
         made = report(log, 40)
-    charts = {chart.key: chart for chart in made.charts}
-    assert [len(charts[key].y[0].names) for key in ("residuals", "resistance")] == [MOST_ROWS] * 2
+    charts = {chart.key: chart for chart in made.figures}
+    assert [len(charts[key].choices[""][0].y.names) for key in ("residuals", "resistance")] == [MOST_ROWS] * 2
     assert f"Not drawn: {1200 - MOST_ROWS}" in charts["residuals"].alt
-    drawn = [float(x) for t in charts["residuals"].choices[""] if t.kind == "points" for x in t.x]
-    every = column(table(made, "specimens"), "ratio")
+    drawn = [float(x) for t in charts["residuals"].choices[""][0].content if t.kind == "points" for x in t.x]
+    every = column(table(made, "readings"), "measured / predicted")
     assert (min(drawn), max(drawn)) == pytest.approx((min(every), max(every)))
-    assert "400 of 1200" in " ".join(made.findings)
+    assert "800 of 1200" in " ".join(made.findings)
+    assert "400 of the 1200" in " ".join(made.headline)
     page = Page(written(made, "html"))
-    assert len(page.cells["specimens"]) == 50 + 1
+    assert len(page.cells["readings"]) == 50 + 1
     assert "the first 50 of 1200 rows" in "".join(page.text)
-    assert written(made, "csv").count("\nspecimens,") == 1200 * 16
+    assert written(made, "csv").count("\nreadings,") == 1200 * 15
 
 
 def test_ratios_are_measured_over_the_middle(of_thesis):
-    found = table(of_thesis, "specimens")
-    for y, low, middle, high, ratio, residual in zip(
-        *(column(found, n) for n in ("R_Y measured", "R_Y from", "R_Y predicted", "R_Y to", "ratio", "residual")),
+    found = table(of_thesis, "readings")
+    for y, low, middle, high, ratio in zip(
+        *(
+            column(found, n)
+            for n in (
+                "electrode resistance measured",
+                "predicted from",
+                "predicted",
+                "predicted to",
+                "measured / predicted",
+            )
+        ),
         strict=True,
     ):
         if y is not None:
             assert middle == pytest.approx(math.sqrt(low * high))
             assert ratio == pytest.approx(y / middle)
-            assert residual == pytest.approx(math.log(y / middle))
-    sizes = [abs(r) for r in column(found, "residual") if r is not None]
+    sizes = [abs(math.log(r)) for r in column(found, "measured / predicted") if r is not None]
     assert sizes == sorted(sizes, reverse=True)
 
 
 def test_the_median_that_it_speaks_of(of_thesis, by_hand):
-    found = table(of_thesis, "specimens")
-    ratios = [r for r, y in zip(column(found, "ratio"), column(found, "R_Y measured"), strict=True)
-              if y is not None and 1 < y < 5e4]  # fmt: skip
-    assert of_thesis.findings[0].startswith(f"Electrodes read {median(ratios):.3g} of")
+    found = table(of_thesis, "readings")
+    ratios = [row.ratio for row in found.rows if 1 < row.measured_ohm < 5e4]
+    assert of_thesis.headline[0].startswith(f"Electrode resistance: measured {1 / median(ratios):.3g} x lower than")
 
 
 def test_resistivity_explains_what_it_must(of_thesis):
     """With one factor on a logarithm, the best one is the mean residual, and takes away the mean's square."""
-    found, explained = table(of_thesis, "specimens"), table(of_thesis, "explained")
-    residuals = [
-        r for r, y in zip(column(found, "residual"), column(found, "R_Y measured"), strict=True)
-        if y is not None and 1 < y < 5e4
-    ]  # fmt: skip
+    found, explained = table(of_thesis, "readings"), table(of_thesis, "explained")
+    residuals = [math.log(row.ratio) for row in found.rows if 1 < row.measured_ohm < 5e4]
     mean = sum(residuals) / len(residuals)
-    row = next(r for r in explained.rows if r[:2] == ("R_Y", "rho"))
-    assert row[3] == pytest.approx(math.exp(mean), rel=1e-5)
-    assert row[6] == pytest.approx(1.0, rel=1e-6)
-    assert row[7] == pytest.approx(100 * len(residuals) * mean**2 / sum(r * r for r in residuals), rel=1e-6)
-    idle = {r[1]: r[7] for r in explained.rows if r[0] == "R_Y"}
-    assert idle["eps_r"] == idle["E"] == idle["d"] == 0
+    row = next(r for r in explained.rows if (r.kind, r.parameter) == ("electrode resistance", "electrode resistivity"))
+    assert row.value == pytest.approx(math.exp(mean), rel=1e-5)
+    assert row.slope == pytest.approx(1.0, rel=1e-6)
+    assert row.share_percent == pytest.approx(100 * len(residuals) * mean**2 / sum(r * r for r in residuals), rel=1e-6)
+    idle = {r.parameter: r.share_percent for r in explained.rows if r.kind == "electrode resistance"}
+    assert idle["film permittivity"] == idle["all moduli"] == idle["film thickness"] == 0
 
 
 def test_it_says_that_predictions_were_made_afterwards(of_thesis, of_recorded):
-    assert "made afterwards" in " ".join(of_thesis.sections[0].words)
-    assert "1 of 1 predictions were stored" in " ".join(of_recorded.sections[0].words)
-    assert any(row[2].startswith("stored 20") for row in table(of_recorded, "provenance").rows)
+    assert "made after the measurement" in " ".join(of_thesis.findings)
+    assert "1 of 1 predictions were stored" in " ".join(of_recorded.findings)
+    assert any(row.which.startswith("stored 20") for row in table(of_recorded, "provenance").rows)
 
 
 def test_what_explains_recordings_is_what_is_wrong(of_recorded):
     """C is 1.3 times the prediction, the modulus half of it: nothing else moves X at rest, and presses, so much."""
-    found = {(r[0], r[1]): r for r in table(of_recorded, "explained").rows}
-    rest = [r for r in table(of_recorded, "explained").rows if r[0] == "Z at rest"]
-    assert {rest[0][1], rest[1][1]} == {"eps_r", "d"}
-    assert rest[0][7] > 95
-    assert found["presses", "E"][3] == pytest.approx(0.5, rel=0.03)
-    assert found["presses", "E"][7] > 95
+    rows = table(of_recorded, "explained").rows
+    rest = [r for r in rows if r.kind == "impedance at rest"]
+    assert {rest[0].parameter, rest[1].parameter} == {"film permittivity", "film thickness"}
+    assert rest[0].share_percent > 95
+    loaded = next(r for r in rows if (r.kind, r.parameter) == ("impedance under load", "all moduli"))
+    assert loaded.value == pytest.approx(0.5, rel=0.03)
+    assert loaded.share_percent > 95
 
 
 def test_tones_beside_their_prediction(of_recorded):
-    found = table(of_recorded, "tones")
+    found = table(of_recorded, "impedance")
     assert len(found.rows) == 2 * 7
-    c = [v for v, f in zip(column(found, "C measured"), column(found, "tone"), strict=True) if f < 3e3]
+    c = [v for v, f in zip(column(found, "C measured"), column(found, "frequency"), strict=True) if f < 3e3]
     middle = math.sqrt(column(found, "C from")[0] * column(found, "C to")[0])
     assert c == pytest.approx([1.3 * middle] * len(c), rel=3e-3)
     for measured, predicted, residual in zip(
-        *(column(found, n) for n in ("X measured", "X predicted", "residual X")), strict=True
+        *(column(found, n) for n in ("X measured", "X predicted", "residual of X")), strict=True
     ):
         assert residual == pytest.approx((measured - predicted) / abs(predicted), rel=2e-2)
 
@@ -261,6 +269,14 @@ def page(of_recorded):
     return Page(written(of_recorded, "html"))
 
 
+def cell_of(page, found, k, j):
+    """A cell of a table on the page: a table of one row stands as a list, without what is empty."""
+    if len(found.rows) > 1:
+        return page.cells[found.key][k + 1][j]
+    by_name = {row[0][1]: row[1] for row in page.cells[found.key]}
+    return by_name.get(found.columns[j].head, (None, ""))
+
+
 def test_all_formats_have_the_same_numbers(of_recorded, page):
     rows = list(csv.reader(io.StringIO(written(of_recorded, "csv"))))
     data = {t["key"]: t for s in json.loads(written(of_recorded, "json"))["sections"] for t in s["tables"]}
@@ -268,18 +284,19 @@ def test_all_formats_have_the_same_numbers(of_recorded, page):
     for found in of_recorded.tables:
         ours = [r for r in rows[1:] if r[0] == found.key]
         assert len(ours) == len(found.rows) * len(found.columns)
-        for k, row in enumerate(found.rows):
+        for k, row in enumerate(found.cells):
             for j, value in enumerate(row):
                 cell = ours[k * len(found.columns) + j][4]
-                plain, (exact, shown) = data[found.key]["rows"][k][j], page.cells[found.key][k + 1][j]
+                plain = data[found.key]["rows"][k][j]
+                exact, shown = cell_of(page, found, k, j)
                 if isinstance(value, str):
                     assert cell.removeprefix("'") == plain == shown == value
                 elif value is None:
                     assert (cell, plain, exact) == ("", None, "")
                 else:
                     assert float(cell) == float(plain) == float(exact) == value
-                    assert shown == said(value)
-        assert sum(line.startswith("| ") for line in lines) >= len(found.rows)
+                    assert shown == shown_as(value)
+    assert sum(line.startswith("| ") for line in lines) >= sum(len(t.rows) for t in of_recorded.tables if t.rows[1:])
     assert any(row[4] == f"'{FORMULA}" for row in rows)
     assert any(row[4] == HOSTILE for row in rows)
 
@@ -313,29 +330,34 @@ def test_a_page_that_everybody_can_read(page):
     assert all("src" not in attrs or attrs["src"].startswith("data:") for _, attrs in page.tags)
 
 
-def test_an_iteration_without_readings_says_so_in_every_format(thesis):
-    with Log(thesis) as log:
-        empty = report(log, 99)
-    assert "no readings of iteration 99" in empty.findings[0]
-    assert "19, 20, 21, 22, 23" in empty.findings[0]
-    assert empty.charts == ()
-    for how in FORMATS:
-        text = written(empty, how)
-        assert how == "csv" or "no readings of iteration 99" in text
-    assert len(written(empty, "html")) < 50_000  # no script that draws nothing
+def test_an_iteration_without_readings_is_refused(thesis):
+    message = r"no readings of iteration 99; iterations in it: 19, 20, 21, 22, 23, 25\."
+    with Log(thesis) as log, pytest.raises(BadInput, match=message):
+        report(log, 99)
+
+
+def test_one_reading_makes_a_short_report(tmp_path):
+    """No table of a group of one, no yield of one, and no explanation of a single number."""
+    with Log(tmp_path / "log.db", create=True) as log:
+        log.add([notes.reading("40 triX .1mm", "700", "OL")])
+        made = report(log, 40)
+    assert made.headline[0].startswith("Electrode resistance of 40 triX .1mm: measured 700 ohm, predicted ")
+    assert made.headline[1] == "Verdict of 40 triX .1mm: intact."
+    assert [t.key for t in made.tables] == ["readings", "verdicts", "identifiability", "provenance"]
+    assert written(made, "md").count("\n| ") < 20
 
 
 def test_readings_without_a_design_make_a_report(tmp_path):
     with Log(tmp_path / "log.db", create=True) as log:
-        log.add([words.reading("50 tri", "650", "OL"), words.reading("50 sq", "", "")])
+        log.add([notes.reading("50 tri", "650", "OL"), notes.reading("50 sq", "", "")])
         made = report(log, 50)
-    assert any("does not tell which design" in row[1] for row in table(made, "left_out").rows)
+    assert any("does not tell which design" in row.why for row in table(made, "left_out").rows)
     for how in FORMATS:
         assert written(made, how)
 
 
 def test_figures_as_files(of_recorded):
-    wanted = [c for c in of_recorded.charts if c.key in ("residuals", "surface-1-1")]
+    wanted = [c for c in of_recorded.figures if c.key in ("residuals", "reactance-1-1")]
     assert len(wanted) == 2
     for chart in (dataclasses.replace(c, choices=dict(list(c.choices.items())[:2])) for c in wanted):
         first, second = dict(files(chart)), dict(files(chart))
@@ -353,4 +375,4 @@ def test_recordings_that_are_gone_are_told(recorded, tmp_path):
     shutil.copy(recorded, copy)
     with Log(copy) as log:
         made = report(log, 30)
-    assert sum("recording" in row[0] and "no such file" in row[1] for row in table(made, "left_out").rows) == 2
+    assert sum("recording" in row.what and "no such file" in row.why for row in table(made, "left_out").rows) == 2

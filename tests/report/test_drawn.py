@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 
 from sensorgen.analysis.comparison import runs
-from sensorgen.analysis.report.charts import Axis, Chart, Trace
-from sensorgen.analysis.report.identified import _lines
-from sensorgen.analysis.report.interactive import figure, packed
-from sensorgen.analysis.report.pictures import files
-from sensorgen.analysis.report.recordings import normalised_differences
-from sensorgen.analysis.report.thinned import kept
+from sensorgen.analysis.plots.figure import Axis, Curve, Figure, Panel, thinned
+from sensorgen.analysis.plots.interactive import data, packed
+from sensorgen.analysis.plots.static import files
+from sensorgen.analysis.report.recordings import compared
+from sensorgen.analysis.report.variants import errors
 from sensorgen.cli import cli
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Log
-from sensorgen.measure.log.bench import take
+from sensorgen.measure.log.bench import log_recording
 
 
 def test_thinned_curves_keep_what_stands_out():
@@ -25,8 +24,8 @@ def test_thinned_curves_keep_what_stands_out():
     values = rng.normal(size=100_003)
     values[[5, 777, 99_999]] = 50.0, -50.0, 40.0
     values[5000:5200] = np.nan
-    at = kept(values, 2000)
-    assert len(at) <= 2002
+    at = thinned(values, 2000)
+    assert len(at) <= 2003
     assert (np.diff(at) > 0).all()
     assert {5, 777, 99_999} <= set(at.tolist())
     width = -(-len(values) // 1000)
@@ -38,8 +37,8 @@ def test_thinned_curves_keep_what_stands_out():
 
 
 def test_few_points_stay_all():
-    assert kept(np.arange(10.0), 10).tolist() == list(range(10))
-    assert len(kept(np.full(5000, np.nan), 100)) <= 101
+    assert thinned(np.arange(10.0), 10).tolist() == list(range(10))
+    assert len(thinned(np.full(5000, np.nan), 100)) <= 101
 
 
 def unpacked(data):
@@ -65,10 +64,9 @@ def test_packed_numbers(values, kind):
 
 def test_names_in_figures_are_text():
     bad = "<a href='http://example.org'>$\\frac{</a>"
-    chart = Chart(
-        "k", bad, bad, {"": (Trace("points", bad, [1.0], [bad], text=[bad]),)}, Axis(bad), (Axis(bad, names=(bad,)),)
-    )
-    assert "<a" not in json.dumps(figure(chart))
+    panel = Panel((Curve("points", bad, [1.0], [bad], text=[bad]),), Axis(bad), Axis(bad, names=(bad,)), title=bad)
+    chart = Figure("k", bad, bad, {"": (panel, panel)})
+    assert "<a" not in json.dumps(data(chart))
     svg = dict(files(chart))["k.svg"].decode()
     assert "<a href" not in svg
     assert "\\frac{" in svg
@@ -77,35 +75,36 @@ def test_names_in_figures_are_text():
 def test_logarithmic_axes_have_plain_numbers():
     """Formulas are not drawn, names being text; a decade's tick would otherwise stand there as its TeX."""
     for high in (5.0, 500.0, 5e6):
-        drawn = (Trace("points", "", [1.0, high], [1.0, high]),)
-        chart = Chart("k", "t", "a", {"": drawn}, Axis("x", log=True), (Axis("y", log=True),))
+        panel = Panel((Curve("points", "", [1.0, high], [1.0, high]),), Axis("x", log=True), Axis("y", log=True))
+        chart = Figure("k", "t", "a", {"": (panel,)})
         svg = dict(files(chart))["k.svg"].decode()
         assert "math" not in svg
         assert sum(f">{number}</text>" in svg for number in ("1", "2", "5", "10", "100", "1000")) >= 2
 
 
 def test_what_is_no_number_is_a_gap():
-    chart = Chart("k", "t", "a", {"": (Trace("line", "", [1.0, 2.0], [np.nan, np.inf]),)}, Axis("x"), (Axis("y"),))
-    assert figure(chart)["choices"][0]["data"][0]["y"] == [None, None]
+    panel = Panel((Curve("line", "", [1.0, 2.0], [np.nan, np.inf]),), Axis("x"), Axis("y"))
+    assert data(Figure("k", "t", "a", {"": (panel,)}))["choices"][0]["data"][0]["y"] == [None, None]
 
 
 def test_differences_of_all_recordings_on_scales_of_their_own(recorded):
     with Log(recorded) as log:
         every = list(runs.runs(log, 30, []))
-    (chart,) = normalised_differences(every)
+    (chart,) = compared(every)
     assert len(chart.choices) == 7
-    for k, traces in enumerate(chart.choices.values()):
-        assert [t.row for t in traces] == [0, 0, 1, 1]
-        for trace, run in zip(traces, every * 2, strict=True):
+    for k, panels in enumerate(chart.choices.values()):
+        traces = [(row, curve) for row, panel in enumerate(panels) for curve in panel.content]
+        assert [row for row, _ in traces] == [0, 0, 1, 1]
+        for (row, trace), run in zip(traces, every * 2, strict=True):
             moved = run.pairs.pressed_ohm[:, k] - run.pairs.before_ohm[:, k]
-            part = moved.imag if trace.row else moved.real
+            part = moved.imag if row else moved.real
             assert trace.x == pytest.approx(run.pairs.force_n)
             assert trace.y == pytest.approx((part - part.min()) / (part.max() - part.min()))
     shifted = replace(every[1], recording=replace(every[1].recording, tones_hz=every[1].recording.tones_hz * 1.01))
-    (chart,) = normalised_differences([every[0], shifted])
-    assert len(chart.choices["1.1kHz"]) == 2
-    assert "1 recordings of other tones are left out" in chart.alt
-    assert not list(normalised_differences([]))
+    (chart,) = compared([every[0], shifted])
+    assert [len(panel.content) for panel in chart.choices["1.1 kHz"]] == [1, 1]
+    assert "Left out: 1 recordings of other frequencies" in chart.alt
+    assert not list(compared([]))
 
 
 def test_what_impedance_could_tell_is_the_cards_map():
@@ -117,13 +116,13 @@ def test_what_impedance_could_tell_is_the_cards_map():
             "sigma_position_m": [[None, k / 1e3] for k in range(5)],
         },
     }  # fmt: skip
-    weak, middling, strong, needed, *below = _lines(card)
+    above, under = errors(card)
+    (weak, middling, strong, needed), below = above.content, under.content
     assert [list(t.y) for t in (weak, middling, strong, needed)] == [[1, 11], [2, 12], [4, 14], [0.6, 0.6]]
-    assert [t.name for t in (weak, middling, strong)] == ["press of 1 N", "press of 2 N", "press of 4 N"]
+    assert [t.name for t in (weak, middling, strong)] == ["1 N", "2 N", "4 N"]
     assert np.isnan([t.y[0] for t in below[:3]]).all()
     assert [t.y[1] for t in below] == pytest.approx([1.0, 2.0, 4.0, 10.0])
     assert list(weak.x) == [0.0, 50.0]
-    assert {t.row for t in below} == {1}
 
 
 def test_presses_of_a_run(recorded):
@@ -142,15 +141,21 @@ def test_the_command(thesis, tmp_path, capsys, monkeypatch):
     opened = []
     monkeypatch.setattr("webbrowser.open", opened.append)
     log = ["--log", str(thesis)]
-    run("--iteration", "99", "--open", *log)
-    assert opened == [(tmp_path / "report-99.html").as_uri()]
-    run("--iteration", "99", "--format", "json", "-o", "-", *log)
-    assert '"iteration": 99' in capsys.readouterr().out
+    run("--iteration", "19", "--open", *log)
+    assert opened == [(tmp_path / "report-19.html").as_uri()]
+    headline, *_, file = capsys.readouterr().out.splitlines()
+    assert headline.startswith("Electrode resistance of 19 sqXY: measured 900 ohm")
+    assert file == "report-19.html"
+    run("--iteration", "19", "--format", "json", "-o", "-", *log)
+    assert json.loads(capsys.readouterr().out)["iteration"] == 19
     run("--iteration", "19", "--format", "csv", "--figures", "figures", *log)
     assert (tmp_path / "report-19.csv").read_text("utf-8").startswith("table,row,column,unit,value\n")
-    assert (tmp_path / "figures" / "residuals.svg").exists()
+    assert (tmp_path / "figures" / "resistance.svg").exists()
     with pytest.raises(BadInput, match="--open shows an HTML file"):
         run("--iteration", "23", "--open", "--format", "md", *log)
+    with pytest.raises(BadInput, match="no readings of iteration 99"):
+        run("--iteration", "99", *log)
+    assert not (tmp_path / "report-99.html").exists()
     with pytest.raises(BadInput):
         run("--iteration", "23", "--log", str(tmp_path / "none.db"))
 
@@ -162,7 +167,7 @@ def test_a_table_with_columns_of_its_own_is_not_left_out(tmp_path):
     columns = {"t": "time_s", "r": "re_ohm_1.1kHz", "x": "im_ohm_1.1kHz"}
     left_out = []
     with Log(tmp_path / "log.db", create=True) as log:
-        take(log, "31 triX .1mm", tmp_path / "own.csv", None, columns=columns)
+        log_recording(log, "31 triX .1mm", tmp_path / "own.csv", None, columns=columns)
         (found,) = runs.runs(log, 31, left_out)
     assert left_out == []
     assert found.rest_ohm[0].real == pytest.approx(1001, abs=0.1)

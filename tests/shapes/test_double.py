@@ -39,7 +39,7 @@ def test_its_middle_electrode_is_of_the_top_ones_material():
 
 
 def test_the_columns_refuse_three_electrodes_and_say_who_speaks_of_them():
-    assert "sensorgen stack" in (columns.unfit(scene()) or "")
+    assert "sensorgen stack" in (columns.why_not_applicable(scene()) or "")
 
 
 @pytest.mark.parametrize("film", ["lower", "upper"])

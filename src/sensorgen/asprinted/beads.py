@@ -120,7 +120,7 @@ def _nearest(regions: Sequence[Region], places_mm: Floats) -> NDArray[np.intp]:
     places = shapely.points(places_mm)
     found = [parts(region) for region in regions]
     tree = shapely.STRtree([part for each in found for part in each])
-    return np.repeat(np.arange(len(found)), [len(each) for each in found])[tree.nearest(places)]
+    return np.asarray(np.repeat(np.arange(len(found)), [len(each) for each in found])[tree.nearest(places)])
 
 
 def layers(

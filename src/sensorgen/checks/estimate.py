@@ -83,11 +83,15 @@ def _printed(layer: LayerRegions, scene: Scene, printer: Printer, wide: Rule) ->
     length, width, _ = scene.size_mm
     regions: dict[str, Region] = {}
     for body in sorted((b for b in scene.bodies if b.name in layer.regions), key=_order):
-        rule = partial(wide, layer_mm=layer.height_mm, printer=printer)
-        widened = shapely.clip_by_rect(_widened(layer, body.name, length * width, rule), 0.0, 0.0, length, width)
+        found = _widened(layer, body.name, length * width, partial(_width, wide, layer.height_mm, printer))
+        widened = shapely.clip_by_rect(found, 0.0, 0.0, length, width)
         others = shapely.union_all(list(regions.values()))
         regions[body.name] = cleaned(shapely.difference(shapely.union_all(widened), others))
     return layer.mapped(regions)
+
+
+def _width(wide: Rule, layer_mm: float, printer: Printer, width_mm: float) -> float:
+    return wide(width_mm, layer_mm, printer)
 
 
 def _order(body: Body) -> tuple[bool, bool]:
@@ -110,4 +114,4 @@ def _widened(layer: LayerRegions, body: str, plan_mm2: float, wide: Callable[[fl
         swollen = shapely.box(*(bounds + more * sides).T)
     else:
         swollen = shapely.buffer(found, more[:, 0], join_style="mitre")
-    return swollen[printed > 0].tolist()
+    return list(swollen[printed > 0])

@@ -1,6 +1,7 @@
 """``sensorgen bench``: what a rig is to do, and what it did."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -64,7 +65,8 @@ def _work(
 
         store.replace(Path(output), plan.csv().encode())
     if as_json:
-        show.as_json(plan.data() | {"design": design.name})
+        steps = [asdict(step) for step in plan.steps()]
+        show.as_json(asdict(plan) | {"seconds": plan.seconds(), "steps": steps, "design": design.name})
     elif output:
         click.echo(f"{output}: {presses * (1 + repeats)} presses, {_lasting(plan.seconds())}")
     else:
@@ -90,12 +92,12 @@ def _plan(
 
 
 def _draw(plan: "Plan", picture: str) -> None:
-    from sensorgen.analysis.plots import bench
+    from sensorgen.analysis.plots import recordings
     from sensorgen.core import files as store
 
     if not picture.lower().endswith(".png"):
         raise BadInput(f"--picture {picture}: expected a file that ends in .png")
-    store.replace(Path(picture), bench.schedule(plan.steps(), plan.seconds()))
+    store.replace(Path(picture), recordings.schedule(plan.steps(), plan.seconds()))
 
 
 def _lasting(seconds: float) -> str:

@@ -71,12 +71,12 @@ def _data(start_s: float, way: "Hysteresis") -> dict[str, Any]:
 
 
 def _drawn(worked: "Processed", ways: "dict[float, Hysteresis]", name: str, plot: str) -> str:
-    from sensorgen.analysis.plots.ways import ways as drawn
+    from sensorgen.analysis.plots import recordings, static
     from sensorgen.core import files as store
 
     if not plot.lower().endswith(".png"):
         raise BadInput(f"--plot {plot}: expected a file that ends in .png")
-    store.replace(Path(plot), drawn(ways, worked.recording.tones_hz, name))
+    store.replace(Path(plot), static.png(recordings.hysteresis(ways, worked.recording.tones_hz, name)))
     return plot
 
 

@@ -61,7 +61,7 @@ def _opened(
         entry = next(log.entries(BenchRun, superseded=True, number=int(what)), None)
         if entry is None:
             raise BadInput(f"no recording {what} in {str(log.path)!r}; sensorgen log list shows their numbers")
-        return bench.reopened(log, entry)
+        return bench.read_again(log, entry)
 
 
 def _chosen(found: "tuple[Recording, ...]", lockin: int | None) -> int:

@@ -108,12 +108,12 @@ def _table(sets: "Mapping[str, Pairs]", tones_hz: "Real", output: str | None, *,
 def _drawn(sets: "Mapping[str, Pairs]", tones_hz: "Real", plot: str | None, *, together: bool) -> list[str]:
     if plot is None:
         return []
-    from sensorgen.analysis.plots import bench
+    from sensorgen.analysis.plots import recordings
     from sensorgen.core import files as store
 
     if not plot.lower().endswith(".png"):
         raise BadInput(f"--plot {plot}: expected a file that ends in .png")
-    store.replace(Path(plot), bench.normalised_differences(sets, tones_hz, together=together))
+    store.replace(Path(plot), recordings.normalised_differences(sets, tones_hz, together=together))
     return [plot]
 
 

@@ -155,7 +155,7 @@ def _csv(names: tuple[str, ...], beside: "Sequence[Real]", tones_hz: "Real", z: 
 
 def _drawn(worked: "Processed", name: str, folder: Path) -> list[str]:
     """Pictures, and the page; surfaces only where presses span one."""
-    from sensorgen.analysis.plots import bench
+    from sensorgen.analysis.plots import recordings
     from sensorgen.core import files as store
 
     if worked.pairs is None:
@@ -166,11 +166,11 @@ def _drawn(worked: "Processed", name: str, folder: Path) -> list[str]:
         name = f"{name}, drift taken out"
         raw = worked.drift.removed(one.time_s[valid], raw)
         smooth = worked.drift.removed(worked.filtered_s, smooth)
-    run = bench.Run(name, one.tones_hz, one.time_s[valid], raw, worked.filtered_s, smooth, worked.pairs)
-    files: dict[str, Callable[[bench.Run], bytes]] = {"time.png": bench.over_time}
+    run = recordings.Run(name, one.tones_hz, one.time_s[valid], raw, worked.filtered_s, smooth, worked.pairs)
+    files: dict[str, Callable[[recordings.Run], bytes]] = {"time.png": recordings.over_time}
     if worked.by_force:
-        files |= {f"{part}.png": partial(bench.surfaces, part=part) for part in bench.PARTS}
-        files["run.html"] = lambda of: bench.html(of).encode()
+        files |= {f"{part}.png": partial(recordings.surfaces, part=part) for part in recordings.PARTS}
+        files["run.html"] = lambda of: recordings.html(of).encode()
     for file, draw in files.items():
         store.replace(folder / file, draw(run))
     return [str(folder / file) for file in files]

@@ -36,7 +36,7 @@ def materials() -> Entries:
 
 def models() -> Entries:
     """Models with their cost and source."""
-    return {name: _model(name) for name in registry.names(model_files)}
+    return {name: _model(name) for name in model_files.names()}
 
 
 def sources() -> Entries:

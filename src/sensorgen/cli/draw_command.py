@@ -8,6 +8,7 @@ import click
 
 from sensorgen.cli import body_options, show
 from sensorgen.cli.designs import DesignGroup
+from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
@@ -24,6 +25,8 @@ def _work(design: "Design", *, output: str | None, drawn: bool, slicer: str | No
     from sensorgen.checks.review import STEPS, draw, review
     from sensorgen.core import files as store
 
+    if output and output != "-" and Path(output).suffix.lower() not in ("", ".svg"):
+        raise BadInput(f"--output {output}: the drawing is SVG; expected a name that ends in .svg, or - to print it")
     made = None if drawn else body_options.printed_of(design, slicer, walls)
     with show.progress(STEPS) as step:
         held = review(design, step)

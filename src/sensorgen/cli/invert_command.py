@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sensorgen.design.design import Design
     from sensorgen.measure.readings import Readings
     from sensorgen.prediction.inverse import Estimator, Prior
-    from sensorgen.prediction.inverse.answers import Summary
+    from sensorgen.prediction.inverse.answers import InversionSummary, Summary
 
 _NORMAL = re.compile(r"(force|position)=(.+?)(?:\+-|±)(.+)")
 
@@ -78,11 +78,31 @@ def _work(design: "Design", *, measured: str, output: str | None, as_json: bool,
             for text in _answers(source, estimator, summary, live=live, written=place is not None):
                 write(text)
     beside = place == "-"
-    for line in [show.json_text(summary.data()).rstrip()] if as_json else summary.lines():
+    for line in _summary(summary.result(), as_json=as_json):
         click.echo(line, err=beside)
     if not as_json and not beside:
         click.echo(output or "--output FILE.csv writes force and position of every sample")
     return 0
+
+
+def _summary(found: "InversionSummary", *, as_json: bool) -> Iterator[str]:
+    if as_json:
+        from pydantic import TypeAdapter
+
+        from sensorgen.prediction.inverse.answers import InversionSummary
+
+        yield show.json_text(TypeAdapter(InversionSummary).dump_python(found, mode="json")).rstrip()
+        return
+
+    def said(value: float | None, unit: str) -> str:
+        return "unknown" if value is None else f"{value:.3g} {unit}"
+
+    counts = ", ".join(f"{count} {words}" for words, count in found.statuses.items())
+    yield f"{found.samples} sample{'s' * (found.samples != 1)}: {counts}"
+    force, position = said(found.median_force_error_n, "N"), said(found.median_position_error_mm, "mm")
+    yield f"median standard errors: force {force}, position {position}"
+    yield from (f"note: {doubt}" for doubt in found.doubts)
+    yield from found.advice
 
 
 def _estimator(

@@ -61,9 +61,9 @@ def _found(log: "Log", what: str) -> list[Any]:
     if what.isascii() and what.isdigit():
         found: list[Any] = list(log.entries(Reading, superseded=True, number=int(what)))
     else:
-        from sensorgen.measure.log.words import named
+        from sensorgen.measure.log import notes
 
-        name = named(what)[0]["specimen"]
+        name = notes.specimen(what).specimen
         found = [row for kind in (Reading, BenchRun) for row in log.entries(kind, superseded=True, specimen=name)]
         found = [*log.entries(Print, specimen=name), *found]
         designs = dict.fromkeys(row.design_id for row in found if row.design_id)
@@ -75,10 +75,10 @@ def _found(log: "Log", what: str) -> list[Any]:
 
 def _export(place: str, file: str | None) -> None:
     """Write readings to a file, .csv or .parquet, or the whole log to a new folder; 'log import' takes both back."""
-    from sensorgen.measure.log import exporting
+    from sensorgen.measure.log import exchange
 
     with opened(file) as log:
-        rows = exporting.export(log, Path(place))
+        rows = exchange.export(log, Path(place))
     click.echo(f"{rows} rows in {place}")
 
 

@@ -29,12 +29,12 @@ def _multimeter(
     Several readings have / between them, as in --z '2.3k / 3.8k'. A small m is taken for mega, and asked for on a
     terminal.
     """
-    from sensorgen.measure.log import Reading, words
+    from sensorgen.measure.log import Reading, notes
 
     meter = {key: how.pop(key) for key in ("visa", "axis", "wires")}
     if meter["visa"] and (y_words or z_words):
         raise BadInput("--visa beside --y or --z; expected the meter's readings or words, not both")
-    words.named(specimen)  # a wrong name is told before anybody measures
+    notes.specimen(specimen)  # a wrong name is told before anybody measures
     _ahead(specimen, file, wanted=how.pop("predict"), as_json=as_json)
     if meter["visa"]:
         y_words, z_words, how["instrument"] = _measured(**meter)
@@ -44,7 +44,7 @@ def _multimeter(
     mega = _asked_mega(y=y_words, z=z_words)
     with opened(file, create=True) as log:
         supersedes = _uid(log, Reading, corrects)
-        new = log.add([words.reading(specimen, y_words, z_words, mega=mega, supersedes=supersedes, **how)])
+        new = log.add([notes.reading(specimen, y_words, z_words, mega=mega, supersedes=supersedes, **how)])
         _say_logged(new, log, as_json=as_json)
 
 
@@ -62,7 +62,7 @@ def _ahead(specimen: str, file: str | None, *, wanted: bool, as_json: bool) -> N
 
 def _asked_mega(**typed: str) -> bool:
     """Whether a person says that a small m means mega; nobody is asked where there is no m, or no person."""
-    from sensorgen.measure.log.words import resistance
+    from sensorgen.measure.log.notes import resistance
 
     found = [word for axis, words in typed.items() for word in resistance(axis, words).mega]
     if not found or not sys.stdin.isatty():
@@ -133,7 +133,7 @@ def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, the
         raise BadInput(f"{'both' if path else 'neither'} of FILE and --thesis given; expected one of them")
     named = dict(pairs(columns, "--column"))
     with opened(file, create=True) as log:
-        done = importing.thesis(log) if thesis else importing.take(log, Path(str(path)), named)
+        done = importing.thesis(log) if thesis else importing.import_file(log, Path(str(path)), named)
         if as_json:
             show.as_json(vars(done))
             return
@@ -158,7 +158,7 @@ def _bench(
     }
     _ahead(specimen, file, wanted=predict, as_json=as_json)
     with opened(file, create=True) as log:
-        new = bench.take(
+        new = bench.log_recording(
             log, specimen, Path(lcr_file), Path(rig_file) if rig_file else None, **maps, remark=remark,
             supersedes=_uid(log, BenchRun, corrects),
         )  # fmt: skip

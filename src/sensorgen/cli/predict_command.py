@@ -131,7 +131,7 @@ def _loaded(body: "Body", query: "Query", axes: Axes, how: dict[str, Any]) -> "P
         found = evaluate(body, query)
         model = sensor_model(body, query)[0]
     if how["plot"]:
-        _plot(model.sensor, axes, Path(how["plot"]))
+        _plot(body.design.name, model.sensor, axes, Path(how["plot"]))
     elif how["as_csv"]:
         _deliver(grid.csv_blocks(model.sensor, *axes), how["output"], len(axes[1]) * len(axes[2]))
     elif how["as_json"]:
@@ -169,16 +169,16 @@ def _refuse_two(how: dict[str, Any]) -> None:
         raise BadInput(f"--explain prints text; with {given[0]} leave it out: --json has the plan too")
 
 
-def _plot(sensor: Any, axes: Axes, folder: Path) -> None:
+def _plot(name: str, sensor: Any, axes: Axes, folder: Path) -> None:
     from sensorgen.analysis import plots
     from sensorgen.core import files as store
 
     with show.progress(plots.STEPS) as step:
-        for name, content in plots.files(sensor, *axes):
-            step(name)
-            store.replace(folder / name, content)
-    for name in plots.STEPS:
-        click.echo(str(folder / name))
+        for file, content in plots.files(sensor, *axes, name):
+            step(file)
+            store.replace(folder / file, content)
+    for file in plots.STEPS:
+        click.echo(str(folder / file))
 
 
 def _deliver(pieces: Iterator[str], output: str | None, rows: int = 0) -> None:

@@ -19,19 +19,20 @@ FORMATS = ("html", "md", "csv", "json")
 def _work(
     iteration: int, file: str | None, output: str | None, how: str, pictures: str | None, *, show_it: bool
 ) -> int:
-    """Set what was predicted beside what was measured, and say how far apart they are.
+    """Compare predictions and measurements of an iteration.
 
-    One HTML file that needs no network, or Markdown, CSV or JSON with the same numbers. An iteration without readings
-    makes a report that says so.
+    One HTML file that needs no network, or Markdown, CSV or JSON with the same numbers. Prints the headline and the
+    name of the file.
     """
-    from sensorgen.analysis.report import report, written
+    from sensorgen.analysis.report import written
+    from sensorgen.analysis.report.contents import STEPS, report
     from sensorgen.core import files as store
 
     if show_it and (how != "html" or output == "-"):
         raise BadInput("--open shows an HTML file; expected --format html and a file")
-    with log_words.opened(file) as log:
-        made = report(log, iteration)
-    text = written(made, how)
+    with log_words.opened(file) as log, show.progress(STEPS) as step:
+        made = report(log, iteration, step)
+        text = written(made, how)
     if pictures:
         _draw(made, Path(pictures))
     if output == "-":
@@ -39,25 +40,25 @@ def _work(
         return 0
     path = Path(output or f"report-{iteration}.{how}")
     store.replace(path, text.encode())
-    click.echo(str(path))
+    click.echo("\n".join((*made.headline, str(path))))
     if show_it:
         webbrowser.open(path.resolve().as_uri())
     return 0
 
 
 def _draw(made: "Report", folder: Path) -> None:
-    from sensorgen.analysis.report.pictures import files
+    from sensorgen.analysis.plots.static import files
     from sensorgen.core import files as store
 
-    with show.progress([chart.key for chart in made.charts]) as step:
-        for chart in made.charts:
-            step(chart.key)
-            for name, content in files(chart):
+    with show.progress([figure.key for figure in made.figures]) as step:
+        for figure in made.figures:
+            step(figure.key)
+            for name, content in files(figure):
                 store.replace(folder / name, content)
 
 
 command = click.Command(
-    "report", callback=_work, help=_work.__doc__, short_help="Set predicted beside measured, as one page.",
+    "report", callback=_work, help=_work.__doc__, short_help="Compare predictions and measurements, as one page.",
     params=[
         click.Option(["--iteration"], type=click.IntRange(0), required=True, help="Of the design."),
         log_words.where(),

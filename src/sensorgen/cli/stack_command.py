@@ -1,8 +1,8 @@
 """``sensorgen stack``: what a second film tells that one does not, and what a touch does to a reading."""
 
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,6 +13,7 @@ from sensorgen.core import units
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
+    from sensorgen.prediction.double_layer import StackStudy
 
 WIDTH = 80
 
@@ -59,7 +60,7 @@ def _work(
     frequency_hz: Sequence[float] | None, tip_mm: Sequence[float], noise: float, drift: float,
     within_n: Sequence[float], compression: str | None, as_json: bool,
 ) -> int:  # fmt: skip
-    from sensorgen.prediction.double_layer import study
+    from sensorgen.prediction.double_layer import StackStudy, study
     from sensorgen.prediction.evaluate import TONES_HZ
 
     at_mm = None if position_mm is None else one("--position", position_mm)
@@ -68,67 +69,71 @@ def _work(
         proper("--noise", noise), proper("--drift", drift), one("--within", within_n), compression or "",
         one("--touch", tip_mm) * units.M_PER_MM,
     )  # fmt: skip
-    (show.as_json if as_json else _print)(found)
+    if as_json:
+        from pydantic import TypeAdapter
+
+        show.as_json(TypeAdapter(StackStudy).dump_python(found, mode="json"))
+    else:
+        _print(found)
     return 0
 
 
-def _print(found: Mapping[str, Any]) -> None:
+def _print(found: "StackStudy") -> None:
     """Tables for a person."""
     for line in (*_head(found), "", *_double(found), "", *_touch(found), ""):
         click.echo(line)
-    for doubt in found["doubts"]:
+    for doubt in found.doubts:
         _wrapped(f"doubt: {doubt}")
-    _wrapped("taken for granted: " + "; ".join(found["assumptions"]))
+    _wrapped("assumptions: " + "; ".join(found.assumptions))
 
 
 def _wrapped(text: str) -> None:
     click.echo(textwrap.fill(text, WIDTH, subsequent_indent="  "))
 
 
-def _head(found: Mapping[str, Any]) -> list[str]:
+def _head(found: "StackStudy") -> list[str]:
     return textwrap.wrap(
-        f"{found['force_n']:g} N at {found['position_m'] / units.M_PER_MM:g} mm, noise {found['noise'] * 100:g} %; "
-        f"it moves a reading by {found['press_shift'] * 100:.3g} %",
+        f"{found.force_n:g} N at {found.position_m / units.M_PER_MM:g} mm, noise {found.noise * 100:g} %; "
+        f"it moves a reading by {found.press_shift * 100:.3g} %",
         WIDTH,
     )
 
 
-def _double(found: Mapping[str, Any]) -> Iterator[str]:
+def _double(found: "StackStudy") -> Iterator[str]:
     yield "two films that share the middle electrode; R and X [ohm]"
     yield f"{'':>9} {'lower':^22} {'upper':^22} {'upper - lower':^22}".rstrip()
-    for row in found["readings_ohm"]:
-        lower, upper = ((row[f"{name}_re"], row[f"{name}_im"]) for name in ("lower", "upper"))
+    for row in found.readings_ohm:
+        lower, upper = (row.lower_re, row.lower_im), (row.upper_re, row.upper_im)
         apart = (upper[0] - lower[0], upper[1] - lower[1])
         said = " ".join(f"{re:10.4g} {im:11.5g}" for re, im in (lower, upper, apart))
-        yield f"{show.si(row['frequency_hz'], 'Hz'):>9} {said}"
+        yield f"{show.si(row.frequency_hz, 'Hz'):>9} {said}"
     yield ""
-    drift = f"it may drift by {found['drift'] * 100:g} %"
+    drift = f"it may drift by {found.drift * 100:g} %"
     yield f"{'standard errors':18} {'permittivity known':>23}   {drift:>27}"
-    for row in found["bounds"]:
-        known, drifting = (
-            f"{_said(row['force_n'][case], 'N'):>11} {_said(row['position_m'][case], 'm'):>11}"
-            for case in ("known", "drifting")
-        )
-        yield f"{row['reading']:18} {known}       {drifting}"
+    for errors in found.bounds:
+        force, position = errors.force_n, errors.position_m
+        known = f"{_said(force.known, 'N'):>11} {_said(position.known, 'm'):>11}"
+        drifting = f"{_said(force.drifting, 'N'):>11} {_said(position.drifting, 'm'):>11}"
+        yield f"{errors.reading:18} {known}       {drifting}"
 
 
 def _said(value: float | None, unit: str) -> str:
-    return "not told" if value is None else show.si(value, unit)
+    return "undefined" if value is None else show.si(value, unit)
 
 
-def _touch(found: Mapping[str, Any]) -> Iterator[str]:
+def _touch(found: "StackStudy") -> Iterator[str]:
     """One row per thickness and one pair of columns per wiring: thicknesses may be many, wirings are three."""
     yield from textwrap.wrap(
         "A body that touches the top beside the press: shift of the reading, and the force that it is mistaken for",
         WIDTH,
     )
-    yield _columns("isolation", [row["wiring"] for row in found["touch"]])
-    for rows in zip(*(row["by_isolation"] for row in found["touch"]), strict=True):
-        thickness = rows[0]["isolation_mm"]
-        cells = [f"{r['largest_shift'] * 100:.2g} % {r['mistaken_for_n']:8.3g} N" for r in rows]
+    yield _columns("isolation", [row.wiring for row in found.touch])
+    for rows in zip(*(row.by_isolation for row in found.touch), strict=True):
+        thickness = rows[0].isolation_mm
+        cells = [f"{r.largest_shift * 100:.2g} % {r.mistaken_for_n:8.3g} N" for r in rows]
         yield _columns(f"{thickness:.4g} mm" if thickness else "bare", cells)
-    yield _columns("needed", [_needed(row["needed_mm"]) for row in found["touch"]])
-    yield f"needed: isolation from which on it stays within {found['within_n']:g} N"
+    yield _columns("needed", [_needed(row.needed_mm) for row in found.touch])
+    yield f"needed: isolation from which on it stays within {found.within_n:g} N"
 
 
 def _columns(head: str, cells: Sequence[str]) -> str:

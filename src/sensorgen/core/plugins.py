@@ -15,9 +15,9 @@ def names(package: ModuleType) -> list[str]:
 
 
 @cache
-def defining(package: ModuleType, function: str) -> tuple[str, ...]:
-    """Names of the modules that define a function, found in their text without loading any."""
-    folder, start = Path(next(iter(package.__path__))), f"def {function}("
+def stating(package: ModuleType, start: str) -> tuple[str, ...]:
+    """Names of the modules that have a line which starts with a text, as ``def f(``, without loading any."""
+    folder = Path(next(iter(package.__path__)))
     texts = ((name, (folder / f"{name}.py").read_text("utf-8")) for name in names(package))
     return tuple(name for name, text in texts if f"\n{start}" in text)
 

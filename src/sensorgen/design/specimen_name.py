@@ -22,6 +22,7 @@ from sensorgen.core.records import shown
 from sensorgen.design.design import Design, make
 
 MAX_LETTERS = 100
+NO_FILM = "no film named: none"
 THICKEST_MM = 10.0  # film that a design may have
 _PLATE_MM = 0.6  # thickness of the plain plate, which its name does not tell
 GRAMMAR = "<iteration> <triX|triY|sqXY|sqYX|SX60> [.1mm|.2mm] [replicate] [fine|x fine] [r|l|m], as in '23 triY .2mm 3'"
@@ -221,7 +222,7 @@ def _rest(text: str, rest: str) -> dict[str, re.Match[str]]:
 def _thickness(text: str, found: re.Match[str] | None) -> tuple[float | None, float | None, list[str]]:
     """Film, size that is no film, and what was assumed."""
     if found is None:
-        return 0.0, None, ["no film named: none"]
+        return 0.0, None, [NO_FILM]
     written = found["number"] or found["bare"]
     value = float(written)
     if value > THICKEST_MM:

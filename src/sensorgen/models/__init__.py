@@ -1,6 +1,58 @@
-"""Physical models, one per file, from cheap to dear; each says which scenes it cannot speak of.
+"""Physical models, one per file; each states ``SOURCE`` and ``COST``: 0 closed form, 1 quadrature, 2 and 3 field solve.
 
-A capacitance model has ``SOURCE``, ``COST`` (0 closed form, 1 quadrature, 2 field solve),
-``unfit(scene)`` and ``capacitance(scene, permittivity)``; a line model has ``impedance``.
-Models speak SI; the scene is in millimetres, and each model converts it where it reads it.
+Capacitance models follow one protocol, :class:`CapacitanceModel`. The scene is in millimetres; models convert to SI
+where they read it.
 """
+
+import sys
+from collections.abc import Mapping
+from typing import Protocol, cast
+
+from sensorgen.core import plugins
+from sensorgen.core.bounds import Disc, Interval
+from sensorgen.scene.scene import Scene
+
+
+class CapacitanceModel(Protocol):
+    """A module that computes bounds of the capacitance between the two terminals of a scene.
+
+    Attributes
+    ----------
+    SOURCE : str
+        Publication or principle.
+    COST : int
+        0 closed form, 1 quadrature, 2 field solve in the plane, 3 in space.
+    WIDTH : float
+        Relative width of the interval unless asked otherwise [-]; inf where the model has one fixed width.
+    """
+
+    SOURCE: str
+    COST: int
+    WIDTH: float
+
+    def why_not_applicable(self, scene: Scene) -> str | None:
+        """Why the model does not apply to a scene, or None."""
+
+    def capacitance(self, scene: Scene, permittivity: Mapping[str, float], width: float = ...) -> Interval:
+        """Bounds at real relative permittivities, no wider than ``width`` where the model can [F]."""
+        ...
+
+
+class LossyModel(CapacitanceModel, Protocol):
+    """A capacitance model that handles dielectric loss and leakage."""
+
+    def lossy(self, scene: Scene, permittivity: Mapping[str, complex], width: float = ...) -> Disc:
+        """Bounds at complex relative permittivities [F]."""
+        ...
+
+
+def names() -> tuple[str, ...]:
+    """Names of all models."""
+    return plugins.stating(sys.modules[__name__], "SOURCE = ")
+
+
+def capacitance_models() -> dict[str, CapacitanceModel]:
+    """The models of capacitance by name, loaded."""
+    package = sys.modules[__name__]
+    found = plugins.stating(package, "def capacitance(")
+    return {name: cast(CapacitanceModel, plugins.load(package, name)) for name in found}

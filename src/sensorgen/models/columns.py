@@ -1,4 +1,4 @@
-"""Vertical columns side by side: a certified lower bound, and an upper one from the columns' own field.
+"""Vertical columns side by side: certified lower bound, and upper bound from the columns' own potential.
 
 Flux that may only run straight up is admissible for Thomson's principle, so the columns in parallel bound the
 capacitance from below. Any potential that is right on the electrodes bounds it from above (Dirichlet): we try
@@ -24,16 +24,17 @@ from sensorgen.solvers.line.straight import energy as straight
 
 SOURCE = "Thesis 3.2.1 and 3.2.2, Eqs. 3.10 to 3.49, corrected; Dirichlet's and Thomson's principles"
 COST = 1
+WIDTH = inf  # the bounds have the width that they have
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _ROUNDING = 1e-9  # by which exact bounds may seem to cross
 _JUMP = 1e-9  # a potential is continuous when its two sides differ by less, of 1 V
 
 
-def unfit(scene: Scene) -> str | None:
-    """Why this model cannot speak of this scene, or None."""
+def why_not_applicable(scene: Scene) -> str | None:
+    """Why the model does not apply to a scene, or None."""
     if len({body.terminal for body in scene.bodies} - {""}) > 2:
-        return "more than two electrodes: sensorgen stack speaks of them"
+        return "more than two electrodes: use sensorgen stack"
     try:
         gaps = [_gap(column) for part in parts(scene) for column in _distinct(part).values()]
     except ValueError as error:
@@ -48,7 +49,7 @@ def unfit(scene: Scene) -> str | None:
     return None
 
 
-def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
+def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:  # noqa: ARG001
     r"""Bounds of the capacitance between the terminals, fringes at the sensor's edge left out.
 
     .. math:: C_{lower} = \varepsilon_0 \int \frac{dA}{s}, \quad s = \sum_k \frac{t_k}{\varepsilon_k}
@@ -62,9 +63,11 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
     Parameters
     ----------
     scene : Scene
-        As drawn, for which :func:`unfit` is None.
+        As drawn, for which :func:`why_not_applicable` is None.
     permittivity : mapping of str to float
         Relative permittivity of each material that lies between the electrodes, and of "air" [-].
+    width : float
+        Not used: the bounds have one width.
 
     Returns
     -------
@@ -76,7 +79,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float]) -> Interval:
     KeyError
         A material between the electrodes has no permittivity.
     ValueError
-        The scene is unfit.
+        The model does not apply to the scene.
     ArithmeticError
         The bounds have crossed, which no geometry can make them do.
     """
@@ -192,7 +195,7 @@ class _Stack:
 
 @dataclass(frozen=True)
 class _Row:
-    """The stacks of a part, those that look alike once: ``names`` tells which stands where."""
+    """The stacks of a part, equal ones once: ``names`` has the number of each in its order."""
 
     depth_mm: float
     names: tuple[int, ...]
@@ -237,7 +240,7 @@ def _graded(left: float, right: float) -> tuple[NDArray[np.float64], NDArray[np.
 def _stack(cell: Column, permittivity: Mapping[str, float]) -> _Stack:
     gap = _gap(cell)
     if gap is None:
-        raise ValueError("an electrode does not cover the whole sensor: ask unfit() first")
+        raise ValueError("an electrode does not cover the whole sensor: ask why_not_applicable() first")
     lines, eps = [gap.bottom_mm], []
     for bottom, top, value in _filled(gap, permittivity):
         if max(top[0] - bottom[0], top[1] - bottom[1]) > 0:

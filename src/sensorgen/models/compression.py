@@ -7,13 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import MissingValue, OutOfRange
+
+if TYPE_CHECKING:
+    from sensorgen.solvers.contact.pressed import Pressed
 
 SOURCE = "Thesis Eq. B.49; Gent and Lindley (1959) for the bonded plate; solved cells as their file says"
 COST = 0
@@ -230,6 +233,21 @@ def curve(name: str, source: str, stress_pa: Sequence[float], ratio: Sequence[fl
     if not (len(p) == len(g) > 1 and p[0] == 0 and g[0] == 1 and (np.diff(p) > 0).all() and (np.diff(g) > 0).all()):
         raise OutOfRange(f"{name}: expected stress from 0 and ratio C/C(0) from 1, two points or more, both rising")
     return Curve(name, source, tuple(p.tolist()), tuple(g.tolist()), tuple(_slopes(p, g).tolist()))
+
+
+def curve_of(pressed: "Pressed", name: str = "solved") -> Curve:
+    """The pressure law of a solved cell.
+
+    Raises
+    ------
+    OutOfRange
+        The solution has faults, or the capacitance is not known at two pressures at least.
+    """
+    if pressed.faults:
+        raise OutOfRange(f"the solved cell is not to be trusted: {'; '.join(pressed.faults)}")
+    known = [(p, c.middle()) for p, c in zip(pressed.stress_pa, pressed.capacitance_f_per_m2, strict=True) if c]
+    ratio = [c / known[0][1] for _, c in known] if known else []
+    return curve(name, pressed.source, [float(p) for p, _ in known], ratio)
 
 
 def _slopes(p: Real, g: Real) -> Real:

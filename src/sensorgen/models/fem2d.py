@@ -1,4 +1,4 @@
-"""Finite elements on the cross-section: a potential from above, a flux from below, as near as asked.
+"""Finite elements on the cross-section: bounds from a potential above and a flux below, to a given width.
 
 Triangles shrink towards every corner where the field is singular, and polynomials of rising order fill them: the
 distance of the bounds falls exponentially. See docs/cells.md.
@@ -18,20 +18,18 @@ from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import Section, sections
 from sensorgen.scene.unit_cell import cell
 from sensorgen.solvers.electrostatics import bounds as fem
+from sensorgen.solvers.electrostatics.bounds import Fields, Turned, disc, turned
 from sensorgen.solvers.electrostatics.cones import RATIO
-from sensorgen.solvers.electrostatics.corners import exponents
+from sensorgen.solvers.electrostatics.corners import exponents, graded
 from sensorgen.solvers.electrostatics.fronts import Numbers
-from sensorgen.solvers.electrostatics.grading import graded
-from sensorgen.solvers.electrostatics.lossy import Fields, Turned, disc, turned
 from sensorgen.solvers.electrostatics.mesh import Cones
-from sensorgen.solvers.electrostatics.plane import Plane
-from sensorgen.solvers.electrostatics.problem import Field
+from sensorgen.solvers.electrostatics.plane import Field, Plane
 from sensorgen.solvers.electrostatics.triangles import Triangles, triangles
 
 SOURCE = "Dirichlet's and Thomson's principles; hp finite elements, rings without end at corners"
 COST = 2
 
-WIDTH = 1e-4  # of the interval, where the caller does not say
+WIDTH = 1e-4  # of the interval unless given
 
 _ORDERS = (3, 20)  # of polynomials: the lowest and the highest
 _CORNER_SHARE = 0.01  # of the wanted width: what may stay unresolved at a corner
@@ -42,8 +40,8 @@ _STEP = 2  # of orders, where the field is complex
 _STALLED = 0.7  # a step that leaves more of the width than this gains nothing
 
 
-def unfit(scene: Scene) -> str | None:
-    """Why this model cannot speak of this scene, or None."""
+def why_not_applicable(scene: Scene) -> str | None:
+    """Why the model does not apply to a scene, or None."""
     try:
         _triangles(scene)
     except ValueError as error:
@@ -59,11 +57,11 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     Parameters
     ----------
     scene : Scene
-        As drawn, for which :func:`unfit` is None.
+        As drawn, for which :func:`why_not_applicable` is None.
     permittivity : mapping of str to float
         Relative permittivity of each material that lies between the electrodes, and of "air", above 0 [-].
     width : float
-        How wide the interval may be, relative to its middle; it is wider where doubles or orders end [-].
+        Relative width of the interval; wider where double precision or the highest order limits it [-].
 
     Returns
     -------
@@ -77,7 +75,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     KeyError
         A material between the electrodes has no permittivity.
     ValueError
-        The scene is unfit.
+        The model does not apply to the scene.
     CrossedBounds
         The lower bound lies above the upper one: a fault of the solver.
     Unsolved
@@ -85,8 +83,8 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
 
     Notes
     -----
-    Where a sensor ends amid a period, the pattern is thought to go on beyond its ends, and the sensor gets the energy
-    that lies within its own length; see :func:`sensorgen.solvers.electrostatics.bounds.whole`.
+    Where a sensor ends amid a period, the pattern is continued periodically beyond its ends; only the energy
+    within the sensor's length counts; see :func:`sensorgen.solvers.electrostatics.bounds.whole`.
     """
     fem.check(permittivity, width)
     best = Interval(0.0, np.inf)
@@ -173,17 +171,17 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     Parameters
     ----------
     scene : Scene
-        As drawn, for which :func:`unfit` is None.
+        As drawn, for which :func:`why_not_applicable` is None.
     permittivity : mapping of str to complex
         Relative permittivity of each material between the electrodes, and of "air"; real part above 0,
         :math:`\varepsilon' (1 - j\tan\delta) - j / (\omega\varepsilon_0\varrho)` [-].
     width : float
-        How wide the disc may be, relative to its centre's modulus; wider where doubles or orders end [-].
+        Relative width of the disc; wider where double precision or the highest order limits it [-].
 
     Returns
     -------
     Disc
-        Capacitance of the whole sensor [F]; see :mod:`sensorgen.solvers.electrostatics.lossy`.
+        Capacitance of the whole sensor [F]; see :mod:`sensorgen.solvers.electrostatics.bounds`.
 
     Raises
     ------
@@ -232,7 +230,7 @@ def _disc(mesh: Cones, permittivity: Mapping[str, complex], turn: Turned, order:
     return disc(found, turn, [share for _, share in mesh.triangles.regions])
 
 
-@lru_cache(maxsize=8)  # unfit() asks before capacitance() does, and a long sensor's cell takes as long as its field
+@lru_cache(maxsize=8)  # of why_not_applicable() and capacitance(): a long sensor's cell takes as long as its field
 def _triangles(scene: Scene) -> tuple[Section, Triangles]:
     """The scene's only cross-section, and its repeating cell in few triangles."""
     found = sections(scene)
@@ -248,7 +246,9 @@ def _graded(coarse: Triangles, permittivity: Mapping[str, float], width: float) 
     doublings = {c: int(np.clip(np.ceil(np.log2(max(n, 1.0))), 0, _MOST_DOUBLINGS)) for c, n in rings.items()}
     mesh = Cones(graded(coarse, found), doublings)
     if mesh.areas().min() <= 0:
-        raise fem.Unsolved("a piece of the scene is too thin for its length: doubles tell no such triangles")
+        raise fem.Unsolved(
+            "a piece of the scene is too thin for its length: double precision does not resolve such triangles"
+        )
     return mesh
 
 
@@ -271,7 +271,7 @@ def _fields(plane: Plane, eps: NDArray[Any]) -> tuple[Field, Field]:
 
 
 def _thomson(plane: Plane, eps: NDArray[Any], u: Field, psi: Field) -> Any:
-    """Twice what flows into the top, which any potential tells by its own 1 V, less the flux's energy."""
+    """Twice the flux into the top, evaluated with any potential of 1 V there, less the flux's energy."""
     return 2 * plane.crossings(u, psi).sum() - (plane.energies(psi, psi) / eps).sum()
 
 

@@ -14,22 +14,22 @@ from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.electrostatics import bounds as fem
+from sensorgen.solvers.electrostatics.bounds import Fields, Turned, disc, turned
+from sensorgen.solvers.electrostatics.boxes import Pair, whole
 from sensorgen.solvers.electrostatics.bricks import Grid, grid, layered
 from sensorgen.solvers.electrostatics.dissection import least, unknowns_of
-from sensorgen.solvers.electrostatics.lossy import Fields, Turned, disc, turned
-from sensorgen.solvers.electrostatics.pair import Pair, whole
 
 SOURCE = "Dirichlet's and Thomson's principles; graded boxes, H1 and hybrid H(div), nested dissection"
 COST = 3
 
-WIDTH = 1e-3  # of the interval, where the caller does not say
+WIDTH = 1e-3  # of the interval unless given
 
 _RUNGS = ((1, 3, 2), (1, 5, 4), (2, 6, 5), (3, 7, 6))  # layers, order of the potential, order of the flux
 _MOST_BRICKS = 2500  # of one rung: more would take hours
 
 
-def unfit(scene: Scene) -> str | None:
-    """Why this model cannot speak of this scene, or None."""
+def why_not_applicable(scene: Scene) -> str | None:
+    """Why the model does not apply to a scene, or None."""
     if reason := fem.third_electrode(scene):
         return reason
     try:
@@ -70,11 +70,11 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     Parameters
     ----------
     scene : Scene
-        As drawn, for which :func:`unfit` is None.
+        As drawn, for which :func:`why_not_applicable` is None.
     permittivity : mapping of str to float
         Relative permittivity of each material that lies between the electrodes, and of "air", above 0 [-].
     width : float
-        How wide the interval may be, relative to its middle; it is wider where the finest mesh is reached [-].
+        Relative width of the interval; wider where the finest mesh is reached [-].
 
     Returns
     -------
@@ -88,7 +88,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     KeyError
         A material between the electrodes has no permittivity.
     ValueError
-        The scene is unfit.
+        The model does not apply to the scene.
     CrossedBounds
         The lower bound lies above the upper one: a fault of the solver.
     """
@@ -131,16 +131,16 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     Parameters
     ----------
     scene : Scene
-        As drawn, for which :func:`unfit` is None.
+        As drawn, for which :func:`why_not_applicable` is None.
     permittivity : mapping of str to complex
         As of :func:`sensorgen.models.fem2d.lossy` [-].
     width : float
-        How wide the disc may be, relative to its centre's modulus; it is wider where the finest mesh is reached [-].
+        Relative width of the disc; wider where the finest mesh is reached [-].
 
     Returns
     -------
     Disc
-        Capacitance of the whole sensor [F]; see :mod:`sensorgen.solvers.electrostatics.lossy`.
+        Capacitance of the whole sensor [F]; see :mod:`sensorgen.solvers.electrostatics.bounds`.
 
     Raises
     ------

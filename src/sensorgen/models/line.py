@@ -1,7 +1,7 @@
-r"""The sensor as a line: two resistive tracks with a film between them, pressed or not, any far end.
+r"""Impedance of the line sensor: two resistive tracks with a film between them, one patch pressed, any far end.
 
-A recursion from the far end to the contacts. It divides by none of resistance, admittance, length and frequency,
-so it survives every limit, and it keeps Re Z, far below the corner a thousandth of \|Z\| that alone tells of position.
+A recursion from the far end to the contacts. It divides by none of resistance, admittance, length and frequency, so it
+survives every limit. It keeps Re Z, which alone has information on position and far below the corner is 1e-3 of \|Z\|.
 """
 
 from collections.abc import Iterable, Sequence
@@ -11,16 +11,27 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.solvers.line.inputs import HIGHEST_OHM, Complex, Inputs, check_fit, far_load, in_blocks, passive, read
+from sensorgen.solvers.line.inputs import (
+    HIGHEST_OHM,
+    Complex,
+    PressedLine,
+    check_fit,
+    far_load,
+    in_blocks,
+    passive,
+    read,
+)
 from sensorgen.solvers.line.slopes import slopes
 from sensorgen.solvers.line.tanhc import tanhc
+
+__all__ = ["PressedLine", "cascade", "corner_frequency_hz", "impedance", "sensitivities"]
 
 SOURCE = "Thesis appendix B, solved for unequal tracks, leak, loss and any far end"
 COST = 0
 UNDIVIDED = 8  # sections
 
 
-def impedance(**inputs: Any) -> Complex:
+def impedance(line: PressedLine) -> Complex:
     r"""Impedance between the two tracks at the contacts, one patch of the line being pressed.
 
     .. math:: Y \leftarrow \frac{Y + y l T}{1 + Y r l T}, \quad T = \frac{\tanh z}{z}, \quad z^2 = r y l^2
@@ -34,20 +45,8 @@ def impedance(**inputs: Any) -> Complex:
 
     Parameters
     ----------
-    **inputs : float or array
-        SI units; arrays broadcast. To compute a grid fast, give each quantity its own axis.
-
-        - ``L_m``, ``W_m``: length and width of the sensor [m]. ``H_top_m``, ``H_bottom_m``: of the electrodes [m].
-        - ``rho_top_ohm_m``, ``rho_bottom_ohm_m``: resistivities [ohm m]; 0 is a perfect conductor.
-        - ``d_m``: thickness of the film [m]. ``eps_r``: its relative permittivity [-].
-        - ``f_Hz``: frequency, 0 or more [Hz].
-        - ``F_N``: force [N], 0 unless given; below 0 it pulls, and the same linear law thickens the film.
-        - ``x_p_left_edge_m``, ``L_p_m``: left edge and length of the patch [m], 0 unless given.
-        - ``E_Pa``: Young's modulus of the film [Pa]; needed with a force.
-        - ``S_n_top_per_N``, ``S_n_bottom_per_N``: relative rise of resistivity per force [1/N], 0 unless given.
-        - ``tan_delta`` [-], ``G_S_per_m``: loss tangent and leak, the same under the patch [S/m]; 0 unless given.
-        - ``far_end``: "open" (default), "short", or a resistor [ohm].
-        - ``eps0_F_per_m``: CODATA 2018 unless given [F/m].
+    line : PressedLine
+        Geometry, materials, press and frequency, SI units; arrays broadcast.
 
     Returns
     -------
@@ -60,7 +59,7 @@ def impedance(**inputs: Any) -> Complex:
         NaN, an infinite or negative value; a patch beyond the sensor; a strain of 1 or more, where the electrodes
         touch; a force on no area; a negative resistivity under the patch; \|Z\| of 1e150 ohm and more.
     MissingValue, UnknownName, BadInput
-        An input that is needed, unknown, or no number.
+        A force without a modulus; no such far end; something that is no number, or shapes that do not broadcast.
 
     Notes
     -----
@@ -69,17 +68,14 @@ def impedance(**inputs: Any) -> Complex:
 
     Examples
     --------
-    >>> plate = dict(L_m=0.1, W_m=0.01, H_top_m=3e-4, H_bottom_m=3e-4, rho_top_ohm_m=0.07, rho_bottom_ohm_m=0.2,
-    ...              d_m=6e-4, eps_r=4.68, E_Pa=6e6, L_p_m=0.01)
-    >>> z = impedance(**plate, f_Hz=1100.0, F_N=1.0, x_p_left_edge_m=0.02)
+    >>> plate = dict(length_m=0.1, width_m=0.01, top_thickness_m=3e-4, bottom_thickness_m=3e-4,
+    ...              top_resistivity_ohm_m=0.07, bottom_resistivity_ohm_m=0.2, film_m=6e-4, eps_r=4.68,
+    ...              modulus_pa=6e6, tip_m=0.01)
+    >>> z = impedance(PressedLine(**plate, frequency_hz=1100.0, force_n=1.0, left_m=0.02))
     >>> round(float(z.real), 6), round(float(z.imag), 3)
     (2999.654163, -2094651.586)
     """
-    return in_blocks(read(inputs), _block)[0]
-
-
-def _block(inputs: Inputs) -> list[Complex]:
-    return [_through(*inputs.sections(), inputs.load_ohm)]
+    return read(line).evaluate(lambda block: [_through(*block.sections(), block.load_ohm)])[0]
 
 
 def cascade(
@@ -123,11 +119,17 @@ def cascade(
     lengths, load = [passive("length", value) for value in length_m], far_load(far_end)
     if not len(r) == len(y) == len(lengths):
         raise BadInput(f"{len(r)} resistances, {len(y)} admittances and {len(lengths)} lengths make no sections")
-    check_fit("the sections' values", [*r, *y, *lengths, *([] if load is None else [load])])
-    return _through(r, y, lengths, load)
+    arrays = [*r, *y, *lengths, *([] if load is None else [load])]
+    check_fit("the sections' values", arrays)
+    n = len(r)
+
+    def work(parts: list[NDArray[Any]]) -> list[Complex]:
+        return [_through(parts[:n], parts[n : 2 * n], parts[2 * n : 3 * n], None if load is None else parts[-1])]
+
+    return in_blocks(arrays, work)[0]
 
 
-def sensitivities(of: Iterable[str] | None = None, **inputs: Any) -> tuple[Complex, dict[str, Complex]]:
+def sensitivities(line: PressedLine, of: Iterable[str] | None = None) -> tuple[Complex, dict[str, Complex]]:
     r"""Impedance and its exact derivatives.
 
     Each section's derivative by r, y and l is passed on through the recursion to the contacts. By position
@@ -140,10 +142,10 @@ def sensitivities(of: Iterable[str] | None = None, **inputs: Any) -> tuple[Compl
 
     Parameters
     ----------
+    line : PressedLine
+        As of :func:`impedance`; ``modulus_pa`` and ``tip_m`` above 0 are needed for derivatives that depend on strain.
     of : iterable of str
-        Inputs to differentiate by, all real ones but ``eps0_F_per_m`` unless given.
-    **inputs : float or array
-        As of :func:`impedance`; ``E_Pa`` and ``L_p_m`` above 0 are needed for whatever depends on strain.
+        Attributes of ``line`` to differentiate by; all real ones but ``eps0_f_per_m`` unless given.
 
     Returns
     -------
@@ -159,13 +161,15 @@ def sensitivities(of: Iterable[str] | None = None, **inputs: Any) -> tuple[Compl
 
     Examples
     --------
-    >>> plate = dict(L_m=0.1, W_m=0.01, H_top_m=3e-4, H_bottom_m=3e-4, rho_top_ohm_m=0.07, rho_bottom_ohm_m=0.2,
-    ...              d_m=6e-4, eps_r=4.68, E_Pa=6e6, L_p_m=0.01)
-    >>> z, by = sensitivities(of=["F_N", "x_p_left_edge_m"], **plate, f_Hz=99.7e3, F_N=6.0, x_p_left_edge_m=0.045)
-    >>> round(float(abs(by["F_N"])), 3), round(float(by["x_p_left_edge_m"].real), 2)
+    >>> plate = dict(length_m=0.1, width_m=0.01, top_thickness_m=3e-4, bottom_thickness_m=3e-4,
+    ...              top_resistivity_ohm_m=0.07, bottom_resistivity_ohm_m=0.2, film_m=6e-4, eps_r=4.68,
+    ...              modulus_pa=6e6, tip_m=0.01)
+    >>> line = PressedLine(**plate, frequency_hz=99.7e3, force_n=6.0, left_m=0.045)
+    >>> z, by = sensitivities(line, of=["force_n", "left_m"])
+    >>> round(float(abs(by["force_n"])), 3), round(float(by["left_m"].real), 2)
     (3.922, 90.55)
     """
-    return slopes(of, inputs)
+    return slopes(line, of)
 
 
 def corner_frequency_hz(resistance_ohm: float, capacitance_f: float) -> float:
@@ -211,7 +215,7 @@ def _march(
 
 
 def _finite(z: Complex, current: NDArray[Any]) -> Complex:
-    """Z, infinite where no current flows; one sum tells whether there is anything to look for."""
+    """Z, infinite where no current flows; one sum decides whether any value has to be checked."""
     if abs(z.sum()) < HIGHEST_OHM:  # neither part of Z changes its sign: nothing cancels
         return z
     idle = np.asarray(current == 0)

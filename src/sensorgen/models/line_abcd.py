@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.solvers.line.inputs import Complex, Inputs, in_blocks, read
+from sensorgen.solvers.line.inputs import Complex, Inputs, PressedLine, read
 
 SOURCE = "Thesis Eqs. B.43, B.51 and B.52, for unequal tracks; D. M. Pozar, Microwave Engineering, 4.4"
 COST = 0
@@ -17,7 +17,7 @@ COST = 0
 Matrix = tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]
 
 
-def impedance(**inputs: Any) -> Complex:
+def impedance(line: PressedLine) -> Complex:
     r"""Impedance at the contacts from the product of the sections' matrices.
 
     .. math:: \begin{pmatrix} \cosh \gamma l & Z_c \sinh \gamma l \\
@@ -26,8 +26,8 @@ def impedance(**inputs: Any) -> Complex:
 
     Parameters
     ----------
-    **inputs : float or array
-        As of :func:`sensorgen.models.line.impedance`, SI units.
+    line : PressedLine
+        As of :func:`sensorgen.models.line.impedance`.
 
     Returns
     -------
@@ -45,12 +45,12 @@ def impedance(**inputs: Any) -> Complex:
 
     Examples
     --------
-    >>> z = impedance(L_m=0.1, W_m=0.01, H_top_m=3e-4, H_bottom_m=3e-4, rho_top_ohm_m=0.07, rho_bottom_ohm_m=0.2,
-    ...               d_m=6e-4, eps_r=4.68, f_Hz=99.7e3)
+    >>> z = impedance(PressedLine(length_m=0.1, width_m=0.01, top_thickness_m=3e-4, bottom_thickness_m=3e-4,
+    ...     top_resistivity_ohm_m=0.07, bottom_resistivity_ohm_m=0.2, film_m=6e-4, eps_r=4.68, frequency_hz=99.7e3))
     >>> round(float(z.real), 3)
     2997.117
     """
-    return in_blocks(read(inputs), _block)[0]
+    return read(line).evaluate(_block)[0]
 
 
 def _block(inputs: Inputs) -> list[Complex]:

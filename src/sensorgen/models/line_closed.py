@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import OutOfRange, UnknownName
-from sensorgen.solvers.line.inputs import Complex, Inputs, in_blocks, read
+from sensorgen.solvers.line.inputs import Complex, Inputs, PressedLine, read
 
 SOURCE = "Thesis appendix B, Eqs. B.39, B.42, B.48, B.51, B.53, and Eqs. 2.24 and B.54"
 COST = 0
@@ -21,7 +21,7 @@ Array = NDArray[Any]
 Matrix = tuple[Array, Array, Array, Array]
 
 
-def impedance(as_printed: str = "", **inputs: Any) -> Complex:
+def impedance(line: PressedLine, as_printed: str = "") -> Complex:
     r"""Impedance of the pressed line, -A22/A21 of the product of three matrices (B.51 to B.53).
 
     .. math:: A = \frac{1}{2e} \begin{pmatrix} 1 + e^2 & -\sqrt{2}\,(e^2 - 1)\,\rho / (\sqrt{\Gamma} H W) \\
@@ -30,12 +30,12 @@ def impedance(as_printed: str = "", **inputs: Any) -> Complex:
 
     Parameters
     ----------
+    line : PressedLine
+        As of :func:`sensorgen.models.line.impedance`; the far end has to be open. Unequal tracks count as two equal
+        ones of the same sum, of the thickness of the top one.
     as_printed : str
         "" for the corrected equations, or the one to take with its misprint: "B.39" has the wrong sign of A21,
         "B.42" has Gamma for its root in A12, "B.48" has sqrt(2 rho) for sqrt(2) rho in A21.
-    **inputs : float or array
-        As of :func:`sensorgen.models.line.impedance`, SI units; the far end has to be open. Unequal tracks count as
-        two equal ones of the same sum, of the height of the top one.
 
     Returns
     -------
@@ -56,25 +56,25 @@ def impedance(as_printed: str = "", **inputs: Any) -> Complex:
 
     Examples
     --------
-    >>> plate = dict(L_m=0.1, W_m=0.01, H_top_m=3e-4, H_bottom_m=3e-4, rho_top_ohm_m=0.07, rho_bottom_ohm_m=0.2,
-    ...              d_m=6e-4, eps_r=4.68, f_Hz=99.7e3)
-    >>> [round(float(impedance(printed, **plate).real), 1) for printed in ("", "B.48", "B.39")]
+    >>> plate = PressedLine(length_m=0.1, width_m=0.01, top_thickness_m=3e-4, bottom_thickness_m=3e-4,
+    ...     top_resistivity_ohm_m=0.07, bottom_resistivity_ohm_m=0.2, film_m=6e-4, eps_r=4.68, frequency_hz=99.7e3)
+    >>> [round(float(impedance(plate, printed).real), 1) for printed in ("", "B.48", "B.39")]
     [2997.1, 8157.1, -2997.1]
     """
     if as_printed and as_printed not in PRINTED:
         raise UnknownName("misprint", as_printed, PRINTED)
-    return in_blocks(_open(inputs), partial(_product, as_printed))[0]
+    return _open(line).evaluate(partial(_product, as_printed))[0]
 
 
-def uniform(**inputs: Any) -> Complex:
+def uniform(line: PressedLine) -> Complex:
     r"""Impedance without force, in one equation (B.53, printed without fault).
 
     .. math:: Z = \frac{\sqrt{2} \rho\, (1 + e^{2 \sqrt{2 \Gamma} L})}{H \sqrt{\Gamma} W (-1 + e^{2 \sqrt{2 \Gamma} L})}
 
     Parameters
     ----------
-    **inputs : float or array
-        As of :func:`impedance`; force and patch are left aside.
+    line : PressedLine
+        As of :func:`impedance`; force and patch are ignored.
 
     Returns
     -------
@@ -86,16 +86,16 @@ def uniform(**inputs: Any) -> Complex:
     OutOfRange
         As :func:`impedance`.
     """
-    return in_blocks(_open(inputs), _uniform)[0]
+    return _open(line).evaluate(_uniform)[0]
 
 
-def series(**inputs: Any) -> Complex:
+def series(line: PressedLine) -> Complex:
     r"""Resistor and capacitor in series, Z = R + 1/(j omega C), as Eqs. 2.24, 2.25 and B.54 take the line.
 
     Parameters
     ----------
-    **inputs : float or array
-        As of :func:`impedance`; force and patch are left aside.
+    line : PressedLine
+        As of :func:`impedance`; force and patch are ignored.
 
     Returns
     -------
@@ -107,11 +107,11 @@ def series(**inputs: Any) -> Complex:
     OutOfRange
         A far end that is not open; no current at all.
     """
-    return in_blocks(_open(inputs), _series)[0]
+    return _open(line).evaluate(_series)[0]
 
 
-def _open(inputs: Any) -> Inputs:
-    found = read(inputs)
+def _open(line: PressedLine) -> Inputs:
+    found = read(line)
     if found.load_ohm is not None:
         raise OutOfRange("the thesis solves the open end only (B.3); for others take model 'line'")
     return found
@@ -119,7 +119,7 @@ def _open(inputs: Any) -> Inputs:
 
 def _product(printed: str, inputs: Inputs) -> list[Complex]:
     r, y, lengths = inputs.sections()
-    height, width = inputs["H_top_m"], inputs["W_m"]
+    height, width = inputs["top_thickness_m"], inputs["width_m"]
     with np.errstate(all="ignore"):
         parts = [
             _matrix(printed, rs * height * width / 2, rs * ys / 2, height, width, length)
@@ -143,17 +143,17 @@ def _matrix(printed: str, rho: Array, gamma: Array, height: Array, width: Array,
 
 def _uniform(inputs: Inputs) -> list[Complex]:
     r, y, _ = inputs.sections()
-    area = inputs["H_top_m"] * inputs["W_m"]
+    area = inputs["top_thickness_m"] * inputs["width_m"]
     with np.errstate(all="ignore"):
         rho, gamma = r[0] * area / 2, r[0] * y[0] / 2
-        e = np.exp(2 * np.sqrt(2 * gamma) * inputs["L_m"])
+        e = np.exp(2 * np.sqrt(2 * gamma) * inputs["length_m"])
         return [_finite(np.sqrt(2.0) * rho * (1 + e) / (area * np.sqrt(gamma) * (-1 + e)))]
 
 
 def _series(inputs: Inputs) -> list[Complex]:
     r, y, _ = inputs.sections()
     with np.errstate(all="ignore"):
-        return [_finite(r[0] * inputs["L_m"] + 1 / (y[0] * inputs["L_m"]))]
+        return [_finite(r[0] * inputs["length_m"] + 1 / (y[0] * inputs["length_m"]))]
 
 
 def _finite(z: Array) -> Complex:

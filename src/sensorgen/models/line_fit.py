@@ -2,8 +2,8 @@ r"""The thesis's own inverse: polynomials for R and C, fitted, then solved for f
 
 .. math:: C = C_0 + C_F F, \qquad R = R_0 + (A + E x + B x^2) F
 
-R is what the thesis reads off one tone, Re Z, and C is -1/(omega Im Z). The fit is linear, so one least-squares solve
-finds what the thesis's search was after. Kept for comparison; :mod:`sensorgen.prediction.inverse` does the work.
+R is Re Z at one frequency, and C is -1/(omega Im Z). The fit is linear: one least-squares solve replaces the search of
+the thesis. Kept for comparison; :mod:`sensorgen.prediction.inverse` does the work.
 """
 
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ class Roots:
 
 @dataclass(frozen=True)
 class LineFit:
-    """Fitted coefficients of one tone.
+    """Fitted coefficients at one frequency.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class LineFit:
         Parameters
         ----------
         capacitance_f, resistance_ohm : (n,) array
-            Measured at the fit's tone [F], [ohm].
+            Measured at the frequency of the fit [F], [ohm].
         """
         force = self.force_n(capacitance_f)
         square, linear, rest = self._in_position(force)
@@ -114,14 +114,14 @@ def fit(
     force_n: ArrayLike, position_m: ArrayLike, capacitance_f: ArrayLike, resistance_ohm: ArrayLike,
     form: str = "corrected",
 ) -> LineFit:  # fmt: skip
-    """Fit R and C to presses of which all is known.
+    """Fit R and C to known presses.
 
     Parameters
     ----------
     force_n, position_m : (n,) array
         Presses [N], [m].
     capacitance_f, resistance_ohm : (n,) array
-        What one tone reads there, see :func:`series` [F], [ohm].
+        Readings there at one frequency, see :func:`series` [F], [ohm].
     form : str
         One of ``FORMS``.
 

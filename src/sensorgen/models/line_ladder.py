@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.solvers.line.inputs import Complex, Inputs, in_blocks, read
+from sensorgen.solvers.line.inputs import Complex, Inputs, PressedLine, read
 
 SOURCE = "Thesis Figs. 2.3, 2.4 and B.4: cells of finite length"
 COST = 1
 
 
-def impedance(cells: int = 100, *, one_sided: bool = False, **inputs: Any) -> Complex:
+def impedance(line: PressedLine, cells: int = 100, *, one_sided: bool = False) -> Complex:
     r"""Impedance at the contacts of a ladder, the same number of cells in each of the three sections.
 
     .. math:: Y \leftarrow \frac{y h}{2} + \left(r h + \frac{1}{Y + y h / 2}\right)^{-1}
@@ -23,12 +23,12 @@ def impedance(cells: int = 100, *, one_sided: bool = False, **inputs: Any) -> Co
 
     Parameters
     ----------
+    line : PressedLine
+        As of :func:`sensorgen.models.line.impedance`; the far end has to be open.
     cells : int
         Cells per section, 1 or more [-].
     one_sided : bool
         The whole capacitance behind the resistor, as in the thesis's figures, in place of half on each side.
-    **inputs : float or array
-        As of :func:`sensorgen.models.line.impedance`, SI units; the far end has to be open.
 
     Returns
     -------
@@ -47,17 +47,17 @@ def impedance(cells: int = 100, *, one_sided: bool = False, **inputs: Any) -> Co
 
     Examples
     --------
-    >>> plate = dict(L_m=0.1, W_m=0.01, H_top_m=3e-4, H_bottom_m=3e-4, rho_top_ohm_m=0.07, rho_bottom_ohm_m=0.2,
-    ...              d_m=6e-4, eps_r=4.68, f_Hz=99.7e3)
-    >>> [round(float(impedance(n, **plate).real), 2) for n in (1, 10, 100)]
+    >>> plate = PressedLine(length_m=0.1, width_m=0.01, top_thickness_m=3e-4, bottom_thickness_m=3e-4,
+    ...     top_resistivity_ohm_m=0.07, bottom_resistivity_ohm_m=0.2, film_m=6e-4, eps_r=4.68, frequency_hz=99.7e3)
+    >>> [round(float(impedance(plate, n).real), 2) for n in (1, 10, 100)]
     [2228.88, 2989.54, 2997.04]
     """
     if cells < 1:
         raise OutOfRange(f"a ladder needs one cell or more in each section, not {cells}")
-    found = read(inputs)
+    found = read(line)
     if found.load_ohm is not None:
         raise OutOfRange("the ladder's far end is open; for others take model 'line'")
-    return in_blocks(found, partial(_block, cells, one_sided))[0]
+    return found.evaluate(partial(_block, cells, one_sided))[0]
 
 
 def _block(cells: int, one_sided: bool, inputs: Inputs) -> list[Complex]:

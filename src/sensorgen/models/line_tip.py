@@ -1,4 +1,4 @@
-"""The line under a tip that presses unevenly: the patch in pieces, each with its own film and tracks."""
+"""The line under a tip of any pressure profile: the patch in pieces, each with its own film and tracks."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -50,7 +50,7 @@ class Track:
 
 
 class Motion(NamedTuple):
-    """What one more newton, or a tip that stands one metre further, changes of what rests on the line."""
+    """Derivatives of the contact by force [per N] or position [per m]."""
 
     left: Real
     """Of where it begins [m/N] or [-]."""
@@ -62,7 +62,7 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True)
 class Tip:
-    """What rests on the line: arrays that broadcast.
+    """Contact of the tip with the line; arrays broadcast.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ def resting(
 
 
 class _Piece(NamedTuple):
-    """One piece of the patch, and what a newton and a metre change of it."""
+    """One piece of the patch, and its derivatives by force and position."""
 
     r_ohm_per_m: Real
     y_s_per_m: Complex
@@ -162,9 +162,9 @@ def impedance(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> C
     track, tip : Track, Tip
         The line and what rests on it.
     law : Compression
-        How the film gives way.
+        Capacitive strain of the film over pressure.
     frequency_hz : array
-        Tones [Hz].
+        Frequencies [Hz].
 
     Raises
     ------
@@ -179,8 +179,8 @@ def response(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> tu
 
     Notes
     -----
-    A tip that moves moves each of its pieces within the unpressed line: between two of them, what one leaves free and
-    what the other takes cancel. So each piece tells of position by its own contrast, and without one there is no trace.
+    A moving tip shifts each of its pieces within the unpressed line; contributions between two neighbours cancel. So
+    Z depends on position by the contrast of each piece, and not at all without one.
     """
     pieces = _pieces(track, tip, law, frequency_hz)
     with np.errstate(all="ignore"):

@@ -5,7 +5,7 @@ is checked: load reached, volume kept, faces not run into each other, work equal
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Scene
-from sensorgen.solvers.contact.cell import AIR, Cell, cell_of
-from sensorgen.solvers.contact.mesh import Fineness, Mesh, Unmeshed, mesh_of
+from sensorgen.solvers.contact.cell import Cell, cell_of
+from sensorgen.solvers.contact.mesh import Fineness, Unmeshed, mesh_of
 from sensorgen.solvers.contact.pressed import (
     DEEPEST,
     Elastic,
     Pressed,
     check,
     compared,
-    curve_of,
+    law_of,
     penalty_pa,
     reached,
     with_capacitances,
@@ -30,8 +30,7 @@ from sensorgen.solvers.contact.pressed import (
 from sensorgen.solvers.contact.support import Held
 
 if TYPE_CHECKING:
-    from sensorgen.solvers.contact.contact import Faces
-    from sensorgen.solvers.contact.load import Problem, State
+    from sensorgen.solvers.contact.pressed import Run
 
 SOURCE = (
     "neo-Hookean plane strain, displacement with bubble and pressure (Crouzeix and Raviart 1973), penalty contact with "
@@ -39,7 +38,7 @@ SOURCE = (
 )
 COST = 2
 
-__all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "curve_of", "press", "unfit"]
+__all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "press", "why_not_applicable"]
 
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
 _STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid when they touched counts [-]
@@ -107,16 +106,6 @@ def _coarsened(first: Pressed, again: Pressed, coarser: Fineness) -> str:
     return f"triangles of {coarser.apex_mm * 1e3:.3g} um at the apex, because finer ones do not converge: {known}"
 
 
-@dataclass(frozen=True)
-class _Run:
-    """What was solved, and the equilibria that were found."""
-
-    problem: "Problem"
-    faces: "Faces"
-    mesh: Mesh
-    states: "list[State]"
-
-
 def _solved(
     cell: Cell,
     solids: Mapping[str, Elastic],
@@ -124,57 +113,53 @@ def _solved(
     held: Held,
     fineness: Fineness,
     step: Callable[[float], None],
-) -> tuple[Pressed, _Run]:
-    from sensorgen.solvers.contact import contact, element, load, support
+) -> tuple[Pressed, "Run"]:
+    from sensorgen.solvers.contact.contact import faces_of
+    from sensorgen.solvers.contact.element import Elements
+    from sensorgen.solvers.contact.load import Problem
+    from sensorgen.solvers.contact.support import free_of, top_load
 
     mesh = mesh_of(cell, fineness)
-    materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in cell.regions]
-    moduli, ratios = (
-        np.array([getattr(m, key) for m in materials])[mesh.region - 1]
-        for key in ("youngs_modulus_pa", "poisson_ratio")
-    )
-    softest, faces = float(moduli.min()), contact.faces_of(mesh)
-    problem = load.Problem(
-        element.Elements(mesh, element.law(moduli, ratios)),
+    law, softest_pa = law_of(["", *(r.material for r in cell.regions)], mesh.region, solids)
+    faces = faces_of(mesh)
+    problem = Problem(
+        Elements(mesh, law),
         faces,
-        support.free_of(mesh.points_m, held),
-        support.top_load(mesh),
-        penalty_pa(softest),
+        free_of(mesh.points_m, held),
+        top_load(mesh.points_m, *mesh.top()),
+        penalty_pa(softest_pa),
         held.contact == "stick",
-        sound=lambda places_m: not faces.crossed(places_m, DEEPEST),
+        sound=lambda places_m: not faces.crossed(places_m, mesh.outline, DEEPEST),
     )
-    longest = softest * (_STICKING_STEP if problem.stick else _STEP)
-    found, states = reached(problem, stress_pa, longest, step, SOURCE)
+    longest_pa = softest_pa * (_STICKING_STEP if problem.stick else _STEP)
+    found, run = reached(problem, stress_pa, longest_pa, step, SOURCE)
     if not cell.mirrored:
         said = "mirrors stand at both ends of the period, though it is not its own mirror image"
         found = replace(found, doubts=(said, *found.doubts))
-    return found, _Run(problem, faces, mesh, states)
+    return found, run
 
 
-def _with_fields(found: Pressed, cell: Cell, run: _Run, permittivity: Mapping[str, float]) -> Pressed:
+def _with_fields(found: Pressed, cell: Cell, run: "Run", permittivity: Mapping[str, float]) -> Pressed:
     """The same with the capacitance of the deformed outlines."""
     fields = [_field(cell, run, s.u_m, permittivity) for s in run.states]
     return with_capacitances(found, [c for c, _ in fields], tuple(outline for _, outline in fields))
 
 
-def _field(cell: Cell, run: _Run, u_m: Real, permittivity: Mapping[str, float]) -> tuple[Interval | None, Cell]:
+def _field(cell: Cell, run: "Run", u_m: Real, permittivity: Mapping[str, float]) -> tuple[Interval | None, Cell]:
     """Capacitance and outlines of a deformed cell; None where no sound mesh of them was found."""
     from sensorgen.solvers.contact import deformed, field
 
-    outline = deformed.deformed(cell, run.mesh, run.faces, u_m)
+    mesh = run.problem.elements.mesh
+    outline = deformed.deformed(cell, mesh, run.problem.faces, u_m)
+    if deformed.misfit(outline, mesh, u_m) > _MISFIT:
+        return None, outline
     try:
-        _refuse_misfit(deformed.misfit(outline, run.mesh, u_m))
         return field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH), outline
     except Unmeshed:
         return None, outline
 
 
-def _refuse_misfit(share: float) -> None:
-    if share > _MISFIT:
-        raise Unmeshed(f"closing the gaps changed a solid's area by {share:.1%}")
-
-
-def unfit(scene: Scene) -> str | None:
+def why_not_applicable(scene: Scene) -> str | None:
     """Why this model cannot speak of a scene, or None."""
     try:
         cell_of(scene, None)

@@ -16,13 +16,12 @@ from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.contact.brick_field import Orders
 from sensorgen.solvers.contact.bricks import Bricks, bricks_of
-from sensorgen.solvers.contact.cell import AIR
 from sensorgen.solvers.contact.pressed import (
     Elastic,
     Pressed,
     check,
     compared,
-    curve_of,
+    law_of,
     penalty_pa,
     reached,
     with_capacitances,
@@ -30,10 +29,8 @@ from sensorgen.solvers.contact.pressed import (
 from sensorgen.solvers.contact.support import Held
 
 if TYPE_CHECKING:
-    from sensorgen.solvers.contact.brick_element import BrickElements
-    from sensorgen.solvers.contact.brick_field import Field
-    from sensorgen.solvers.contact.brick_touch import BrickFaces
-    from sensorgen.solvers.contact.load import Problem, State
+    from sensorgen.solvers.contact.load import State
+    from sensorgen.solvers.contact.pressed import Run
 
 SOURCE = (
     "neo-Hookean in 3D, bricks with 27 nodes and a linear pressure each (Q2 / P1); bounds of the capacitance by "
@@ -41,7 +38,7 @@ SOURCE = (
 )
 COST = 3
 
-__all__ = ["Elastic", "Held", "Pieces", "Pressed", "cell", "compared", "curve_of", "press", "unfit"]
+__all__ = ["Elastic", "Held", "Pieces", "Pressed", "cell", "compared", "press", "why_not_applicable"]
 
 _STEP = 1 / 60  # longest load step over the least Young's modulus: 100 kPa for 6 MPa [-]
 _MOST = 4000  # solid bricks: more would take hours
@@ -67,16 +64,7 @@ class Pieces:
         return replace(self, pieces=self.pieces - 1)
 
 
-@dataclass(frozen=True)
-class _Run:
-    """What was solved, and the equilibria that were found."""
-
-    elements: "BrickElements"
-    faces: "BrickFaces"
-    states: "list[State]"
-
-
-def unfit(scene: Scene) -> str | None:
+def why_not_applicable(scene: Scene) -> str | None:
     """Why this model cannot speak of a scene, or None."""
     try:
         cell(scene)
@@ -137,7 +125,8 @@ def press(
     """
     held, wanted = held or Held(), fineness or Pieces()
     check(stress_pa, held)
-    fineness = _affordable(bricks, wanted)
+    most = int((_MOST / max((bricks.fill > 0).sum(), 1)) ** (1 / 3))
+    fineness = replace(wanted, pieces=min(wanted.pieces, max(most, 1)))
     found, run = _solved(
         bricks.cut(fineness.pieces, fineness.shrink), solids, stress_pa, held, step or (lambda _: None)
     )
@@ -147,74 +136,60 @@ def press(
     return _with_fields(found, run, permittivity, fineness.orders) if permittivity else found
 
 
-def _affordable(bricks: Bricks, wanted: Pieces) -> Pieces:
-    most = int((_MOST / max((bricks.fill > 0).sum(), 1)) ** (1 / 3))
-    return replace(wanted, pieces=min(wanted.pieces, max(most, 1)))
-
-
 def _solved(
-    bricks: Bricks,
+    cut: Bricks,
     solids: Mapping[str, Elastic],
     stress_pa: Sequence[float],
     held: Held,
     step: Callable[[float], None],
-) -> tuple[Pressed, _Run]:
-    from sensorgen.solvers.contact import brick_element, brick_factors, brick_touch, element, load, support
+) -> tuple[Pressed, "Run"]:
+    from sensorgen.solvers.contact.bricks import mesh_of
+    from sensorgen.solvers.contact.contact import brick_faces_of
+    from sensorgen.solvers.contact.element import Elements
+    from sensorgen.solvers.contact.factors import Solver
+    from sensorgen.solvers.contact.load import Problem
+    from sensorgen.solvers.contact.support import free_of, top_load
 
-    mesh = brick_element.mesh_of(bricks, bricks.fill > 0)
-    materials = [solids[r.material] if r.material != AIR else Elastic(1.0, 0.3) for r in bricks.regions]
-    moduli, ratios = (
-        np.array([getattr(m, key) for m in materials])[mesh.region] for key in ("youngs_modulus_pa", "poisson_ratio")
-    )
-    elements = brick_element.BrickElements(mesh, element.law(moduli, ratios))
+    mesh = mesh_of(cut, cut.fill > 0)
+    law, softest_pa = law_of([r.material for r in cut.regions], mesh.region, solids)
     used = np.zeros(len(mesh.points_m), bool)
-    used[elements.freedoms // 3] = True
-    faces = brick_touch.BrickFaces(mesh, held.contact == "stick")
-    free = support.free_of(mesh.points_m, held, bricks.spans_m(), used)
+    used[mesh.outer] = True
+    free = free_of(mesh.points_m, held, cut.spans_m(), used)
     first = free.tocsc().indices[free.tocsc().indptr[:-1]]
-    problem = load.Problem(
-        elements,
-        faces,
+    problem = Problem(
+        Elements(mesh, law),
+        brick_faces_of(mesh),
         free,
-        brick_touch.top_load(mesh),
-        penalty_pa(float(moduli.min())),
+        top_load(mesh.points_m, *mesh.top()),
+        penalty_pa(softest_pa),
         held.contact == "stick",
-        solver=brick_factors.Solver(mesh.lattice[first // 3]),
+        solver=Solver(mesh.lattice[first // 3]),
     )
-    found, states = reached(problem, stress_pa, _STEP * float(moduli.min()), step, SOURCE)
-    return _judged(found, problem, states, held), _Run(elements, faces, states)
+    found, run = reached(problem, stress_pa, _STEP * softest_pa, step, SOURCE)
+    last = run.states[-1]
+    if (problem.gaps(last.pairs, last.u_m) < 0).any():
+        how = "and hold fast" if held.contact == "stick" else "without friction"
+        found = replace(found, doubts=(*found.doubts, f"faces of gaps touch, {how}"))
+    return found, run
 
 
-def _judged(found: Pressed, problem: "Problem", states: "list[State]", held: Held) -> Pressed:
-    """With what is to be known of its contact."""
-    last = states[-1]
-    touching = problem.gaps(last.pairs, last.u_m) < 0
-    if not touching.any():
-        return found
-    how = "and hold fast" if held.contact == "stick" else "without friction"
-    return replace(found, doubts=(*found.doubts, f"faces of gaps touch, {how}"))
+def _with_fields(found: Pressed, run: "Run", permittivity: Mapping[str, float], orders: Orders) -> Pressed:
+    """The same with the capacitance of the deformed boxes; gaps that are shut are held open by a little."""
+    from sensorgen.solvers.contact.air import AirMap
+    from sensorgen.solvers.contact.brick_field import Field, Folded
+    from sensorgen.solvers.contact.bricks import mesh_of
 
+    solid = run.problem.elements.mesh
+    whole = mesh_of(solid.bricks, np.ones(solid.bricks.fill.shape, bool))
+    field, air = Field(whole, permittivity, orders), AirMap(whole, solid)
 
-def _with_fields(found: Pressed, run: _Run, permittivity: Mapping[str, float], orders: Orders) -> Pressed:
-    """The same with the capacitance of the deformed boxes."""
-    from sensorgen.solvers.contact import brick_element
-    from sensorgen.solvers.contact.brick_field import Field
+    def bounds(state: "State") -> Interval | None:
+        moved = solid.all_nodes(state.u_m, state.inner.bubble)
+        for share in _OPEN:
+            try:
+                return field.capacitance(air.displacements_m(moved, share))
+            except Folded:
+                continue
+        return None
 
-    bricks = run.elements.mesh.bricks
-    whole = brick_element.mesh_of(bricks, np.ones(bricks.fill.shape, bool))
-    cell = Field(whole, permittivity, orders)
-    return with_capacitances(found, [_bounds(cell, run, s) for s in run.states])
-
-
-def _bounds(cell: "Field", run: _Run, state: "State") -> Interval | None:
-    """Bounds of the capacitance; gaps that are shut are held open by a little."""
-    from sensorgen.solvers.contact import brick_air, brick_field
-
-    moved = run.elements.all_nodes(state.u_m, state.inner)
-    for share in _OPEN:
-        u = brick_air.extended(cell.mesh, run.elements.mesh, *run.faces.opened(moved, share))
-        try:
-            return cell.capacitance(u)
-        except brick_field.Folded:
-            continue
-    return None
+    return with_capacitances(found, [bounds(state) for state in run.states])

@@ -8,11 +8,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from numpy.typing import ArrayLike
 
 from sensorgen.core.errors import UnknownName
-from sensorgen.solvers.sheet.bound import Bounds, bounds, contact_sets
-from sensorgen.solvers.sheet.links import BY
-from sensorgen.solvers.sheet.network import Complex
+from sensorgen.solvers.sheet.network import BY, Complex
 from sensorgen.solvers.sheet.parts import Contact, Patch, Port, Sheet
-from sensorgen.solvers.sheet.solve import Solution, depth_m, solution
+from sensorgen.solvers.sheet.solve import Bounds, Solution, bounds, contact_sets, depth_m, solution
 
 __all__ = [
     "BY", "Bounds", "Contact", "Patch", "Port", "Sheet", "Solution", "contact_sets", "depth_m", "impedance", "localise",
@@ -151,7 +149,7 @@ def localise(
     sheet, ports
         As of :func:`impedance`; each port is read by itself, the others are open.
     frequency_hz : float or (n,) array
-        Tones that are read at every port, above 0 unless the film leaks [Hz].
+        Frequencies that are read at every port, above 0 unless the film leaks [Hz].
     press : Patch
         Size of the tip, and its factors at the force in question; its place is not looked at.
     per_newton : dict of str to float
@@ -161,7 +159,7 @@ def localise(
     places : int
         Along each side [-].
     done : callable
-        Told before each place how many are done: they may take minutes.
+        Called before each place with the number of places done; they may take minutes.
 
     Returns
     -------
@@ -177,11 +175,11 @@ def localise(
     Notes
     -----
     Impedances within 3 % (resolution chosen with the patch in the middle). A bound on unbiased estimates: where it
-    exceeds the spread of a guess, the readings say nothing of place.
+    exceeds the spread of a guess, the readings have no information on position.
 
     Examples
     --------
-    One port and one tone give two numbers, and the press has three unknowns:
+    One port and one frequency give two numbers, and the press has three unknowns:
 
     >>> film = Sheet(0.1, 0.1, (450.0, 450.0), 7e-8)
     >>> tip = Patch(0.0, 0.0, 0.02, 0.02, capacitance_factor=1.05)

@@ -52,7 +52,7 @@ def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Seq
 
     Notes
     -----
-    It ignores that columns hold each other and that rubber keeps its volume: see ``docs/press.md`` for its error.
+    It ignores that columns hold each other and that rubber keeps its volume: see ``docs/compression.md`` for its error.
     """
     gap, yielding, width, height = _columns(scene, modulus_pa)
     stress = np.asarray(stress_pa, float)

@@ -13,10 +13,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.solvers.line.inputs import check_fit, numbers, passive
-from sensorgen.solvers.multiline.body import Body, Touch, reading, with_body
-from sensorgen.solvers.multiline.bounds import standard_errors
-from sensorgen.solvers.multiline.lines import diagonal, directions, inverse, loops, march, side_by_side
-from sensorgen.solvers.multiline.piece import Line, Matrix
+from sensorgen.solvers.multiline import (
+    Body,
+    Line,
+    Matrix,
+    Touch,
+    diagonal,
+    directions,
+    inverse,
+    loops,
+    march,
+    reading,
+    side_by_side,
+    standard_errors,
+    with_body,
+)
 
 __all__ = [
     "Body", "Film", "Press", "Response", "Stack", "Touch", "Track", "admittance", "impedance", "port",
@@ -139,7 +150,7 @@ class Film(NamedTuple):
     capacitance_f_per_m : float
         Unloaded, per length [F/m].
     thinning : callable
-        Stress [Pa] to the share by which it is thinner [-] and that share's derivative [1/Pa], as
+        Pressure [Pa] to capacitive strain [-] and its derivative [1/Pa], as
         :meth:`sensorgen.models.compression.Plate.thinning`.
     tan_delta : float
         Loss tangent [-].
@@ -220,7 +231,7 @@ class Stack:
         Parameters
         ----------
         frequency_hz : float or array
-            Tones, above 0 [Hz].
+            Frequencies, above 0 [Hz].
         touch, body : Touch, Body
             Where and through what it touches; how it is tied to the ground of the instrument.
         driven, low : int
@@ -286,7 +297,7 @@ class Stack:
         Parameters
         ----------
         frequency_hz : float or array
-            Tones, above 0 [Hz].
+            Frequencies, above 0 [Hz].
         press : Press
             What presses, and where; the derivative by position is by ``left_m``.
 

@@ -152,9 +152,9 @@ def bulging_f_per_m2(p: rect.Params, eps_r: float, press_mm: float = 0.0, printe
     eps_r : float
         Relative permittivity [-].
     press_mm : float
-        By how much the stack is thinner, dh [mm].
+        Compression of the stack, dh [mm].
     printed : bool
-        Add the whole of the term, which is no increment: it does not vanish at rest. Else only what it grew by.
+        Add the whole term as printed, which does not vanish at rest; else its increment.
 
     Raises
     ------
@@ -190,11 +190,11 @@ class Named:
     Attributes
     ----------
     shapes : tuple of str
-        That it speaks of.
+        To which it applies.
     work : callable
         Of sizes and permittivity, and of ``press_mm`` where ``pressed`` [F/m2].
     pressed : bool
-        Whether it speaks of a pressed cell.
+        Whether it applies to a pressed cell.
     """
 
     shapes: tuple[str, ...]
@@ -202,7 +202,7 @@ class Named:
     pressed: bool = False
 
     def value_f_per_m2(self, p: Any, eps_r: float, press_mm: float = 0.0) -> float:
-        """What it gives for sizes, a permittivity [-] and, if it knows one, a press [mm]."""
+        """Capacitance per area for sizes, permittivity [-] and, where ``pressed``, compression [mm]."""
         return self.work(p, eps_r, press_mm) if self.pressed else self.work(p, eps_r)
 
 

@@ -1,7 +1,7 @@
 """The thesis's geometry of a pressed cell: no elasticity, air purged from the gaps, every solid's volume kept (3.1.2).
 
-A model of compression by sizes alone: any model of capacitance can speak of the sizes that it gives. How far it is from
-solved compression stands in docs/cells.md.
+A model of compression by sizes alone, for use with any capacitance model. Its error against solved compression is in
+docs/cells.md.
 """
 
 from collections.abc import Callable
@@ -24,14 +24,14 @@ _P = TypeVar("_P", tri.Params, rect.Params)
 
 
 def swept(p: _P, press_mm: float) -> _P:
-    """Sizes of a cell whose top has come down.
+    """Sizes of a compressed cell.
 
     Parameters
     ----------
     p : tri.Params or rect.Params
         Sizes at rest.
     press_mm : float
-        By how much the top has come down [mm].
+        Displacement of the top [mm].
 
     Raises
     ------
@@ -85,7 +85,7 @@ def turned(p: tri.Params, turned_rad: float) -> tri.Params:
 
 
 def _flattened(p: tri.Params, press_mm: float) -> tri.Params:
-    """Flanks turned until the top has come down."""
+    """Flanks turned until the top has its displacement."""
     quarter = p.period_mm / 4
     flank, angle = hypot(quarter, p.hang_height_mm), atan2(p.hang_height_mm, quarter)
     rest = p.hang_height_mm + p.dielectric_mm
@@ -97,14 +97,14 @@ def _flattened(p: tri.Params, press_mm: float) -> tri.Params:
     if press_mm >= down_mm(closed):
         raise OutOfRange(f"pressed by {press_mm:g} mm: all air is gone at {down_mm(closed):.3g} mm; expected less")
     low, high = closed, angle
-    for _ in range(_HALVINGS):  # the top comes down steadily as the flanks turn
+    for _ in range(_HALVINGS):  # the displacement is monotonic in the angle
         middle = 0.5 * (low + high)
         low, high = (middle, high) if down_mm(middle) > press_mm else (low, middle)
     return turned(p, angle - high)
 
 
 def _widened(p: rect.Params, press_mm: float) -> rect.Params:
-    """Both layers of strips thinner by one share, their strips wider at constant volume; the film is confined."""
+    """Both layers of strips compressed by the same ratio at constant volume; the film is confined."""
     strips = p.upper_height_mm + p.lower_height_mm
     solid = p.etpu_width_mm + p.x60_width_mm
     most = strips * (1 - solid / p.period_mm)

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from sensorgen.core.errors import OutOfRange
 from sensorgen.solvers.network import links as links
 from sensorgen.solvers.network.band import product
-from sensorgen.solvers.network.lines import Lines
-from sensorgen.solvers.network.nodes import Nodes
+from sensorgen.solvers.network.nodes import Lines, Nodes
 
 SOURCE = "Lines as in Dijkshoorn et al., Sensors 2021, 21, 3710 (traxel model); network derived anew"
 COST = 2
@@ -29,7 +28,7 @@ COST = 2
 
 @dataclass(frozen=True)
 class Resistance:
-    """What a network of lines says.
+    """Result of a network of lines.
 
     Attributes
     ----------

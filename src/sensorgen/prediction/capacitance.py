@@ -11,14 +11,12 @@ from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
 from json import dumps
 from math import hypot, inf
-from types import ModuleType
 from typing import Any
 
-from sensorgen import models
 from sensorgen.core import cache as cached
-from sensorgen.core import plugins as registry
 from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
+from sensorgen.models import capacitance_models
 from sensorgen.prediction.cost_model import expected
 from sensorgen.prediction.plan import Candidate
 from sensorgen.scene.scene import Scene
@@ -171,14 +169,9 @@ def _ordered(scene: Scene, width: float, model: str) -> list[Candidate]:
     return sorted(found, key=lambda c: _rank(c, loaded[c.model].COST, width))
 
 
-def capacitance_models() -> dict[str, ModuleType]:
-    """The models of capacitance, by name."""
-    return {name: registry.load(models, name) for name in registry.defining(models, "capacitance")}
-
-
 def _unfit(candidate: Candidate, scene: Scene, kind: str) -> str:
     model = capacitance_models()[candidate.model]
-    return (model.unfit(scene) or "") if hasattr(model, kind) else "it knows no losses"
+    return (model.why_not_applicable(scene) or "") if hasattr(model, kind) else "it knows no losses"
 
 
 def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float]:

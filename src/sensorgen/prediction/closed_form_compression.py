@@ -37,7 +37,7 @@ class Guess:
 
 def _springs(design: Design, piece: Piece, stress_pa: Sequence[float]) -> Guess:
     """Columns as springs side by side, for any scene."""
-    scene, why = piece.scene, press2d.unfit(piece.scene)
+    scene, why = piece.scene, press2d.why_not_applicable(piece.scene)
     solids = elastic(design, scene)
     moduli = {n: s.youngs_modulus_pa / (1.0 if why else 1 - s.poisson_ratio**2) for n, s in solids.items()}
     boxes = all(prism.is_box() for body in scene.bodies for prism in body.prisms)

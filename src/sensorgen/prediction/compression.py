@@ -19,7 +19,17 @@ from sensorgen.models.press2d import Held, Pressed
 from sensorgen.prediction import capacitance_answer as bounds
 from sensorgen.prediction import closed_form_compression as guesses
 from sensorgen.prediction.compression_law import elastic, expected
-from sensorgen.prediction.mesh_ladder import MODELS, SAFETY, USUAL, Case, Piece, Rung, pressed, rungs, unfit
+from sensorgen.prediction.mesh_ladder import (
+    MODELS,
+    SAFETY,
+    USUAL,
+    Case,
+    Piece,
+    Rung,
+    pressed,
+    rungs,
+    why_not_applicable,
+)
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, plain, run_until_within
 from sensorgen.prediction.sensor_model import piece
 from sensorgen.scene.scene import Scene
@@ -123,7 +133,7 @@ def _planned(design: Design, piece: Piece, asked: Asked) -> Plan:
         raise OutOfRange(f"an accuracy of {asked.accuracy:g}; expected a number above 0, as 1e-2")
     model = _model(piece, asked)
     if model in guesses.MODELS:
-        why = f"--model {model}" if asked.model else unfit(piece, MODELS[0])
+        why = f"--model {model}" if asked.model else why_not_applicable(piece, MODELS[0])
         raise BadInput(f"an accuracy of C, and {why}: {model} tells {_NO_C}; leave out --accuracy")
     others = [Candidate(name, passed_over=_reason(piece, name, asked.model)) for name in ALL if name != model]
     meshes = [_candidate(design, asked, rung) for rung in _rungs(piece, model, asked)]
@@ -135,7 +145,7 @@ def _planned(design: Design, piece: Piece, asked: Asked) -> Plan:
 
 
 def _model(piece: Piece, asked: Asked) -> str:
-    return asked.model or next((name for name in MODELS if not unfit(piece, name)), guesses.FIRST)
+    return asked.model or next((name for name in MODELS if not why_not_applicable(piece, name)), guesses.FIRST)
 
 
 def _rungs(piece: Piece, model: str, asked: Asked) -> list[Rung]:
@@ -145,7 +155,9 @@ def _rungs(piece: Piece, model: str, asked: Asked) -> list[Rung]:
 def _reason(piece: Piece, name: str, forced: str) -> str:
     if forced:
         return f"--model {forced}"
-    return _NO_C if name in guesses.MODELS else unfit(piece, name) or "the model before it speaks of the cell"
+    return (
+        _NO_C if name in guesses.MODELS else why_not_applicable(piece, name) or "the model before it speaks of the cell"
+    )
 
 
 def _candidate(design: Design, asked: Asked, rung: Rung) -> Candidate:

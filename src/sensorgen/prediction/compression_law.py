@@ -14,7 +14,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.values import MaterialValue, film, of_all_materials, permittivities
 from sensorgen.models import compression
-from sensorgen.models.compression import Compression, Curve
+from sensorgen.models.compression import Compression, Curve, curve_of
 from sensorgen.prediction.capacitance import Answer, is_plate
 from sensorgen.prediction.mesh_ladder import SAFETY, USUAL, Case, Piece, Rung, drawn, model_of, pressed, rungs
 from sensorgen.scene.scene import Scene
@@ -196,7 +196,7 @@ def solved(design: Design, printed: Piece | None = None, level: int = USUAL, **h
     MissingValue, BadInput, OutOfRange
         No modulus or Poisson's ratio, no NGSolve; a cell that is no prism; a solution that is not to be trusted.
     """
-    from sensorgen.models.press2d import Held, curve_of
+    from sensorgen.models.press2d import Held
 
     moduli, ratios = of_all_materials(design, "youngs_modulus_pa"), of_all_materials(design, "poisson_ratio")
     piece = printed or drawn(design)

@@ -1,4 +1,4 @@
-"""What the models of capacitance should reach, and in what time: measured once, scaled to the scene.
+"""Expected width and run time of the capacitance models, from benchmark data scaled to the scene.
 
 The measurements are ``models/expected.yaml``, all of them, made by ``bench/expected.py``.
 """
@@ -90,7 +90,7 @@ def measured() -> dict[str, Measured]:
 def _size(scene: Scene, counted: str) -> Size | None:
     try:
         return COUNTED[counted](scene)
-    except ValueError:  # a scene that the model cannot speak of either
+    except ValueError:  # a scene that the model does not apply to either
         return None
 
 

@@ -20,7 +20,7 @@ from sensorgen.models.compression import Compression
 from sensorgen.prediction import bodies, planning
 from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.error_budget import Load, error_budget
-from sensorgen.prediction.identifiability import FORCE_N, NOISE, card
+from sensorgen.prediction.identifiability import FORCE_N, NOISE, identify
 from sensorgen.prediction.losses import Lost, lost
 from sensorgen.prediction.plan import Plan
 from sensorgen.prediction.rest_state import RestState, rest_state
@@ -206,14 +206,14 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
         else None
     )
     try:
-        made = card(
+        made = identify(
             model.sensor, load.frequency_hz, query.noise, force_n=load.force_n or FORCE_N, position_m=load.position_m,
             stiffest=stiffest, assumed="" if law.bounded else _ASSUMED,
         )  # fmt: skip
         return replace(
             found, identifiability=made, budget=error_budget(model, load, query.accuracy),
             sensitivity=_sensitivity(model, load),
-            force_resolution_n=made["sigma_force_n"], position_resolution_m=made["sigma_position_m"],
+            force_resolution_n=made.sigma_force_n, position_resolution_m=made.sigma_position_m,
         )  # fmt: skip
     except SensorgenError as error:
         return replace(found, reason=str(error))

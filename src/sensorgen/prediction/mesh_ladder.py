@@ -97,15 +97,15 @@ class Rung:
 
 
 @lru_cache(maxsize=16)
-def unfit(piece: Piece, model: str) -> str | None:
+def why_not_applicable(piece: Piece, model: str) -> str | None:
     """Why a model cannot speak of a piece, or None."""
-    said: str | None = import_module(f"sensorgen.models.{model}").unfit(piece.scene)
+    said: str | None = import_module(f"sensorgen.models.{model}").why_not_applicable(piece.scene)
     return said
 
 
 def model_of(piece: Piece) -> str:
     """The first of ``MODELS`` that can speak of a piece; the first of all, which says why not, where none can."""
-    return next((model for model in MODELS if not unfit(piece, model)), MODELS[0])
+    return next((model for model in MODELS if not why_not_applicable(piece, model)), MODELS[0])
 
 
 def rungs(piece: Piece, model: str, loads: int) -> list[Rung]:

@@ -10,6 +10,7 @@ from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import BadInput
 from sensorgen.design.values import MaterialValue
 from sensorgen.prediction.error_budget import ErrorBudget
+from sensorgen.prediction.identifiability.results import Identifiability, of_schema_1
 from sensorgen.prediction.plan import Plan
 
 if TYPE_CHECKING:
@@ -67,8 +68,8 @@ class Prediction:
         The reference load [N], [m].
     force_resolution_n, position_resolution_m : float or None
         Standard errors of force and position there, from one reading [N], [m]; None where undefined.
-    identifiability : mapping or None
-        What impedance tells about force and position.
+    identifiability : Identifiability or None
+        How precisely impedance determines force and position.
     budget : ErrorBudget or None
         Error of the impedance at the reference load.
     plan : Plan or None
@@ -99,7 +100,7 @@ class Prediction:
     sensitivity: Bounds | None = None
     force_resolution_n: float | None = None
     position_resolution_m: float | None = None
-    identifiability: dict[str, Any] | None = None
+    identifiability: Identifiability | None = None
     budget: ErrorBudget | None = None
     plan: Plan | None = None
     values: tuple[MaterialValue, ...] = ()
@@ -154,7 +155,7 @@ def _of_schema_1(data: dict[str, Any]) -> Prediction:
         resistance={end: Bounds.of(ohm, "ohm") for end, ohm in (data.get("electrode_resistance_ohm") or {}).items()},
         corner_frequency=_old_bounds(data.get("corner_frequency_hz"), "Hz"),
         impedance=tuple(_old_impedance(tone) for tone in data.get("impedance_ohm") or ()),
-        identifiability=data.get("identifiability"),
+        identifiability=of_schema_1(data.get("identifiability") or {}),
         values=tuple(MaterialValue(**value) for value in data.get("values") or ()),
         assumptions=tuple(data.get("assumptions") or ()),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What a microstructure is worth: how a press changes a sensor's capacitance, beside a plate held in the same way."""
+"""Sensitivity of a microstructure to a press, beside a plate under the same boundary conditions."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -49,16 +49,16 @@ def sensitivity(
     resistivity_ohm_m: float | None = None,
     accuracy: float = 1e-3,
 ) -> Sensitivity:
-    """How a design answers to a press in its middle.
+    """Response of a design to a press in its middle.
 
     Parameters
     ----------
     design : Design
         As drawn.
     law : Compression or str
-        How it gives way, or "free" or "bonded": its cell is then solved, held so.
+        Law of compression, or "free" or "bonded": its cell is then solved with these boundary conditions.
     frequency_hz : tuple of float
-        Tones [Hz].
+        Frequencies [Hz].
     force_n : float
         The press, by a flat tip of 10 mm [N].
     resistivity_ohm_m : float
@@ -74,7 +74,7 @@ def sensitivity(
     Notes
     -----
     "free" slides on its base and widens as it likes, "bonded" can do neither. A plate that is bonded over an unbounded
-    area gives way by its bulk modulus alone; over a width of 10 mm it is :func:`sensorgen.models.compression.bonded`.
+    area deforms by its bulk modulus alone; over a width of 10 mm it is :func:`sensorgen.models.compression.bonded`.
     """
     body = bodies.drawn(design)
     given = build_sensor(body, "unconfined", rest=rest_state(body, accuracy)).sensor

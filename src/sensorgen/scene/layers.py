@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 import shapely
@@ -11,7 +12,7 @@ from shapely import MultiPolygon, Polygon
 
 from sensorgen.scene.scene import SLIVER_MM, Body, Outline, Prism, Scene, box, rectangle, rounded
 
-Region = Polygon | MultiPolygon
+Region: TypeAlias = Polygon | MultiPolygon
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ def cleaned(region: Region) -> Region:
 def is_box(part: Polygon) -> bool:
     """Whether a polygon is a rectangle along the axes."""
     x0, y0, x1, y1 = part.bounds
-    return abs((x1 - x0) * (y1 - y0) - part.area) < SLIVER_MM**2
+    return bool(abs((x1 - x0) * (y1 - y0) - part.area) < SLIVER_MM**2)
 
 
 def is_rectilinear(region: Region) -> bool:
@@ -83,7 +84,7 @@ def narrow_mm(part: Polygon) -> float:
     """Smaller side of the smallest rectangle around a polygon [mm]."""
     x0, y0, x1, y1 = part.bounds
     if is_box(part):
-        return min(x1 - x0, y1 - y0)
+        return float(min(x1 - x0, y1 - y0))
     around = np.diff(shapely.get_coordinates(shapely.minimum_rotated_rectangle(part))[:3], axis=0)
     return float(np.hypot(*around.T).min())
 
@@ -129,8 +130,8 @@ def _along(regions: Mapping[str, Region], scene: Scene) -> str:
     if not all(map(is_box, found)):
         return ""
     low, high = np.array([part.bounds for part in found]).reshape(-1, 2, 2).swapaxes(0, 1)
-    whole = ((low < SLIVER_MM) & (high > np.array(scene.size_mm[:2]) - SLIVER_MM)).all(0)
-    return "y" if whole[1] else "x" if whole[0] else ""
+    along_x, along_y = ((low < SLIVER_MM) & (high > np.array(scene.size_mm[:2]) - SLIVER_MM)).all(axis=0).tolist()
+    return "y" if along_y else "x" if along_x else ""
 
 
 def scene_of(layers: Sequence[LayerRegions], like: Scene) -> Scene:

@@ -1,56 +1,55 @@
-"""What is expected of a specimen, logged before anybody measures it."""
+"""Predict a specimen's design and log the prediction before the specimen is measured."""
 
 import json
 from pathlib import Path
 
 from sensorgen.core.errors import MissingValue
 from sensorgen.design.design import Design
+from sensorgen.measure.log import notes
 from sensorgen.measure.log.batches import prediction
 from sensorgen.measure.log.entries import Entry
 from sensorgen.measure.log.logbook import Log
-from sensorgen.measure.log.words import design_like, named
 
 OUT = Path("out")  # folder of the designs' folders, where build and slice write
 
 
 def predict(log: Log, specimen: str) -> list[Entry]:
-    """Log a prediction of a specimen's design, if the log has none yet.
+    """Log a prediction of a specimen's design, unless the log has one.
 
     Parameters
     ----------
     log : Log
-        An open one.
+        An open log.
     specimen : str
-        The specimen's name.
+        Name of the specimen.
 
     Returns
     -------
     list of Entry
-        The prediction, if it is new.
+        The new prediction, if there is one.
 
     Raises
     ------
     BadInput
-        A name that cannot be read.
+        A name that cannot be parsed.
     MissingValue
-        The name does not tell the design, or its print bed had another one, whose file alone can be predicted.
+        The name stands for no design, or the specimen was printed from another design, whose file must be predicted.
     """
-    told, name = named(specimen)
-    design = design_like(name)
-    printed = [row.design_id for row in log.prints(specimen=str(told["specimen"]))][-1:]
-    wanted = printed or ([design.id()] if design else [])
-    if wanted and log.predictions(design_id=wanted[0]):
+    design = notes.design_of(specimen)
+    printed = [row.design_id for row in log.prints(specimen=notes.specimen(specimen).specimen)][-1:]
+    design_ids = printed or ([design.id()] if design else [])
+    if design_ids and log.predictions(design_id=design_ids[0]):
         return []
-    if design is None or design.id() != wanted[0]:
-        raise MissingValue(f"{specimen!r} does not tell its design: sensorgen log predict takes the design's file")
+    if design is None or design.id() != design_ids[0]:
+        raise MissingValue(f"{specimen!r} names no design; log a prediction of its file: sensorgen log predict FILE")
     return log.add([predicted_row(design)])
 
 
 def predicted_row(design: Design) -> Entry:
-    """The prediction of a design's print as a row of the log."""
+    """Prediction of a design's print, as a row of the log."""
     from sensorgen.prediction import bodies
     from sensorgen.prediction.evaluate import evaluate
     from sensorgen.prediction.results import to_json
 
-    found = evaluate(bodies.default_body(design, OUT / design.name))
-    return prediction(design.id(), design.name, json.loads(to_json(found)))
+    predicted = evaluate(bodies.default_body(design, OUT / design.name))
+    return prediction(design.id(), design.name, json.loads(to_json(predicted)))

@@ -7,7 +7,7 @@ import numpy as np
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.measure.log import BenchRun, Log
-from sensorgen.measure.log.bench import reopened
+from sensorgen.measure.log.bench import read_again
 from sensorgen.measure.recording import joined_all
 from sensorgen.measure.recording.rig import RigLog
 from sensorgen.measure.recording.samples import Complex, Real, Recording
@@ -71,7 +71,7 @@ def runs(log: Log, iteration: int, left_out: list[tuple[str, str]]) -> Iterator[
 
 
 def _of_entry(log: Log, entry: BenchRun) -> Iterator[Run]:
-    found, pressed = reopened(log, entry)
+    found, pressed = read_again(log, entry)
     beside, without = _beside(found, pressed)
     for one in beside:
         yield _brought(entry, one, without)

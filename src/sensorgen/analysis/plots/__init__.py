@@ -1,42 +1,48 @@
-"""What a sensor answers to presses, in pictures: maps of R and X, their sensitivities, and the way back (PNG, HTML)."""
+"""Figures: described once as data, drawn as pictures or on a page for the browser."""
 
 from collections.abc import Iterator, Sequence
 
-from sensorgen.analysis.plots.field import QUANTITIES, field
 from sensorgen.models.sensor import Sensor
 
-PAGE = "predict.html"
-CARD = "identifiability.png"
-STEPS = (*(f"{name}.png" for name in QUANTITIES), "inverse-position.png", "inverse-force.png", CARD, PAGE)
+PAGE, IDENTIFIABILITY = "predict.html", "identifiability.png"
+STEPS = (
+    IDENTIFIABILITY, "resistance.png", "reactance.png", "resistance-by-position.png", "resistance-by-force.png",
+    "reactance-by-position.png", "reactance-by-force.png", "inverse-position.png", "inverse-force.png", PAGE,
+)  # fmt: skip
 
 
 def files(
-    sensor: Sensor, frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float]
-) -> Iterator[tuple[str, bytes]]:
-    """All pictures of a sensor, by file name, in the order of ``STEPS``.
+    sensor: Sensor, frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float],
+    title: str = "",
+) -> Iterator[tuple[str, bytes]]:  # fmt: skip
+    """All pictures of a sensor under load, by file name, in the order of ``STEPS``.
 
     Parameters
     ----------
     sensor : Sensor
-        That is pressed.
+        Under load.
     frequency_hz, force_n, position_mm : sequence of float
-        Tones [Hz], forces [N] and centres of the tip [mm], each rising; at least two forces and two positions.
+        Frequencies [Hz], forces [N] and centres of the tip [mm], each rising; at least two forces and two positions.
+    title : str
+        Name of the design.
 
     Raises
     ------
     OutOfRange
-        As :func:`sensorgen.analysis.plots.field.field`.
+        As :func:`sensorgen.analysis.plots.response.response`.
     MissingValue
         Matplotlib or Plotly is not installed.
     """
-    from sensorgen.analysis.plots import card, inverse, maps, page, panels
+    from sensorgen.analysis.plots import identifiability, pages, response, static
     from sensorgen.analysis.plots.libraries import needed
 
     needed("matplotlib", "plotly")
-    answer = field(sensor, frequency_hz, force_n, position_mm)
-    for name in QUANTITIES:
-        yield f"{name}.png", maps.png(answer, name)
-    yield "inverse-position.png", inverse.png(answer, "position")
-    yield "inverse-force.png", inverse.png(answer, "force")
-    yield CARD, panels.png(card.figure(sensor, frequency_hz, force_n=force_n[-1]))
-    yield PAGE, page.html(answer).encode()
+    found = response.response(sensor, frequency_hz, force_n, position_mm)
+    drawn = [identifiability.figure(sensor, frequency_hz, force_n=force_n[-1], title=title), *response.figures(found)]
+    for figure in drawn:
+        yield f"{figure.key}.png", static.png(figure)
+    words = (
+        f"{len(frequency_hz)} frequencies, {force_n[0]:g} to {force_n[-1]:g} N, "
+        f"{position_mm[0]:g} to {position_mm[-1]:g} mm, tip {found.tip_mm:g} mm."
+    )
+    yield PAGE, pages.page(f"{title or 'Sensor'} under load", [words], drawn).encode()

@@ -1,10 +1,10 @@
-"""Displacement and capacitance of a cell over stress, as a picture."""
+"""Displacement and capacitance of a cell over stress, as a figure."""
 
 from collections.abc import Mapping
-from io import BytesIO
 from typing import Any
 
-KPA, UM, NF = "stress [kPa]", "displacement of the top [µm]", "capacitance [nF/m²]"
+from sensorgen.analysis.plots import static
+from sensorgen.analysis.plots.figure import BLUE, ORANGE, Axis, Curve, Figure, Panel
 
 
 def png(data: Mapping[str, Any]) -> bytes:
@@ -15,29 +15,20 @@ def png(data: Mapping[str, Any]) -> bytes:
     data : mapping
         Its answer.
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    known = [
-        (p, 1e9 * low, 1e9 * high)
-        for p, low, high in zip(*(data[k] for k in ("stress_kpa", "lower_f_per_m2", "upper_f_per_m2")), strict=True)
-        if low is not None
-    ]
-    with mpl.rc_context({"font.size": 9}):
-        figure = Figure(figsize=(8.4, 3.4) if known else (4.4, 3.4), layout="constrained")
-        axes = figure.subplots(1, 2 if known else 1, squeeze=False)[0]
-        axes[0].plot(data["stress_kpa"], data["displacement_um"], "o-", ms=3, clip_on=False, color="#0072b2")
-        axes[0].set(xlabel=KPA, ylabel=UM, xlim=(0, None), ylim=(0, None))
-        if known:
-            stress, low, high = zip(*known, strict=True)
-            axes[1].plot(stress, high, "v", ms=4, clip_on=False, color="#d55e00", label="upper bound")
-            axes[1].plot(stress, low, "^", ms=4, clip_on=False, color="#0072b2", label="lower bound")
-            axes[1].set(xlabel=KPA, ylabel=NF, xlim=(0, None))
-            axes[1].legend(frameon=False)
-        for ax in axes:
-            ax.grid(alpha=0.3)
-        held = ", ".join(f"{key} {value}" for key, value in data["held"].items())
-        figure.suptitle(f"{data['model']}: {held}", fontsize=9)
-        file = BytesIO()
-        figure.savefig(file, format="png", dpi=150)
-    return file.getvalue()
+    stress, displacement = data["stress_kpa"], data["displacement_um"]
+    x = Axis("stress [kPa]", low=0.0)
+    curve = (Curve("line", "", stress, displacement), Curve("points", "", stress, displacement))
+    panels = [Panel(curve, x, Axis("displacement of the top [µm]", low=0.0))]
+    bounds = {"lower bound": (data["lower_f_per_m2"], BLUE, "triangle-up"),
+              "upper bound": (data["upper_f_per_m2"], ORANGE, "triangle-down")}  # fmt: skip
+    known = [k for k, value in enumerate(data["lower_f_per_m2"]) if value is not None]
+    if known:
+        at = [stress[k] for k in known]
+        curves = tuple(
+            Curve("points", name, at, [1e9 * values[k] for k in known], colour=colour, symbol=symbol)
+            for name, (values, colour, symbol) in bounds.items()
+        )
+        panels.append(Panel(curves, x, Axis("capacitance [nF/m²]")))
+    held = ", ".join(f"{key} {value}" for key, value in data["held"].items())
+    alt = "Displacement of the top and capacitance per area over stress."
+    return static.png(Figure("compression", f"{data['model']}: {held}", alt, {"": tuple(panels)}, columns=2))

@@ -1,25 +1,29 @@
-"""Maps of how well a press is located on a sheet."""
+"""Maps of how well a load is located on a sheet."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from sensorgen.analysis.plots import panels
-from sensorgen.analysis.plots.libraries import needed
+import numpy as np
+
+from sensorgen.analysis.plots import static
+from sensorgen.analysis.plots.figure import Axis, Curve, Figure, Map, Panel
+from sensorgen.core.units import M_PER_MM
 
 if TYPE_CHECKING:
     from sensorgen.models.sheet import Bounds, Port, Sheet
 
-_MM = 1e3
-_SHARES = (1 / 30, 1 / 10, 1 / 3, 1.0)  # of a guess, at which the scale is marked
+_LEAST = 1 / 30  # of the guess's error, at which the colours begin
 
 
 def png(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Sequence["Port"]]) -> bytes:
-    """Standard errors of x and y over the sheet, one column per set of contacts, as shares of a guess's.
+    """Standard errors of x and y over the sheet, one column per set of contacts, as PNG.
+
+    The colours end at the error of a guess, that is of a reading without any information.
 
     Parameters
     ----------
     film : Sheet
-        What is pressed.
+        Under load.
     bounds : mapping of str to Bounds
         By the name of the set of contacts.
     ports : mapping of str to sequence of Port
@@ -30,57 +34,23 @@ def png(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Seque
     MissingValue
         Matplotlib is not installed.
     """
-    needed("matplotlib")
-    return panels.png(_figure(film, bounds, ports))
+    panels = tuple(_panel(film, name, bounds[name], ports[name], row) for row in (0, 1) for name in bounds)
+    title = "Standard error of a load's position, outline known; contacts red; the scale ends at a guess"
+    alt = "Standard errors of x above and of y below, over the sheet, one column per set of contacts."
+    return static.png(Figure("sheet", title, alt, {"": panels}, columns=len(bounds)))
 
 
-def _figure(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Sequence["Port"]]) -> Any:
-    import numpy as np
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.colors import LogNorm
-    from matplotlib.figure import Figure
-
-    guess_m = next(iter(bounds.values())).guess_m
-    norm = LogNorm(1 / 30, 1)
-    height = 2.3 * min(2.0, max(0.4, film.width_m / film.length_m))
-    figure = Figure(figsize=(2.1 + 2.3 * len(bounds), 1.0 + 2 * height), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
-    grid = figure.subplots(2, len(bounds), squeeze=False, sharex=True, sharey=True)
-    for column, (name, found) in enumerate(bounds.items()):
-        shares = found.sigma(outline=True)[..., 1:] / guess_m
-        for row, axis in enumerate("xy"):
-            frame = grid[row][column]
-            shown = np.clip(shares[..., row], norm.vmin, norm.vmax)
-            image = frame.pcolormesh(
-                found.x_m * _MM, found.y_m * _MM, shown.T, norm=norm, cmap="viridis", shading="nearest"
-            )
-            _contacts(frame, ports[name])
-            frame.set(xlim=(0, film.length_m * _MM), ylim=(0, film.width_m * _MM), aspect="equal")
-            if row == 0:
-                frame.set_title(name)
-            else:
-                frame.set_xlabel("x [mm]")
-            if column == 0:
-                frame.set_ylabel(f"error of {axis}\n\ny [mm]")
-    bar = figure.colorbar(image, ax=grid, extend="min", shrink=0.9, label="standard error, outline known")
-    bar.set_ticks(_SHARES, labels=[_mark(share, guess_m) for share in _SHARES])
-    bar.minorticks_off()
-    return figure
-
-
-def _mark(share: float, guess_m: tuple[float, float]) -> str:
-    r"""What a share of a guess is in x and in y, once where both are alike.
-
-    >>> _mark(0.1, (0.03, 0.03)), _mark(0.1, (0.03, 0.015))
-    ('3 mm', 'x 3 mm\ny 1.5 mm')
-    """
-    x, y = (f"{share * guess * _MM:.2g}" for guess in guess_m)
-    said = f"{x} mm" if x == y else f"x {x} mm\ny {y} mm"
-    return f"{said}\n(a guess)" if share == 1 else said
-
-
-def _contacts(frame: Any, ports: Sequence["Port"]) -> None:
+def _panel(film: "Sheet", name: str, found: "Bounds", ports: Sequence["Port"], row: int) -> Panel:
+    guess_mm = found.guess_m[row] / M_PER_MM
+    sigma_mm = found.sigma(outline=True)[..., 1 + row].T / M_PER_MM
+    shown = np.clip(sigma_mm, guess_mm * _LEAST, guess_mm)
+    drawn = Map(found.x_m / M_PER_MM, found.y_m / M_PER_MM, shown, f"error of {'xy'[row]} [mm]", guess_mm * _LEAST,
+                guess_mm, log=True)  # fmt: skip
+    contacts = []
     for plus, _ in ports:
-        (left, right), (front, back) = ((a * _MM for a in span) for span in (plus.x_m, plus.y_m))
-        x, y = [left, right, right, left, left], [front, front, back, back, front]
-        frame.plot(x, y, color="red", linewidth=3, solid_joinstyle="miter", clip_on=False)
+        (left, right), (front, back) = ((a / M_PER_MM for a in span) for span in (plus.x_m, plus.y_m))
+        outline = [left, right, right, left, left], [front, front, back, back, front]
+        contacts.append(Curve("line", "", *outline, colour="#ff0000"))
+    x, y = (Axis(f"{axis} [mm]", low=0.0, high=size / M_PER_MM)
+            for axis, size in (("x", film.length_m), ("y", film.width_m)))  # fmt: skip
+    return Panel((drawn, *contacts), x, y, title="" if row else name, equal=True)

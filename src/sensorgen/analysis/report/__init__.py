@@ -1,4 +1,4 @@
-"""What was predicted beside what was measured, and how far apart, for everybody who wants to know."""
+"""Predictions and measurements of an iteration, compared."""
 
 from sensorgen.analysis.report.contents import Report, Section, report
 
@@ -17,7 +17,6 @@ def written(made: Report, how: str) -> str:
     how : str
         One of ``FORMATS``.
     """
-    from sensorgen.analysis.report import page, text
+    from sensorgen.analysis.report.formats import WRITERS
 
-    writers = {"html": page.html, "md": text.markdown, "csv": text.comma_separated, "json": text.as_json}
-    return writers[how](made)
+    return WRITERS[how](made)

@@ -1,18 +1,30 @@
-"""What a report holds, whatever it is written as."""
+"""Content of a report, whatever it is written as."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison, of_iteration
 from sensorgen.analysis.comparison.runs import Run, runs
 from sensorgen.analysis.comparison.specimens import known_iterations
-from sensorgen.analysis.report import figures, identified, recordings, specimens, yields
-from sensorgen.analysis.report.charts import Chart
-from sensorgen.analysis.report.explained import Explanation, explanations, sentences, table_of
+from sensorgen.analysis.plots.figure import Figure
+from sensorgen.analysis.report import electrodes, explained, recordings, variants, yields
 from sensorgen.analysis.report.provenance import origins
-from sensorgen.analysis.report.tables import Column, Table, table
-from sensorgen.analysis.report.variants import Variant, variants
+from sensorgen.analysis.report.tables import Column, Table
+from sensorgen.analysis.report.variants import Variant
+from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Log
+
+STEPS = ("readings", "recordings", "residuals", "variants", "page")
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Something that could not be used, and the reason."""
+
+    what: Annotated[str, Column("what")]
+    why: Annotated[str, Column("why")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,19 +35,19 @@ class Section:
     ----------
     key, title : str
         Anchor and heading.
-    words : tuple of str
-        Paragraphs.
-    tables, charts : tuple
+    figures, tables : tuple
         In the order in which they stand.
+    notes : tuple of str
+        Paragraphs on how numbers come about.
     variants : tuple of Variant
         Drawings.
     """
 
     key: str
     title: str
-    words: tuple[str, ...] = ()
+    figures: tuple[Figure, ...] = ()
     tables: tuple[Table, ...] = ()
-    charts: tuple[Chart, ...] = ()
+    notes: tuple[str, ...] = ()
     variants: tuple[Variant, ...] = ()
 
 
@@ -49,14 +61,17 @@ class Report:
         Of the design.
     made_at : str
         UTC.
+    headline : tuple of str
+        Measured against predicted, one sentence for each quantity.
     findings : tuple of str
-        What comes out of it, in sentences.
+        Further results, in sentences.
     sections : tuple of Section
         Residuals first.
     """
 
     iteration: int
     made_at: str
+    headline: tuple[str, ...]
     findings: tuple[str, ...]
     sections: tuple[Section, ...]
 
@@ -66,18 +81,18 @@ class Report:
         return f"Iteration {self.iteration}: predicted and measured"
 
     @property
-    def charts(self) -> tuple[Chart, ...]:
+    def figures(self) -> tuple[Figure, ...]:
         """All figures."""
-        return tuple(chart for section in self.sections for chart in section.charts)
+        return tuple(figure for section in self.sections for figure in section.figures)
 
     @property
     def tables(self) -> tuple[Table, ...]:
         """All tables."""
-        return tuple(found for section in self.sections for found in section.tables)
+        return tuple(table for section in self.sections for table in section.tables)
 
 
-def report(log: Log, iteration: int) -> Report:
-    """The report of an iteration; one without readings says so, and which iterations there are.
+def report(log: Log, iteration: int, step: Callable[[str], None] = lambda _: None) -> Report:
+    """The report of an iteration.
 
     Parameters
     ----------
@@ -85,89 +100,87 @@ def report(log: Log, iteration: int) -> Report:
         An open one.
     iteration : int
         Of the design.
+    step : callable
+        Called with each of ``STEPS`` before it is done.
+
+    Raises
+    ------
+    BadInput
+        The log has no readings of the iteration.
     """
+    step("readings")
     found = of_iteration(log, iteration)
     left_out = list(found.left_out)
+    step("recordings")
     recorded = list(runs(log, iteration, left_out))
-    explained = explanations(found, recorded)
+    if not found.rows and not recorded:
+        raise BadInput(_no_readings(log, iteration, left_out))
+    step("residuals")
+    explanations = explained.explanations(found, recorded)
+    impedances = recordings.impedances(recorded, found) if recorded else None
+    verdicts = bool(found.rows)
+    headline = [*electrodes.headline(found), *(yields.headline(found) if verdicts else ())]
+    findings = [
+        *(yields.findings(found) if verdicts else ()), *explained.sentences(explanations), *electrodes.findings(found)
+    ]  # fmt: skip
+    step("variants")
     sections = (
-        _residuals(found, recorded),
-        _explained(explained),
+        _measured(found, impedances),
         _verdicts(found),
+        _explained(explanations),
         _recordings(recorded),
-        _variants(found),
-        _left_out(left_out),
+        Section("variants", "The variants", tuple(variants.figures(found)), variants.identifiability(found),
+                variants=variants.variants(found)),
+        Section("left-out", "What was left out, and why", tables=_left_out(left_out)),
         Section("provenance", "Provenance", tables=(origins(log, found),)),
-    )
+    )  # fmt: skip
+    step("page")
     return Report(
-        iteration, datetime.now(UTC).isoformat(timespec="seconds"),
-        tuple(_findings(log, iteration, found, recorded, explained)),
-        tuple(s for s in sections if s.words or s.tables or s.charts or s.variants),
+        iteration, datetime.now(UTC).isoformat(timespec="seconds"), (*headline, *recordings.headline(impedances)),
+        tuple(findings), tuple(s for s in sections if s.tables or s.figures or s.variants),
     )  # fmt: skip
 
 
-def _findings(
-    log: Log, iteration: int, found: Comparison, recorded: list[Run], explained: list[Explanation]
-) -> list[str]:
-    if not found.rows and not recorded:
-        known = ", ".join(map(str, known_iterations(log))) or "none"
-        return [
-            f"The log has no readings of iteration {iteration}. Iterations that it knows: {known}.",
-            "Log some with: sensorgen log multimeter SPECIMEN --y 0.65k --z OL",
-        ]
-    of_readings = [*specimens.findings(found), *yields.findings(found)] if found.rows else []
-    return [*of_readings, *sentences(explained), *recordings.findings(recorded, found)]
-
-
-def _residuals(found: Comparison, recorded: list[Run]) -> Section:
-    if not found.rows and not recorded:
-        return Section("residuals", "Residuals")
-    tables = [specimens.table_of(found)] if found.rows else []
-    tables += [recordings.tones(recorded, found)] if recorded else []
-    drawn = [*figures.residuals(found), *recordings.residuals(recorded, found)]
-    return Section(
-        "residuals", "Predicted against measured: residuals first", specimens.words(found), tuple(tables), tuple(drawn)
+def _no_readings(log: Log, iteration: int, left_out: Sequence[tuple[str, str]]) -> str:
+    known = ", ".join(map(str, known_iterations(log))) or "none"
+    lost = "; ".join(f"{what}: {why}" for what, why in left_out)
+    return (
+        f"the log has no readings of iteration {iteration}{f' ({lost})' if lost else ''}; iterations in it: {known}. "
+        "Log some with: sensorgen log multimeter SPECIMEN --y 0.65k --z OL"
     )
 
 
-def _explained(explained: list[Explanation]) -> Section:
-    if not explained:
-        return Section("explained", "Explained")
-    words = (
-        "Each parameter is moved alone, for all specimens at once, until the squared residuals are least. R_Z is "
-        "compared up to the meter's highest range, which is also what a film without a leak is predicted to read; "
-        "where the electrodes touch as drawn, it is not compared.",
-    )  # fmt: skip
-    return Section("explained-by", "Which parameter explains the residuals", words, (table_of(explained),))
-
-
-def _recordings(recorded: list[Run]) -> Section:
-    if not recorded:
-        return Section("recorded", "Recordings")
-    drawn = (*recordings.normalised_differences(recorded), *recordings.figures(recorded))
-    return Section("recorded", "Recordings", (), (recordings.facts(recorded),), drawn)
+def _measured(found: Comparison, impedances: Table | None) -> Section:
+    tables = [electrodes.readings(found)] if found.rows else []
+    drawn = [*electrodes.figures(found), *(recordings.residuals(impedances) if impedances else ())]
+    notes = electrodes.NOTES if found.rows else ()
+    return Section(
+        "measured", "Measured and predicted", tuple(drawn), (*tables, *([impedances] if impedances else [])), notes
+    )
 
 
 def _verdicts(found: Comparison) -> Section:
     if not found.rows:
-        return Section("verdicts", "Verdicts")
-    return Section(
-        "verdicts",
-        "Verdicts and yield",
-        yields.words(found),
-        (*yields.tables(found), specimens.reasons(found)),
-        figures.verdicts(found),
+        return Section("verdicts", "Verdicts and yield")
+    tables = (*([yields.table(found)] if len(found.last) > 1 else []), electrodes.reasons(found))
+    return Section("verdicts", "Verdicts and yield", yields.figures(found), tables, yields.notes(found))
+
+
+def _explained(found: Sequence[explained.Explanation]) -> Section:
+    notes = (
+        "Each parameter is moved alone, for all specimens at once, until the squared residuals are least. Film "
+        "resistance is compared up to the meter's highest range, the prediction for a film without leakage; it is not "
+        "compared where the electrodes touch as drawn.",
     )
+    tables = (explained.table(found),) if found else ()
+    return Section("explained-by", "Which parameter explains the residuals", (), tables, notes)
 
 
-def _variants(found: Comparison) -> Section:
-    made = variants(found)
-    card = identified.table_of(found)
-    drawn = (*figures.bodies(found), *identified.figure(found))
-    return Section("variants", "The variants", (), (card,) if card else (), drawn, made)
+def _recordings(recorded: Sequence[Run]) -> Section:
+    tables = (recordings.facts(recorded),) if recorded else ()
+    return Section("recorded", "Recordings", tuple(recordings.figures(recorded)), tables)
 
 
-def _left_out(rows: list[tuple[str, str]]) -> Section:
-    words = () if rows else ("Nothing was left out.",)
-    made = (table("left_out", "What was left out, or taken with care, and why", (Column("what"), Column("why")), rows),)
-    return Section("left-out", "What was left out, and why", words, made if rows else ())
+def _left_out(rows: Sequence[tuple[str, str]]) -> tuple[Table, ...]:
+    caption = "What was left out, or taken with care, and why"
+    return (Table("left_out", caption, tuple(LeftOut(*row) for row in rows)),) if rows else ()

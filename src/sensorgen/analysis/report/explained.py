@@ -1,13 +1,14 @@
 r"""Which parameter explains the residuals best: one at a time, by least squares.
 
 For every kind of measurement, the residual is :math:`r = \ln(\text{measured} / \text{predicted})`, of every reading or
-tone, complex where Z is. One parameter p is moved for all of them until :math:`\sum |r|^2` is least; its share is what
-that takes away of it.
+frequency, complex where Z is. One parameter is moved for all of them until :math:`\sum |r|^2` is least; its share is
+the part of that sum that it takes away.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import exp, inf, log, nan, sqrt
+from typing import Annotated
 
 import numpy as np
 
@@ -15,31 +16,30 @@ from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.comparison.leaky import across_ohm, along_ohm
 from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
 from sensorgen.analysis.comparison.runs import Run
-from sensorgen.analysis.report.specimens import usable
-from sensorgen.analysis.report.tables import Column, Table, table
+from sensorgen.analysis.report.electrodes import usable
+from sensorgen.analysis.report.tables import Column, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.measure.signal.verdicts import INTACT_OHM
 
-PARAMETERS = {
-    "rho": "resistivity of the electrodes", "eps_r": "permittivity of the film's material", "E": "all moduli",
-    "d": "film thickness", "leak": "leak of the whole film",
-}  # fmt: skip
+RESISTIVITY, PERMITTIVITY, MODULUS, FILM, LEAK = PARAMETERS = (
+    "electrode resistivity", "film permittivity", "all moduli", "film thickness", "film leakage",
+)  # fmt: skip
 _FACTOR, _LEAK_S = (1e-2, 1e2), (1e-12, 1e3)
 _GRID = 31
 _STEP = 1e-3
-_OPEN = log(1e6)  # a factor beyond is told as this one: nothing is known
-_FLAT = 1e-9  # share below which a parameter does nothing
+_OPEN = log(1e6)  # a larger factor is shown as this one: nothing is known
+_FLAT = 1e-9  # share below which a parameter has no effect
 
 Model = Callable[[str, float], Complex]
 
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """A kind of measurement: ln of what was measured, and of what is predicted with one parameter moved.
+    """A kind of measurement: ln of the measured values, and of the predicted ones with one parameter moved.
 
-    A leak of 0 and a factor of 1 are the prediction itself.
+    A leakage of 0 and a factor of 1 are the prediction itself.
     """
 
     name: str
@@ -49,70 +49,75 @@ class Kind:
 
 @dataclass(frozen=True)
 class Explanation:
-    """What one parameter does for one kind of measurement.
+    """Effect of one parameter on one kind of measurement."""
 
-    Attributes
-    ----------
-    kind, parameter : str
-        Which.
-    value, error : float
-        The best: a factor [-], or the leak [S]; and its standard error as a factor [-].
-    slope : float
-        Root mean square of d ln(prediction) / d ln(parameter) there [-].
-    share : float
-        Of the residuals' sum of squares that it takes away [-].
-    """
-
-    kind: str
-    parameter: str
-    value: float
-    error: float
-    slope: float
-    share: float
+    kind: Annotated[str, Column("measured")]
+    parameter: Annotated[str, Column("parameter")]
+    value: Annotated[float, Column("best value")]
+    unit: Annotated[str, Column("unit", "", "factor to the prediction, or conductance of the whole film")]
+    error: Annotated[float, Column("uncertain by a factor", "", "one standard error")]
+    slope: Annotated[float, Column("slope", "", "root mean square of d ln(prediction) / d ln(parameter)")]
+    share_percent: Annotated[float, Column("residual explained", "%", "of the sum of squares")]
 
 
 def explanations(found: Comparison, recorded: Sequence[Run]) -> list[Explanation]:
-    """All parameters for all kinds of measurements that there are."""
-    kinds = [*_resistances(found), *_impedances(found, recorded)]
-    return [_explained(kind, parameter) for kind in kinds for parameter in PARAMETERS]
+    """All parameters for all kinds of measurements with two values or more, the best of each kind first."""
+    kinds = [kind for kind in (*_resistances(found), *_impedances(found, recorded)) if len(kind.measured) > 1]
+    return [
+        one for kind in kinds
+        for one in sorted((_explained(kind, p) for p in PARAMETERS), key=lambda one: -one.share_percent)
+    ]  # fmt: skip
+
+
+def table(found: Sequence[Explanation]) -> Table:
+    """A row for each."""
+    return Table("explained", "Share of the residuals that one parameter explains", tuple(found))
+
+
+def sentences(found: Sequence[Explanation]) -> Iterator[str]:
+    """The best parameter of each kind, and those that the readings cannot constrain."""
+    for kind in dict.fromkeys(e.kind for e in found):
+        best = next(e for e in found if e.kind == kind)
+        if best.share_percent > 100 * _FLAT:
+            by = f"of {best.value:.3g} S" if best.parameter == LEAK else f"scaled by {best.value:.3g}"
+            yield (
+                f"{kind.capitalize()}: {best.parameter} {by} explains {best.share_percent:.3g} % of the squared "
+                "residuals."
+            )
+    silent = [p for p in PARAMETERS if all(e.share_percent <= 100 * _FLAT for e in found if e.parameter == p)]
+    if silent and found:
+        yield f"These readings cannot constrain {', '.join(silent[:-1])}{' or ' if silent[1:] else ''}{silent[-1]}."
 
 
 def _resistances(found: Comparison) -> Iterator[Kind]:
-    """R_Y, and R_Z up to what the meter can tell from an open circuit."""
+    """Electrodes, and films up to what the meter can tell from an open circuit."""
     rows = usable(found)
     middles = [row.predicted.ry_ohm.middle() for row in rows if row.predicted and row.predicted.ry_ohm]
     if rows:
-        yield Kind("R_Y", np.log([row.verdict.ry_ohm for row in rows]).astype(complex), _along(middles))
+        measured = np.log([row.verdict.ry_ohm for row in rows]).astype(complex)
+        yield Kind("electrode resistance", measured, _of_electrodes(middles, _along))
     both = [k for k, row in enumerate(rows) if row.verdict.rz_ohm > 0 and not row.evidence.touching]
     if both:
-        measured = np.log([min(rows[k].verdict.rz_ohm, INTACT_OHM) for k in both])
-        yield Kind("R_Z", measured.astype(complex), _across([middles[k] for k in both]))
+        measured = np.log([min(rows[k].verdict.rz_ohm, INTACT_OHM) for k in both]).astype(complex)
+        yield Kind("film resistance", measured, _of_electrodes([middles[k] for k in both], _across))
 
 
-def _along(middles: Sequence[float]) -> Model:
-    return _of_electrodes(
-        middles,
-        lambda ohm, parameter, value: along_ohm(
-            ohm * (value if parameter == "rho" else 1.0), value if parameter == "leak" else 0.0
-        ),
-    )
+def _along(ohm: float, parameter: str, value: float) -> float:
+    return along_ohm(ohm * (value if parameter == RESISTIVITY else 1.0), value if parameter == LEAK else 0.0)
 
 
-def _across(middles: Sequence[float]) -> Model:
-    return _of_electrodes(
-        middles,
-        lambda ohm, parameter, value: min(across_ohm(ohm, value if parameter == "leak" else 0.0), INTACT_OHM),
-    )
+def _across(ohm: float, parameter: str, value: float) -> float:
+    return min(across_ohm(ohm, value if parameter == LEAK else 0.0), INTACT_OHM)
 
 
 def _of_electrodes(middles: Sequence[float], law: Callable[[float, str, float], float]) -> Model:
-    """What a law makes of all electrodes, once for those that are alike: many readings are of few designs."""
+    """A law for all electrodes, evaluated once for those that are alike: many readings are of few designs."""
     distinct, of = np.unique(middles, return_inverse=True)
     return lambda parameter, value: np.log([complex(law(ohm, parameter, value)) for ohm in distinct.tolist()])[of]
 
 
 def _impedances(found: Comparison, recorded: Sequence[Run]) -> Iterator[Kind]:
-    """Z at rest, and what presses change of it, where a line can be made of the design."""
+    """Z at rest, and its change under load, where a line can be made of the design."""
     known: list[tuple[Run, Movable]] = []
     for run in recorded:
         of = Movable(found.designs[found.names[run.entry.specimen]]) if run.entry.specimen in found.names else None
@@ -123,11 +128,11 @@ def _impedances(found: Comparison, recorded: Sequence[Run]) -> Iterator[Kind]:
         except SensorgenError:
             continue
     if known:
-        yield Kind("Z at rest", np.concatenate([np.log(run.rest_ohm) for run, _ in known]), _rest(known))
-    presses = [(run, of) for run, of in known if run.pairs is not None]
-    if presses:
-        measured = [np.log(r.pairs.pressed_ohm / r.pairs.before_ohm).ravel() for r, _ in presses if r.pairs]
-        yield Kind("presses", np.concatenate(measured), _presses(presses))
+        yield Kind("impedance at rest", np.concatenate([np.log(run.rest_ohm) for run, _ in known]), _rest(known))
+    loaded = [(run, of) for run, of in known if run.pairs is not None]
+    if loaded:
+        measured = [np.log(r.pairs.pressed_ohm / r.pairs.before_ohm).ravel() for r, _ in loaded if r.pairs]
+        yield Kind("impedance under load", np.concatenate(measured), _loaded(loaded))
 
 
 def _rest(known: Sequence[tuple[Run, Movable]]) -> Model:
@@ -136,36 +141,35 @@ def _rest(known: Sequence[tuple[Run, Movable]]) -> Model:
     )
 
 
-def _presses(known: Sequence[tuple[Run, Movable]]) -> Model:
+def _loaded(known: Sequence[tuple[Run, Movable]]) -> Model:
     def of_run(run: Run, of: Movable, parameter: str, value: float) -> Complex:
         sensor = moved(of.model.sensor, **_moves(of, parameter, value))
         assert run.pairs is not None  # noqa: S101 - chosen so
-        stiffness = value if parameter == "E" else 1.0
-        return pressed(
-            sensor, run.recording.tones_hz, run.pairs.force_n, run.pairs.position_mm * M_PER_MM, stiffness
-        ).ravel()
+        stiffness = value if parameter == MODULUS else 1.0
+        where = run.pairs.force_n, run.pairs.position_mm * M_PER_MM
+        return pressed(sensor, run.recording.tones_hz, *where, stiffness).ravel()
 
     return lambda parameter, value: np.concatenate([of_run(run, of, parameter, value) for run, of in known])
 
 
 def _moves(of: Movable, parameter: str, value: float) -> dict[str, float]:
-    """What a parameter moves of a sensor."""
-    if parameter in ("eps_r", "d"):
-        factors, curve = of.by_permittivity if parameter == "eps_r" else of.by_film
+    """Properties of a sensor that a parameter moves."""
+    if parameter in (PERMITTIVITY, FILM):
+        factors, curve = of.by_permittivity if parameter == PERMITTIVITY else of.by_film
         return {"capacitance": exp(float(np.interp(log(value), factors, curve)))}
-    return {"rho": {"resistivity": value}, "leak": {"leak_s": value}}.get(parameter, {})
+    return {RESISTIVITY: {"resistivity": value}, LEAK: {"leak_s": value}}.get(parameter, {})
 
 
 def _explained(kind: Kind, parameter: str) -> Explanation:
     from scipy.optimize import minimize_scalar
 
-    start = 0.0 if parameter == "leak" else 1.0
-    low, high = np.log(_LEAK_S if parameter == "leak" else _FACTOR)
+    start, unit = (0.0, "S") if parameter == LEAK else (1.0, "factor")
+    low, high = np.log(_LEAK_S if parameter == LEAK else _FACTOR)
 
     def left(at: float) -> float:
         try:
             return float((np.abs(kind.measured - kind.model(parameter, exp(at))) ** 2).sum())
-        except SensorgenError:  # presses that a film so soft cannot bear
+        except SensorgenError:  # loads that a film so soft cannot bear
             return inf
 
     before = float((np.abs(kind.measured - kind.model(parameter, start)) ** 2).sum())
@@ -177,44 +181,13 @@ def _explained(kind: Kind, parameter: str) -> Explanation:
     at, least = min((float(done.x), float(done.fun)), (float(grid[best]), sums[best]), key=lambda pair: pair[1])
     share = 1 - least / before if before > 0 else 0.0
     if share < _FLAT:
-        return Explanation(kind.name, parameter, start, nan, _slope(kind, parameter, log(start)) if start else 0.0, 0.0)
-    slope = _slope(kind, parameter, at)
-    count = len(kind.measured)
+        slope = _slope(kind, parameter, log(start)) if start else 0.0
+        return Explanation(kind.name, parameter, start, unit, nan, slope, 0.0)
+    slope, count = _slope(kind, parameter, at), len(kind.measured)
     error = sqrt(least / max(count - 1, 1) / count) / slope if slope else inf
-    return Explanation(kind.name, parameter, exp(at), float(np.exp(min(error, _OPEN))), slope, share)
+    return Explanation(kind.name, parameter, exp(at), unit, float(np.exp(min(error, _OPEN))), slope, 100 * share)
 
 
 def _slope(kind: Kind, parameter: str, at: float) -> float:
     ends: list[Real] = [np.asarray(kind.model(parameter, exp(at + sign * _STEP))) for sign in (-1, 1)]
     return float(np.sqrt(np.mean(np.abs((ends[1] - ends[0]) / (2 * _STEP)) ** 2)))
-
-
-def table_of(found: Sequence[Explanation]) -> Table:
-    """A row for each, the best of its kind first."""
-    order = list(dict.fromkeys(e.kind for e in found))
-    rows = [
-        (e.kind, e.parameter, PARAMETERS[e.parameter], e.value, "S" if e.parameter == "leak" else "factor",
-         e.error, e.slope, 100 * e.share)
-        for e in sorted(found, key=lambda e: (order.index(e.kind), -e.share))
-    ]  # fmt: skip
-    columns = (
-        Column("measured"), Column("parameter"), Column("what"), Column("best value"), Column("as"),
-        Column("uncertain by a factor", "", "one standard error"), Column("slope", "", "rms d ln prediction / d ln p"),
-        Column("residual taken away", "%", "of the sum of squares"),
-    )  # fmt: skip
-    return table("explained", "What one parameter, moved for all specimens at once, takes away", columns, rows)
-
-
-def sentences(found: Sequence[Explanation]) -> Iterator[str]:
-    """The best parameter of each kind, and those that nothing tells of."""
-    for kind in dict.fromkeys(e.kind for e in found):
-        best = max((e for e in found if e.kind == kind), key=lambda e: e.share)
-        if best.share > _FLAT:
-            by = f"{best.value:.3g} S" if best.parameter == "leak" else f"a factor of {best.value:.3g}"
-            yield (
-                f"{kind}: {PARAMETERS[best.parameter]} explains most; {by} takes {100 * best.share:.3g} % of the "
-                "squared residuals away."
-            )
-    silent = [p for p in PARAMETERS if all(e.share <= _FLAT for e in found if e.parameter == p)]
-    if silent and found:
-        yield f"Nothing that was measured depends on {', '.join(PARAMETERS[p] for p in silent)}."

@@ -1,16 +1,16 @@
-"""Tables of a report: numbers once, for people and for programs."""
+"""Tables of a report: rows are frozen dataclasses whose fields are annotated with the ``Column`` that they fill."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import isfinite, isinf, isnan
+from typing import Any, get_type_hints
 
 Cell = str | float | int | None
-DIGITS = 4  # that people are shown; files for programs hold all
+DIGITS = 4  # for people; files for programs hold all
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its name, its unit, and what it means where the name does not tell."""
+    """A column: name, unit, and its meaning if the name does not say it."""
 
     name: str
     unit: str = ""
@@ -32,28 +32,32 @@ class Table:
         Its name for programs, and its anchor on the page.
     caption : str
         What it shows.
-    columns : tuple of Column
-        From left to right.
-    rows : tuple of tuple
-        Cells; None where nothing is known, infinite where the meter showed overload.
+    rows : tuple
+        At least one, all of one type.
     """
 
     key: str
     caption: str
-    columns: tuple[Column, ...]
-    rows: tuple[tuple[Cell, ...], ...]
+    rows: tuple[Any, ...]
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """From left to right."""
+        hints = get_type_hints(type(self.rows[0]), include_extras=True)
+        return tuple(hint.__metadata__[0] for hint in hints.values())
+
+    @property
+    def cells(self) -> tuple[tuple[Cell, ...], ...]:
+        """Values row by row; None where nothing is known, infinite where the meter showed overload."""
+        names = [f.name for f in fields(self.rows[0])]
+        values = ((getattr(row, name) for name in names) for row in self.rows)
+        return tuple(tuple(None if isinstance(v, float) and isnan(v) else v for v in row) for row in values)
 
 
-def table(key: str, caption: str, columns: Sequence[Column], rows: Sequence[Sequence[Cell]]) -> Table:
-    """A table whose cells that are not numbers are nothing."""
-    cleaned = tuple(tuple(None if isinstance(v, float) and isnan(v) else v for v in row) for row in rows)
-    return Table(key, caption, tuple(columns), cleaned)
-
-
-def said(cell: Cell) -> str:
+def shown(cell: Cell) -> str:
     """A cell for people.
 
-    >>> [said(v) for v in (None, float("inf"), 1234.5678, 7, "a")]
+    >>> [shown(v) for v in (None, float("inf"), 1234.5678, 7, "a")]
     ['–', '∞', '1235', '7', 'a']
     """
     if cell is None:

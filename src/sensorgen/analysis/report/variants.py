@@ -1,14 +1,22 @@
-"""The variants of an iteration: drawings and bodies."""
+"""The variants of an iteration: drawings, bodies, and whether each can sense force and position."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import nan
+from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison, Predicted
-from sensorgen.analysis.report.charts import Body
+from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, Body, Curve, Figure, Panel
+from sensorgen.analysis.report.tables import Column, Table
 from sensorgen.checks.review import draw, review
+from sensorgen.core.units import M_PER_MM
 from sensorgen.design import materials
 from sensorgen.design.design import Design
+from sensorgen.prediction.identifiability import FORCE_N, Identifiability
 from sensorgen.scene.geometry.meshes import mesh
+
+_STRETCH = (1.0, 1.0, 10.0)
+_F_PER_PF = 1e-12
 
 
 @dataclass(frozen=True)
@@ -22,13 +30,24 @@ class Variant:
     svg : str
         Its drawing.
     words : str
-        What it is and should measure.
+        Its prediction.
     """
 
     design: str
     design_id: str
     svg: str
     words: str
+
+
+@dataclass(frozen=True)
+class IdentifiabilityRow:
+    """Least standard errors of force and position of a design, and the verdict."""
+
+    design: Annotated[str, Column("design")]
+    force_n: Annotated[float, Column("standard error of force", "N")]
+    position_mm: Annotated[float, Column("standard error of position", "mm")]
+    correlation: Annotated[float, Column("correlation")]
+    verdict: Annotated[str, Column("verdict")]
 
 
 def variants(found: Comparison) -> tuple[Variant, ...]:
@@ -42,14 +61,73 @@ def variants(found: Comparison) -> tuple[Variant, ...]:
 def _words(of: Predicted) -> str:
     r, c = of.ry_ohm, of.capacitance_f
     parts = [
-        f"R_Y {r.lower:.4g} to {r.upper:.4g} ohm" if r else "R_Y unknown",
-        f"C {c.lower * 1e12:.4g} to {c.upper * 1e12:.4g} pF" if c else f"no capacitance: {of.reason}",
+        f"electrode resistance {r.lower:.4g} to {r.upper:.4g} ohm" if r else "electrode resistance unknown",
+        f"capacitance {c.lower / _F_PER_PF:.4g} to {c.upper / _F_PER_PF:.4g} pF"
+        if c
+        else f"no capacitance: {of.reason}",
         of.provenance,
     ]
     return "; ".join(parts)
 
 
-def bodies(design: Design) -> Iterator[Body]:
+def identifiability(found: Comparison) -> tuple[Table, ...]:
+    """A row for each variant with a prediction."""
+    rows = tuple(_row(name, of.prediction.identifiability, of.reason) for name, of in found.predictions.items())
+    caption = f"Predicted identifiability of {FORCE_N:g} N in the middle, by seven frequencies (Cramér-Rao)"
+    return (Table("identifiability", caption, rows),) if rows else ()
+
+
+def _row(name: str, found: Identifiability | None, reason: str) -> IdentifiabilityRow:
+    if found is None:
+        return IdentifiabilityRow(name, nan, nan, nan, reason or "no prediction")
+    force, place, together = (
+        nan if value is None else value for value in (found.sigma_force_n, found.sigma_position_m, found.correlation)
+    )
+    return IdentifiabilityRow(name, force, place / M_PER_MM, together, found.verdict)
+
+
+def figures(found: Comparison) -> Iterator[Figure]:
+    """Standard errors over position for three forces, and the bodies; of every variant, one at a time."""
+    cards = {name: of.prediction.identifiability for name, of in found.predictions.items()}
+    known = {name: errors(card) for name, card in cards.items() if card}
+    if known:
+        yield Figure(
+            "identifiability-map", "Predicted standard errors of force and position",
+            "Least standard error (Cramér-Rao) of force above, of position below, over the position of the load, for "
+            "the frequencies and noise of the prediction. Dashed: required. Gaps: undefined.", known, "variant",
+        )  # fmt: skip
+    if found.designs:
+        axes = Axis("x [mm]"), Axis("y [mm]"), Axis("z [mm]")
+        yield Figure(
+            "bodies", f"Bodies, height x {_STRETCH[2]:g}",
+            "The bodies of the chosen variant, to be turned with the mouse, their height enlarged. The drawings show "
+            "them in section.",
+            {name: (Panel(tuple(_bodies(design)), *axes),) for name, design in found.designs.items()}, "variant",
+            stretch=_STRETCH,
+        )  # fmt: skip
+
+
+def errors(found: Identifiability) -> tuple[Panel, Panel]:
+    """Standard errors over position [mm], for a weak, a middling and the greatest force."""
+    over, required = found.map, found.required
+    place, panels = [x / M_PER_MM for x in over.position_m], []
+    for quantity, unit, sigma, needed, per in (
+        ("force", "N", over.sigma_force_n, required.sigma_force_n, 1.0),
+        ("position", "mm", over.sigma_position_m, required.sigma_position_m, M_PER_MM),
+    ):
+        curves = [
+            Curve("line", f"{over.force_n[k]:g} N", place, [nan if v is None else v / per for v in sigma[k]],
+                  colour=colour)
+            for k, colour in zip((1, len(sigma) // 2, len(sigma) - 1), (SKY, BLUE, ORANGE), strict=True)
+        ]  # fmt: skip
+        need = [nan if needed is None else needed / per] * 2
+        curves.append(Curve("line", "required", [place[0], place[-1]], need, colour=GREY, dash="dash"))
+        y = Axis(f"error of {quantity} [{unit}]", log=True)
+        panels.append(Panel(tuple(curves), Axis("position of the tip's centre [mm]"), y))
+    return panels[0], panels[1]
+
+
+def _bodies(design: Design) -> Iterator[Body]:
     """The bodies of the sensor in use, as triangles."""
     for body in design.in_use.bodies:
         made = mesh(body)

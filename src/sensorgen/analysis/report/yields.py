@@ -1,21 +1,61 @@
-"""Verdicts and yield, and what the multimeter says of shorts by film and by shape."""
+"""Verdicts and yield: shorts and leaks by film and by shape, as the multimeter shows them."""
 
-from collections.abc import Callable, Hashable, Iterator
-from math import isnan
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison
-from sensorgen.analysis.report.tables import Cell, Column, Table, table
+from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, Axis, Curve, Figure, Panel
+from sensorgen.analysis.report.electrodes import VERDICT_COLOURS
+from sensorgen.analysis.report.tables import Cell, Column, Table
 from sensorgen.measure.signal.verdicts import ORDER, WORDS, Evidence
 from sensorgen.measure.signal.yields import Group, Share, dependence, groups
 
+MOST_POINTS = 3000  # that a browser draws at once
+_SYMBOLS = {"tri": "circle", "rect": "square", "reference": "diamond", "double": "cross"}
+
+
+def _film(of: Evidence) -> str:
+    return f"{of.film_mm:g} mm" if of.film_mm is not None else "unknown"
+
+
 BY: dict[str, Callable[[Evidence], tuple[Hashable, ...]]] = {
     "shape": lambda of: (of.shape or "unknown",),
-    "film": lambda of: (f"{of.film_mm:g} mm" if of.film_mm is not None else "unknown",),
-    "shape and film": lambda of: (of.shape or "unknown", f"{of.film_mm:g} mm" if of.film_mm is not None else "unknown"),
+    "film": lambda of: (_film(of),),
+    "shape and film": lambda of: (of.shape or "unknown", _film(of)),
     "remark": lambda of: (of.remark or "none",),
 }
-TESTED = ("film", "shape")  # groups that are asked whether they differ
-DIFFER = 0.05 / len(TESTED)  # probability by chance below which one is said to: all together by chance in 1 of 20 logs
+TESTED = ("film", "shape")  # groups that are tested for a difference
+DIFFER = 0.05 / len(TESTED)  # p value below which one is affirmed: together wrong in 1 of 20 logs
+
+
+@dataclass(frozen=True)
+class YieldRow:
+    """Specimens that have something in common."""
+
+    by: Annotated[str, Column("grouped by")]
+    group: Annotated[str, Column("group")]
+    specimens: Annotated[int, Column("specimens")]
+    open_electrode: Annotated[int, Column("open electrode")]
+    short: Annotated[int, Column("short")]
+    leak: Annotated[int, Column("leak")]
+    dry_joint: Annotated[int, Column("dry joint")]
+    intact: Annotated[int, Column("intact")]
+    unknown: Annotated[int, Column("unknown")]
+    yield_percent: Annotated[
+        Cell, Column("yield", "%", "intact specimens of those with a verdict; shorts by design left out")
+    ]
+    yield_from: Annotated[Cell, Column("yield from", "%", "95 % confidence")]
+    yield_to: Annotated[Cell, Column("yield to", "%", "95 % confidence")]
+    shorted: Annotated[
+        int, Column("shorted or leaking", "", f"film resistance at most {ORDER:g} times the electrode's")
+    ]
+    total: Annotated[int, Column("of", "", "specimens with both resistances; shorts by design left out")]
+    share_percent: Annotated[Cell, Column("share", "%")]
+    share_from: Annotated[Cell, Column("share from", "%", "95 % confidence")]
+    share_to: Annotated[Cell, Column("share to", "%", "95 % confidence")]
+    median_ratio: Annotated[float, Column("median film / electrode", "", "ratio of the two resistances")]
 
 
 def judged(found: Comparison, by: str) -> list[Group]:
@@ -28,98 +68,153 @@ def everything(found: Comparison) -> Group:
     return groups([(row.evidence, row.verdict) for row in found.last], lambda _: ())[0]
 
 
+def headline(found: Comparison) -> Iterator[str]:
+    """The yield, in one sentence."""
+    whole = everything(found).intact
+    if len(found.last) == 1:
+        yield f"Verdict of {found.last[0].reading.specimen}: {found.last[0].verdict.word}."
+    elif whole.total:
+        which = "None" if not whole.count else "All" if whole.count == whole.total else f"{whole.count}"
+        verb = "is" if whole.count in (0, 1) and which != "All" else "are"
+        yield f"{which} of the {whole.total} testable sensors {verb} intact: yield {_range(whole)}, 95 % confidence."
+
+
 def findings(found: Comparison) -> Iterator[str]:
-    """What the groups say, in sentences."""
-    whole = everything(found)
-    yield from _shorted(found, whole)
-    if whole.intact.total:
+    """Shorts and leaks of all sensors, and of groups."""
+    both = [row for row in found.last if row.verdict.same_order is not None]
+    if len(both) < 2:
+        return
+    such, whole = [row for row in both if row.verdict.same_order], everything(found)
+    design = sum(row.evidence.touching for row in such)
+    doubtful = sum(row.verdict.electrode != "sound" for row in such)
+    of = ", ".join(f"{n} {words}" for n, words in ((design, "by design"), (doubtful, "with a doubtful electrode")) if n)
+    yield (
+        f"{len(such)} of {len(both)} sensors are shorted or leaking{f' ({of})' if of else ''}: film "
+        f"resistance at most {ORDER:g} times the electrode's. Median ratio {whole.median_ratio:.3g}."
+    )
+    if design and whole.shorted.total:
         yield (
-            f"{whole.intact.count} of {whole.intact.total} specimens that allow a verdict, and whose electrodes do not "
-            f"touch as drawn, are intact: a yield of {_range(whole.intact)}."
+            f"Without those shorted by design: {whole.shorted.count} of {whole.shorted.total} are shorted or leaking, "
+            f"{_range(whole.shorted)} of such prints, 95 % confidence."
         )
     for by in TESTED:
-        yield from _dependence(judged(found, by), by)
-
-
-def _shorted(found: Comparison, whole: Group) -> Iterator[str]:
-    both = [row for row in found.last if row.verdict.same_order is not None]
-    if not both:
-        return
-    such = [row for row in both if row.verdict.same_order]
-    yield (
-        f"{len(such)} of {len(both)} specimens with both resistances have an R_Z of the order of R_Y or below (up to "
-        f"{ORDER:g} times), {sum(row.evidence.touching for row in such)} of them shorts by design, "
-        f"{sum(row.verdict.electrode != 'sound' for row in such)} beside an R_Y that is no sound electrode's. Median "
-        f"R_Z / R_Y: {whole.median_ratio:.3g}."
-    )
-    if whole.shorted.total:
-        yield (
-            f"Without those whose electrodes touch as drawn: {whole.shorted.count} of {whole.shorted.total}; "
-            f"{_range(whole.shorted)} of such prints are shorted or leak as much, at 95 % confidence."
-        )
+        known = [g for g in judged(found, by) if g.shorted.total]
+        if len(known) > 1:
+            chance = dependence(known)
+            parts = ", ".join(f"{_name(g)}: {g.shorted.count} of {g.shorted.total}" for g in known)
+            differ = "a significant difference" if chance < DIFFER else "no significant difference"
+            yield f"Shorted or leaking by {by}: {parts}; {differ} (p = {chance:.2g})."
 
 
 def _range(share: Share) -> str:
-    return f"{100 * share.low:.3g} to {100 * share.high:.3g} %"
-
-
-def _dependence(found: list[Group], by: str) -> Iterator[str]:
-    known = [g for g in found if g.shorted.total]
-    if len(known) < 2:
-        return
-    chance = dependence(known)
-    parts = ", ".join(f"{_key(g)}: {g.shorted.count} of {g.shorted.total}" for g in known)
-    differ = "differ" if chance < DIFFER else "do not differ more than chance makes them"
-    yield f"By {by}: {parts}. The groups {differ} (p = {chance:.2g})."
-
-
-def _key(group: Group) -> str:
-    return ", ".join(map(str, group.key))
-
-
-def words(found: Comparison) -> tuple[str, ...]:
-    """How verdicts come about, and what is counted."""
-    earlier = len(found.rows) - len(found.last)
     return (
-        "The verdict is the gravest of what the readings of electrode and film show. An electrode is held against the "
-        "median of its own shape. R_Z up to the two electrodes in series is what a bridge may read: a short; above, "
-        "and below the meter's highest range, the film leaks.",
-        "Each specimen counts once, with its last reading"
-        + (f"; {earlier} earlier readings count for nothing here. " if earlier else ". ")
-        + "Specimens whose electrodes touch as drawn have a verdict, but count for no share: they are shorts however "
-        "well they were printed. Intervals are Clopper's and Pearson's, at 95 %. Whether groups differ is asked of "
-        "film and of shape (Fisher's exact test, for more groups Freeman's and Halton's), and affirmed below "
-        f"p = {DIFFER:g}, half of 0.05; every other comparison of groups here is exploratory, and proves nothing.",
+        f"{100 * share.low:.2g} to {100 * share.high:.2g} %"
+        if share.count < share.total
+        else f"{100 * share.low:.2g} to 100 %"
     )
 
 
-def tables(found: Comparison) -> tuple[Table, ...]:
-    """Yield by every kind of group."""
-    return tuple(_table(judged(found, by), by) for by in BY)
+def _name(group: Group) -> str:
+    return ", ".join(map(str, group.key))
 
 
-def _table(found: list[Group], by: str) -> Table:
-    parts = by.split(" and ")
-    columns = [
-        *(Column(part) for part in parts), Column("specimens"), *(Column(word) for word in WORDS),
-        Column("intact", "%"), Column("from", "%"), Column("to", "%"),
-        Column("R_Z of the order of R_Y"), Column("of"), Column("share", "%"), Column("share from", "%"),
-        Column("share to", "%"), Column("median R_Z / R_Y"),
-    ]  # fmt: skip
-    caption = f"Verdicts and yield by {by}"
-    if by in TESTED and sum(bool(g.shorted.total) for g in found) > 1:
-        caption += f"; differences in shorts as large by chance alone: p = {dependence(found):.2g}"
-    return table(f"yield_by_{by.replace(' ', '_')}", caption, columns, [_row(g) for g in found])
+def notes(found: Comparison) -> tuple[str, ...]:
+    """How verdicts come about, and what is counted."""
+    how = (
+        "The verdict is the gravest of the electrode's and the film's. An electrode is compared with the median of its "
+        "own shape. A film resistance up to that of two electrodes in series is a short; above, and below the meter's "
+        "highest range, the film leaks."
+    )
+    if len(found.last) == 1:
+        return (how,)
+    earlier = len(found.rows) - len(found.last)
+    more = f"; {earlier} earlier readings are not counted" if earlier else ""
+    return (
+        how,
+        f"Each specimen counts once, with its last reading{more}. Specimens shorted by design have a verdict, but "
+        "count for no share. Intervals are Clopper's and Pearson's. Differences between films and between shapes are "
+        f"tested (Fisher; Freeman and Halton) and affirmed below p = {DIFFER:g}; every other comparison of groups is "
+        "exploratory.",
+    )
 
 
-def _row(g: Group) -> list[Cell]:
-    return [
-        *map(str, g.key), sum(g.words.values()), *(g.words.get(word, 0) for word in WORDS),
-        *_percents(g.intact), g.shorted.count, g.shorted.total, *_percents(g.shorted),
-        None if isnan(g.median_ratio) else g.median_ratio,
-    ]  # fmt: skip
+def table(found: Comparison) -> Table:
+    """Verdicts, yield and shorts of all specimens, and by each grouping that has more than one group."""
+    rows = [_row("all", "all", everything(found))]
+    for by in BY:
+        known = judged(found, by)
+        alone = by == "shape and film" and any(len(judged(found, part)) < 2 for part in TESTED)
+        rows += [_row(by, _name(g), g) for g in known if len(known) > 1 and not alone]
+    return Table("yield", "Verdicts and yield", tuple(rows))
+
+
+def _row(by: str, name: str, g: Group) -> YieldRow:
+    opened, short, leak, dry, intact, unknown = (g.words.get(word, 0) for word in WORDS)
+    return YieldRow(
+        by, name, sum(g.words.values()), opened, short, leak, dry, intact, unknown, *_percents(g.intact),
+        g.shorted.count, g.shorted.total, *_percents(g.shorted), g.median_ratio,
+    )  # fmt: skip
 
 
 def _percents(of: Share) -> tuple[Cell, Cell, Cell]:
-    """Share and its interval; nothing of nothing."""
     return (100 * of.share, 100 * of.low, 100 * of.high) if of.total else (None, None, None)
+
+
+def figures(found: Comparison) -> tuple[Figure, ...]:
+    """Film resistance over the electrode's, and verdicts and shorts by shape and film; none of one specimen."""
+    if len(found.last) < 2:
+        return ()
+    known = judged(found, "shape and film")
+    return (*_ratios(found), _counts(known), *_shares(known))
+
+
+def _ratios(found: Comparison) -> Iterator[Figure]:
+    rows = [r for r in found.rows if isfinite(r.verdict.ratio) and r.verdict.rz_ohm > 0]
+    if not rows:
+        return
+    every, rows = len(rows), rows[:: -(-len(rows) // MOST_POINTS)]
+    ends = [min(r.verdict.ry_ohm for r in rows) / 1.5, max(r.verdict.ry_ohm for r in rows) * 1.5]
+    curves = [
+        Curve("line", f"film = {factor:g} x electrode", ends, [factor * x for x in ends], colour=GREY, dash=dash)
+        for factor, dash in ((2.0, "solid"), (ORDER, "dash"))
+    ]
+    for shape in sorted({r.reading.shape for r in rows}):
+        here = [r for r in rows if r.reading.shape == shape]
+        curves.append(
+            Curve("points", shape, [r.verdict.ry_ohm for r in here], [r.verdict.rz_ohm for r in here],
+                  text=[f"{r.reading.specimen}: {r.verdict.word}" for r in here],
+                  colour=BLUE if shape == "tri" else ORANGE, symbol=_SYMBOLS.get(shape, "x"))
+        )  # fmt: skip
+    zero, overload = (sum(r.verdict.rz_ohm == value for r in found.rows) for value in (0, inf))
+    x, y = Axis("electrode resistance [ohm]", log=True), Axis("film resistance [ohm]", log=True)
+    yield Figure(
+        "shorts", "Film resistance over electrode resistance",
+        f"Both logarithmic, for {len(rows)} of {every} readings. Below the solid line a bridge explains the reading; "
+        f"below the dashed one the sensor is shorted or leaking. Not on the axis: {zero} readings of 0 ohm, {overload} "
+        "of overload.", {"": (Panel(tuple(curves), x, y),)},
+    )  # fmt: skip
+
+
+def _counts(known: Sequence[Group]) -> Figure:
+    names = tuple(map(_name, known))
+    curves = tuple(
+        Curve("bars", word, [float(g.words.get(word, 0)) for g in known], names, colour=VERDICT_COLOURS[word])
+        for word in WORDS if any(g.words.get(word) for g in known)
+    )  # fmt: skip
+    alt = "Number of specimens of each shape and film with each verdict."
+    return Figure("verdict-counts", "Verdicts by shape and film", alt,
+                  {"": (Panel(curves, Axis("specimens"), Axis(names=names)),)})  # fmt: skip
+
+
+def _shares(known: Sequence[Group]) -> Iterator[Figure]:
+    known = [g for g in known if g.shorted.total]
+    if not known:
+        return
+    names, shares = tuple(map(_name, known)), [g.shorted for g in known]
+    curve = Curve(
+        "points", "share, 95 % confidence", [100 * s.share for s in shares], names, [100 * s.low for s in shares],
+        [100 * s.high for s in shares], [f"{s.count} of {s.total}" for s in shares],
+    )  # fmt: skip
+    panel = Panel((curve,), Axis("share [%]", low=0.0, high=102.0), Axis(names=names))
+    alt = f"Share of specimens whose film resistance is at most {ORDER:g} times the electrode's, with exact intervals."
+    yield Figure("shorted", "Shorted or leaking, by shape and film", alt, {"": (panel,)})

@@ -1,114 +1,105 @@
-"""``batch.json`` of a print bed to rows of the log: which specimens came from it, their designs and predictions."""
+"""Import the record of a print bed, ``batch.json``: its specimens with their designs and predictions."""
 
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from pydantic import Field
+
 from sensorgen import __version__
 from sensorgen.core.errors import BadInput
-from sensorgen.core.records import shown
+from sensorgen.core.records import Strict, checked
+from sensorgen.measure.log import notes
 from sensorgen.measure.log.entries import Batch, Entry, Prediction, Print, RawFile
 from sensorgen.measure.log.verify import prediction_uid
-from sensorgen.measure.log.words import named
 
 MOST_BYTES = 64_000_000
 
 
+class _Piece(Strict, extra="ignore"):
+    """One specimen on the bed; version 0.1.0 has its prediction in ``expected``."""
+
+    design_id: str = Field(min_length=1)
+    design: str
+    expected: dict[str, Any] | None = None
+
+
+class _Slicer(Strict, extra="ignore"):
+    """Predictions of the designs as one slicer prints them, by design."""
+
+    printed: dict[str, dict[str, Any]] | None = None
+
+
+class _Record(Strict, extra="ignore"):
+    """The parts of ``batch.json`` that are logged."""
+
+    specimens: dict[str, _Piece]
+    predictions: dict[str, dict[str, Any]] | None = None
+    batch: str | None = None
+    slicers: dict[str, _Slicer] | None = None
+
+
 def rows(path: Path, file: RawFile) -> Iterator[Entry]:
-    """Everything that a print bed brings into the log.
+    """Rows of a print bed: its file, the batch, and the prints with their predictions.
 
     Parameters
     ----------
     path : Path
         ``batch.json``.
     file : RawFile
-        The same, as it is kept.
+        Its row as a raw file.
 
     Raises
     ------
     BadInput
-        Not the record of a batch; with the file's name, and the specimen's.
+        Not the record of a batch; with the file's name, and the key.
     """
-    record = _record(path)
-    batch = str(record.get("batch") or path.absolute().parent.name)
-    yield file
-    yield Batch(uid=file.uid, batch=batch, file=file.uid)
-    printed = _as_printed(record, str(path))
-    pieces = _mapping(record.get("specimens"), f"{path}: specimens").items()
-    predictions = _mapping(record.get("predictions") or {}, f"{path}: predictions")
-    found = (
-        row
-        for written, piece in pieces
-        for row in _of_piece(
-            file.uid, written, _mapping(piece, f"{path}: specimen {written}"), predictions, printed, str(path)
-        )
-    )
-    yield from dict.fromkeys(found)  # copies of one design share a prediction
-
-
-def _as_printed(record: Mapping[str, Any], where: str) -> dict[str, dict[str, Any]]:
-    """What each slicer prints of each design, by the design and the slicer; none where the print was not read back."""
-    found: dict[str, dict[str, Any]] = {}
-    for slicer, used in _mapping(record.get("slicers") or {}, f"{where}: slicers").items():
-        printed = _mapping(used, f"{where}: slicer {slicer}").get("printed") or {}
-        for design_id, report in _mapping(printed, f"{where}: printed by {slicer}").items():
-            found.setdefault(design_id, {})[slicer] = report
-    return found
-
-
-def _of_piece(
-    batch: str,
-    written: str,
-    piece: Mapping[str, Any],
-    predictions: Mapping[str, Any],
-    printed: Mapping[str, Any],
-    where: str,
-) -> Iterator[Entry]:
-    design_id, design = piece.get("design_id"), piece.get("design")
-    if not isinstance(design_id, str) or not isinstance(design, str) or not design_id:
-        raise BadInput(f"{where}: specimen {written}: design_id is {shown(design_id)}; expected text")
     try:
-        specimen, _ = named(written)
+        record = checked(_Record, _json(path))
+        yield file
+        yield Batch(uid=file.uid, batch=record.batch or path.absolute().parent.name, file=file.uid)
+        pieces = (row for name, piece in record.specimens.items() for row in _piece(file.uid, name, piece, record))
+        yield from dict.fromkeys(pieces)  # copies of one design share a prediction
     except BadInput as error:
-        raise error.within(where) from None
-    uid = f"{batch} {specimen['specimen']}"
-    yield Print(uid=uid, batch_uid=batch, design_id=design_id, design=design, **specimen)  # type: ignore[arg-type]
-    if design_id in predictions:
-        yield prediction(design_id, design, _mapping(predictions[design_id], f"{where}: prediction of {design}"))
-    elif piece.get("expected"):  # of version 0.1.0
-        expected = _mapping(piece["expected"], f"{where}: specimen {written}: expected")
-        beside = {"printed": printed[design_id]} if design_id in printed else {}
-        yield prediction(design_id, design, expected | beside)
+        raise error.within(str(path)) from None
+
+
+def _piece(batch: str, name: str, piece: _Piece, record: _Record) -> Iterator[Entry]:
+    of = notes.specimen(name)
+    yield Print(
+        **vars(of), uid=f"{batch} {of.specimen}", batch_uid=batch, design_id=piece.design_id, design=piece.design
+    )
+    if record.predictions and piece.design_id in record.predictions:
+        yield prediction(piece.design_id, piece.design, record.predictions[piece.design_id])
+    elif piece.expected:
+        slicers = (record.slicers or {}).items()
+        printed = {slicer: used.printed[piece.design_id] for slicer, used in slicers
+                   if used.printed and piece.design_id in used.printed}  # fmt: skip
+        yield prediction(piece.design_id, piece.design, piece.expected | ({"printed": printed} if printed else {}))
 
 
 def prediction(design_id: str, design: str, data: Mapping[str, Any]) -> Prediction:
-    """What a design is expected to measure, as a row of the log.
+    """Row of a design's prediction.
 
     Parameters
     ----------
     design_id, design : str
         Identity and name of the design.
     data : mapping
-        The prediction, as plain data.
+        The prediction, as JSON has it.
     """
     text = json.dumps(data, ensure_ascii=False, sort_keys=True)
     unnamed = Prediction(uid="", design_id=design_id, design=design, version=__version__, data=text)
     return Prediction(**vars(unnamed) | {"uid": prediction_uid(unnamed)})
 
 
-def _record(path: Path) -> dict[str, Any]:
+def _json(path: Path) -> Any:
     try:
         if path.stat().st_size > MOST_BYTES:
-            raise BadInput(f"{path}: {path.stat().st_size} bytes; expected the record of a batch")
-        return _mapping(json.loads(path.read_text("utf-8")), str(path))
+            raise BadInput(f"{path.stat().st_size} bytes; expected the record of a batch")
+        return json.loads(path.read_text("utf-8"))
     except OSError as error:
-        raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None
+        raise BadInput(f"cannot read it: {error.strerror or error}") from None
     except (ValueError, RecursionError) as error:
-        raise BadInput(f"{path}: not the record of a batch: {str(error)[:100]}") from None
-
-
-def _mapping(data: object, where: str) -> dict[str, Any]:
-    if not isinstance(data, dict):
-        raise BadInput(f"{where} holds {shown(data)}; expected a mapping, as in the record of a batch")
-    return data
+        raise BadInput(f"not the record of a batch: {str(error)[:100]}") from None

@@ -1,7 +1,7 @@
-"""The log's SQLite file: opened, checked and brought up to date; all or nothing is written, and then it stays.
+"""Open, check and migrate the log's SQLite file; transactions that survive a crash.
 
-A commit has reached the disk before it returns (WAL, ``synchronous=FULL``). A new file is made whole beside its
-place and then linked there, so that two who start at once share one log, and a killed one leaves none behind.
+A commit is on the disk before it returns (WAL, ``synchronous=FULL``). A new file is completed beside its path and then
+linked there, so that two programs that start at once share one log, and a killed program leaves no incomplete log.
 """
 
 import os
@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from sensorgen.core.errors import BadInput, SensorgenError, Unwritable
-from sensorgen.measure.log.leftovers import part_of, sweep
+from sensorgen.measure.log.durable import part_of, remove_stale_parts, sync_folder
 from sensorgen.measure.log.schema import APPLICATION_ID, STEPS, VERSION
 
 WAIT_S = 20.0  # for another writer to finish
@@ -27,31 +27,31 @@ _UNWRITABLE = (
 
 
 def connect(path: Path, *, create: bool) -> sqlite3.Connection:
-    """Open a log, and make it if it is not there and may be made.
+    """Open a log and bring it up to date.
 
     Parameters
     ----------
     path : Path
         The file.
     create : bool
-        Whether to make a new log where there is none.
+        Whether to create a missing file.
 
     Raises
     ------
     BadInput
-        There is none, or the file is no log, damaged, or of a newer sensorgen.
+        The file is missing, no log, damaged, or of a newer sensorgen.
     Unwritable
-        It cannot be made or brought up to date.
+        The file cannot be created or migrated.
     """
-    with told(path):
+    with translate_errors(path):
         if not os.path.lexists(path):
             if not create:
                 raise BadInput(f"no log at {str(path)!r}: log something first, or name another with --log")
-            _make(path)
+            _create(path)
         _check_header(path)
         connection = _open(path)
         try:
-            _bring_up_to_date(connection, path)
+            _migrate(connection, path)
             _check_tables(connection, path)
         except BaseException:
             connection.close()
@@ -61,14 +61,14 @@ def connect(path: Path, *, create: bool) -> sqlite3.Connection:
 
 @contextmanager
 def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[None]:
-    """All that is written inside is there afterwards, and on the disk, or nothing of it.
+    """Commit everything that is written inside to the disk, or nothing.
 
     Raises
     ------
     Unwritable
-        The disk is full or read-only, or another program keeps the log to itself.
+        The disk is full or read-only, or another program holds the lock.
     """
-    with told(path):
+    with translate_errors(path):
         connection.execute("BEGIN IMMEDIATE")
         try:
             yield
@@ -80,12 +80,12 @@ def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def told(path: Path) -> Iterator[None]:
-    """What SQLite has to complain of, in our words."""
+def translate_errors(path: Path) -> Iterator[None]:
+    """Translate errors of sqlite3 and of the file system to BadInput and Unwritable."""
     try:
         yield
     except sqlite3.Error as error:
-        raise _in_our_words(error, str(path)) from None
+        raise _translated(error, str(path)) from None
     except UnicodeDecodeError as error:
         raise _damaged(str(path), f"text that is no UTF-8: {error.object[:20]!r}") from None
     except UnicodeEncodeError as error:
@@ -96,14 +96,14 @@ def told(path: Path) -> Iterator[None]:
         raise Unwritable(f"cannot use the log {str(path)!r}: {error.strerror or error}") from None
 
 
-def _in_our_words(error: sqlite3.Error, path: str) -> SensorgenError:
+def _translated(error: sqlite3.Error, path: str) -> SensorgenError:
     code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
     if code in _BUSY:
-        return Unwritable(f"another program keeps the log {path!r} to itself; nothing was logged, try again")
+        return Unwritable(f"another program has locked the log {path!r}; nothing was logged, try again")
     if code in _UNWRITABLE:
         return Unwritable(f"cannot write to the log {path!r}: {error}; nothing was logged")
     if code == sqlite3.SQLITE_CONSTRAINT:
-        return BadInput(f"the log {path!r} does not take this: {error}")
+        return BadInput(f"the log {path!r} does not accept this row: {error}")
     return _damaged(path, str(error))
 
 
@@ -126,8 +126,11 @@ def _check_header(path: Path) -> None:
 
 
 def _open(path: Path) -> sqlite3.Connection:
-    how = "mode=rw" if _writable(path) else "immutable=1"
-    connection = sqlite3.connect(f"{path.absolute().as_uri()}?{how}", uri=True, timeout=WAIT_S, isolation_level=None)
+    own = {"effective_ids": True} if os.access in os.supports_effective_ids else {}
+    # without write permission and without a write-ahead log beside it, the file cannot change while it is read
+    writable = os.access(path.parent, os.W_OK, **own) or Path(f"{path}-wal").exists()
+    uri = f"{path.absolute().as_uri()}?{'mode=rw' if writable else 'immutable=1'}"
+    connection = sqlite3.connect(uri, uri=True, timeout=WAIT_S, isolation_level=None)
     try:
         for pragma in (
             "trusted_schema = OFF", "cell_size_check = ON", "foreign_keys = ON", "recursive_triggers = ON",
@@ -140,61 +143,46 @@ def _open(path: Path) -> sqlite3.Connection:
     return connection
 
 
-def _writable(path: Path) -> bool:
-    """Whether this user may write there; where not, a log without a write-ahead log beside it cannot change either."""
-    own = {"effective_ids": True} if os.access in os.supports_effective_ids else {}
-    return os.access(path.parent, os.W_OK, **own) or Path(f"{path}-wal").exists()
-
-
-def _make(path: Path) -> None:
-    """Make an empty log beside its place, and link it there unless somebody else was first."""
-    fresh = [folder for folder in path.parents if not folder.exists()]
+def _create(path: Path) -> None:
+    """Write an empty log beside its path, and link it there unless another program was first."""
+    new_folders = [folder for folder in path.parents if not folder.exists()]
     path.parent.mkdir(parents=True, exist_ok=True)
-    sweep(path.parent)
+    remove_stale_parts(path.parent)
     part = part_of(path)
     try:
         with part.open("wb") as file:
             file.write(_empty())
             file.flush()
             os.fsync(file.fileno())
-        _put(part, path)
-        for folder in (path.parent, *(made.parent for made in fresh)):
-            _to_disk(folder)
+        try:
+            os.link(part, path)
+        except FileExistsError:
+            pass
+        except OSError:  # a file system without links
+            part.rename(path)
+        for folder in (path.parent, *(new.parent for new in new_folders)):
+            sync_folder(folder)
     finally:
         with suppress(OSError):
             part.unlink()
 
 
-def _put(part: Path, path: Path) -> None:
-    try:
-        os.link(part, path)
-    except FileExistsError:
-        pass
-    except OSError:  # a file system without links
-        part.rename(path)
-
-
 def _empty() -> bytes:
-    """An empty log as it is on disk."""
-    connection = sqlite3.connect(":memory:", isolation_level=None)
+    """Content of an empty log file."""
+    connection = _in_memory()
     try:
         connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-        _take_steps(connection, 0)
         content = bytearray(connection.serialize())
     finally:
         connection.close()
-    content[_FORMAT] = _WAL  # SQLite's file format, 1.3: memory has no write-ahead log that it could be told to keep
+    content[_FORMAT] = _WAL  # file format 1.3 of SQLite: a database in memory cannot be switched to WAL
     return bytes(content)
 
 
-def _to_disk(path: Path) -> None:
-    if os.name == "nt" and path.is_dir():
-        return
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+def _in_memory() -> sqlite3.Connection:
+    connection = sqlite3.connect(":memory:", isolation_level=None)
+    _take_steps(connection, 0)
+    return connection
 
 
 def _take_steps(connection: sqlite3.Connection, version: int) -> None:
@@ -204,7 +192,7 @@ def _take_steps(connection: sqlite3.Connection, version: int) -> None:
     connection.execute(f"PRAGMA user_version = {VERSION}")
 
 
-def _bring_up_to_date(connection: sqlite3.Connection, path: Path) -> None:
+def _migrate(connection: sqlite3.Connection, path: Path) -> None:
     version = _version(connection)
     if version > VERSION or version < 1:
         raise BadInput(
@@ -212,7 +200,7 @@ def _bring_up_to_date(connection: sqlite3.Connection, path: Path) -> None:
         )
     if version < VERSION:
         with transaction(connection, path):
-            _take_steps(connection, _version(connection))  # another may have been faster
+            _take_steps(connection, _version(connection))  # another program may have migrated it meanwhile
 
 
 def _version(connection: sqlite3.Connection) -> int:
@@ -220,19 +208,16 @@ def _version(connection: sqlite3.Connection) -> int:
 
 
 def _check_tables(connection: sqlite3.Connection, path: Path) -> None:
-    """Refuse a file whose tables or triggers are not those of the version that it claims."""
-    fresh = sqlite3.connect(":memory:", isolation_level=None)
+    """Refuse a file whose tables or triggers are not those of this version."""
+    sound = _in_memory()
     try:
-        _take_steps(fresh, 0)
-        wanted = _objects(fresh)
+        expected, present = (
+            set(database.execute("SELECT type, name, sql FROM sqlite_schema WHERE sql IS NOT NULL"))
+            for database in (sound, connection)
+        )
     finally:
-        fresh.close()
-    found = _objects(connection)
-    wrong = (wanted - found) | {thing for thing in found - wanted if thing[0] == "trigger"}
+        sound.close()
+    wrong = (expected - present) | {item for item in present - expected if item[0] == "trigger"}
     if wrong:
         names = ", ".join(sorted({f"{name!r:.40}" for _, name, _ in wrong}))
         raise _damaged(str(path), f"{names:.200} not as sensorgen made it")
-
-
-def _objects(connection: sqlite3.Connection) -> set[tuple[str, str, str]]:
-    return set(connection.execute("SELECT type, name, sql FROM sqlite_schema WHERE sql IS NOT NULL"))

@@ -1,20 +1,25 @@
-"""The log as tables for other programs, CSV or Parquet, and back, exactly.
+"""Export of the log as CSV or Parquet, and the exact way back.
 
-Text that a spreadsheet would take for a formula gets an apostrophe ahead of it, and so does text that begins with one:
-what has lost its first apostrophe on the way back is what it was.
+Spreadsheets run text that begins with ``=``, ``+``, ``-`` or ``@``. Such text gets a leading apostrophe, and so does
+text that begins with an apostrophe: the import removes one, so that every text comes back unchanged.
 """
 
 import csv
 import io
-from collections.abc import Iterable, Iterator, Sequence
+import os
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from sensorgen.core.errors import BadInput, MissingValue
+from sensorgen.core import files as store
+from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
 from sensorgen.measure.log import entries, files
-from sensorgen.measure.log.codec import CODECS
-from sensorgen.measure.log.entries import Entry, RawFile
+from sensorgen.measure.log.durable import part_of
+from sensorgen.measure.log.entries import Entry, RawFile, Reading
+from sensorgen.measure.log.fields import Value, from_cell, from_sql, to_cell, to_sql
 from sensorgen.measure.log.logbook import TABLES, Log
 from sensorgen.measure.log.tables import Sheet
 
@@ -24,58 +29,124 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "'", "＝", "＋", "－", "＠
 
 
 def columns(kind: type[Entry]) -> dict[str, Any]:
-    """Columns of a kind's table, with their types; numbers are this log's own, and no part of it."""
-    return {name: hint for name, hint in entries.columns(kind).items() if name != "number"}
+    """Columns of an exported table with their types: all fields but the row's number in its own log."""
+    return {name: annotation for name, annotation in entries.columns(kind).items() if name != "number"}
 
 
 def kind_of(names: Iterable[str]) -> type[Entry] | None:
-    """The kind of row that a header is of, or None."""
+    """Kind of row with exactly these columns, or None."""
     return next((kind for kind in TABLES if set(columns(kind)) == set(names)), None)
 
 
-def csv_pieces(kind: type[Entry], rows: Iterable[Entry]) -> Iterator[str]:
+def export(log: Log, place: Path) -> int:
+    """Write readings to a ``.csv`` or ``.parquet`` file, or the whole log to a new folder.
+
+    Parameters
+    ----------
+    log : Log
+        An open log.
+    place : Path
+        File or folder.
+
+    Returns
+    -------
+    int
+        Number of rows written.
+
+    Raises
+    ------
+    BadInput
+        The folder exists; or a raw file of the log is missing.
+    Unwritable
+        The file or folder cannot be written.
+    """
+    file_format = place.suffix.lower().removeprefix(".")
+    if file_format in FORMATS:
+        return _write_table(log, Reading, place, file_format)
+    if place.suffix or os.path.lexists(place):
+        raise BadInput(
+            f"cannot export to {str(place)!r}; expected a .csv or .parquet file, or a folder that is not there"
+        )
+    part = part_of(place)
+    try:
+        (part / "files").mkdir(parents=True)
+        rows = sum(_write_table(log, kind, part / f"{name}.csv", "csv") for kind, name in FILES.items())
+        for file in log.entries(RawFile):
+            shutil.copyfile(files.place(log.files, file), part / "files" / file.uid)
+        part.rename(place)
+        return rows
+    except OSError as error:
+        raise Unwritable(f"cannot export to {str(place)!r}: {error.strerror or error}") from None
+    finally:
+        with suppress(OSError):
+            shutil.rmtree(part)
+
+
+def _write_table(log: Log, kind: type[Entry], path: Path, file_format: str) -> int:
+    rows = log.entries(kind, superseded=True)
+    if file_format == "parquet":
+        table = list(rows)
+        store.replace(path, parquet(kind, table))
+        return len(table)
+    count = -1  # the header
+    with store.replacing(path) as file:
+        for line in csv_lines(kind, rows):
+            file.write(line.encode())
+            count += 1
+    return count
+
+
+def csv_lines(kind: type[Entry], rows: Iterable[Entry]) -> Iterator[str]:
     """Rows as CSV, the header first."""
     wanted = columns(kind)
     yield _line(list(wanted))
     for entry in rows:
-        yield _line([_cell(annotation, getattr(entry, name)) for name, annotation in wanted.items()])
+        cells = {name: to_cell(getattr(entry, name)) for name in wanted}
+        yield _line([
+            f"'{cell}" if wanted[name] is str and cell.startswith(_FORMULA) else cell for name, cell in cells.items()
+        ])  # fmt: skip
 
 
-def _line(cells: Sequence[str]) -> str:
+def _line(cells: list[str]) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="\r\n").writerow(cells)  # \n alone leaves a bare \r unquoted
     return text.getvalue()
 
 
-def _cell(annotation: Any, value: Any) -> str:
-    text = CODECS[annotation].text(value)
-    return f"'{text}" if annotation is str and text.startswith(_FORMULA) else text
-
-
-def from_sheet(kind: type[Entry], table: Sheet) -> Iterator[Entry]:
-    """Rows back from CSV.
+def from_sheet(kind: type[Entry], sheet: Sheet) -> Iterator[Entry]:
+    """Rows of an exported CSV table.
 
     Raises
     ------
     BadInput
-        A cell that the log did not write; with file, row and column.
+        A cell that the export did not write; with file, row and column.
     """
-    wanted = columns(kind)
-    for row, number in zip(table.rows, table.numbers, strict=True):
-        yield kind(**{
-            name: _value(wanted[name], cell, f"{table.name}, row {number}, column {name}")
-            for name, cell in zip(table.columns, row, strict=True)
-        })  # fmt: skip
+    for number, cells in zip(sheet.numbers, sheet.rows, strict=True):
+        values = dict(zip(sheet.columns, cells, strict=True))
+        yield _entry(kind, values, f"{sheet.name}, row {number}", _from_cell)
 
 
-def _value(annotation: Any, cell: str, where: str) -> Any:
-    try:
-        return CODECS[annotation].from_text(cell.removeprefix("'") if annotation is str else cell)
-    except (TypeError, ValueError, OverflowError, RecursionError):
-        raise BadInput(f"{where}: {cell!r:.60} is not what the log writes there") from None
+def _from_cell(annotation: Any, cell: str) -> Value:
+    return from_cell(annotation, cell.removeprefix("'") if annotation is str else cell)
 
 
-def parquet(kind: type[Entry], rows: Iterable[Entry]) -> bytes:
+def _from_parquet(annotation: Any, value: Any) -> Value:
+    return from_sql(annotation, to_sql(tuple(value) if isinstance(value, list) else value))
+
+
+def _entry(
+    kind: type[Entry], values: Mapping[str, Any], where: str, convert: Callable[[Any, Any], Value]
+) -> Entry:  # fmt: skip
+    wanted, fields = columns(kind), dict[str, Any]()
+    for name, value in values.items():
+        try:
+            fields[name] = convert(wanted[name], value)
+        except (TypeError, ValueError, KeyError, OverflowError, RecursionError):
+            raise BadInput(f"{where}, column {name}: {value!r:.60} is not what the log writes there") from None
+    return kind(**fields)
+
+
+def parquet(kind: type[Entry], rows: list[Entry]) -> bytes:
     """Rows as Parquet.
 
     Raises
@@ -84,9 +155,13 @@ def parquet(kind: type[Entry], rows: Iterable[Entry]) -> bytes:
         pyarrow is not installed.
     """
     pyarrow = _pyarrow()
-    rows = list(rows)
+    text, integer, number = pyarrow.string(), pyarrow.int64(), pyarrow.float64()
+    types = {
+        str: text, int: integer, int | None: integer, float | None: number, bool | None: pyarrow.bool_(),
+        tuple[float, ...]: pyarrow.list_(number), tuple[str, ...]: pyarrow.list_(text),
+    }  # fmt: skip
     arrays = {
-        name: pyarrow.array([_plain(getattr(row, name)) for row in rows], _arrow_type(annotation))
+        name: pyarrow.array([getattr(row, name) for row in rows], types[annotation])
         for name, annotation in columns(kind).items()
     }
     sink = io.BytesIO()
@@ -95,64 +170,24 @@ def parquet(kind: type[Entry], rows: Iterable[Entry]) -> bytes:
 
 
 def from_parquet(path: Path) -> tuple[type[Entry], list[Entry]]:
-    """Kind and rows back from Parquet.
+    """Kind and rows of an exported Parquet file.
 
     Raises
     ------
     BadInput
-        Not a file that the log wrote.
+        Not a file that the export wrote.
     """
     pyarrow = _pyarrow()
     try:
         table = pyarrow.parquet.read_table(path)
         rows = table.to_pylist()
     except (OSError, ValueError, pyarrow.ArrowException) as error:
-        said = " ".join(str(error).split())
-        raise BadInput(f"{str(path)!r} is no Parquet file that can be read: {said:.200}") from None
+        reason = " ".join(str(error).split())
+        raise BadInput(f"{str(path)!r} is no Parquet file that can be read: {reason:.200}") from None
     kind = kind_of(table.column_names)
     if kind is None:
         raise BadInput(f"{str(path)!r}: columns {shown(table.column_names)}; expected those of the export of a log")
-    wanted = columns(kind)
-    return kind, [
-        kind(**{name: _checked(wanted[name], value, f"{path}, row {k}, column {name}") for name, value in row.items()})
-        for k, row in enumerate(rows, 1)
-    ]
-
-
-def _checked(annotation: Any, value: Any, where: str) -> Any:
-    """A value from Parquet, held against its type by way of SQLite's."""
-    codec = CODECS[annotation]
-    try:
-        held = tuple(value) if isinstance(value, list) else value
-        return codec.from_sql(codec.sql(int(held) if isinstance(held, bool) else held))
-    except (TypeError, ValueError, KeyError):
-        raise BadInput(f"{where}: {value!r:.60} is not what the log writes there") from None
-
-
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
-
-
-def _arrow_type(annotation: Any) -> Any:
-    pyarrow = _pyarrow()
-    text, integer, number = pyarrow.string(), pyarrow.int64(), pyarrow.float64()
-    return {
-        str: text, int: integer, int | None: integer, float | None: number, bool | None: pyarrow.bool_(),
-        tuple[float, ...]: pyarrow.list_(number), tuple[str, ...]: pyarrow.list_(text),
-    }[annotation]  # fmt: skip
-
-
-def keep_raw_files(log: Log, folder: Path, found: Iterable[Entry]) -> None:
-    """Keep the raw files of an exported log, each as it was called before.
-
-    Raises
-    ------
-    BadInput
-        One is missing, or is not what its name says.
-    """
-    for row in found:
-        if isinstance(row, RawFile):
-            files.keep(log.files, folder / "files" / row.uid, row)
+    return kind, [_entry(kind, row, f"{path}, row {k}", _from_parquet) for k, row in enumerate(rows, 1)]
 
 
 def _pyarrow() -> Any:

@@ -1,4 +1,4 @@
-"""Files into the log: tables of readings, print beds, and exports of a log; the whole file or nothing of it."""
+"""Import files into the log: tables of readings, print beds, and exported logs; each file as a whole or not at all."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,24 +6,24 @@ from pathlib import Path
 
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import batches, exchange, files, tables
-from sensorgen.measure.log.entries import Entry, Reading
+from sensorgen.measure.log.entries import Entry, RawFile, Reading
 from sensorgen.measure.log.logbook import Log
 
 
 @dataclass(frozen=True)
-class Done:
-    """What came of an import.
+class Imported:
+    """Result of an import.
 
     Attributes
     ----------
     rows : int
-        In the file.
+        Rows in the file.
     new : int
-        Of them; the others were in the log.
+        Rows that the log did not have.
     doubtful : int
-        Of the new ones, readings with something to doubt.
+        New readings with doubts.
     left_out : tuple of str
-        Columns that the log has no place for.
+        Columns that were ignored.
     """
 
     rows: int
@@ -32,29 +32,29 @@ class Done:
     left_out: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
-        """The same for people."""
+        """The result as text."""
         known = f"{self.rows - self.new} were there" if self.new < self.rows else ""
         doubtful = f"{self.doubtful} with doubts" if self.doubtful else ""
-        said = [", ".join(filter(None, (f"{self.new} of {self.rows} rows logged", known, doubtful)))]
-        return said + ([f"columns left out: {', '.join(self.left_out)}"] if self.left_out else [])
+        rows = ", ".join(filter(None, (f"{self.new} of {self.rows} rows logged", known, doubtful)))
+        return [rows, *([f"columns left out: {', '.join(self.left_out)}"] if self.left_out else [])]
 
 
-def thesis(log: Log) -> Done:
+def thesis(log: Log) -> Imported:
     """Log Table D.1 of the thesis."""
-    return _added(log, tables.thesis())
+    return _add(log, tables.thesis())
 
 
-def take(log: Log, path: Path, columns: Mapping[str, str]) -> Done:
-    """Log a file, whatever it is.
+def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> Imported:
+    """Log a file; its format is recognised.
 
     Parameters
     ----------
     log : Log
-        An open one.
+        An open log.
     path : Path
         A table as CSV, ``batch.json``, an exported ``.csv`` or ``.parquet``, or the folder of an exported log.
     columns : mapping
-        Columns of ours to those of a table, as of :func:`sensorgen.measure.log.tables.readings`.
+        From sensorgen's columns to the table's, as in :func:`sensorgen.measure.log.tables.readings`.
 
     Raises
     ------
@@ -62,38 +62,39 @@ def take(log: Log, path: Path, columns: Mapping[str, str]) -> Done:
         A file that cannot be read; with its name, row and column. Nothing is logged then.
     """
     if path.is_dir():
-        return _folder(log, path)
+        return _add(log, _exported(log, path))
     if path.suffix.lower() == ".json":
-        return _added(log, list(batches.rows(path, files.keep(log.files, path))))
-    rows, left_out = _rows(path, columns)
-    return _added(log, rows, left_out)
+        return _add(log, list(batches.rows(path, files.keep(log.files, path))))
+    return _add(log, *_table(path, columns))
 
 
-def _rows(path: Path, columns: Mapping[str, str]) -> tuple[Sequence[Entry], Sequence[str]]:
+def _table(path: Path, columns: Mapping[str, str]) -> tuple[Sequence[Entry], Sequence[str]]:
+    """Rows of a table, and the columns that are ignored."""
     if path.suffix.lower() == ".parquet":
         return exchange.from_parquet(path)[1], ()
-    table = tables.sheet(path)
-    kind = exchange.kind_of(table.columns)
-    if kind:
-        return list(exchange.from_sheet(kind, table)), ()
-    return tables.readings(table, columns, path.name)
+    sheet = tables.sheet(path)
+    kind = exchange.kind_of(sheet.columns)
+    return (list(exchange.from_sheet(kind, sheet)), ()) if kind else tables.readings(sheet, columns, path.name)
 
 
-def _folder(log: Log, folder: Path) -> Done:
-    found: list[Entry] = []
+def _exported(log: Log, folder: Path) -> list[Entry]:
+    """Rows of an exported log, after its raw files were copied."""
+    exported: list[Entry] = []
     for kind, name in exchange.FILES.items():
-        path = next((p for form in exchange.FORMATS if (p := folder / f"{name}.{form}").is_file()), None)
+        path = next((p for suffix in exchange.FORMATS if (p := folder / f"{name}.{suffix}").is_file()), None)
         if path is None:
             raise BadInput(f"{str(folder)!r} has no {name}.csv; expected the folder of an exported log")
-        rows = _rows(path, {})[0]
+        rows = _table(path, {})[0]
         if not all(isinstance(row, kind) for row in rows):
             raise BadInput(f"{path}: columns of another table; expected those of {name}")
-        found += rows
-    exchange.keep_raw_files(log, folder, found)
-    return _added(log, found)
+        exported += rows
+    for row in exported:
+        if isinstance(row, RawFile):
+            files.keep(log.files, folder / "files" / row.uid, row)
+    return exported
 
 
-def _added(log: Log, rows: Sequence[Entry], left_out: Iterable[str] = ()) -> Done:
+def _add(log: Log, rows: Sequence[Entry], left_out: Iterable[str] = ()) -> Imported:
     new = log.add(rows)
     doubtful = sum(isinstance(row, Reading) and bool(row.doubts) for row in new)
-    return Done(len(rows), len(new), doubtful, tuple(left_out))
+    return Imported(len(rows), len(new), doubtful, tuple(left_out))

@@ -1,4 +1,4 @@
-"""The log: readings, recordings and predictions of printed specimens, in one SQLite file that only grows."""
+"""The log: readings, recordings, prints and predictions of specimens in one append-only SQLite file."""
 
 import dataclasses
 from collections.abc import Iterable, Iterator, Sequence
@@ -7,10 +7,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
-from sensorgen.core import paths as places
+from sensorgen.core import paths
 from sensorgen.core.errors import BadInput, MissingValue, UnknownName
 from sensorgen.measure.log import database, files
-from sensorgen.measure.log.codec import CODECS
 from sensorgen.measure.log.entries import (
     SPECIMEN_COLUMNS,
     Batch,
@@ -23,48 +22,62 @@ from sensorgen.measure.log.entries import (
     Specimen,
     columns,
 )
+from sensorgen.measure.log.fields import FROM_SQL, Value, to_sql
 
 PLACE = "SENSORGEN_LOG"  # environment variable with another file
 TABLES: dict[type[Any], str] = {
     RawFile: "raw_file", Batch: "batch", Print: "print", Reading: "reading", BenchRun: "bench_run",
     Prediction: "prediction",
 }  # fmt: skip
-_NULL_FOR_NONE = ("supersedes", "rig_file")  # text that is NULL where it is "", so that it may be a key
-_KINDS: tuple[type[Any], ...] = (Specimen, *TABLES)
-_CODECS = {kind: {name: CODECS[hint] for name, hint in columns(kind).items()} for kind in _KINDS}
-_TIES = ("batch", "design_id", "design")
-_PRINTED = (
+_NULL_IF_EMPTY = ("supersedes", "rig_file")  # foreign keys, which may be NULL but not ""
+_FROM_PRINT = ("batch", "design_id", "design")
+_LATEST_PRINT = (
     "SELECT batch.batch, print.design_id, print.design FROM print JOIN batch ON batch.uid = print.batch_uid "
     "WHERE print.specimen = ? ORDER BY print.number DESC LIMIT 1"
 )
-
-
-def _insert_into(table: str, names: Sequence[str], otherwise: str = "") -> str:
-    marks = ", ".join("?" * len(names))
-    return f"INSERT {otherwise} INTO {table} ({', '.join(names)}) VALUES ({marks})"  # noqa: S608 - our own names
-
-
-_OF_NAME = _insert_into("specimen", SPECIMEN_COLUMNS, "OR IGNORE")
 _Kind = TypeVar("_Kind", bound=Entry)
 
 
 def place() -> Path:
-    """Where the log is unless told otherwise: what SENSORGEN_LOG says, or the system's place for a user's data.
+    """Default file of the log: that of ``SENSORGEN_LOG``, else in the system's folder for a user's data.
 
-    One for all folders that one works in, and never below ``out/``, which may be deleted.
+    One log for all working folders, and never below ``out/``, which may be deleted.
     """
-    return places.data(PLACE, "log.db")
+    return paths.data(PLACE, "log.db")
+
+
+class _Statements:
+    """SQL for one kind of record; every name in it is a field's or a table's, never a user's text."""
+
+    def __init__(self, kind: type[Any], table: str) -> None:
+        self.columns = columns(kind)
+        joined = issubclass(kind, Specimen) and table != "specimen"  # columns of the name are stored once, by specimen
+        self.home = {name: "specimen" if joined and name in SPECIMEN_COLUMNS[1:] else table for name in self.columns}
+        self.stored = [name for name, home in self.home.items() if home == table and name != "number"]
+        names, marks = ", ".join(self.stored), ", ".join("?" * len(self.stored))
+        self.insert = f"INTO {table} ({names}) VALUES ({marks})"
+        selected = ", ".join(f"{home}.{name}" for name, home in self.home.items())
+        join = f"JOIN specimen ON specimen.specimen = {table}.specimen" if joined else ""
+        self.select = f"SELECT {selected} FROM {table} {join}"  # noqa: S608
+        self.known = f"SELECT 1 FROM {table} WHERE uid = ?"  # noqa: S608
+        self.order = f"ORDER BY {table}.number"
+        later = f"NOT EXISTS (SELECT 1 FROM {table} later WHERE later.supersedes = {table}.uid)"  # noqa: S608
+        self.uncorrected = [later] if "supersedes" in self.columns else []
+
+
+_SQL = {kind: _Statements(kind, table) for kind, table in TABLES.items()}
+_SPECIMEN = _SQL[Specimen] = _Statements(Specimen, "specimen")
 
 
 class Log:
-    """A log, open from ``with`` to its end.
+    """A log; use it in a ``with`` statement.
 
     Parameters
     ----------
     path : Path
-        Its file.
+        SQLite file.
     create : bool
-        Whether to make it where there is none.
+        Whether to create a missing file.
 
     Examples
     --------
@@ -88,114 +101,104 @@ class Log:
 
     @property
     def files(self) -> Path:
-        """The folder of raw files, beside the log."""
+        """Folder of raw files, beside the log."""
         return self.path.with_name(f"{self.path.name}.files")
 
     def raw(self, sha256: str) -> Path:
-        """Where the raw file of that SHA-256 is.
+        """Path of the raw file with that SHA-256.
 
         Raises
         ------
         MissingValue
-            The log has none such.
+            The log has no such raw file.
         """
-        found = next(self.entries(RawFile, uid=sha256), None)
-        if found is None:
+        file = next(self.entries(RawFile, uid=sha256), None)
+        if file is None:
             raise MissingValue(f"no raw file {sha256!r:.80} in the log {str(self.path)!r}")
-        return files.place(self.files, found)
+        return files.place(self.files, file)
 
     def specimens(self, *, iteration: int | None = None) -> tuple[Specimen, ...]:
-        """Every specimen that something was logged of, by iteration and name."""
+        """Specimens with rows in the log, by iteration and name."""
         where, values = ("WHERE iteration = ?", [iteration]) if iteration is not None else ("", [])
-        sql = f"SELECT {', '.join(SPECIMEN_COLUMNS)} FROM specimen {where} ORDER BY iteration, specimen"  # noqa: S608 - our own names
-        with self._reading():
-            return tuple(_record(Specimen, row, str(self.path)) for row in self._connection.execute(sql, values))
+        rows = self._rows(f"{_SPECIMEN.select} {where} ORDER BY iteration, specimen", values)
+        return tuple(self._record(Specimen, row) for row in rows)
 
-    def readings(self, **wanted: Any) -> tuple[Reading, ...]:
-        """Readings of the multimeter, the earliest first.
+    def readings(
+        self, *, last: int | None = None, superseded: bool = False, **equal: Value
+    ) -> tuple[Reading, ...]:  # fmt: skip
+        """Readings of the multimeter, the earliest first; parameters as :meth:`entries`."""
+        return tuple(self.entries(Reading, last=last, superseded=superseded, **equal))
 
-        Parameters
-        ----------
-        **wanted
-            Of :meth:`entries`: ``iteration``, ``specimen``, ``last``, ``superseded``.
-        """
-        return tuple(self.entries(Reading, **wanted))
-
-    def recordings(self, **wanted: Any) -> tuple[BenchRun, ...]:
-        """Recordings of the bench, the earliest first; as :meth:`readings`."""
-        return tuple(self.entries(BenchRun, **wanted))
+    def recordings(
+        self, *, last: int | None = None, superseded: bool = False, **equal: Value
+    ) -> tuple[BenchRun, ...]:  # fmt: skip
+        """Recordings of the bench, the earliest first; parameters as :meth:`entries`."""
+        return tuple(self.entries(BenchRun, last=last, superseded=superseded, **equal))
 
     def predictions(self, *, design_id: str = "") -> tuple[Prediction, ...]:
-        """Predictions, the earliest first; of one design if ``design_id`` names it."""
-        wanted: dict[str, Any] = {"design_id": design_id} if design_id else {}
-        return tuple(self.entries(Prediction, **wanted))
+        """Predictions, the earliest first; of one design if ``design_id`` is given."""
+        return tuple(self.entries(Prediction, design_id=design_id) if design_id else self.entries(Prediction))
 
     def batches(self) -> tuple[Batch, ...]:
         """Print beds, the earliest first."""
         return tuple(self.entries(Batch))
 
-    def prints(self, *, specimen: str | None = None) -> tuple[Print, ...]:
-        """Which specimens are known from which batch, and their designs, the earliest first."""
-        wanted: dict[str, Any] = {} if specimen is None else {"specimen": specimen}
-        return tuple(self.entries(Print, **wanted))
+    def prints(self, *, specimen: str = "") -> tuple[Print, ...]:
+        """Specimens on print beds with their designs, the earliest first; one specimen's if ``specimen`` is given."""
+        return tuple(self.entries(Print, specimen=specimen) if specimen else self.entries(Print))
 
     def entries(
-        self, kind: type[_Kind], *, last: int | None = None, superseded: bool = False, **equal: Any
+        self, kind: type[_Kind], *, last: int | None = None, superseded: bool = False, **equal: Value
     ) -> Iterator[_Kind]:
         """Rows of one kind, the earliest first.
 
         Parameters
         ----------
         kind : type
-            Of the rows.
+            Kind of the rows.
         last : int or None
-            Give no more than the latest so many.
+            Only the latest rows, at most this many.
         superseded : bool
-            Give rows, too, that a later one corrects.
+            Also rows that a later row corrects.
         **equal
-            Columns, and what they have to be.
+            Required values by column.
 
         Raises
         ------
         UnknownName
-            There is no such column.
+            No such column.
         BadInput
-            The log is damaged; what was given until then is sound.
+            The log is damaged; rows given before are sound.
         """
-        sql, values = _selection(kind, equal, last, superseded)
-        with self._reading():
-            rows = self._connection.execute(sql, values)
-            yield from (_record(kind, row, str(self.path)) for row in (reversed(rows.fetchall()) if last else rows))
+        rows = self._rows(*_selection(kind, equal, last, superseded=superseded))
+        yield from (self._record(kind, row) for row in (reversed(list(rows)) if last else rows))
 
     def count(self, kind: type[Entry], *, superseded: bool = False) -> int:
-        """How many rows of a kind there are."""
-        sql, values = _selection(kind, {}, None, superseded)
-        with self._reading():
-            return int(self._connection.execute(f"SELECT count(*) FROM ({sql})", values).fetchone()[0])  # noqa: S608
+        """Number of rows of a kind."""
+        sql, values = _selection(kind, {}, None, superseded=superseded)
+        return int(next(self._rows(f"SELECT count(*) FROM ({sql})", values))[0])  # noqa: S608
 
     def pragma(self, name: str) -> tuple[str, ...]:
-        """What SQLite answers to a pragma, first column."""
-        with self._reading():
-            return tuple(str(row[0]) for row in self._connection.execute(f"PRAGMA {name}"))
+        """SQLite's result of a pragma, first column."""
+        return tuple(str(row[0]) for row in self._rows(f"PRAGMA {name}"))
 
     def add(self, entries: Iterable[Entry]) -> list[Entry]:
-        """Log rows, all or none of them; when this returns, they are on the disk.
+        """Log all rows or none; when this returns, they are on the disk.
 
         Parameters
         ----------
         entries : iterable of Entry
-            New rows, in the order in which they refer to each other. Those whose ``uid`` is known are passed over.
+            New rows, each after the rows that it refers to. Rows with a known ``uid`` are skipped.
 
         Returns
         -------
         list of Entry
-            Those that are new, as they now stand in the log.
+            The new rows, as logged.
 
         Raises
         ------
         BadInput
-            A row with the name of another that says something else, or that corrects one which was corrected before,
-            or is not there; nothing is logged then.
+            A row with a known ``uid`` and other content; a correction of a row that is missing or corrected already.
         Unwritable
             The disk is full, or the log cannot be written to.
         """
@@ -204,17 +207,19 @@ class Log:
             return [new for entry in entries if (new := self._add(entry, now))]
 
     def _add(self, entry: Entry, now: str) -> Entry | None:
-        if self._connection.execute(_KNOWN[type(entry)], [entry.uid]).fetchone():
-            _check_same(next(self.entries(type(entry), superseded=True, uid=entry.uid)), entry)
+        kind = type(entry)
+        if self._connection.execute(_SQL[kind].known, [entry.uid]).fetchone():
+            known = next(self.entries(kind, superseded=True, uid=entry.uid))
+            if entry.logged_at and dataclasses.replace(known, number=0) != dataclasses.replace(entry, number=0):
+                raise BadInput(f"row {entry.uid} has other content in the log; expected the same")
             return None
         if isinstance(entry, Specimen):
-            self._insert(_OF_NAME, SPECIMEN_COLUMNS, entry)
+            self._insert("INSERT OR IGNORE", _SPECIMEN, entry)
         if isinstance(entry, Reading | BenchRun):
             self._check_correction(entry)
-            entry = self._tied(entry)
+            entry = self._with_print(entry)
         entry = dataclasses.replace(entry, logged_at=entry.logged_at or now, number=0)
-        sql, names = _INSERTIONS[type(entry)]
-        return dataclasses.replace(entry, number=self._insert(sql, names, entry))
+        return dataclasses.replace(entry, number=self._insert("INSERT", _SQL[kind], entry))
 
     def _check_correction(self, entry: Reading | BenchRun) -> None:
         if not entry.supersedes:
@@ -227,72 +232,47 @@ class Log:
         if later:
             raise BadInput(f"row {old.number} was corrected before, by row {later.number}; correct that one")
 
-    def _tied(self, entry: Reading | BenchRun) -> Reading | BenchRun:
-        """The entry with design and batch of the print bed that its specimen came from, if that is known."""
+    def _with_print(self, entry: Reading | BenchRun) -> Reading | BenchRun:
+        """Entry with batch and design of the specimen's latest print, if it is new and the log has the print."""
         if entry.batch or entry.logged_at:
             return entry
-        printed = self._connection.execute(_PRINTED, [entry.specimen]).fetchone()
-        return dataclasses.replace(entry, **dict(zip(_TIES, printed, strict=True))) if printed else entry
+        printed = self._connection.execute(_LATEST_PRINT, [entry.specimen]).fetchone()
+        return dataclasses.replace(entry, **dict(zip(_FROM_PRINT, printed, strict=True))) if printed else entry
 
-    def _insert(self, sql: str, names: Sequence[str], entry: Entry) -> int:
-        values = [_to_sql(type(entry), name, getattr(entry, name)) for name in names]
-        return int(self._connection.execute(sql, values).lastrowid or 0)
+    def _insert(self, verb: str, sql: _Statements, entry: Any) -> int:
+        values = [to_sql(getattr(entry, name)) for name in sql.stored]
+        values = [
+            None if name in _NULL_IF_EMPTY and value == "" else value
+            for name, value in zip(sql.stored, values, strict=True)
+        ]
+        return int(self._connection.execute(f"{verb} {sql.insert}", values).lastrowid or 0)
 
-    def _reading(self) -> Any:
-        return database.told(self.path)
+    def _rows(self, sql: str, values: Sequence[Value] = ()) -> Iterator[tuple[Any, ...]]:
+        with database.translate_errors(self.path):
+            for row in self._connection.execute(sql, values):  # noqa: UP028 - closes the cursor late
+                yield row
+
+    def _record(self, kind: type[Any], row: Sequence[Any]) -> Any:
+        """Record of a row; a value that no field can have is reported as damage."""
+        values = {}
+        for (name, annotation), value in zip(_SQL[kind].columns.items(), row, strict=True):
+            try:
+                values[name] = "" if value is None and name in _NULL_IF_EMPTY else FROM_SQL[annotation](value)
+            except (TypeError, ValueError, KeyError, OverflowError, RecursionError):
+                held = f"column {name} of a {kind.__name__} holds {value!r:.60}"
+                raise BadInput(f"the log {str(self.path)!r} is damaged: {held}") from None
+        return kind(**values)
 
 
-def _check_same(known: Entry, entry: Entry) -> None:
-    """Refuse an exported row that says something else than the log's own of that name."""
-    if entry.logged_at and dataclasses.replace(known, number=0) != dataclasses.replace(entry, number=0):
-        raise BadInput(f"row {entry.uid} is in the log and says something else there; expected the same")
-
-
-def _selection(kind: type[Entry], equal: dict[str, Any], last: int | None, superseded: bool) -> tuple[str, list[Any]]:
-    """The SQL for some rows; all names in it are our own."""
+def _selection(
+    kind: type[Entry], equal: dict[str, Value], last: int | None, *, superseded: bool
+) -> tuple[str, list[Value]]:
+    """SQL for some rows, and its values."""
+    sql = _SQL[kind]
     for name in equal:
-        if name not in columns(kind):
-            raise UnknownName(f"column of a {kind.__name__}", name, columns(kind))
-    table = TABLES[kind]
-    names = ", ".join(f"{_home(kind, name)}.{name}" for name in columns(kind))
-    joined = f"JOIN specimen ON specimen.specimen = {table}.specimen" if issubclass(kind, Specimen) else ""
-    conditions = [f"{_home(kind, name)}.{name} IS ?" for name in equal]
-    if not superseded and "supersedes" in _CODECS[kind]:
-        conditions.append(f"NOT EXISTS (SELECT 1 FROM {table} later WHERE later.supersedes = {table}.uid)")  # noqa: S608
+        if name not in sql.columns:
+            raise UnknownName(f"column of a {kind.__name__}", name, sql.columns)
+    conditions = [f"{sql.home[name]}.{name} IS ?" for name in equal] + ([] if superseded else sql.uncorrected)
     where = f"WHERE {' AND '.join(conditions)}" if conditions else ""
     limit = f"DESC LIMIT {int(last)}" if last else ""
-    return f"SELECT {names} FROM {table} {joined} {where} ORDER BY {table}.number {limit}", list(equal.values())  # noqa: S608
-
-
-def _home(kind: type[Entry], name: str) -> str:
-    """The table of a column: what a name tells stands with the specimens."""
-    return "specimen" if issubclass(kind, Specimen) and name in SPECIMEN_COLUMNS[1:] else TABLES[kind]
-
-
-def _to_sql(kind: type[Any], name: str, value: Any) -> Any:
-    if name in _NULL_FOR_NONE and value == "":
-        return None
-    return _CODECS[kind][name].sql(value)
-
-
-def _record(kind: type[Any], row: Sequence[Any], path: str) -> Any:
-    """A row as a record; what no record can be is told as damage."""
-    found = {}
-    for (name, codec), value in zip(_CODECS[kind].items(), row, strict=True):
-        try:
-            found[name] = "" if value is None and name in _NULL_FOR_NONE else codec.from_sql(value)
-        except (TypeError, ValueError, KeyError, RecursionError):
-            raise BadInput(
-                f"the log {path!r} is damaged: column {name} of a {kind.__name__} holds {value!r:.60}"
-            ) from None
-    return kind(**found)
-
-
-def _insertion(kind: type[Any]) -> tuple[str, tuple[str, ...]]:
-    """The SQL that inserts a row, and the columns that it takes."""
-    own = tuple(name for name in columns(kind) if name != "number" and _home(kind, name) == TABLES[kind])
-    return _insert_into(TABLES[kind], own), own
-
-
-_INSERTIONS = {kind: _insertion(kind) for kind in TABLES}
-_KNOWN = {kind: f"SELECT 1 FROM {table} WHERE uid = ?" for kind, table in TABLES.items()}  # noqa: S608 - our own names
+    return f"{sql.select} {where} {sql.order} {limit}", list(equal.values())

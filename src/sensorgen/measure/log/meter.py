@@ -1,10 +1,12 @@
-"""Resistances from a bench multimeter through VISA: HP (Agilent, Keysight) 34401A and Keithley 2000.
+"""Read resistances from a bench multimeter through VISA: HP (Agilent, Keysight) 34401A and Keithley 2000.
 
-Both speak SCPI: ``MEAS:RES?`` with two leads, ``MEAS:FRES?`` with four, and both send 9.9E37 for an overload.
+Both use SCPI: ``MEAS:RES?`` with two leads, ``MEAS:FRES?`` with four; both send 9.9E37 for an overload.
 """
 
 import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
@@ -12,36 +14,41 @@ from sensorgen.core.errors import InstrumentFailed, MissingValue
 
 TIMEOUT_S = 10.0  # an autoranging reading takes up to three
 KNOWN = {"34401A": "HP 34401A", "MODEL 2000": "Keithley 2000"}
-_ASK = {2: "MEAS:RES?", 4: "MEAS:FRES?"}
+_QUERY = {2: "MEAS:RES?", 4: "MEAS:FRES?"}
 _NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?(E[-+]?[0-9]{1,3})?", re.IGNORECASE)
 
 
 class Meter:
-    """A multimeter at a VISA address, open from ``with`` to its end.
+    """A multimeter at a VISA address; use it in a ``with`` statement.
 
     Parameters
     ----------
     address : str
-        As VISA has it: ``GPIB0::22::INSTR``, ``ASRL/dev/ttyUSB0::INSTR``, ``TCPIP::10.0.0.5::INSTR``.
+        VISA resource: ``GPIB0::22::INSTR``, ``ASRL/dev/ttyUSB0::INSTR``, ``TCPIP::10.0.0.5::INSTR``.
 
     Raises
     ------
     MissingValue
         PyVISA is not installed.
     InstrumentFailed
-        Nothing answers there, or it is another instrument.
+        No instrument replies, or another instrument does.
     """
 
     def __init__(self, address: str) -> None:
-        self.address, self._visa = address, _pyvisa()
-        self._failures = (self._visa.errors.Error, OSError, ValueError)
-        self._open: list[Any] = []
         try:
-            self._port = self._connected()
-            if address.upper().startswith("ASRL"):
-                self._tell("SYST:REM")  # over RS-232 the 34401A takes no orders before this
-            self.name = self._checked_name()
-            self._tell("*CLS")  # whatever went wrong before is not ours
+            import pyvisa
+        except ImportError:
+            raise MissingValue("--visa needs PyVISA: pip install 'sensorgen[bench]'") from None
+        self.address, self._visa = address, pyvisa
+        self._resources: list[Any] = []
+        try:
+            with self._failures():
+                self._port = self._connect()
+                if address.upper().startswith("ASRL"):
+                    self._port.write("SYST:REM")  # over RS-232 the 34401A accepts no other command before this
+            self.name = self._identify()
+            with self._failures():
+                self._port.write("*CLS")  # errors from before are not ours
         except BaseException:
             self._close()
             raise
@@ -53,7 +60,7 @@ class Meter:
         self._close()
 
     def resistance(self, *, wires: int) -> str:
-        """One reading in the meter's own words, as ``+6.50000000E+02`` [ohm]; autoranged.
+        """One autoranged reading as the meter sends it, as ``+6.50000000E+02`` [ohm].
 
         Parameters
         ----------
@@ -63,64 +70,53 @@ class Meter:
         Raises
         ------
         InstrumentFailed
-            No answer in time, an answer that is no number, or the meter reports an error.
+            No reply in time, a reply that is no number, or an error of the meter.
         """
-        answer = self._ask(_ASK[wires])
-        if not _NUMBER.fullmatch(answer):
-            raise InstrumentFailed(f"{self.name} at {self.address} answers {answer!r:.60}; expected a resistance")
-        said = self._ask("SYST:ERR?")
-        if not re.match(r"[-+]?0\b", said):
-            raise InstrumentFailed(f"{self.name} at {self.address} reports {said!r:.100}")
-        return answer
+        reply = self._query(_QUERY[wires])
+        if not _NUMBER.fullmatch(reply):
+            raise InstrumentFailed(f"{self.name} at {self.address} answers {reply!r:.60}; expected a resistance")
+        status = self._query("SYST:ERR?")
+        if not re.match(r"[-+]?0\b", status):
+            raise InstrumentFailed(f"{self.name} at {self.address} reports {status!r:.100}")
+        return reply
 
-    def _connected(self) -> Any:
-        try:
-            self._open.append(manager := self._visa.ResourceManager())
-            self._open.append(port := manager.open_resource(self.address))
-            if not isinstance(port, self._visa.resources.MessageBasedResource):
-                raise ValueError("not the address of an instrument that takes orders, as GPIB0::22::INSTR")
-            port.read_termination = port.write_termination = "\n"
-            port.timeout = TIMEOUT_S * 1e3
-            return port
-        except self._failures as error:
-            raise self._failed(error) from None
+    def _connect(self) -> Any:
+        self._resources.append(manager := self._visa.ResourceManager())
+        self._resources.append(port := manager.open_resource(self.address))
+        if not isinstance(port, self._visa.resources.MessageBasedResource):
+            raise ValueError("not the address of an instrument that takes commands, as GPIB0::22::INSTR")
+        port.read_termination = port.write_termination = "\n"
+        port.timeout = TIMEOUT_S * 1e3
+        return port
 
-    def _checked_name(self) -> str:
-        said = self._ask("*IDN?")
-        name = next((name for word, name in KNOWN.items() if f",{word}," in re.sub(r"\s*,\s*", ",", said.upper())), "")
+    def _identify(self) -> str:
+        reply = self._query("*IDN?")
+        fields = re.sub(r"\s*,\s*", ",", reply.upper())
+        name = next((name for model, name in KNOWN.items() if f",{model}," in fields), "")
         if not name:
             raise InstrumentFailed(
-                f"{self.address} is {said!r:.80}; expected {' or '.join(KNOWN.values())}: or type it with --y, --z"
+                f"{self.address} is {reply!r:.80}; expected {' or '.join(KNOWN.values())}: or type it with --y, --z"
             )
-        return f"{name} ({said})"
+        return f"{name} ({reply})"
 
-    def _ask(self, question: str) -> str:
+    def _query(self, command: str) -> str:
+        with (
+            self._failures(),
+            warnings.catch_warnings(action="ignore"),
+        ):  # PyVISA's; a truncated reply is refused anyway
+            return str(self._port.query(command)).strip()
+
+    @contextmanager
+    def _failures(self) -> Iterator[None]:
+        """Translate errors of PyVISA to InstrumentFailed."""
         try:
-            with warnings.catch_warnings(action="ignore"):  # of PyVISA: an answer that is cut short is refused anyway
-                return str(self._port.query(question)).strip()
-        except self._failures as error:
-            raise self._failed(error) from None
-
-    def _tell(self, order: str) -> None:
-        try:
-            self._port.write(order)
-        except self._failures as error:
-            raise self._failed(error) from None
-
-    def _failed(self, error: Exception) -> InstrumentFailed:
-        said = " ".join(str(error).split())
-        return InstrumentFailed(
-            f"no answer from a meter at {self.address!r}: {said:.200}; check address, cable and power"
-        )
+            yield
+        except (self._visa.errors.Error, OSError, ValueError) as error:
+            reason = " ".join(str(error).split())
+            raise InstrumentFailed(
+                f"no answer from a meter at {self.address!r}: {reason:.200}; check address, cable and power"
+            ) from None
 
     def _close(self) -> None:
-        while self._open:
-            self._open.pop().close()
-
-
-def _pyvisa() -> Any:
-    try:
-        import pyvisa
-    except ImportError:
-        raise MissingValue("--visa needs PyVISA: pip install 'sensorgen[bench]'") from None
-    return pyvisa
+        while self._resources:
+            self._resources.pop().close()

@@ -1,4 +1,4 @@
-"""Tables that people keep: CSV with any separator and any names of columns, to readings of the multimeter."""
+"""Tables of readings kept by hand: CSV with any separator and any column names."""
 
 import csv
 import io
@@ -11,13 +11,14 @@ from pathlib import Path
 
 from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
 from sensorgen.core.records import shown
+from sensorgen.measure.csv_table import separator_of
 from sensorgen.measure.log.entries import Reading
-from sensorgen.measure.log.words import reading
+from sensorgen.measure.log.notes import reading
 
 MOST_BYTES = 64_000_000
-MOST_LETTERS = 100_000  # of a cell
+MAX_CELL = 100_000  # characters
 THESIS = "thesis Table D.1"
-NAMES = {  # columns of ours, and what they are called in the wild
+NAMES = {  # our columns, and names that are recognised
     "specimen": ("specimen", "design", "name", "name_raw", "sensor", "sample", "written"),
     "y": ("y", "ry", "r_y", "resistance in y", "resistance y", "y_words"),
     "z": ("z", "rz", "r_z", "resistance in z", "resistance z", "z_words"),
@@ -27,7 +28,7 @@ NAMES = {  # columns of ours, and what they are called in the wild
 }
 _TRUTH = {"": None, "yes": True, "true": True, "1": True, "baked": True, "no": False, "false": False, "0": False,
           "unbaked": False, "not baked": False}  # fmt: skip
-_BEGINNINGS = {
+_FIRST_BYTES = {
     b"PK\x03\x04": "a zip archive or a spreadsheet", b"\x80\x04": "a pickle", b"\x80\x05": "a pickle",
     b"\x80\x03": "a pickle", b"\x80\x02": "a pickle", b"\x1f\x8b": "gzip", b"SQLite": "a database",
     b"\x89HDF": "HDF5", b"MATLAB": "MATLAB's", b"PAR1": "Parquet", b"\xd0\xcf\x11\xe0": "an old spreadsheet",
@@ -42,13 +43,13 @@ class Sheet:
     Attributes
     ----------
     name : str
-        Of its file, for messages.
+        Name of the file, for messages.
     columns : tuple of str
-        Names in its header.
+        Names in the header.
     rows : tuple of list of str
-        The cells below it, as they stand; blank lines are left out.
+        Cells below the header, unchanged; without blank lines.
     numbers : tuple of int
-        The rows' numbers, the header being row 1.
+        Row numbers in the file; the header is row 1.
     """
 
     name: str
@@ -63,22 +64,22 @@ def sheet(path: Path) -> Sheet:
     Raises
     ------
     BadInput
-        Not there, no plain file, too large, not UTF-8 or not CSV; with file, row and column as far as there are any.
+        Missing, no regular file, too large, not UTF-8 or not CSV; with file and row.
     """
     return parsed(_content(path), str(path))
 
 
 def parsed(content: bytes, name: str) -> Sheet:
-    """The same for bytes; ``name`` stands for the file in messages."""
+    """Read CSV as text from bytes; ``name`` stands for the file in messages."""
     text = _text(content, name)
     head = text.partition("\n")[0]
     if not head.strip():
         raise BadInput(f"{name}: row 1 is empty; expected a header such as specimen,y,z,remark")
     rows, numbers = [], []
     try:
-        csv.field_size_limit(MOST_LETTERS)
+        csv.field_size_limit(MAX_CELL)
         for number, row in enumerate(
-            csv.reader(io.StringIO(text, newline=""), delimiter=_separator(head), strict=True), 1
+            csv.reader(io.StringIO(text, newline=""), delimiter=separator_of(head), strict=True), 1
         ):
             if number == 1 or any(cell.strip() for cell in row):
                 rows.append(row)
@@ -94,10 +95,6 @@ def parsed(content: bytes, name: str) -> Sheet:
     return Sheet(name, columns, tuple(rows[1:]), tuple(numbers[1:]))
 
 
-def _separator(head: str) -> str:
-    return max(",;\t", key=head.count)
-
-
 def _content(path: Path) -> bytes:
     try:
         if path.exists() and not path.is_file():
@@ -110,9 +107,9 @@ def _content(path: Path) -> bytes:
 
 
 def _text(content: bytes, name: str) -> str:
-    what = next((said for start, said in _BEGINNINGS.items() if content.startswith(start)), "")
-    if what:
-        raise BadInput(f"{name} is {what}; expected a table as CSV in UTF-8")
+    other = next((kind for start, kind in _FIRST_BYTES.items() if content.startswith(start)), "")
+    if other:
+        raise BadInput(f"{name} is {other}; expected a table as CSV in UTF-8")
     if not content:
         raise BadInput(f"{name} is empty; expected a header such as specimen,y,z,remark, and rows below it")
     try:
@@ -130,88 +127,77 @@ def _text(content: bytes, name: str) -> str:
 
 
 def readings(table: Sheet, columns: Mapping[str, str], source: str) -> tuple[list[Reading], list[str]]:
-    """The readings in a table, and the columns that were left out.
+    """Readings of a table, and the columns that are ignored.
 
     Parameters
     ----------
     table : Sheet
         The table.
     columns : mapping
-        Of ours (``NAMES``) to those of the table, where they are not known by themselves.
+        From our columns (``NAMES``) to the table's, where the names are not recognised.
     source : str
-        What to call it in the log.
+        Name of the table in the log.
 
     Raises
     ------
     BadInput
-        A cell that cannot be read; with file, row and column. Nothing is taken from such a table.
+        A cell that cannot be parsed; with file, row and column.
     """
     places = _places(table, columns)
     seen: Counter[str] = Counter()
-    found = [
+    rows = [
         _row(table, row, number, places, seen, source) for row, number in zip(table.rows, table.numbers, strict=True)
     ]
-    if not found:
+    if not rows:
         raise BadInput(f"{table.name}: no rows below the header")
-    taken = set(places.values())
-    return found, [name for k, name in enumerate(table.columns) if k not in taken and name]
+    used = set(places.values())
+    return rows, [name for k, name in enumerate(table.columns) if k not in used and name]
 
 
 def _places(table: Sheet, columns: Mapping[str, str]) -> dict[str, int]:
-    """Which of the table's columns is which of ours."""
-    there = {name.casefold(): k for k, name in enumerate(table.columns)}
-    found = {}
+    """Position of each of our columns in the table."""
+    position = {name.casefold(): k for k, name in enumerate(table.columns)}
+    places = {}
     for ours, theirs in columns.items():
         if ours not in NAMES:
             raise UnknownName("column of --column", ours, NAMES)
-        if theirs.casefold() not in there:
+        if theirs.casefold() not in position:
             raise UnknownName(f"column of {table.name}", theirs, table.columns)
-        found[ours] = there[theirs.casefold()]
+        places[ours] = position[theirs.casefold()]
     for ours, names in NAMES.items():
-        known = [there[name] for name in names if name in there]
-        if ours not in found and known:
-            found[ours] = known[0]
-    for wanted in (("specimen",), ("y", "z")):
-        if not any(ours in found for ours in wanted):
+        recognised = [position[name] for name in names if name in position]
+        if ours not in places and recognised:
+            places[ours] = recognised[0]
+    for needed in (("specimen",), ("y", "z")):
+        if not any(ours in places for ours in needed):
             raise BadInput(
-                f"{table.name}, row 1: no column {' or '.join(wanted)} among {shown(', '.join(table.columns))}; "
-                f"name it, as --column {wanted[0]}=NAME"
+                f"{table.name}, row 1: no column {' or '.join(needed)} among {shown(', '.join(table.columns))}; "
+                f"name it, as --column {needed[0]}=NAME"
             )
-    return found
+    return places
 
 
 def _row(
     table: Sheet, row: list[str], number: int, places: Mapping[str, int], seen: Counter[str], source: str
 ) -> Reading:
-    cells = {ours: row[place] for ours, place in places.items()}
-    same = json.dumps([cells.get(ours, "").strip() for ours in NAMES])
-    seen[same] += 1
+    cells = {ours: row[places[ours]].strip() if ours in places else "" for ours in NAMES}
+    content = json.dumps(list(cells.values()))
+    seen[content] += 1
+    baked = cells["baked"].casefold()
     try:
+        if baked not in _TRUTH:
+            raise BadInput(f"column baked: {shown(cells['baked'])}; expected yes, no or nothing")
         return reading(
-            cells["specimen"].strip(),
-            cells.get("y", "").strip(),
-            cells.get("z", "").strip(),
-            remark=cells.get("remark", "").strip(),
-            baked=_truth(cells.get("baked", "")),
-            table=True,
-            measured_at=cells.get("measured_at", "").strip(),
-            source=source,
-            source_row=number - 1,
-            uid=sha256(f"{seen[same]} {same}".encode()).hexdigest()[:32],
-        )
+            cells["specimen"], cells["y"], cells["z"], remark=cells["remark"], baked=_TRUTH[baked], table=True,
+            measured_at=cells["measured_at"], source=source, source_row=number - 1,
+            uid=sha256(f"{seen[content]} {content}".encode()).hexdigest()[:32],
+        )  # fmt: skip
     except SensorgenError as error:
         raise error.within(f"{table.name}, row {number}") from None
 
 
-def _truth(cell: str) -> bool | None:
-    word = cell.strip().casefold()
-    if word not in _TRUTH:
-        raise BadInput(f"column baked: {shown(cell)}; expected yes, no or nothing")
-    return _TRUTH[word]
-
-
 def thesis() -> list[Reading]:
-    """Table D.1 of the thesis, 69 rows in its own words.
+    """Table D.1 of the thesis, 69 rows as printed.
 
     >>> rows = thesis()
     >>> len(rows), rows[11].written, rows[11].y_words, rows[11].z_ohm

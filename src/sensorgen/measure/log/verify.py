@@ -1,4 +1,4 @@
-"""Whether a log is what was logged: the database, what refers to what, and the raw files."""
+"""Verify a log: SQLite's integrity, references between rows, raw files, and hashes of predictions."""
 
 import json
 from collections.abc import Iterator
@@ -11,30 +11,31 @@ from sensorgen.measure.log.logbook import TABLES, Log
 
 
 def faults(log: Log) -> Iterator[str]:
-    """What is wrong with a log, in words; nothing where all is well.
+    """Faults of a log, as messages; none where it is sound.
 
     Parameters
     ----------
     log : Log
-        An open one.
+        An open log.
     """
     try:
-        unsound = (said for said in log.pragma("integrity_check") if said != "ok")
-        yield from (f"database: {' '.join(said.split()):.200}" for said in unsound)
-        lost = log.pragma("foreign_key_check")
-        yield from (f"{table!r:.60}: a row refers to one that is not there" for table in lost)
+        for message in log.pragma("integrity_check"):
+            if message != "ok":
+                yield f"database: {' '.join(message.split()):.200}"
+        for table in log.pragma("foreign_key_check"):
+            yield f"{table!r:.60}: a row refers to one that is not there"
         for kind in TABLES:
             for _ in log.entries(kind, superseded=True):
-                pass  # reading it says what is wrong
+                pass  # reading a damaged row raises
         yield from files.faults(log.files, log.entries(RawFile))
-        yield from (
-            f"prediction {p.number} is not what was made then" for p in log.predictions() if p.uid != prediction_uid(p)
-        )
+        for prediction in log.predictions():
+            if prediction.uid != prediction_uid(prediction):
+                yield f"prediction {prediction.number} is not what was logged"
     except BadInput as error:
         yield str(error)
 
 
 def prediction_uid(prediction: Prediction) -> str:
-    """What a prediction has to be called: a hash of what it says."""
+    """Identity of a prediction: a hash of its content."""
     text = json.dumps([prediction.design_id, prediction.design, prediction.version, prediction.data])
     return sha256(text.encode()).hexdigest()

@@ -1,6 +1,6 @@
-"""A file to its recordings, by what the file begins with and not by what it is called."""
+"""Recognise the format of a recording by its first bytes, whatever its name, and read it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from sensorgen.core.errors import BadInput, SensorgenError
@@ -25,42 +25,55 @@ _HDF_PLACES = (0, 512, 1024, 2048)
 
 
 def read(path: Path | str, columns: Mapping[str, str] | None = None) -> Recording:
-    """The recording in a file that has one.
+    """Read a file of one recording.
 
     Parameters, errors and formats as :func:`read_all`; several lock-ins are refused as well.
     """
-    found = read_all(path, columns)
-    if len(found) > 1:
-        raise BadInput(f"{path}: {len(found)} lock-ins; expected one: choose among those of read_all")
-    return found[0]
+    recordings = read_all(path, columns)
+    if len(recordings) > 1:
+        raise BadInput(f"{path}: {len(recordings)} lock-ins; expected one: choose among those of read_all")
+    return recordings[0]
 
 
 def read_all(path: Path | str, columns: Mapping[str, str] | None = None) -> tuple[Recording, ...]:
-    """Every lock-in's recording in a file.
+    """Read the recordings of all lock-ins in a file; the format is recognised by the file's first bytes.
 
     Parameters
     ----------
     path : Path or str
         TiePieLCR's .mat (MATLAB 5, either byte order, or 7.3), an HDF5 file with the same variables, or CSV.
     columns : mapping of str to str, optional
-        Only for CSV: what the file calls its columns, to what we call them, see
-        :mod:`sensorgen.measure.recording.table`.
+        For CSV only: from the file's column names to sensorgen's, see :mod:`sensorgen.measure.recording.table`.
 
     Raises
     ------
     BadInput
-        A file that is missing, empty, damaged, cut off, too large or of another kind, with the place where that shows.
+        A file that is missing, empty, damaged, truncated, too large or of another format, with the place in the file.
     MissingValue
-        HDF5, without h5py.
+        HDF5 without h5py.
     """
     path = Path(path)
     head = _head(path)
+    file_format = _format(head)
     try:
-        return _reader(head)(path, columns or {})
+        if file_format == "CSV":
+            return (table.recording(path, columns or {}),)
+        try:
+            matlab5 = file_format == "MATLAB 5"
+            tree = (
+                matfive.variables(path.read_bytes(), tiepie.WANTED) if matlab5 else hdf.variables(path, tiepie.WANTED)
+            )
+            return tiepie.recordings(tree, Source(path.name, file_format))
+        except SensorgenError as error:
+            raise error.within(str(path)) from None
     except OSError as error:
         raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None
-    except SensorgenError as error:
-        raise error if str(path) in str(error) else error.within(str(path)) from None
+
+
+def _format(head: bytes) -> str:
+    if any(head[at : at + len(_HDF)] == _HDF for at in _HDF_PLACES):
+        return "MATLAB 7.3" if head.startswith(b"MATLAB") else "HDF5"
+    return "MATLAB 5" if head.startswith(b"MATLAB") or head[126:128] in (b"IM", b"MI") else "CSV"
 
 
 def _head(path: Path) -> bytes:
@@ -82,27 +95,3 @@ def _head(path: Path) -> bytes:
         if head.startswith(magic):
             raise BadInput(f"{path} is {why}")
     return head
-
-
-def _reader(head: bytes) -> Callable[[Path, Mapping[str, str]], tuple[Recording, ...]]:
-    if any(head[place : place + len(_HDF)] == _HDF for place in _HDF_PLACES):
-        return _mat73 if head.startswith(b"MATLAB") else _hdf
-    if head.startswith(b"MATLAB") or head[126:128] in (b"IM", b"MI"):
-        return _mat5
-    return _csv
-
-
-def _mat5(path: Path, _: Mapping[str, str]) -> tuple[Recording, ...]:
-    return tiepie.recordings(matfive.variables(path.read_bytes(), tiepie.WANTED), Source(path.name, "MATLAB 5"))
-
-
-def _mat73(path: Path, _: Mapping[str, str]) -> tuple[Recording, ...]:
-    return tiepie.recordings(hdf.variables(path, tiepie.WANTED), Source(path.name, "MATLAB 7.3"))
-
-
-def _hdf(path: Path, _: Mapping[str, str]) -> tuple[Recording, ...]:
-    return tiepie.recordings(hdf.variables(path, tiepie.WANTED), Source(path.name, "HDF5"))
-
-
-def _csv(path: Path, columns: Mapping[str, str]) -> tuple[Recording, ...]:
-    return (table.recording(path, Source(path.name, "CSV"), columns),)

@@ -1,7 +1,7 @@
-"""HDF5 files, MATLAB's 7.3 among them, as the same lists, dicts and arrays that MATLAB 5 files come as.
+"""Read HDF5 files, MATLAB's 7.3 among them, as the same lists, dicts and arrays as MATLAB 5 files.
 
-Only what lies in the file itself is read: links to other files are refused, and objects of other programs, which may be
-pickles, are no numbers. MATLAB's arrays are turned back to MATLAB's shape.
+Only data in the file itself are read: links to other files are refused, and objects of other programs, which may be
+pickles, are not numbers. MATLAB's arrays get MATLAB's shape.
 """
 
 from collections.abc import Collection, Iterator
@@ -21,21 +21,21 @@ _BROKEN = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeErro
 
 
 def variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
-    """The variables of a file by their names.
+    """Read variables of a file.
 
     Parameters
     ----------
     path : Path
         The file.
     wanted : collection of str
-        Names; others are passed over unread.
+        Names of variables; others are skipped unread.
 
     Raises
     ------
     MissingValue
         h5py is not installed.
     BadInput
-        A file that is damaged, links to other files, or holds something that is neither numbers nor text.
+        A file that is damaged, links to other files, or has other data than numbers and text.
     """
     with _opened(path) as file:
         reader = _Reader(file)
@@ -52,12 +52,12 @@ def _opened(path: Path) -> Iterator[Any]:
         with h5py.File(path, "r") as file:
             yield file
     except _BROKEN as error:
-        said = " ".join(str(error).split())[:200]
-        raise BadInput(f"the HDF5 file is damaged or cut off: {said}") from None
+        reason = " ".join(str(error).split())[:200]
+        raise BadInput(f"the HDF5 file is damaged or cut off: {reason}") from None
 
 
 class _Reader:
-    """What groups and datasets hold."""
+    """Groups and datasets of a file, up to a depth and a number of items."""
 
     def __init__(self, file: Any) -> None:
         import h5py
@@ -65,10 +65,9 @@ class _Reader:
         self._h5, self._file, self._left = h5py, file, _MOST_ITEMS
 
     def member(self, group: Any, name: str, depth: int) -> Any:
-        """What a group has under a name, which may be a link."""
-        where = f"{group.name.rstrip('/')}/{name}"
+        """Content of a member of a group."""
         if isinstance(group.get(name, getlink=True), self._h5.ExternalLink):
-            raise BadInput(f"{where}: a link to another file; expected the data itself")
+            raise BadInput(f"{group.name.rstrip('/')}/{name}: a link to another file; expected the data itself")
         return self._item(group[name], depth)
 
     def _item(self, item: Any, depth: int) -> Any:
@@ -79,19 +78,21 @@ class _Reader:
             return self._struct(item, depth)
         if not isinstance(item, self._h5.Dataset):
             raise BadInput(f"{item.name}: neither a group nor a dataset")
-        _check_size(item)
+        if item.is_virtual or item.external:
+            raise BadInput(f"{item.name}: its data lie in another file; expected them in this one")
+        size = (item.size or 0) * item.dtype.itemsize
+        if size > MOST_BYTES:
+            raise BadInput(f"{item.name}: {size / 2**30:.3g} GB; expected up to {MOST_BYTES >> 30} GB")
         if self._refers(item):
             # HDF5 has the axes the other way round: its rows one after the other are MATLAB's columns
             return [self._item(self._file[ref], depth + 1) for ref in np.asarray(item[()]).ravel() if ref]
-        if item.attrs.get("MATLAB_empty"):
-            return np.empty((0, 0))
-        return self._numbers(item)
+        return np.empty((0, 0)) if item.attrs.get("MATLAB_empty") else self._array(item)
 
     def _refers(self, item: Any) -> bool:
         return isinstance(item, self._h5.Dataset) and self._h5.check_ref_dtype(item.dtype) is self._h5.Reference
 
     def _struct(self, group: Any, depth: int) -> list[dict[str, Any]]:
-        """A struct; an array of them is a group whose every field is a list of references without a class."""
+        """Struct; an array of structs is a group whose fields are lists of references without a class."""
         fields = {name: self.member(group, name, depth + 1) for name in group}
         members = [group[name] for name in group]
         if members and all(self._refers(item) and _CLASS not in item.attrs for item in members):
@@ -99,41 +100,29 @@ class _Reader:
             return [{name: values[i] for name, values in fields.items()} for i in range(count)]
         return [fields | {name: _attribute(v) for name, v in group.attrs.items() if not name.startswith("MATLAB_")}]
 
-    def _numbers(self, item: Any) -> Any:
+    def _array(self, item: Any) -> Any:
         names = item.dtype.names
         if names and {n.lower() for n in names} in ({"real", "imag"}, {"r", "i"}):
             raw = item[()]
-            found = np.empty(raw.shape, np.complex128)
-            found.real, found.imag = (raw[n] for n in sorted(names, key=str.lower, reverse=True))
+            values = np.empty(raw.shape, np.complex128)
+            values.real, values.imag = (raw[n] for n in sorted(names, key=str.lower, reverse=True))
         elif self._h5.check_string_dtype(item.dtype):
-            return _text(item)
+            texts = np.asarray(item[()]).ravel()
+            if len(texts) != 1:
+                raise BadInput(f"{item.name}: {len(texts)} texts; expected one text, or numbers")
+            return texts[0].decode("utf-8", "replace") if isinstance(texts[0], bytes) else str(texts[0])
         elif item.dtype.kind in "iufcb":
-            found = np.asarray(item[()])
+            values = np.asarray(item[()])
         else:
             raise BadInput(f"{item.name}: data of type {item.dtype}; expected numbers, complex numbers or text")
         if _CLASS not in item.attrs:
-            return found
+            return values
         if item.attrs[_CLASS] in (b"char", "char"):
-            return "".join(chr(int(c)) if 0 <= c < 0xD800 else "\ufffd" for c in found.ravel())
-        return found.T
+            return "".join(chr(int(c)) if 0 <= c < 0xD800 else "\ufffd" for c in values.ravel())
+        return values.T
 
 
 def _attribute(value: Any) -> Any:
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")
     return value if isinstance(value, str) else np.atleast_2d(np.asarray(value))
-
-
-def _check_size(item: Any) -> None:
-    if item.is_virtual or item.external:
-        raise BadInput(f"{item.name}: its data lie in another file; expected them in this one")
-    size = (item.size or 0) * item.dtype.itemsize
-    if size > MOST_BYTES:
-        raise BadInput(f"{item.name}: {size / 2**30:.3g} GB; expected up to {MOST_BYTES >> 30} GB")
-
-
-def _text(item: Any) -> str:
-    raw = np.asarray(item[()]).ravel()
-    if len(raw) != 1:
-        raise BadInput(f"{item.name}: {len(raw)} texts; expected one text, or numbers")
-    return raw[0].decode("utf-8", "replace") if isinstance(raw[0], bytes) else str(raw[0])

@@ -1,4 +1,4 @@
-"""A recording: impedances over time, with everything that speaks against single samples beside them."""
+"""A recording: impedance over time at several frequencies, with marks on single samples."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,28 +15,28 @@ MARKS = {
     "missing": "a tone is no finite number, or beyond any impedance (1e30 ohm)",
     "transient": "the demodulator was still starting up",
     "clipped": "the instrument's input was beyond its range",
-    "invalid": "the file itself says that the sample does not count",
+    "invalid": "the file marks the sample as invalid",
     "gap": "first sample after samples that were lost",
     "reversed stamp": "the time stamp is earlier than the one before",
     "repeated stamp": "the time stamp is the same as the one before",
     "no stamp": "the time stamp is not a finite number",
     "rig error": "the rig reported an error, or nothing",
 }
-"""What may be said of a sample, and what it means."""
+"""Marks of samples, and their meanings."""
+
+HARMLESS = frozenset({"gap", "reversed stamp", "repeated stamp", "no stamp"})
+"""Marks that leave a sample valid: the rebuilt clock corrects them."""
 
 _LARGEST_OHM = 1e30  # beyond it arithmetic fails before physics does
 
-HARMLESS = frozenset({"gap", "reversed stamp", "repeated stamp", "no stamp"})
-"""Marks that do not take a sample out: the rebuilt clock has put them right."""
-
 
 def blank(count: int) -> dict[str, Bools]:
-    """No mark at any of ``count`` samples."""
+    """Marks without any sample marked."""
     return {name: np.zeros(count, bool) for name in MARKS}
 
 
 def sifted(impedance_ohm: Complex) -> dict[str, Bools]:
-    """Marks of what is no reading: exact zeros and what is not finite; both become nan in place [ohm]."""
+    """Marks of exact zeros and of numbers that are not finite; both are replaced by nan in place [ohm]."""
     zero = impedance_ohm == 0
     with np.errstate(over="ignore"):
         missing = ~(np.abs(impedance_ohm) < _LARGEST_OHM)
@@ -46,20 +46,20 @@ def sifted(impedance_ohm: Complex) -> dict[str, Bools]:
 
 @dataclass(frozen=True)
 class Clock:
-    """How a recording's time stands to real time: ``epoch_s + (1 + skew) time_s``.
+    """Relation of a recording's time to real time: ``epoch_s + (1 + skew) time_s``.
 
     Attributes
     ----------
     epoch_s : float
-        Real time at ``time_s`` = 0, in seconds since 1970; nan where the file has no stamps.
+        Real time at ``time_s`` = 0, in seconds since 1970; nan without stamps.
     skew : float
-        Rate of the stamps' clock over the instrument's, less 1; 0 unless it stands out of its error [-].
+        Rate of the stamps' clock over the instrument's, less 1; 0 unless significant [-].
     epoch_error_s, skew_error : float
         Standard errors [s], [-].
     jitter_s : float
         Standard deviation of a stamp about the rebuilt clock [s].
     blocks : int
-        Blocks of stamps that the clock was fitted to.
+        Number of stamps in the fit, one for each block.
     """
 
     epoch_s: float = np.nan
@@ -76,7 +76,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class Source:
-    """Where a recording comes from.
+    """Origin of a recording.
 
     Attributes
     ----------
@@ -85,15 +85,15 @@ class Source:
     format : str
         As in "MATLAB 5".
     program : str
-        That wrote it, with its version; "" where the file does not say.
+        Program that wrote the file, with its version; "" if unknown.
     lockin : int
-        Which of the file's lock-ins, counted from 1.
+        Number of the lock-in in the file, from 1.
     rate_hz : float
-        Samples per second, from the file's own clock.
+        Sampling rate, from the file's own clock [Hz].
     bandwidth_hz : float
-        Of the demodulator; nan where the file does not say.
+        Bandwidth of the demodulator; nan if unknown [Hz].
     notes : tuple of str
-        What was put right on the way, in words.
+        Corrections that were made.
     """
 
     file: str
@@ -107,22 +107,22 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What one lock-in measured.
+    """Recording of one lock-in.
 
     Attributes
     ----------
     time_s : (n,) array
-        Rebuilt clock, rising from sample to sample [s].
+        Time by the rebuilt clock, rising [s].
     tones_hz : (m,) array
-        Tones, in the order of the columns [Hz].
+        Frequencies of the excitation, in the order of the columns [Hz].
     impedance_ohm : (n, m) array
-        Complex impedance [ohm]; nan where nothing was measured.
+        Complex impedance [ohm]; nan where none was measured.
     marks : mapping of str to (n,) array
-        Which samples each of ``MARKS`` is true of; all of them, also those that are true of none.
+        Marked samples, for every name of ``MARKS``.
     clock : Clock
-        How ``time_s`` stands to real time.
+        Relation of ``time_s`` to real time.
     source : Source
-        Where it comes from.
+        Origin.
     """
 
     time_s: Real
@@ -134,22 +134,22 @@ class Recording:
 
     @property
     def epoch_s(self) -> float:
-        """Real time at ``time_s`` = 0, in seconds since 1970; nan where the file does not say."""
+        """Real time at ``time_s`` = 0, in seconds since 1970; nan if unknown [s]."""
         return self.clock.epoch_s
 
     def real_s(self) -> Real:
-        """Seconds since 1970 of every sample; nan where the file does not say."""
+        """Seconds since 1970 of every sample; nan if unknown [s]."""
         return self.clock.real_s(self.time_s)
 
     def counts(self) -> dict[str, int]:
-        """How many samples have each mark, and how many there are and count."""
-        found = {name: int(np.count_nonzero(which)) for name, which in self.marks.items()}
-        return {"samples": len(self.time_s), "valid": int(np.count_nonzero(self.valid()))} | found
+        """Number of samples, of valid samples, and of samples with each mark."""
+        marked = {name: int(np.count_nonzero(which)) for name, which in self.marks.items()}
+        return {"samples": len(self.time_s), "valid": int(np.count_nonzero(self.valid()))} | marked
 
     def valid(self) -> Bools:
-        """Samples that nothing speaks against."""
-        found = np.ones(len(self.time_s), bool)
+        """Samples without any mark but the harmless ones."""
+        valid = np.ones(len(self.time_s), bool)
         for name, which in self.marks.items():
             if name not in HARMLESS:
-                found &= ~which
-        return found
+                valid &= ~which
+        return valid

@@ -1,8 +1,8 @@
-"""The thesis's low-pass: Butterworth, order 4, in second-order sections, live and offline.
+"""Butterworth low-pass of order 4, as in the thesis: causal for a stream, zero-phase for a recording.
 
-Sections and not polynomials: with cut-off far below the sampling rate the poles crowd at 1, where polynomial
-coefficients lose one digit after the other until the filter is unstable. The sampling rate is that of the recording:
-the thesis's 66.6666 Hz belongs to another version of the instrument's program.
+Second-order sections and not polynomials: with a cut-off far below the sampling rate the poles lie close to 1, where
+polynomial coefficients lose so many digits that the filter becomes unstable. The sampling rate is that of the
+recording: the thesis's 66.6666 Hz belongs to another version of the instrument's program.
 """
 
 from dataclasses import dataclass, field
@@ -18,10 +18,10 @@ from sensorgen.measure.recording.samples import Bools, Complex, Real, Recording
 CUTOFF_HZ = 0.2727
 THESIS_RATE_HZ = 66.6666
 ORDER = 4
-_SETTLED = 3.0  # over the cut-off: until then a filter that was started wrong has forgotten it
-_END = 0.5  # over the cut-off: how much of an end says how it goes on
-_LONGEST_GAP = 0.5  # over the cut-off: what is missing for longer is not made up
-_EVEN = 1e-3  # of a step: how evenly samples must lie to be taken as they are
+_SETTLED = 3.0  # over the cut-off: settling time of the filter
+_END = 0.5  # over the cut-off: length of the ends that are extrapolated
+_LONGEST_GAP = 0.5  # over the cut-off: longer gaps are not interpolated
+_EVEN = 1e-3  # of a step: deviation of even samples
 
 
 def sections(rate_hz: float, cutoff_hz: float = CUTOFF_HZ, order: int = ORDER) -> Real:
@@ -30,16 +30,16 @@ def sections(rate_hz: float, cutoff_hz: float = CUTOFF_HZ, order: int = ORDER) -
     Parameters
     ----------
     rate_hz : float
-        Sampling rate of the data that it is meant for [Hz].
+        Sampling rate [Hz].
     cutoff_hz : float
-        Where the power is halved: -3 dB in one pass, -6 dB forward and backward [Hz].
+        Cut-off frequency: -3 dB in one pass, -6 dB forward and backward [Hz].
     order : int
-        Of the filter.
+        Order of the filter.
 
     Raises
     ------
     OutOfRange
-        A cut-off that is not between 0 and half the rate.
+        A cut-off frequency that is not between 0 and half the rate.
     """
     from scipy.signal import butter
 
@@ -52,12 +52,12 @@ def sections(rate_hz: float, cutoff_hz: float = CUTOFF_HZ, order: int = ORDER) -
 
 @dataclass
 class Live:
-    """The filter for a stream: begun in the steady state of the first reading, so that it need not settle.
+    """Causal filter for a stream, started in the steady state of the first reading.
 
     Parameters
     ----------
     rate_hz, cutoff_hz : float
-        Sampling rate and cut-off [Hz].
+        Sampling rate and cut-off frequency [Hz].
 
     Examples
     --------
@@ -73,11 +73,11 @@ class Live:
     _last: NDArray[Any] | None = field(init=False, default=None, repr=False)
 
     def __post_init__(self) -> None:
-        """Make the filter, or refuse."""
+        """Compute the sections."""
         self._sections = sections(self.rate_hz, self.cutoff_hz)
 
     def __call__(self, block: NDArray[Any]) -> NDArray[Any]:
-        """Filter the next samples (n, m); where one is nan the last reading is held, and the answer is nan."""
+        """Filter the next samples (n, m); where a sample is nan, the last reading is held and the result is nan."""
         from scipy.signal import sosfilt, sosfilt_zi
 
         missing = np.isnan(block)
@@ -86,11 +86,11 @@ class Live:
             self._state = np.full((len(self._sections), 2, block.shape[1]), np.nan, block.dtype)
         fresh = np.isnan(self._state[0, 0]) & bool(len(block))  # a column begins with its own first reading
         self._state[:, :, fresh] = sosfilt_zi(self._sections)[:, :, None] * held[:1, fresh]
-        found, self._state = sosfilt(self._sections, held, axis=0, zi=self._state)
-        return np.where(missing, np.nan, found)
+        filtered, self._state = sosfilt(self._sections, held, axis=0, zi=self._state)
+        return np.where(missing, np.nan, filtered)
 
     def _held(self, values: NDArray[Any], missing: Bools) -> NDArray[Any]:
-        """Every gap filled by the reading before it; before the first one, by that."""
+        """Samples with gaps filled by the reading before, at the begin by the first reading."""
         last = np.full(values.shape[1], np.nan, values.dtype) if self._last is None else self._last
         for j in np.flatnonzero(missing.any(axis=0)):
             places = np.where(missing[:, j], -1, np.arange(len(values)))
@@ -103,7 +103,7 @@ class Live:
 
 
 def offline(values: NDArray[Any], rate_hz: float, cutoff_hz: float = CUTOFF_HZ) -> NDArray[Any]:
-    """Evenly sampled values, forward and backward: no delay, -6 dB at the cut-off.
+    """Filter evenly sampled values forward and backward: no delay, -6 dB at the cut-off.
 
     Parameters
     ----------
@@ -114,9 +114,8 @@ def offline(values: NDArray[Any], rate_hz: float, cutoff_hz: float = CUTOFF_HZ) 
 
     Notes
     -----
-    At both ends the values are continued for as long as the filter remembers: reflected at the end of a straight line
-    through the last half period of the cut-off, so that a drift goes on and the noise of the last reading does
-    not become a step.
+    Both ends are extended for the settling time of the filter: reflected at the end of a straight line through the last
+    half period of the cut-off, so that a drift continues and the noise of the last reading does not become a step.
 
     Raises
     ------
@@ -125,7 +124,7 @@ def offline(values: NDArray[Any], rate_hz: float, cutoff_hz: float = CUTOFF_HZ) 
     """
     from scipy.signal import sosfiltfilt
 
-    made = sections(rate_hz, cutoff_hz)
+    sos = sections(rate_hz, cutoff_hz)
     if len(values) < 2:
         return np.array(values)
     pad = min(len(values) - 1, ceil(_SETTLED * rate_hz / cutoff_hz))
@@ -134,12 +133,12 @@ def offline(values: NDArray[Any], rate_hz: float, cutoff_hz: float = CUTOFF_HZ) 
     end = 2 * _first(values[: -fit - 1 : -1]) - values[-2 : -pad - 2 : -1]
     longer = np.concatenate([begin, values, end])
     parts = [longer.real, longer.imag] if np.iscomplexobj(values) else [longer]
-    found = [np.asarray(sosfiltfilt(made, part, axis=0, padlen=0))[pad : pad + len(values)] for part in parts]
-    return found[0] if len(found) == 1 else found[0] + 1j * found[1]
+    smooth = [np.asarray(sosfiltfilt(sos, part, axis=0, padlen=0))[pad : pad + len(values)] for part in parts]
+    return smooth[0] if len(smooth) == 1 else smooth[0] + 1j * smooth[1]
 
 
 def _first(values: NDArray[Any]) -> NDArray[Any]:
-    """Where a straight line through some values begins."""
+    """First value of a straight line through values."""
     t = np.arange(len(values)) - (len(values) - 1) / 2
     spread = float(t @ t)
     slope = t @ values / spread if spread else np.zeros(values.shape[1])
@@ -147,14 +146,14 @@ def _first(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def filtered(recording: Recording, cutoff_hz: float = CUTOFF_HZ) -> tuple[Real, Complex]:
-    """A recording's valid samples on even steps of its rebuilt clock, filtered forward and backward.
+    """Filter a recording's valid samples forward and backward, on even steps.
 
     Parameters
     ----------
     recording : Recording
-        What was measured; samples that do not count are bridged by straight lines.
+        Invalid samples are interpolated linearly.
     cutoff_hz : float
-        Cut-off [Hz].
+        Cut-off frequency [Hz].
 
     Returns
     -------
@@ -172,33 +171,33 @@ def filtered(recording: Recording, cutoff_hz: float = CUTOFF_HZ) -> tuple[Real, 
         raise OutOfRange(f"{len(time)} valid samples; expected two or more to filter")
     rate = recording.source.rate_hz
     grid, values = evenly(time, z, rate)
-    found = offline(values, rate, cutoff_hz)
+    smooth = offline(values, rate, cutoff_hz)
     before = np.clip(np.searchsorted(time, grid, side="right") - 1, 0, len(time) - 2)
-    found[(time[before + 1] - time[before]) * cutoff_hz > _LONGEST_GAP] = np.nan
-    return grid, found
+    smooth[(time[before + 1] - time[before]) * cutoff_hz > _LONGEST_GAP] = np.nan
+    return grid, smooth
 
 
 def evenly(time_s: Real, values: Complex, rate_hz: float) -> tuple[Real, Complex]:
-    """Values on even steps: as they are where they lie so, or on straight lines between their neighbours."""
+    """Values on even steps: unchanged where the steps are even, else interpolated linearly."""
     steps = np.diff(time_s) * rate_hz
     if np.abs(steps - 1).max() < _EVEN:
         return time_s, values
     grid = np.arange(time_s[0], time_s[-1] + 0.5 / rate_hz, 1 / rate_hz)
-    found = np.empty((len(grid), values.shape[1]), np.complex128)
+    even = np.empty((len(grid), values.shape[1]), np.complex128)
     for j in range(values.shape[1]):
-        found[:, j] = np.interp(grid, time_s, values[:, j])
-    return grid, found
+        even[:, j] = np.interp(grid, time_s, values[:, j])
+    return grid, even
 
 
 def response_db(frequency_hz: float, cutoff_hz: float, rate_hz: float, order: int = ORDER) -> float:
-    r"""Gain of one pass, in closed form [dB].
+    r"""Gain of one pass [dB].
 
     .. math:: |H|^2 = \frac{1}{1 + (\tan(\pi f / f_s) / \tan(\pi f_c / f_s))^{2n}}
 
     Parameters
     ----------
     frequency_hz, cutoff_hz, rate_hz : float
-        Of the signal, the cut-off, and the samples [Hz].
+        Frequency of the signal, cut-off frequency and sampling rate [Hz].
     order : int
         Of the filter.
 

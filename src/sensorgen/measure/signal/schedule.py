@@ -1,21 +1,19 @@
-"""The plan of a run: random presses, the same for the same seed, that any rig can follow.
+"""Plan a run of random presses, reproducible by its seed, that any rig can follow.
 
-Forces and positions are drawn independently and evenly, so that neither drift nor creep can be taken for either. The
-order is random as drawn; a press that is repeated comes back at a random place of the run, not at once, so that the two
-tell repeatability and not memory.
+Forces and positions are independent and uniform, so that neither drift nor creep correlates with them. Repeated presses
+come at random times of the run, not one after the other, so that they show repeatability and not relaxation.
 """
 
 import csv
 import io
 from dataclasses import asdict, dataclass, fields
-from typing import Any
 
 import numpy as np
 
 from sensorgen.core.errors import OutOfRange
 
 MOST_PRESSES = 100_000
-_STEP_N, _STEP_MM = 0.001, 0.001  # to which the numbers are rounded, so that the file says all of them
+_STEP_N, _STEP_MM = 0.001, 0.001  # resolution: the file has all digits
 
 
 @dataclass(frozen=True)
@@ -25,15 +23,15 @@ class Step:
     Attributes
     ----------
     press : int
-        Counted from 1, in the order of the run.
+        Number in the run, from 1.
     point : int
-        Which of the points it presses, counted from 1; the same in a repeat.
+        Number of the point, from 1; the same in a repeat.
     start_s : float
-        When the tip comes down, from the begin of the run [s].
+        Begin of the press, since the begin of the run [s].
     force_n, position_mm : float
-        What to press with and where: the centre of the tip along the sensor [N], [mm].
+        Force, and position of the tip's centre along the sensor [N], [mm].
     dwell_s, rest_s : float
-        How long to press, and how long to wait after it [s].
+        Length of the press, and of the rest after it [s].
     """
 
     press: int
@@ -47,20 +45,20 @@ class Step:
 
 @dataclass(frozen=True)
 class Plan:
-    """A run that is to be.
+    """Parameters of a run.
 
     Attributes
     ----------
     seed : int
-        Of the random numbers.
+        Seed of the random numbers.
     presses : int
-        Points; each is pressed ``1 + repeats`` times.
+        Number of points; each is pressed ``1 + repeats`` times.
     force_n, position_mm : (float, float)
         Least and largest [N], [mm].
     dwell_s, rest_s : float
-        How long each press and each rest lasts [s].
+        Length of each press and of each rest [s].
     repeats : int
-        How often each point is pressed again.
+        Number of repeats of each point.
     """
 
     seed: int
@@ -72,7 +70,7 @@ class Plan:
     repeats: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what no rig can run."""
+        """Check the ranges."""
         total = self.presses * (1 + self.repeats)
         if self.presses < 1 or self.repeats < 0 or total > MOST_PRESSES:
             raise OutOfRange(f"{self.presses} presses, each {self.repeats} times more; expected up to {MOST_PRESSES}")
@@ -83,7 +81,7 @@ class Plan:
             raise OutOfRange(f"dwell {self.dwell_s:g} s and rest {self.rest_s:g} s; expected a dwell above 0")
 
     def steps(self) -> list[Step]:
-        """Every press, in the order of the run; a rest comes first."""
+        """Presses in the order of the run, after a rest."""
         rng = np.random.default_rng(self.seed)
         force = np.round(rng.uniform(*self.force_n, self.presses) / _STEP_N) * _STEP_N
         position = np.round(rng.uniform(*self.position_mm, self.presses) / _STEP_MM) * _STEP_MM
@@ -98,12 +96,8 @@ class Plan:
         ]
 
     def seconds(self) -> float:
-        """How long the run takes [s]."""
+        """Length of the run [s]."""
         return self.rest_s + self.presses * (1 + self.repeats) * (self.dwell_s + self.rest_s)
-
-    def data(self) -> dict[str, Any]:
-        """The plan as plain data."""
-        return asdict(self) | {"seconds": self.seconds(), "steps": [asdict(step) for step in self.steps()]}
 
     def csv(self) -> str:
         """The plan as CSV, a row per press."""

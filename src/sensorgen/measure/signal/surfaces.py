@@ -1,4 +1,4 @@
-"""Differences of readings as surfaces over force and position, and on one scale for all sets."""
+"""Interpolate differences of readings over force and position, and normalise them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ POINTS = 50
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Values on a grid, straight between the presses around each point (Delaunay).
+    """Values on a grid, linear between the presses (Delaunay triangulation).
 
     Attributes
     ----------
     force_n, position_mm : (k,) array
         Axes of the grid [N], [mm].
     values : (k, k, m) array
-        Force down, position across; nan where no presses lie around the point.
+        By force, then position; nan outside the convex hull of the presses.
     """
 
     force_n: Real
@@ -29,16 +29,16 @@ class Surface:
 
 
 def surface(force_n: Real, position_mm: Real, values: Real, points: int = POINTS) -> Surface:
-    """A surface through scattered presses.
+    """Interpolate scattered presses linearly.
 
     Parameters
     ----------
     force_n, position_mm : (p,) array
-        The presses [N], [mm].
+        Force and position of the presses [N], [mm].
     values : (p, m) array
-        What was measured, as differences of R or X of every tone.
+        Readings, as differences of R or X at every frequency.
     points : int
-        Of the grid, to either side.
+        Grid points along each axis.
 
     Raises
     ------
@@ -60,19 +60,19 @@ def surface(force_n: Real, position_mm: Real, values: Real, points: int = POINTS
 
 
 def normalised(sets: Sequence[Real], *, together: bool = False) -> list[Real]:
-    """Differences of several sets on a scale from 0 to 1, as figure 6.33 of the thesis shows them.
+    """Scale the differences of several sets to 0 to 1, as in figure 6.33 of the thesis.
 
     Parameters
     ----------
     sets : sequence of (p, m) arrays
-        Differences of R, or of X, of one set each; tones beside each other.
+        Differences of R, or of X, of each set; a column per frequency.
     together : bool
-        One scale for all sets, so that sizes compare; else each set has its own and only their courses do.
+        One scale for all sets, to compare sizes; else one for each set, to compare shapes.
 
     Returns
     -------
     list of (p, m) arrays
-        0 the least and 1 the largest, tone by tone; nan where all values of a scale are the same.
+        0 is the least and 1 the largest of each column; nan where all values of a column are equal.
 
     Examples
     --------

@@ -1,12 +1,12 @@
-r"""What the multimeter says of a specimen: open electrode, short, leak, dry joint or intact.
+r"""Diagnose a specimen by its resistances: open electrode, short, leak, dry joint or intact.
 
-Along an electrode it should read :math:`R_Y = \rho L / (H W)`; between the electrodes an intact film lets nothing
-through. With electrodes of :math:`R_Y` each and a film that leaks evenly, :math:`G` in all, the line reads
+The resistance along an electrode is :math:`R_Y = \rho L / (H W)`; between the electrodes an intact film insulates. With
+electrodes of :math:`R_Y` each and a film of uniform leakage, :math:`G` in all, the resistance of the line is
 
 .. math:: R_Z = \sqrt{\frac{2 R_Y}{G}} \coth \sqrt{2 R_Y G},
 
-which tends to :math:`1/G` for a small leak. A bridge without resistance of its own, at a distance x from the contacts,
-reads :math:`2 R_Y x / L`: whatever lies below :math:`2 R_Y` may be a short, and nothing above it is one.
+which tends to :math:`1/G` for a small leak. A short without resistance of its own, at a distance x from the contacts,
+reads :math:`2 R_Y x / L`: a reading below :math:`2 R_Y` may be a short, a reading above it is none.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,12 @@ from statistics import median
 from sensorgen.core.errors import OutOfRange
 
 WORDS = ("open electrode", "short", "leak", "dry joint", "intact", "unknown")
-"""Verdicts, the gravest first; unknown where a reading is missing that the others hang on."""
+"""Verdicts, the gravest first; unknown where a reading is missing."""
 
-INTACT_OHM = 1e8  # the highest range of a bench multimeter: what it can still tell from open
-ORDER = 10.0  # what is of the same order: up to a factor of ten
+INTACT_OHM = 1e8  # highest range of a bench multimeter
+ORDER = 10.0  # largest factor of one order of magnitude
 _DRY, _OPEN, _LOW = 3.0, 100.0, 0.1  # of the expected resistance
-_APART = 2.0  # readings of one electrode that disagree by more are a matter of the contact
+_APART = 2.0  # factor between readings of one electrode beyond which the contact is bad
 
 
 @dataclass(frozen=True)
@@ -32,12 +32,11 @@ class Evidence:
     Attributes
     ----------
     name : str
-        Of the specimen.
+        Name of the specimen.
     ry_ohm, rz_ohm : tuple of float
-        Along an electrode, and between the electrodes: several readings are several; inf where the meter showed
-        overload; none where nothing was read [ohm].
+        Readings along an electrode and between the electrodes; inf for an overload, empty if not measured [ohm].
     expected_ohm : float
-        What an electrode should have [ohm]; nan where nobody knows.
+        Expected resistance of an electrode [ohm]; nan if unknown.
     shape, remark : str
         For groups.
     film_mm : float or None
@@ -45,7 +44,7 @@ class Evidence:
     iteration : str
         For groups.
     touching : bool
-        Whether the electrodes touch as drawn: such a short says nothing of how well it was printed.
+        Whether the electrodes touch by design: such a short is no fault of the print.
     """
 
     name: str
@@ -61,7 +60,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A verdict and the numbers behind it.
+    """A verdict with its numbers.
 
     Attributes
     ----------
@@ -72,15 +71,16 @@ class Verdict:
     film : str
         "intact", "leak", "short" or "unknown".
     ry_ohm, rz_ohm : float
-        Least reading of each, nan where there is none: a contact only adds, and the film is as good as its worst place.
+        Least reading of each, nan if not measured: a contact only adds resistance, and the film is as good as its worst
+        place.
     ratio : float
         R_Z over R_Y [-].
     leak_s : float
-        Leak through the whole film that would read like that [S]; inf for a reading of 0.
+        Leakage of the whole film with that reading [S]; inf for a reading of 0.
     over_expected : float
-        R_Y over what it should be [-].
+        R_Y over its expected value [-].
     reasons : tuple of str
-        In words, with numbers.
+        Reasons with numbers.
     """
 
     word: str
@@ -95,12 +95,12 @@ class Verdict:
 
     @property
     def same_order(self) -> bool | None:
-        """Whether R_Z is of the order of R_Y or below, within a factor of ten; None where one is missing."""
+        """Whether R_Z is below ten times R_Y; None where one is missing."""
         return None if isnan(self.ratio) else self.ratio <= ORDER
 
 
 def electrode_ohm(resistivity_ohm_m: float, length_m: float, thickness_m: float, width_m: float) -> float:
-    """R_Y of an even electrode, rho L / (H W) [ohm].
+    """Resistance of a uniform electrode, rho L / (H W) [ohm].
 
     Parameters
     ----------
@@ -118,16 +118,16 @@ def electrode_ohm(resistivity_ohm_m: float, length_m: float, thickness_m: float,
 
 
 def leak_s(rz_ohm: float, ry_ohm: float) -> float:
-    r"""Leak through the whole film that reads as ``rz_ohm`` between electrodes of ``ry_ohm`` each [S].
+    r"""Leakage of the whole film with a reading of ``rz_ohm`` between electrodes of ``ry_ohm`` each [S].
 
-    With :math:`q = \sqrt{2 R_Y G}` the line reads :math:`R_Z / 2 R_Y = \coth(q) / q`, which falls with q.
+    With :math:`q = \sqrt{2 R_Y G}`, :math:`R_Z / 2 R_Y = \coth(q) / q`, which falls with q.
 
     Parameters
     ----------
     rz_ohm : float
-        Between the electrodes, inf for none [ohm].
+        Resistance between the electrodes, inf for an overload [ohm].
     ry_ohm : float
-        Of one electrode, end to end [ohm].
+        Resistance of one electrode, end to end [ohm].
 
     Raises
     ------
@@ -136,7 +136,7 @@ def leak_s(rz_ohm: float, ry_ohm: float) -> float:
 
     Examples
     --------
-    >>> round(1 / leak_s(1e6, 600.0))  # far above the electrodes it is the leak alone, less a third of them
+    >>> round(1 / leak_s(1e6, 600.0))  # far above the electrodes: the leakage alone, less a third of them
     999600
     """
     if rz_ohm < 0 or ry_ohm < 0:
@@ -155,14 +155,14 @@ def leak_s(rz_ohm: float, ry_ohm: float) -> float:
 
 
 def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> Verdict:
-    """The verdict on a specimen.
+    """Verdict on a specimen.
 
     Parameters
     ----------
     of : Evidence
-        Its readings.
+        Readings.
     intact_ohm : float
-        What an intact film has at least; what is known of the dielectric, or the meter's highest range [ohm].
+        Least resistance of an intact film; the meter's highest range if not given [ohm].
 
     Raises
     ------
@@ -171,7 +171,7 @@ def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> Verdict:
 
     Notes
     -----
-    A reading below 0 is one of 0: a meter's offset, and its leads, are subtracted.
+    A reading below 0 counts as 0: it comes from subtracting the meter's offset and leads.
     """
     if of.expected_ohm <= 0:
         raise OutOfRange(f"{of.name}: {of.expected_ohm:g} ohm expected of an electrode; expected a number above 0")
@@ -202,16 +202,16 @@ def _electrode(of: Evidence, ry: float) -> tuple[str, str]:
     if ry == inf:
         return "open electrode", "the meter shows overload along the electrode"
     over, spread = ry / of.expected_ohm, max(of.ry_ohm) / ry if ry else 1.0
-    said = f"R_Y {ry:.4g} ohm is {over:.3g} of the expected {of.expected_ohm:.4g} ohm"
+    compared = f"R_Y {ry:.4g} ohm is {over:.3g} of the expected {of.expected_ohm:.4g} ohm"
     if over >= _OPEN:
-        return "open electrode", f"{said}: {_OPEN:g} times and more is a track that is interrupted"
+        return "open electrode", f"{compared}: {_OPEN:g} times and more is an interrupted track"
     if over > _DRY:
-        return "dry joint", f"{said}: more than {_DRY:g} times"
+        return "dry joint", f"{compared}: more than {_DRY:g} times"
     if spread > _APART:
         return "dry joint", f"readings of R_Y differ by a factor of {spread:.3g}: more than {_APART:g}"
     if over < _LOW:
-        return "unknown", f"{said}: so little is no such electrode; is a k lost?"
-    return "sound", f"R_Y {ry:.4g} ohm, nothing expected to hold it against" if isnan(over) else said
+        return "unknown", f"{compared}: too little for such an electrode; is a k lost?"
+    return "sound", f"R_Y {ry:.4g} ohm, expected value unknown" if isnan(over) else compared
 
 
 def _film(ry: float, rz: float, expected_ohm: float, intact_ohm: float) -> tuple[str, str]:
@@ -219,9 +219,9 @@ def _film(ry: float, rz: float, expected_ohm: float, intact_ohm: float) -> tuple
         return "unknown", "no reading between the electrodes"
     if rz >= intact_ohm:
         return "intact", f"R_Z {rz:.4g} ohm is at or above the {intact_ohm:.4g} ohm of an intact film"
-    line = next((r for r in (ry, expected_ohm) if 0 <= r < inf), 0.0)  # an open electrode says nothing of a bridge
+    line = next((r for r in (ry, expected_ohm) if 0 <= r < inf), 0.0)  # an open electrode has no part in a short
     if rz <= 2 * line:
-        return "short", f"R_Z {rz:.4g} ohm is within the {2 * line:.4g} ohm of two electrodes: a bridge reads that"
+        return "short", f"R_Z {rz:.4g} ohm is within the {2 * line:.4g} ohm of two electrodes"
     return (
         "leak",
         f"R_Z {rz:.4g} ohm is below the {intact_ohm:.4g} ohm of an intact film: {leak_s(rz, line):.3g} S",
@@ -229,12 +229,12 @@ def _film(ry: float, rz: float, expected_ohm: float, intact_ohm: float) -> tuple
 
 
 def expected_from(group: Sequence[Evidence]) -> float:
-    """What an electrode of a group has, by its own least readings: their median [ohm]; nan where there are none.
+    """Expected resistance of an electrode: median of a group's least readings [ohm]; nan of none.
 
     Parameters
     ----------
     group : sequence of Evidence
-        Specimens that are printed alike.
+        Specimens with the same electrodes.
     """
     readings = [min(of.ry_ohm) for of in group if of.ry_ohm and min(of.ry_ohm) < inf]
     return median(readings) if readings else nan

@@ -1,8 +1,8 @@
-r"""Phasors of several tones at once, from raw waveforms: the discrete Fourier transform over whole periods.
+r"""Demodulate several tones at once: discrete Fourier transform of raw waveforms over whole periods.
 
-In a window that holds whole periods of every tone the tones are orthogonal, so that no window function, no filter and
-no reference is needed. Only a few of the transform's values are wanted, so it is made in two steps: stretches of B
-samples, one after the other, are mixed down to every tone by one matrix product, and then turned and put together:
+In a window of whole periods of every tone the tones are orthogonal, so that no window function, filter or reference is
+needed. Only a few coefficients are needed, so the transform has two steps: segments of B samples are multiplied by one
+matrix for all tones, then shifted in phase and summed:
 
 .. math:: U_k = \frac{2}{N} \sum_{a=0}^{N/B-1} e^{-2 \pi i k a B / N}
           \sum_{b=0}^{B-1} u_{aB + b} \, e^{-2 \pi i k b / N}
@@ -10,8 +10,9 @@ samples, one after the other, are mixed down to every tone by one matrix product
 Tones that are all multiples of 100 Hz have whole periods in 10 ms.
 """
 
+from dataclasses import dataclass
 from math import gcd
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,36 +21,44 @@ from sensorgen.core.errors import BadInput, OutOfRange
 
 Complex = NDArray[np.complex128]
 _HARMONICS = range(2, 12)
-_BATCH = 1 << 16  # samples at a time: they stay in the cache
-_STRETCH = 256  # samples, at least: so many are mixed at the speed of a matrix product, and few are left to turn
+_BATCH = 1 << 16  # samples that fit into the cache
+_SEGMENT = 256  # least samples of a segment: large enough for the matrix product, small enough for the sum
 
 
-class Demodulated(NamedTuple):
-    """Impedances of windows one after the other."""
+@dataclass(frozen=True, eq=False)
+class Demodulated:
+    """Impedances of consecutive windows.
+
+    Attributes
+    ----------
+    time_s : (n,) array
+        Middles of the windows [s].
+    impedance_ohm : (n, m) array
+        Impedance at m tones [ohm].
+    clipped : (n,) array
+        Windows in which a waveform stays at the end of its range.
+    """
 
     time_s: NDArray[np.float64]
-    """Middles of the windows [s]."""
     impedance_ohm: Complex
-    """(windows, tones) [ohm]."""
     clipped: NDArray[np.bool_]
-    """Windows in which a waveform stays at the end of its range."""
 
 
 def window_samples(rate_hz: float, tones_hz: ArrayLike) -> int:
-    """Samples of the shortest window that holds whole periods of every tone.
+    """Length of the shortest window with whole periods of every tone, in samples.
 
     Parameters
     ----------
     rate_hz : float
-        Samples per second [Hz].
+        Sampling rate [Hz].
     tones_hz : (m,) array
         Tones, whole numbers of hertz [Hz].
 
     Raises
     ------
     OutOfRange
-        Tones that are no whole numbers of hertz, from 0 to half the rate; a rate with no whole number of samples in any
-        window up to a second.
+        Tones that are not whole numbers of hertz between 0 and half the rate; a rate without a whole number of samples
+        in any window up to a second.
 
     Examples
     --------
@@ -70,18 +79,18 @@ def window_samples(rate_hz: float, tones_hz: ArrayLike) -> int:
 
 
 def phasors(signal: ArrayLike, rate_hz: float, tones_hz: ArrayLike, window: int = 0) -> Complex:
-    """Amplitude and phase of every tone in windows one after the other.
+    """Amplitude and phase of every tone in consecutive windows.
 
     Parameters
     ----------
     signal : (n,) array
-        Waveform; what is left over at the end counts for nothing.
+        Waveform; an incomplete window at the end is ignored.
     rate_hz : float
-        Samples per second [Hz].
+        Sampling rate [Hz].
     tones_hz : (m,) array
         Tones [Hz].
     window : int
-        Samples of a window, whole periods of every tone; the shortest if not given.
+        Length of a window, whole periods of every tone; the shortest if not given [samples].
 
     Returns
     -------
@@ -105,21 +114,21 @@ def phasors(signal: ArrayLike, rate_hz: float, tones_hz: ArrayLike, window: int 
 
 
 def _transformed(windows: NDArray[Any], bins: NDArray[np.int64]) -> Complex:
-    """Twice the mean of each window, turned back by so many turns (windows, m)."""
+    """Coefficients of each window (n, m), normalised to amplitudes."""
     (count, size), tones = windows.shape, len(bins)
-    stretch = next(n for n in range(min(_STRETCH, size), size + 1) if size % n == 0)
-    within, between = (_turns(at, bins, size) for at in (np.arange(stretch), np.arange(0, size, stretch)))
+    segment = next(n for n in range(min(_SEGMENT, size), size + 1) if size % n == 0)
+    within, between = (_turns(at, bins, size) for at in (np.arange(segment), np.arange(0, size, segment)))
     mixer, step = np.hstack([within.real, within.imag]), _BATCH // size or 1
-    found = np.empty((count, tones), np.complex128)
+    sums = np.empty((count, tones), np.complex128)
     for i in range(0, count, step):
-        mixed = np.asarray(windows[i : i + step], float).reshape(-1, stretch) @ mixer
-        sums = (mixed[:, :tones] + 1j * mixed[:, tones:]).reshape(-1, len(between), tones)
-        found[i : i + step] = (sums * between).sum(axis=1)
-    return np.asarray(found * (2 / size))
+        mixed = np.asarray(windows[i : i + step], float).reshape(-1, segment) @ mixer
+        segments = (mixed[:, :tones] + 1j * mixed[:, tones:]).reshape(-1, len(between), tones)
+        sums[i : i + step] = (segments * between).sum(axis=1)
+    return np.asarray(sums * (2 / size))
 
 
 def _turns(at: NDArray[np.int64], bins: NDArray[np.int64], size: int) -> Complex:
-    """Back by so many turns in a window, at some of its samples; whole turns are left out before they cost digits."""
+    """Phase factors at some samples; whole turns are removed first, to keep the digits."""
     return np.asarray(np.exp(-2j * np.pi * (np.outer(at, bins) % size) / size))
 
 
@@ -127,23 +136,23 @@ def impedance(
     voltage_v: ArrayLike, current_a: ArrayLike, rate_hz: float, tones_hz: ArrayLike, range_v: float = np.inf,
     range_a: float = np.inf,
 ) -> Demodulated:  # fmt: skip
-    """Impedance at every tone from two waveforms that were sampled together.
+    """Impedance at every tone from two simultaneous waveforms.
 
     Parameters
     ----------
     voltage_v, current_a : (n,) array
         Waveforms [V], [A].
     rate_hz : float
-        Samples per second [Hz].
+        Sampling rate [Hz].
     tones_hz : (m,) array
         Tones [Hz].
     range_v, range_a : float
-        Largest values that the instrument can show [V], [A].
+        Ranges of the instrument [V], [A].
 
     Raises
     ------
     BadInput
-        Waveforms of unequal length; a tone without current.
+        Waveforms of different lengths; a tone without current.
     OutOfRange
         As :func:`window_samples`.
     """
@@ -159,18 +168,18 @@ def impedance(
 
 
 def _clipped(signal: NDArray[Any], limit: float, size: int, count: int) -> NDArray[np.bool_]:
-    """Windows with several samples in a row at the rail; a single one may be the crest of a whole wave."""
-    found, step = np.zeros(count, bool), _BATCH // size or 1
+    """Windows with consecutive samples at the end of the range; a single sample may be a crest."""
+    clipped, step = np.zeros(count, bool), _BATCH // size or 1
     for i in range(0, count if np.isfinite(limit) else 0, step):
         some = signal[i * size : (i + step) * size]
         if some.max() >= limit or some.min() <= -limit:
             at = (np.abs(some[: (count - i) * size]) >= limit).reshape(-1, size)
-            found[i : i + step] = (at[:, 1:] & at[:, :-1]).any(axis=1)
-    return found
+            clipped[i : i + step] = (at[:, 1:] & at[:, :-1]).any(axis=1)
+    return clipped
 
 
 def coincidences(tones_hz: ArrayLike) -> list[tuple[float, str]]:
-    """Tones that another one's distortion falls on.
+    """Tones that coincide with distortion products of others.
 
     Parameters
     ----------
@@ -180,25 +189,23 @@ def coincidences(tones_hz: ArrayLike) -> list[tuple[float, str]]:
     Returns
     -------
     list of (float, str)
-        The tone that is hit [Hz], and by what: a harmonic up to the 11th, or 2a + b or 2a - b of two others.
+        The tone [Hz], and the product: a harmonic up to the 11th, or 2a + b or 2a - b of two others.
 
     Examples
     --------
     >>> coincidences([1000, 2000])
     [(2000.0, '2 x 1000 Hz')]
 
-    Of the thesis's tones two are hit, by one relation:
+    Of the thesis's tones, two coincide by one relation:
 
     >>> coincidences([1100, 2300, 5300, 10100, 19900, 49900, 99700])
     [(49900.0, '2 x 19900 + 10100 Hz'), (10100.0, '49900 - 2 x 19900 Hz')]
     """
     tones = [float(f) for f in np.atleast_1d(np.asarray(tones_hz, float))]
-    found = [(hit, f"{n} x {f:g} Hz") for f in tones for n in _HARMONICS for hit in tones if hit == n * f]
+    hits = [(hit, f"{n} x {f:g} Hz") for f in tones for n in _HARMONICS for hit in tones if hit == n * f]
     pairs = [(a, b) for a in tones for b in tones if a != b]
-    found += [(hit, f"2 x {a:g} + {b:g} Hz") for a, b in pairs for hit in tones if hit == 2 * a + b]
-    found += [(hit, _difference(a, b)) for a, b in pairs for hit in tones if hit == abs(2 * a - b) != b]
-    return found
-
-
-def _difference(a: float, b: float) -> str:
-    return f"2 x {a:g} - {b:g} Hz" if 2 * a > b else f"{b:g} - 2 x {a:g} Hz"
+    hits += [(hit, f"2 x {a:g} + {b:g} Hz") for a, b in pairs for hit in tones if hit == 2 * a + b]
+    for a, b in pairs:
+        product = f"2 x {a:g} - {b:g} Hz" if 2 * a > b else f"{b:g} - 2 x {a:g} Hz"
+        hits += [(hit, product) for hit in tones if hit == abs(2 * a - b) != b]
+    return hits

@@ -1,8 +1,7 @@
-r"""Yield per group with its interval, and whether it depends on the group, exactly.
+r"""Yield of groups of specimens with confidence intervals, and exact tests of independence.
 
-Intervals are Clopper's and Pearson's: with few specimens and yields near 0 or 1 they are the ones that hold at least
-the stated confidence whatever the true yield is. Wilson's are narrower because they hold it on average only; who is
-told a yield of "0 to 6 %" should not find 8.
+Intervals are those of Clopper and Pearson: they hold at least the stated confidence for every true yield, also with few
+specimens and yields near 0 or 1. Wilson's are narrower because they hold it only on average.
 """
 
 from collections import Counter
@@ -16,14 +15,14 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.measure.signal.verdicts import ORDER, Evidence, Verdict
 
 CONFIDENCE = 0.95
-_MOST_TABLES, _MOST = 20_000, 1000  # tables, and readings in them, that are all looked at
-_DRAWS, _SEED, _ALIKE = 100_000, 23, 1e-6  # of tables, where there are more; ln of chances that are the same
-_SAME = 1 + 1e-9  # tables as likely as the one seen count as such in spite of rounding
+_MOST_TABLES, _MOST = 20_000, 1000  # tables, and specimens in them, that are enumerated
+_DRAWS, _SEED, _ALIKE = 100_000, 23, 1e-6  # random tables beyond that; difference in ln of equal probabilities
+_SAME = 1 + 1e-9  # ratio of equal probabilities after rounding
 
 
 @dataclass(frozen=True)
 class Share:
-    """A count out of another, with the interval of the share behind it."""
+    """Share of a count in a total, with its confidence interval."""
 
     count: int
     total: int
@@ -32,27 +31,26 @@ class Share:
 
     @property
     def share(self) -> float:
-        """The one over the other [-]; nan of nothing."""
+        """Count over total [-]; nan of nothing."""
         return self.count / self.total if self.total else nan
 
 
 @dataclass(frozen=True)
 class Group:
-    """Specimens that have something in common.
+    """A group of specimens.
 
     Attributes
     ----------
     key : tuple
-        What they have in common.
+        Common property.
     intact : Share
-        The yield: those that are intact, of those that a verdict was possible on; shorts by design are none of either.
+        The yield: intact specimens among those with a verdict, without shorts by design.
     shorted : Share
-        Those whose R_Z is of the order of their R_Y or below, of those that have both readings; again without shorts by
-        design.
+        Specimens whose R_Z is below ten times R_Y among those with both readings, without shorts by design.
     median_ratio : float
-        Median of R_Z over R_Y [-]; nan where none has both.
+        Median of R_Z over R_Y [-]; nan without any.
     words : mapping of str to int
-        How many have each verdict.
+        Number of specimens by verdict.
     """
 
     key: tuple[Hashable, ...]
@@ -66,14 +64,14 @@ Judged = tuple[Evidence, Verdict]
 
 
 def share(count: int, total: int, confidence: float = CONFIDENCE) -> Share:
-    """A share with its exact interval (Clopper and Pearson 1934).
+    """Share with its exact confidence interval (Clopper and Pearson 1934).
 
     Parameters
     ----------
     count, total : int
-        How many, of how many.
+        Count and total.
     confidence : float
-        Held at least [-].
+        Least coverage of the interval [-].
 
     Raises
     ------
@@ -82,8 +80,8 @@ def share(count: int, total: int, confidence: float = CONFIDENCE) -> Share:
 
     Examples
     --------
-    >>> found = share(0, 10)
-    >>> round(found.low, 4), round(found.high, 4)
+    >>> none = share(0, 10)
+    >>> round(none.low, 4), round(none.high, 4)
     (0.0, 0.3085)
     """
     from scipy.special import betaincinv
@@ -102,25 +100,25 @@ def groups(
     confidence: float = CONFIDENCE,
     order: float = ORDER,
 ) -> list[Group]:
-    """Yield of every group, in the order of their keys.
+    """Yield of every group, by key.
 
     Parameters
     ----------
     judged : iterable of (Evidence, Verdict)
         Specimens.
     by : function
-        What they are grouped by, as ``lambda of: (of.shape, of.film_mm)``.
+        Key of a specimen, as ``lambda of: (of.shape, of.film_mm)``.
     confidence : float
-        Of the intervals [-].
+        Confidence of the intervals [-].
     order : float
         R_Z over R_Y up to which a specimen counts as shorted [-].
     """
-    found: dict[tuple[Hashable, ...], list[Judged]] = {}
+    members: dict[tuple[Hashable, ...], list[Judged]] = {}
     for of, verdict in judged:
-        found.setdefault(by(of), []).append((of, verdict))
+        members.setdefault(by(of), []).append((of, verdict))
     return [
-        _group(key, found[key], confidence, order)
-        for key in sorted(found, key=lambda key: [(k is None, str(k)) for k in key])
+        _group(key, members[key], confidence, order)
+        for key in sorted(members, key=lambda key: [(k is None, str(k)) for k in key])
     ]
 
 
@@ -136,27 +134,28 @@ def _group(key: tuple[Hashable, ...], judged: Sequence[Judged], confidence: floa
     )  # fmt: skip
 
 
-def dependence(found: Sequence[Group]) -> float:
-    """How probable it is by chance alone that groups differ so much in how many are shorted, as :func:`independence`.
+def dependence(of: Sequence[Group]) -> float:
+    """p-value of the differences in shorted specimens between groups, by :func:`independence`.
 
     Parameters
     ----------
-    found : sequence of Group
-        As :func:`groups` gives them; groups without both readings count for nothing.
+    of : sequence of Group
+        As :func:`groups` returns them; groups without both readings are ignored.
     """
-    shorted = [group.shorted for group in found if group.shorted.total]
+    shorted = [group.shorted for group in of if group.shorted.total]
     return independence([(s.count, s.total - s.count) for s in shorted])
 
 
 def independence(table: Sequence[tuple[int, int]]) -> float:
-    """Probability of a table at least as unlikely as this one, if the group does not matter (Fisher, Freeman, Halton).
+    """p-value of independence of a 2 x n table (Fisher, Freeman, Halton).
 
-    Exact where all tables with the same sums can be looked at; of more, 100 000 are drawn at random, always the same.
+    Exact by enumeration of all tables with the same sums, up to a limit; beyond it from 100 000 random tables with a
+    fixed seed.
 
     Parameters
     ----------
     table : sequence of (int, int)
-        For every group, how many did and how many did not.
+        Both counts of every group.
 
     Raises
     ------
@@ -165,7 +164,7 @@ def independence(table: Sequence[tuple[int, int]]) -> float:
 
     Examples
     --------
-    Fisher's lady, who tasted all eight cups rightly:
+    Fisher's tea tasting, all eight cups right:
 
     >>> round(independence([(4, 0), (0, 4)]), 4)
     0.0286
@@ -175,13 +174,13 @@ def independence(table: Sequence[tuple[int, int]]) -> float:
     sizes, seen = [a + b for a, b in table], [a for a, _ in table]
     if sum(sizes) > _MOST or prod(sorted(n + 1 for n in sizes)[:-1]) > _MOST_TABLES:
         return _drawn(sizes, seen)
-    ways = _ways(seen, sizes)
+    ways = prod(comb(n, k) for k, n in zip(seen, sizes, strict=True))
     likely = sum(n for n in _every(sizes, sum(seen)) if n <= ways * _SAME)
     return likely / comb(sum(sizes), sum(seen))
 
 
 def _drawn(sizes: Sequence[int], seen: Sequence[int]) -> float:
-    """The same from tables that are drawn; the one seen counts as one of them, so that it is never 0."""
+    """p-value from random tables; the observed table is one of them, so that it is never 0."""
     import numpy as np
     from scipy.special import gammaln
 
@@ -195,15 +194,8 @@ def _drawn(sizes: Sequence[int], seen: Sequence[int]) -> float:
     return (1 + unlikely) / (1 + _DRAWS)
 
 
-def _ways(did: Sequence[int], sizes: Sequence[int]) -> int:
-    found = 1
-    for k, n in zip(did, sizes, strict=True):
-        found *= comb(n, k)
-    return found
-
-
 def _every(sizes: Sequence[int], did: int) -> Iterable[int]:
-    """Ways in which each table with the same sums can come about."""
+    """Number of arrangements of each table with the same sums."""
     if not sizes:
         return [1] if did == 0 else []
     rest = sizes[1:]

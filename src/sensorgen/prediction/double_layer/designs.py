@@ -1,18 +1,18 @@
-"""The stacks that a design makes."""
+"""Stacks of tracks and films made from a design."""
 
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design, make
+from sensorgen.design.values import MaterialValue
 from sensorgen.models.sensor import Sensor
 from sensorgen.models.stack import Film, Press, Stack, Track
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import Query, sensor_model
-from sensorgen.prediction.sensor_model import TIP_M, SensorModel, Tip
+from sensorgen.prediction.sensor_model import TIP_M, Tip
 
 
 @dataclass(frozen=True)
@@ -22,22 +22,22 @@ class Stacked:
     Attributes
     ----------
     own, double : Stack
-        As drawn; and with two films, which is the same for a double sensor and two of a kind for any other.
+        As drawn; and with two films: the same for a double sensor, two equal films for any other.
     tip_m : float
         Length of the tip and of the touch [m].
     isolation_eps_r : float
         Relative permittivity of the isolation's material [-].
-    taken : list of dict
-        Material values that the numbers rest on.
+    taken : tuple of MaterialValue
+        Material values used.
     doubts : tuple of str
-        Why they are to be taken with care.
+        Why the numbers are uncertain.
     """
 
     own: Stack
     double: Stack
     tip_m: float
     isolation_eps_r: float
-    taken: list[dict[str, Any]]
+    taken: tuple[MaterialValue, ...]
     doubts: tuple[str, ...]
 
 
@@ -49,15 +49,12 @@ def stacked(design: Design, law: str = "", tip_m: float = TIP_M) -> Stacked:
     double = stack_of([lower.sensor, upper.sensor])
     own = double if len(found) > 1 else stack_of([lower.sensor])
     material, source = design.slot("isolation")
-    taken = {tuple(vars(value).items()) for half in found for value in half.values}
+    taken = {value for half in found for value in half.values}
     return Stacked(
         own, double, tip_m, material.value("relative_permittivity", source).value,
-        [dict(value) for value in sorted(taken)], _doubts(found),
+        tuple(sorted(taken, key=lambda value: tuple(vars(value).values()))),
+        tuple(dict.fromkeys(doubt for half in found for doubt in half.doubts)),
     )  # fmt: skip
-
-
-def _doubts(found: Sequence[SensorModel]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(doubt for half in found for doubt in half.doubts))
 
 
 def halves(design: Design) -> list[Design]:
@@ -88,15 +85,15 @@ def stack_of(sensors: Sequence[Sensor]) -> Stack:
     sensors : sequence of Sensor
         Of one outline.
     """
+
+    def track(sensor: Sensor, end: int) -> Track:
+        section = sensor.electrode_m[end] * sensor.width_m
+        return Track(sensor.resistivity_ohm_m[end] / section, sensor.piezoresistance_per_pa[end])
+
     first = sensors[0]
-    tracks = [_track(first, 1), *(_track(sensor, 0) for sensor in sensors)]
     films = [Film(s.capacitance_f_per_m, s.compression.thinning, s.tan_delta, s.leak_s_per_m) for s in sensors]
-    return Stack(first.length_m, first.width_m, tuple(tracks), tuple(films))
-
-
-def _track(sensor: Sensor, end: int) -> Track:
-    section = sensor.electrode_m[end] * sensor.width_m
-    return Track(sensor.resistivity_ohm_m[end] / section, sensor.piezoresistance_per_pa[end])
+    tracks = (track(first, 1), *(track(sensor, 0) for sensor in sensors))
+    return Stack(first.length_m, first.width_m, tracks, tuple(films))
 
 
 def press_at(found: Stacked, force_n: float, position_m: float | None) -> Press:

@@ -1,21 +1,20 @@
-"""What a design or its reading could change, each as a function of a setup, and what it would be worth.
+"""Changes of design and readout, each as a function of a setup, and the standard errors with them.
 
-A change keeps the press: the same force at the same place. What is required of it stays that of the unchanged setup.
+A change keeps the press: the same force at the same place. The required errors stay those of the unchanged setup.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import Any
 
 import numpy as np
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import compression
 from sensorgen.models.compression import Plate
-from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.identifiability.fisher import Bounds, Setup
-from sensorgen.prediction.identifiability.tones import spread
+from sensorgen.prediction.identifiability.frequencies import spread
+from sensorgen.prediction.identifiability.results import ChangeResult, standard_errors
 from sensorgen.prediction.identifiability.verdict import Required
 
 SHOWN = 3
@@ -35,13 +34,13 @@ class Change:
     Attributes
     ----------
     kind : str
-        What it is a change of; of each kind only the most helpful one is advised.
+        Part of the sensor or readout; of each kind only the most helpful change is advised.
     name : str
-        In words; ``{lowest}`` and ``{highest}`` stand for the tones.
+        In words; ``{lowest}`` and ``{highest}`` stand for the frequencies.
     risk : str
-        What it costs or endangers.
+        Its disadvantage.
     apply : callable
-        The changed setup, or the same where this is nothing to do.
+        The changed setup, or the same where the change does not apply.
     """
 
     kind: str
@@ -52,36 +51,36 @@ class Change:
 
 @dataclass(frozen=True)
 class Tried:
-    """A change and what a press is then known to."""
+    """A change, the changed setup and its bounds."""
 
     change: Change
     setup: Setup
     bounds: Bounds
     shortfall: float
 
-    def as_dict(self) -> dict[str, Any]:
-        """As plain data, SI units."""
-        tones = self.setup.frequency_hz
-        named = self.change.name.format(lowest=_khz(min(tones)), highest=_khz(max(tones)))
-        return {
-            "kind": self.change.kind,
-            "change": named,
-            "risk": self.change.risk,
-            "sigma_force_n": float(self.bounds.force_n),
-            "sigma_position_m": float(self.bounds.position_m),
-            "shortfall": self.shortfall,
-        }
+    def result(self) -> ChangeResult:
+        """As a result, with the frequencies named."""
+        low, high = (
+            f"{np.round(f / 1e3, 3):.4g} kHz" for f in (min(self.setup.frequency_hz), max(self.setup.frequency_hz))
+        )
+        return ChangeResult(
+            **vars(standard_errors(self.bounds)),
+            kind=self.change.kind,
+            change=self.change.name.format(lowest=low, highest=high),
+            risk=self.change.risk,
+            shortfall=self.shortfall,
+        )
 
 
 def most_helpful(setup: Setup, need: Required) -> list[Tried]:
-    """The changes that bring the worse of both errors down most, one of each kind, the best first.
+    """The changes that lower the worse of both errors most, one of each kind, the best first.
 
     Parameters
     ----------
     setup : Setup
         As designed.
     need : Required
-        What a press has to be known to; the errors are held against it.
+        Required errors, which the errors are compared with.
     """
     before = float(need.shortfall(setup.bounds()))
     ranked = sorted((t for t in _tried(setup, need) if t.shortfall < HELPS * before), key=lambda t: t.shortfall)
@@ -90,7 +89,7 @@ def most_helpful(setup: Setup, need: Required) -> list[Tried]:
 
 
 def together(setup: Setup, changes: Sequence[Tried]) -> Bounds | None:
-    """What several changes do at once, tones last since they go by the corner; None where that has no answer."""
+    """Bounds with several changes, frequencies last since they depend on the corner; None if the film closes."""
     ordered = sorted((t.change for t in changes), key=CHANGES.index)
     try:
         return reduce(lambda so_far, change: change.apply(so_far), ordered, setup).bounds()
@@ -99,7 +98,7 @@ def together(setup: Setup, changes: Sequence[Tried]) -> Bounds | None:
 
 
 def _tried(setup: Setup, need: Required) -> Iterator[Tried]:
-    """Every change that has an answer: not one that presses a film flat."""
+    """Every change with finite results: not one that closes the film."""
     for change in CHANGES:
         changed = change.apply(setup)
         try:
@@ -131,17 +130,18 @@ def cell(setup: Setup) -> Setup:
     """The solved cell of triangles in place of what is there."""
     sensor = setup.sensor
     law = compression.solved("tri", _CELL, _CELL_PA)
-    if law is None or law == sensor.compression or setup.assumed:  # what an unsolved cell would gain, nobody knows
+    if law is None or law == sensor.compression or setup.assumed:  # the gain over an unsolved cell is unknown
         return setup
     return setup.on(replace(sensor, capacitance_f_per_m=CELL_F_PER_M2 * sensor.width_m, compression=law))
 
 
 def soft_film(setup: Setup) -> Setup:
-    """A plate six times softer, down to 1 MPa; a solved curve would have to be solved anew."""
+    """A plate six times softer, down to 1 MPa; a solved curve would have to be computed again."""
     law = setup.sensor.compression
     if not isinstance(law, Plate):
         return setup
-    return setup.on(_giving_way(setup.sensor, min(law.modulus_pa, max(law.modulus_pa / SOFTER_X60, SOFTER_X60_PA))))
+    modulus_pa = min(law.modulus_pa, max(law.modulus_pa / SOFTER_X60, SOFTER_X60_PA))
+    return setup.on(replace(setup.sensor, compression=Plate(law.name, law.source, modulus_pa)))
 
 
 def thin_film(setup: Setup) -> Setup:
@@ -152,7 +152,7 @@ def thin_film(setup: Setup) -> Setup:
 
 
 def narrow(setup: Setup) -> Setup:
-    """Half the width: the same force on half the area. A bonded plate would in truth grow softer besides."""
+    """Half the width: the same force on half the area. A bonded plate would also become softer, which is neglected."""
     sensor = setup.sensor
     half = replace(sensor, width_m=sensor.width_m / 2, capacitance_f_per_m=sensor.capacitance_f_per_m / 2)
     return setup.on(half)
@@ -175,15 +175,15 @@ def tip(factor: float) -> Callable[[Setup], Setup]:
     return apply
 
 
-def higher_tones(setup: Setup) -> Setup:
-    """Ten times higher tones, where the instrument can give them."""
+def higher_frequencies(setup: Setup) -> Setup:
+    """Ten times higher frequencies, where the instrument can give them."""
     if 10 * max(setup.frequency_hz) > setup.highest_hz:
         return setup
     return replace(setup, frequency_hz=tuple(10 * f for f in setup.frequency_hz))
 
 
-def tones_at_corner(setup: Setup) -> Setup:
-    """As many tones spread about the corner."""
+def frequencies_at_corner(setup: Setup) -> Setup:
+    """As many frequencies spread about the corner."""
     if not setup.sensor.resistance_ohm():
         return setup
     return replace(setup, frequency_hz=spread(setup))
@@ -192,15 +192,6 @@ def tones_at_corner(setup: Setup) -> Setup:
 def quieter(setup: Setup) -> Setup:
     """A tenth of the noise."""
     return replace(setup, noise=setup.noise / 10)
-
-
-def _giving_way(sensor: Sensor, modulus_pa: float) -> Sensor:
-    law = sensor.compression
-    return replace(sensor, compression=Plate(law.name, law.source, modulus_pa))
-
-
-def _khz(frequency_hz: float) -> str:
-    return f"{np.round(frequency_hz / 1e3, 3):.4g} kHz"
 
 
 CHANGES = (
@@ -218,9 +209,9 @@ CHANGES = (
     Change("far end", "a resistor at the far end, as large as both electrodes", "a contact at the far end", ended),
     Change("tip", "a tip twice as long", "two presses closer than the tip become one", tip(2.0)),
     Change("tip", "a tip half as long", "twice the pressure on the film", tip(0.5)),
-    Change("tones", "ten times higher tones, {lowest} to {highest}", "stray capacitance and leads count more",
-           higher_tones),
-    Change("tones", "tones about the corner, {lowest} to {highest}", "stray capacitance and leads count more",
-           tones_at_corner),
+    Change("frequencies", "ten times higher frequencies, {lowest} to {highest}",
+           "stray capacitance and leads count more", higher_frequencies),
+    Change("frequencies", "frequencies about the corner, {lowest} to {highest}",
+           "stray capacitance and leads count more", frequencies_at_corner),
     Change("noise", "a tenth of the noise", "a hundred readings averaged in place of one, or a better bridge", quieter),
 )  # fmt: skip

@@ -1,7 +1,7 @@
-r"""How well a reading tells force and position: Fisher information and the bound of Cramer and Rao.
+r"""Fisher information of readings on force and position, and the Cramer-Rao bound.
 
-The real and the imaginary part of Z at each tone carry Gaussian noise of standard deviation ``noise`` \|Z\|, all
-independent. Divided by Z a reading is then ln Z with noise ``noise`` in both parts, at every tone the same.
+The real and the imaginary part of Z at each frequency carry Gaussian noise of standard deviation ``noise`` \|Z\|, all
+independent. Divided by Z a reading is then ln Z with noise ``noise`` in both parts, the same at every frequency.
 """
 
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ PARALLEL = 1e-9  # sine of the angle between two directions below which they are
 
 
 class Slopes(NamedTuple):
-    """Relative derivatives of Z, tones on the last axis."""
+    """Relative derivatives of Z, frequencies on the last axis."""
 
     by_force_per_n: Complex
     by_position_per_m: Complex
@@ -36,22 +36,22 @@ class Bounds(NamedTuple):
 
 @dataclass(frozen=True)
 class Setup:
-    """One press on one sensor, read by some tones.
+    """One press on one sensor, read at some frequencies.
 
     Attributes
     ----------
     sensor : Sensor
-        What is pressed.
+        That is pressed.
     frequency_hz : tuple of float
-        Tones [Hz]; a tone that is there twice is read twice.
+        Frequencies [Hz]; one that is listed twice is read twice.
     noise : float
-        Standard deviation of Re Z and of Im Z, each, as a share of abs(Z) [-].
+        Standard deviation of Re Z and of Im Z, each, relative to abs(Z) [-].
     force_n, position_m : float
         The press: force [N], centre of the tip [m].
     highest_hz : float
-        Highest tone that the instrument can give [Hz].
+        Highest frequency of the instrument [Hz].
     assumed : str
-        What is taken for granted of how the film gives way, where nobody solved it; or "".
+        Assumption on the law of compression of a cell that was not solved, or "".
     """
 
     sensor: Sensor
@@ -63,7 +63,7 @@ class Setup:
     assumed: str = ""
 
     def bounds(self) -> Bounds:
-        """What the tones tell of the press."""
+        """Bounds of the press by these readings."""
         return bounds(slopes(self.sensor, self.frequency_hz, self.force_n, self.position_m), self.noise)
 
     def on(self, sensor: Sensor) -> "Setup":
@@ -77,11 +77,11 @@ def slopes(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position
     Parameters
     ----------
     sensor : Sensor
-        What is pressed.
+        That is pressed.
     frequency_hz : (n,) array
-        Tones [Hz].
+        Frequencies [Hz].
     force_n, position_m : float or array
-        Presses [N], [m]; they broadcast, and the tones come as a last axis.
+        Presses [N], [m]; they broadcast, and the frequencies are a last axis.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def slopes(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position
     z, by_force, by_position = sensor.response(np.asarray(frequency_hz, float), force, position)
     if not z.all():
         raise OutOfRange("Z is 0: a relative change needs a resistance or a capacitance to change")
-    return Slopes(by_force / z, np.where(force == 0, 0.0, by_position / z))  # at the ends rounding would leave dust
+    return Slopes(by_force / z, np.where(force == 0, 0.0, by_position / z))  # at the ends rounding would leave residues
 
 
 def bounds(found: Slopes, noise: float) -> Bounds:
@@ -102,21 +102,21 @@ def bounds(found: Slopes, noise: float) -> Bounds:
               \sigma_x = \frac{n}{\lVert b - (a \cdot b / a \cdot a)\, a \rVert}, \quad
               a = \frac{\partial \ln Z}{\partial F}, \quad b = \frac{\partial \ln Z}{\partial x}
 
-    with the real and imaginary parts of all tones as components: the inverse of the Fisher matrix
+    with the real and imaginary parts of all frequencies as components: the inverse of the Fisher matrix
     [a.a, a.b; a.b, b.b]/n^2, by what is left of each slope beside the other so that no determinant cancels.
 
     Parameters
     ----------
     found : Slopes
-        Tones on the last axis.
+        Frequencies on the last axis.
     noise : float
         n, of each part of Z, relative to abs(Z) [-].
 
     Returns
     -------
     Bounds
-        sigma_F [N], sigma_x [m] and their correlation [-]; nan where the matrix is singular. Where position leaves
-        no trace (b = 0, as without a force) only sigma_x is: sigma_F then is that of force alone, n/norm(a).
+        sigma_F [N], sigma_x [m] and their correlation [-]; nan where the matrix is singular. Where Z does not
+        depend on position (b = 0, as without a force) only sigma_x is nan: sigma_F then is n/norm(a).
 
     Examples
     --------
@@ -138,9 +138,9 @@ def _error(noise: float, left: Real, whole: Real) -> Real:
 
 
 def shares(found: Slopes) -> tuple[Real, Real]:
-    """Share of each tone in what all tones tell of force, and of position, the other being unknown too [-].
+    """Share of each frequency in the information on force, and on position, the other being unknown too [-].
 
-    The information on one of them, 1/sigma^2, is a sum over tones; nan where it is undefined.
+    The information on one of them, 1/sigma^2, is a sum over frequencies; nan where it is undefined.
     """
     a, b = found
     with np.errstate(all="ignore"):
@@ -149,32 +149,30 @@ def shares(found: Slopes) -> tuple[Real, Real]:
 
 
 def undefined(setup: Setup, found: Slopes) -> str:
-    """Why the position of a press is undefined, or nothing."""
+    """Why the position of a press is undefined, or ""."""
     if setup.force_n == 0:
         return "without a force there is no press to locate"
     if not found.by_position_per_m.any():
-        return "position leaves no trace in Z"
+        return "Z does not depend on position"
     if np.isnan(bounds(found, setup.noise).position_m):
-        return "these tones cannot tell it from force: both move Z the same way"
+        return "these frequencies cannot separate it from force: both change Z in the same direction"
     return ""
 
 
 def bearable(sensor: Sensor, force_n: Real, position_m: Real) -> NDArray[np.bool_]:
-    """Which presses the law of compression speaks of, in the broadcast shape of forces [N] and positions [m]."""
+    """Where the law of compression is defined, in the broadcast shape of forces [N] and positions [m]."""
+
+    def defined(stress_pa: Real) -> bool:
+        try:
+            sensor.compression.thinning(stress_pa)
+        except OutOfRange:
+            return False
+        return True
+
     stress = sensor.stress_pa(force_n, position_m)
-    try:
-        sensor.compression.thinning(stress)
-    except OutOfRange:
-        return np.array([_thins(sensor, one) for one in stress.ravel()]).reshape(stress.shape)
-    return np.ones(stress.shape, bool)
-
-
-def _thins(sensor: Sensor, stress_pa: np.float64) -> bool:
-    try:
-        sensor.compression.thinning(np.asarray(stress_pa))
-    except OutOfRange:
-        return False
-    return True
+    if defined(stress):
+        return np.ones(stress.shape, bool)
+    return np.array([defined(np.asarray(one)) for one in stress.ravel()]).reshape(stress.shape)
 
 
 def _dot(a: Complex, b: Complex) -> Real:
@@ -186,6 +184,6 @@ def _norm(a: Complex) -> Real:
 
 
 def _beside(a: Complex, b: Complex) -> Complex:
-    """What is left of a beside b: a itself where b is nothing."""
+    """Component of a orthogonal to b; a itself where b is 0."""
     length = _dot(b, b)
     return np.asarray(a - (_dot(a, b) / np.where(length == 0, 1.0, length))[..., None] * b)

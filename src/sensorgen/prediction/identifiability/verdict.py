@@ -1,35 +1,31 @@
-"""What the bounds mean: when a design senses force and locates a press, and how to say it."""
+"""Verdict on the bounds: whether a design senses force and locates a press, in words."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from sensorgen.prediction.identifiability.fisher import Bounds, Real, Setup
+from sensorgen.prediction.identifiability.results import StandardErrors
 
-FORCE_SHARE = 0.1  # a force is sensed that is known to a tenth
-GUESS = 12**-0.5  # standard deviation of a blind guess between two ends, as a share of their distance [-]
+FORCE_SHARE = 0.1  # force is sensed where its standard error is a tenth of it
+GUESS = 12**-0.5  # standard deviation of a blind guess between two ends, relative to their distance [-]
 
 _FORCE = {"yes": "senses force", "roughly": "senses force only roughly", "no": "cannot sense force"}
-_POSITION = {
-    "yes": "locates a press",
-    "roughly": "locates a press only roughly",
-    "no": "cannot locate a press",
-}
-_RANK = ("no", "roughly", "yes")
+_POSITION = {"yes": "locates a press", "roughly": "locates a press only roughly", "no": "cannot locate a press"}
 
 
 @dataclass(frozen=True)
 class Required:
-    """How well a press has to be known.
+    """Required standard errors of a press.
 
-    A quantity is sensed ("yes") where its standard error is at most what is required: a tenth of the press's force,
-    one length of the tip. It is not ("no") where the error is that of a blind guess or more: force range/sqrt(12),
-    sensor length/sqrt(12); a reading then tells nothing. Between the two it is sensed "roughly".
+    A quantity is sensed ("yes") where its standard error is at most the required one: a tenth of the force, one length
+    of the tip. It is not ("no") where the error is that of a blind guess or more: force range/sqrt(12), sensor
+    length/sqrt(12); a reading then has no information. Between the two it is sensed "roughly".
 
     Attributes
     ----------
     force_n, position_m : float
-        Standard errors that serve [N], [m].
+        Required standard errors [N], [m].
     guess_force_n, guess_position_m : float
         Those of a blind guess [N], [m].
     """
@@ -40,10 +36,14 @@ class Required:
     guess_position_m: float
 
     def shortfall(self, bounds: Bounds) -> Real:
-        """How many times the worse of both errors exceeds what is required [-]; infinite where undefined."""
-        with np.errstate(all="ignore"):  # nothing is required where nothing presses
+        """By what factor the worse of both errors exceeds what is required [-]; infinite where undefined."""
+        with np.errstate(all="ignore"):  # without force, nothing is required
             worse = np.maximum(bounds.force_n / self.force_n, bounds.position_m / self.position_m)
         return np.where(np.isnan(worse), np.inf, worse)
+
+    def errors(self) -> StandardErrors:
+        """The required standard errors as a result."""
+        return StandardErrors(sigma_force_n=self.force_n, sigma_position_m=self.position_m)
 
     def force(self, sigma_n: float) -> str:
         """Whether force is sensed at a standard error [N]: yes, roughly or no."""
@@ -67,20 +67,21 @@ def _grade(sigma: float, serves: float, guess: float) -> str:
 
 
 def verdict(setup: Setup, bounds: Bounds, need: Required, reason: str) -> str:
-    """One plain sentence on what a design can do; ``reason`` says why position is undefined."""
+    """What a design can do, in one sentence; ``reason`` says why position is undefined."""
     where = f"at {setup.force_n:g} N and {setup.position_m * 1e3:g} mm"
     unless = f"not known, as {setup.assumed}; if it did: " if setup.assumed else ""
+    position = f", but {reason}" if reason else f", position to {metres(bounds.position_m)}"
     return (
         f"{unless}at {setup.noise * 100:g} % noise this design {_ability(bounds, need)}: {where} "
-        f"{_known(bounds, reason)}; the sensor is {metres(setup.sensor.length_m)} long"
+        f"force is known to {newtons(bounds.force_n)}{position}; the sensor is {metres(setup.sensor.length_m)} long"
     )
 
 
 def bracket(free: Bounds, stiff: Bounds, need: Required) -> str:
-    """What it means for a verdict that the film may give way anywhere between freely and not sideways at all."""
+    """The verdict where the law of compression lies anywhere between a free and a confined film."""
     certain = ": what it cannot do is certain" if "no" in _grades(free, need) else ""
     return (
-        f"the film is taken to give way sideways freely, the softest case{certain}; bonded to stiff electrodes, the "
+        f"the film is assumed to expand sideways freely, the softest case{certain}; bonded to stiff electrodes, the "
         f"stiffest, it {_ability(stiff, need)} ({newtons(stiff.force_n)}, {metres(stiff.position_m)})"
     )
 
@@ -94,18 +95,13 @@ def _grades(bounds: Bounds, need: Required) -> tuple[str, str]:
     return need.force(float(bounds.force_n)), need.position(float(bounds.position_m))
 
 
-def _known(bounds: Bounds, reason: str) -> str:
-    force = f"force is known to {newtons(bounds.force_n)}"
-    return f"{force}, but {reason}" if reason else f"{force}, position to {metres(bounds.position_m)}"
-
-
 def newtons(value: float | Real) -> str:
     """A force to two digits.
 
     >>> newtons(2.2299), newtons(213.4), newtons(0.1508), newtons(float("nan"))
     ('2.2 N', '213 N', '0.15 N', 'undefined')
     """
-    return _said(float(value), {"N": 1.0}, "kN")
+    return _text(float(value), {"N": 1.0}, "kN")
 
 
 def metres(value: float | Real) -> str:
@@ -114,11 +110,11 @@ def metres(value: float | Real) -> str:
     >>> metres(0.22495), metres(21.34), metres(0.00829), metres(2e5)
     ('225 mm', '21 m', '8.3 mm', 'more than 1 km')
     """
-    return _said(float(value), {"mm": 1e-3, "m": 1.0}, "km")
+    return _text(float(value), {"mm": 1e-3, "m": 1.0}, "km")
 
 
-def _said(value: float, units: dict[str, float], beyond: str) -> str:
-    """A value in the first unit that keeps it below a thousand; whole digits are all told."""
+def _text(value: float, units: dict[str, float], beyond: str) -> str:
+    """A value in the first unit that keeps it below a thousand."""
     for unit, size in units.items():
         shown = value / size
         if shown < 99.5:

@@ -1,4 +1,4 @@
-"""Force and position back from impedance, with covariance, or the word why not."""
+"""Inverse problem: force and position from impedance, with covariance, or a status."""
 
 from sensorgen.prediction.inverse.estimator import NOISE, Estimates, Estimator, estimate
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N

@@ -1,7 +1,8 @@
-"""Estimates as text: rows of a CSV file, and a summary with what to do about it."""
+"""Estimates as rows of a CSV file, and their summary with advice."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
@@ -20,7 +21,7 @@ _DIAGONAL = np.arange(2)
 
 
 def header(kept: Sequence[str]) -> str:
-    """Names of the columns, those of the input before; one that is called like an answer is ``..._given``.
+    """Names of the columns, those of the input before; one that has the name of a result is ``..._given``.
 
     >>> header(["time_s", "force_n"])[:32]
     'time_s,force_n_given,force_n,pos'
@@ -29,16 +30,16 @@ def header(kept: Sequence[str]) -> str:
 
 
 def rows(kept: Sequence[Sequence[str]], found: Estimates, *, prior: bool = False) -> str:
-    """Rows of a CSV file, blank where the reading does not say.
+    """Rows of a CSV file, blank where a quantity is not identifiable.
 
     Parameters
     ----------
     kept : sequence of sequence of str
         The input's other cells, row by row.
     found : Estimates
-        The answers.
+        The results.
     prior : bool
-        Whether a prior was stated, so that an answer is one even where the reading says little.
+        Whether a prior was stated: results then count even where the reading has little information.
     """
     words = [status.words for status in Status]
     ends = zip(kept, _numbers(found, prior).tolist(), found.tones.tolist(), found.status.tolist(), strict=True)
@@ -61,26 +62,59 @@ def _numbers(found: Estimates, prior: bool) -> np.ndarray[Any, np.dtype[np.float
     return numbers
 
 
+@dataclass(frozen=True)
+class InversionSummary:
+    """Counts and medians over all samples.
+
+    Attributes
+    ----------
+    samples : int
+        Number of samples.
+    statuses : dict of str to int
+        How many have which status.
+    frequency_hz : tuple of float
+        Frequencies of the readings [Hz].
+    force_limit_n : float
+        Largest force that was searched [N].
+    median_force_error_n, median_position_error_mm : float or None
+        Medians of standard errors [N], [mm]; None where none is finite.
+    median_residual_over_noise : float or None
+        Median of residuals relative to the noise [-].
+    doubts, advice : tuple of str
+        Why the estimates are uncertain, and what to do about it.
+    """
+
+    samples: int
+    statuses: dict[str, int]
+    frequency_hz: tuple[float, ...]
+    force_limit_n: float
+    median_force_error_n: float | None
+    median_position_error_mm: float | None
+    median_residual_over_noise: float | None
+    doubts: tuple[str, ...]
+    advice: tuple[str, ...]
+
+
 class Summary:
-    """What is counted on the way through a file; of standard errors each block's median is kept.
+    """Counts blocks of estimates; of standard errors each block's median is kept.
 
     Parameters
     ----------
     estimator : Estimator
-        What the answers come from.
+        That makes the estimates.
     doubts : sequence of str
-        What to doubt about its sensor.
+        Why its sensor is uncertain.
     """
 
     def __init__(self, estimator: Estimator, doubts: Sequence[str] = ()) -> None:
-        self._estimator, self._doubts = estimator, [*doubts, *estimator.doubts]
+        self._estimator, self._doubts = estimator, (*doubts, *estimator.doubts)
         self._statuses: Counter[int] = Counter()
         self._errors: list[tuple[float, float]] = []
         self._excess: list[float] = []
 
     @property
     def samples(self) -> int:
-        """How many there were."""
+        """Number of samples so far."""
         return self._statuses.total()
 
     def add(self, found: Estimates) -> None:
@@ -93,49 +127,35 @@ class Summary:
         if free.any():
             self._excess.append(float(np.median(np.sqrt(found.chi2[free] / (2 * found.tones[free] - 2)))))
 
-    def data(self) -> dict[str, Any]:
-        """The summary as plain data."""
-        force, position = (
-            (_middle(column) for column in zip(*self._errors, strict=True)) if self._errors else (None,) * 2
+    def result(self) -> InversionSummary:
+        """The summary so far."""
+        return InversionSummary(
+            samples=self.samples,
+            statuses={s.words: self._statuses[s] for s in Status if self._statuses[s]},
+            frequency_hz=tuple(self._estimator.frequency_hz.tolist()),
+            force_limit_n=float(self._estimator.scale[0]),
+            median_force_error_n=_middle([force for force, _ in self._errors]),
+            median_position_error_mm=_middle([position for _, position in self._errors]),
+            median_residual_over_noise=_middle(self._excess),
+            doubts=self._doubts,
+            advice=tuple(self._advice()),
         )
-        return {
-            "samples": self.samples,
-            "statuses": {s.words: self._statuses[s] for s in Status if self._statuses[s]},
-            "frequency_hz": self._estimator.frequency_hz.tolist(),
-            "force_limit_n": float(self._estimator.scale[0]),
-            "median_force_error_n": force,
-            "median_position_error_mm": position,
-            "median_residual_over_noise": _middle(self._excess),
-            "doubts": self._doubts,
-            "advice": list(self._advice()),
-        }
-
-    def lines(self) -> Iterator[str]:
-        """The summary as a person reads it."""
-        told = self.data()
-        counts = ", ".join(f"{count} {words}" for words, count in told["statuses"].items())
-        yield f"{self.samples} sample{'s' * (self.samples != 1)}: {counts}"
-        force, position = told["median_force_error_n"], told["median_position_error_mm"]
-        yield f"median standard errors: force {_said(force, 'N')}, position {_said(position, 'mm')}"
-        yield from (f"note: {doubt}" for doubt in self._doubts)
-        yield from told["advice"]
 
     def _advice(self) -> Iterator[str]:
-        """What to do where most samples share a trouble."""
+        """What to do where most samples have the same problem."""
         excess = _middle(self._excess)
         if self._most(Status.NO_FIT) and excess is not None:
             yield (
-                f"no press explains most readings: the residuals are {excess:.3g} times the noise; give a larger "
-                "--noise if that is noise, or another design or material source if it is not"
+                f"most readings fit no press: residuals are {excess:.3g} times the noise; set a larger --noise if it "
+                "is noise, or another design or material source if it is not"
             )
         if self._most(Status.NOT_IDENTIFIABLE, Status.FORCE_ONLY):
             yield (
-                "most readings say less than a guess: average them, choose tones nearer to the sensor's corner "
-                "frequency, more resistive electrodes or a softer cell (see sensorgen predict), or state with --prior "
-                "what is known"
+                "most readings have less information than a guess: average them, choose frequencies nearer to the "
+                "corner frequency, more resistive electrodes or a softer cell (see sensorgen predict), or set --prior"
             )
         if self._most(Status.AT_THE_END):
-            yield "most presses lie on the border of what was searched: see --force-limit, and which end is connected"
+            yield "most presses lie at the limits of the search: check --force-limit, and which end is connected"
 
     def _most(self, *statuses: Status) -> bool:
         return sum(self._statuses[s] for s in statuses) > self.samples / 2
@@ -145,10 +165,6 @@ def _middle(values: Sequence[float]) -> float | None:
     """Median, None where there is none or it is infinite."""
     found = median(values) if values else np.inf
     return found if found < np.inf else None
-
-
-def _said(value: float | None, unit: str) -> str:
-    return f"{value:.3g} {unit}" if value is not None else "unknown"
 
 
 def _text(value: float) -> str:

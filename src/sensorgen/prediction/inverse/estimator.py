@@ -1,4 +1,4 @@
-"""Force and position back from impedance: prepared once for a sensor and its tones, then for batches and streams."""
+"""Inversion: force and position from impedance, prepared once per sensor, for batches and streams."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -26,12 +26,12 @@ _RIVAL = 2 * PAIR**0.5  # distance of two presses up to which noise may exchange
 
 @dataclass(frozen=True)
 class Estimates:
-    """Presses, sample by sample.
+    """Estimated presses, sample by sample.
 
     Attributes
     ----------
     force_n, position_m : (n,) array
-        Least squares, or the posterior mean where a prior is given [N], [m]; nan where no tone was measured.
+        Least squares, or the posterior mean where a prior is given [N], [m]; nan where nothing was measured.
     covariance : (n, 2, 2) array
         Of force and position [N2, N m, m2]; a variance is inf where the reading does not depend on its quantity.
     force_90_n, position_90_m : (n, 2) array
@@ -41,9 +41,9 @@ class Estimates:
     chi2 : (n,) array
         Sum of squared residuals over their variances [-].
     tones : (n,) array
-        How many tones were measured.
+        Number of frequencies that were measured.
     other_force_n, other_position_m : (n,) array
-        The press that explains the reading as well [N], [m]; nan where there is none.
+        A second press that fits the reading as well [N], [m]; nan where there is none.
     """
 
     force_n: Real
@@ -67,7 +67,7 @@ class _Pair(NamedTuple):
 
 
 class Estimator:
-    """Weighted least squares over all tones, prepared for one sensor.
+    """Weighted least squares over all frequencies, prepared for one sensor.
 
     The residual is ln Z measured less ln Z of the model; both parts of it have the standard deviation ``noise``.
 
@@ -76,18 +76,18 @@ class Estimator:
     sensor : Sensor
         The sensor.
     frequency_hz : (n_tones,) array
-        Tones [Hz].
+        Frequencies [Hz].
     noise : float or (n_tones,) array
         Standard deviation of the real and of the imaginary part of Z, each relative to its magnitude [-].
     prior : Prior, optional
         With it the answer is the posterior's mean and covariance.
     force_limit_n : float
-        Largest force to look for; a sensor that bears less is searched as far as it goes [N].
+        Largest force of the search, at most what the sensor bears [N].
 
     Raises
     ------
     BadInput, OutOfRange
-        Tones or noise that are no positive numbers; noise of the size of the signal.
+        Frequencies or noise that are not above 0; noise as large as the signal.
 
     Examples
     --------
@@ -119,15 +119,15 @@ class Estimator:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What the user should know before trusting any answer."""
+        """Why all estimates are uncertain."""
         if len(self.frequency_hz) > 1:
             return ()
-        return ("one tone gives two numbers for two unknowns: nothing is left to tell a bad reading from a good one",)
+        return ("one frequency gives two numbers for two unknowns: bad readings cannot be detected",)
 
     def one(self, impedance_ohm: ArrayLike) -> Press:
         """The press behind one reading (n_tones,) [ohm]; errors as :meth:`batch`.
 
-        A plain reading, all tones measured and one press that explains it, takes a shorter way to the same answer.
+        A complete reading that one press explains takes a shorter way to the same result.
         """
         z = self._readings(np.asarray(impedance_ohm)[None])
         if self.prior is None and (z != 0).all() and np.isfinite(z).all():
@@ -142,7 +142,7 @@ class Estimator:
     def batch(self, impedance_ohm: ArrayLike) -> Estimates:
         """The presses behind readings (n, n_tones) [ohm].
 
-        A tone that is NaN, infinite or exactly 0 was not measured; the others still count.
+        A value that is NaN, infinite or exactly 0 was not measured; the others still count.
 
         Raises
         ------
@@ -163,7 +163,7 @@ class Estimator:
             raise BadInput(f"readings are complex numbers in ohm, not {str(impedance_ohm)[:60]!r}") from None
         if z.ndim != 2 or z.shape[1] != len(self.frequency_hz):
             raise BadInput(
-                f"expected readings of shape (n, {len(self.frequency_hz)}), one column per tone; not {z.shape}"
+                f"expected readings of shape (n, {len(self.frequency_hz)}), one column per frequency; not {z.shape}"
             )
         return z
 
@@ -259,7 +259,7 @@ def _noise(noise: ArrayLike, n_tones: int) -> Real:
     try:
         sigma = np.broadcast_to(np.asarray(noise, np.float64), n_tones)
     except (TypeError, ValueError):
-        raise BadInput(f"noise is one number, or one per tone ({n_tones}), not {str(noise)[:60]!r}") from None
+        raise BadInput(f"noise is one number, or one per frequency ({n_tones}), not {str(noise)[:60]!r}") from None
     bad = ~((sigma > 0) & (sigma <= _MOST_NOISE))
     if bad.any():
         raise OutOfRange(f"a noise of {sigma[bad][0]:g}; expected above 0 and up to 1, the share of the impedance")

@@ -7,12 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from sensorgen.prediction.inverse.descent import LOOSE, REACH, ROUNDING, TIGHT
-from sensorgen.prediction.inverse.forward import Forward, Real
-from sensorgen.prediction.inverse.scalar import Scalar
+from sensorgen.prediction.inverse.forward import Forward, Real, Scalar
 from sensorgen.prediction.inverse.table import Index, Table, parts
 from sensorgen.prediction.inverse.verdict import PAIR, Status, chi2_limit
 
-_ROUGH = 2  # steps on the table before the exact model has its say
+_ROUGH = 2  # steps on the table before the exact model is used
 _STEPS = 6
 _FIRST_ORDER = [2, 1]  # by force, by position; the others are the value and the mixed derivative
 _SAME = PAIR / 2  # far below PAIR, the table being only near the truth
@@ -63,7 +62,7 @@ class _Normal(NamedTuple):
 
 
 class Single:
-    """Undamped Gauss-Newton for a reading with all its tones; whatever else comes is left to the batch.
+    """Undamped Gauss-Newton for a complete reading; all other cases are left to the batch.
 
     Parameters
     ----------
@@ -128,7 +127,7 @@ class Single:
         return row * self._table.shape[1] + bisect_right(positions, position, 1, len(positions) - 1) - 1
 
     def _alone(self, response: Real, press: tuple[float, float], best: _Normal) -> bool:
-        """Whether the rival's valley has no press of its own near this sum of squares; False if hard to tell."""
+        """Whether the rival's valley has no minimum near this sum of squares; False if undecided."""
         rival = self._rival[self._cell(*press)]
         if rival < 0:
             return True

@@ -1,4 +1,4 @@
-"""What to make of an estimate: one word per sample."""
+"""Status of an estimate: one word per sample."""
 
 from enum import IntEnum
 
@@ -19,17 +19,17 @@ class Status(IntEnum):
 
     OK = 0
     AMBIGUOUS = 1
-    """Another press explains the reading as well."""
+    """Another press fits the reading as well."""
     AT_THE_END = 2
     """The best press lies on the border: no force, the force limit, or an end of the sensor."""
     FORCE_ONLY = 3
-    """The reading says less on the position than a guess."""
+    """Less information on position than a guess."""
     NOT_IDENTIFIABLE = 4
-    """It says less on the force, too."""
+    """Less information on force, too."""
     NO_FIT = 5
-    """No press explains it: the residual is far above the noise."""
+    """No press fits: the residual is far above the noise."""
     MISSING = 6
-    """No tone was measured."""
+    """Nothing was measured."""
 
     @property
     def words(self) -> str:

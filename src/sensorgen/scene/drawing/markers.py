@@ -1,26 +1,28 @@
-"""Findings: numbered markers at their places, and the list that the numbers lead to."""
+"""Findings: numbered markers at their places, and the list with their text."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, hypot, pi, sin
 
 from sensorgen.core.findings import SEVERITIES, Finding
 from sensorgen.scene.drawing.panels import GUTTER, Panel, Room
-from sensorgen.scene.drawing.paper import Frame, clean, element, fitted, line, spread, text, wrapped
+from sensorgen.scene.drawing.paper import element, fitted, line, spread, text, wrapped
 from sensorgen.scene.scene import AXES, Point
 
-MOST, FEW = 10, 6  # findings in the list; up to so many have room for longer words
 RADIUS, CLEAR = 2.1, 4.5  # of a marker; from one marker's centre to the next [mm]
 LINE, INDENT, COLUMNS_APART = 2.95, 6.0, 5.0  # of the list [mm]
 DISTANCES, ANGLES = (5.0, 7.5, 10.0, 13.0, 17.0, 22.0), 16
+_NUMBER = re.compile(r"[0-9.]+")
 
 
 @dataclass(frozen=True)
 class Marked:
-    """A finding with its number on the page."""
+    """A finding with its number on the page, and how many findings are merged in it."""
 
     number: int
     finding: Finding
+    merged: int = 1
 
     @property
     def kind(self) -> str:
@@ -39,9 +41,23 @@ class Entry:
 
 
 def ranked(findings: Sequence[Finding]) -> list[Marked]:
-    """All findings numbered from the most severe to the least, waived ones last."""
-    order = sorted(findings, key=lambda f: (bool(f.waiver), SEVERITIES.index(f.severity)))
-    return [Marked(k, finding) for k, finding in enumerate(order, start=1)]
+    """Findings numbered from the most severe to the least, waived ones last.
+
+    Those that differ in their numbers only, as of one body layer by layer, are one, with the number of their places.
+    """
+    alike: dict[tuple[str, ...], list[Finding]] = {}
+    for f in sorted(findings, key=lambda f: (bool(f.waiver), SEVERITIES.index(f.severity))):
+        message, advice = (_NUMBER.sub("#", words) for words in (f.message, f.advice))
+        alike.setdefault((f.rule, f.severity, f.body, f.waiver, message, advice), []).append(f)
+    return [Marked(k, _merged(same), len(same)) for k, same in enumerate(alike.values(), start=1)]
+
+
+def _merged(same: Sequence[Finding]) -> Finding:
+    if len(same) == 1:
+        return same[0]
+    layers = [n for f in same for n in (f.layer, f.last_layer) if n is not None]
+    first, last = (min(layers), max(layers)) if layers else (None, None)
+    return replace(same[0], count=sum(f.count for f in same), layer=first, last_layer=last if last != first else None)
 
 
 def height_mm(finding: Finding, boundaries_mm: Sequence[float]) -> float | None:
@@ -77,7 +93,7 @@ def panel_of(finding: Finding, panels: Sequence[Panel]) -> int:
 def on_detail(
     marked: Sequence[Marked], panels: Sequence[Panel], boundaries_mm: Sequence[float], taken: list[Point]
 ) -> Iterator[str]:
-    """Markers on the detail views, clear of the points ``taken``; what lies elsewhere stands at the right edge."""
+    """Markers on the detail views, as many as fit clear of ``taken``; those without a place at the right edge."""
     edges: dict[int, list[tuple[Point, Marked]]] = {}
     for mark in marked:
         z = height_mm(mark.finding, boundaries_mm)
@@ -88,24 +104,21 @@ def on_detail(
         spot = _spot(panels[k], along, z)
         if along is None:
             edges.setdefault(k, []).append((spot, mark))
-        else:
-            taken.append(spot)
-            yield _marker(mark, spot, _free(spot, panels[k], taken))
+        elif place := _free(spot, panels[k], taken):
+            taken += [spot, place]
+            yield _marker(mark, spot, place)
     for k, found in sorted(edges.items()):
-        yield from _at_edge(found, panels[k].frame)
+        frame = panels[k].frame
+        fitting = sorted(found[: int((frame.bed - frame.top + 14) // CLEAR)], key=lambda at: (at[0][1], at[1].number))
+        heights = spread([spot[1] for spot, _ in fitting], [CLEAR] * len(fitting), frame.top - 8, frame.bed + 6)
+        for (spot, mark), y in zip(fitting, heights, strict=True):
+            yield _marker(mark, spot, (frame.right + GUTTER / 2 + 0.6, y))
 
 
 def _spot(panel: Panel, along: float | None, z: float) -> Point:
     """Place of a finding on the page; the right edge where it has none, and never off the view [mm]."""
     x, y = panel.place((panel.view.end_mm if along is None else along, z))
     return x, min(max(y, panel.frame.top), panel.frame.bed)
-
-
-def _at_edge(found: list[tuple[Point, Marked]], frame: Frame) -> Iterator[str]:
-    found = sorted(found, key=lambda pair: (pair[0][1], pair[1].number))
-    heights = spread([spot[1] for spot, _ in found], [CLEAR] * len(found), frame.top - 8, frame.bed + 6)
-    for (spot, mark), y in zip(found, heights, strict=True):
-        yield _marker(mark, spot, (frame.right + GUTTER / 2 + 0.6, y))
 
 
 def on_overview(marked: Sequence[Marked], details: Sequence[Panel], wholes: Sequence[Panel]) -> Iterator[str]:
@@ -126,8 +139,8 @@ def _far_spot(finding: Finding, details: Sequence[Panel], k: int, whole: Panel) 
     return None if along_mm(finding, details[k]) is not None else _spot(whole, along, finding.place_mm[2])
 
 
-def _free(spot: Point, panel: Panel, taken: list[Point]) -> Point:
-    """A place for a marker near its spot that covers nothing else; it is taken then."""
+def _free(spot: Point, panel: Panel, taken: Sequence[Point]) -> Point | None:
+    """A place for a marker near its spot that covers nothing else; None where there is none."""
     frame = panel.frame
     for distance in DISTANCES:
         for k in range(ANGLES):
@@ -135,9 +148,8 @@ def _free(spot: Point, panel: Panel, taken: list[Point]) -> Point:
             x, y = spot[0] + distance * cos(angle), spot[1] - distance * sin(angle)
             inside = frame.left + RADIUS <= x <= frame.right - RADIUS and frame.top + RADIUS <= y <= frame.bed - RADIUS
             if inside and all(hypot(x - p[0], y - p[1]) >= CLEAR for p in taken):
-                taken.append((x, y))
                 return x, y
-    return spot
+    return None
 
 
 def _marker(mark: Marked, spot: Point, place: Point) -> str:
@@ -155,17 +167,19 @@ def _balloon(mark: Marked, x: float, y: float) -> str:
 
 
 def placed(marked: Sequence[Marked], letters: Mapping[str, str], room: Room) -> list[Entry]:
-    """As many findings as there is room for on the page, in two columns; fewer may have more words."""
+    """As many findings, each with its whole text, as there is room for on the page, in two columns.
+
+    Only a text longer than a column is cut.
+    """
     left, top, right, bottom = room
-    lines = 2 if len(marked) > FEW else 4
     wide = (right - left - COLUMNS_APART) / 2
     entries: list[Entry] = []
     x, y = left, top
-    for mark in marked[:MOST]:
-        rows = _rows(mark, letters, wide - INDENT, lines)
+    for mark in marked:
+        rows = _rows(mark, letters, wide - INDENT, int((bottom - top) / LINE) + 1)
         if y + (len(rows) - 1) * LINE > bottom:
             x, y = x + wide + COLUMNS_APART, top
-        if x > right - wide + 1e-9 or y + (len(rows) - 1) * LINE > bottom:
+        if x > right - wide + 1e-9:
             break
         entries.append(Entry(mark, x, y, rows))
         y += len(rows) * LINE + 0.6
@@ -184,33 +198,24 @@ def listed(entries: Sequence[Entry], marked: Sequence[Marked], left: float, top:
 def _summary(marked: Sequence[Marked], shown: int) -> str:
     if not marked:
         return "Findings: no findings"
-    kinds = [mark.kind for mark in marked]
-    counts = [(kinds.count(kind), kind) for kind in (*SEVERITIES, "waived")]
-    words = ", ".join(f"{n} {_plural(kind, n)}" for n, kind in counts if n)
-    return f"Findings: {words}" + (f" … and {len(marked) - shown} more in check.json" if shown < len(marked) else "")
+    counts = [(sum(mark.merged for mark in marked if mark.kind == kind), kind) for kind in (*SEVERITIES, "waived")]
+    words = ", ".join(f"{n} {kind}{'s' if n > 1 and kind in ('error', 'warning') else ''}" for n, kind in counts if n)
+    return f"Findings: {words}" + (f"; {len(marked) - shown} not shown, see check.json" if shown < len(marked) else "")
 
 
-def _plural(kind: str, count: int) -> str:
-    return kind if count == 1 or kind in ("info", "waived") else kind + "s"
-
-
-def _rows(mark: Marked, letters: Mapping[str, str], room: float, lines: int) -> list[tuple[str, str]]:
-    """Class and text of one finding's lines: up to ``lines`` for what and where, one for what to do."""
+def _rows(mark: Marked, letters: Mapping[str, str], room: float, most: int) -> list[tuple[str, str]]:
+    """Class and text of one finding's lines: what and where, then what to do."""
     f = mark.finding
-    where = ", ".join(_where(f, letters))
-    what = wrapped(f"{f.rule}{f' ({where})' if where else ''}: {f.message}", room, lines)
-    advice = f"waived: {f.waiver}" if f.waiver else f.advice
-    kind = "faint" if f.waiver else ""
-    return [(kind, row) for row in what] + [("faint", fitted(clean(advice), room))] * bool(advice)
-
-
-def _where(f: Finding, letters: Mapping[str, str]) -> Iterator[str]:
-    """Body, by its letter in the legend; layer; number of places, or the one place, which may lie elsewhere."""
-    if f.body:
-        yield " / ".join(letters.get(name, name) for name in f.body.split(" / "))
+    where = [" / ".join(letters.get(name, name) for name in f.body.split(" / "))] if f.body else []
     if f.layer is not None:
-        yield f"layer {f.layer}"
+        where.append(f"layer {f.layer}" if f.last_layer is None else f"layers {f.layer} to {f.last_layer}")
     if f.count > 1:
-        yield f"{f.count} places"
+        where.append(f"{f.count} places")
     elif f.layer is not None and f.place_mm is not None:
-        yield f"at x {f.place_mm[0]:g}, y {f.place_mm[1]:g}"
+        where.append(f"at x {f.place_mm[0]:g}, y {f.place_mm[1]:g}")
+    place = f" ({', '.join(where)})" if where else ""
+    what = f"{f.rule}{place}: {f.message}"
+    advice = f"waived: {f.waiver}" if f.waiver else f.advice
+    rows = wrapped(what, room, most)
+    further = wrapped(advice, room, most - len(rows)) if advice and len(rows) < most else []
+    return [("faint" if f.waiver else "", row) for row in rows] + [("faint", row) for row in further]

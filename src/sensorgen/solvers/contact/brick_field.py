@@ -9,7 +9,7 @@ potentials on the faces (hybrid H(div)), and stays so when it is mapped.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
-from functools import cache, cached_property
+from functools import cache
 from itertools import combinations_with_replacement, product
 
 import numpy as np
@@ -19,9 +19,9 @@ from scipy.sparse import coo_matrix, csr_matrix
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M
-from sensorgen.solvers.contact.brick_element import BrickMesh, cofactor, determinant, gradients
-from sensorgen.solvers.contact.brick_factors import Factors, Order, factored, iterations, order_of
-from sensorgen.solvers.contact.bricks import Bricks
+from sensorgen.solvers.contact.bricks import BrickMesh
+from sensorgen.solvers.contact.element import brick_gradients, cofactor, determinant
+from sensorgen.solvers.contact.factors import Factors, factored, iterations, order_of
 from sensorgen.solvers.electrostatics.boxes import Element, flux, potential
 
 Real = NDArray[np.float64]
@@ -49,15 +49,14 @@ class Orders:
     flux: int = 2
 
 
-def capacitance(mesh: BrickMesh, u_m: Real, permittivity: Mapping[str, float], orders: Orders) -> Interval:
-    """Bounds of the capacitance per area of the cell as it is [F/m2].
+@dataclass
+class Field:
+    """Capacitance of a cell of boxes, load after load.
 
-    Parameters
+    Attributes
     ----------
     mesh : BrickMesh
         All boxes of the cell, air included.
-    u_m : (3n,) array
-        Displacements [m].
     permittivity : mapping of str to float
         Relative permittivity by material, with "air" [-].
     orders : Orders
@@ -68,135 +67,119 @@ def capacitance(mesh: BrickMesh, u_m: Real, permittivity: Mapping[str, float], o
     OutOfRange
         The electrodes touch.
     BadInput
-        An electrode does not cover the cell, nothing lies between them, or a displacement folds the air.
-    """
-    return Field(mesh, permittivity, orders).capacitance(u_m)
-
-
-@dataclass
-class _Earlier:
-    """What solving a system leaves for the next one that is like it: unknowns, factors, and its tensors."""
-
-    unknowns: Real
-    factors: Factors
-    tensors: Real
-
-
-@dataclass
-class Field:
-    """The field in a cell, load after load: factors of one serve for the next.
-
-    An approximate potential is still one, so that its energy still lies above; that of an approximate flux lies below
-    once what its residual could take away is subtracted. With factors K0 of an earlier K, whose tensors T0 are such
-    that T <= c T0 everywhere, this is c r' K0^-1 r at most; c <= the largest trace of T0^-1 T.
+        An electrode does not cover the cell, or nothing lies between them.
     """
 
     mesh: BrickMesh
     permittivity: Mapping[str, float]
     orders: Orders
-    _earlier: dict[str, _Earlier] = dataclass_field(default_factory=dict, repr=False)
 
-    @cached_property
-    def _ends(self) -> list[Mask]:
-        return [np.isin(self.mesh.bricks.fill, _of(self.mesh.bricks, end)) for end in ("bottom", "top")]
-
-    @cached_property
-    def _carrying(self) -> Mask:
-        return _between(self.mesh, self._ends)
-
-    @cached_property
-    def _systems(self) -> dict[str, "System"]:
-        kinds = {"flux": _plain(flux(self.orders.flux)), "potential": potential(self.orders.potential)}
-        boxes = self.mesh.boxes[self._carrying]
-        return {name: system_of(self.mesh.bricks, boxes, self._ends, kind) for name, kind in kinds.items()}
+    def __post_init__(self) -> None:
+        """Select the boxes that carry field, and number their unknowns."""
+        bricks = self.mesh.bricks
+        of = [[k for k, r in enumerate(bricks.regions) if r.terminal == end] for end in ("bottom", "top")]
+        ends = [np.isin(bricks.fill, regions) for regions in of]
+        self.carrying = _between(self.mesh, ends)
+        # Legendre polynomials, of which the first on each face is a potential of 1/2
+        kind, one = flux(self.orders.flux), np.zeros((6, (self.orders.flux + 1) ** 2))
+        one[:, 0] = 2.0
+        boxes = self.mesh.boxes[self.carrying]
+        self.systems = {
+            "flux": _system(boxes, ends, replace(kind, one=one.ravel()), _fluxes, self.orders.flux),
+            "potential": _system(boxes, ends, potential(self.orders.potential), _potentials, self.orders.potential),
+        }
 
     def capacitance(self, u_m: Real) -> Interval:
-        """Bounds at given displacements of all nodes (3n,), as :func:`capacitance` gives them."""
-        regions, nodes = self.mesh.bricks.regions, self.mesh.nodes[self._carrying]
-        eps = np.array([self.permittivity.get(r.material, np.nan) for r in regions])[self.mesh.region[self._carrying]]
-        moved = u_m.reshape(-1, 3)[nodes] + self.mesh.points_m[nodes]
-        area = float(np.prod([np.ptp(moved[..., axis]) for axis in (0, 1)]))
-        lower = self._bound("flux", moved, eps, _fluxes, self.orders.flux) / area
-        upper = self._bound("potential", moved, eps, _potentials, self.orders.potential) / area
+        """Bounds of the capacitance per area of the deformed cell [F/m2].
+
+        Parameters
+        ----------
+        u_m : (3n,) array
+            Displacements of all nodes [m].
+
+        Raises
+        ------
+        Folded
+            The displacement folds the air.
+        """
+        regions, nodes = self.mesh.bricks.regions, self.mesh.nodes[self.carrying]
+        eps = np.array([self.permittivity.get(r.material, np.nan) for r in regions])[self.mesh.region[self.carrying]]
+        places = u_m.reshape(-1, 3)[nodes] + self.mesh.points_m[nodes]
+        area = float(np.prod([np.ptp(places[..., axis]) for axis in (0, 1)]))
+        least, missing = self.systems["flux"].least(places, eps)
+        lower, upper = (least - missing) / area, self.systems["potential"].least(places, eps)[0] / area
         if not 0 < lower <= upper * (1 + _ROUNDING):
             raise BadInput(f"bounds in the wrong order, {lower} above {upper}: the solver failed on this cell")
         return Interval(lower * (1 - _ROUNDING), upper * (1 + _ROUNDING)).times(EPS0_F_PER_M)
 
-    def _bound(self, name: str, moved: Real, eps: Real, local: "Local", order: int) -> float:
-        """Energy at 1 V: at least the least of potentials, at most the least of fluxes."""
-        parts = [local(moved[k : k + _CHUNK], eps[k : k + _CHUNK], order) for k in range(0, len(eps), _CHUNK)]
-        energies, tensors = (np.concatenate([part[k] for part in parts]) for k in range(2))
-        system, earlier = self._systems[name], self._earlier.get(name)
-        matrix, push, held = system.assembled(energies)
-        found = None
-        if earlier and (far := _apart(earlier.tensors, tensors)) < _LIKE:
-            found = _iterated(matrix, push, held, earlier, far)
-        if found is None:
-            factors = factored(matrix, system.order(matrix))
-            if factors is None:
-                raise BadInput("the field's equations are not positive: the solver failed on this cell")
-            earlier = self._earlier[name] = _Earlier(np.zeros_like(push), factors, tensors)
-            found = _iterated(matrix, push, held, earlier, 3.0)
-        if found is None or earlier is None:
-            raise BadInput("the field's equations could not be solved on this cell")
-        earlier.unknowns, energy, missing = found
-        return energy - (missing if name == "flux" else 0.0)
 
+@dataclass
+class _System:
+    """Energy of the unknowns that boxes share; the factors of one load serve for the next.
 
-def _apart(earlier: Real, now: Real) -> float:
-    """The largest trace of T0^-1 T."""
-    return float(np.trace(np.linalg.solve(earlier, now), axis1=-2, axis2=-1).max())
+    An approximate potential is still one, so that its energy still lies above; that of an approximate flux lies below
+    once what its residual could take away is subtracted. With factors K0 of an earlier K, whose tensors T0 are such
+    that T <= c T0 everywhere, this is c r' K0^-1 r at most; c <= the largest trace of T0^-1 T.
 
-
-def _iterated(
-    matrix: csr_matrix, push: Real, held: float, earlier: _Earlier, apart: float
-) -> tuple[Real, float, float] | None:
-    """Unknowns x that nearly make held + x' K x + 2 push' x least, this energy, and how much less it may be at most."""
-    residual = -push - matrix @ earlier.unknowns
-    for step, left, power in iterations(matrix, residual, earlier.factors):
-        x = earlier.unknowns + step
-        energy = held + float(push @ x - x @ left)
-        if apart * power < _SMALL * energy:
-            return x, energy, apart * power
-    return None
-
-
-@dataclass(frozen=True)
-class System:
-    """Unknowns that boxes share: which are free, as numbers (m, b), -1 for others; those at 1 V; and their places."""
+    Attributes
+    ----------
+    number : (m, b) array
+        Of the free unknowns of each box, -1 for others.
+    one : (m, b) array
+        Values of the others: at 1 V on the top, else 0.
+    places : (n, 3) array
+        Of the free unknowns.
+    local : callable
+        Energies and tensors of boxes, by their places, permittivity and the polynomials' order.
+    order : int
+        Of the polynomials.
+    """
 
     number: Whole
     one: Real
     places: Whole
+    local: Local
+    order: int
+    factors: Factors | None = None
+    _tensors: Real = dataclass_field(default_factory=lambda: np.empty(0), repr=False)
+    _unknowns: Real = dataclass_field(default_factory=lambda: np.empty(0), repr=False)
 
-    @cached_property
-    def _pattern(self) -> tuple[Whole, Whole]:
-        b = self.number.shape[1]
-        return np.repeat(self.number, b, axis=1).ravel(), np.tile(self.number, (1, b)).ravel()
-
-    def assembled(self, energies: Real) -> tuple[csr_matrix, Real, float]:
-        """Matrix of the free unknowns, what the top at 1 V pushes them with, and the energy if they were 0."""
-        rows, columns = self._pattern
-        kept, n = (rows >= 0) & (columns >= 0), len(self.places)
+    def least(self, places: Real, eps: Real) -> tuple[float, float]:
+        """Energy at 1 V that is at least the least, and by how much it may be above it at most."""
+        parts = [
+            self.local(places[k : k + _CHUNK], eps[k : k + _CHUNK], self.order) for k in range(0, len(eps), _CHUNK)
+        ]
+        energies, tensors = (np.concatenate([part[k] for part in parts]) for k in range(2))
+        n, b = len(self.places), self.number.shape[1]
+        rows, columns = np.repeat(self.number, b, axis=1).ravel(), np.tile(self.number, (1, b)).ravel()
+        kept, free = (rows >= 0) & (columns >= 0), self.number >= 0
         matrix = coo_matrix((energies.ravel()[kept], (rows[kept], columns[kept])), (n, n)).tocsr()
-        pushed, free = np.einsum("mij,mj->mi", energies, self.one), self.number >= 0
+        pushed = np.einsum("mij,mj->mi", energies, self.one)
         push: Real = np.bincount(self.number[free], pushed[free], n).astype(float)
-        return matrix, push, float((pushed * self.one).sum())
+        held = float((pushed * self.one).sum())
+        if len(self._tensors):
+            apart = float(np.trace(np.linalg.solve(self._tensors, tensors), axis1=-2, axis2=-1).max())
+            if apart < _LIKE and (found := self._iterated(matrix, push, held, apart)):
+                return found
+        self.factors = factored(matrix, order_of(matrix, self.places))
+        self._tensors, self._unknowns = tensors, np.zeros_like(push)
+        found = self._iterated(matrix, push, held, 3.0)
+        if found is None:
+            raise BadInput("the field's equations could not be solved on this cell")
+        return found
 
-    def order(self, matrix: csr_matrix) -> Order:
-        """Of elimination."""
-        return order_of(matrix, self.places)
-
-
-def _plain(kind: Element) -> Element:
-    """The same unknowns in Legendre polynomials, of which the first on each face is a potential of 1/2."""
-    one = np.zeros((6, len(kind.one) // 6))
-    one[:, 0] = 2.0
-    return replace(kind, one=one.ravel())
-
-
-def _of(bricks: Bricks, terminal: str) -> list[int]:
-    return [k for k, region in enumerate(bricks.regions) if region.terminal == terminal]
+    def _iterated(self, matrix: csr_matrix, push: Real, held: float, apart: float) -> tuple[float, float] | None:
+        """Nearly the least of held + x' K x + 2 push' x, and by how much less it may be at most."""
+        if self.factors is None:
+            return None
+        start = self._unknowns
+        for step, left, power in iterations(matrix, -push - matrix @ start, self.factors):
+            x = start + step
+            energy = held + float(push @ x - x @ left)
+            if apart * power < _SMALL * energy:
+                self._unknowns = x
+                return energy, apart * power
+        return None
 
 
 def _between(mesh: BrickMesh, ends: list[Mask]) -> Mask:
@@ -211,15 +194,14 @@ def _between(mesh: BrickMesh, ends: list[Mask]) -> Mask:
         raise BadInput("no dielectric lies between a top and a bottom electrode")
     if inside[:, :, [0, -1]].any():
         raise BadInput("an electrode does not cover the whole cell")
-    corners = [set(mesh.nodes[end[tuple(mesh.boxes.T)]].ravel().tolist()) for end in ends]
-    if corners[0] & corners[1]:
+    if np.intersect1d(*(mesh.nodes[end[tuple(mesh.boxes.T)]] for end in ends)).size:
         raise OutOfRange("the electrodes touch: the capacitance grows without bound")
     return np.asarray(inside[tuple(mesh.boxes.T)])
 
 
-def system_of(bricks: Bricks, boxes: Whole, ends: list[Mask], kind: Element) -> System:
-    """The unknowns of boxes between two electrodes."""
-    count = np.array(bricks.fill.shape)
+def _system(boxes: Whole, ends: list[Mask], kind: Element, local: Local, order: int) -> _System:
+    """Number the unknowns of boxes between two electrodes."""
+    count = np.array(ends[0].shape)
     keys = kind.keys(boxes, count)
     below, above = (np.isin(keys, kind.keys(np.argwhere(end), count)) for end in ends)
     free = ~(below | above)
@@ -228,12 +210,12 @@ def system_of(bricks: Bricks, boxes: Whole, ends: list[Mask], kind: Element) -> 
     numbers[free] = number
     lattice = np.column_stack(np.unravel_index(known // 3, tuple(count * kind.pitch + 1)))
     places = 2 * (lattice // kind.pitch) + (lattice % kind.pitch > 0)
-    return System(numbers, np.where(above, kind.one, 0.0), places)
+    return _System(numbers, np.where(above, kind.one, 0.0), places, local, order)
 
 
 def _stretch(moved: Real, at: Real) -> tuple[Real, Real]:
     """Derivative of the place to that in the brick (m, points, 3, 3) [m], and its determinant [m3]."""
-    f = np.einsum("qnj,mni->mqij", gradients(at), moved, optimize=True)
+    f = np.einsum("qnj,mni->mqij", brick_gradients(at), moved, optimize=True)
     j = determinant(f)
     if j.min() <= 0:
         raise Folded("faces run into each other: the deformed outlines have no capacitance")
@@ -250,7 +232,7 @@ def _potentials(moved: Real, eps: Real, order: int) -> tuple[Real, Real]:
     n = basis.shape[1]
     flat = basis.transpose(0, 2, 1).reshape(-1, n)
     energy = np.matmul(flat.T, np.matmul(tensor, basis.transpose(0, 2, 1)).reshape(len(eps), -1, n))
-    shared = _shared(order)
+    shared = (np.indices((order + 1,) * 3).reshape(3, -1) < 2).any(axis=0)  # those that do not vanish at all faces
     outer, coupling, inner = (
         energy[:, a][:, :, b] for a, b in ((shared, shared), (~shared, shared), (~shared, ~shared))
     )
@@ -275,11 +257,6 @@ def _fluxes(moved: Real, eps: Real, order: int) -> tuple[Real, Real]:
     coupling = given[:, k:, :k]
     held = np.matmul(coupling.transpose(0, 2, 1), np.linalg.solve(given[:, k:, k:], coupling))
     return given[:, :k, :k] - held, plain
-
-
-def _shared(order: int) -> Mask:
-    """Which products of modes neighbours share: not those that vanish at all six faces."""
-    return np.asarray((np.indices((order + 1,) * 3).reshape(3, -1) < 2).any(axis=0))
 
 
 @cache

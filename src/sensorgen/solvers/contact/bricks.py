@@ -1,7 +1,8 @@
-"""One cell of a scene of boxes as bricks: between its mirrors, cut into layers that shrink towards its planes."""
+"""Unit cell of a scene of boxes between its mirror planes, and its mesh of bricks graded towards its planes."""
 
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import cached_property
+from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.unit_cell import Band, Slice, mirrored
 from sensorgen.solvers.contact.cell import AIR, Region
+from sensorgen.solvers.contact.element import BRICK, BRICK_CORNERS, BRICK_INNER, BRICK_OUTER, ElementMesh
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -104,3 +106,55 @@ def _cut(planes: Real, pieces: int, shrink: float) -> tuple[Real, Whole]:
         size = (1 / shrink) ** np.minimum(apart, pieces - 1)
         found.append(a + (b - a) * np.cumsum(size) / size.sum())
     return np.concatenate(found), np.repeat(np.arange(last + 1), pieces)
+
+
+@dataclass(frozen=True)
+class BrickMesh(ElementMesh):
+    """Some boxes of a cell as elements, with nodes at corners, on edges and faces and within.
+
+    Attributes
+    ----------
+    bricks : Bricks
+        All boxes, air included.
+    boxes : (m, 3) array
+        Which box each brick is, along x, y and z.
+    nodes : (m, 27) array
+        Of each brick.
+    lattice : (n, 3) array
+        Of each node, its place counted in half bricks along x, y and z.
+    """
+
+    bricks: Bricks
+    boxes: Whole
+    nodes: Whole
+    lattice: Whole
+
+    @cached_property
+    def edges_m(self) -> Real:
+        """Edges of each brick (m, 3) [m]."""
+        return np.column_stack([np.diff(p)[self.boxes[:, a]] for a, p in enumerate(self.bricks.planes_m)])
+
+    def top(self) -> tuple[Whole, Real]:
+        """Faces on the top, from line to line (k, 9), and their areas [m2]."""
+        on_top = self.boxes[:, 2] == self.bricks.fill.shape[2] - 1
+        return self.nodes[on_top].reshape(-1, 9, 3)[..., 2], self.edges_m[on_top, :2].prod(axis=1)
+
+    def all_nodes(self, u_m: Real, inner_m: Real) -> Real:
+        """Displacements of all nodes (n, 3) from those of the outer ones (3n,) and of the inner ones (m, 3) [m]."""
+        found = u_m.reshape(-1, 3).copy()
+        found[self.nodes[:, BRICK_INNER]] = inner_m + found[self.nodes[:, BRICK_CORNERS]].mean(axis=1)
+        return np.asarray(found)
+
+
+def mesh_of(bricks: Bricks, which: NDArray[np.bool_]) -> BrickMesh:
+    """Mesh some of the boxes of a cell."""
+    boxes = np.argwhere(which)
+    size = 2 * np.array(which.shape) + 1
+    corners = 2 * boxes[:, None, :] + np.array(list(product(range(3), repeat=3)))
+    flat = np.ravel_multi_index(tuple(np.moveaxis(corners, -1, 0)), tuple(size))
+    used, nodes = np.unique(flat, return_inverse=True)
+    lattice = [np.interp(np.arange(2 * len(p) - 1) / 2, np.arange(len(p)), p) for p in bricks.planes_m]
+    places = np.column_stack(np.unravel_index(used, tuple(size)))
+    points = np.column_stack([line[k] for line, k in zip(lattice, places.T, strict=True)])
+    nodes = nodes.reshape(flat.shape)
+    return BrickMesh(BRICK, points, nodes[:, BRICK_OUTER], bricks.fill[which], bricks, boxes, nodes, places)

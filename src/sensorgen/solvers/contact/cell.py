@@ -50,14 +50,14 @@ class Cell:
         """Its width [mm]."""
         return self.right_mm - self.left_mm
 
+    @property
+    def air(self) -> int:
+        """Region of the air, or ``OUTSIDE`` where there is none."""
+        return next((k for k, region in enumerate(self.regions, 1) if region.material == AIR), OUTSIDE)
+
     def solid(self, region: int) -> bool:
         """Whether a region is filled by a body."""
         return region != OUTSIDE and self.regions[region - 1].material != AIR
-
-    def heights_mm(self) -> Point:
-        """Lowest and highest place [mm]."""
-        heights = [v for edge in self.edges for _, v in edge]
-        return min(heights), max(heights)
 
 
 def cell_of(scene: Scene, period_mm: float | None) -> Cell:

@@ -101,9 +101,12 @@ def closed(edges: Sides, air: int, places: Real, faces: Faces) -> Sides:
 
     Points that touch a mirror are moved onto it in ``places`` [mm].
     """
-    border = _border(edges, air, places, faces)
-    if not len(border.runs):
+    depth = dict(zip(map(tuple, _halves(faces).tolist()), np.tile(faces.depth_m, 2) / M_PER_MM, strict=True))
+    known = {run if sides[1] == air else run[::-1]: OUTSIDE in sides for run, sides in edges.items() if air in sides}
+    if not known:
         return edges
+    behind = np.array([depth.get(run, np.inf) for run in known])
+    border = _Air(np.array([*known], int), np.array([*known.values()], bool), behind, places)
     instead, touched = _joined(border, _fixed(edges, air, faces))
     ways = dict(zip(map(tuple, border.runs.tolist()), _ways(border, instead, touched), strict=True))
     found: Sides = {}
@@ -112,24 +115,22 @@ def closed(edges: Sides, air: int, places: Real, faces: Faces) -> Sides:
         for a, b in pairwise(way):
             if a != b:
                 key, here = ((a, b), sides) if a < b else ((b, a), sides[::-1])
-                known = found.get(key, (air, air))
-                found[key] = (known[0] if here[0] == air else here[0], known[1] if here[1] == air else here[1])
+                before = found.get(key, (air, air))
+                found[key] = (before[0] if here[0] == air else here[0], before[1] if here[1] == air else here[1])
     return found
 
 
-def _border(edges: Sides, air: int, places: Real, faces: Faces) -> _Air:
-    depth = dict(zip(map(tuple, faces.halves.tolist()), np.tile(faces.depth_m, 2) / M_PER_MM, strict=True))
-    known = {run if sides[1] == air else run[::-1]: OUTSIDE in sides for run, sides in edges.items() if air in sides}
-    behind = np.array([depth.get(run, np.inf) for run in known])
-    return _Air(np.array([*known], int).reshape(-1, 2), np.array([*known.values()], bool), behind, places)
+def _halves(faces: Faces) -> Whole:
+    """From end to middle of each face, and on to its other end, (2k, 2)."""
+    return np.concatenate([faces.nodes[:, :2], faces.nodes[:, 1:]])
 
 
 def _fixed(edges: Sides, air: int, faces: Faces) -> Mask:
     """Points that stay where they are: where a face turns by more than a tenth or ends, and ends of other edges."""
-    drawn = faces.mesh.points_m
+    drawn = faces.points_m
     found = np.zeros(len(drawn), bool)
     found[[k for run, sides in edges.items() if air not in sides or OUTSIDE in sides for k in run]] = True
-    after = dict(faces.halves.tolist())
+    after = dict(_halves(faces).tolist())
     before = {b: a for a, b in after.items()}
     found[list(set(after) ^ set(before))] = True
     both = np.array([(before[k], k, after[k]) for k in after if k in before], int).reshape(-1, 3)

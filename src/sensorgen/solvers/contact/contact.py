@@ -1,18 +1,22 @@
-"""Gaps between faces, along their normals: between solids, within one, and to the mirrors at both ends of the cell.
+"""Point-to-face contact along normals: between bodies, within one body, and with the mirrors at the ends of a cell.
 
-From each quadrature point of a face a ray along its normal finds a partner: a place on a face that looks against it,
-or a mirror. Both of two faces look, and each carries half. Partner and normal are *frozen* while Newton's method runs:
-the gap is then linear in the displacements. Following them live, with the exact Hessian, stalls.
+A ray along the normal of each quadrature point of a face finds its partner: a place on a face that looks against it,
+or a mirror. Both of two faces look, and each carries half of the penalty. Partner and normal are *frozen* while
+Newton's method runs: the gap is then linear in the displacements. With partners that follow and the exact Hessian it
+stalls. Faces are quadratic lines in two dimensions, biquadratic quadrilaterals in three.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, vstack
 
-from sensorgen.solvers.contact import rays
+from sensorgen.solvers.contact.bricks import BrickMesh
+from sensorgen.solvers.contact.element import line_slopes, line_values
 from sensorgen.solvers.contact.mesh import Mesh, at_border
 
 Real = NDArray[np.float64]
@@ -23,154 +27,337 @@ _STEEP = 0.3  # cosine of a face's slope, below which nothing rests on it [-]
 _PASS = 0.5  # share of the penalty that each of two faces brings [-]
 _IMAGE = 2.0  # a mirror's penalty over that of two faces: half the gap, and one of two bodies [-]
 _THIN = 0.5  # of a body's thickness: deeper than this is rather its other side [-]
+_OPPOSED = 0.1  # cosine between a ray and the face that it hits, below which it grazes [-]
+_REACH = 2e-9  # how far past its ends, at -1 and 1, a face is still hit [-]
+_BULGE = 0.1  # of its extent, by which a face may bulge beyond its corners [-]
+_TURNS = 6  # of Newton's method for a place on a face, which is nearly flat
+
+_LINE, _LINE_WEIGHTS = np.polynomial.legendre.leggauss(3)
 _EACH = ("stiffness_pa", "length_m", "point", "sticks", "slid_m")
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """Quadrature points of faces that have a partner, frozen.
+    """Quadrature points of faces with a partner, frozen.
 
     Attributes
     ----------
-    gap, slip : sparse (k, n)
-        Gap along the partner's normal, and how far the partner has moved sideways, from the places of all nodes
-        [m per m].
+    gap : sparse (k, n)
+        Gap along the partner's normal, from the places of all nodes [m per m].
+    slips : tuple of sparse (k, n)
+        Displacement of the partner along each tangent of the point's face [m per m].
     stiffness_pa : (k,) array
-        Penalty times the length that each point stands for [Pa].
+        Contact force per penetration, in two dimensions per depth.
     length_m : (k,) array
-        Length of the side that it is on [m].
+        Shortest side of the face [m].
     point : (k,) array
-        Which quadrature point it is.
+        Number of the quadrature point.
     sticks : (k,) array
-        Whether it touched before, and holds fast.
-    slid_m : (k,) array
-        How far the partner had moved sideways when they touched [m].
+        Whether it touched before and sticks.
+    slid_m : (k, d - 1) array
+        Place of the partner along the tangents when they touched [m].
     """
 
     gap: csr_matrix
-    slip: csr_matrix
+    slips: tuple[csr_matrix, ...]
     stiffness_pa: Real
     length_m: Real
     point: Whole
     sticks: Mask
     slid_m: Real
 
+    def some(self, which: Mask) -> "Pairs":
+        """A part of them."""
+        return Pairs(self.gap[which], tuple(s[which] for s in self.slips), *(getattr(self, k)[which] for k in _EACH))
+
+
+def _joined(parts: Sequence[Pairs]) -> Pairs:
+    slips = zip(*(p.slips for p in parts), strict=True)
+    return Pairs(
+        vstack([p.gap for p in parts]).tocsr(),
+        tuple(vstack(rows).tocsr() for rows in slips),
+        *(np.concatenate([getattr(p, key) for p in parts]) for key in _EACH),
+    )
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Lines along unit normals (k, d) from places (k, d), each with the unit tangents of its face (k, d - 1, d)."""
+
+    here_m: Real
+    normal: Real
+    tangents: Real
+
 
 @dataclass(frozen=True)
 class Faces:
-    """Sides of a mesh that may touch, (k, 3) nodes each."""
+    """Faces of a mesh that may touch.
 
-    mesh: Mesh
-    sides: Whole
+    Attributes
+    ----------
+    points_m : (n, d) array
+        Places of all nodes as drawn [m].
+    nodes : (k, 3^(d - 1)) array
+        Of each face, from line to line; its normal points out of the body.
+    mirrors : tuple of (int, int, int)
+        Axis, direction and a node of each mirror.
+    """
+
+    points_m: Real
+    nodes: Whole
+    mirrors: tuple[tuple[int, int, int], ...]
 
     @property
-    def halves(self) -> Whole:
-        """From end to middle and on to the other end, (2k, 2)."""
-        return np.concatenate([self.sides[:, [0, 2]], self.sides[:, [2, 1]]])
+    def _ways(self) -> int:
+        """Directions along a face."""
+        return self.points_m.shape[1] - 1
 
     @cached_property
-    def _length(self) -> Real:
-        ends = self.mesh.points_m[self.sides[:, 1]] - self.mesh.points_m[self.sides[:, 0]]
-        return np.asarray(np.hypot(*ends.T))
+    def _at(self) -> Real:
+        """Quadrature points on a face (q, d - 1)."""
+        return np.array(list(product(_LINE, repeat=self._ways)))
 
     @cached_property
-    def _depth(self) -> Real:
-        """How deep each point may be in another solid: a side's length, or less where its own is thin [m]."""
-        found = np.repeat(self._length, len(rays.POINTS))
-        here, along = self._rays(self.mesh.points_m)
-        back, side, s = rays.hit(here, -along, self.mesh.points_m[self.sides][:, [1, 0, 2]], np.zeros(len(here)))
-        place, _ = rays.at(1 - s, self.mesh.points_m[self.sides[side]])
-        found[back] = np.minimum(found[back], _THIN * np.hypot(*(place - here[back]).T))
+    def shapes(self) -> Real:
+        """Functions of a face at its quadrature points (q, f)."""
+        return face_values(self._at)
+
+    @cached_property
+    def _edges_m(self) -> Real:
+        """Lengths of each face along its directions (k, d - 1) [m]."""
+        lattice = self.points_m[self.nodes].reshape(-1, *(3,) * self._ways, self._ways + 1)
+        edges = [lattice[:, 2] - lattice[:, 0]] if self._ways == 1 else []
+        edges = edges or [lattice[:, 2, 0] - lattice[:, 0, 0], lattice[:, 0, 2] - lattice[:, 0, 0]]
+        return np.stack([np.sqrt((e**2).sum(axis=-1)) for e in edges], axis=1)
+
+    @cached_property
+    def _depth_m(self) -> Real:
+        """How deep each point may be in another body: a side's length, or less where its own is thin [m]."""
+        found = np.repeat(self._edges_m.min(axis=1), len(self._at))
+        rays = self.rays(self.points_m)
+        back, _, _, distance = hit(rays, self.points_m[self.nodes], np.zeros(len(found)), inwards=True)
+        found[back] = np.minimum(found[back], _THIN * distance)
         return found
 
     @cached_property
     def depth_m(self) -> Real:
-        """How deep another solid's points may be in each side's [m]."""
-        return np.asarray(self._depth.reshape(-1, len(rays.POINTS)).min(axis=1))
+        """How deep another body's points may be in each face's [m]."""
+        return np.asarray(self._depth_m.reshape(len(self.nodes), len(self._at)).min(axis=1))
 
-    def _rays(self, places_m: Real) -> tuple[Real, Real]:
-        sides = np.repeat(places_m[self.sides], len(rays.POINTS), axis=0)
-        return rays.at(np.tile(rays.POINTS, len(self.sides)), sides)
+    def rays(self, places_m: Real) -> Rays:
+        """From all quadrature points, face by face, at given places of the nodes (n, d)."""
+        faces = places_m[self.nodes]
+        tangents = np.matmul(face_slopes(self._at), faces[:, None]).reshape(-1, self._ways, self._ways + 1)
+        normal = _normals(tangents)
+        first = tangents[:, 0] / np.sqrt((tangents[:, :1] ** 2).sum(axis=-1))
+        frame = [first] if self._ways == 1 else [first, np.cross(normal, first)]
+        return Rays((self.shapes @ faces).reshape(-1, self._ways + 1), normal, np.stack(frame, axis=1))
 
     def project(self, places_m: Real, penalty_pa: float, kept: Pairs | None = None) -> Pairs:
-        """Find the partner of every point at given places of the nodes (n, 2); those of ``kept`` stay as they are."""
-        here, along = self._rays(places_m)
-        made = [self._met(places_m, here, along, penalty_pa), self._mirrored(places_m, here, along, penalty_pa)]
+        """Find the partner of every point at given places of the nodes (n, d); those of ``kept`` stay as they are."""
+        rays = self.rays(places_m)
+        made = [self._met(places_m, rays, penalty_pa), *self._mirrored(places_m, rays, penalty_pa)]
         if kept is None:
             return _joined(made)
-        return _joined([*(some(p, ~np.isin(p.point, kept.point)) for p in made), kept])
+        return _joined([*(p.some(~np.isin(p.point, kept.point)) for p in made), kept])
 
-    def crossed(self, places_m: Real, share: float) -> bool:
-        """Whether a face is in two solids at once, or beyond a mirror, deeper than a share of its side."""
-        here, along = self._rays(places_m)
-        looks = rays.outwards(along)
-        inside = here - (share * self._depth)[:, None] * looks
-        x = self.mesh.points_m[:, 0]
-        ends = places_m[np.where(looks[:, 0] > 0, x.argmax(), x.argmin()), 0]
-        beyond = (ends - inside[:, 0]) * looks[:, 0] < 0
-        a, b, middle = places_m[self.mesh.rim].transpose(1, 0, 2)
-        found = rays.turns(inside, np.concatenate([a, middle]), np.concatenate([middle, b]))
-        return bool((beyond | (found > 1)).any())
+    def _met(self, places_m: Real, rays: Rays, penalty_pa: float) -> Pairs:
+        """Points whose partner is on another face."""
+        faces = places_m[self.nodes]
+        point, face, s, _ = hit(rays, faces, self._depth_m)
+        own, at = np.divmod(point, len(self._at))
+        weights = np.concatenate([face_values(s), -self.shapes[at]], axis=1)
+        nodes = np.concatenate([self.nodes[face], self.nodes[own]], axis=1)
+        _, looks = on_faces(s, faces[face])
+        slips = tuple(self._rows(weights, nodes, rays.tangents[point, k]) for k in range(self._ways))
+        return self._pairs(self._rows(weights, nodes, -looks), slips, point, 0, _PASS * penalty_pa)
 
-    def _met(self, places_m: Real, here: Real, along: Real, penalty_pa: float) -> Pairs:
-        """Points whose partner is on another side."""
-        point, side, s = rays.hit(here, along, places_m[self.sides], self._depth)
-        _, way = rays.at(s, places_m[self.sides[side]])
-        own = point // len(rays.POINTS)
-        below = rays.shapes(rays.POINTS)[point % len(rays.POINTS)]
-        weights = np.concatenate([rays.shapes(s), -below], axis=1)
-        nodes = np.concatenate([self.sides[side], self.sides[own]], axis=1)
-        gap, slip = (self._rows(weights, nodes, v) for v in (-rays.outwards(way), along[point]))
-        return self._pairs(gap, slip, point, _PASS * penalty_pa)
-
-    def _mirrored(self, places_m: Real, here: Real, along: Real, penalty_pa: float) -> Pairs:
-        """Points that look at a mirror at one of the cell's ends; its image slips as they do."""
-        x = self.mesh.points_m[:, 0]
-        ends = np.array([x.argmin(), x.argmax()])
-        looks = rays.outwards(along)[:, 0]
-        end = ends[(looks > 0).astype(int)]
-        ahead = (places_m[end, 0] - here[:, 0]) * np.sign(looks)
-        point = np.flatnonzero((abs(looks) > rays.OPPOSED) & (ahead > -self._depth))
-        own = point // len(rays.POINTS)
-        below = rays.shapes(rays.POINTS)[point % len(rays.POINTS)]
-        weights = np.concatenate([np.ones((len(point), 1)), -below], axis=1)
-        nodes = np.concatenate([end[point, None], self.sides[own]], axis=1)
-        level = np.stack([np.sign(looks[point]), np.zeros(len(point))], axis=1)
-        gap = self._rows(weights, nodes, level)
-        return self._pairs(gap, 0 * gap, point, _IMAGE * penalty_pa, len(here))
+    def _mirrored(self, places_m: Real, rays: Rays, penalty_pa: float) -> Iterator[Pairs]:
+        """Points that look at a mirror; its image slips as they do."""
+        for axis, direction, node in self.mirrors:
+            looks = direction * rays.normal[:, axis]
+            ahead = direction * (places_m[node, axis] - rays.here_m[:, axis])
+            point = np.flatnonzero((looks > _OPPOSED) & (ahead > -self._depth_m))
+            own, at = np.divmod(point, len(self._at))
+            weights = np.concatenate([np.ones((len(point), 1)), -self.shapes[at]], axis=1)
+            nodes = np.concatenate([np.full((len(point), 1), node), self.nodes[own]], axis=1)
+            level = np.zeros((len(point), self._ways + 1))
+            level[:, axis] = direction
+            gap = self._rows(weights, nodes, level)
+            still = (csr_matrix(gap.shape),) * self._ways
+            yield self._pairs(gap, still, point, (1 + axis) * len(rays.here_m), _IMAGE * penalty_pa)
 
     def _rows(self, weights: Real, nodes: Whole, ways: Real) -> csr_matrix:
-        """Weighted places of nodes (k, m) along a direction each (k, 2), as sparse rows."""
-        values = weights[..., None] * ways[:, None]
-        columns = 2 * nodes[..., None] + np.arange(2)
-        starts = np.arange(len(nodes) + 1) * (2 * nodes.shape[1])
-        return csr_matrix((values.ravel(), columns.ravel(), starts), (len(nodes), 2 * len(self.mesh.points_m)))
+        """Weighted places of nodes (k, m) along a direction each (k, d), as sparse rows."""
+        d = ways.shape[1]
+        values, columns = weights[..., None] * ways[:, None], d * nodes[..., None] + np.arange(d)
+        starts = np.arange(len(nodes) + 1) * (d * nodes.shape[1])
+        found = csr_matrix((values.ravel(), columns.ravel(), starts), (len(nodes), self.points_m.size))
+        found.eliminate_zeros()
+        return found
 
-    def _pairs(self, gap: csr_matrix, slip: csr_matrix, point: Whole, penalty_pa: float, first: int = 0) -> Pairs:
-        weight = penalty_pa * rays.WEIGHTS[point % len(rays.POINTS)]
-        length = self._length[point // len(rays.POINTS)]
-        return Pairs(gap, slip, weight, length, first + point, np.zeros(len(point), bool), np.zeros(len(point)))
+    def _pairs(
+        self, gap: csr_matrix, slips: tuple[csr_matrix, ...], point: Whole, first: int, penalty_pa: float
+    ) -> Pairs:
+        own, at = np.divmod(point, len(self._at))
+        edges, length = self._edges_m[own], self._edges_m[own].min(axis=1)
+        weights = np.array([np.prod(w) for w in product(_LINE_WEIGHTS / 2, repeat=self._ways)])
+        stiffness = penalty_pa * weights[at] * edges.prod(axis=1) / length
+        still = np.zeros((len(point), self._ways))
+        return Pairs(gap, slips, stiffness, length, first + point, np.zeros(len(point), bool), still)
+
+    def crossed(self, places_m: Real, outline: Whole, share: float) -> bool:
+        """Whether a face is in two bodies at once, or beyond a mirror, deeper than a share of its side; in a plane.
+
+        ``outline`` (k, 2) are the straight pieces of all bodies' outlines, anticlockwise.
+        """
+        rays = self.rays(places_m)
+        inside = rays.here_m - (share * self._depth_m)[:, None] * rays.normal
+        beyond = [
+            (looks * rays.normal[:, a] > 0) & (looks * (places_m[n, a] - inside[:, a]) < 0)
+            for a, looks, n in self.mirrors
+        ]
+        around = winding_number(inside, *places_m[outline].transpose(1, 0, 2))
+        return bool(np.any(beyond) or (around > 1).any())
 
 
 def faces_of(mesh: Mesh) -> Faces:
-    """The faces of a mesh, its lowest and highest level and its left and right side left out."""
-    return Faces(mesh, mesh.rim[~at_border(mesh)])
+    """Sides of triangles with nothing behind them, those on the straight border of the cell left out."""
+    x = mesh.points_m[:, 0]
+    mirrors = ((0, -1, int(x.argmin())), (0, 1, int(x.argmax())))
+    return Faces(mesh.points_m, mesh.rim[~at_border(mesh)][:, [0, 2, 1]], mirrors)
 
 
-def _joined(parts: list[Pairs]) -> Pairs:
-    gap, slip = (vstack([getattr(p, key) for p in parts]).tocsr() for key in ("gap", "slip"))
-    return Pairs(gap, slip, *(np.concatenate([getattr(p, key) for p in parts]) for key in _EACH))
+def brick_faces_of(mesh: BrickMesh) -> Faces:
+    """Faces of solid boxes towards air, and the mirrors that the solid reaches."""
+    solid, found = np.pad(mesh.bricks.fill > 0, 1, constant_values=True), []
+    lattice = mesh.nodes.reshape(-1, 3, 3, 3)
+    for axis, side in product(range(3), range(2)):
+        beside = mesh.boxes + 1
+        beside[:, axis] += 2 * side - 1
+        faces = lattice[~solid[tuple(beside.T)]].take(2 * side, axis + 1)
+        outwards = (axis == 1) != (side == 1)  # along the second and third of x, y, z but the axis: x, -y and z
+        found.append((faces if outwards else faces.transpose(0, 2, 1)).reshape(-1, 9))
+    mirrors = [
+        (axis, direction, int((direction * mesh.points_m[:, axis]).argmax()))
+        for axis, direction in product(range(2), (-1, 1))
+    ]
+    spans = mesh.bricks.spans_m()
+    reached = [(a, s, n) for a, s, n in mirrors if mesh.points_m[n, a] in spans[a]]
+    return Faces(mesh.points_m, np.concatenate(found), tuple(reached))
 
 
-def some(pairs: Pairs, which: Mask) -> Pairs:
-    """A part of them."""
-    return Pairs(pairs.gap[which], pairs.slip[which], *(getattr(pairs, key)[which] for key in _EACH))
-
-
-def carrying(pairs: Pairs, loose: Mask, dimension: int) -> tuple[Pairs, Real]:
-    """The pairs between a loose piece above and one below that is held, and by how much a gap shuts as it falls [-].
+def carrying(pairs: Pairs, loose: Mask) -> tuple[Pairs, Real]:
+    """The pairs between a loose piece above and a supported one below, and the gap's change per fall [-].
 
     ``loose`` says it of each node.
     """
-    share = np.asarray(pairs.gap[:, dimension - 1 :: dimension] @ loose.astype(float))
-    return some(pairs, share > _STEEP), share[share > _STEEP]
+    d = pairs.gap.shape[1] // len(loose)
+    share = np.asarray(pairs.gap[:, d - 1 :: d] @ loose.astype(float))
+    return pairs.some(share > _STEEP), share[share > _STEEP]
+
+
+def face_values(s: Real) -> Real:
+    """Functions of a face at places (..., d - 1), each from -1 to 1: (..., f)."""
+    return _products([line_values(c) for c in np.moveaxis(s, -1, 0)])
+
+
+def face_slopes(s: Real) -> Real:
+    """Their derivatives (..., d - 1, f)."""
+    lines = np.moveaxis(s, -1, 0)
+    found = [[(line_values, line_slopes)[int(a == b)](c) for b, c in enumerate(lines)] for a in range(len(lines))]
+    return np.stack([_products(factors) for factors in found], axis=-2)
+
+
+def _products(factors: list[Real]) -> Real:
+    found = factors[0]
+    for other in factors[1:]:
+        found = (found[..., :, None] * other[..., None, :]).reshape(
+            *found.shape[:-1], found.shape[-1] * other.shape[-1]
+        )
+    return found
+
+
+def _normals(tangents: Real) -> Real:
+    """Unit normals from tangents (k, d - 1, d)."""
+    found = tangents[:, 0, ::-1] * [1.0, -1.0] if tangents.shape[1] == 1 else np.cross(tangents[:, 0], tangents[:, 1])
+    return np.asarray(found / np.sqrt((found**2).sum(axis=1))[:, None])
+
+
+def on_faces(s: Real, faces: Real) -> tuple[Real, Real]:
+    """Places (k, d) and unit normals at coordinates (k, d - 1) of faces (k, f, d)."""
+    return np.matmul(face_values(s)[:, None], faces)[:, 0], _normals(np.matmul(face_slopes(s), faces))
+
+
+def hit(rays: Rays, faces: Real, depth_m: Real, *, inwards: bool = False) -> tuple[Whole, Whole, Real, Real]:
+    """For each ray the nearest face that looks against it, ahead or less than a depth behind.
+
+    Parameters
+    ----------
+    rays : Rays
+        k of them.
+    faces : (m, f, d) array
+        Places of their nodes [m].
+    depth_m : (k,) array
+        Of each ray [m].
+    inwards : bool
+        Rays run against their normal, to faces from behind.
+
+    Returns
+    -------
+    (rays, faces, (h, d - 1) array, (h,) array)
+        Which rays hit, what, where on it, and how far away [m].
+    """
+    point, face = np.nonzero(_candidates(rays, faces))
+    relative = faces[face] - rays.here_m[point, None]
+    level = np.matmul(rays.tangents[point], relative.transpose(0, 2, 1))  # of the nodes, along the tangents
+    s = np.zeros(level.shape[:2])
+    for _ in range(_TURNS):
+        off, slope = (level * face_values(s)[:, None]).sum(axis=-1), np.matmul(level, face_slopes(s).transpose(0, 2, 1))
+        s = np.clip(s - _divided(off, slope), -2.0, 2.0)
+    inside = (np.abs(s) <= 1 + _REACH).all(axis=1)
+    s = np.clip(s, -1.0, 1.0)
+    place, looks = on_faces(s, relative)
+    normal = rays.normal[point]
+    distance = (-1 if inwards else 1) * (place * normal).sum(axis=1)
+    good = np.flatnonzero(inside & (distance > -depth_m[point]) & ((looks * normal).sum(axis=1) < -_OPPOSED))
+    good = good[np.argsort(np.abs(distance[good]), kind="stable")]
+    found, first = np.unique(point[good], return_index=True)
+    good = good[first]
+    return found, face[good], s[good], distance[good]
+
+
+def _candidates(rays: Rays, faces: Real) -> Mask:
+    """Which faces look against each ray and have it between their corners (k, m)."""
+    ways = rays.tangents.shape[1]
+    _, looks = on_faces(np.zeros((len(faces), ways)), faces)
+    found = rays.normal @ looks.T < 0
+    corners = faces.reshape(-1, *(3,) * ways, ways + 1)[(slice(None), *(slice(None, None, 2),) * ways)]
+    corners = corners.reshape(len(faces), 2**ways, ways + 1)
+    for k in range(ways):
+        way, start = rays.tangents[:, k], (rays.tangents[:, k] * rays.here_m).sum(axis=1)[:, None]
+        across = [way @ corners[:, c].T - start for c in range(corners.shape[1])]
+        low, high = np.minimum.reduce(across), np.maximum.reduce(across)
+        room = _BULGE * (high - low)
+        found &= (low <= room) & (high >= -room)
+    return np.asarray(found)
+
+
+def _divided(right: Real, matrix: Real) -> Real:
+    """Solutions of one or two equations (k, n) by Cramer's rule."""
+    if right.shape[1] == 1:
+        return right / np.where(matrix[..., 0] == 0, np.inf, matrix[..., 0])
+    (a, b), (c, d) = matrix.transpose(1, 2, 0)
+    x, y = right.T
+    whole = np.where(a * d == b * c, np.inf, a * d - b * c)
+    return np.column_stack([(x * d - b * y) / whole, (a * y - x * c) / whole])
+
+
+def winding_number(here: Real, starts: Real, ends: Real) -> Whole:
+    """How often closed outlines of straight pieces (m, 2) run anticlockwise around points (k, 2)."""
+    x = here[:, :1]
+    (x0, y0), (x1, y1) = starts.T, ends.T
+    sign = np.where(x1 < x0, 1, -1) * ((np.minimum(x0, x1) <= x) & (x < np.maximum(x0, x1)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        above = y0 + (x - x0) * (y1 - y0) / (x1 - x0) > here[:, 1:]
+    return np.asarray((sign * above).sum(axis=1))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.units import M_PER_MM
-from sensorgen.solvers.contact.cell import AIR, OUTSIDE, Cell
+from sensorgen.solvers.contact.cell import OUTSIDE, Cell
 from sensorgen.solvers.contact.closing import Sides, closed
 from sensorgen.solvers.contact.contact import Faces
 from sensorgen.solvers.contact.mesh import Mesh, at_border
@@ -22,7 +22,7 @@ def deformed(cell: Cell, mesh: Mesh, faces: Faces, u_m: Real) -> Cell:
     places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
     found = _edges(cell, mesh)
     if u_m.any():
-        found = closed(found, _air(cell), places, faces)
+        found = closed(found, cell.air, places, faces)
     edges = {}
     for (a, b), sides in found.items():
         p, q = (tuple(np.round(places[k], 9).tolist()) for k in (a, b))
@@ -34,7 +34,9 @@ def deformed(cell: Cell, mesh: Mesh, faces: Faces, u_m: Real) -> Cell:
 def misfit(cell: Cell, mesh: Mesh, u_m: Real) -> float:
     """Largest change of a solid's area by what was closed, over that area [-]; ``cell`` has the closed outlines."""
     places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
-    kept = np.bincount(mesh.region, _areas(places[mesh.triangles[:, _ROUND]]), len(cell.regions) + 1)
+    x, y = places[mesh.outer[:, _ROUND]].transpose(2, 0, 1)
+    areas = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) / 2
+    kept = np.bincount(mesh.region, areas, len(cell.regions) + 1)
     found = np.zeros(len(kept))
     for (a, b), sides in cell.edges.items():
         half = (a[0] * b[1] - a[1] * b[0]) / 2
@@ -44,23 +46,14 @@ def misfit(cell: Cell, mesh: Mesh, u_m: Real) -> float:
     return float(np.abs(found[solid] / kept[solid] - 1).max())
 
 
-def _areas(corners: Real) -> Real:
-    """Of polygons (m, n, 2)."""
-    ahead = np.roll(corners, -1, axis=1)
-    return np.asarray((corners[..., 0] * ahead[..., 1] - corners[..., 1] * ahead[..., 0]).sum(axis=1) / 2)
-
-
-def _air(cell: Cell) -> int:
-    return next((k + 1 for k, region in enumerate(cell.regions) if region.material == AIR), OUTSIDE)
-
-
 def _edges(cell: Cell, mesh: Mesh) -> Sides:
     """Sides between different regions: (node, node) to the regions on their left and right; halved but at walls."""
     found: Sides = {}
-    air, walls = _air(cell), _walls(mesh)
+    air, x, middles = cell.air, mesh.points_m[:, 0], mesh.rim[:, 2]
+    walls = set(middles[np.isin(x[middles], (x.min(), x.max()))].tolist())  # middles of sides at the cell's ends
     for k in range(3):
         for (a, m, b), region in zip(
-            mesh.triangles[:, [k, k + 3, (k + 1) % 3]].tolist(), mesh.region.tolist(), strict=True
+            mesh.outer[:, [k, k + 3, (k + 1) % 3]].tolist(), mesh.region.tolist(), strict=True
         ):
             for p, q in ((a, b),) if m in walls else ((a, m), (m, b)):
                 if (q, p) in found:
@@ -75,9 +68,3 @@ def _edges(cell: Cell, mesh: Mesh) -> Sides:
         if air != OUTSIDE and set(sides) == {air, OUTSIDE}:
             found[nodes[p], nodes[q]] = sides
     return {run: sides for run, sides in found.items() if sides[0] != sides[1]}
-
-
-def _walls(mesh: Mesh) -> set[int]:
-    """Middles of the sides on the left and right end of the cell."""
-    x, middles = mesh.points_m[:, 0], mesh.rim[:, 2]
-    return set(middles[np.isin(x[middles], (x.min(), x.max()))].tolist())

@@ -1,56 +1,133 @@
-r"""Near-incompressible neo-Hookean triangles: six nodes and a bubble for the displacement, and a linear pressure.
+r"""Mixed finite elements of a nearly incompressible neo-Hookean solid, in two and three dimensions.
 
-.. math:: \Pi = \int \tfrac{\mu}{2} (F : F - 2) - \mu \ln J + p (J - 1) - \frac{p^2}{2 \lambda}
+.. math:: \Pi = \int \tfrac{\mu}{2} (F : F - d) - \mu \ln J + p (J - 1) - \frac{p^2}{2 \lambda}
 
-The pressure jumps between triangles; it and the bubble are condensed, triangle by triangle. Stationary in p it is the
-energy mu/2 (tr C - 2) - mu ln J + lambda/2 (J - 1)^2; for nu = 1/2 the last term is gone and J = 1 holds on average.
+Quadratic displacement with an inner node, linear pressure that is discontinuous between elements: P2+ / P1 triangles
+(Crouzeix and Raviart 1973) and Q2 / P1 bricks (Boffi and Gastaldi 2002), which do not lock. Inner node and pressure are
+condensed element by element. Stationary in p the energy is mu/2 (tr C - d) - mu ln J + lambda/2 (J - 1)^2; for
+nu = 1/2 the last term vanishes and J = 1 on average. All derivatives are with respect to the reference coordinates, so
+that one table of shape functions serves every element.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.solvers.contact.mesh import Mesh
-
 Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
 
-# Six points, exact to degree 4 (Strang and Fix; Cowper 1973): barycentric a, a, 1 - 2a, and weight.
-_ORBITS = ((0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322))
-_POINTS = np.array([p for a, _ in _ORBITS for p in ((a, a), (1 - 2 * a, a), (a, 1 - 2 * a))])
-_WEIGHTS = np.array([w / 2 for _, w in _ORBITS for _ in range(3)])
-_OUTER = 12  # displacements of the six nodes; then the bubble's two, then three of the pressure
-_STIFF = 1e6  # in the tangent of an incompressible triangle, the pressure's stiffness over mu
+_STIFF = 1e6  # in the tangent of an incompressible element, the pressure's stiffness over mu
+_CHUNK = 2**19  # entries of element matrices at once: they stay in the cache
 
 
-def gradients(xi: Real, eta: Real) -> Real:
-    """Derivatives of the six nodal functions and the bubble to xi and eta, (points, 7, 2)."""
-    one, o = np.ones_like(xi), np.zeros_like(xi)
-    a, b, c = 1 - xi - eta, xi, eta
-    da, db, dc = (-one, -one), (one, o), (o, one)
-    both = range(2)
-    rows = [[(4 * x - 1) * d[k] for k in both] for x, d in ((a, da), (b, db), (c, dc))]
-    rows += [
-        [4 * (x * dy[k] + y * dx[k]) for k in both] for x, dx, y, dy in ((a, da, b, db), (b, db, c, dc), (c, dc, a, da))
-    ]
-    rows += [[27 * (da[k] * b * c + a * db[k] * c + a * b * dc[k]) for k in both]]
-    return np.moveaxis(np.array(rows), 2, 0)
+@dataclass(frozen=True)
+class Reference:
+    """Shape functions of an element at its quadrature points.
+
+    Attributes
+    ----------
+    gradients : (q, n, d) array
+        Derivatives of the displacement's functions with respect to the reference coordinates, the inner node last.
+    weights : (q,) array
+        Of the quadrature.
+    pressures : (q, d + 1) array
+        Functions of the pressure.
+    """
+
+    gradients: Real
+    weights: Real
+    pressures: Real
 
 
-_GRADIENTS = gradients(*_POINTS.T)
-_PRESSURES = np.column_stack([np.ones(len(_POINTS)), _POINTS - 1 / 3])  # constant, and two slopes without mean
-_PRODUCTS = (_PRESSURES[:, :, None] * _PRESSURES[:, None]).reshape(-1, 9)
-_UNMOVED = np.array([1.0, 0.0, 0.0, 1.0])
-_ALTERNATING = np.array([1.0, -1.0, -1.0, 1.0])  # signs of a cofactor
+def triangle_gradients(at: Real) -> Real:
+    """Derivatives of the six nodal functions and the bubble of a triangle at places (p, 2): (p, 7, 2)."""
+    share, slope = np.column_stack([1 - at.sum(axis=1), at]), np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+    after, last = [1, 2, 0], [2, 0, 1]
+    corners = (4 * share[..., None] - 1) * slope
+    sides = 4 * (share[..., None] * slope[after] + share[:, after, None] * slope)
+    bubble = 27 * (share[:, after] * share[:, last]) @ slope
+    return np.concatenate([corners, sides, bubble[:, None]], axis=1)
+
+
+def line_values(s: Real) -> Real:
+    """Quadratic functions of a line from -1 to 1, (..., 3): start, middle, end."""
+    return np.stack([s * (s - 1) / 2, 1 - s**2, s * (s + 1) / 2], axis=-1)
+
+
+def line_slopes(s: Real) -> Real:
+    """Their derivatives."""
+    return np.stack([s - 0.5, -2 * s, s + 0.5], axis=-1)
+
+
+def brick_gradients(at: Real) -> Real:
+    """Derivatives of the 27 nodal functions of a brick on a lattice, ``at`` along each axis: (points, 27, 3)."""
+    pair = line_values(at), line_slopes(at)
+    found = [np.einsum("ai,bj,ck->abcijk", *(pair[int(a == axis)] for a in range(3))) for axis in range(3)]
+    return np.stack([f.reshape(len(at) ** 3, 27) for f in found], axis=-1)
+
+
+BRICK_INNER, BRICK_CORNERS = 13, np.array([0, 2, 6, 8, 18, 20, 24, 26])
+BRICK_OUTER = np.delete(np.arange(27), BRICK_INNER)
+
+
+def _triangle() -> Reference:
+    """Six points, exact to degree 4 (Strang and Fix; Cowper 1973): barycentric a, a, 1 - 2a, and weight."""
+    orbits = ((0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322))
+    at = np.array([p for a, _ in orbits for p in ((a, a), (1 - 2 * a, a), (a, 1 - 2 * a))])
+    weights = np.repeat([w / 2 for _, w in orbits], 3)
+    return Reference(triangle_gradients(at), weights, np.column_stack([np.ones(6), at - 1 / 3]))
+
+
+def _brick() -> Reference:
+    """Gauss's 27 points; the inner node's displacement is relative to the mean of the corners'."""
+    at, weight = np.polynomial.legendre.leggauss(3)
+    gradients = brick_gradients(at)
+    gradients[:, BRICK_CORNERS] += gradients[:, [BRICK_INNER]] / 8
+    weights = np.einsum("a,b,c->abc", weight, weight, weight).ravel()
+    pressures = np.column_stack([np.ones(27), np.array(list(product(at, repeat=3)))])
+    return Reference(gradients[:, [*BRICK_OUTER, BRICK_INNER]], weights, pressures)
+
+
+TRIANGLE, BRICK = _triangle(), _brick()
+
+
+@dataclass(frozen=True)
+class ElementMesh:
+    """A mesh of one kind of element, each an affine image of the reference.
+
+    Attributes
+    ----------
+    reference : Reference
+        Its shape functions.
+    points_m : (n, d) array
+        Places of the nodes [m].
+    outer : (m, k) array
+        Nodes of each element but the inner one, as in the reference.
+    region : (m,) array
+        Region of each element, from 1 on.
+    """
+
+    reference: Reference
+    points_m: Real
+    outer: Whole
+    region: Whole
+
+    @cached_property
+    def jacobians_m(self) -> Real:
+        """Derivative of the place with respect to the reference coordinates (m, d, d) [m]."""
+        return np.einsum("mni,na->mia", self.points_m[self.outer], self.reference.gradients[0, :-1], optimize=True)
 
 
 @dataclass(frozen=True)
 class Law:
-    """What each triangle is made of: shear modulus [Pa], and 1 / lambda [1/Pa], 0 where incompressible."""
+    """Material of each element: shear modulus [Pa], and 1 / lambda [1/Pa], 0 where incompressible."""
 
     mu_pa: Real
-    yielding_per_pa: Real
+    compliance_per_pa: Real
 
 
 def law(youngs_modulus_pa: Real, poisson_ratio: Real) -> Law:
@@ -61,29 +138,29 @@ def law(youngs_modulus_pa: Real, poisson_ratio: Real) -> Law:
 
 @dataclass(frozen=True)
 class Inner:
-    """What elements keep for themselves: bubble (m, 2 or 3) [m] and pressure (m, 3 or 4) [Pa]."""
+    """Unknowns that elements do not share: displacement of the inner node (m, d) [m] and pressure (m, d + 1) [Pa]."""
 
     bubble: Real
     pressure: Real
 
     def moved(self, step: Real, share: float) -> "Inner":
-        """After a share of a step (m, 5 or 7)."""
+        """After a share of a step (m, 2d + 1)."""
         own = self.bubble.shape[1]
         return Inner(self.bubble + share * step[:, :own], self.pressure + share * step[:, own:])
 
-    def ahead(self, before: "Inner", share: float) -> "Inner":
-        """As much further as it has come since ``before``, times a share."""
-        bubble, pressure = (
-            getattr(self, key) + share * (getattr(self, key) - getattr(before, key)) for key in ("bubble", "pressure")
+    def extrapolated(self, before: "Inner", share: float) -> "Inner":
+        """Further by a share of the change since ``before``."""
+        return Inner(
+            self.bubble + share * (self.bubble - before.bubble),
+            self.pressure + share * (self.pressure - before.pressure),
         )
-        return Inner(bubble, pressure)
 
 
 @dataclass(frozen=True)
 class Tangent:
     """Condensed stiffness (m, k, k) and force (m, k); the inner step is ``offset - slope @ du``.
 
-    ``pressure_step`` is how far the pressures are from their own equilibrium.
+    ``pressure_step`` is the distance of the pressures from their own equilibrium.
     """
 
     stiffness: Real
@@ -94,129 +171,156 @@ class Tangent:
     mu_pa: Real
 
     def imbalance(self) -> float:
-        """How far the inner unknowns are from their own equilibrium: the largest step of a pressure over mu [-]."""
+        """Distance of the inner unknowns from their own equilibrium: largest pressure step over mu [-]."""
         return float(np.abs(self.pressure_step / self.mu_pa[:, None]).max())
 
     def inner_step(self, du: Real) -> Real:
-        """Step of bubble and pressure that belongs to a step of the nodes (m, k)."""
+        """Step of inner node and pressure for a step of the other nodes (m, k)."""
         return np.asarray(self.offset - np.einsum("mij,mj->mi", self.slope, du))
-
-
-def condensed(residual: Real, matrix: Real, outer: int, pressures: int, mu_pa: Real) -> Tangent:
-    """Without what elements keep for themselves: all beyond the first ``outer`` unknowns, pressures last."""
-    o = outer
-    inside = np.concatenate([matrix[:, o:, :o], residual[:, o:, None]], axis=2)
-    solved = np.linalg.solve(matrix[:, o:, o:], inside)
-    taken = np.matmul(matrix[:, :o, o:], solved)
-    return Tangent(
-        matrix[:, :o, :o] - taken[..., :-1],
-        residual[:, :o] - taken[..., -1],
-        -solved[..., -1],
-        solved[..., :-1],
-        -solved[:, -pressures:, -1],
-        mu_pa,
-    )
 
 
 @dataclass(frozen=True)
 class Elements:
-    """All triangles of a mesh, at once."""
+    """All elements of a mesh; d is 2 or 3."""
 
-    mesh: Mesh
+    mesh: ElementMesh
     law: Law
-
-    @property
-    def points_m(self) -> Real:
-        """Places of the nodes [m]."""
-        return self.mesh.points_m
+    _last: list[tuple[Real, Inner, Tangent]] = field(default_factory=list, repr=False, compare=False)
 
     @cached_property
-    def _geometry(self) -> tuple[Real, Real, Real]:
-        """Slopes of the seven functions along x and y (m, 7, points) [1/m], and weights (m, points) [m2]."""
-        a, b, c = (self.mesh.points_m[self.mesh.triangles[:, k]] for k in range(3))
-        jacobian = np.stack([b - a, c - a], axis=2)
-        x, y = np.einsum("qnk,mki->imnq", _GRADIENTS, np.linalg.inv(jacobian))
-        return np.ascontiguousarray(x), np.ascontiguousarray(y), np.linalg.det(jacobian)[:, None] * _WEIGHTS
+    def freedoms(self) -> Whole:
+        """Numbers of the displacements that each element shares with its neighbours (m, k): x, y (, z) of each node."""
+        outer, d = self.mesh.outer, self.mesh.points_m.shape[1]
+        return np.asarray((d * outer[:, :, None] + np.arange(d)).reshape(len(outer), -1))
 
     @cached_property
-    def _soft(self) -> Real:
-        """Second derivatives of mu/2 F : F, to displacements of one direction (m, 7, 7) [Pa]."""
-        x, y, w = self._geometry
-        weight = (w * self.law.mu_pa[:, None])[:, None]
-        return np.asarray(np.matmul(weight * x, x.transpose(0, 2, 1)) + np.matmul(weight * y, y.transpose(0, 2, 1)))
+    def _volumes(self) -> Real:
+        """Volume of each element over that of the reference (m,) [m^d]."""
+        return np.asarray(determinant(self.mesh.jacobians_m))
 
     @cached_property
-    def _turning(self) -> Real:
-        """Second derivatives of J, to one displacement sideways and one up (m, points, 49) [1/m2]."""
-        x, y = (slopes.swapaxes(1, 2) for slopes in self._geometry[:2])
-        mixed = x[..., :, None] * y[..., None, :]
-        return np.asarray((mixed - mixed.swapaxes(2, 3)).reshape(*x.shape[:2], 49))
+    def _metric(self) -> Real:
+        """Jacobian^-1 Jacobian^-T of each element (m, d, d) [1/m2]."""
+        inverse = np.linalg.inv(self.mesh.jacobians_m)
+        return np.asarray(inverse @ inverse.transpose(0, 2, 1))
 
-    def _rates(self, t: Real) -> Real:
-        """Of T : F to the 14 displacements (m, 14, points), for entries 11, 12, 21, 22 of T (m, points, 4)."""
-        x, y, _ = self._geometry
-        found = np.empty((len(x), 7, 2, x.shape[2]))
-        for row in range(2):
-            found[:, :, row] = t[:, None, :, 2 * row] * x + t[:, None, :, 2 * row + 1] * y
-        return found.reshape(len(x), 14, -1)
+    @cached_property
+    def _weights(self) -> Real:
+        """Of each quadrature point (m, q) [m^d]."""
+        return np.asarray(self._volumes[:, None] * self.mesh.reference.weights)
 
     def start(self) -> Inner:
         """Unloaded."""
-        m = len(self.mesh.triangles)
-        return Inner(np.zeros((m, 2)), np.zeros((m, 3)))
+        m, d = len(self.mesh.outer), self.mesh.points_m.shape[1]
+        return Inner(np.zeros((m, d)), np.zeros((m, d + 1)))
 
-    def deformation(self, u: Real, inner: Inner) -> Real:
-        """Entries 11, 12, 21, 22 of F at each quadrature point (m, points, 4)."""
-        x, y, _ = self._geometry
-        local = np.concatenate([u[self.freedoms], inner.bubble], axis=1).reshape(-1, 7, 2).transpose(0, 2, 1)
-        found = np.stack([np.matmul(local, x), np.matmul(local, y)], axis=-1)
-        return np.asarray(found.transpose(0, 2, 1, 3).reshape(len(x), -1, 4) + _UNMOVED)
+    def _stretch(self, u: Real, inner: Inner, which: slice) -> Real:
+        """Derivative of the deformed place with respect to the reference coordinates, F Jacobian (m, q, d, d) [m]."""
+        gradients, d = self.mesh.reference.gradients, self.mesh.points_m.shape[1]
+        local = np.concatenate([u.reshape(-1, d)[self.mesh.outer[which]], inner.bubble[which, None]], axis=1)
+        rows = local.transpose(0, 2, 1).reshape(len(local) * d, -1)
+        moved = (rows @ gradients.transpose(1, 0, 2).reshape(rows.shape[1], -1)).reshape(len(local), d, -1, d)
+        return np.asarray(moved.transpose(0, 2, 1, 3) + self.mesh.jacobians_m[which, None])
 
     def volume_ratio(self, u: Real, inner: Inner) -> Real:
-        """J at each quadrature point (m, points)."""
-        f = self.deformation(u, inner)
-        return np.asarray(f[..., 0] * f[..., 3] - f[..., 1] * f[..., 2])
+        """J at each quadrature point (m, q)."""
+        return np.asarray(determinant(self._stretch(u, inner, slice(None))) / self._volumes[:, None])
 
-    @cached_property
-    def freedoms(self) -> NDArray[np.int64]:
-        """Numbers of the 12 displacements of each triangle: x, y of one node after the other."""
-        return np.asarray((2 * self.mesh.triangles[:, :, None] + np.arange(2)).reshape(-1, _OUTER))
-
-    def energy_j_per_m(self, u: Real, inner: Inner) -> float:
-        """Energy stored, per depth [J/m]."""
-        f, (_, _, weights) = self.deformation(u, inner), self._geometry
-        j = f[..., 0] * f[..., 3] - f[..., 1] * f[..., 2]
-        p = inner.pressure @ _PRESSURES.T
-        shape = self.law.mu_pa[:, None] * (0.5 * ((f**2).sum(-1) - 2) - np.log(j))
-        return float((weights * (shape + p * (j - 1) - 0.5 * p**2 * self.law.yielding_per_pa[:, None])).sum())
+    def energy_j(self, u: Real, inner: Inner) -> float:
+        """Energy stored [J], per depth in two dimensions [J/m]."""
+        h, reference = self._stretch(u, inner, slice(None)), self.mesh.reference
+        j, p = determinant(h) / self._volumes[:, None], inner.pressure @ reference.pressures.T
+        squares = ((h @ self._metric[:, None]) * h).sum((-1, -2))
+        shape = self.law.mu_pa[:, None] * (0.5 * (squares - h.shape[-1]) - np.log(j))
+        return float((self._weights * (shape + p * (j - 1) - 0.5 * p**2 * self.law.compliance_per_pa[:, None])).sum())
 
     def tangent(self, u: Real, inner: Inner) -> Tangent:
-        """Residual and its derivative at a state whose J is above 0."""
-        return condensed(*self.full(u, inner), _OUTER, 3, self.law.mu_pa)
+        """Condensed residual and its derivative at a state whose J is above 0; the last one is kept."""
+        if not (self._last and self._last[0][0] is u and self._last[0][1] is inner):
+            parts = list(self._condensed(u, inner))
+            found = Tangent(*(np.concatenate([getattr(p, key.name) for p in parts]) for key in fields(Tangent)))
+            self._last[:] = [(u, inner, found)]
+        return self._last[0][2]
 
-    def full(self, u: Real, inner: Inner) -> tuple[Real, Real]:
-        """Residual (m, 17) and its derivative before the inner unknowns are condensed."""
-        f, (_, _, w) = self.deformation(u, inner), self._geometry
-        m = len(w)
-        cofactor = f[..., ::-1] * _ALTERNATING
-        j = f[..., 0] * f[..., 3] - f[..., 1] * f[..., 2]
-        mu, p = self.law.mu_pa[:, None], inner.pressure @ _PRESSURES.T
-        along = self._rates(cofactor)
-        stress = (w * mu)[..., None] * f + (w * (p - mu / j))[..., None] * cofactor
-        stiffness = np.matmul(along * (w * mu / j**2)[:, None], along.transpose(0, 2, 1)).reshape(m, 7, 2, 7, 2)
-        stiffness[:, :, 0, :, 0] += self._soft
-        stiffness[:, :, 1, :, 1] += self._soft
-        turned = np.matmul((w * (p - mu / j))[:, None], self._turning).reshape(m, 7, 7)
-        stiffness[:, :, 0, :, 1] += turned
-        stiffness[:, :, 1, :, 0] -= turned
-        coupling = np.matmul(along * w[:, None], _PRESSURES)
-        mass = (w @ _PRODUCTS).reshape(m, 3, 3)
-        yielding = self.law.yielding_per_pa[:, None]
-        matrix = np.zeros((m, 17, 17))
-        matrix[:, :14, :14] = stiffness.reshape(m, 14, 14)
-        matrix[:, :14, 14:], matrix[:, 14:, :14] = coupling, coupling.transpose(0, 2, 1)
-        matrix[:, 14:, 14:] = -mass * np.maximum(yielding, 1 / (_STIFF * mu))[..., None]
-        residual = np.empty((m, 17))
-        residual[:, :14] = self._rates(stress).sum(axis=2)
-        residual[:, 14:] = (w * (j - 1)) @ _PRESSURES - yielding * np.einsum("mik,mk->mi", mass, inner.pressure)
+    def _condensed(self, u: Real, inner: Inner) -> Iterator[Tangent]:
+        """Eliminate inner node and pressure, some elements at a time."""
+        outer, pressures = self.freedoms.shape[1], inner.pressure.shape[1]
+        step = max(_CHUNK // (outer + inner.bubble.shape[1] + pressures) ** 2, 1)
+        for k in range(0, len(self.freedoms), step):
+            here = slice(k, k + step)
+            residual, matrix = self.full(u, inner, here)
+            inside = np.concatenate([matrix[:, outer:, :outer], residual[:, outer:, None]], axis=2)
+            solved = np.linalg.solve(matrix[:, outer:, outer:], inside)
+            taken = np.matmul(matrix[:, :outer, outer:], solved)
+            yield Tangent(
+                matrix[:, :outer, :outer] - taken[..., :-1],
+                residual[:, :outer] - taken[..., -1],
+                -solved[..., -1],
+                solved[..., :-1],
+                -solved[:, -pressures:, -1],
+                self.law.mu_pa[here],
+            )
+
+    def full(self, u: Real, inner: Inner, which: slice = slice(None)) -> tuple[Real, Real]:
+        """Residual (m, k) and its derivative (m, k, k) before condensation: displacements, inner node, pressures."""
+        h, w, volume = self._stretch(u, inner, which), self._weights[which], self._volumes[which, None]
+        table, metric = self.mesh.reference, self._metric[which, None]
+        m, d, n = len(w), h.shape[-1], table.gradients.shape[1]
+        g = table.gradients.transpose(0, 2, 1)  # (q, d, n)
+        flat, size = g.reshape(-1, n), d * n
+        mu, p = self.law.mu_pa[which, None], inner.pressure[which] @ table.pressures.T
+        j, rate = determinant(h) / volume, cofactor(h) / volume[..., None, None]  # J and its derivative to h
+        hydro = p - mu / j
+        stress = (w * mu)[..., None, None] * (h @ metric) + (w * hydro)[..., None, None] * rate
+        residual, matrix = np.empty((m, size + d + 1)), np.zeros((m, size + d + 1, size + d + 1))
+        forces = np.matmul(stress.transpose(0, 2, 1, 3).reshape(m, d, -1), flat)
+        residual[:, :size] = forces.transpose(0, 2, 1).reshape(m, size)
+        for i in range(d):
+            for k in range(i, d):
+                block = (w * mu / j**2)[..., None, None] * rate[:, :, i, :, None] * rate[:, :, k, None, :]
+                if i == k:
+                    block += (w * mu)[..., None, None] * metric
+                else:
+                    block += (w * hydro / volume)[..., None, None] * mixed_minors(h, i, k)
+                found = np.matmul(flat.T, np.matmul(block, g).reshape(m, -1, n))
+                matrix[:, i:size:d, k:size:d] = found
+                matrix[:, k:size:d, i:size:d] = found.transpose(0, 2, 1)
+        along = np.matmul(table.gradients, rate.transpose(0, 1, 3, 2)).reshape(m, -1, size)  # dJ to the displacements
+        coupling = np.matmul((along * w[..., None]).transpose(0, 2, 1), table.pressures)
+        matrix[:, :size, size:], matrix[:, size:, :size] = coupling, coupling.transpose(0, 2, 1)
+        mass = np.einsum("mq,qi,qk->mik", w, table.pressures, table.pressures)
+        compliance = self.law.compliance_per_pa[which, None]
+        matrix[:, size:, size:] = -mass * np.maximum(compliance, 1 / (_STIFF * mu))[..., None]
+        residual[:, size:] = (w * (j - 1)) @ table.pressures - compliance * np.einsum(
+            "mik,mk->mi", mass, inner.pressure[which]
+        )
         return residual, matrix
+
+
+def cofactor(h: Real) -> Real:
+    """Derivative of the determinant of matrices (..., d, d): det h h^-T."""
+    if h.shape[-1] == 2:
+        return np.asarray(h[..., ::-1, ::-1] * [[1.0, -1.0], [-1.0, 1.0]])
+    found = np.empty_like(h)
+    for i in range(3):
+        found[..., i, :] = np.cross(h[..., (i + 1) % 3, :], h[..., (i + 2) % 3, :])
+    return found
+
+
+def determinant(h: Real) -> Real:
+    """Of matrices (..., d, d)."""
+    if h.shape[-1] == 2:
+        return np.asarray(h[..., 0, 0] * h[..., 1, 1] - h[..., 0, 1] * h[..., 1, 0])
+    return np.asarray((h[..., 0, :] * np.cross(h[..., 1, :], h[..., 2, :])).sum(-1))
+
+
+def mixed_minors(h: Real, i: int, k: int) -> Real:
+    """Second derivative of the determinant with respect to rows i < k: (..., d, d), or (d, d) in two dimensions."""
+    if h.shape[-1] == 2:
+        return np.array([[0.0, 1.0], [-1.0, 0.0]])
+    found = np.zeros_like(h)
+    rest, sign = h[..., 3 - i - k, :], 1.0 if k == i + 1 else -1.0
+    for a in range(3):
+        found[..., a, (a + 1) % 3] = sign * rest[..., (a + 2) % 3]
+        found[..., (a + 1) % 3, a] = -sign * rest[..., (a + 2) % 3]
+    return found

@@ -5,21 +5,22 @@ Any potential that is right on the electrodes bounds it from above (Dirichlet); 
 with 1/eps, its values given on the sides of the cell in place of the electrodes.
 """
 
-from collections.abc import Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.solvers.contact import rings
-from sensorgen.solvers.contact.cell import AIR, OUTSIDE, Cell, Edge
+from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Edge
+from sensorgen.solvers.contact.element import triangle_gradients
+from sensorgen.solvers.contact.factors import solved_by_lu
 from sensorgen.solvers.contact.mesh import Mesh, Net, Unmeshed, Whole, nearest, of_triangles, triangulated
 from sensorgen.solvers.contact.wedge import Wedge, filled, wedges
 
@@ -28,13 +29,6 @@ Mask = NDArray[np.bool_]
 Edges = Mapping[Edge, tuple[int, int]]
 
 _ROUNDING = 1e-9
-_SYMMETRIC: dict[str, Any] = {
-    "permc_spec": "MMD_AT_PLUS_A",
-    "diag_pivot_thresh": 0.0,
-    "options": {"SymmetricMode": True},
-    "relax": 1,  # columns one by one: so sparse a factor has no panels worth their room
-    "panel_size": 1,
-}
 _RINGS = 6
 _HOLE = 1e-6  # area that a mesh may miss, as a share
 _MIDS = np.array([[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])  # middles of the sides: exact to degree 2
@@ -59,50 +53,46 @@ def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float,
     Unmeshed
         The mesher gave up, left a hole, or the bounds are in the wrong order, which no sound mesh can do.
     """
-    air = next((k + 1 for k, r in enumerate(cell.regions) if r.material == AIR), OUTSIDE)
-    mesh = _meshed(cell, air, coarse_mm, growth)
+    mesh = _meshed(cell, coarse_mm, growth)
     terminal = np.array([r.terminal for r in cell.regions])[mesh.region - 1]
-    ends = [_nodes(mesh, terminal == end) for end in ("bottom", "top")]
+    ends = [np.isin(np.arange(len(mesh.points_m)), mesh.outer[terminal == end]) for end in ("bottom", "top")]
     if (ends[0] & ends[1]).any():
         raise OutOfRange("the electrodes touch: the capacitance grows without bound")
-    triangles, region = _between(mesh.triangles[terminal == ""], mesh.region[terminal == ""], ends)
-    eps = np.array([permittivity.get(r.material, np.nan) for r in cell.regions])[region - 1]
+    inside = _between(mesh.outer, terminal == "", ends)
+    eps = np.array([permittivity.get(r.material, np.nan) for r in cell.regions])[mesh.region[inside] - 1]
     x = mesh.points_m[:, 0]
-    sides = [abs(x - end) < 1e-9 * (x.max() - x.min()) for end in (x.min(), x.max())]
-    width = float(x.max() - x.min())
-    upper = _energy(mesh.points_m, triangles, eps, *ends) / width
-    lower = 1 / (_energy(mesh.points_m, triangles, 1 / eps, *sides) * width)
+    width = float(np.ptp(x))
+    sides = [abs(x - end) < _ROUNDING * width for end in (x.min(), x.max())]
+    gradients = np.einsum("qnk,mki->mqni", triangle_gradients(_MIDS)[:, :6], np.linalg.inv(mesh.jacobians_m[inside]))
+    flat = gradients.transpose(0, 2, 1, 3).reshape(len(gradients), 6, 6)
+    stiffness = np.matmul(flat, flat.transpose(0, 2, 1)) * (np.linalg.det(mesh.jacobians_m[inside]) / 6)[:, None, None]
+    upper = _energy(mesh.outer[inside], stiffness * eps[:, None, None], *ends) / width
+    lower = 1 / (_energy(mesh.outer[inside], stiffness / eps[:, None, None], *sides) * width)
     if not lower <= upper * (1 + _ROUNDING):
         raise Unmeshed(f"bounds in the wrong order, {lower} above {upper}")
     return Interval(lower, upper).times(EPS0_F_PER_M)
 
 
-def _meshed(cell: Cell, air: int, coarse_mm: float, growth: float) -> Mesh:
-    """Mesh everything but the thin ends of the air, which are filled with triangles of their own; rings at corners."""
-    edges = cell.edges
-    cut, thin = dict(edges), wedges(edges, air) if air != OUTSIDE else []
+def _meshed(cell: Cell, coarse_mm: float, growth: float) -> Mesh:
+    """Mesh everything but thin wedges of air, which are filled with triangles of their own; rings at corners."""
+    edges, room = cell.edges, _ROUNDING * cell.width_mm()
+    cut, thin = dict(edges), wedges(edges, cell.air) if cell.air != OUTSIDE else []
     for number, wedge in enumerate(thin, 1):
         for p, q in (*pairwise(wedge.first), *pairwise(wedge.second[::-1])):
             key, place = ((p, q), 0) if (p, q) in cut else ((q, p), 1)
             cut[key] = (-number, cut[key][1]) if place == 0 else (cut[key][0], -number)
         if wedge.first[-1] != wedge.second[-1]:
-            cut[wedge.first[-1], wedge.second[-1]] = (-number, air)
-    _refuse_outside(cell)
+            cut[wedge.first[-1], wedge.second[-1]] = (-number, cell.air)
+    if any(not cell.left_mm - room <= x <= cell.right_mm + room for edge in edges for x, _ in edge):
+        raise Unmeshed("the deformed outlines run through the mirrors")
     _refuse_crossings(np.array(list(edges)).reshape(-1, 2, 2))
     net = triangulated(cut, coarse_mm, growth, quick=True)
     new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
     corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])
     _refuse_holes(edges, net.points_m[corners])
-    region = np.concatenate([net.region, np.full(len(new), air)])
+    region = np.concatenate([net.region, np.full(len(new), cell.air)])
     tips = [nearest(net.points_m, place) for place in rings.corners(edges, cell.left_mm, cell.right_mm)]
     return of_triangles(*rings.ringed(net.points_m, corners, region, tips, _RINGS))
-
-
-def _refuse_outside(cell: Cell) -> None:
-    """Faces that fold through a wall of the cell, which is a mirror, run into their own image."""
-    places, room = [x for edge in cell.edges for x, _ in edge], _ROUNDING * cell.width_mm()
-    if min(places) < cell.left_mm - room or max(places) > cell.right_mm + room:
-        raise Unmeshed("the deformed outlines run through the mirrors")
 
 
 def _refuse_crossings(edges: Real) -> None:
@@ -133,64 +123,35 @@ def _refuse_holes(edges: Edges, corners: Real) -> None:
         raise Unmeshed("the mesh has holes or folds")
 
 
-def _filling(net: Net, number: int, wedge: Wedge) -> Iterator[tuple[int, int, int]]:
+def _filling(net: Net, number: int, wedge: Wedge) -> list[tuple[int, int, int]]:
     """Triangles for a wedge, whose sides the mesher may have cut."""
-    places = net.points_m.tolist()
-    beside: dict[int, list[int]] = {}
+    points, beside = net.points_m, defaultdict(list)
     for a, b in net.marked[-number]:
-        beside.setdefault(a, []).append(b)
-        beside.setdefault(b, []).append(a)
-    tip, ahead = (nearest(net.points_m, p) for p in wedge.first[:2])
-    ring = [tip, min(beside[tip], key=lambda k: _turn(net.points_m, tip, k, ahead))]
+        beside[a].append(b)
+        beside[b].append(a)
+    tip, ahead = (nearest(points, p) for p in wedge.first[:2])
+    ways = points[beside[tip]] - points[tip]
+    ring = [tip, beside[tip][int((ways @ (points[ahead] - points[tip]) / np.hypot(*ways.T)).argmax())]]
     while ring[-1] != tip:
         ring.append(next(k for k in beside[ring[-1]] if k != ring[-2]))
-    yield from filled(ring[:-1], places)
+    return filled(ring[:-1], points.tolist())
 
 
-def _turn(points: Real, tip: int, a: int, b: int) -> float:
-    """How far two ways from a tip are from one way, as 1 - cos."""
-    u, v = points[a] - points[tip], points[b] - points[tip]
-    return float(1 - u @ v / np.sqrt((u @ u) * (v @ v)))
-
-
-def _nodes(mesh: Mesh, which: Mask) -> Mask:
-    found = np.zeros(len(mesh.points_m), bool)
-    found[mesh.triangles[which]] = True
-    return found
-
-
-def _between(triangles: Whole, region: Whole, ends: list[Mask]) -> tuple[Whole, Whole]:
-    """Triangles, with their region, of the pieces that touch both electrodes; others carry no field."""
-    n, middles = len(ends[0]), triangles[:, 3:]
-    beside = coo_matrix((np.ones(middles.size), (middles.ravel(), middles[:, [1, 2, 0]].ravel())), (n, n))
+def _between(triangles: Whole, dielectric: Mask, ends: list[Mask]) -> Whole:
+    """Numbers of the dielectric triangles in pieces that touch both electrodes; others carry no field."""
+    middles = triangles[dielectric, 3:]
+    beside = coo_matrix((np.ones(middles.size), (middles.ravel(), middles[:, [1, 2, 0]].ravel())), (len(ends[0]),) * 2)
     _, piece = connected_components(beside)
     touched = [np.unique(piece[middles[end[middles].any(axis=1), 0]]) for end in ends]
-    inside = np.isin(piece[middles[:, 0]], np.intersect1d(touched[0], touched[1]))
-    return triangles[inside], region[inside]
+    return np.flatnonzero(dielectric)[np.isin(piece[middles[:, 0]], np.intersect1d(*touched))]
 
 
-def _energy(points: Real, triangles: Whole, weight: Real, zero: Mask, one: Mask) -> float:
-    """Least of the integral of weight |grad v|^2 over functions that are 0 and 1 at given nodes [-]."""
-    n = len(points)
-    local = _stiffness(points, triangles) * weight[:, None, None]
+def _energy(triangles: Whole, local: Real, zero: Mask, one: Mask) -> float:
+    """Least of the sum of quadratic forms (m, 6, 6) of functions that are 0 and 1 at given nodes [-]."""
+    n = len(zero)
     rows, columns = np.repeat(triangles, 6, axis=1).ravel(), np.tile(triangles, (1, 6)).ravel()
     matrix = coo_matrix((local.ravel(), (rows, columns)), (n, n)).tocsr()
-    used = np.zeros(n, bool)
-    used[triangles] = True
     v = one.astype(float)
-    free = used & ~zero & ~one
-    inner = matrix[free][:, free].tocsc()
-    solver = splu(inner, **_SYMMETRIC)
-    v[free] = solver.solve(-(matrix @ v)[free])
+    free = np.isin(np.arange(n), triangles) & ~zero & ~one
+    v[free] = solved_by_lu(matrix[free][:, free], -(matrix @ v)[free])
     return float(v @ (matrix @ v))
-
-
-def _stiffness(points: Real, triangles: Whole) -> Real:
-    """Integrals of grad . grad of the six functions of each triangle (m, 6, 6)."""
-    from sensorgen.solvers.contact.element import gradients
-
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    jacobian = np.stack([b - a, c - a], axis=2)
-    g = np.einsum("qnk,mki->mqni", gradients(*_MIDS.T)[:, :6], np.linalg.inv(jacobian))
-    g = g.transpose(0, 2, 1, 3).reshape(len(triangles), 6, 6)
-    return np.asarray(np.matmul(g, g.transpose(0, 2, 1)) * (np.linalg.det(jacobian) / 6)[:, None, None])

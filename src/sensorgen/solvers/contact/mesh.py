@@ -12,6 +12,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Point
 from sensorgen.solvers.contact import rings
 from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Edge
+from sensorgen.solvers.contact.element import TRIANGLE, ElementMesh
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -28,25 +29,26 @@ class Unmeshed(BadInput):
 
 
 @dataclass(frozen=True)
-class Mesh:
-    """A mesh of straight-sided triangles with six nodes.
+class Mesh(ElementMesh):
+    """A mesh of straight-sided triangles: corners counter-clockwise, then the middles of the sides 01, 12, 20.
 
     Attributes
     ----------
-    points_m : (n, 2) array
-        Places of the nodes [m].
-    triangles : (m, 6) array
-        Corners counter-clockwise, then the middles of the sides 01, 12, 20.
-    region : (m,) array
-        Region of each triangle, from 1 on.
     rim : (k, 3) array
         Sides with nothing behind them: the solid lies to the left from the first to the second corner; then the middle.
     """
 
-    points_m: Real
-    triangles: Whole
-    region: Whole
     rim: Whole
+
+    @property
+    def outline(self) -> Whole:
+        """Straight pieces of the rim, anticlockwise (2k, 2)."""
+        return np.concatenate([self.rim[:, [0, 2]], self.rim[:, [2, 1]]])
+
+    def top(self) -> tuple[Whole, Real]:
+        """Sides on the top, start, middle and end (k, 3), and their lengths [m]."""
+        on_top = (self.points_m[self.rim, 1] == self.points_m[:, 1].max()).all(axis=1)
+        return self.rim[on_top][:, [0, 2, 1]], self.lengths_m()[on_top]
 
     def lengths_m(self) -> Real:
         """Length of each side of the rim [m]."""
@@ -73,7 +75,7 @@ def of_triangles(points_m: Real, corners: Whole, region: Whole) -> Mesh:
     numbers = len(points_m) + back
     rim = np.column_stack([sides, numbers])[count[back] == 1]
     triangles = np.concatenate([corners, numbers.reshape(3, -1).T], axis=1)
-    return Mesh(np.concatenate([points_m, middles]), triangles, region, rim)
+    return Mesh(TRIANGLE, np.concatenate([points_m, middles]), triangles, region, rim)
 
 
 def at_border(mesh: Mesh) -> NDArray[np.bool_]:

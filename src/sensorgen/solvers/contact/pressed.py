@@ -1,6 +1,6 @@
-"""What a pressed cell answers, in two or three dimensions, and the checks that say whether to trust it."""
+"""Result of a cell under pressure, in two or three dimensions, and the checks of its validity."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -10,22 +10,21 @@ from numpy.typing import NDArray
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.models import compression
 from sensorgen.solvers.contact.cell import Cell
 from sensorgen.solvers.contact.support import CHOICES, Held
 
 if TYPE_CHECKING:
+    from sensorgen.solvers.contact.element import Law
     from sensorgen.solvers.contact.load import Problem, State
 
 _PENALTY = 60.0  # over the least Young's modulus of a solid [-]
-_LEAST_VOLUME = 0.2  # J below which an element says nothing any more [-]
+_LEAST_VOLUME = 0.2  # J below which an element's answer is not to be trusted [-]
 DEEPEST = 0.3  # penetration over the side it happens on [-]
 _BALANCE = 0.01  # by which work and energy may differ [-]
 _LEVELS = 0.01  # by which two meshes may differ [-]
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)  # of the work between two loads
-
 Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -46,12 +45,12 @@ class Elastic:
 
 @dataclass(frozen=True)
 class Pressed:
-    """A cell under rising pressure, as far as it converged.
+    """A cell under increasing pressure, as far as it converged.
 
     Attributes
     ----------
     stress_pa, displacement_m : (n,) array
-        Pressure on the top, and how far the top has come down on average [Pa], [m].
+        Pressure on the top, and the mean displacement of the top downwards [Pa], [m].
     capacitance_f_per_m2 : tuple of (Interval or None)
         Bounds for the deformed outlines; None where they could not be meshed [F/m2].
     outlines : tuple of Cell
@@ -59,13 +58,13 @@ class Pressed:
     volume_ratio, penetration, imbalance : (n,) array
         Least J, largest penetration over the side that it happens on, and work over energy less 1 [-].
     fall_m : float
-        How far the top came down before anything carried it: feet that do not touch as drawn [m].
+        Displacement of the top before anything carries it: parts that are not supported as drawn [m].
     faults : tuple of str
         Why the answer is not to be trusted; empty when every check holds.
     doubts : tuple of str
-        What else to know of it.
+        Other remarks.
     source : str
-        How it was solved.
+        Method.
     """
 
     stress_pa: Real
@@ -86,6 +85,32 @@ class Pressed:
         return float(self.stress_pa[-1])
 
 
+@dataclass(frozen=True)
+class Run:
+    """A problem and its equilibria, load by load."""
+
+    problem: "Problem"
+    states: "list[State]"
+
+
+def check(stress_pa: Sequence[float], held: Held) -> None:
+    """Refuse stresses that do not rise from 0, and unknown choices."""
+    if len(stress_pa) < 2 or stress_pa[0] != 0 or any(b <= a for a, b in pairwise(stress_pa)):
+        raise OutOfRange("stresses must begin with 0 and rise, as in 0:100:10")
+    for key, choices in CHOICES.items():
+        if getattr(held, key) not in choices:
+            raise BadInput(f"{key} {getattr(held, key)!r}: expected {' or '.join(choices)}")
+
+
+def law_of(materials: Sequence[str], region: Whole, solids: Mapping[str, Elastic]) -> "tuple[Law, float]":
+    """Material law of elements by their region's number, and the least Young's modulus [Pa]."""
+    from sensorgen.solvers.contact.element import law
+
+    known = [solids[materials[k]] for k in region.tolist()]
+    moduli, ratios = np.array([[s.youngs_modulus_pa, s.poisson_ratio] for s in known]).T
+    return law(moduli, ratios), float(moduli.min())
+
+
 def penalty_pa(softest_pa: float) -> float:
     """Contact pressure per penetration, times the length of a side [Pa]; ``softest_pa`` is the least modulus."""
     return _PENALTY * softest_pa
@@ -93,43 +118,66 @@ def penalty_pa(softest_pa: float) -> float:
 
 def reached(
     problem: "Problem", stress_pa: Sequence[float], longest_pa: float, step: Callable[[float], None], source: str
-) -> tuple[Pressed, "list[State]"]:
-    """Press, as far as it converges in steps of at most ``longest_pa``; ``step`` is told what is reached [Pa]."""
+) -> tuple[Pressed, Run]:
+    """Press in load steps of at most ``longest_pa``, as far as it converges, and check the result.
+
+    ``step`` is called with each pressure that is reached [Pa].
+    """
     from sensorgen.solvers.contact import load
 
     states = []
     for state in load.curve(problem, stress_pa, longest_pa):
         states.append(state)
         step(state.pressure_pa)
-    width = np.abs(problem.load).sum()
-    down = np.array([problem.load @ s.u_m / width for s in states])
-    volume = np.array([problem.elements.volume_ratio(s.u_m, s.inner).min() for s in states])
-    depth = np.array([_depth(problem.gaps(s.pairs, s.u_m) / s.pairs.length_m) for s in states])
-    energy = np.array([problem.elements.energy_j_per_m(s.u_m, s.inner) + problem.contact_energy(s) for s in states])
+    area, fall = np.abs(problem.load).sum(), problem.fall_m(states[0])
     stress = np.array([s.pressure_pa for s in states])
-    fall = problem.fall_m(states[0])
-    imbalance = _imbalance(stress, (down - fall) * width, energy)
-    faults = tuple(_faults(stress, stress_pa, volume, depth, imbalance))
+    down = np.array([problem.load @ s.u_m / area for s in states])
+    volume = np.array([problem.elements.volume_ratio(s.u_m, s.inner).min() for s in states])
+    depth = np.array([-(problem.gaps(s.pairs, s.u_m) / s.pairs.length_m).min(initial=0.0) for s in states])
+    energy = np.array([problem.elements.energy_j(s.u_m, s.inner) + problem.contact_energy(s) for s in states])
+    imbalance = _imbalance(stress, (down - fall) * area, energy)
+    faults = {
+        f"converged up to {stress[-1] / 1e3:.4g} of {stress_pa[-1] / 1e3:.4g} kPa": stress[-1]
+        < stress_pa[-1] * (1 - 1e-9),
+        f"a triangle is squeezed to {volume.min():.2g} of its volume": volume.min() < _LEAST_VOLUME,
+        f"faces run into each other by {depth.max():.2g} of a side": depth.max() > DEEPEST,
+        f"work and energy differ by {imbalance[-1]:.1%}": abs(imbalance[-1]) > _BALANCE,
+    }
     said = (f"feet hang free as drawn: the top falls {fall * 1e6:.4g} um before they carry",) if fall > 0 else ()
-    return Pressed(stress, down, (), (), volume, depth, imbalance, fall, faults, said, source), states
+    wrong = tuple(words for words, holds in faults.items() if holds)
+    return Pressed(stress, down, (), (), volume, depth, imbalance, fall, wrong, said, source), Run(problem, states)
+
+
+def _imbalance(stress: Real, moved: Real, energy: Real) -> Real:
+    """Work of the load less the energy stored, from the first load on, over the energy stored [-].
+
+    Between the loads log displacement is a spline of log stress; before the first, parts may still be landing.
+    """
+    from scipy.interpolate import CubicSpline
+
+    found = np.zeros(len(stress))
+    if len(stress) < 3:
+        return found
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    logs = np.log(stress[1:])
+    law, half = CubicSpline(logs, np.log(moved[1:])), np.diff(logs) / 2
+    at = logs[:-1] + half * (1 + nodes[:, None])
+    work = np.cumsum(half * (weights @ (np.exp(at + law(at)) * law(at, 1))))
+    found[2:] = (work - (energy[2:] - energy[1])) / energy[2:]
+    return found
 
 
 def with_capacitances(found: Pressed, bounds: Sequence[Interval | None], outlines: tuple[Cell, ...] = ()) -> Pressed:
-    """The same with the capacitance of the deformed outlines, and what is wrong with it."""
-    unknown, known = sum(c is None for c in bounds), [c.middle() for c in bounds if c]
-    said = {
-        f"no capacitance at {unknown} of {len(bounds)} stresses: the deformed outlines could not be meshed": unknown
-        > 0,
-        "the capacitance falls under pressure: some outlines were closed in the wrong place": any(
-            after < before * (1 - _LEVELS) for before, after in pairwise(known)
-        ),
-    }
-    faults = (*found.faults, *(words for words, holds in said.items() if holds))
-    return replace(found, capacitance_f_per_m2=tuple(bounds), outlines=outlines, faults=faults)
-
-
-def _depth(gaps: Real) -> float:
-    return float(-gaps.min(initial=0.0))
+    """The same with the capacitance of the deformed outlines, and its faults."""
+    faults, known = list(found.faults), [c.middle() for c in bounds if c]
+    if len(known) < len(bounds):
+        unknown = len(bounds) - len(known)
+        faults.append(
+            f"no capacitance at {unknown} of {len(bounds)} stresses: the deformed outlines could not be meshed"
+        )
+    if any(after < before * (1 - _LEVELS) for before, after in pairwise(known)):
+        faults.append("the capacitance falls under pressure: some outlines were closed in the wrong place")
+    return replace(found, capacitance_f_per_m2=tuple(bounds), outlines=outlines, faults=tuple(faults))
 
 
 def compared(found: Pressed, finer: Pressed) -> Pressed:
@@ -139,55 +187,3 @@ def compared(found: Pressed, finer: Pressed) -> Pressed:
     if apart <= _LEVELS:
         return finer
     return replace(finer, faults=(*finer.faults, f"two meshes differ by {apart:.1%} in displacement"))
-
-
-def curve_of(pressed: Pressed, name: str = "solved") -> compression.Curve:
-    """The law of compression that a solved cell gives, for the sensor.
-
-    Raises
-    ------
-    OutOfRange
-        The solution has faults, or the capacitance is not known at two pressures at least.
-    """
-    if pressed.faults:
-        raise OutOfRange(f"the solved cell is not to be trusted: {'; '.join(pressed.faults)}")
-    known = [(p, c.middle()) for p, c in zip(pressed.stress_pa, pressed.capacitance_f_per_m2, strict=True) if c]
-    ratio = [c / known[0][1] for _, c in known] if known else []
-    return compression.curve(name, pressed.source, [float(p) for p, _ in known], ratio)
-
-
-def check(stress_pa: Sequence[float], held: Held) -> None:
-    """Refuse stresses that do not rise from 0, and choices that are not known."""
-    if len(stress_pa) < 2 or stress_pa[0] != 0 or any(b <= a for a, b in pairwise(stress_pa)):
-        raise OutOfRange("stresses must begin with 0 and rise, as in 0:100:10")
-    for key, choices in CHOICES.items():
-        if getattr(held, key) not in choices:
-            raise BadInput(f"{key} {getattr(held, key)!r}: expected {' or '.join(choices)}")
-
-
-def _imbalance(stress: Real, moved: Real, energy: Real) -> Real:
-    """Work of the load less the energy stored, from the first load on, over the energy stored [-].
-
-    Between the loads log displacement is a spline of log stress; before the first, feet may still be landing.
-    """
-    from scipy.interpolate import CubicSpline
-
-    found = np.zeros(len(stress))
-    if len(stress) < 3:
-        return found
-    logs = np.log(stress[1:])
-    law, half = CubicSpline(logs, np.log(moved[1:])), np.diff(logs) / 2
-    at = logs[:-1] + half * (1 + _NODES[:, None])
-    work = np.cumsum(half * (_WEIGHTS @ (np.exp(at + law(at)) * law(at, 1))))
-    found[2:] = (work - (energy[2:] - energy[1])) / energy[2:]
-    return found
-
-
-def _faults(stress: Real, asked: Sequence[float], volume: Real, depth: Real, imbalance: Real) -> list[str]:
-    said = {
-        f"converged up to {stress[-1] / 1e3:.4g} of {asked[-1] / 1e3:.4g} kPa": stress[-1] < asked[-1] * (1 - 1e-9),
-        f"a triangle is squeezed to {volume.min():.2g} of its volume": volume.min() < _LEAST_VOLUME,
-        f"faces run into each other by {depth.max():.2g} of a side": depth.max() > DEEPEST,
-        f"work and energy differ by {imbalance[-1]:.1%}": abs(imbalance[-1]) > _BALANCE,
-    }
-    return [words for words, holds in said.items() if holds]

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.solvers.contact.mesh import Mesh
-
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
 
 _SAME = 1e-9  # of the cell's width: places nearer than this are one
 
@@ -92,11 +91,14 @@ def free_of(
     return csr_matrix((np.ones(len(column)), (np.flatnonzero(number >= 0), column)), (d * nodes, len(kept)))
 
 
-def top_load(mesh: Mesh) -> Real:
-    """Forces of a unit pressure on the top, downwards, in its first direction and area [m]."""
-    top = mesh.points_m[:, 1].max()
-    on_top = (mesh.points_m[mesh.rim, 1] == top).all(axis=1)
-    force = np.zeros(2 * len(mesh.points_m))
-    for node, share in zip(mesh.rim[on_top].T, (1 / 6, 1 / 6, 2 / 3), strict=True):
-        np.add.at(force, 2 * node + 1, -share * mesh.lengths_m()[on_top])
+def top_load(points_m: Real, faces: Whole, measure: Real) -> Real:
+    """Forces of a unit pressure on the top, downwards, in its first direction and area (d n,) [m^(d - 1)].
+
+    ``faces`` (k, 3^(d - 1)) are the nodes of each face of the top, from line to line, ``measure`` (k,) its area.
+    """
+    d = points_m.shape[1]
+    shares, force = np.array([1.0]), np.zeros(points_m.size)
+    for _ in range(d - 1):
+        shares = np.outer(shares, [1 / 6, 2 / 3, 1 / 6]).ravel()
+    np.add.at(force, d * faces + d - 1, -shares * measure[:, None])
     return force

@@ -13,7 +13,7 @@ import numpy as np
 
 from sensorgen.scene.scene import Point
 from sensorgen.solvers.contact.cell import Edge
-from sensorgen.solvers.electrostatics.flips import flipped
+from sensorgen.solvers.electrostatics.triangles import flipped
 
 _SHARP = 0.7  # a point of air with a smaller angle is a wedge [rad]
 _THICK = 0.4  # a wedge ends where it is thicker than this share of the next pieces of its sides [-]

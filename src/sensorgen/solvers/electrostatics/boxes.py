@@ -11,11 +11,17 @@ In a box of edges h the energy is a sum over the three directions, each a produc
 In the eigenvectors of g the unknowns inside a box do not couple, so that they are eliminated by a division.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from sensorgen.core.bounds import Interval
+from sensorgen.solvers.electrostatics.bricks import Grid
+from sensorgen.solvers.electrostatics.dissection import Elements, least, unknowns_of
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -192,3 +198,114 @@ def _worked_out(order: int) -> tuple[Array, Array, Array, Array]:
 
 def _three(found: NDArray[np.float64]) -> tuple[Array, Array, Array]:
     return found[0], found[1], found[2]
+
+
+Matrix = NDArray[Any]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """All boxes between the electrodes as elements of one kind.
+
+    Attributes
+    ----------
+    elements : Elements
+        Their energies over eps0 [mm].
+    eps : (n,) array
+        Relative permittivity, complex where it loses [-].
+    shares : (n,) array
+        How often each occurs in the sensor [-].
+    shape : callable
+        From a box's number to its matrix for a permittivity of 1.
+    """
+
+    elements: Elements
+    eps: Matrix
+    shares: Real
+    shape: Callable[[int], Real]
+
+    def unknowns(self) -> int:
+        """How many the boxes share."""
+        return len(np.unique(self.elements.keys[np.isnan(self.elements.held)]))
+
+    def solved(self) -> Matrix:
+        """The unknowns of each box (n, b) that have the least energy."""
+        return unknowns_of(self.elements, least(self.elements, keep=True).values())
+
+    def pushed(self, load: Matrix) -> "Boxes":
+        """The same with both electrodes at 0 V and forces (n, b) on the unknowns."""
+        held = np.where(np.isnan(self.elements.held), np.nan, 0.0)
+        return replace(self, elements=replace(self.elements, held=held, load=load))
+
+    def answers(self, unknowns: Matrix) -> Matrix:
+        """What the unknowns (n, b) are met with (n, b): from a flux's, its moments on the six faces."""
+        return np.array([e * (self.shape(box) @ x) for box, (e, x) in enumerate(zip(self.eps, unknowns, strict=True))])
+
+
+def boxes_of(fine: Grid, values: Sequence[complex], kind: Element) -> Boxes:
+    """The boxes of a grid whose materials have some relative permittivities."""
+    boxes = np.argwhere(fine.fill > 1)
+    count = np.array(fine.fill.shape)
+    keys = kind.keys(boxes, count)
+    held = np.full(keys.shape, np.nan)
+    for code, value in ((0, 0.0), (1, 1.0)):
+        held[np.isin(keys, kind.keys(np.argwhere(fine.fill == code), count))] = value
+    eps = np.array(values)[fine.fill[tuple(boxes.T)]]
+    edges = np.column_stack([np.diff(p)[boxes[:, axis]] for axis, p in enumerate(fine.planes_mm)])
+    scales = edges.prod(1)[:, None] / (2 * edges**2)
+
+    def shape(box: int) -> Real:
+        return kind.condensed(scales[box])
+
+    elements = Elements(boxes, keys, held, kind.one, lambda box: eps[box] * shape(box))
+    return Boxes(elements, eps, fine.shares[boxes[:, 0], boxes[:, 1]], shape)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Both kinds of elements on the same boxes; ``seen``, what fluxes feel of potentials."""
+
+    potential: Boxes
+    flux: Boxes
+    seen: Real
+
+    @classmethod
+    def of(cls, fine: Grid, values: Sequence[complex], order: int, flux_order: int) -> "Pair":
+        """Of a grid, by the orders of their polynomials."""
+        one, other = (boxes_of(fine, values, kind) for kind in (potential(order), flux(flux_order)))
+        return cls(one, other, traces(order, flux_order))
+
+    def unknowns(self) -> int:
+        """That the larger of the two systems couples."""
+        return max(self.potential.unknowns(), self.flux.unknowns())
+
+    def apart(self, u: Matrix, level: Matrix, rho: Real) -> float:
+        r"""How far fields with these unknowns are apart, :math:`\int |\varepsilon \nabla u - D|^2 / \rho`."""
+        found = np.empty(len(rho))
+        for box, (here, there) in enumerate(zip(u, level, strict=True)):
+            into, out = self.potential.shape(box) @ here, self.flux.shape(box) @ there
+            found[box] = (here.conj() @ into - 2 * (self.seen @ here) @ out.conj() + there.conj() @ out).real
+        return max(float((abs(self.flux.eps) ** 2 / rho) @ found), 0.0)
+
+    def part(self, level: Matrix, rho: Real) -> tuple[Any, float]:
+        """Energy of a flux, by its unknowns, weighted with how often boxes occur beyond the least; and kappa squared.
+
+        The latter is weighted with 1 / ``rho``.
+        """
+        more = self.flux.shares - self.flux.shares.min()
+        if not more.any():
+            return 0.0, 0.0
+        moments = self.flux.answers(level)
+        load = more[:, None] * moments
+        gradient, best = self.potential.pushed(load @ self.seen).solved(), self.flux.pushed(load).solved()
+        return more @ (level * moments).sum(axis=1), self.apart(gradient, best, rho)
+
+
+def whole(cell: Interval, part: float, unmet: float, shares: Real) -> Interval:
+    """Bounds of all that a sensor holds, from those of its cell and :meth:`Pair.part`."""
+    least, most = float(shares.min()), float(shares.max())
+    off, kappa = np.sqrt(cell.upper - cell.lower), np.sqrt(unmet)
+    found, worst = least * cell.lower + part, min(off, kappa / least) if least else off
+    lower, upper = found + worst * (least * worst - 2 * kappa), found + off * (2 * kappa + most * off)
+    return Interval(float(lower), float(upper))

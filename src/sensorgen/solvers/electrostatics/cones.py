@@ -95,7 +95,7 @@ def _arranged(corners: Whole, spokes: int, levels: int, fixed: NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Cone:
-    """All rings around a corner: an energy of what is on the outermost, and the way back inside.
+    """All rings around a corner: energy of the outermost unknowns, and recovery of the inner ones.
 
     Attributes
     ----------

@@ -1,15 +1,151 @@
-"""Triangles of which those at singular corners stand for rings, and what of them both problems share."""
+"""Where a stream function has one value, and where it jumps.
 
-from collections.abc import Mapping
+No flux crosses a mirror: the function has one value along each. Around an island of electrode it grows by all the flux
+that ends there: a cut from each island to another boundary lets it jump by a value of its own.
+"""
+
+from collections import defaultdict, deque
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from sensorgen.solvers.electrostatics.cuts import Flow, flow
-from sensorgen.solvers.electrostatics.fans import Fan, fans
-from sensorgen.solvers.electrostatics.fronts import Numbers, Whole
-from sensorgen.solvers.electrostatics.triangles import Triangles
+from sensorgen.solvers.electrostatics.fronts import HELD, Numbers, Whole
+from sensorgen.solvers.electrostatics.triangles import Edge, Fan, Triangles, fans
+
+
+@dataclass(frozen=True)
+class Flow:
+    """The boundary as a flux sees it; unknown 0 is the value 0.
+
+    Attributes
+    ----------
+    held : dict of int to int
+        Points where the function has one value with others: the unknown that this is.
+    walls : set of edge
+        Edges that no flux crosses.
+    lifts : dict of int to list of (int, int)
+        Of the triangles beside a cut: a corner on it, and the unknown that adds to the function there.
+    top : list of (int, int)
+        Edges of the electrode at 1 V, counter-clockwise around the dielectric.
+    rise : dict of int to int
+        How often each jump adds to what flows into that electrode.
+    count : int
+        Unknowns so far.
+    """
+
+    held: dict[int, int]
+    walls: set[Edge]
+    lifts: dict[int, list[tuple[int, int]]]
+    top: list[tuple[int, int]]
+    rise: dict[int, int]
+    count: int
+
+
+def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
+    """Mirrors, cuts and electrode of a mesh whose every corner has one fan; cuts keep away from cones."""
+    around = {corner: found[0] for corner, found in fans(mesh.triangles).items()}
+    rim = [(corner, fan.spokes[0]) for corner, fan in around.items() if not fan.closed]  # counter-clockwise
+    walls = [e for e in rim if _named(e) not in mesh.terminals]
+    loops, mirrors = _groups(rim), _groups(walls)
+    held: dict[int, int] = {}
+    lifts: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    # a cut ends with an electrode to its left, lest it part a mirror's value
+    ends = {a for a, b in rim if a not in cones and _named((a, b)) in mesh.terminals}
+    carrying = {loops[a] for a, b in rim if _named((a, b)) in mesh.terminals}  # a hole whose rim is all mirror does not
+    count = HELD
+    for piece in _pieces(around):
+        ground = min((mirrors[k] for k in piece if k in mirrors), default=-1)
+        for name in sorted({mirrors[k] for k in piece if k in mirrors} - {ground}):
+            held |= dict.fromkeys((k for k in piece if mirrors.get(k) == name), count)
+            count += 1
+        zero = {k for k in piece if mirrors.get(k) == ground} or {min((piece & loops.keys()) - set(cones))}
+        held |= dict.fromkeys(zero, 0)
+        start = loops[min(zero)]
+        rims = {k: loops[k] for k in piece if k in loops}
+        for path in _cuts(around, rims, start, carrying & set(rims.values()) | {start}, ends, cones):
+            for number, corner in _beside(around, path):
+                lifts[number].append((corner, count))
+            count += 1
+    top = [e for e in rim if mesh.terminals.get(_named(e)) == "top"]
+    rise: dict[int, int] = defaultdict(int)
+    for a, b in top:
+        for corner, jump in lifts.get(around[a].members[0], ()):
+            rise[jump] += (corner == b) - (corner == a)
+    return Flow(held, {_named(e) for e in walls}, dict(lifts), top, rise, count)
+
+
+def _named(edge: Edge) -> Edge:
+    return min(edge), max(edge)
+
+
+def _groups(edges: Iterable[Edge]) -> dict[int, int]:
+    """Points that edges join, each with the least of those that it is joined to."""
+    beside: dict[int, list[int]] = defaultdict(list)
+    for a, b in edges:
+        beside[a].append(b)
+        beside[b].append(a)
+    found: dict[int, int] = {}
+    for start in sorted(beside):
+        todo = [start] if start not in found else []
+        while todo:
+            k = todo.pop()
+            if k not in found:
+                found[k] = start
+                todo += beside[k]
+    return found
+
+
+def _pieces(around: dict[int, Fan]) -> Iterator[set[int]]:
+    """Points of each connected piece of dielectric."""
+    name = _groups((corner, spoke) for corner, fan in around.items() for spoke in fan.spokes)
+    for least in sorted(set(name.values())):
+        yield {k for k, n in name.items() if n == least}
+
+
+def _cuts(
+    around: dict[int, Fan], loops: dict[int, int], start: int, carrying: set[int], ends: set[int],
+    cones: Collection[int],
+) -> Iterator[list[int]]:  # fmt: skip
+    """For each loop that carries flux but the first, points from it to another one, all inside but for both ends."""
+    reached, before = {start}, {k: k for k in loops if loops[k] == start and k in ends}
+    todo = deque(before)
+    while todo and reached < carrying:
+        here = todo.popleft()
+        for spoke in _inner(around[here]):
+            if spoke in before or spoke in cones:
+                continue
+            if spoke not in loops:
+                before[spoke] = here
+                todo.append(spoke)
+            elif loops[spoke] in carrying - reached:
+                yield _path(before | {spoke: here}, spoke)
+                reached.add(loops[spoke])
+                new = [k for k in loops if loops[k] == loops[spoke] and k in ends]
+                before |= {k: k for k in new}
+                todo += new
+
+
+def _inner(fan: Fan) -> list[int]:
+    return fan.spokes if fan.closed else fan.spokes[1:-1]
+
+
+def _path(before: dict[int, int], end: int) -> list[int]:
+    found = [end]
+    while before[found[-1]] != found[-1]:
+        found.append(before[found[-1]])
+    return found
+
+
+def _beside(around: dict[int, Fan], path: list[int]) -> Iterator[tuple[int, int]]:
+    """Triangles to the left of a path, each with its corner there."""
+    for k, corner in enumerate(path):
+        fan = around[corner]
+        start = fan.spokes.index(path[k + 1]) if k + 1 < len(path) else 0
+        end = fan.spokes.index(path[k - 1]) if k else len(fan.members)
+        for number in fan.members[start:end] if start <= end else fan.members[start:] + fan.members[:end]:
+            yield number, corner
 
 
 @dataclass(frozen=True)
@@ -61,7 +197,7 @@ class Cones:
         return np.minimum(a, b) * len(self.triangles.points) + np.maximum(a, b)
 
     def areas(self) -> Numbers:
-        """Of all triangles, twice; 0 or less where doubles tell no triangle [mm2]."""
+        """Of all triangles, twice; 0 or less where double precision does not resolve it [mm2]."""
         a, b, c = self.triangles.points[self.corners].transpose(1, 2, 0)
         return np.asarray((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0])
 

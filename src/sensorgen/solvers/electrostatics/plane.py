@@ -1,22 +1,193 @@
-r"""Potential and stream function on one mesh: both bounds by the same matrices.
+"""Potential and stream function on a graded mesh: unknowns, blocks for the solver, energies."""
 
-In the plane a flux without sources is the curl of a function psi, which has one value along each line that no flux
-crosses, and :math:`\int |D|^2 / \varepsilon = \int |\nabla \psi|^2 / \varepsilon`. Hence both problems are one, with
-the permittivity or its inverse for a weight, and values held at the electrodes or at the mirrors.
-"""
-
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from sensorgen.solvers.electrostatics.cones import ring_corners
-from sensorgen.solvers.electrostatics.fronts import HELD, Numbers, Whole
-from sensorgen.solvers.electrostatics.mesh import Cones
-from sensorgen.solvers.electrostatics.polynomials import Real, condensed, crossed
-from sensorgen.solvers.electrostatics.problem import Field, Problem
+from sensorgen.solvers.electrostatics.cones import Cone, Layout, ring_corners
+from sensorgen.solvers.electrostatics.fronts import HELD, Block, Numbers, Whole, least
+from sensorgen.solvers.electrostatics.mesh import Cones, Flow
+from sensorgen.solvers.electrostatics.polynomials import Real, condensed, crossed, numbered
+from sensorgen.solvers.electrostatics.triangles import Edge
+
+
+@dataclass(frozen=True)
+class Field:
+    """A function on all triangles, by its values on their sides.
+
+    Attributes
+    ----------
+    plain : (n, k) array
+        Of the triangles that are no tips.
+    cones : list of ((rings, s, 2, k) array, (s, k) array)
+        Of the rings at each singular corner, and of the innermost triangles.
+    """
+
+    plain: Numbers
+    cones: list[tuple[Numbers, Numbers]]
+
+    def conj(self) -> "Field":
+        """Its complex conjugate."""
+        return Field(self.plain.conj(), [(rings.conj(), tips.conj()) for rings, tips in self.cones])
+
+    def moduli(self) -> "Field":
+        """The moduli of its values."""
+        return Field(abs(self.plain), [(abs(rings), abs(tips)) for rings, tips in self.cones])
+
+
+Jumps = list[tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class _Share:
+    """How values on one block are made from the unknowns.
+
+    Attributes
+    ----------
+    ids, signs : (k,) array
+        The unknown of each value, and 1 or -1.
+    jumps : list of (int, int)
+        Places of values to which another unknown adds, and that one.
+    """
+
+    ids: Whole
+    signs: Real
+    jumps: Jumps
+
+    def block(self, matrix: Numbers, place: Real) -> Block:
+        """For the solver."""
+        rows = np.array([*range(len(self.ids)), *(k for k, _ in self.jumps)])
+        ids = np.array([*self.ids, *(jump for _, jump in self.jumps)])
+        signed = self.signs[:, None] * matrix * self.signs
+        return Block(ids, signed[rows[:, None], rows], place) if self.jumps else Block(self.ids, signed, place)
+
+    def values(self, unknowns: Numbers) -> Numbers:
+        """On the block."""
+        found = unknowns[self.ids]
+        for place, jump in self.jumps:
+            found[place] += unknowns[jump]
+        return np.asarray(found * self.signs)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A function to be found: what weighs its slope, and where it is held.
+
+    Attributes
+    ----------
+    mesh : Cones
+        That it lives on.
+    order : int
+        Of the polynomials.
+    plain : (n, k, k) array
+        Energies of the plain triangles.
+    cones : list of (array, array)
+        Energies of a ring's triangles and of the innermost ones, at each singular corner.
+    weight : (n,) array
+        Of each triangle.
+    held : dict of int to int
+        Points whose value is an unknown that others share.
+    walls : set of edge
+        Sides along which it does not change.
+    lifts : dict of int to list of (int, int)
+        As :class:`sensorgen.solvers.electrostatics.mesh.Flow`.
+    count : int
+        Of the unknowns named in ``held`` and ``lifts``, 0 and 1 among them.
+    """
+
+    mesh: Cones
+    order: int
+    plain: Real
+    cones: Sequence[tuple[Real, Real]]
+    weight: Numbers
+    held: Mapping[int, int]
+    walls: set[Edge]
+    lifts: Mapping[int, Jumps]
+    count: int
+
+    def solved(self, flow: Flow | None = None) -> Field:
+        """The function of least energy, less twice what flows into the top where a flux is sought."""
+        points = self.mesh.triangles.points
+        plain, cones = self._plain_shares(), [self._cone(c, e) for c, e in zip(self.mesh.fans, self.cones, strict=True)]
+        rims = [self._rim(corner, cone.layout) for corner, cone in zip(self.mesh.fans, cones, strict=True)]
+        energies = self.weight[self.mesh.plain, None, None] * self.plain
+        places = points[self.mesh.corners[self.mesh.plain, 0]]
+        blocks = [share.block(*parts) for share, *parts in zip(plain, energies, places, strict=True)]
+        corners = points[list(self.mesh.fans)]
+        blocks += [rim.block(cone.matrix, at) for rim, cone, at in zip(rims, cones, corners, strict=True)]
+        unknowns = least([*blocks, self._rise(flow)] if flow else blocks, self._unknowns[0])
+        inside = [cone.inside(rim.values(unknowns)) for cone, rim in zip(cones, rims, strict=True)]
+        on_plain = np.array([share.values(unknowns) for share in plain])
+        return Field(on_plain, inside)
+
+    @cached_property
+    def _unknowns(self) -> tuple[int, Whole, Whole]:
+        """How many there are; the unknown of each point; the first of each side, 0 where it has none."""
+        mesh, count = self.mesh, self.count
+        vertex = np.full(len(mesh.triangles.points), -1)
+        vertex[list(self.held)] = list(self.held.values())
+        used = np.unique(mesh.corners[mesh.plain])
+        free = used[vertex[used] < 0]
+        vertex[free] = count + np.arange(len(free))
+        count += len(free)
+        names, modes = mesh.sides[0], self.order - 1
+        open_sides = ~np.isin(names, mesh.names(*np.array(list(self.walls)).reshape(-1, 2).T))
+        first = np.zeros(len(names), np.int64)
+        first[open_sides] = count + modes * np.arange(open_sides.sum())
+        return count + modes * int(open_sides.sum()), vertex, first
+
+    def _plain_shares(self) -> list[_Share]:
+        mesh = self.mesh
+        _, vertex, first = self._unknowns
+        ids, signs = numbered(mesh.corners[mesh.plain], vertex, first[mesh.sides[1]], self.order)
+        corners = mesh.triangles.triangles
+        jumps = [
+            [(corners[n].index(point), jump) for point, jump in self.lifts.get(n, ())] for n in mesh.plain.tolist()
+        ]
+        return [_Share(*parts) for parts in zip(ids, signs, jumps, strict=True)]
+
+    def _cone(self, corner: int, energies: tuple[Real, Real]) -> Cone:
+        fan, (rings, tips) = self.mesh.fans[corner], energies
+        ends = self._is_wall(corner, fan.spokes[0]), self._is_wall(corner, fan.spokes[-1])
+        layout = Layout.of(len(fan.spokes), fan.closed, ends, self.order)
+        here = self.weight[fan.members][:, None, None]
+        return Cone.of(layout, rings * here[:, None], tips * here, self.mesh.doublings[corner])
+
+    def _is_wall(self, a: int, b: int) -> bool:
+        return (min(a, b), max(a, b)) in self.walls
+
+    def _rim(self, corner: int, layout: Layout) -> _Share:
+        """What a cone shares with its neighbours, in its own turn."""
+        _, vertex, first = self._unknowns
+        mesh, fan = self.mesh, self.mesh.fans[corner]
+        spokes = np.array(fan.spokes)
+        free = spokes[layout.free]
+        a, b = spokes[layout.rim].T
+        on_side = first[np.searchsorted(mesh.sides[0], mesh.names(a, b))]
+        modes = np.arange(self.order - 1)
+        sign = np.where((a > b)[:, None], (-1.0) ** modes, 1.0)
+        held = vertex[[corner]] if layout.held else vertex[:0]
+        ids = np.concatenate([vertex[free], (on_side[:, None] + modes).ravel(), held])
+        signs = np.concatenate([np.ones(len(free)), sign.ravel(), np.ones(len(held))])
+        lifts = {lift for n in fan.members for lift in self.lifts.get(n, ())}
+        return _Share(ids, signs, [(free.tolist().index(point), jump) for point, jump in sorted(lifts)])
+
+    def _rise(self, flow: Flow) -> Block:
+        """Minus the function's rise along the top, as an energy with the unknown 1, whose value is 1."""
+        count, vertex, _ = self._unknowns
+        ends = np.array(flow.top)
+        start, end = (np.bincount(vertex[e] + 1, minlength=count + 1)[1:] for e in ends.T)  # -1, at cones, cancels
+        rise = (end - start).astype(float)
+        for jump, times in flow.rise.items():
+            rise[jump] += times
+        where = np.flatnonzero(rise)
+        where = where[where >= HELD]
+        matrix = np.zeros((len(where) + 1,) * 2)
+        matrix[0, 1:] = matrix[1:, 0] = -rise[where]
+        return Block(np.concatenate([[1], where]), matrix, self.mesh.triangles.points[ends[:, 0]].mean(axis=0))
 
 
 @dataclass(frozen=True)

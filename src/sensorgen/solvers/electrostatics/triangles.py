@@ -2,7 +2,7 @@
 
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from sensorgen.scene.sections import ROUNDING_MM
 from sensorgen.scene.unit_cell import Cell, Slice
-from sensorgen.solvers.electrostatics.fans import Fan, fans
-from sensorgen.solvers.electrostatics.flips import flipped
 
 Edge = tuple[int, int]
 Triangle = tuple[int, int, int]
@@ -94,7 +92,7 @@ def apart(mesh: Triangles) -> Triangles:
     return mesh
 
 
-def _parted(mesh: Triangles, corner: int, fan: Fan) -> Triangles:
+def _parted(mesh: Triangles, corner: int, fan: "Fan") -> Triangles:
     """One of a corner's fans with a new point at the same place."""
     new = len(mesh.points)
     corners, terminals = list(mesh.triangles), dict(mesh.terminals)
@@ -227,7 +225,7 @@ def _piece(found: _Found, beside: dict[int, list[int]], left: set[int]) -> tuple
 
 
 def _refuse_open(points: NDArray[np.float64], owners: dict[Edge, list[int]], inside: set[int], cell: Cell) -> None:
-    """Refuse a field that would reach the box's floor or lid: beyond them lies more than the scene says."""
+    """Refuse a field that would reach the box's floor or lid: the scene does not describe what is beyond them."""
     last = cell.slices[0].bands
     ends = (last[0].bottom_mm[0], last[-1].top_mm[0])
     for edge, sides in owners.items():
@@ -235,3 +233,115 @@ def _refuse_open(points: NDArray[np.float64], owners: dict[Edge, list[int]], ins
             z = points[list(edge), 1]
             if any(np.abs(z - end).max() < ROUNDING_MM for end in ends):
                 raise ValueError("an electrode does not cover the whole sensor")
+
+
+_GAIN = 1e-9  # by which the sum of two opposite angles must exceed half a turn [rad]
+_STRAIGHT = 1e-9  # sine of the angle of three corners on a line
+
+
+def flipped(points: NDArray[np.float64], triangles: Sequence[Triangle], regions: Sequence[Hashable]) -> list[Triangle]:
+    """The same regions in triangles of the same number and corners, no two of which would be blunter if turned.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        Corners.
+    triangles : list of (int, int, int)
+        Counter-clockwise.
+    regions : list
+        Of each triangle; edges between different ones stay.
+    """
+    made = list(triangles)
+    owner = {edge: n for n, corners in enumerate(made) for edge in _turns(corners)}
+    todo = [edge for edge in owner if edge[0] < edge[1]]
+    places: list[tuple[float, float]] = [(float(x), float(y)) for x, y in points]
+    while todo:
+        a, b = todo.pop()
+        one, other = owner.get((a, b)), owner.get((b, a))
+        if one is None or other is None or regions[one] != regions[other]:
+            continue
+        c, d = _third(made[one], a, b), _third(made[other], a, b)
+        if not _is_better(*(places[k] for k in (a, b, c, d))):
+            continue
+        del owner[a, b], owner[b, a]
+        made[one], made[other] = (a, d, c), (d, b, c)
+        for n in (one, other):
+            owner.update(dict.fromkeys(_turns(made[n]), n))
+        todo += [(a, d), (d, b), (b, c), (c, a)]
+    return made
+
+
+def _turns(corners: Triangle) -> list[Edge]:
+    a, b, c = corners
+    return [(a, b), (b, c), (c, a)]
+
+
+def _third(corners: Triangle, a: int, b: int) -> int:
+    return next(k for k in corners if k not in (a, b))
+
+
+_Point = tuple[float, float]
+
+
+def _is_better(a: _Point, b: _Point, c: _Point, d: _Point) -> bool:
+    """Whether d-c is the better diagonal of a, d, b, c than a-b: the angles at c and d are more than half a turn."""
+    if min(_sine(a, d, c), _sine(d, b, c)) < _STRAIGHT:
+        return False
+    return _angle(a, c, b) + _angle(a, d, b) > np.pi + _GAIN
+
+
+def _sine(a: _Point, b: _Point, c: _Point) -> float:
+    """Of the angle at b, from a to c, above 0 where the three turn left."""
+    (ux, uy), (vx, vy) = (b[0] - a[0], b[1] - a[1]), (c[0] - b[0], c[1] - b[1])
+    return float((ux * vy - uy * vx) / (np.hypot(ux, uy) * np.hypot(vx, vy)))
+
+
+def _angle(a: _Point, b: _Point, c: _Point) -> float:
+    """At b, between a and c [rad]."""
+    (ux, uy), (vx, vy) = (a[0] - b[0], a[1] - b[1]), (c[0] - b[0], c[1] - b[1])
+    return float(np.arctan2(abs(ux * vy - uy * vx), ux * vx + uy * vy))
+
+
+@dataclass(frozen=True)
+class Fan:
+    """Triangles that meet at a corner, counter-clockwise.
+
+    Attributes
+    ----------
+    members : list of int
+        Their numbers.
+    spokes : list of int
+        Other ends of the edges that meet there; one more than members, unless the fan is closed.
+    """
+
+    members: list[int]
+    spokes: list[int]
+
+    @property
+    def closed(self) -> bool:
+        """Whether it goes all around the corner."""
+        return len(self.members) == len(self.spokes)
+
+
+def fans(triangles: Sequence[Triangle]) -> dict[int, list[Fan]]:
+    """Of each corner, its fans; more than one where pieces touch at a point only."""
+    around: dict[int, dict[int, tuple[int, int]]] = defaultdict(dict)
+    for number, (a, b, c) in enumerate(triangles):
+        around[a][b], around[b][c], around[c][a] = (number, c), (number, a), (number, b)
+    return {corner: _fans(by_first) for corner, by_first in around.items()}
+
+
+def _fans(by_first: dict[int, tuple[int, int]]) -> list[Fan]:
+    """From each triangle's first spoke, with its number and last spoke."""
+    lasts = {last for _, last in by_first.values()}
+    found = []
+    for start in [first for first in by_first if first not in lasts] or [next(iter(by_first))]:
+        fan, spoke = Fan([], []), start
+        while spoke in by_first and not (fan.spokes and spoke == start):
+            fan.spokes.append(spoke)
+            number, spoke = by_first[spoke]
+            fan.members.append(number)
+        if spoke != start:
+            fan.spokes.append(spoke)
+        found.append(fan)
+    return found

@@ -1,41 +1,41 @@
-"""Exact derivatives of the pressed line, passed on from section to section; each is worked out only when asked for."""
+"""Exact derivatives of the pressed line by the chain rule along its sections, each computed only on demand."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from sensorgen.core.errors import MissingValue, OutOfRange, UnknownName
-from sensorgen.solvers.line.inputs import HIGHEST_OHM, NAMES, Complex, Inputs, in_blocks, read
+from sensorgen.solvers.line.inputs import HIGHEST_OHM, NAMES, Complex, Inputs, PressedLine, read
 from sensorgen.solvers.line.tanhc import sech_squared, tanhc, tanhc_slope
 
 Array = Any  # of numpy, or one of its scalars
 
-BY = tuple(name for name in NAMES if name != "eps0_F_per_m")
-_OF_PATCH = {"F_N", "E_Pa", "L_p_m"}  # through the strain, which needs an area and a modulus
+BY = tuple(name for name in NAMES if name != "eps0_f_per_m")
+_OF_PATCH = {"force_n", "modulus_pa", "tip_m"}  # through the strain, which needs an area and a modulus
 
 
-def slopes(of: Iterable[str] | None, given: Mapping[str, Any]) -> tuple[Complex, dict[str, Complex]]:
+def slopes(line: PressedLine, of: Iterable[str] | None) -> tuple[Complex, dict[str, Complex]]:
     """Z [ohm] and its derivatives; see :func:`sensorgen.models.line.sensitivities`."""
     names = tuple(BY if of is None else of)
     for name in names:
         if name not in BY:
             raise UnknownName("input to differentiate by", name, BY)
-    if _OF_PATCH & set(names) and "E_Pa" not in given:
-        raise MissingValue("a derivative by force or patch needs E_Pa")
-    found = read(given)
-    if _OF_PATCH & set(names) and not found["L_p_m"].all():
-        raise OutOfRange("a derivative by force or patch needs a patch: L_p_m above 0")
-    first, *rest = in_blocks(found, lambda part: _block(part, names), 1 + len(names))
+    if _OF_PATCH & set(names) and line.modulus_pa is None:
+        raise MissingValue("a derivative by force or patch needs modulus_pa")
+    found = read(line)
+    if _OF_PATCH & set(names) and not found["tip_m"].all():
+        raise OutOfRange("a derivative by force or patch needs a patch: tip_m above 0")
+    first, *rest = found.evaluate(partial(_block, names), 1 + len(names))
     return first, dict(zip(names, rest, strict=True))
 
 
-def _block(inputs: Inputs, names: tuple[str, ...]) -> list[Array]:
+def _block(names: tuple[str, ...], inputs: Inputs) -> list[Array]:
     with np.errstate(all="ignore"):
-        seen = _Line(inputs)
-        found = [seen.z, *(seen.slope(name) for name in names)]
-        if abs(seen.z.sum()) < HIGHEST_OHM and all(np.isfinite(value.sum()) for value in found):
+        pressed = _Pressed(inputs)
+        found = [pressed.z, *(pressed.slope(name) for name in names)]
+        if abs(pressed.z.sum()) < HIGHEST_OHM and all(np.isfinite(value.sum()) for value in found):
             return found
     raise OutOfRange("no derivative where Z is infinite or beyond double precision")
 
@@ -134,60 +134,43 @@ class Chain:
         return self.gain(index) * self.sections[index].by_shift * (contrast if self.opened else -contrast)
 
 
-class _Line(Chain):
-    """The sections left of the patch, under it and right of it, as seen from the contacts."""
-
-    def __init__(self, inputs: Inputs) -> None:
-        self.inputs = inputs
-        r, y, lengths = inputs.sections()
-        self._r, self._y = r[0], y[0]
-        super().__init__(r, y, lengths, inputs.load_ohm)
-
-    def slope(self, name: str) -> Array:
-        """Derivative of Z by an input."""
-        parts = [*self._by_place(name), *self._by_inputs(name)]
-        return np.asarray(sum(parts), np.complex128)
-
-    def _by_place(self, name: str) -> Iterator[Array]:
-        """What a change of the sections' lengths, or a move of the patch, does."""
-        if name == "x_p_left_edge_m":
-            yield self.by_shift(1, self._contrast())
-        if name == "L_p_m":
-            by_shunt, by_series = self.shunt_and_series(*self._raised())
-            yield self.gain(2) * (by_shunt - by_series * self.sections[1].q ** 2)
-        if name == "L_m":
-            yield self.by_length(2)
-
-    def _by_inputs(self, name: str) -> Iterator[Array]:
-        """What a change of resistance and admittance per length does."""
-        if name not in _CHANGES:
-            return
-        away, pressed = _CHANGES[name](_Film(self.inputs))
-        for index, change in enumerate((away, pressed, away)):
-            yield from self.by_matter(index, *change)
-
-    def _contrast(self) -> Array:
-        """r0 y_p - r_p y0 [1/m2]."""
-        of_r, of_y = self._raised()
-        return np.asarray(self._r * of_y - of_r * self._y)
-
-    def _raised(self) -> tuple[Array, Array]:
-        """What pressing adds to r [ohm/m] and y [S/m], exactly 0 where nothing is pressed."""
-        p = self.inputs
-        strain = p.strain()
-        return p.track_change(), (p["tan_delta"] + 1j) * (p.susceptance() * (strain / (1 - strain)))
-
-
-class _Film:
-    """What several derivatives share: the film's loss and its admittance, away from the patch and under it."""
+class _Pressed(Chain):
+    """The sections left of the patch, under it and right of it, and how each input changes them."""
 
     def __init__(self, inputs: Inputs) -> None:
         self.inputs, self.strain = inputs, inputs.strain()
-        self.turned = inputs["tan_delta"] + 1j
-        self.susceptance = inputs.susceptance()
+        self.turned, self.susceptance = inputs["tan_delta"] + 1j, inputs.susceptance()
+        r, y, lengths = inputs.sections()
+        self.r, self.y = r[0], y[0]
+        super().__init__(r, y, lengths, inputs.load_ohm)
 
     def __getitem__(self, name: str) -> Array:
         return self.inputs[name]
+
+    def slope(self, name: str) -> Array:
+        """Derivative of Z by an input."""
+        parts = [*self._by_lengths(name)]
+        if name in _CHANGES:
+            away, pressed = _CHANGES[name](self)
+            for index, change in enumerate((away, pressed, away)):
+                parts += self.by_matter(index, *change)
+        return np.asarray(sum(parts), np.complex128)
+
+    def _by_lengths(self, name: str) -> Iterator[Array]:
+        """Effect of the sections' lengths, or of a move of the patch."""
+        if name == "left_m":
+            of_r, of_y = self._raised()
+            yield self.by_shift(1, np.asarray(self.r * of_y - of_r * self.y))  # r0 y_p - r_p y0
+        if name == "tip_m":
+            by_shunt, by_series = self.shunt_and_series(*self._raised())
+            yield self.gain(2) * (by_shunt - by_series * self.sections[1].q ** 2)
+        if name == "length_m":
+            yield self.by_length(2)
+
+    def _raised(self) -> tuple[Array, Array]:
+        """What pressing adds to r [ohm/m] and y [S/m], exactly 0 without force."""
+        denser = self.strain / (1 - self.strain)
+        return self.inputs.track_change(), self.turned * (self.susceptance * denser)
 
     def thinned(self, value: Array) -> Array:
         """Under the patch, in proportion to 1/d."""
@@ -198,72 +181,59 @@ class _Film:
         return self.turned * (self.susceptance / (1 - self.strain) ** 2)
 
 
-class _Change(NamedTuple):
-    """Derivative of resistance [ohm/m] and admittance [S/m] per length by an input."""
-
-    of_r: Array | float = 0.0
-    of_y: Array | float = 0.0
+_Change = tuple[Array, Array]  # derivative of resistance [ohm/m] and admittance [S/m] per length by an input
+_Changes = tuple[_Change, _Change]  # away from the patch, and under it
 
 
-Changes = tuple[_Change, _Change]  # away from the patch, and under it
+def _of_film(of_susceptance: Callable[[_Pressed], Array], p: _Pressed) -> _Changes:
+    """By an input that enters the susceptance only."""
+    change = of_susceptance(p)
+    return (0.0, p.turned * change), (0.0, p.turned * p.thinned(change))
 
 
-def _of_film(p: _Film, of_susceptance: Array) -> Changes:
-    """Of what enters the susceptance only."""
-    return _Change(of_y=p.turned * of_susceptance), _Change(of_y=p.turned * p.thinned(of_susceptance))
-
-
-def _by_width(p: _Film) -> Changes:
+def _by_width(p: _Pressed) -> _Changes:
     away, pressed = p.inputs.tracks()
-    wider = p.susceptance / p["W_m"]
-    film = p.turned * p.thinned(wider) - p.by_strain() * (p.strain / p["W_m"])
-    return _Change(-away / p["W_m"], p.turned * wider), _Change(-pressed / p["W_m"], film)
+    wider = p.susceptance / p["width_m"]
+    film = p.turned * p.thinned(wider) - p.by_strain() * (p.strain / p["width_m"])
+    return (-away / p["width_m"], p.turned * wider), (-pressed / p["width_m"], film)
 
 
-def _by_tan_delta(p: _Film) -> Changes:
-    return _Change(of_y=p.susceptance), _Change(of_y=p.thinned(p.susceptance))
+def _by_stiffness(name: str, p: _Pressed) -> _Changes:
+    """By modulus or length of the patch: both lower the strain."""
+    return (0.0, 0.0), (0.0, -p.by_strain() * (p.strain / p[name]))
 
 
-def _by_leak(_: _Film) -> Changes:
-    return _Change(of_y=1.0), _Change(of_y=1.0)
+def _by_force(p: _Pressed) -> _Changes:
+    touches_at = p["width_m"] * p["tip_m"] * p["modulus_pa"]
+    return (0.0, 0.0), (p.inputs.track_change_per_newton(), p.by_strain() / touches_at)
 
 
-def _by_stiffness(name: str, p: _Film) -> Changes:
-    """By modulus or length of the patch: both make it yield less."""
-    return _Change(), _Change(of_y=-p.by_strain() * (p.strain / p[name]))
+def _by_resistivity(end: str, p: _Pressed) -> _Changes:
+    section = p.inputs.section(end)
+    return (1 / section, 0.0), ((1 + p[f"{end}_piezoresistance_per_n"] * p["force_n"]) / section, 0.0)
 
 
-def _by_force(p: _Film) -> Changes:
-    yields_at = p["W_m"] * p["L_p_m"] * p["E_Pa"]
-    return _Change(), _Change(p.inputs.track_change_per_newton(), p.by_strain() / yields_at)
-
-
-def _by_resistivity(end: str, p: _Film) -> Changes:
-    section = p[f"H_{end}_m"] * p["W_m"]
-    return _Change(1 / section), _Change((1 + p[f"S_n_{end}_per_N"] * p["F_N"]) / section)
-
-
-def _by_height(end: str, p: _Film) -> Changes:
+def _by_thickness(end: str, p: _Pressed) -> _Changes:
     away, pressed = _by_resistivity(end, p)
-    thinner = -p[f"rho_{end}_ohm_m"] / p[f"H_{end}_m"]
-    return _Change(thinner * away.of_r), _Change(thinner * pressed.of_r)
+    thinner = -p[f"{end}_resistivity_ohm_m"] / p[f"{end}_thickness_m"]
+    return (thinner * away[0], 0.0), (thinner * pressed[0], 0.0)
 
 
-def _by_softening(end: str, p: _Film) -> Changes:
-    return _Change(), _Change(p[f"rho_{end}_ohm_m"] * p["F_N"] / (p[f"H_{end}_m"] * p["W_m"]))
+def _by_piezoresistance(end: str, p: _Pressed) -> _Changes:
+    return (0.0, 0.0), (p[f"{end}_resistivity_ohm_m"] * p["force_n"] / p.inputs.section(end), 0.0)
 
 
-_CHANGES: dict[str, Callable[[_Film], Changes]] = {
-    "W_m": _by_width,
-    "d_m": lambda p: _of_film(p, -p.susceptance / p["d_m"]),
-    "eps_r": lambda p: _of_film(p, p.susceptance / p["eps_r"]),
-    "f_Hz": lambda p: _of_film(p, p.inputs.susceptance_per_hertz()),
-    "tan_delta": _by_tan_delta,
-    "G_S_per_m": _by_leak,
-    "E_Pa": partial(_by_stiffness, "E_Pa"),
-    "L_p_m": partial(_by_stiffness, "L_p_m"),
-    "F_N": _by_force,
-    **{f"rho_{end}_ohm_m": partial(_by_resistivity, end) for end in ("top", "bottom")},
-    **{f"H_{end}_m": partial(_by_height, end) for end in ("top", "bottom")},
-    **{f"S_n_{end}_per_N": partial(_by_softening, end) for end in ("top", "bottom")},
+_CHANGES: dict[str, Callable[[_Pressed], _Changes]] = {
+    "width_m": _by_width,
+    "film_m": partial(_of_film, lambda p: -p.susceptance / p["film_m"]),
+    "eps_r": partial(_of_film, lambda p: p.susceptance / p["eps_r"]),
+    "frequency_hz": partial(_of_film, lambda p: p.inputs.susceptance_per_hertz()),
+    "tan_delta": lambda p: ((0.0, p.susceptance), (0.0, p.thinned(p.susceptance))),
+    "leak_s_per_m": lambda _: ((0.0, 1.0), (0.0, 1.0)),
+    "modulus_pa": partial(_by_stiffness, "modulus_pa"),
+    "tip_m": partial(_by_stiffness, "tip_m"),
+    "force_n": _by_force,
+    **{f"{end}_resistivity_ohm_m": partial(_by_resistivity, end) for end in ("top", "bottom")},
+    **{f"{end}_thickness_m": partial(_by_thickness, end) for end in ("top", "bottom")},
+    **{f"{end}_piezoresistance_per_n": partial(_by_piezoresistance, end) for end in ("top", "bottom")},
 }

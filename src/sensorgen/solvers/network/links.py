@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.solvers.network.lines import Floats, Ints, Lines
-from sensorgen.solvers.network.nodes import Nodes, interleaved
+from sensorgen.solvers.network.nodes import Floats, Ints, Lines, Nodes, interleaved
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

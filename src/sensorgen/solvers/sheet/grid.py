@@ -1,12 +1,12 @@
 """Grid lines for a sheet, and exact integrals of what lies between them however it lies."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.solvers.sheet.parts import ROUNDING, Contact, Sheet
+from sensorgen.solvers.sheet.parts import ROUNDING, Contact, Patch, Port, Sheet
 
 Real = NDArray[np.float64]
 GRADING = 3.0  # cells at a corner of a contact shrink with this power: above 2, potentials as sqrt(r) cost no order
@@ -122,3 +122,23 @@ def _crowding(at: Real, size: float, corners: set[float]) -> Real:
         away = (at - corner) / size
         found = found + np.sign(away) * np.abs(away) ** (1 / GRADING)
     return np.asarray(found)
+
+
+def folds(ports: Sequence[Port], patch: Patch | None) -> bool:
+    """Whether the currents in both sheets are opposite everywhere, so that only u_t - u_b counts.
+
+    They are where every port joins two contacts that face each other, and the resistances have one ratio everywhere.
+    """
+    facing = all((plus.x_m, plus.y_m) == (minus.x_m, minus.y_m) for plus, minus in ports)
+    return facing and (patch is None or patch.resistance_factor[0] == patch.resistance_factor[1])
+
+
+def fold(sheet: Sheet) -> tuple[Sheet, dict[str, tuple[str, float]]]:
+    """The folded sheet; and, by each factor of resistance, what derivative of it is which share of the folded one's."""
+    top, bottom = sheet.sheet_resistance_ohm
+    both = top + bottom
+    shares = {
+        f"{side}_resistance_factor": ("top_resistance_factor", ohm / both if both else 0.0)
+        for side, ohm in (("top", top), ("bottom", bottom))
+    }
+    return replace(sheet, sheet_resistance_ohm=(both, 0.0)), shares

@@ -1,18 +1,16 @@
 """A sheet solved on a given grid, or on the coarsest that is good enough, with the error that remains."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
-from sensorgen.solvers.sheet.fold import fold, folds
-from sensorgen.solvers.sheet.grid import axes
-from sensorgen.solvers.sheet.links import BY, links
-from sensorgen.solvers.sheet.network import Complex, network
-from sensorgen.solvers.sheet.parts import Patch, Port, Sheet, check_patch, contacts_of
+from sensorgen.solvers.sheet.grid import axes, fold, folds
+from sensorgen.solvers.sheet.network import BY, Complex, links, network
+from sensorgen.solvers.sheet.parts import SIDES, Contact, Patch, Port, Sheet, check, check_patch, contacts_of
 
 COARSEST, FINEST = 10, 320  # cells between which a resolution is looked for
 _HIGHEST_HZ = 1e100
@@ -69,7 +67,7 @@ def depth_m(sheet: Sheet, frequency_hz: float, patch: Patch | None = None) -> fl
 
 
 def frequencies(given: ArrayLike) -> NDArray[np.float64]:
-    """Tones as an array [Hz], or an error that names them."""
+    """Frequencies as an array [Hz], checked."""
     found = np.atleast_1d(np.asarray(given))
     if found.dtype.kind not in "iuf" or found.ndim != 1 or not found.size:
         raise BadInput(f"frequency_hz takes numbers in Hz, not {str(given)[:60]!r}")
@@ -169,3 +167,160 @@ def _change(before: Complex, after: Complex) -> float:
         relative = np.divide(np.abs(new - old), scale, out=np.zeros_like(scale), where=scale > 0)
         worst = max(worst, float(relative.max()))
     return worst
+
+
+Real = NDArray[np.float64]
+
+ACCURACY = 3e-2  # of the impedances behind a bound [-]
+SHALLOWEST = 1 / 20  # depth of the current over the longer side, under which places would take hours [-]
+_ROUNDING = 1e-11  # relative change of an impedance across the sheet [-] below which a derivative is only rounding
+_SINGULAR = 1e-13  # smallest eigenvalue of a correlation of derivatives that is distinct from 0 [-]
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Smallest standard errors that any unbiased estimate of a press can have.
+
+    Attributes
+    ----------
+    x_m, y_m : (nx,) and (ny,) array
+        Centres of the patch [m].
+    frequency_hz : (n,) array
+        Frequencies [Hz].
+    information : (nx, ny, n, 3, 3) array
+        Fisher information of each frequency on force, x and y [1/N2 and 1/m2].
+    guess_m : tuple of float
+        Standard error of a place on the sheet without any reading, length and width over sqrt(12) [m].
+    cells : int
+        Resolution that was taken [-].
+    """
+
+    x_m: Real
+    y_m: Real
+    frequency_hz: Real
+    information: Real
+    guess_m: tuple[float, float]
+    cells: int
+
+    def sigma(self, tones: Sequence[int] | None = None, *, outline: bool = False) -> Real:
+        """Standard errors of force [N], x and y [m] on the last axis, from all frequencies or some; inf if unknown.
+
+        Parameters
+        ----------
+        tones : sequence of int
+            Which frequencies, counted from 0; all unless given.
+        outline : bool
+            Whether it is known that the press is on the sheet, as a prior of its spread (van Trees): errors of place
+            then never exceed a guess, and an undetermined position does not affect the other errors.
+        """
+        chosen = self.information if tones is None else self.information[:, :, list(tones)]
+        known = np.diag([0.0, *(1 / spread**2 for spread in self.guess_m)]) if outline else 0.0
+        return _standard_errors(chosen.sum(2) + known)
+
+    def located(self) -> float:
+        """Share of the places where both x and y are known twice as well as by a guess [-]."""
+        sigma = self.sigma(outline=True)
+        return float(np.mean((sigma[..., 1] < self.guess_m[0] / 2) & (sigma[..., 2] < self.guess_m[1] / 2)))
+
+    def best_tones(self) -> list[int]:
+        """Frequencies, counted from 0, by how much the median position error rises without them; the best first."""
+        everyone = range(len(self.frequency_hz))
+        missed = [
+            float(np.median(np.hypot(s[..., 1], s[..., 2])))
+            for s in (self.sigma([k for k in everyone if k != left_out], outline=True) for left_out in everyone)
+        ]
+        return sorted(everyone, key=lambda k: -missed[k])
+
+    def verdict(self) -> str:
+        """Whether these readings locate a press, in one sentence."""
+        share = self.located()
+        where = "everywhere" if share == 1 else f"on {share:.0%} of the sheet" if share else "nowhere"
+        x, y = (float(np.median(self.sigma(outline=True)[..., k])) / self.guess_m[k - 1] for k in (1, 2))
+        return f"locates a press {where}: typical error {x:.0%} of a guess's in x, {y:.0%} in y"
+
+
+def contact_sets(sheet: Sheet) -> dict[str, tuple[Port, ...]]:
+    """The usual sets, each port between a contact on top and the one that faces it on the bottom.
+
+    Pads of the corners are a tenth of the shorter side; contacts on two edges that meet leave as much free.
+
+    >>> [(name, len(ports)) for name, ports in contact_sets(Sheet(0.1, 0.1, (450.0, 450.0), 7e-8)).items()]
+    [('one-edge', 1), ('opposite', 2), ('two-edges', 2), ('corner', 1), ('corners', 4)]
+    """
+    pad = min(sheet.length_m, sheet.width_m) / 10
+    x, y = ((0.0, pad), (sheet.length_m - pad, sheet.length_m)), ((0.0, pad), (sheet.width_m - pad, sheet.width_m))
+
+    def edge(name: str, start_m: float = 0.0, stop_m: float | None = None) -> Port:
+        return sheet.edge("top", name, start_m, stop_m), sheet.edge("bottom", name, start_m, stop_m)
+
+    def corner(at_x: tuple[float, float], at_y: tuple[float, float]) -> Port:
+        return Contact(SIDES[0], at_x, at_y), Contact(SIDES[1], at_x, at_y)
+
+    return {
+        "one-edge": (edge("left"),),
+        "opposite": (edge("left"), edge("right")),
+        "two-edges": (edge("left", pad, sheet.width_m - pad), edge("front", pad, sheet.length_m - pad)),
+        "corner": (corner(x[0], y[0]),),
+        "corners": tuple(corner(at_x, at_y) for at_x in x for at_y in y),
+    }
+
+
+def bounds(
+    sheet: Sheet, ports: Sequence[Port], frequency_hz: ArrayLike, press: Patch, per_newton: Mapping[str, float],
+    noise: float, places: int, done: Callable[[int], object] | None,
+) -> Bounds:  # fmt: skip
+    """Bounds over the sheet; see :func:`sensorgen.models.sheet.localise`."""
+    check("noise", noise, above=True)
+    if places < 1:
+        raise OutOfRange(f"bounds need one place or more along each side, not {places}")
+    tones = frequencies(frequency_hz)
+    _refuse_depth(sheet, float(tones.max()), press)
+    middle = _moved(press, (sheet.length_m - press.length_m) / 2, (sheet.width_m - press.width_m) / 2)
+    cells = solution(sheet, ports, tones, middle, (), None, ACCURACY).cells
+    x, y = (np.linspace(0.0, end, places) for end in (sheet.length_m - press.length_m, sheet.width_m - press.width_m))
+    information = np.empty((places, places, len(tones), 3, 3))
+    for count, (i, j) in enumerate(np.ndindex(places, places)):
+        if done:
+            done(count)
+        found = solution(sheet, ports, tones, _moved(press, float(x[i]), float(y[j])), BY, cells, ACCURACY)
+        z = np.einsum("fpp->fp", found.impedance_ohm)
+        by = {name: np.einsum("fpp->fp", value) / z for name, value in found.by.items()}
+        by_force = sum((by[name] * slope for name, slope in per_newton.items()), np.zeros_like(z))
+        information[i, j] = _information(np.stack([by_force, by["x_m"], by["y_m"]]), sheet, noise)
+    guess = (sheet.length_m / 12**0.5, sheet.width_m / 12**0.5)
+    return Bounds(x + press.length_m / 2, y + press.width_m / 2, tones, information, guess, cells)
+
+
+def _refuse_depth(sheet: Sheet, highest_hz: float, press: Patch) -> None:
+    """Refuse at once what would compute for hours: cells have to be as small as the depth, and each place has them."""
+    depth, side = depth_m(sheet, highest_hz, press), max(sheet.length_m, sheet.width_m)
+    if depth < SHALLOWEST * side:
+        most = highest_hz * (depth / (SHALLOWEST * side)) ** 2
+        raise OutOfRange(
+            f"at {highest_hz:g} Hz current reaches {depth:.3g} m; bounds take {SHALLOWEST:.0%} or more of the sheet's "
+            f"{side:g} m: use frequencies up to {most:.2g} Hz"
+        )
+
+
+def _moved(press: Patch, x_m: float, y_m: float) -> Patch:
+    return replace(press, x_m=max(x_m, 0.0), y_m=max(y_m, 0.0))
+
+
+def _information(relative: NDArray[np.complex128], sheet: Sheet, noise: float) -> Real:
+    """Of each frequency, from relative derivatives (3, tones, ports); noise relative to the magnitude in both parts."""
+    scale = np.array([1.0, sheet.length_m, sheet.width_m])[:, None, None]
+    rows = np.concatenate([relative.real, relative.imag], axis=2) / noise
+    rows[np.abs(rows) * noise * scale < _ROUNDING] = 0.0
+    return np.asarray(np.einsum("afk,bfk->fab", rows, rows))
+
+
+def _standard_errors(information: Real) -> Real:
+    """Square roots of the diagonal of the inverse; inf for what a singular information leaves open."""
+    own = np.sqrt(np.einsum("...aa->...a", information))
+    unit = np.where(own > 0, own, 1.0)
+    values, vectors = np.linalg.eigh(information / (unit[..., :, None] * unit[..., None, :]))
+    known = values > _SINGULAR
+    weight = np.where(known, 1 / np.where(known, values, 1.0), 0.0)
+    errors = np.sqrt(np.einsum("...ak,...k->...a", vectors**2, weight)) / unit
+    open_ = np.einsum("...ak,...k->...a", vectors**2, ~known) > _SINGULAR**0.5
+    return np.where(open_, np.inf, errors)

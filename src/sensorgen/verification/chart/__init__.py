@@ -54,8 +54,8 @@ def kind_of(scene: str) -> ModuleType:
 
 def _silent(scene: str, found: Sequence[Point]) -> Iterator[Silent]:
     spoke, kind = {p.model.partition(":")[0] for p in found}, kind_of(scene)
-    refused = kind.unfit(scene)
-    for name in registry.names(models):
+    refused = kind.why_not_applicable(scene)
+    for name in models.names():
         if name not in spoke:
             yield Silent(scene, name, refused.get(name) or f"{_about(name)} Not {kind.ASKED}.")
 

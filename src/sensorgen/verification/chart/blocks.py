@@ -139,11 +139,13 @@ def points(name: str, budget_s: float) -> list[Point]:
     return [_point(name, standard, *found) for found in (*_cheap(standard), *_solved(standard, budget_s))]
 
 
-def unfit(name: str) -> dict[str, str]:
+def why_not_applicable(name: str) -> dict[str, str]:
     """Why models of compression cannot speak of a scene."""
     standard = STANDARD[name]()
-    flat = "it holds the body along its depth" if not standard.plane else press2d.unfit(standard.scene) or ""
-    deep = press3d.unfit(standard.scene) or "free sides give way in both directions, not along x alone"
+    flat = (
+        "it holds the body along its depth" if not standard.plane else press2d.why_not_applicable(standard.scene) or ""
+    )
+    deep = press3d.why_not_applicable(standard.scene) or "free sides give way in both directions, not along x alone"
     return {"press2d": flat or "the mesher is not installed (extra fem)", "press3d": deep,
             "springs": "beside the strip nothing reaches the top"}  # fmt: skip
 
@@ -167,7 +169,7 @@ def _cheap(standard: Standard) -> Found:
 
 def _solved(standard: Standard, budget_s: float) -> Found:
     """The same by finite elements from coarse to fine, in two and in three dimensions."""
-    if standard.plane and has_mesher() and not press2d.unfit(standard.scene):
+    if standard.plane and has_mesher() and not press2d.why_not_applicable(standard.scene):
         yield from _finer(
             "press2d", [(f"mesh {k}, ", partial(_flat, standard, m)) for k, m in enumerate(_MESHES, 1)], budget_s
         )

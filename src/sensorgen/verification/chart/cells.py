@@ -10,8 +10,7 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design import design as designs
-from sensorgen.models import thesis_cells
-from sensorgen.prediction import capacitance as planner
+from sensorgen.models import capacitance_models, thesis_cells
 from sensorgen.scene.scene import Scene
 from sensorgen.verification.chart import exact
 from sensorgen.verification.chart.measured import Point, timed
@@ -87,10 +86,10 @@ def points(name: str, budget_s: float) -> list[Point]:
     return [*_formulas(name, standard), *_bounds(name, standard, budget_s)]
 
 
-def unfit(name: str) -> dict[str, str]:
+def why_not_applicable(name: str) -> dict[str, str]:
     """Why models of capacitance cannot speak of a scene."""
     scene = STANDARD[name]().scene
-    said = {model: module.unfit(scene) for model, module in planner.capacitance_models().items()}
+    said = {model: module.why_not_applicable(scene) for model, module in capacitance_models().items()}
     only = "it has formulas of tri and rect alone"
     return {model: why for model, why in said.items() if why} | {"thesis_cells": only}
 
@@ -98,8 +97,8 @@ def unfit(name: str) -> dict[str, str]:
 def _bounds(name: str, standard: Standard, budget_s: float) -> Iterator[Point]:
     """Every model with bounds, from coarse to fine."""
     area = standard.scene.size_mm[0] * standard.scene.size_mm[1] * M_PER_MM**2
-    for model, module in planner.capacitance_models().items():
-        if module.unfit(standard.scene):
+    for model, module in capacitance_models().items():
+        if module.why_not_applicable(standard.scene):
             continue
         given = (standard.scene, standard.permittivity)
         for wanted, interval, seconds in _rungs(module.capacitance, given, module, budget_s):
@@ -110,7 +109,7 @@ def _rungs(
     work: Callable[..., Interval], given: tuple[Any, ...], module: Any, budget_s: float
 ) -> Iterator[tuple[float | None, Interval, float]]:
     """Width that was asked for, bounds and seconds; each time for a decade less than was reached."""
-    if not hasattr(module, "WIDTH"):
+    if math.inf == module.WIDTH:
         yield (None, *timed(lambda: work(*given)))
         return
     wanted, last = 0.1, math.inf

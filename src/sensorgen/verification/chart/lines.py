@@ -16,16 +16,25 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import compression, line, line_abcd, line_closed, line_ladder, line_tip, sheet, stack
 from sensorgen.models.sheet import Patch, Sheet
-from sensorgen.solvers.line.inputs import read
+from sensorgen.solvers.line.inputs import PressedLine, read
 from sensorgen.verification.chart.measured import DIGITS, Point, timed
 
 ASKED = "the impedance of a pressed line"
 
 # The plate of Table 3.1, pressed in its middle.
 PLATE = {
-    "L_m": 0.1, "W_m": 0.01, "H_top_m": 3e-4, "H_bottom_m": 3e-4, "rho_top_ohm_m": 0.07, "rho_bottom_ohm_m": 0.2,
-    "d_m": 6e-4, "eps_r": 4.68, "E_Pa": 6e6, "L_p_m": 0.01, "x_p_left_edge_m": 0.045,
-}  # fmt: skip
+    "length_m": 0.1,
+    "width_m": 0.01,
+    "top_thickness_m": 3e-4,
+    "bottom_thickness_m": 3e-4,
+    "top_resistivity_ohm_m": 0.07,
+    "bottom_resistivity_ohm_m": 0.2,
+    "film_m": 6e-4,
+    "eps_r": 4.68,
+    "modulus_pa": 6e6,
+    "tip_m": 0.01,
+    "left_m": 0.045,
+}
 
 
 @dataclass(frozen=True)
@@ -46,9 +55,9 @@ class Standard:
     force_n: float = 3.0
     profile: str = "uniform"
 
-    def inputs(self) -> dict[str, Any]:
-        """What models of a flat tip are given."""
-        return PLATE | {"F_N": self.force_n, "f_Hz": np.array(list(self.known))}
+    def line(self) -> PressedLine:
+        """Inputs of models of a flat tip."""
+        return PressedLine(**PLATE, force_n=self.force_n, frequency_hz=np.array(list(self.known)))
 
 
 STANDARD = {
@@ -103,7 +112,7 @@ def _closed(name: str) -> Iterator[Point]:
         "line": line.impedance,
         "line_abcd": line_abcd.impedance,
         "line_closed": line_closed.impedance,
-        "line_closed: B.48 as printed": partial(line_closed.impedance, "B.48"),
+        "line_closed: B.48 as printed": partial(line_closed.impedance, as_printed="B.48"),
         "line_closed: uniform": line_closed.uniform,
         "line_closed: R and C in series": line_closed.series,
         "stack: one film": _stack,
@@ -117,16 +126,17 @@ def _closed(name: str) -> Iterator[Point]:
 
 def _grown(name: str, budget_s: float) -> Iterator[Point]:
     """Ladders, grids and pieces of a tip, from coarse to fine."""
-    tip = partial(_tip, STANDARD[name].profile)
+    tip = partial(_tip, profile=STANDARD[name].profile)
     pieces = _PIECES if STANDARD[name].profile != "uniform" else _PIECES[:1]
-    for model, work, cells, kind in (
+    models: list[tuple[str, Model, tuple[int, ...], str]] = [
         ("line_ladder", line_ladder.impedance, _LADDERS, "cells"),
         ("sheet", _sheet, _GRIDS, "cells"),
         ("line_tip", tip, pieces, "pieces"),
-    ):
+    ]
+    for model, work, cells, kind in models:
         for number in cells:
             try:
-                point = _point(name, model, partial(work, number), f"{number} {kind}, ")
+                point = _point(name, model, partial(work, **{kind: number}), f"{number} {kind}, ")
             except OutOfRange:
                 break  # current reaches less deep than a cell
             yield point
@@ -134,45 +144,55 @@ def _grown(name: str, budget_s: float) -> Iterator[Point]:
                 break
 
 
-def unfit(name: str) -> dict[str, str]:
+def why_not_applicable(name: str) -> dict[str, str]:
     """Why models of lines cannot speak of a scene."""
     if STANDARD[name].profile == "uniform":
         return {"pressure": "a flat tip presses evenly"}
     return {"pressure": "it cuts the tip into the pieces of line_tip"}
 
 
-def _stack(**inputs: Any) -> Any:
+def _stack(line: PressedLine) -> Any:
     """Two tracks and the film between them."""
-    sections = read(inputs).sections()
+    sections = read(line).sections()
     tracks = [[0.5 * r, 0.5 * r] for r in sections.r_ohm_per_m]  # what a loop runs through is their sum
     return stack.impedance(tracks, [[y] for y in sections.y_s_per_m], sections.length_m)[..., 0, 0]
 
 
-def _sheet(cells: int, **inputs: Any) -> Any:
+def _sheet(line: PressedLine, cells: int) -> Any:
     """Two sheets with contacts all along one edge, pressed across their whole width."""
-    p = inputs
-    resistances = p["rho_top_ohm_m"] / p["H_top_m"], p["rho_bottom_ohm_m"] / p["H_bottom_m"]
-    plate = Sheet(p["L_m"], p["W_m"], resistances, EPS0_F_PER_M * p["eps_r"] / p["d_m"])
-    thinner = 1 / (1 - p["F_N"] / (p["W_m"] * p["L_p_m"] * p["E_Pa"]))
-    press = Patch(p["x_p_left_edge_m"], 0.0, p["L_p_m"], p["W_m"], thinner)
+    p = vars(line)
+    resistances = (
+        p["top_resistivity_ohm_m"] / p["top_thickness_m"],
+        p["bottom_resistivity_ohm_m"] / p["bottom_thickness_m"],
+    )
+    plate = Sheet(p["length_m"], p["width_m"], resistances, EPS0_F_PER_M * p["eps_r"] / p["film_m"])
+    thinner = 1 / (1 - p["force_n"] / (p["width_m"] * p["tip_m"] * p["modulus_pa"]))
+    press = Patch(p["left_m"], 0.0, p["tip_m"], p["width_m"], thinner)
     contacts = plate.edge("top", "left"), plate.edge("bottom", "left")
-    return sheet.impedance(plate, [contacts], p["f_Hz"], press, cells)[:, 0, 0]
+    return sheet.impedance(plate, [contacts], p["frequency_hz"], press, cells)[:, 0, 0]
 
 
-def _tip(profile: str, pieces: int, **inputs: Any) -> Any:
+def _tip(line: PressedLine, pieces: int, profile: str) -> Any:
     """The patch in pieces, each with its own pressure."""
-    p, law = inputs, compression.unconfined(inputs["E_Pa"])
-    r = (p["rho_top_ohm_m"] / p["H_top_m"] + p["rho_bottom_ohm_m"] / p["H_bottom_m"]) / p["W_m"]
-    track = line_tip.Track(p["L_m"], r, 0.0, EPS0_F_PER_M * p["eps_r"] * p["W_m"] / p["d_m"], 0.0, 0.0, "open")
-    middle, contact = p["x_p_left_edge_m"] + p["L_p_m"] / 2, (np.asarray(p["L_p_m"]), np.zeros(()))
-    tip = line_tip.resting(p["L_m"], p["W_m"], (profile, pieces), np.asarray(p["F_N"]), np.asarray(middle), contact)
-    return line_tip.impedance(track, tip, law, p["f_Hz"])
+    p = vars(line)
+    law = compression.unconfined(p["modulus_pa"])
+    r = (
+        p["top_resistivity_ohm_m"] / p["top_thickness_m"] + p["bottom_resistivity_ohm_m"] / p["bottom_thickness_m"]
+    ) / p["width_m"]
+    track = line_tip.Track(
+        p["length_m"], r, 0.0, EPS0_F_PER_M * p["eps_r"] * p["width_m"] / p["film_m"], 0.0, 0.0, "open"
+    )
+    middle, contact = p["left_m"] + p["tip_m"] / 2, (np.asarray(p["tip_m"]), np.zeros(()))
+    tip = line_tip.resting(
+        p["length_m"], p["width_m"], (profile, pieces), np.asarray(p["force_n"]), np.asarray(middle), contact
+    )
+    return line_tip.impedance(track, tip, law, p["frequency_hz"])
 
 
 def _point(name: str, model: str, work: Model, said: str = "") -> Point:
     standard = STANDARD[name]
     known = np.array(list(standard.known.values()))
-    found, seconds = timed(lambda: work(**standard.inputs()))
+    found, seconds = timed(lambda: work(standard.line()))
     whole = float(np.max(abs(found - known) / abs(known)))
     real = float(np.max(abs(found.real - known.real) / abs(known.real)))
     words = f"{said}abs(Z) off by {whole:.2g}, Re Z by {real:.2g}"

@@ -42,7 +42,7 @@ def points(name: str, budget_s: float) -> list[Point]:
     return found
 
 
-def unfit(_: str) -> dict[str, str]:
+def why_not_applicable(_: str) -> dict[str, str]:
     """Why models of compression cannot speak of it."""
     return {"press3d": "its bricks have upright walls", "springs": "nothing presses it", "compression": "it is no film"}
 
@@ -56,7 +56,7 @@ def edge(cells: int) -> float:
     from sensorgen.solvers.contact.mesh import of_triangles
 
     mesh = of_triangles(*_grid(cells))
-    full = np.full(len(mesh.triangles), 1.0)
+    full = np.full(len(mesh.outer), 1.0)
     elements = element.Elements(mesh, element.law(_MODULUS * full, _RATIO * full))
     x = mesh.points_m[:, 0]
     force = np.zeros(2 * len(x))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sensorgen.asprinted.rectilinear import plate
 from sensorgen.models import line, sheet, stack, traxels
 from sensorgen.models.sheet import Sheet
-from sensorgen.solvers.network.lines import Lines
+from sensorgen.solvers.network.nodes import Lines
 from sensorgen.verification.chart.measured import DIGITS, Point, timed
 
 ASKED = "what a network of tracks, sheets or lines conducts"
@@ -109,7 +109,7 @@ def points(name: str, budget_s: float) -> list[Point]:
     return list(_points(name, STANDARD[name](), budget_s))
 
 
-def unfit(_: str) -> dict[str, str]:
+def why_not_applicable(_: str) -> dict[str, str]:
     """Why models of networks cannot speak of a scene."""
     other = "this network is of another kind"
     return {"stack": other, "sheet": other, "traxels": other, "line": other}

@@ -100,10 +100,10 @@ def points(name: str, budget_s: float) -> list[Point]:
     return [_point(name, model, said, value, expected, floor, seconds) for model, said, value, seconds in found]
 
 
-def unfit(name: str) -> dict[str, str]:
+def why_not_applicable(name: str) -> dict[str, str]:
     """Why models of compression cannot speak of a scene."""
     film, what = STANDARD[name]
-    said = {"press3d": press3d.unfit(_scene(CELLS[film])) or "", "press2d": _MISSING}
+    said = {"press3d": press3d.why_not_applicable(_scene(CELLS[film])) or "", "press2d": _MISSING}
     if what == _DOWN:
         return said | {"thesis_swept": "the displacement is what it is given"}
     return said | {"springs": "it has a displacement and no capacitance"}

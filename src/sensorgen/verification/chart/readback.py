@@ -6,6 +6,7 @@ of force, as a share of it, and position, as a share of the sensor's length.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
@@ -22,9 +23,9 @@ _LINE = lines.STANDARD["line, seven tones"]
 _TONES = np.array(list(_LINE.known))
 _READING = np.array(list(_LINE.known.values()))
 _FIT_HZ, _FIT = 10.1e3, 3  # tone of the thesis's fit, and its place among all
-_LENGTH_M, _TIP_M = lines.PLATE["L_m"], lines.PLATE["L_p_m"]
+_LENGTH_M, _TIP_M = lines.PLATE["length_m"], lines.PLATE["tip_m"]
 
-STANDARD = {"press read back": (_LINE.force_n, lines.PLATE["x_p_left_edge_m"] + _TIP_M / 2)}  # [N], centre [m]
+STANDARD = {"press read back": (_LINE.force_n, lines.PLATE["left_m"] + _TIP_M / 2)}  # [N], centre [m]
 
 Press = tuple[float, float]
 
@@ -45,7 +46,7 @@ def points(name: str, _: float) -> list[Point]:
     return [_point(name, model, *timed(work)) for model, work in ways.items()]
 
 
-def unfit(_: str) -> dict[str, str]:
+def why_not_applicable(_: str) -> dict[str, str]:
     """Why models of the line are not asked: only what turns around is."""
     return {}
 
@@ -54,7 +55,7 @@ def unfit(_: str) -> dict[str, str]:
 def _fitted(form: str) -> line_fit.LineFit:
     """The fit to presses all over the plate, by the line's own model."""
     force, x = (a.ravel() for a in np.meshgrid(np.linspace(1, 6, 6), np.linspace(0, _LENGTH_M - _TIP_M, 10)))
-    z = line.impedance(**lines.PLATE | {"F_N": force, "x_p_left_edge_m": x, "f_Hz": _FIT_HZ})
+    z = line.impedance(replace(line.PressedLine(**lines.PLATE, frequency_hz=_FIT_HZ), force_n=force, left_m=x))
     return line_fit.fit(force, x + _TIP_M / 2, *line_fit.series(_FIT_HZ, z), form)
 
 
@@ -72,10 +73,13 @@ def _as_printed() -> Press:
 @cache
 def _estimator() -> Estimator:
     p = lines.PLATE
-    film = EPS0_F_PER_M * p["eps_r"] * p["W_m"] / p["d_m"]
-    high, rho = (p["H_top_m"], p["H_bottom_m"]), (p["rho_top_ohm_m"], p["rho_bottom_ohm_m"])
-    law = compression.unconfined(p["E_Pa"])
-    return Estimator(Sensor(_LENGTH_M, p["W_m"], high, rho, film, law, _TIP_M), _TONES)
+    film = EPS0_F_PER_M * p["eps_r"] * p["width_m"] / p["film_m"]
+    high, rho = (
+        (p["top_thickness_m"], p["bottom_thickness_m"]),
+        (p["top_resistivity_ohm_m"], p["bottom_resistivity_ohm_m"]),
+    )
+    law = compression.unconfined(p["modulus_pa"])
+    return Estimator(Sensor(_LENGTH_M, p["width_m"], high, rho, film, law, _TIP_M), _TONES)
 
 
 def _sought() -> Press:

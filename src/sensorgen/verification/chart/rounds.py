@@ -44,7 +44,7 @@ def points(name: str, budget_s: float) -> list[Point]:
     return found
 
 
-def unfit(_: str) -> dict[str, str]:
+def why_not_applicable(_: str) -> dict[str, str]:
     """Why models of compression cannot speak of it."""
     no_film = "it tells how far the top comes down, and not where bodies touch"
     return {"press2d": "the mesher is not installed (extra fem)", "press3d": "a prism is no box",
@@ -68,17 +68,14 @@ def _formula() -> float:
 
 def _solved(side_mm: float) -> float:
     """Length of a half ellipse of pressure that has the second moment of what the faces push."""
-    from sensorgen.solvers.contact import rays
-
     stress = [0.0, _load_n_per_m() / (2 * _RADIUS_MM * M_PER_MM)]
     fineness = Fineness(side_mm, 0.1, 0.1, 0.3)
     _, run = press2d._solved(_cylinder(side_mm), _SOLIDS, stress, Held(top="rigid"), fineness, lambda _: None)
     state = run.states[-1]
     places = run.problem.places(state.u_m)
+    here = run.problem.faces.rays(places).here_m
     push = np.maximum(-run.problem.gaps(state.pairs, state.u_m), 0) * state.pairs.stiffness_pa
-    points = len(rays.POINTS)
-    side, point = np.divmod(state.pairs.point % (points * len(run.faces.sides)), points)
-    x = (rays.shapes(rays.POINTS[point]) * places[run.faces.sides[side], 0]).sum(axis=1) - places[:, 0].max()
+    x = here[state.pairs.point % len(here), 0] - places[:, 0].max()
     return float(4 * np.sqrt((push * x**2).sum() / push.sum()))
 
 

@@ -26,8 +26,8 @@ STEP_M = 1e-6  # that stands for a Delta x
 INPUT_V = 1.0
 
 TRACKS = {
-    "W_m": WIDTH_M, "H_top_m": HEIGHT_M, "H_bottom_m": HEIGHT_M, "rho_top_ohm_m": RHO_OHM_M,
-    "rho_bottom_ohm_m": RHO_OHM_M, "d_m": FILM_M, "eps_r": EPS_R, "f_Hz": FREQUENCY_HZ,
+    "width_m": WIDTH_M, "top_thickness_m": HEIGHT_M, "bottom_thickness_m": HEIGHT_M, "top_resistivity_ohm_m": RHO_OHM_M,
+    "bottom_resistivity_ohm_m": RHO_OHM_M, "film_m": FILM_M, "eps_r": EPS_R, "frequency_hz": FREQUENCY_HZ,
 }  # fmt: skip
 
 AREA_M2 = HEIGHT_M * WIDTH_M
@@ -59,7 +59,7 @@ class Line:
     @cached_property
     def impedance_ohm(self) -> complex:
         """At the contacts."""
-        return complex(line.impedance(L_m=LENGTH_M, **TRACKS))
+        return complex(line.impedance(line.PressedLine(length_m=LENGTH_M, **TRACKS)))
 
     @cached_property
     def input_a(self) -> complex:
@@ -87,8 +87,8 @@ class Line:
     def transfer(self, x_m: ArrayLike) -> tuple[Complex, Complex, Complex]:
         """A11 = A22, A12 and A21 of a piece of the line, from its impedances."""
         length = np.asarray(x_m, float)
-        far_open = line.impedance(L_m=length, **TRACKS)
-        far_short = line.impedance(L_m=length, far_end="short", **TRACKS)
+        far_open = line.impedance(line.PressedLine(length_m=length, **TRACKS))
+        far_short = line.impedance(line.PressedLine(length_m=length, far_end="short", **TRACKS))
         same = np.sqrt(far_open / (far_open - far_short))
         return same, -far_short * same, -same / far_open
 

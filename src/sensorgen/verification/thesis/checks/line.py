@@ -154,8 +154,8 @@ def bottom_track() -> list[Part]:
 
 def slice_impedance() -> list[Part]:
     """B.13: a slice whose tracks do not resist."""
-    plain = TRACKS | {"rho_top_ohm_m": 0.0, "rho_bottom_ohm_m": 0.0}
-    ours = line.impedance(L_m=STEP_M, **plain)
+    plain = TRACKS | {"top_resistivity_ohm_m": 0.0, "bottom_resistivity_ohm_m": 0.0}
+    ours = line.impedance(line.PressedLine(length_m=STEP_M, **plain))
     whole = FILM_M / (1j * OMEGA * EPS0_F_PER_M * EPS_R * WIDTH_M * STEP_M)
     return [Part("by C", "ohm", ours, 1 / (1j * OMEGA * _SLICE_F)), Part("by permittivity", "ohm", ours, whole)]
 
@@ -171,7 +171,7 @@ def contacts() -> list[Part]:
 
 def far_end() -> list[Part]:
     """B.3: an open end, and one with so large a resistor that no current leaves; in both the potential ends flat."""
-    shut = line.impedance(L_m=LENGTH_M, far_end=_NO_CURRENT_OHM, **TRACKS)
+    shut = line.impedance(line.PressedLine(length_m=LENGTH_M, far_end=_NO_CURRENT_OHM, **TRACKS))
     flat = abs(LINE.input_a) * RHO_OHM_M / AREA_M2
     return [
         Part("Z", "ohm", LINE.impedance_ohm, shut),
@@ -181,7 +181,7 @@ def far_end() -> list[Part]:
 
 def return_current() -> list[Part]:
     """B.4: as both tracks carry one current, only the sum of their resistances shows; here of unequal ones."""
-    apart = {"rho_top_ohm_m": 0.5 * RHO_OHM_M, "rho_bottom_ohm_m": 1.5 * RHO_OHM_M}
-    ours = line.impedance(L_m=LENGTH_M, **TRACKS | apart)
-    printed = line_closed.uniform(L_m=LENGTH_M, **TRACKS)
+    apart = {"top_resistivity_ohm_m": 0.5 * RHO_OHM_M, "bottom_resistivity_ohm_m": 1.5 * RHO_OHM_M}
+    ours = line.impedance(line.PressedLine(length_m=LENGTH_M, **TRACKS | apart))
+    printed = line_closed.uniform(line.PressedLine(length_m=LENGTH_M, **TRACKS))
     return [Part("Re Z", "ohm", np.real(ours), np.real(printed)), Part("Im Z", "ohm", np.imag(ours), np.imag(printed))]

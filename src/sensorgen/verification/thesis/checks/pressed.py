@@ -25,10 +25,16 @@ _CELLS = 2000  # of a ladder: its error is below 1e-6 then
 _LEAST_HZ, _MOST_HZ, _HALVINGS = 1e5, 1e7, 60
 
 _TRACKS: dict[str, Any] = {
-    "L_m": LENGTH_M, "W_m": WIDTH_M, "H_top_m": HEIGHT_M, "H_bottom_m": HEIGHT_M, "rho_top_ohm_m": RHO_OHM_M,
-    "rho_bottom_ohm_m": RHO_OHM_M, "d_m": FILM_M, "eps_r": EPS_R,
-}  # fmt: skip
-_PRESS = {"F_N": _FORCE_N, "E_Pa": _MODULUS_PA, "L_p_m": _PATCH_M, "x_p_left_edge_m": _LEFT_M}
+    "length_m": LENGTH_M,
+    "width_m": WIDTH_M,
+    "top_thickness_m": HEIGHT_M,
+    "bottom_thickness_m": HEIGHT_M,
+    "top_resistivity_ohm_m": RHO_OHM_M,
+    "bottom_resistivity_ohm_m": RHO_OHM_M,
+    "film_m": FILM_M,
+    "eps_r": EPS_R,
+}
+_PRESS = {"force_n": _FORCE_N, "modulus_pa": _MODULUS_PA, "tip_m": _PATCH_M, "left_m": _LEFT_M}
 _RESISTANCE_OHM = 2 * RHO_OHM_M * LENGTH_M / (HEIGHT_M * WIDTH_M)
 _CAPACITANCE_F = CAPACITANCE_F_PER_M * LENGTH_M
 
@@ -43,10 +49,10 @@ def _both(name: str, ours: Any, printed: Any) -> list[Part]:
 def in_series() -> list[Part]:
     """2.24, B.54: a resistor and a capacitor in series, in place of a line, at the lowest tone."""
     tone = _TONES_HZ[0]
-    ours = line.impedance(f_Hz=tone, **_TRACKS)
+    ours = line.impedance(line.PressedLine(frequency_hz=tone, **_TRACKS))
     printed = _RESISTANCE_OHM + 1 / (2j * np.pi * tone * _CAPACITANCE_F)
     real, imaginary = _both("Z", ours, printed)
-    rise = [float(np.real(line.impedance(f_Hz=f, **_TRACKS))) for f in _TONES_HZ]
+    rise = [float(np.real(line.impedance(line.PressedLine(frequency_hz=f, **_TRACKS)))) for f in _TONES_HZ]
     return [real, imaginary, Part("Re Z, lowest and highest tone", "ohm", np.array(rise))]
 
 
@@ -64,18 +70,18 @@ def corner() -> list[Part]:
 
 def _falls_by(share: float) -> float:
     """Frequency at which Re Z is lower than at low frequency by a share, by halving in the logarithm [Hz]."""
-    rest = float(np.real(line.impedance(f_Hz=1.0, **_TRACKS)))
+    rest = float(np.real(line.impedance(line.PressedLine(frequency_hz=1.0, **_TRACKS))))
     low, high = np.log(_LEAST_HZ), np.log(_MOST_HZ)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        fallen = 1 - float(np.real(line.impedance(f_Hz=np.exp(middle), **_TRACKS))) / rest
+        fallen = 1 - float(np.real(line.impedance(line.PressedLine(frequency_hz=np.exp(middle), **_TRACKS)))) / rest
         low, high = (middle, high) if fallen < share else (low, middle)
     return float(np.exp(low))
 
 
 def parts_of_z() -> list[Part]:
     """5.1: resistance and capacitance that a reading is taken apart into make it up again."""
-    ours = line.impedance(f_Hz=_TONES_HZ, **_TRACKS, **_PRESS)
+    ours = line.impedance(line.PressedLine(frequency_hz=_TONES_HZ, **_TRACKS, **_PRESS))
     made = []
     for tone, z in zip(_TONES_HZ, ours, strict=True):
         c, r = line_fit.series(tone, z)
@@ -97,27 +103,41 @@ def thinner() -> list[Part]:
 
 def piezoresistive() -> list[Part]:
     """B.50: a line that is pressed all along, of a film that does not give way, is one of more resistivity."""
-    stiff = {"E_Pa": 1e30, "L_p_m": LENGTH_M, "F_N": _FORCE_N}
-    ours = line.impedance(f_Hz=_TONES_HZ, **_TRACKS, **stiff, S_n_top_per_N=_S_PER_N, S_n_bottom_per_N=_S_PER_N)
+    stiff = {"modulus_pa": 1e30, "tip_m": LENGTH_M, "force_n": _FORCE_N}
+    ours = line.impedance(
+        line.PressedLine(
+            frequency_hz=_TONES_HZ,
+            **_TRACKS,
+            **stiff,
+            top_piezoresistance_per_n=_S_PER_N,
+            bottom_piezoresistance_per_n=_S_PER_N,
+        )
+    )
     more = RHO_OHM_M * (1 + _S_PER_N * _FORCE_N)
-    printed = line_closed.uniform(f_Hz=_TONES_HZ, **_TRACKS | {"rho_top_ohm_m": more, "rho_bottom_ohm_m": more})
+    printed = line_closed.uniform(
+        line.PressedLine(
+            frequency_hz=_TONES_HZ, **_TRACKS | {"top_resistivity_ohm_m": more, "bottom_resistivity_ohm_m": more}
+        )
+    )
     return _both("Z", ours, printed)
 
 
 def three_sections() -> list[Part]:
     """B.51: product of the three sections' matrices as in B.44 to B.47; and as textbooks have it."""
-    given = _TRACKS | _PRESS | {"f_Hz": _TONES_HZ}
-    ours = line.impedance(**given)
+    given = _TRACKS | _PRESS | {"frequency_hz": _TONES_HZ}
+    ours = line.impedance(line.PressedLine(**given))
     return [
-        *_both("Z", ours, line_closed.impedance(**given)),
-        *_both("Z by cosh and sinh", ours, line_abcd.impedance(**given)),
+        *_both("Z", ours, line_closed.impedance(line.PressedLine(**given))),
+        *_both("Z by cosh and sinh", ours, line_abcd.impedance(line.PressedLine(**given))),
     ]
 
 
 def ladder() -> list[Part]:
     """2.3, 2.4, B.4, B.5: a chain of resistors and capacitors, each cell's capacitance halved between its ends."""
-    given = _TRACKS | _PRESS | {"f_Hz": _TONES_HZ[1]}
-    return _both("Z", line.impedance(**given), line_ladder.impedance(_CELLS, **given))
+    given = _TRACKS | _PRESS | {"frequency_hz": _TONES_HZ[1]}
+    return _both(
+        "Z", line.impedance(line.PressedLine(**given)), line_ladder.impedance(line.PressedLine(**given), _CELLS)
+    )
 
 
 def cog_resistance() -> list[Part]:
@@ -130,6 +150,8 @@ def cog_resistance() -> list[Part]:
 def reactance_of(eps_r: float) -> list[Part]:
     """2.6, 2.8: a capacitor's impedance, and the positive number that stands for it."""
     tone = float(_TONES_HZ[0])
-    plain = _TRACKS | {"rho_top_ohm_m": 0.0, "rho_bottom_ohm_m": 0.0, "eps_r": eps_r}
+    plain = _TRACKS | {"top_resistivity_ohm_m": 0.0, "bottom_resistivity_ohm_m": 0.0, "eps_r": eps_r}
     printed = FILM_M / (2 * np.pi * tone * EPS0_F_PER_M * eps_r * WIDTH_M * LENGTH_M)
-    return [Part("X", "ohm", line.impedance(f_Hz=tone, **plain), complex(printed), printed / 1j)]
+    return [
+        Part("X", "ohm", line.impedance(line.PressedLine(frequency_hz=tone, **plain)), complex(printed), printed / 1j)
+    ]

@@ -1,0 +1,183 @@
+"""Electrode resistance, reading by reading: predicted, measured, and the ratio of the two."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import exp, isfinite, nan
+from statistics import median
+from typing import Annotated
+
+from sensorgen.analysis.comparison import Compared, Comparison
+from sensorgen.analysis.plots.figure import GREEN, GREY, ORANGE, PINK, SKY, YELLOW, Axis, Curve, Figure, Panel
+from sensorgen.analysis.report.tables import Column, Table
+from sensorgen.measure.signal.verdicts import WORDS
+
+VERDICT_COLOURS = dict(zip(WORDS, (PINK, ORANGE, YELLOW, SKY, GREEN, GREY), strict=True))
+MOST_ROWS = 200  # of a figure: more cannot be read
+_ALIKE = 1.05  # ratio up to which two resistances are called alike
+NOTES = (
+    "The predicted interval runs from the better electrode with all its cogs to the worse one without them, because "
+    "the log does not say which of the two was measured. The ratio is that of the least reading and the middle of the "
+    "interval.",
+    "A leaking film lets a part of the current pass through the other electrode: the reading then falls by up to half.",
+)
+
+
+@dataclass(frozen=True)
+class ReadingRow:
+    """A reading beside its prediction."""
+
+    number: Annotated[int, Column("reading", "", "number in the log")]
+    specimen: Annotated[str, Column("specimen")]
+    design: Annotated[str, Column("design")]
+    measured_ohm: Annotated[
+        float, Column("electrode resistance measured", "ohm", "the least reading along an electrode")
+    ]
+    highest_ohm: Annotated[
+        float, Column("highest reading", "ohm", "the highest of several readings along an electrode")
+    ]
+    lower_ohm: Annotated[float, Column("predicted from", "ohm", "lower bound")]
+    predicted_ohm: Annotated[float, Column("predicted", "ohm", "middle of the interval")]
+    upper_ohm: Annotated[float, Column("predicted to", "ohm", "upper bound")]
+    ratio: Annotated[float, Column("measured / predicted")]
+    within: Annotated[str, Column("within interval", "", "whether a reading lies between the bounds")]
+    film_ohm: Annotated[float, Column("film resistance measured", "ohm", "the least reading between the electrodes")]
+    film_highest_ohm: Annotated[float, Column("highest film reading", "ohm", "the highest of several readings")]
+    film_ratio: Annotated[float, Column("film / electrode", "", "ratio of the two resistances")]
+    leak_s: Annotated[float, Column("leak", "S", "conductance of a film that leaks evenly")]
+    verdict: Annotated[str, Column("verdict")]
+
+
+@dataclass(frozen=True)
+class VerdictRow:
+    """A verdict and its reasons."""
+
+    number: Annotated[int, Column("reading", "", "number in the log")]
+    specimen: Annotated[str, Column("specimen")]
+    verdict: Annotated[str, Column("verdict")]
+    electrode: Annotated[str, Column("electrode")]
+    film: Annotated[str, Column("film")]
+    remark: Annotated[str, Column("remark")]
+    doubts: Annotated[str, Column("doubts")]
+
+
+def readings(found: Comparison) -> Table:
+    """A row for each reading, the largest deviation first."""
+    ordered = sorted(found.rows, key=lambda row: -abs(row.residual) if isfinite(row.residual) else 1.0)
+    return Table("readings", "Every reading and its prediction; the largest deviation first", tuple(map(_row, ordered)))
+
+
+def _row(row: Compared) -> ReadingRow:
+    r, v = row.reading, row.verdict
+    expected = row.predicted.ry_ohm if row.predicted else None
+    bounds = (expected.lower, expected.middle(), expected.upper) if expected else (nan, nan, nan)
+    within = {None: "", True: "yes", False: "no"}[row.inside]
+    return ReadingRow(
+        r.number, r.specimen, row.predicted.design if row.predicted else "", v.ry_ohm,
+        max(row.evidence.ry_ohm, default=nan), *bounds, exp(row.residual), within, v.rz_ohm,
+        max(row.evidence.rz_ohm, default=nan), v.ratio, v.leak_s, v.word,
+    )  # fmt: skip
+
+
+def reasons(found: Comparison) -> Table:
+    """Verdicts with reasons, remarks and doubts, in the order of the log."""
+    rows = []
+    for row in found.rows:
+        r, (electrode, film) = row.reading, row.verdict.reasons
+        rows.append(VerdictRow(r.number, r.specimen, row.verdict.word, electrode, film, r.remark, "; ".join(r.doubts)))
+    return Table("verdicts", "Verdicts and their reasons", tuple(rows))
+
+
+def usable(found: Comparison) -> list[Compared]:
+    """Rows with a prediction, and an electrode that is neither open nor so low that a prefix k was lost."""
+    return [r for r in found.rows if isfinite(r.residual) and r.verdict.electrode in ("sound", "dry joint")]
+
+
+def headline(found: Comparison) -> Iterator[str]:
+    """Measured against predicted, in one sentence."""
+    rows = usable(found)
+    if len(rows) == 1 and rows[0].predicted and rows[0].predicted.ry_ohm:
+        expected, where = rows[0].predicted.ry_ohm, "within" if rows[0].inside else "outside"
+        yield (
+            f"Electrode resistance of {rows[0].reading.specimen}: measured {rows[0].verdict.ry_ohm:.4g} ohm, predicted "
+            f"{expected.lower:.4g} to {expected.upper:.4g} ohm ({where} the interval)."
+        )
+    elif rows:
+        ratio = median(exp(r.residual) for r in rows)
+        off = max(ratio, 1 / ratio)
+        words = "as predicted" if off < _ALIKE else f"{off:.3g} x {'higher' if ratio > 1 else 'lower'} than predicted"
+        yield (
+            f"Electrode resistance: measured {words} (median of {len(rows)} readings; "
+            f"{sum(bool(r.inside) for r in rows)} within the predicted interval)."
+        )
+    elif found.rows:
+        yield "Electrode resistance: no reading can be compared with a prediction."
+
+
+def findings(found: Comparison) -> Iterator[str]:
+    """When predictions were made, and which electrodes touch as drawn."""
+    made = sum(not p.stored_at for p in found.predictions.values())
+    if found.predictions:
+        late = f"; {made} made after the measurement" if made else ""
+        yield f"{len(found.predictions) - made} of {len(found.predictions)} predictions were stored in the log{late}."
+    touching = Counter(r.predicted.design for r in found.rows if r.predicted and r.predicted.touches)
+    if touching:
+        names = ", ".join(f"{name} ({count})" for name, count in sorted(touching.items()))
+        yield f"Shorted by design, the electrodes touch as drawn: {names}; {touching.total()} readings."
+
+
+def figures(found: Comparison) -> tuple[Figure, ...]:
+    """Measured over predicted, and both in ohm."""
+    known = [row for row in found.rows if isfinite(row.residual)]
+    every = sorted((row for row in known if row.verdict.electrode != "unknown"), key=lambda row: row.residual)
+    if not every:
+        return ()
+    rows = every if len(every) <= MOST_ROWS else every[: MOST_ROWS // 2] + every[-MOST_ROWS // 2 :]
+    low, more = len(known) - len(every), len(every) - len(rows)
+    left_out = f" Left out: {low} readings too low for an electrode." if low else ""
+    left_out += f" Not drawn: {more} readings of moderate ratio." if more else ""
+    both = _resistances(sorted(rows, key=lambda row: row.reading.number))
+    return (_ratios(rows, left_out), both) if len(rows) > 1 else (both,)
+
+
+def _names(rows: Sequence[Compared]) -> tuple[str, ...]:
+    """Names of the rows, with the reading's number where a specimen was measured twice."""
+    count = Counter(row.reading.specimen for row in rows)
+    return tuple(
+        row.reading.specimen + (f" (no. {row.reading.number})" if count[row.reading.specimen] > 1 else "")
+        for row in rows
+    )
+
+
+def _ratios(rows: Sequence[Compared], left_out: str) -> Figure:
+    names, values = _names(rows), [exp(row.residual) for row in rows]
+    bounds = [row.predicted.ry_ohm if row.predicted else None for row in rows]
+    low, high = ([getattr(b, end) / b.middle() if b else 1.0 for b in bounds] for end in ("lower", "upper"))
+    curves = [Curve("ranges", "predicted interval", [1.0] * len(rows), names, low, high, colour=GREY)]
+    for word in dict.fromkeys(row.verdict.word for row in rows):
+        here = [k for k, row in enumerate(rows) if row.verdict.word == word]
+        curves.append(
+            Curve("points", word, [values[k] for k in here], [names[k] for k in here],
+                  text=["; ".join(rows[k].verdict.reasons) for k in here], colour=VERDICT_COLOURS[word])
+        )  # fmt: skip
+    panel = Panel(tuple(curves), Axis("measured / predicted", log=True), Axis(names=names))
+    inside = sum(bool(row.inside) for row in rows)
+    alt = (
+        f"{len(rows)} readings over the middle of their prediction, on a logarithmic axis; {inside} lie within the "
+        f"predicted interval.{left_out}"
+    )
+    return Figure("residuals", "Electrode resistance: measured / predicted", alt, {"": (panel,)})
+
+
+def _resistances(rows: Sequence[Compared]) -> Figure:
+    names = _names(rows)
+    bounds = [row.predicted.ry_ohm for row in rows if row.predicted and row.predicted.ry_ohm]
+    least, most = [min(r.evidence.ry_ohm) for r in rows], [max(r.evidence.ry_ohm) for r in rows]
+    curves = (
+        Curve("ranges", "predicted interval", [b.middle() for b in bounds], names, [b.lower for b in bounds],
+              [b.upper for b in bounds], colour=GREY),
+        Curve("points", "measured, with the spread of its readings", least, names, least, most),
+    )  # fmt: skip
+    panel = Panel(curves, Axis("electrode resistance [ohm]", log=True), Axis(names=names))
+    alt = "Resistance along an electrode of each specimen: predicted interval as a bar, readings as points."
+    return Figure("resistance", "Electrode resistance: measured and predicted", alt, {"": (panel,)})

@@ -1,0 +1,255 @@
+"""CSV tables of numbers, read block by block.
+
+The separator is the commonest of ``;``, tab and ``,`` in the header; with ``;``, numbers may have decimal commas. Empty
+cells are nan. Rows are counted as an editor counts them: the header is row 1. NumPy converts a block at once; where it
+fails, cells are converted one by one, so that the message can name the cell.
+"""
+
+import csv
+import sys
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import datetime
+from itertools import islice
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.errors import BadInput
+
+BLOCK_ROWS = 1 << 14
+LONGEST_LINE = 1 << 16
+SAME_NAMES: Mapping[str, str] = {}
+
+
+@dataclass(frozen=True)
+class Block:
+    """Consecutive rows of a table.
+
+    Attributes
+    ----------
+    rows : list of int
+        Row numbers in the file.
+    numbers : (n, k) array
+        Columns that were asked for as numbers; nan where a cell is empty.
+    text : list of list of str
+        Columns that were asked for as text, row by row.
+    """
+
+    rows: list[int]
+    numbers: NDArray[np.float64]
+    text: list[list[str]]
+
+
+class Table:
+    """A CSV table whose header has been read.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for messages.
+    file : text stream
+        Opened with ``errors="surrogateescape"``.
+    columns : mapping of str to str
+        From the file's column names to sensorgen's.
+
+    Attributes
+    ----------
+    names : list of str
+        Columns, by sensorgen's names where ``columns`` has them.
+    truncated : bool
+        Whether an incomplete last row was dropped.
+    """
+
+    def __init__(self, name: str, file: IO[str], columns: Mapping[str, str] = SAME_NAMES) -> None:
+        self.name, self.truncated = name, False
+        self._file, self._row = file, 0
+        header = self._line()
+        if not header.strip():
+            raise BadInput(f"{name}: the file is empty; expected a header and rows below it")
+        self._separator = separator_of(header)
+        names = [cell.strip() for cell in self._cells(1, header)]
+        for given in columns:
+            if given not in names:
+                raise self.error(1, f"no column {given!r}, which the map of columns names; columns: {listed(names)}")
+        self.names = [columns.get(cell, cell) for cell in names]
+
+    def error(self, row: int, message: str) -> BadInput:
+        """Error with file and row."""
+        return BadInput(f"{self.name}, row {row}: {message}")
+
+    def blocks(
+        self, numbers: Sequence[int], text: Sequence[int] = (), size: int = BLOCK_ROWS, *, dates: Collection[int] = (),
+        truncated: bool = False,
+    ) -> Iterator[Block]:  # fmt: skip
+        """Rows, up to ``size`` at a time.
+
+        Parameters
+        ----------
+        numbers, text : sequence of int
+            Columns to give as numbers and as text.
+        size : int
+            Lines of a block.
+        dates : collection of int
+            Columns of ``numbers`` that may hold dates with a time zone; given in seconds since 1970.
+        truncated : bool
+            Whether the last row may be incomplete, as after a run that was stopped; it is dropped then.
+
+        Raises
+        ------
+        BadInput
+            A row with too few or too many cells, a cell that is no finite number, bytes that are not UTF-8, or no rows.
+        """
+        empty = True
+        while batch := [(self._row, line) for line in islice(iter(self._line, ""), size)]:
+            last = batch[-1][1]
+            if truncated and not last.endswith("\n") and last.count(self._separator) < len(self.names) - 1:
+                self.truncated = True
+                batch.pop()
+            filled = [(row, line) for row, line in batch if not line.isspace()]
+            if filled:
+                empty = False
+                yield self._block([row for row, _ in filled], [line for _, line in filled], numbers, text, dates)
+        if empty:
+            raise BadInput(f"{self.name}: no rows below the header")
+
+    def _line(self) -> str:
+        line = self._file.readline(LONGEST_LINE)
+        self._row += bool(line)
+        if len(line) == LONGEST_LINE:
+            raise self.error(self._row, f"longer than {LONGEST_LINE} characters; expected a CSV table")
+        try:
+            _ = line.isascii() or line.encode()
+        except UnicodeEncodeError as error:  # bytes that were not UTF-8 are lone surrogates in the text
+            byte = ord(line[error.start]) & 0xFF
+            message = f"character {error.start + 1}: byte {byte:#04x} is not UTF-8; save the file as CSV in UTF-8"
+            raise BadInput(f"{self.name}, row {self._row}, {message}") from None
+        if "\0" in line:
+            raise self.error(self._row, "a zero byte; expected text")
+        return line
+
+    def _block(
+        self, rows: list[int], lines: list[str], numbers: Sequence[int], text: Sequence[int], dates: Collection[int]
+    ) -> Block:
+        simple = all(line.count(self._separator) == len(self.names) - 1 and '"' not in line for line in lines)
+        values = self._converted_at_once(lines, numbers) if simple else None
+        if values is None:
+            cells = [self._cells(row, line) for row, line in zip(rows, lines, strict=True)]
+        else:  # no quotes: every separator separates, and splitting is faster
+            cells = [line.rstrip("\r\n").split(self._separator) if text else [] for line in lines]
+        if values is None:
+            values = np.array([
+                [self._number(row, line[at], at, date=at in dates) for at in numbers]
+                for row, line in zip(rows, cells, strict=True)
+            ]).reshape(len(rows), len(numbers))  # fmt: skip
+        return Block(rows, values, [[line[at] for at in text] for line in cells])
+
+    def _converted_at_once(self, lines: list[str], numbers: Sequence[int]) -> NDArray[np.float64] | None:
+        """All numbers of a block, or None where a cell is empty, no number, or infinite."""
+        if self._separator == ";":
+            lines = [line.replace(",", ".") for line in lines]
+        try:
+            values = np.loadtxt(lines, delimiter=self._separator, usecols=numbers, comments=None, ndmin=2, dtype=float)
+        except ValueError:
+            return None
+        return None if np.isinf(values).any() else values
+
+    def _cells(self, row: int, line: str) -> list[str]:
+        separator = self._separator
+        try:
+            cells = next(csv.reader([line], delimiter=separator, strict=True))
+        except csv.Error as error:
+            advice = "close every quotation mark just before a separator, and end rows with a line feed"
+            raise self.error(row, f"this is no row of a CSV file ({error}); {advice}") from None
+        wanted = len(self.names) if row > 1 else len(cells)
+        if len(cells) == wanted:
+            return cells
+        decimal = separator == "," and len(cells) > wanted
+        advice = "; if the numbers have decimal commas, write ';' between the columns" if decimal else ""
+        raise self.error(row, f"{len(cells)} cells, but the header has {wanted}{advice}")
+
+    def _number(self, row: int, text: str, column: int, *, date: bool) -> float:
+        try:
+            return number(text, decimal_comma=self._separator == ";", date=date)
+        except BadInput as error:
+            raise error.within(f"{self.name}, row {row}, column {self.names[column]}") from None
+
+
+@contextmanager
+def opened(path: Path | str, columns: Mapping[str, str] = SAME_NAMES) -> Iterator[Table]:
+    """Open a CSV file; "-" is the standard input.
+
+    Raises
+    ------
+    BadInput
+        A file that is missing or cannot be read; a header without a column that ``columns`` names.
+    """
+    if path == "-":
+        if hasattr(sys.stdin, "reconfigure"):
+            sys.stdin.reconfigure(encoding="utf-8-sig", errors="surrogateescape", newline="\n")
+        yield Table("standard input", sys.stdin, columns)
+        return
+    if Path(path).is_dir():
+        raise BadInput(f"{path} is a folder; expected a CSV file")
+    with _open(path) as file:
+        yield Table(str(path), file, columns)
+
+
+def _open(path: Path | str) -> IO[str]:
+    try:
+        return Path(path).open(encoding="utf-8-sig", errors="surrogateescape", newline="\n")
+    except (OSError, ValueError) as error:
+        raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
+
+
+def separator_of(header: str) -> str:
+    """Commonest of ``;``, tab and ``,`` in a header."""
+    return max(";\t,", key=header.count)
+
+
+def listed(names: Sequence[str]) -> str:
+    """First names of a header, for a message."""
+    return (", ".join(names[:8]) or "none") + (", ..." if len(names) > 8 else "")
+
+
+def number(text: str, *, decimal_comma: bool = False, date: bool = False) -> float:
+    """Number in a cell; nan where it is empty.
+
+    Raises
+    ------
+    BadInput
+        No finite number.
+
+    Examples
+    --------
+    >>> number("1,5", decimal_comma=True), number("1970-01-01T00:01:00Z", date=True), number(" ")
+    (1.5, 60.0, nan)
+    """
+    stripped = text.strip()
+    if decimal_comma:
+        if "," in stripped and "." in stripped:
+            raise BadInput(f"{text[:60]!r} has a point and a comma; write numbers as 1234.5 or 1234,5")
+        stripped = stripped.replace(",", ".")
+    value = None
+    try:
+        value = float(stripped) if stripped else np.nan
+    except ValueError:
+        if date:
+            value = _seconds(stripped)
+    if value is None or "_" in stripped or not stripped.isascii():  # Python reads 1_0 and other scripts' digits too
+        raise BadInput(f"{text[:60]!r} is not a number; leave the cell empty where nothing was measured")
+    if np.isinf(value):
+        raise BadInput(f"{text[:60]!r} is not finite; leave the cell empty where nothing was measured")
+    return value
+
+
+def _seconds(date: str) -> float | None:
+    """Seconds since 1970 of an ISO 8601 date with a time zone."""
+    try:
+        found = datetime.fromisoformat(date)
+    except ValueError:
+        return None
+    return found.timestamp() if found.tzinfo else None

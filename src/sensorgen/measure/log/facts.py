@@ -1,0 +1,156 @@
+"""Summary of a recording as it was logged: samples, marks, frequencies and clocks; JSON in the field ``facts``."""
+
+import math
+from dataclasses import dataclass, field
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from sensorgen.core.errors import BadInput
+
+if TYPE_CHECKING:
+    from sensorgen.measure.recording import Joined, Recording, RigLog
+
+
+@dataclass(frozen=True)
+class LockIn:
+    """Recording of one lock-in.
+
+    Attributes
+    ----------
+    tones_hz : tuple of float
+        Frequencies [Hz].
+    counts : dict of str to int
+        Samples, valid samples, and samples with each mark.
+    seconds : float
+        Time of the last sample [s].
+    format, program, lockin, rate_hz, bandwidth_hz, notes
+        As in :class:`sensorgen.measure.recording.Source`; None for nan.
+    epoch_s : float or None
+        Real time at time 0, in seconds since 1970 [s].
+    """
+
+    tones_hz: tuple[float, ...]
+    counts: dict[str, int]
+    seconds: float
+    format: str
+    program: str = ""
+    lockin: int = 1
+    rate_hz: float | None = None
+    bandwidth_hz: float | None = None
+    epoch_s: float | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Log of the rig beside a recording.
+
+    Attributes
+    ----------
+    rows, errors : int
+        Rows, and rows with an error.
+    samples : int
+        Samples of the recording without a sound row beside them.
+    clocks : str
+        Offset of the clocks as text.
+    offset_s, offset_error_s, skew, skew_error, explained
+        As in :class:`sensorgen.measure.recording.Joined`; None for nan.
+    notes : tuple of str
+        Remarks.
+    """
+
+    rows: int
+    errors: int
+    samples: int = 0
+    clocks: str = ""
+    offset_s: float | None = None
+    offset_error_s: float | None = None
+    skew: float | None = None
+    skew_error: float | None = None
+    explained: float | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Summary of a recording.
+
+    Attributes
+    ----------
+    lockins : tuple of LockIn
+        Every lock-in of the file.
+    columns, rig_columns : dict of str to str
+        From the columns of the files to sensorgen's, to read the files again.
+    rig : Rig or None
+        None without a log of the rig.
+    """
+
+    lockins: tuple[LockIn, ...] = ()
+    columns: dict[str, str] = field(default_factory=dict)
+    rig_columns: dict[str, str] = field(default_factory=dict)
+    rig: Rig | None = None
+
+
+def to_json(facts: Facts) -> str:
+    """Facts as JSON."""
+    return str(_adapter().dump_json(facts, exclude_none=facts.rig is None).decode())
+
+
+def from_json(text: str) -> Facts:
+    """Facts of a logged recording.
+
+    Raises
+    ------
+    BadInput
+        Not the JSON that :func:`to_json` writes.
+    """
+    from pydantic import ValidationError
+
+    try:
+        facts: Facts = _adapter().validate_json(text)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise BadInput(f"the facts of a recording are damaged: {where}: {first['msg']}") from None
+    return facts
+
+
+@cache
+def _adapter() -> Any:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(Facts)
+
+
+def summarised(
+    recordings: "tuple[Recording, ...]", columns: dict[str, str], rig: "RigLog | None", rig_columns: dict[str, str]
+) -> Facts:
+    """Facts of recordings, joined with the rig's log if there is one."""
+    from sensorgen.measure.recording import joined_all
+
+    joined = joined_all(recordings, rig) if rig else ()
+    marked = [one.recording for one in joined] or recordings  # joining marks the rig's errors
+    lockins = tuple(_lockin(one) for one in marked)
+    return Facts(lockins, dict(columns), dict(rig_columns), _rig(rig, joined[0]) if rig else None)
+
+
+def _lockin(recording: "Recording") -> LockIn:
+    source = recording.source
+    return LockIn(
+        tuple(recording.tones_hz.tolist()), recording.counts(), float(recording.time_s[-1]), source.format,
+        source.program, source.lockin, _known(source.rate_hz), _known(source.bandwidth_hz), _known(recording.epoch_s),
+        source.notes,
+    )  # fmt: skip
+
+
+def _rig(log: "RigLog", joined: "Joined") -> Rig:
+    return Rig(
+        **log.counts(), samples=joined.recording.counts()["rig error"], clocks=joined.clock_text(), notes=joined.notes,
+        offset_s=_known(joined.offset_s), offset_error_s=_known(joined.offset_error_s), skew=_known(joined.skew),
+        skew_error=_known(joined.skew_error), explained=_known(joined.explained),
+    )  # fmt: skip
+
+
+def _known(value: float) -> float | None:
+    """The number, or None for nan and infinity, which JSON lacks."""
+    return value if math.isfinite(value) else None

@@ -1,0 +1,129 @@
+"""Transcribe notes of a measurement to a row of the log, with everything in them that is doubtful."""
+
+import dataclasses
+import re
+import uuid
+from collections.abc import Iterator
+from functools import lru_cache
+
+from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.design import specimen_name
+from sensorgen.design.design import Design
+from sensorgen.measure.log import resistances
+from sensorgen.measure.log.entries import SPECIMEN_COLUMNS, Reading, Specimen
+from sensorgen.measure.log.resistances import Resistances
+
+MAX_REMARK = 10_000  # characters
+FIRST_WITH_FILMS = 22  # iteration from which on the thesis writes films into names
+_UNBAKED = re.compile(r"\b(not|un|never)[\s-]*baked\b|\bbefore (the )?bak(e|ing)\b", re.IGNORECASE)
+
+
+def specimen(written: str) -> Specimen:
+    """Specimen by its name.
+
+    Raises
+    ------
+    BadInput
+        The name cannot be parsed.
+    """
+    name = specimen_name.parse(written)
+    return Specimen(specimen=name.name, **{key: getattr(name, key) for key in SPECIMEN_COLUMNS[1:]})
+
+
+def reading(
+    written: str, y_words: str = "", z_words: str = "", *, remark: str = "", baked: bool | None = None,
+    measured_at: str = "", instrument: str = "", source: str = "typed", source_row: int | None = None,
+    supersedes: str = "", uid: str = "", table: bool = False, mega: bool = False,
+) -> Reading:  # fmt: skip
+    """Reading of the multimeter, from text.
+
+    Parameters
+    ----------
+    written : str
+        Name of the specimen as written.
+    y_words, z_words : str
+        Resistance along an electrode and between the electrodes, as written; "" if not measured.
+    remark : str
+        Any text; "not baked" in it counts unless ``baked`` is given.
+    baked : bool or None
+        Whether the specimen had been baked; None if unknown.
+    measured_at, instrument, source, source_row, supersedes
+        As in :class:`Reading`.
+    uid : str
+        Identity of the row; random if not given.
+    table : bool
+        Whether the text comes from a table, where a blank beside a reading may be an overload.
+    mega : bool
+        Whether a small m is known to mean mega, so that it is not doubtful.
+
+    Raises
+    ------
+    BadInput
+        A name or a resistance that cannot be parsed; the message names the column.
+
+    Examples
+    --------
+    >>> r = reading("23 triY .1mm xfine", "75k", "1.1m", remark="not baked")
+    >>> r.specimen, r.y_ohm, r.z_ohm, r.baked
+    ('23 triY .1mm xfine', (75000.0,), (1100000.0,), False)
+    """
+    if len(remark) > MAX_REMARK:
+        raise BadInput(f"a remark of {len(remark)} characters; expected at most {MAX_REMARK}")
+    if any("\0" in text for text in (remark, written, y_words, z_words)):
+        raise BadInput("a zero byte in a name, a value or a remark; expected text")
+    of, name = specimen(written), specimen_name.parse(written)
+    y, z = resistance("y", y_words, mega=mega), resistance("z", z_words, mega=mega)
+    unbaked = bool(_UNBAKED.search(remark))
+    film_expected = (name.iteration or 0) < FIRST_WITH_FILMS
+    doubts = [doubt for doubt in name.assumed if doubt != specimen_name.NO_FILM or film_expected]
+    doubts += [f"{axis}: {doubt}" for axis, parsed in (("y", y), ("z", z)) for doubt in parsed.doubts]
+    doubts += _blanks(y.ohm, z.ohm) if table else []
+    if unbaked and baked:
+        doubts.append("baked, but the remark says that it is not")
+    design_id, design = design_fields(written)
+    return Reading(
+        **vars(of), uid=uid or uuid.uuid4().hex, design_id=design_id, design=design, written=written,
+        y_words=y_words, z_words=z_words, y_ohm=y.ohm, z_ohm=z.ohm, remark=remark, doubts=tuple(doubts),
+        baked=False if baked is None and unbaked else baked, measured_at=measured_at, instrument=instrument,
+        source=source, source_row=source_row, supersedes=supersedes,
+    )  # fmt: skip
+
+
+def resistance(axis: str, text: str, *, mega: bool = False) -> Resistances:
+    """Parse a resistance in ``y`` or ``z``.
+
+    Raises
+    ------
+    BadInput
+        Not a resistance; the message names the axis.
+    """
+    try:
+        return resistances.parse(text, mega=mega)
+    except BadInput as error:
+        raise error.within(f"resistance in {axis.upper()}") from None
+
+
+def _blanks(y_ohm: tuple[float, ...], z_ohm: tuple[float, ...]) -> Iterator[str]:
+    if not y_ohm and not z_ohm:
+        yield "no measurement"
+    elif not y_ohm or not z_ohm:
+        yield f"{'z' if y_ohm else 'y'} blank: not measured, or an overload"
+
+
+def design_fields(written: str) -> tuple[str, str]:
+    """Identity and name of the design that a specimen's name stands for; "" where it stands for none."""
+    design = design_of(written)
+    return (design.id(), design.name) if design else ("", "")
+
+
+def design_of(written: str) -> Design | None:
+    """Design that a specimen's name stands for, or None."""
+    return _design(dataclasses.replace(specimen_name.parse(written), iteration=None, replicate=None, place=""))
+
+
+@lru_cache(maxsize=256)
+def _design(name: specimen_name.Specimen) -> Design | None:
+    try:
+        return specimen_name.design_of(name)
+    except SensorgenError:  # a film that no design may have
+        return None

@@ -1,0 +1,237 @@
+"""Solution of symmetric sparse systems: LU of planar meshes, multifrontal Cholesky factors of solid ones.
+
+For the latter, blocks of unknowns are halved along planes; what lies on a plane is eliminated after both halves, by
+dense algebra (nested dissection and fronts: George 1973; Duff and Reid 1983). The order serves as long as the pattern
+stays.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.linalg import splu
+
+Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+_PIVOT = 1e-3  # share of its column below which a pivot of an indefinite matrix is exchanged [-]
+_LEAST = 60  # unknowns that are not halved any more
+_MOST_TURNS = 30  # of conjugate gradients, before new factors are made
+_ENOUGH = 1e-4  # residual over right side: Newton's method takes the rest away [-]
+
+
+def solved_by_lu(matrix: csr_matrix, right: Real, pivot: float = 0.0) -> Real:
+    """Solution of a symmetric system; pivots smaller than a share of their column are exchanged.
+
+    Raises
+    ------
+    RuntimeError
+        The matrix is exactly singular.
+    """
+    # columns one by one (relax, panel_size): the factors are too sparse for panels to pay
+    how = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}, "relax": 1, "panel_size": 1}
+    found: Real = splu(matrix.tocsc(), diag_pivot_thresh=pivot, **how).solve(right)
+    return found
+
+
+def by_lu(matrix: csr_matrix, right: Real) -> Real | None:
+    """Solution of a symmetric system that may be indefinite, or None where it is singular."""
+    try:
+        return solved_by_lu(matrix, right, _PIVOT)
+    except RuntimeError:
+        return None
+
+
+@dataclass(frozen=True)
+class Front:
+    """Unknowns that are eliminated together.
+
+    Attributes
+    ----------
+    start, stop : int
+        Which, in the order of elimination.
+    outer : (k,) array
+        Those after them that they are coupled with, also through what went before.
+    children : tuple of int
+        Fronts whose rest is added to this one.
+    """
+
+    start: int
+    stop: int
+    outer: Whole
+    children: tuple[int, ...]
+
+    def local(self, numbers: Whole) -> Whole:
+        """Where some unknowns, its own or outer ones, lie in it."""
+        inside = self.stop - self.start
+        return np.where(numbers < self.stop, numbers - self.start, inside + np.searchsorted(self.outer, numbers))
+
+
+@dataclass(frozen=True)
+class Order:
+    """In what order unknowns are eliminated, and in which fronts."""
+
+    turn: Whole
+    fronts: list[Front]
+
+
+def order_of(matrix: csr_matrix, places: Whole) -> Order:
+    """Nested dissection of the unknowns of a matrix.
+
+    Parameters
+    ----------
+    matrix : sparse (n, n)
+        Symmetric, of which only the pattern is used.
+    places : (n, 3) array
+        Of each unknown; blocks are cut at even places.
+    """
+    pieces: list[tuple[Whole, tuple[int, ...]]] = []
+    _dissected(matrix, places, np.arange(len(places)), pieces)
+    turn = np.concatenate([own for own, _ in pieces])
+    ends = np.cumsum([len(own) for own, _ in pieces])
+    turned = matrix[turn][:, turn]
+    fronts: list[Front] = []
+    for (own, children), stop in zip(pieces, ends.tolist(), strict=True):
+        start = stop - len(own)
+        near = [turned.indices[turned.indptr[start] : turned.indptr[stop]], *(fronts[c].outer for c in children)]
+        outer = np.unique(np.concatenate(near))
+        fronts.append(Front(start, stop, outer[outer >= stop].astype(np.int64), children))
+    return Order(turn, fronts)
+
+
+def _dissected(matrix: csr_matrix, places: Whole, block: Whole, pieces: list[tuple[Whole, tuple[int, ...]]]) -> int:
+    """Put a block's pieces into a list, what is eliminated first before the rest; the number of its last one."""
+    cut = _cut(places[block]) if len(block) > _LEAST else None
+    if cut is None:
+        pieces.append((block, ()))
+        return len(pieces) - 1
+    beyond = np.zeros(len(places), bool)
+    beyond[block[~cut]] = True
+    left = block[cut]
+    touches = matrix[left] @ beyond.astype(float) != 0
+    children = tuple(_dissected(matrix, places, half, pieces) for half in (left[~touches], block[~cut]) if len(half))
+    pieces.append((left[touches], children))
+    return len(pieces) - 1
+
+
+def _cut(places: Whole) -> NDArray[np.bool_] | None:
+    """The lower part of a block cut across its longest side at the even place nearest to the middle; or None."""
+    for axis in np.argsort(-np.ptp(places, axis=0), kind="stable"):
+        here = places[:, axis]
+        even = np.unique(here[here % 2 == 0])
+        even = even[(even >= here.min()) & (even < here.max())]
+        if even.size:
+            below = np.array([(here <= e).mean() for e in even])
+            return np.asarray(here <= even[np.abs(below - 0.5).argmin()])
+    return None
+
+
+@dataclass(frozen=True)
+class Factors:
+    """Of a positive matrix: of each front the inverse of its own triangle, and what couples it to the rest."""
+
+    order: Order
+    parts: list[tuple[Real, Real]]
+
+    def solve(self, right: Real) -> Real:
+        """What a right side makes."""
+        x = right[self.order.turn]
+        for front, (inverse, coupling) in zip(self.order.fronts, self.parts, strict=True):
+            own = x[front.start : front.stop] = inverse @ x[front.start : front.stop]
+            x[front.outer] -= own @ coupling
+        for front, (inverse, coupling) in zip(reversed(self.order.fronts), reversed(self.parts), strict=True):
+            own = x[front.start : front.stop] - coupling @ x[front.outer]
+            x[front.start : front.stop] = own @ inverse
+        found = np.empty_like(x)
+        found[self.order.turn] = x
+        return found
+
+
+def factored(matrix: csr_matrix, order: Order) -> Factors | None:
+    """Factors of a matrix, or None where it is not positive."""
+    from scipy.linalg import lapack
+
+    turned = matrix[order.turn][:, order.turn].tocsr()
+    rests: dict[int, Real] = {}
+    parts: list[tuple[Real, Real]] = []
+    for number, front in enumerate(order.fronts):
+        whole = _gathered(turned, front, [(order.fronts[c].outer, rests.pop(c)) for c in front.children])
+        n = front.stop - front.start
+        lower, failed = lapack.dpotrf(whole[:n, :n], lower=True, clean=True)
+        if failed:
+            return None
+        inverse = np.ascontiguousarray(lapack.dtrtri(lower, lower=True)[0]) if n else lower
+        coupling = inverse @ whole[:n, n:]
+        parts.append((inverse, coupling))
+        rests[number] = whole[n:, n:] - coupling.T @ coupling
+    return Factors(order, parts)
+
+
+def _gathered(turned: csr_matrix, front: Front, rests: list[tuple[Whole, Real]]) -> Real:
+    """A front with its own entries and what its children leave."""
+    n = front.stop - front.start
+    found = np.zeros((n + len(front.outer),) * 2)
+    low, high = turned.indptr[front.start], turned.indptr[front.stop]
+    rows = np.repeat(np.arange(n), np.diff(turned.indptr[front.start : front.stop + 1]))
+    columns = turned.indices[low:high]
+    later = columns >= front.start
+    here = front.local(columns[later])
+    found[rows[later], here] = turned.data[low:high][later]
+    for numbers, rest in rests:
+        at = front.local(numbers)
+        found[np.ix_(at, at)] += rest
+    return found
+
+
+@dataclass
+class Solver:
+    """Conjugate gradients, preconditioned by the factors of an earlier matrix while these serve.
+
+    Attributes
+    ----------
+    places : (n, 3) array
+        Of the unknowns, as for :func:`order_of`.
+    enough : float
+        Residual over right side that is small enough [-].
+    """
+
+    places: Whole
+    enough: float = _ENOUGH
+    _factors: Factors | None = field(default=None, repr=False)
+
+    def __call__(self, matrix: csr_matrix, right: Real) -> Real | None:
+        """Solution of a positive system, or None where it is not."""
+        found = self._iterated(matrix, right)
+        if found is None:
+            self._factors = factored(matrix, order_of(matrix, self.places))
+            found = self._iterated(matrix, right)
+        return found
+
+    def _iterated(self, matrix: csr_matrix, right: Real) -> Real | None:
+        if self._factors is None:
+            return None
+        for found, residual, _ in iterations(matrix, right, self._factors):
+            if np.abs(residual).max() < self.enough * np.abs(right).max():
+                return found
+        return None
+
+
+def iterations(matrix: csr_matrix, right: Real, factors: Factors) -> Iterator[tuple[Real, Real, float]]:
+    """Solution, residual and its energy in the factors' norm, turn by turn, while these serve."""
+    found, residual = np.zeros_like(right), right.copy()
+    direction, power = np.zeros_like(right), 1.0
+    for _ in range(_MOST_TURNS):
+        way = factors.solve(residual)
+        before, power = power, float(residual @ way)
+        if not (np.isfinite(power) and power > 0):
+            return
+        direction = way + power / before * direction
+        pushed = matrix @ direction
+        bearing = float(direction @ pushed)
+        if not bearing > 0:
+            return
+        share = power / bearing
+        found, residual = found + share * direction, residual - share * pushed
+        yield found, residual, power

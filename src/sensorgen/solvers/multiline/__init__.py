@@ -1,1 +1,0 @@
-"""Coupled lines of stacked electrodes."""
