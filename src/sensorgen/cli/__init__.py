@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from sensorgen import __version__
+from sensorgen.core.version import __version__
 from sensorgen.core.errors import SensorgenError, Unprintable
 
 COMMANDS = (

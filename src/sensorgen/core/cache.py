@@ -13,7 +13,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from sensorgen import __version__
+from sensorgen.core.version import __version__
 from sensorgen.core import files as store
 from sensorgen.core import paths as places
 from sensorgen.core.errors import Unwritable

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from sensorgen import __version__
+from sensorgen.core.version import __version__
 from sensorgen.checks.review import Review, Step, draw, report, review
 from sensorgen.core import files as store
 from sensorgen.core.errors import Unprintable

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sensorgen import __version__
+from sensorgen.core.version import __version__
 from sensorgen.asprinted.printed import rule7
 from sensorgen.checks.review import Review, review
 from sensorgen.checks.volumes import Row

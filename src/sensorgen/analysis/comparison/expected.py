@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sensorgen import __version__
+from sensorgen.core.version import __version__
 from sensorgen.core.bounds import Interval
 from sensorgen.design.design import Design
 from sensorgen.measure import log

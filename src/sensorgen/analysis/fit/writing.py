@@ -2,7 +2,7 @@
 
 import json
 
-from sensorgen import __version__
+from sensorgen.core.version import __version__
 from sensorgen.analysis.fit.results import Fit
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field
 
-from sensorgen import __version__
+from sensorgen.core.version import __version__
 from sensorgen.core.errors import BadInput
 from sensorgen.core.records import Strict, checked
 from sensorgen.measure.input_file import checked_head
