@@ -11,6 +11,8 @@ Names are imported when they are first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from sensorgen.core.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from sensorgen.core.bounds import Bounds as Bounds
     from sensorgen.design.body import Body as Body
@@ -27,8 +29,6 @@ if TYPE_CHECKING:
     from sensorgen.workflows.api import load as load
     from sensorgen.workflows.api import predict as predict
     from sensorgen.workflows.api import slice_design as slice_design
-
-__version__ = "0.1.0"
 
 _TYPES = {
     "Body": "design.body",

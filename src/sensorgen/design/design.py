@@ -13,12 +13,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from sensorgen import __version__
 from sensorgen.core import display, yamlfile
 from sensorgen.core import plugins as registry
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, shown
+from sensorgen.core.version import __version__
 from sensorgen.design import materials as material_files
 from sensorgen.design import shapes
 from sensorgen.design.materials import own

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +21,12 @@ from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.export.gcode import paths
 from sensorgen.measure.log import Log
-from sensorgen.models.press2d import Held
 from sensorgen.prediction import bodies, compression, evaluate, grid
 from sensorgen.prediction.identifiability import NOISE
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
 from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.sensor_model import FLAT, Tip
+from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.workflows import build as builds
 from sensorgen.workflows import display as display
 from sensorgen.workflows import slice as slicing
@@ -195,7 +196,9 @@ def compress(what: Design | Body, pressure_kpa: Sequence[float], *, accuracy: fl
     10.0
     """
     asked = compression.Asked(
-        compression.stresses_kpa(tuple(pressure_kpa)), Held(), accuracy=float("inf") if accuracy is None else accuracy
+        compression.stresses_kpa(tuple(pressure_kpa)),
+        BoundaryConditions(),
+        accuracy=float("inf") if accuracy is None else accuracy,
     )
     data = compression.answer(_body(what), asked)
     pressure, displacement, lower, upper = (

@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import Field
 
-from sensorgen import __version__
 from sensorgen.core.errors import BadInput
 from sensorgen.core.records import Strict, checked
+from sensorgen.core.version import __version__
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log import notes
 from sensorgen.measure.log.entries import Batch, Entry, Prediction, Print, RawFile
