@@ -25,12 +25,13 @@ from sensorgen.measure.log.logbook import TABLES, Log
 
 FORMATS = ("csv", "parquet")
 FILES = {kind: f"{table.replace('_', '-')}s" if table != "batch" else "batches" for kind, table in TABLES.items()}
+_COLUMNS = {kind: {k: v for k, v in entries.columns(kind).items() if k != "number"} for kind in TABLES}
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "'", "＝", "＋", "－", "＠")
 
 
 def columns(kind: type[Entry]) -> dict[str, Any]:
     """Columns of an exported table with their types: all fields but the row's number in its own log."""
-    return {name: annotation for name, annotation in entries.columns(kind).items() if name != "number"}
+    return _COLUMNS[kind]
 
 
 def kind_of(names: Iterable[str]) -> type[Entry] | None:

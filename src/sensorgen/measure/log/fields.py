@@ -9,7 +9,7 @@ import json
 import math
 from collections.abc import Callable
 from types import NoneType
-from typing import Any, get_args, get_origin
+from typing import Any, get_args
 
 Value = str | int | float | bool | tuple[float, ...] | tuple[str, ...] | None
 
@@ -28,10 +28,9 @@ def to_cell(value: Value) -> str:
 
 def from_cell(annotation: Any, cell: str) -> Value:
     """Value of a cell, by the field's type; ValueError, TypeError, KeyError or RecursionError for any other cell."""
-    if cell == "" and NoneType in get_args(annotation):
+    if cell == "" and annotation in _OPTIONAL:
         return None
-    value: Value = cell if annotation is str or get_origin(annotation) is tuple else json.loads(cell)
-    return from_sql(annotation, value)
+    return from_sql(annotation, cell if annotation in _TEXT else json.loads(cell))
 
 
 def from_sql(annotation: Any, value: object) -> Value:
@@ -90,3 +89,5 @@ FROM_SQL: dict[Any, Callable[[Any], Any]] = {
     tuple[str, ...]: _texts,
 }
 """From SQLite's value to the field's, by the field's type; errors as :func:`from_cell`."""
+_OPTIONAL = frozenset(annotation for annotation in FROM_SQL if NoneType in get_args(annotation))
+_TEXT = frozenset(FROM_SQL) - _OPTIONAL - {int}  # held as text in SQLite, too
