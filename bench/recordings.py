@@ -34,7 +34,7 @@ NOISE, RATE = 1e-3, 140.0
 READ = """
 import re, sys, time
 from pathlib import Path
-from sensorgen.recording import read
+from sensorgen.measure.recording import read
 start = time.process_time()
 found = read(sys.argv[1])
 peak = re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1]
