@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from sensorgen import checks
+from sensorgen.core.display import Displayed
 from sensorgen.core.findings import Finding
 from sensorgen.design import materials
 from sensorgen.design.design import Design, fields
@@ -20,7 +21,7 @@ _WIDENED = ("2-printed-gap", "5-width", LOST)  # rules that larger widths or a l
 
 
 @dataclass(frozen=True, eq=False)
-class Review:
+class Review(Displayed):
     """The printed bodies as meshes, by name, and all findings about them."""
 
     meshes: dict[str, Mesh]
@@ -100,7 +101,8 @@ def _advised(finding: Finding, parameters: list[str]) -> Finding:
     """A finding whose advice names parameters that the shape has."""
     wider = [name for name in parameters if name == "period_mm" or name.endswith("_width_mm")]
     if finding.rule in _WIDENED and finding.severity != "info" and wider:
-        return replace(finding, advice=f"{finding.advice} (increase {' or '.join(wider)})")
+        what, comma, more = finding.advice.partition(",")
+        return replace(finding, advice=f"{what} (increase {' or '.join(wider)}){comma}{more}")
     films = " or ".join(name for name in parameters if name.endswith("dielectric_mm"))
     return replace(finding, advice=finding.advice.replace("dielectric_mm", films)) if films else finding
 
