@@ -101,7 +101,7 @@ def report(log: Log, iteration: int, step: Callable[[str], None] = lambda _: Non
     iteration : int
         Of the design.
     step : callable
-        Called with each of ``STEPS`` before it is done.
+        Called with each of ``STEPS``, and with the name of each design to predict, before it is done.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def report(log: Log, iteration: int, step: Callable[[str], None] = lambda _: Non
         The log has no readings of the iteration.
     """
     step("readings")
-    found = of_iteration(log, iteration)
+    found = of_iteration(log, iteration, step)
     left_out = list(found.left_out)
     step("recordings")
     recorded = list(runs(log, iteration, left_out))
