@@ -168,7 +168,7 @@ def _verdicts(found: Comparison) -> Section:
 
 def _explained(found: Sequence[explained.Explanation]) -> Section:
     notes = (
-        "Each parameter is moved alone, for all specimens at once, until the squared residuals are least. Film "
+        "Each parameter is moved alone, for all specimens together, until the squared residuals are least. Film "
         "resistance is compared up to the meter's highest range, the prediction for a film without leakage; it is not "
         "compared where the electrodes touch as drawn.",
     )
