@@ -15,7 +15,7 @@ Pair = tuple[Body, Body]
 def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> Iterator[Finding]:
     """Findings about the electrode gaps; ``gap_mm`` is the exact smallest distance of the electrodes.
 
-    Of three electrodes or more, neighbours are held apart by plates: there the distance is that of their faces.
+    Of three electrodes or more, plates separate neighbours: there the distance is that of their faces.
     """
     pairs = [pair for pair in pairwise(_electrodes(slices.scene)) if pair[0].terminal != pair[1].terminal]
     for pair in pairs:

@@ -66,7 +66,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "arachne") 
     design : Design
         What to check.
     step : callable
-        Told what comes next, for a progress display.
+        Called with the next step, for a progress display.
     walls : str
         Of the slicer, one of :data:`sensorgen.checks.estimate.RULES`; those of PrusaSlicer's profile if not given.
 

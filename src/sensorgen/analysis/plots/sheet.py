@@ -18,7 +18,7 @@ _LEAST = 1 / 30  # of the guess's error, at which the colours begin
 def png(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Sequence["Port"]]) -> bytes:
     """Standard errors of x and y over the sheet, one column per set of contacts, as PNG.
 
-    The colours end at the error of a guess, that is of a reading without any information.
+    The colours end at the error of a uniform distribution, that is of a reading without any information.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def png(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Seque
         Matplotlib is not installed.
     """
     panels = tuple(_panel(film, name, bounds[name], ports[name], row) for row in (0, 1) for name in bounds)
-    title = "Standard error of a load's position, outline known; contacts red; the scale ends at a guess"
+    title = "Standard error of a load's position, outline known; contacts red; the scale ends at a uniform distribution"
     alt = "Standard errors of x above and of y below, over the sheet, one column per set of contacts."
     return static.png(Figure("sheet", title, alt, {"": panels}, columns=len(bounds)))
 

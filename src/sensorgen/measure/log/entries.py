@@ -37,9 +37,9 @@ class Specimen:
     iteration : int or None
         Of the design.
     shape, axes : str
-        As designs call them; "" where the name does not tell.
+        As designs call them; "" where the name lacks it.
     film_mm : float or None
-        Thickness of the film [mm], 0 for none; None where the name does not tell.
+        Thickness of the film [mm], 0 for none; None where the name lacks it.
     size_mm : float or None
         A size in the name that is no film [mm].
     replicate : int or None
@@ -77,9 +77,9 @@ class _OfSpecimen(Specimen, Entry):
     written : str
         The specimen's name as it was written down.
     design_id, design : str
-        Identity and name of the design that it was made from; "" where nobody knows.
+        Identity and name of the design that it was made from; "" if unknown.
     batch : str
-        The batch that it was printed in, "" where nobody knows.
+        The batch that it was printed in, "" if unknown.
     remark : str
         In the words of whoever measured.
     source : str
@@ -108,11 +108,11 @@ class Reading(_OfSpecimen):
     y_ohm, z_ohm : tuple of float
         The readings that the words stand for [ohm]; infinite for an overload, none where nothing was measured.
     baked : bool or None
-        Whether the specimen had been baked; None where nobody says.
+        Whether the specimen had been baked; None if not stated.
     doubts : tuple of str
-        What was read otherwise than written, in the name too, and what stays doubtful.
+        What was read otherwise than written, in the name too, and what remains uncertain.
     measured_at : str
-        When, as written down; "" where nobody says.
+        When, as written down; "" if not stated.
     instrument : str
         What an instrument calls itself; "" for words that a person wrote down.
     source_row : int or None

@@ -57,7 +57,7 @@ def svg(
     notes : sequence of str
         Further lines for the title block.
     printed : Scene, optional
-        What is printed of it, in boxes, to be outlined over the sections.
+        Its print, in boxes, to be outlined over the sections.
 
     Returns
     -------

@@ -166,7 +166,7 @@ def _cell(whole: list[Column], left: float, right: float, *, mirrored: bool) -> 
 
 
 def _add(edges: dict[Edge, tuple[int, int]], a: Point, b: Point, sides: tuple[int, int]) -> None:
-    """Add an edge from left to right, or from below upwards; what is known of it from its other side stays."""
+    """Add an edge from left to right, or from below upwards; data from its other side stay."""
     key = (_rounded(a), _rounded(b))
     known = edges.get(key, (OUTSIDE, OUTSIDE))
     edges[key] = (sides[0] or known[0], sides[1] or known[1])

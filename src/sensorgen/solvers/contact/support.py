@@ -1,4 +1,4 @@
-"""How a cell is held and loaded: which displacements are fixed or equal, and the pressure on its top."""
+"""Boundary conditions and load of a cell: which displacements are fixed or equal, and the pressure on its top."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING

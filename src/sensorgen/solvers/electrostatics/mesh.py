@@ -1,7 +1,7 @@
 """Where a stream function has one value, and where it jumps.
 
 No flux crosses a mirror: the function has one value along each. Around an island of electrode it grows by all the flux
-that ends there: a cut from each island to another boundary lets it jump by a value of its own.
+that ends there: a cut from each island to another boundary allows a jump by a value of its own.
 """
 
 from collections import defaultdict, deque
