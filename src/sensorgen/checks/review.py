@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from sensorgen import checks
+from sensorgen.core.display import Displayed
 from sensorgen.core.findings import Finding
 from sensorgen.design import materials
 from sensorgen.design.design import Design, fields
@@ -20,7 +21,7 @@ _WIDENED = ("2-printed-gap", "5-width", LOST)  # rules that larger widths or a l
 
 
 @dataclass(frozen=True, eq=False)
-class Review:
+class Review(Displayed):
     """The printed bodies as meshes, by name, and all findings about them."""
 
     meshes: dict[str, Mesh]

@@ -45,7 +45,7 @@ def lines(found: "Identifiability") -> Iterator[str]:
     for k, change in enumerate(found.changes):
         yield from _paragraph("" if k else "to improve", f"{k + 1}. {change.change}: {_known(change)}")
     if found.changes_together and len(found.changes) > 1:
-        yield f"{'':12}all at once: {_known(found.changes_together)}"
+        yield f"{'':12}all together: {_known(found.changes_together)}"
 
 
 def _frequency(row: "FrequencyInformation") -> str:
