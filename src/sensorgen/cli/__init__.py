@@ -89,7 +89,7 @@ def main() -> None:
     except (KeyboardInterrupt, click.Abort):
         code = _complain("interrupted; no file is half-written", 128 + signal.SIGINT)
     except _Terminated:
-        code = _complain("told to end; no file is half-written", 128 + signal.SIGTERM)
+        code = _complain("stopped; no file is half-written", 128 + signal.SIGTERM)
     except (OSError, UnicodeEncodeError) as error:
         _silence()
         code = _complain(f"cannot write the output: {getattr(error, 'strerror', None) or error}", WRONG_INPUT)

@@ -67,7 +67,7 @@ OWN: list[click.Parameter] = [
     ),
     click.Option(
         ["--compression"], type=OneOf(("unconfined", "bonded")),
-        help="How a plate gives way; the best that is known of the cell if not given.",
+        help="Compression law of a plate; the best of the cell if not given.",
     ),
     *body_options.body_options(),
     click.Option(["--json", "as_json"], is_flag=True, help="Print impedances, bounds, and their maps, as JSON."),
