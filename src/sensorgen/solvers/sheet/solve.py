@@ -211,7 +211,8 @@ class Bounds:
             Which frequencies, counted from 0; all unless given.
         outline : bool
             Whether it is known that the press is on the sheet, as a prior of its spread (van Trees): errors of
-            position then never exceed that of a uniform distribution, and an undetermined position does not affect the other errors.
+            position then never exceed that of a uniform distribution, and an undetermined position does not affect
+            the other errors.
         """
         chosen = self.information if tones is None else self.information[:, :, list(tones)]
         known = np.diag([0.0, *(1 / spread**2 for spread in self.guess_m)]) if outline else 0.0
@@ -292,7 +293,7 @@ def bounds(
 
 
 def _refuse_depth(sheet: Sheet, highest_hz: float, press: Patch) -> None:
-    """Refuse frequencies that would compute for hours: cells have to be as small as the depth, and each place has them."""
+    """Refuse frequencies that would compute for hours: cells have to be as small as the depth."""
     depth, side = depth_m(sheet, highest_hz, press), max(sheet.length_m, sheet.width_m)
     if depth < SHALLOWEST * side:
         most = highest_hz * (depth / (SHALLOWEST * side)) ** 2
