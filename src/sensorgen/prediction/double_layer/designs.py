@@ -108,7 +108,7 @@ def stack_of(sensors: Sequence[Sensor]) -> Stack:
         return Track(sensor.resistivity_ohm_m[end] / section, sensor.piezoresistance_per_pa[end])
 
     first = sensors[0]
-    films = [Film(s.capacitance_f_per_m, s.compression.thinning, s.tan_delta, s.leak_s_per_m) for s in sensors]
+    films = [Film(s.capacitance_f_per_m, s.compression.capacitive_strain, s.tan_delta, s.leak_s_per_m) for s in sensors]
     tracks = (track(first, 1), *(track(sensor, 0) for sensor in sensors))
     return Stack(first.length_m, first.width_m, tracks, tuple(films))
 

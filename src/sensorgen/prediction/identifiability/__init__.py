@@ -91,7 +91,7 @@ def identify(
     together = changes.together(setup, tried) if tried else None
     stiff = setup.on(stiffest).bounds() if stiffest else None
     stress = sensor.stress_pa(force_n, setup.position_m)
-    strain = float(sensor.compression.thinning(stress)[0])
+    strain = float(sensor.compression.capacitive_strain(stress)[0])
     return Identifiability(
         **vars(standard_errors(limits)),
         noise=noise,

@@ -1,0 +1,178 @@
+"""What commit 0645a80 wrote is read by today's code: a log with every kind of row, and the files beside it."""
+
+import csv
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from sensorgen.cli import main
+
+OLD = Path(__file__).parents[1] / "reference" / "0645a80"
+TABLES = ("batches", "bench-runs", "predictions", "prints", "raw-files", "readings")
+ROWS = 21  # as `log verify` of 0645a80 counted them
+SPECIMENS = {  # rows that `log show` of 0645a80 printed: readings with corrected ones, recordings, predictions
+    "59 triX .2mm": (1, 1, 1),
+    "59 triX .2mm 2": (1, 0, 1),
+    "59 triY .2mm": (1, 0, 0),
+    "59 sqXY .1mm x fine": (1, 0, 0),
+    "60 triX .2mm 1 fine": (2, 0, 1),
+    "60 triX .2mm 2 fine": (0, 0, 1),
+    "60 SX60 1 fine": (1, 0, 1),
+}
+
+
+@pytest.fixture
+def command(capfd, monkeypatch, tmp_path):
+    """Run a command in this process, in an empty folder; gives what it printed, and checks its exit code."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words, code=0):
+        monkeypatch.setattr(sys, "argv", ["sensorgen", *map(str, words)])
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as left:
+            main()
+        said = capfd.readouterr()
+        assert left.value.code == code, said.err
+        return said.out
+
+    return call
+
+
+@pytest.fixture
+def old(path):
+    """A copy of the old log with its raw files, where the command line looks for the log."""
+    shutil.copyfile(OLD / "log.db", path)
+    shutil.copytree(OLD / "log.db.files", path.with_name(f"{path.name}.files"))
+    return path
+
+
+def table(path):
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def as_then(rows, before):
+    """Rows with the columns that the old version had: a later one may add some."""
+    return [{name: row[name] for name in then} for row, then in zip(rows, before, strict=True)]
+
+
+def test_every_row_comes_out_as_it_went_in(old, command, tmp_path):
+    """The old version's own export beside today's, cell for cell; no table has more rows or fewer."""
+    command("log", "export", tmp_path / "now")
+    for name in TABLES:
+        before, now = table(OLD / "export" / f"{name}.csv"), table(tmp_path / "now" / f"{name}.csv")
+        assert as_then(now, before) == before, name
+
+
+def test_every_specimen_is_shown_with_all_its_rows(old, command):
+    readings = {row["uid"]: row for row in table(OLD / "export" / "readings.csv")}
+    for specimen, counts in SPECIMENS.items():
+        rows = json.loads(command("log", "show", specimen, "--json"))
+        kinds = [sum(column in row for row in rows) for column in ("y_words", "facts", "data")]
+        assert tuple(kinds) == counts, specimen
+        for row in (row for row in rows if "y_words" in row):
+            then = readings[row["uid"]]
+            assert [row[k] for k in ("written", "y_words", "z_words", "remark", "design_id", "batch")] == [
+                then[k].removeprefix("'") for k in ("written", "y_words", "z_words", "remark", "design_id", "batch")
+            ]
+
+
+def test_a_correction_stands_for_the_reading_that_it_corrects(old, command):
+    current = json.loads(command("log", "list", "--json", "--iteration", 60))["readings"]
+    assert [row["y_ohm"] for row in current if row["specimen"] == "60 triX .2mm 1 fine"] == [[1200.0]]
+    first, second = (json.loads(command("log", "show", number, "--json"))[0] for number in (1, 2))
+    assert second["supersedes"] == first["uid"]
+
+
+def test_the_old_log_is_sound(old, command):
+    """Verified: the database, what refers to what, predictions by their hashes, raw files by their SHA-256."""
+    assert f"{ROWS} rows" in command("log", "verify")
+
+
+def test_a_damaged_raw_file_is_found(old, command):
+    raw = next(old.with_name(f"{old.name}.files").rglob("*.csv"))
+    raw.write_bytes(raw.read_bytes()[:-1])
+    assert raw.stem in command("log", "verify", code=1)
+
+
+def test_reports_find_the_predictions_that_were_stored_before_measuring(old, command):
+    found = json.loads(command("report", "--iteration", 59, "--format", "json", "-o", "-"))
+    assert "trix-d0.2" in json.dumps(found)
+    assert "stored 2026-11-22T10:33:59" in json.dumps(found)
+    command("report", "--iteration", 60, "--format", "md", "-o", "-")
+
+
+def test_the_old_recording_opens_and_is_fitted(old, command):
+    shown = command("bench", "show", 1)
+    assert "275 samples" in shown
+    made = json.loads(command("fit", "--iteration", 59, "--dry-run", "--json"))
+    fitted = {value["quantity"]: value for value in made["values"]}
+    # The ladder behind the recording has 1.12 times the default resistivities, and 0.845677 for the top's cogs.
+    truth = 1.12 * (0.07 * 0.845677 + 0.2) / 2
+    assert fitted["resistivity_ohm_m"]["value"] == pytest.approx(truth, rel=0.1)
+
+
+def test_rows_are_added_to_the_old_log(old, command):
+    command("log", "multimeter", "59 triX .2mm 5", "--y", "2.7k", "--z", "OL")
+    command("log", "predict", "reference")
+    assert f"{ROWS + 2} rows" in command("log", "verify")
+
+
+def test_the_old_export_is_imported(command, path, tmp_path):
+    folder = Path(shutil.copytree(OLD / "export", tmp_path / "export"))
+    (folder / "files").mkdir()
+    for raw in (OLD / "log.db.files").rglob("*.*"):
+        shutil.copyfile(raw, folder / "files" / raw.stem)
+    assert f"{ROWS} of {ROWS} rows logged" in command("log", "import", folder)
+    command("log", "verify")
+    command("log", "export", tmp_path / "now")
+    before = table(OLD / "export" / "readings.csv")
+    assert as_then(table(tmp_path / "now" / "readings.csv"), before) == before
+
+
+def test_old_readings_alone_are_imported(command, path):
+    assert "9 of 9 rows logged" in command("log", "import", OLD / "export" / "readings.csv")
+
+
+def test_the_old_record_of_a_batch_is_imported(command, path):
+    """Three specimens of two designs, their predictions, the bed and its file."""
+    (record,) = (OLD / "log.db.files").rglob("*.json")
+    assert "7 of 7 rows logged" in command("log", "import", record)
+    rows = json.loads(command("log", "show", "60 triX .2mm 1 fine", "--json"))
+    (data,) = (row["data"] for row in rows if "data" in row)
+    expected = data if isinstance(data, dict) else json.loads(data)
+    assert expected["capacitance_f"]["lower"] == pytest.approx(12.84e-12, rel=1e-3)
+    assert expected["printed"]["prusa"]["electrode_gap_mm"]["printed"] == [0.3, 0.3]
+
+
+@pytest.mark.parametrize(("file", "key"), [("design.json", "7f4cf270ac4e80a1"), ("own.yaml", "c0d91538dfb4aabc")])
+def test_old_designs_are_the_same_designs(command, file, key):
+    """Their identity is what finds stored predictions."""
+    assert json.loads(command("check", OLD / file, "--json"))["design"] == key
+
+
+def test_an_old_fit_is_a_source(command, monkeypatch, tmp_path):
+    monkeypatch.setenv("SENSORGEN_MATERIALS", str(tmp_path / "materials"))
+    (tmp_path / "materials").mkdir()
+    shutil.copy(OLD / "fit-59.yaml", tmp_path / "materials")
+    said = json.loads(command("predict", "reference", "--material", "electrode=etpu@fit-59", "--json"))
+    text = json.dumps(said)
+    assert "fit-59" in text
+    assert "0.145163" in text
+
+
+def test_a_folder_that_the_old_version_built_is_taken_over(command, tmp_path):
+    """Files that only the old manifest lists go; a user's own stay."""
+    folder = tmp_path / "out" / "trix-d0.2"
+    folder.mkdir(parents=True)
+    manifest = json.loads((OLD / "manifest.json").read_text("utf-8"))
+    manifest["files"]["gone.txt"] = next(iter(manifest["files"].values()))
+    (folder / "manifest.json").write_text(json.dumps(manifest), "utf-8")
+    for name in ("gone.txt", "mine.txt"):
+        (folder / name).write_text("before", "utf-8")
+    command("build", "tri", "--no-cad")
+    assert not (folder / "gone.txt").exists()
+    assert (folder / "mine.txt").read_text("utf-8") == "before"
