@@ -110,7 +110,7 @@ class Table:
         return np.asarray(force * self.shape[1] + position)
 
     def rivals(self, sigma: Real) -> tuple[Index, Real]:
-        """For every cell, the cell of the nearest other minimum of the distance to it, or -1; and the least distance.
+        """For every cell, the cell of the nearest other minimum of the distance, or -1; and a lower limit of it.
 
         The distance, in units of noise, is the one that is left for a press anywhere in the two cells.
         """
