@@ -17,12 +17,12 @@ from matplotlib import pyplot as plt
 from sensorgen.prediction.as_printed import electrode
 
 from sensorgen.asprinted.printed import body, gap_mm
-from sensorgen.asprinted.rectilinear import plate
 from sensorgen.checks.estimate import RULES
 from sensorgen.design.design import make
 from sensorgen.export import slicing
 from sensorgen.export.gcode import paths
 from sensorgen.models import fem2d, traxels
+from sensorgen.verification.chart.rectilinear import plate
 
 RESULTS = Path(__file__).parent / "results"
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"

@@ -106,14 +106,16 @@ def pressed(model: str) -> Iterator[tuple[float, float]]:
 
 def case(design: Design) -> pressing.Case:
     piece = pressing.drawn(design)
-    return pressing.Case(piece, pressing.model_of(piece), celllaw.elastic(design, piece.scene), EPS, press2d.Held())
+    return pressing.Case(
+        piece, pressing.model_of(piece), celllaw.elastic(design, piece.scene), EPS, press2d.BoundaryConditions()
+    )
 
 
 def truth(model: str, one: pressing.Case, of: tuple[str, float]) -> Real:
     """The rise on the finest mesh that is affordable in the plane; of boxes, where their meshes lead."""
     if model == "press2d":
         cell = press2d.cell(one.piece.scene, one.piece.period_mm)
-        return rises(press2d.press(cell, one.solids, STRESS_PA, EPS, one.held, press2d.Fineness().scaled(FINEST)))
+        return rises(press2d.press(cell, one.solids, STRESS_PA, EPS, one.boundary, press2d.Fineness().scaled(FINEST)))
     shape, film = of
     parameters = vars(make({"shape": shape, "parameters": {"dielectric_mm": film}}).params)
     moduli = {name: solid.youngs_modulus_pa for name, solid in one.solids.items()}

@@ -5,24 +5,23 @@ Run with NGSolve installed: python bench/held.py
 
 from collections.abc import Iterator, Sequence
 
-from sensorgen.asprinted.rules import RULES
-
-from sensorgen.asprinted import compared, pressed
+from sensorgen.asprinted.printed import body, gap_mm
+from sensorgen.checks.estimate import RULES
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design, make
 from sensorgen.models import press2d
-from sensorgen.models.press2d import Elastic, Held
+from sensorgen.models.press2d import BoundaryConditions, Elastic
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.sensor_model import Tip, build_sensor
 from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 
 STRESS_PA = [0.0, 1e5]
 RATIO = 0.4999  # of Poisson
-FREE = Held(base="sliding", period="free")
+FREE = BoundaryConditions(base="sliding", period="free")
 OTHERWISE = {
-    "faces that stick": Held(contact="stick"),
-    "stiff tip": Held(top="rigid"),
-    "base sliding": Held(base="sliding"),
+    "faces that stick": BoundaryConditions(contact="stick"),
+    "stiff tip": BoundaryConditions(top="rigid"),
+    "base sliding": BoundaryConditions(base="sliding"),
     "base sliding, sides free": FREE,
 }
 EPS = {"x60": 4.68, "air": 1.00059}
@@ -48,7 +47,7 @@ def tri(film_mm: float) -> Design:
 
 
 def pressed_cell(
-    scene: Scene, held: Held | None = None, etpu_ratio: float = RATIO, x60_ratio: float = RATIO
+    scene: Scene, held: BoundaryConditions | None = None, etpu_ratio: float = RATIO, x60_ratio: float = RATIO
 ) -> press2d.Pressed:
     """A cell at up to 100 kPa."""
     return press2d.press(press2d.cell(scene, PERIOD_MM), solids(etpu_ratio, x60_ratio), STRESS_PA, EPS, held)
@@ -84,11 +83,11 @@ def print_printed() -> None:
     for film in (0.1, 0.2):
         for walls in RULES:
             design = tri(film)
-            scene = pressed.piece(design, compared.estimated(design, walls)).scene
+            scene = body(design, walls=walls).cell.scene
             found = pressed_cell(scene)
             moved, before, after = answer(found)
             fall = found.fall_m * 1e6
-            gap = compared.gap_mm(scene)
+            gap = gap_mm(scene)
             numbers = f"{gap:g}", f"{fall:.0f}", f"{moved - fall:.2f}", f"{before:.1f}", f"{after:.1f}"
             print(row(f"{film:g}", walls, *numbers), flush=True)
 
@@ -119,7 +118,7 @@ def print_staircases() -> None:
     print(row(*head), row(*["---"] * len(head)), sep="\n")
     for touch, name, low, held, ratio in readings():
         cog = COGS[name] if touch == "touches" else (0.0, 0.0, *COGS[name][2:])
-        choice = FREE if held == "free" else Held()
+        choice = FREE if held == "free" else BoundaryConditions()
         moved, before, after = answer(pressed_cell(staircase(cog, LOWER[low]), choice, ratio, ratio))
         numbers = f"{moved:.1f}", f"{before:.1f}", f"{after:.1f}", f"{100 * (after / before - 1):.1f} %"
         print(row(touch, name, low, held, f"{ratio:g}", *numbers), flush=True)

@@ -17,7 +17,7 @@ from matplotlib import pyplot as plt
 from sensorgen.design.design import make
 from sensorgen.models import press2d, springs
 from sensorgen.models.compression import bonded
-from sensorgen.models.press2d import Elastic, Fineness, Held
+from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.scene.scene import Body, Prism, Scene, box, rectangle
 from sensorgen.scene.sections import columns, sections
 from sensorgen.solvers.contact import cell as cells
@@ -47,7 +47,7 @@ def timed(*args, **more):
 
 def once(cell, materials, stresses, fineness, permittivity=None):
     """One solution, without a retry on other meshes."""
-    found, run = press2d._solved(cell, materials, stresses, Held(), fineness, lambda _: None)
+    found, run = press2d._solved(cell, materials, stresses, BoundaryConditions(), fineness, lambda _: None)
     return press2d._with_fields(found, cell, run, permittivity) if permittivity else found
 
 
@@ -83,7 +83,7 @@ def reference_table():
 def moved(name, materials, fineness, stresses=STRESSES):
     """A row: displacements at 10 and 100 kPa, triangles and seconds."""
     start = time.process_time()
-    found, run = press2d._solved(tri()[1], materials, stresses, Held(), fineness, lambda _: None)
+    found, run = press2d._solved(tri()[1], materials, stresses, BoundaryConditions(), fineness, lambda _: None)
     seconds = time.process_time() - start
     u = [np.interp(p, found.stress_pa, found.displacement_m, right=np.nan) * 1e6 for p in (1e4, 1e5)]
     said = "; ".join(found.faults)
@@ -285,10 +285,16 @@ def rungs_table():
     plane = {name: s.youngs_modulus_pa / (1 - s.poisson_ratio**2) for name, s in solids().items()}
     plate = make({"shape": "reference"}).in_use
     cells = [
-        ("plate, sides fixed", plate, press2d.cell(plate, None), Held(), 0.6e-3),
-        ("plate, sides free, base sliding", plate, press2d.cell(plate, None), Held("sliding", "free"), 0.6e-3),
-        ("tri, film 0.1 mm", *tri(0.1), Held(), 0.6e-3),
-        ("tri, film 0.2 mm", *tri(0.2), Held(), 0.7e-3),
+        ("plate, sides fixed", plate, press2d.cell(plate, None), BoundaryConditions(), 0.6e-3),
+        (
+            "plate, sides free, base sliding",
+            plate,
+            press2d.cell(plate, None),
+            BoundaryConditions("sliding", "free"),
+            0.6e-3,
+        ),
+        ("tri, film 0.1 mm", *tri(0.1), BoundaryConditions(), 0.6e-3),
+        ("tri, film 0.2 mm", *tri(0.2), BoundaryConditions(), 0.7e-3),
     ]
     for name, scene, cell, held, gap in cells:
         stress = np.array([0.0, 1e4, 1e5])
@@ -428,12 +434,14 @@ def upright_table():
     yield "| stress [kPa] | two pillars [um] | one before a mirror [um] | finer mesh [um] | 0.3 mm apart [um] |"
     yield "|---|---|---|---|---|"
     cases = ((pillars(0.05, 2), Fineness()), (pillars(0.05, 1), Fineness()), (pillars(0.05, 1), Fineness().finer()))
-    solved = [press2d._solved(c, solids(x60=1e6), stress, Held(), f, lambda _: None) for c, f in cases]
+    solved = [press2d._solved(c, solids(x60=1e6), stress, BoundaryConditions(), f, lambda _: None) for c, f in cases]
     apart = once(pillars(0.3, 1), solids(x60=1e6), stress, Fineness())
     for k in range(1, len(stress)):
         moved = [f.displacement_m[k] * 1e6 for f in (*(found for found, _ in solved), apart)]
         yield f"| {stress[k] / 1e3:g} | " + " | ".join(f"{u:.2f}" for u in moved) + " |"
-    brim = press2d._solved(mushroom(), solids(x60=1e6), np.linspace(0, 1.6e5, 9), Held(), Fineness(), lambda _: None)
+    brim = press2d._solved(
+        mushroom(), solids(x60=1e6), np.linspace(0, 1.6e5, 9), BoundaryConditions(), Fineness(), lambda _: None
+    )
     figure, axes = plt.subplots(1, 4, figsize=(9, 3.9), layout="constrained", sharey=True)
     for ax, (run, k) in zip(axes, ((solved[0][1], 2), (solved[0][1], -1), (brim[1], 2), (brim[1], -1)), strict=True):
         draw_pressed(ax, run, run.states[k])

@@ -17,7 +17,7 @@ from matplotlib.collections import LineCollection
 
 from sensorgen.design.design import make
 from sensorgen.models import press2d, press3d
-from sensorgen.models.press3d import Elastic, Held, Pieces
+from sensorgen.models.press3d import BoundaryConditions, Elastic, Pieces
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.contact import element
 
@@ -94,13 +94,13 @@ def as_data(found, seconds):
 def strips(film_mm, pieces, loads, base="bonded", period="fixed", top="even"):
     """The cell of rect at even steps up to 100 kPa."""
     stresses = np.linspace(0, 1e5, loads).tolist()
-    return press3d.press(rect(film_mm), SOLIDS, stresses, EPS, Held(base, period, top), Pieces(pieces))
+    return press3d.press(rect(film_mm), SOLIDS, stresses, EPS, BoundaryConditions(base, period, top), Pieces(pieces))
 
 
 @kept
 def feet(name, contact, pieces):
     """A cog pressed by bricks, or by the plane model on a fine mesh for no pieces."""
-    held = Held(contact=contact)
+    held = BoundaryConditions(contact=contact)
     if not pieces:
         finest = press2d.Fineness().finer().finer()
         return press2d.press(press2d.cell(SCENES[name], 2.0), SOLIDS, FEET, EPS, held, finest)
@@ -113,7 +113,7 @@ def narrow(pieces):
     widths = {"air_width_mm": 0.02, "etpu_width_mm": 0.98, "x60_width_mm": 0.98}
     cell = press3d.cell(make({"shape": "rect", "parameters": {"dielectric_mm": 0.1} | widths}).in_use)
     soft = SOLIDS | {"x60": Elastic(1e6, 0.4999)}
-    return press3d.press(cell, soft, list(NARROW), EPS, Held(), Pieces(pieces))
+    return press3d.press(cell, soft, list(NARROW), EPS, BoundaryConditions(), Pieces(pieces))
 
 
 def rises(data, side):
@@ -226,7 +226,9 @@ def section(ax, run, state, enlarged):
 
 def picture(name, cell, stress, pieces, enlarged):
     """Unloaded and pressed, side by side."""
-    _, run = press3d._solved(cell.cut(pieces.pieces, pieces.shrink), SOLIDS, stress, Held(), lambda _: None)
+    _, run = press3d._solved(
+        cell.cut(pieces.pieces, pieces.shrink), SOLIDS, stress, BoundaryConditions(), lambda _: None
+    )
     figure, axes = plt.subplots(1, 2, figsize=(9, 4.2), layout="constrained", sharey=True)
     for ax, state in zip(axes, (run.states[0], run.states[-1]), strict=True):
         section(ax, run, state, enlarged)

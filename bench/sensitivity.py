@@ -15,7 +15,7 @@ from sensorgen.models import compression
 from sensorgen.models.compression import Compression
 from sensorgen.prediction.compression_law import solved
 from sensorgen.prediction.evaluate import TONES_HZ
-from sensorgen.prediction.sensitivity import HELD, Sensitivity, sensitivity
+from sensorgen.prediction.sensitivity import BOUNDARIES, Sensitivity, sensitivity
 
 FORCE_N, RHO_OHM_M = 6.0, 0.135
 RECT_MESH = 1.022  # rise in the limit of fine meshes over that of the default mesh: docs/compression.md
@@ -31,8 +31,8 @@ DESIGNS = {
 
 def law(name: str, design: Design, boundary: str) -> Compression:
     """The law of a cell, held so; the rise of rect as it is extrapolated from three meshes."""
-    found = solved(design, **HELD[boundary]).compression
-    return found.rising(RECT_MESH) if name.startswith("rect") else found
+    found = solved(design, boundary=BOUNDARIES[boundary]).compression
+    return found.scaled_rise(RECT_MESH) if name.startswith("rect") else found
 
 
 def rows() -> list[tuple[str, str, Compression, Sensitivity]]:
@@ -42,7 +42,7 @@ def rows() -> list[tuple[str, str, Compression, Sensitivity]]:
         ("plate", "B.49", compression.unconfined(6e6)),
         ("plate", "bonded, 10 mm", compression.bonded(6e6, 0.01, 6e-4)),
     ]
-    laws += [(name, held, law(name, make(DESIGNS[name]), held)) for held, name in product(HELD, DESIGNS)]
+    laws += [(name, held, law(name, make(DESIGNS[name]), held)) for held, name in product(BOUNDARIES, DESIGNS)]
     found = []
     for name, held, how in laws:
         design = plate if name == "plate" else make(DESIGNS[name])
@@ -106,8 +106,8 @@ def draw(found: list[tuple[str, str, Compression, Sensitivity]]) -> None:
     colours = dict(zip(DESIGNS, ("#555555", "#c0392b", "#e59866", "#1f618d", "#7fb3d5"), strict=True))
     stress = np.linspace(1e3, 1e5, 200)
     for name, held, how, _ in found:
-        if held in HELD:
-            thinning = how.thinning(stress)[0]
+        if held in BOUNDARIES:
+            thinning = how.capacitive_strain(stress)[0]
             style = "-" if held == "free" else "--"
             rise = 100 * thinning / (1 - thinning)
             left.semilogy(stress / 1e3, rise, style, color=colours[name], label=f"{name}, {held}")

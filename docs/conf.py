@@ -12,7 +12,7 @@ from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
-from sensorgen import __version__ as release
+from sensorgen.core.version import __version__ as release
 
 ROOT = Path(__file__).parents[1]
 

@@ -29,7 +29,9 @@ def sensorgen(*words: str, folder: str = ".") -> str:
     command = [sys.executable, "-m", "sensorgen", *words]
     environment = {"COLUMNS": "100", "TERMINAL_WIDTH": "100", "PYTHONIOENCODING": "utf-8", "PATH": ""}
     environment["PYTHONPATH"] = os.environ.get("PYTHONPATH", "")
-    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment, cwd=folder)
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=folder)
+    if done.returncode not in (0, 1) or "Traceback" in done.stderr:  # 1: the design has findings
+        raise SystemExit(f"{' '.join(words)}: {done.stderr}")
     return done.stdout
 
 

@@ -42,7 +42,7 @@ def test_it_says_what_the_plate_cannot_do(capsys):
     assert "position to 225 mm" in text
     assert "(213 N, 21 m)" in text
     assert "1. a cell of triangles over a film of 0.1 mm (tri), in place of the film: 0.15 N, 8.3 mm" in text
-    assert "all at once:" in text
+    assert "all together:" in text
     assert "99.7 kHz (6 N, 258 mm); 49.9 + 99.7 kHz" in text
     assert "of all up to 1 MHz:" in text
     assert "above 1 N, force is resolved to 0.6 N in 0 % of presses, position to 10 mm in 0 %" in text

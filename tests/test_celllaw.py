@@ -7,14 +7,16 @@ from functools import partial
 
 import numpy as np
 import pytest
-from sensorgen.prediction.ladder import Press, carried_out, drawn, outlined
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.design import make
 from sensorgen.models import compression
+from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.capacitance import Answer
 from sensorgen.prediction.compression_law import law_of
+from sensorgen.prediction.error_budget import Load
+from sensorgen.prediction.planning import execute, plan
 
 GAPS = Answer("columns", Interval(1e-10, 2e-10), ())
 OTHER = {"shape": "tri", "parameters": {"period_mm": 2.5}}
@@ -29,18 +31,18 @@ def test_rises_and_stiffness_of_a_curve():
     """Stress over modulus decides, so twice the modulus bears twice the stress; a rise is scaled as it is."""
     law = compression.curve("c", "made up", [0, 1e4, 5e4, 1e5], [1, 1.1, 1.2, 1.3])
     at = np.array([0.0, 3e3, 6e4, 2e5])
-    thinning, slope = law.stiffer(2.0).thinning(at)
-    assert thinning == pytest.approx(law.thinning(at / 2)[0], rel=1e-14)
-    assert slope == pytest.approx(law.thinning(at / 2)[1] / 2, rel=1e-14)
-    risen = 1 / (1 - law.rising(1.5).thinning(at)[0]) - 1
-    assert risen == pytest.approx(1.5 * (1 / (1 - law.thinning(at)[0]) - 1), rel=1e-12)
+    thinning, slope = law.scaled_modulus(2.0).capacitive_strain(at)
+    assert thinning == pytest.approx(law.capacitive_strain(at / 2)[0], rel=1e-14)
+    assert slope == pytest.approx(law.capacitive_strain(at / 2)[1] / 2, rel=1e-14)
+    risen = 1 / (1 - law.scaled_rise(1.5).capacitive_strain(at)[0]) - 1
+    assert risen == pytest.approx(1.5 * (1 / (1 - law.capacitive_strain(at)[0]) - 1), rel=1e-12)
     step = 1.0
-    difference = law.rising(1.5).thinning(at + step)[0] - law.rising(1.5).thinning(at)[0]
-    assert law.rising(1.5).thinning(at + step / 2)[1] == pytest.approx(difference / step, rel=1e-4)
+    difference = law.scaled_rise(1.5).capacitive_strain(at + step)[0] - law.scaled_rise(1.5).capacitive_strain(at)[0]
+    assert law.scaled_rise(1.5).capacitive_strain(at + step / 2)[1] == pytest.approx(difference / step, rel=1e-4)
 
 
 def test_a_stiffer_plate_bears_more():
-    assert compression.unconfined(6e6).stiffer(0.5).modulus_pa == 3e6
+    assert compression.unconfined(6e6).scaled_modulus(0.5).modulus_pa == 3e6
 
 
 def test_a_prototype_is_known_and_nothing_is_solved(monkeypatch):
@@ -65,11 +67,11 @@ def test_a_cell_of_boxes_is_solved_in_three_dimensions(monkeypatch):
     law = law_of(cell, GAPS, "solved")
     stored = law_of(make({"shape": "rect", "parameters": {"dielectric_mm": 0.1}}), GAPS)
     assert (law.compression.name, law.doubts, stored.doubts, stored.bounded) == ("solved", (), (), True)
-    rise = [c.compression.thinning(np.asarray(6e4))[0] for c in (law, stored)]
+    rise = [c.compression.capacitive_strain(np.asarray(6e4))[0] for c in (law, stored)]
     assert rise[0] == pytest.approx(rise[1], rel=0.08)
     assert rise[1] == pytest.approx(0.006, rel=0.05)  # 1.0 % at 100 kPa, by another program
     assert 0.006 < law.compression.within < 0.2
-    assert len(law.held) == len(stored.held) > 0
+    assert len(law.other_boundaries) == len(stored.other_boundaries) > 0
 
 
 def test_without_the_solver_a_plate_stands_in_and_that_is_said(monkeypatch):
@@ -78,11 +80,10 @@ def test_without_the_solver_a_plate_stands_in_and_that_is_said(monkeypatch):
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(SensorgenError, match="pip install"):
         law_of(make(OTHER), GAPS, "solved")
-    design, press = make(OTHER), Press((1e3,), 1.0, 0.05)
-    sensed, plan = carried_out(outlined(design, drawn(design), press, 1e-2))
+    sensed, found = execute(plan(drawn(make(OTHER)), Load((1e3,), 1.0, 0.05), 1e-2))
     assert not sensed.law.bounded
     assert "pip install" in sensed.doubts[-1]
-    assert plan.width == math.inf
+    assert found.width == math.inf
 
 
 def test_a_curve_ends_where_the_capacitance_is_no_longer_known(monkeypatch):
@@ -114,7 +115,7 @@ def test_an_unknown_cell_is_solved_once(monkeypatch):
     law = law_of(cell, GAPS, "solved")
     stored = compression.solved("tri", vars(make({"shape": "tri"}).params), {"x60": 6e6, "etpu": 22e6})
     at = np.array([1e4, 3e4, 6e4, 1e5])
-    rise, expected = (1 / (1 - c.thinning(at)[0]) - 1 for c in (law.compression, stored))
+    rise, expected = (1 / (1 - c.capacitive_strain(at)[0]) - 1 for c in (law.compression, stored))
     within = (law.others[1].ratio[-1] - 1) / (law.compression.ratio[-1] - 1) - 1
     assert 0.00599 <= within < 0.03
     assert rise == pytest.approx(expected, rel=0.006 + within)

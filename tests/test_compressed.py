@@ -9,7 +9,8 @@ import pytest
 from sensorgen.core.bounds import Interval
 from sensorgen.design.design import make
 from sensorgen.prediction import compression as compressed
-from sensorgen.prediction.compression import Asked, Held
+from sensorgen.prediction.bodies import drawn
+from sensorgen.prediction.compression import Asked, BoundaryConditions
 
 KNOWN = json.loads((Path(__file__).parent / "reference" / "contact.json").read_text())
 LOADS = (0, 2, 6, 10)  # of the reference's, a tenth of its kPa
@@ -24,7 +25,7 @@ def _own_cache(monkeypatch, tmp_path):
 def pressed(film, accuracy):
     design = make({"shape": "tri", "parameters": {"dielectric_mm": film}})
     stress = tuple(KNOWN[f"tri_d{film}"]["p_kPa"][k] for k in LOADS)
-    return compressed.answer(design, Asked(stress, Held(), accuracy=accuracy))
+    return compressed.answer(drawn(design), Asked(stress, BoundaryConditions(), accuracy=accuracy))
 
 
 @needs_mesher

@@ -142,7 +142,7 @@ def test_an_accuracy_is_above_0(accuracy):
 def test_a_light_press_below_the_first_stress_of_a_curve_is_within_what_is_claimed(force_n):
     """A contact grows from nothing: the stored curve begins at 10 kPa, the same cell is solved at 1, 2 and 5."""
     from sensorgen.models.compression import curve_of
-    from sensorgen.models.press2d import Held
+    from sensorgen.models.press2d import BoundaryConditions
     from sensorgen.prediction.mesh_ladder import Case, drawn, pressed
 
     design = tri(0.1)
@@ -150,7 +150,7 @@ def test_a_light_press_below_the_first_stress_of_a_curve_is_within_what_is_claim
     sensed, plan = worked_out(design, 1e-3, press)
     piece = drawn(design)
     eps = {t.material: t.value for t in sensed.taken if t.quantity == "relative_permittivity"}
-    case = Case(piece, "press2d", celllaw.elastic(design, piece.scene), eps, Held())
+    case = Case(piece, "press2d", celllaw.elastic(design, piece.scene), eps, BoundaryConditions())
     fine = curve_of(pressed(case, (0.0, 1e3, 2e3, 5e3)))
     claimed = next(c.width for c in plan.levels[1].candidates if c.model == "solved")
     assert off(sensed.sensor, replace(sensed.sensor, compression=fine), press) < claimed < 1e-3

@@ -232,7 +232,7 @@ def test_other_tones():
 
 @pytest.fixture(scope="module")
 def plate():
-    """The plate of Table 3.1, free to give way (B.49), and its design."""
+    """The plate of Table 3.1, free to expand (B.49), and its design."""
     design = make({"shape": "reference"})
     return design, sensor_of(design)
 
@@ -395,7 +395,8 @@ def test_losses_reach_the_line():
     for row in found.impedance:
         z = exact_line(
             60, **LINE_PLATE | {
-                "frequency_hz": row.frequency_hz, "tan_delta": 0.02, "leak_s_per_m": 0.01 / (1e9 * FILM_M), "force_n": 0,
+                "frequency_hz": row.frequency_hz, "tan_delta": 0.02, "force_n": 0,
+                "leak_s_per_m": 0.01 / (1e9 * FILM_M),
             }
         )  # fmt: skip
         assert row.re.value == pytest.approx(float(z.real), rel=1e-6)

@@ -63,7 +63,7 @@ def test_a_law_that_is_asked_for_is_taken():
 
 
 def test_what_cannot_be_is_refused():
-    with pytest.raises(OutOfRange, match="speaks of a solid plate; tri has gaps"):
+    with pytest.raises(OutOfRange, match="applies to a solid plate; tri has gaps"):
         sensed("tri", "bonded")
     with pytest.raises(UnknownName, match="law of compression 'bondet'; did you mean 'bonded'"):
         sensed("tri", "bondet")
@@ -95,8 +95,8 @@ def test_a_cell_that_says_no_displacement_is_no_bed():
     from sensorgen.models import compression
 
     law = compression.curve("c", "made up", [0, 1e4], [1, 1.1])
-    with pytest.raises(MissingValue, match="how far the top comes down"):
-        law.bed_pa_per_m(1e-3)
+    with pytest.raises(MissingValue, match="displacement of the top"):
+        law.foundation_stiffness_pa_per_m(1e-3)
 
 
 def test_a_modulus_that_no_source_gives_is_missing():

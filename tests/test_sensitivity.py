@@ -5,7 +5,7 @@ import pytest
 from sensorgen.design.design import make
 from sensorgen.models import compression
 from sensorgen.prediction.evaluate import TONES_HZ
-from sensorgen.prediction.sensitivity import HELD, sensitivity
+from sensorgen.prediction.sensitivity import BOUNDARIES, sensitivity
 
 PLATE = make({"shape": "reference"})
 
@@ -31,7 +31,7 @@ def test_the_designs_own_resistivity_unless_given():
     assert own.sigma_position_m == pytest.approx(same.sigma_position_m, rel=1e-9)  # 0.07 and 0.2, whose mean it is
 
 
-@pytest.mark.parametrize("held", HELD)
+@pytest.mark.parametrize("held", BOUNDARIES)
 def test_a_plate_gives_way_as_its_three_layers_do(held):
     """Free: they widen alike. Bonded without end: by the modulus of uniaxial strain."""
     pytest.importorskip("netgen", reason="solves a cell: pip install sensorgen[fem]")

@@ -1,3 +1,55 @@
-"""sensorgen: from one design to a printable elastomer sensor, its prediction and its report."""
+"""sensorgen: from one design to a printable elastomer sensor, its prediction and its report.
 
-__version__ = "0.1.0"
+Names are imported when they are first used.
+
+>>> import sensorgen as sg
+>>> p = sg.predict(sg.Design(shape="reference"))
+>>> round(p.drawn.capacitance.value * 1e12, 2)  # pF
+69.06
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from sensorgen.core.version import __version__ as __version__
+
+if TYPE_CHECKING:
+    from sensorgen.core.bounds import Bounds as Bounds
+    from sensorgen.design.body import Body as Body
+    from sensorgen.design.design import Design as Design
+    from sensorgen.measure.log import Log as Log
+    from sensorgen.prediction.results import Prediction as Prediction
+    from sensorgen.workflows.api import as_printed as as_printed
+    from sensorgen.workflows.api import build as build
+    from sensorgen.workflows.api import check as check
+    from sensorgen.workflows.api import compare as compare
+    from sensorgen.workflows.api import compress as compress
+    from sensorgen.workflows.api import fit as fit
+    from sensorgen.workflows.api import invert as invert
+    from sensorgen.workflows.api import load as load
+    from sensorgen.workflows.api import predict as predict
+    from sensorgen.workflows.api import slice_design as slice_design
+
+_TYPES = {
+    "Body": "design.body",
+    "Bounds": "core.bounds",
+    "Design": "design.design",
+    "Log": "measure.log",
+    "Prediction": "prediction.results",
+}
+_FUNCTIONS = ("as_printed", "build", "check", "compare", "compress", "fit", "invert", "load", "predict", "slice_design")
+
+__all__ = [*_TYPES, *_FUNCTIONS]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _TYPES:
+        import_module("sensorgen.workflows.display")  # how they show themselves in a notebook
+        return getattr(import_module(f"sensorgen.{_TYPES[name]}"), name)
+    if name in _FUNCTIONS:
+        return getattr(import_module("sensorgen.workflows.api"), name)
+    raise AttributeError(f"module 'sensorgen' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -10,7 +10,7 @@ from sensorgen.asprinted.printed import body
 from sensorgen.checks.estimate import TITLES
 from sensorgen.core.errors import SensorgenError
 from sensorgen.models import press2d, press3d
-from sensorgen.models.press2d import Elastic, Fineness, Held
+from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction import compression_law as celllaw
 from sensorgen.prediction.bodies import drawn, estimated, sliced
@@ -62,7 +62,7 @@ def built(widths, film=0.1):
 
 
 def answered(body, *kpa):
-    return compressed.answer(body, Asked((0.0, *kpa), Held()))
+    return compressed.answer(body, Asked((0.0, *kpa), BoundaryConditions()))
 
 
 @needs_mesher
@@ -100,7 +100,7 @@ def test_the_printed_sensor_has_the_law_of_its_own_cell():
     sensed = build_sensor(printed, "solved")
     found = answered(printed, 10.0, 20.0)
     middle = (np.array(found["lower_f_per_m2"]) + np.array(found["upper_f_per_m2"])) / 2
-    thinning, _ = sensed.sensor.compression.thinning(np.array([1e4, 2e4]))
+    thinning, _ = sensed.sensor.compression.capacitive_strain(np.array([1e4, 2e4]))
     assert 1 / (1 - thinning) == pytest.approx(middle[1:] / middle[0], rel=1e-4)
     assert sensed.law.bounded
     c = sensed.rest.capacitance
@@ -146,7 +146,7 @@ def test_support_takes_no_place_from_what_stays(walls):
 def test_the_staircase_whose_cog_ends_short_of_the_film():
     """Published: 47 um, C' from 88 to 112 pF/m; feet of X60 at mid-layer, the cog narrowest, base and sides free."""
     bars = {"cog": (0, 0, 0.2, 0.3, 0.4), "feet": (0.05, 0.15, 0.25, 0.35, 0.45), "low": (0.3958,)}
-    free = Held(base="sliding", period="free")
+    free = BoundaryConditions(base="sliding", period="free")
     found = press2d.press(built(bars), SOLIDS, [0.0, 1e5], EPS, free, QUICK)
     assert found.faults == ()
     assert found.displacement_m[1] * 1e6 == pytest.approx(47, rel=0.03)

@@ -10,6 +10,7 @@ import pytest
 from sensorgen.asprinted.beads import beads, layers
 from sensorgen.asprinted.printed import body, cell, electrode_lines, gap_mm, rule7
 from sensorgen.asprinted.window import window
+from sensorgen.checks.review import review
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.models import fem2d, fem3d, traxels
 from sensorgen.prediction.bodies import sliced
@@ -24,6 +25,7 @@ WALLS = ("arachne", "classic", "cura", "cura-gaps")
 EPS = {"air": 1.00059, "x60": 4.68}
 PLATE = small("reference", {"length_mm": 100.0, "width_mm": 10.0})
 COG = "top_electrode_with_cogs"
+LOST = ("7-printed", "error")
 FEET = 4  # layer of the feet on the film, from 0
 
 
@@ -142,6 +144,27 @@ def test_lost_layers_are_errors_and_can_be_waived(real):
     assert (7, 8) in {(f.layer, f.last_layer) for f in found if f.severity == "warning" and f.body == COG}  # too full
     waived = small(waivers=[{"rule": "7", "reason": "the gap is known to be larger"}])
     assert all(f.waiver for f in rule7(waived, lines)[1])
+
+
+@pytest.mark.parametrize(
+    ("walls", "variant"),
+    [
+        ("arachne", small()), ("arachne", small(parameters={"dielectric_mm": 0.2})), ("classic", small()),
+        ("cura-gaps", small()), ("arachne", small(parameters={"along": "y"})), ("arachne", small("rect")),
+        ("arachne", small(orientation="upside-down")),
+    ],
+    ids=["tri", "tri film 0.2", "classic walls", "cura", "triY", "rect", "upside-down"],
+)  # fmt: skip
+def test_check_reports_the_errors_of_slice_before_slicing(real, walls, variant):
+    """Word for word: the same layers, bodies and severity."""
+    variant, lines, _ = real(walls, variant)
+
+    def errors(findings):
+        return {(f.body, f.layer, f.last_layer, f.message) for f in findings if (f.rule, f.severity) == LOST}
+
+    expected = errors(rule7(variant, lines)[1])
+    assert errors(review(variant, walls=walls).findings) == expected
+    assert bool(expected) == (variant.shape == "tri" and walls != "cura-gaps")
 
 
 def test_the_first_to_be_printed_keeps_its_place_or_the_electrode(real):

@@ -194,7 +194,7 @@ def test_laws_of_a_plate(run):
     assert moved["unconfined"] == pytest.approx([0.0, 600 * 1e5 / 3e6])
     assert moved["bonded"] == pytest.approx([0.0, 600 * 1e5 / 3e6 / 93.9], rel=1e-3)
     for law in moved:
-        assert "speaks of a solid plate of one material, tri is none" in run("compress", "tri", "--model", law).line
+        assert "applies to a solid plate of one material, tri is none" in run("compress", "tri", "--model", law).line
     two = ("--isolation", "0.2", "--material", "isolation=pla", "--set", "eps_pla=4")
     assert "reference is none" in run(*PLATE, "--model", "bonded", *two).line
     soft = run(*PLATE, "--model", "unconfined", "--set", "youngs_modulus_x60=5e4")

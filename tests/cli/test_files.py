@@ -144,7 +144,7 @@ def as_nobody():
 
 @pytest.mark.skipif(not hasattr(os, "seteuid"), reason="no users on this system")
 def test_no_permission(run, tmp_path):
-    (tmp_path / "shut.yaml").write_text("shape: tri")
+    (tmp_path / "shut.yaml").write_text("shape: reference")
     assert run("check", "shut.yaml").code == 0
     (tmp_path / "shut.yaml").chmod(0)
     with as_nobody():
@@ -162,7 +162,12 @@ def test_not_utf8(run, tmp_path, content):
 
 
 @pytest.mark.parametrize(
-    "content", [b"\xef\xbb\xbfshape: tri", b"shape: tri\r\nquality: fine\r\n", b"shape: tri # gr\xc3\xb6\xc3\x9fe"]
+    "content",
+    [
+        b"\xef\xbb\xbfshape: reference",
+        b"shape: reference\r\nquality: fine\r\n",
+        b"shape: reference # gr\xc3\xb6\xc3\x9fe",
+    ],
 )
 def test_bom_and_windows_line_ends_and_umlauts_in_comments_are_fine(run, tmp_path, content):
     (tmp_path / "ok.yaml").write_bytes(content)
@@ -173,11 +178,11 @@ def test_bom_and_windows_line_ends_and_umlauts_in_comments_are_fine(run, tmp_pat
 @pytest.mark.parametrize("stem", ["mein größter sensor", "it's", "-x", "CON"])
 def test_a_file_whose_name_is_no_name_for_results(run, tmp_path, stem):
     path = tmp_path / f"{stem}.yaml"
-    path.write_text("shape: tri")
+    path.write_text("shape: reference")
     said = run("check", path)
     assert "set it with --name, or 'name:' in the file" in said.line
     assert run("check", path, "--name", "fine-name").code == 0
-    path.write_text("shape: tri\nname: fine-name")
+    path.write_text("shape: reference\nname: fine-name")
     assert run("check", path).code == 0
 
 

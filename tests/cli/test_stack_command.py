@@ -54,7 +54,7 @@ def test_tones_are_taken_as_typed(run):
         (["--noise", "nan"], "--noise"),
         (["--drift", "0"], "--drift 0; expected a share"),
         (["--frequencies", "-1kHz"], "--frequencies"),
-        (["--touch", "200"], "overhangs"),
+        (["--touch", "200"], "a tip of 200 mm; expected up to"),
         (["--touch=-3"], "--touch: -3; expected above 0"),
         (["--touch", "0"], "--touch: 0; expected above 0"),
         (["--touch", "5,10"], "--touch: 2 values; expected one"),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.measure.log import TABLES, Log, Reading, bench, importing, verify
+from sensorgen.measure.log import TABLES, Log, Reading, bench, facts, importing, verify
 
 EARLIER = Path(__file__).with_name("of_0645a80")
 ROWS = json.loads((EARLIER / "rows.json").read_text("utf-8"))
@@ -68,9 +68,11 @@ def test_recordings_are_read_again_from_their_files(log):
     importing.import_file(log, EARLIER / "export", {})
     first, *others = log.recordings(superseded=True)
     (one,), rig = bench.read_again(log, first)
-    facts = json.loads(first.facts)
-    assert (len(one.time_s), rig.counts()) == (575, {"rows": 144, "errors": 1})
-    assert one.tones_hz.tolist() == facts["lockins"][0]["tones_hz"]
+    summary = facts.from_json(first.facts)
+    assert (len(one.time_s), rig.counts()) == (575, {"rows": summary.rig.rows, "errors": summary.rig.errors})
+    assert tuple(one.tones_hz) == summary.lockins[0].tones_hz
+    assert summary.lockins[0].bandwidth_hz is None
+    assert summary.columns == {"t": "time_s"}
     for run in others:
         (one,), rig = bench.read_again(log, run)
         assert (len(one.time_s), rig) == (40, None)

@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import io
 import math
 
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput, MissingValue, Unwritable
+from sensorgen.measure.csv_table import Table
 from sensorgen.measure.log import (
     TABLES,
     Batch,
@@ -26,7 +28,6 @@ from sensorgen.measure.log import (
 )
 from sensorgen.measure.log.batches import prediction
 from sensorgen.measure.log.notes import reading
-from sensorgen.measure.log.tables import parsed
 
 REMARKS = [
     "=1+1",
@@ -139,7 +140,7 @@ def test_any_text_comes_back_from_csv(words):
         for k, word in enumerate(words)
     ]
     text = "".join(exchange.csv_lines(Reading, rows))
-    assert list(exchange.from_sheet(Reading, parsed(text.encode(), "x"))) == rows
+    assert list(exchange.from_csv(Reading, Table("x", io.StringIO(text, newline="")))) == rows
 
 
 @given(

@@ -132,7 +132,7 @@ def test_a_prediction_is_kept_when_it_is_made(run, path):
         assert log.predictions(design_id=kept.design_id) == (kept,)
         assert log.predictions(design_id="x") == ()
         assert log.readings()[0].design_id == kept.design_id
-    assert json.loads(kept.data)["capacitance_f"]["lower"] > 1e-12
+    assert json.loads(kept.data)["capacitance"]["lower"] > 1e-12
     assert "is sound: 2 rows" in run("verify").out
 
 

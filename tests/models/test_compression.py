@@ -23,7 +23,7 @@ def test_stiffness_of_bonded_films_10_mm_wide(thickness_mm, factor):
 
 
 def test_a_free_plate_obeys_hooke():
-    thinning, slope = compression.unconfined(6e6).thinning(np.array([-6e4, 0.0, 6e4]))
+    thinning, slope = compression.unconfined(6e6).capacitive_strain(np.array([-6e4, 0.0, 6e4]))
     assert thinning == pytest.approx([-0.01, 0.0, 0.01], rel=1e-15)
     assert slope == pytest.approx([1 / 6e6] * 3, rel=1e-15)
 
@@ -33,7 +33,7 @@ def test_curves_run_through_their_points_and_as_pchip_between(film):
     law = tri(dielectric_mm=film)
     oracle = PchipInterpolator(law.stress_pa, law.ratio)
     at = np.linspace(1.001e4, 1e5, 1234)  # a contact begins otherwise, below the first point
-    thinning, slope = law.thinning(at)
+    thinning, slope = law.capacitive_strain(at)
     assert 1 / (1 - thinning) == pytest.approx(oracle(at), rel=1e-13)
     assert slope == pytest.approx(oracle(at, 1) / oracle(at) ** 2, rel=1e-9)
 
@@ -43,11 +43,11 @@ def test_a_curve_begins_with_the_power_of_the_stress_that_its_points_follow(powe
     at = np.geomspace(700, 9e3, 50)
     points = np.arange(11) * 1e4
     law = compression.curve("contact", "made up", points, 1 + 0.07 * (points / 1e4) ** power)
-    thinning, slope = law.thinning(at)
+    thinning, slope = law.capacitive_strain(at)
     rise = 0.07 * (at / 1e4) ** power
     assert thinning / (1 - thinning) == pytest.approx(rise, rel=0.22)  # a cubic alone: 66 and 41 % less
     assert slope * (1 + rise) ** 2 == pytest.approx(power * rise / at, rel=0.35)
-    steeper, _ = replace(law, onset=1.25).thinning(at)
+    steeper, _ = replace(law, onset=1.25).capacitive_strain(at)
     assert (steeper > thinning).all() == (power < 1)
 
 
@@ -57,7 +57,7 @@ def test_a_curve_begins_with_the_power_of_the_stress_that_its_points_follow(powe
 def test_curves_rise_wherever_their_points_do(stress, ratio):
     law = compression.curve("bent", "made up", stress, ratio)
     at = np.linspace(0, stress[-1] * 2, 4001)
-    thinning, slope = law.thinning(at)
+    thinning, slope = law.capacitive_strain(at)
     assert (slope >= 0).all()
     summed = np.concatenate([[0.0], np.cumsum((slope[1:] + slope[:-1]) / 2 * np.diff(at))])
     assert summed == pytest.approx(thinning, abs=1e-3)
@@ -65,14 +65,16 @@ def test_curves_rise_wherever_their_points_do(stress, ratio):
 
 def test_the_solved_cell_at_100_kpa():
     """212.12 of 159.65 pF/m at 100 kPa (finite elements with contact)."""
-    thinning, _ = tri().thinning(np.asarray(1e5))
+    thinning, _ = tri().capacitive_strain(np.asarray(1e5))
     assert float(thinning) == pytest.approx(1 - 159.652 / (159.652 + 52.508), rel=1e-5)
 
 
 def test_stress_scales_with_the_moduli():
     """A neo-Hookean solid of twice the modulus does the same at twice the stress."""
     stiff = compression.solved("tri", TRI, {name: 2 * e for name, e in MODULI.items()})
-    assert stiff.thinning(np.asarray(8e4))[0] == pytest.approx(tri().thinning(np.asarray(4e4))[0], rel=1e-14)
+    assert stiff.capacitive_strain(np.asarray(8e4))[0] == pytest.approx(
+        tri().capacitive_strain(np.asarray(4e4))[0], rel=1e-14
+    )
 
 
 @pytest.mark.parametrize(
@@ -91,7 +93,7 @@ def test_only_the_very_cell_counts_as_solved(shape, changes, moduli):
 
 def test_beyond_the_last_point_it_goes_on_straight_and_says_so():
     law = tri()
-    (s0, s1), (_, slope) = law.thinning(np.array([1e5, 1.2e5]))
+    (s0, s1), (_, slope) = law.capacitive_strain(np.array([1e5, 1.2e5]))
     assert 1 / (1 - s1) - 1 / (1 - s0) == pytest.approx(law.slope_per_pa[-1] * 2e4, rel=1e-12)
     assert slope * 1 / (1 - s1) ** 2 == pytest.approx(law.slope_per_pa[-1], rel=1e-12)
     assert "above 100 kPa" in law.doubt(1.2e5)
@@ -108,7 +110,7 @@ def test_beyond_the_last_point_it_goes_on_straight_and_says_so():
 )
 def test_stress_that_has_no_answer_is_refused(law, stress, said):
     with pytest.raises(OutOfRange, match=said):
-        law.thinning(np.array([0.0, stress]))
+        law.capacitive_strain(np.array([0.0, stress]))
 
 
 @pytest.mark.parametrize(
@@ -122,5 +124,5 @@ def test_points_that_make_no_curve_are_refused(stress, ratio):
 
 
 def test_a_breath_keeps_its_digits():
-    (thinning,), (slope,) = tri().thinning(np.array([1e-9]))
+    (thinning,), (slope,) = tri().capacitive_strain(np.array([1e-9]))
     assert thinning == pytest.approx(1e-9 * slope, rel=1e-12)

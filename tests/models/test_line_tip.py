@@ -50,7 +50,7 @@ def by_hand(sensor, force, position, f):
             borne = (share(a + (b - a) * t1) - share(a + (b - a) * t0)) / (share(b) - share(a))
             length = (mp(right) - mp(left)) * (t1 - t0)
             stress = float(force * borne / (w * length))
-            thinning = mp(float(sensor.compression.thinning(np.asarray(stress))[0]))
+            thinning = mp(float(sensor.compression.capacitive_strain(np.asarray(stress))[0]))
             whole = whole * section(length, force * borne / (w * length), thinning)
         whole = whole * section(mp(sensor.length_m) - mp(right), 0, mp(0))
         return complex(terminated(whole, sensor.far_end))

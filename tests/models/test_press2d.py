@@ -12,7 +12,7 @@ from sensorgen.design.design import make
 pytest.importorskip("netgen")
 from sensorgen.models import press2d
 from sensorgen.models.compression import curve_of
-from sensorgen.models.press2d import Fineness, Held
+from sensorgen.models.press2d import BoundaryConditions, Fineness
 from sensorgen.solvers.contact import closing, deformed, load, pressed
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "contact.json").read_text())
@@ -49,16 +49,16 @@ def test_the_reference_curve_at_every_load(film):
 @pytest.mark.parametrize(
     ("name", "held", "nu"),
     [
-        ("stick", Held(contact="stick"), 0.4999),
-        ("free", Held(base="sliding", period="free"), 0.4999),
-        ("roller", Held(base="sliding"), 0.4999),
-        ("rigid", Held(top="rigid"), 0.4999),
-        ("nu45", Held(), 0.45),
-        ("nu499", Held(), 0.499),
+        ("stick", BoundaryConditions(contact="stick"), 0.4999),
+        ("free", BoundaryConditions(base="sliding", period="free"), 0.4999),
+        ("roller", BoundaryConditions(base="sliding"), 0.4999),
+        ("rigid", BoundaryConditions(top="rigid"), 0.4999),
+        ("nu45", BoundaryConditions(), 0.45),
+        ("nu499", BoundaryConditions(), 0.499),
     ],
 )
 def test_choices_of_the_boundary(name, held, nu):
-    found = press2d.press(tri(), solids(nu), STRESSES, held=held)
+    found = press2d.press(tri(), solids(nu), STRESSES, boundary=held)
     assert found.faults == ()
     early = 1 if name == "stick" else 0  # there the file is above what gives way without friction, which cannot be
     known = VARIANTS[f"{name}_d0.1"]["uy_um"]
@@ -67,7 +67,10 @@ def test_choices_of_the_boundary(name, held, nu):
 
 
 def test_sticking_depends_little_on_the_loads_asked_for():
-    few, many = (press2d.press(tri(), solids(), s, held=Held(contact="stick")) for s in ([0, 2e4], STRESSES[:3]))
+    few, many = (
+        press2d.press(tri(), solids(), s, boundary=BoundaryConditions(contact="stick"))
+        for s in ([0, 2e4], STRESSES[:3])
+    )
     assert few.displacement_m[-1] == pytest.approx(many.displacement_m[-1], rel=1e-6)
 
 
@@ -119,7 +122,7 @@ def test_a_plate_between_fixed_sides_is_confined():
 
 def test_a_curve_for_the_sensor():
     law = curve_of(press2d.press(tri(), solids(), STRESSES[:3], EPS))
-    thinning, slope = law.thinning(np.asarray(2e4))
+    thinning, slope = law.capacitive_strain(np.asarray(2e4))
     assert 1 / (1 - thinning) == pytest.approx(1 + 18.21 / 159.65204, rel=0.002)
     assert slope > 0
 
@@ -198,7 +201,7 @@ def test_what_is_no_prism_or_no_solid_is_refused():
     with pytest.raises(OutOfRange, match=r"up to 0\.5"):
         press2d.Elastic(6e6, 0.51)
     with pytest.raises(BadInput, match="bonded or sliding"):
-        press2d.press(tri(), solids(), [0.0, 1.0], held=Held(base="glued"))
+        press2d.press(tri(), solids(), [0.0, 1.0], boundary=BoundaryConditions(base="glued"))
 
 
 def test_work_and_energy_are_weighed():

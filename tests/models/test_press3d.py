@@ -11,7 +11,7 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models import fem2d, fem3d, press2d, press3d, springs
 from sensorgen.models.compression import curve_of
-from sensorgen.models.press3d import Elastic, Held, Pieces
+from sensorgen.models.press3d import BoundaryConditions, Elastic, Pieces
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.contact import (
     air,
@@ -57,7 +57,7 @@ def test_a_block_follows_the_closed_form(nu, period):
     """Homogeneous neo-Hookean block: stretch a across in both directions, b along the load; at a third of E."""
     block = boxes(((0, 0.3, 1), (0, 0.6, 1), (0, 0.2, 1)), np.ones((2, 2, 2), int))
     mu, lam = 6e6 / (2 * (1 + nu)), np.inf if nu == 0.5 else 6e6 * nu / ((1 + nu) * (1 - 2 * nu))
-    found = press3d.press(block, solids(nu), [0.0, 1e6, 2e6], None, Held("sliding", period), Pieces(1))
+    found = press3d.press(block, solids(nu), [0.0, 1e6, 2e6], None, BoundaryConditions("sliding", period), Pieces(1))
 
     def across(b):  # nothing pulls sideways: mu a - mu / a + lam (J - 1) J / a = 0
         if period == "fixed":
@@ -108,7 +108,7 @@ def test_a_bonded_strip_does_not_lock(thick, stiffer):
     fill[-1] = 0
     block = boxes((x, (0, 0.1), np.linspace(0, thick / 2, 4)), fill)
     stress = 1e-4 * stiffer * 6e6
-    found = press3d.press(block, solids(0.5), [0.0, stress], None, Held(top="rigid"), Pieces(1))
+    found = press3d.press(block, solids(0.5), [0.0, stress], None, BoundaryConditions(top="rigid"), Pieces(1))
     strain = found.displacement_m[-1] / (thick / 2 * 1e-3)
     assert stress / strain / 6e6 == pytest.approx(stiffer, rel=0.02)
 
@@ -121,7 +121,7 @@ def test_a_plate_between_mirrors_is_confined_and_a_free_one_widens():
     assert found.capacitance_f_per_m2[0].middle() == pytest.approx(0.27625066e-12 / 4e-6, rel=1e-6, abs=0)
     rise = found.capacitance_f_per_m2[1].middle() / found.capacitance_f_per_m2[0].middle() - 1
     assert rise == pytest.approx(1e5 / confined["x60"], rel=1e-3)
-    loose = press3d.press(plate, solids(), [0.0, 1e3], EPS, Held("sliding", "free"), Pieces(1))
+    loose = press3d.press(plate, solids(), [0.0, 1e3], EPS, BoundaryConditions("sliding", "free"), Pieces(1))
     rise = loose.capacitance_f_per_m2[1].middle() / loose.capacitance_f_per_m2[0].middle() - 1
     biaxial = {k: s.youngs_modulus_pa / (1 - 0.4999) for k, s in solids().items()}  # all layers widen alike
     wide = 1e3 * 0.4999 * sum(1.2e-3 / 2 / 0.5001 for _ in range(2)) / sum(0.6e-3 * m for m in biaxial.values())
@@ -267,7 +267,7 @@ def test_feet_that_stick_are_stiffer_by_as_much_as_in_a_cross_section():
     scene, stress = stairs(0.3, lift=0.02), [0.0, 1e4, 2e4, 5e4]
     moved = {}
     for kind in ("frictionless", "stick"):
-        held = Held(contact=kind)
+        held = BoundaryConditions(contact=kind)
         flat = press2d.press(press2d.cell(scene, 2.0), solids(), stress, EPS, held, press2d.Fineness().finer())
         solid = press3d.press(press3d.cell(scene), solids(), stress, EPS, held, Pieces(2, 0.4))
         assert flat.faults == solid.faults == ()
@@ -405,7 +405,7 @@ def test_what_is_wrong_is_refused():
     with pytest.raises(BadInput, match="b overlaps"):
         press3d.cell(over)
     with pytest.raises(BadInput, match="bonded or sliding"):
-        press3d.press(press3d.cell(rect()), solids(), [0.0, 1.0], held=Held(base="glued"))
+        press3d.press(press3d.cell(rect()), solids(), [0.0, 1.0], boundary=BoundaryConditions(base="glued"))
     touching = boxes(((0, 1), (0, 1), (0, 1, 2, 3)), [[[2, 3, 1]]])
     with pytest.raises(BadInput, match="no dielectric lies between"):
         unmoved(touching, Orders())

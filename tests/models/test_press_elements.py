@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from sensorgen.solvers.contact import element, load, support
+from sensorgen.solvers.contact import boundary, element, load
 from sensorgen.solvers.contact.contact import Faces
 from sensorgen.solvers.contact.mesh import of_triangles
 
@@ -30,8 +30,8 @@ def elements(mesh, e, nu):
 
 
 def pressed(mesh, e, nu, held, stress, steps=5):
-    free = support.free_of(mesh.points_m, held)
-    problem = load.Problem(elements(mesh, e, nu), none(mesh), free, support.top_load(mesh.points_m, *mesh.top()), 1.0)
+    free = boundary.free_of(mesh.points_m, held)
+    problem = load.Problem(elements(mesh, e, nu), none(mesh), free, boundary.top_load(mesh.points_m, *mesh.top()), 1.0)
     return problem, list(load.curve(problem, np.linspace(0, stress, steps + 1), stress))[-1]
 
 
@@ -41,7 +41,7 @@ def pressed(mesh, e, nu, held, stress, steps=5):
 def test_a_block_follows_the_closed_form_on_any_mesh(nu, period):
     """Homogeneous neo-Hookean block: stretch a across, b along the load, nothing pulls sideways where free."""
     mesh = grid(3, 3, bend=0.08)
-    problem, state = pressed(mesh, 6.0, nu, support.Held("sliding", period, "rigid"), 2.0)
+    problem, state = pressed(mesh, 6.0, nu, boundary.BoundaryConditions("sliding", period, "rigid"), 2.0)
     mu, lam = 6 / (2 * (1 + nu)), np.inf if nu == 0.5 else 6 * nu / ((1 + nu) * (1 - 2 * nu))
 
     def across(b):  # mu a - mu / a + lam (a b - 1) b = 0
@@ -105,7 +105,7 @@ def test_a_bonded_strip_is_as_stiff_as_gent_and_lindley_say(thick, stiffer):
     kept, column = np.unique(leader[free], return_inverse=True)
     reduce = csr_matrix((np.ones(len(free)), (free, column)), (2 * len(x), len(kept)))
     problem = load.Problem(
-        elements(mesh, 1.0, 0.5), none(mesh), reduce, support.top_load(mesh.points_m, *mesh.top()), 1.0
+        elements(mesh, 1.0, 0.5), none(mesh), reduce, boundary.top_load(mesh.points_m, *mesh.top()), 1.0
     )
     *_, state = load.curve(problem, [0.0, 1e-3], 1.0)
     strain = problem.load @ state.u_m / np.abs(problem.load).sum() / thick
@@ -176,6 +176,6 @@ def test_cooks_membrane_locks_with_linear_triangles_and_not_with_ours():
 
 def test_an_even_pressure_moves_a_confined_block_evenly():
     mesh = grid(3, 3, bend=0.08)
-    _, state = pressed(mesh, 6.0, 0.4, support.Held("sliding", "fixed", "even"), 1.0)
+    _, state = pressed(mesh, 6.0, 0.4, boundary.BoundaryConditions("sliding", "fixed", "even"), 1.0)
     top = state.u_m[1::2][mesh.points_m[:, 1] == 1.0]
     assert top == pytest.approx(np.full_like(top, top[0]), rel=1e-6)

@@ -8,7 +8,7 @@ from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d
-from sensorgen.models.press2d import Elastic, Fineness, Held
+from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.solvers.contact import field
 
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
@@ -50,7 +50,7 @@ def test_a_bonded_foot_is_nearly_linear(bonded):
 @pytest.mark.parametrize("lift", [1e-3, 0.05])
 def test_a_free_foot_falls_and_then_carries_as_if_it_stuck(bonded, lift):
     """A flat foot that rests on the film and cannot slip differs from a bonded one only in its corners."""
-    held = Held(contact="stick")
+    held = BoundaryConditions(contact="stick")
     found = press2d.press(stacked(0.2, 0.3, lift=lift), SOLIDS, [0.0, 5e3, 1e4], EPS, held, QUICK)
     assert found.faults == ()
     assert found.fall_m == pytest.approx(lift * 1e-3, rel=1e-6)

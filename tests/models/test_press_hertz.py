@@ -7,7 +7,7 @@ from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d
-from sensorgen.models.press2d import Elastic, Fineness, Held
+from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 
 RADIUS_MM, HALF_WIDTH_MM, E_PA = 1.0, 0.02, 6e6
 
@@ -33,7 +33,9 @@ def over_hertz(side_mm, nu):
     solids = {"soft": Elastic(E_PA, nu), "stiff": Elastic(1e5 * E_PA, 0.3)}
     stress = [0.0, force / (2 * RADIUS_MM * 1e-3)]
     fineness = Fineness(side_mm, 0.1, 0.1, 0.3)
-    found, run = press2d._solved(cylinder(side_mm), solids, stress, Held(top="rigid"), fineness, lambda _: None)
+    found, run = press2d._solved(
+        cylinder(side_mm), solids, stress, BoundaryConditions(top="rigid"), fineness, lambda _: None
+    )
     assert found.faults == ()
     state, places = run.states[-1], run.problem.places(run.states[-1].u_m)
     push = np.maximum(-run.problem.gaps(state.pairs, state.u_m), 0) * state.pairs.stiffness_pa

@@ -11,7 +11,7 @@ from sensorgen.scene.sections import columns, sections
 
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d
-from sensorgen.models.press2d import Elastic, Fineness, Held
+from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.solvers.contact import cell as cells
 from sensorgen.solvers.contact import contact
 
@@ -44,7 +44,7 @@ def pillars(gap, count):
 
 
 def solved(cell, stresses, held=None):
-    return press2d._solved(cell, SOFT, stresses, held or Held(), Fineness(), lambda _: None)
+    return press2d._solved(cell, SOFT, stresses, held or BoundaryConditions(), Fineness(), lambda _: None)
 
 
 def with_field(cell, stresses, solids=SOFT, fineness=None):
@@ -175,7 +175,7 @@ def test_a_sloping_joint_that_sticks_is_none():
     whole = cell_of(0.6, 0, 0.7, box(0, 0.7, 0, 0.6))
     one = press2d.press(whole, solids, [0.0, 1e4, 2e4]).displacement_m
     held, loose = (
-        press2d.press(slope(0.4), solids, [0.0, 1e4, 2e4], None, Held(contact=kind)).displacement_m
+        press2d.press(slope(0.4), solids, [0.0, 1e4, 2e4], None, BoundaryConditions(contact=kind)).displacement_m
         for kind in ("stick", "frictionless")
     )
     assert np.diff(held)[1] == pytest.approx(np.diff(one)[1], rel=0.02)
@@ -184,7 +184,7 @@ def test_a_sloping_joint_that_sticks_is_none():
 
 def test_the_energy_of_the_contact_is_that_of_its_forces():
     """Gap and slip: the energy's differences along a motion are the forces' work."""
-    _, run = solved(slope(0.4), [0.0, 1e4], Held(contact="stick"))
+    _, run = solved(slope(0.4), [0.0, 1e4], BoundaryConditions(contact="stick"))
     problem, state = run.problem, run.states[-1]
     assert state.pairs.sticks.any()
     ways = np.random.default_rng(1).normal(size=(2, len(state.u_m)))
@@ -203,7 +203,9 @@ def test_steps_of_any_length_stick_alike():
     solids = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
     cell = press2d.cell(drawn.in_use, drawn.params.period_mm)
     moved = [
-        press2d.press(cell, solids, np.linspace(0, 1e4, n + 1), None, Held(contact="stick")).displacement_m[-1]
+        press2d.press(
+            cell, solids, np.linspace(0, 1e4, n + 1), None, BoundaryConditions(contact="stick")
+        ).displacement_m[-1]
         for n in (1, 4)
     ]
     assert moved[0] == pytest.approx(moved[1], rel=0.03)

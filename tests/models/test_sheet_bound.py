@@ -124,9 +124,11 @@ def test_a_place_is_located_where_both_coordinates_are():
     assert one.located() == 0.25
     assert one.verdict().startswith("locates a press on 25% of the sheet: ")
     assert told([[(NEAR, NEAR)]]).verdict() == (
-        "locates a press everywhere: typical error 3% of a guess's in x, 7% in y"  # 1 mm of 28.9 and of 14.4 mm
+        "locates a press everywhere: typical error 3% of a uniform prior's in x, 7% in y"  # 1 mm of 28.9 and of 14.4 mm
     )
-    assert told([[(NEAR, FAR)]]).verdict() == ("locates a press nowhere: typical error 3% of a guess's in x, 100% in y")
+    assert told([[(NEAR, FAR)]]).verdict() == (
+        "locates a press nowhere: typical error 3% of a uniform prior's in x, 100% in y"
+    )
 
 
 def test_located_is_half_of_a_guess_with_the_outline_known():

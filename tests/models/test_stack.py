@@ -279,7 +279,7 @@ def test_it_refuses_ports_that_are_none(upper, lower):
 FIRM, SOFT = unconfined(6e6), unconfined(1e6)
 DOUBLE = Stack(
     0.1, 0.01, (Track(45e3, 1e-7), Track(20e3), Track(30e3, 2e-7)),
-    (Film(6.9e-10, FIRM.thinning), Film(8e-10, SOFT.thinning, 0.01, 1e-9)),
+    (Film(6.9e-10, FIRM.capacitive_strain), Film(8e-10, SOFT.capacitive_strain, 0.01, 1e-9)),
 )  # fmt: skip
 
 
@@ -336,7 +336,7 @@ def test_the_derivative_by_drift_is_exact(f, which):
 
 def test_without_a_change_of_characteristic_impedance_there_is_no_trace_of_position():
     """Strain 1/2 and tracks of twice the resistance: R and Y both double, R / Y stays."""
-    films = tuple(Film(c, FIRM.thinning) for c in (6.9e-10, 3e-10))
+    films = tuple(Film(c, FIRM.capacitive_strain) for c in (6.9e-10, 3e-10))
     twin = Stack(0.1, 0.01, tuple(Track(r, 1 / 3e6) for r in (4e4, 2e4, 3e4)), films)
     found = twin.response(1e6, Press(300.0, 0.03, 0.01))
     assert (found.by_position_ohm_per_m == 0).all()
@@ -374,14 +374,14 @@ def test_it_refuses_presses_that_cannot_be(press, words):
 
 
 def test_it_refuses_a_derivative_at_frequency_0_and_stacks_that_are_none():
-    plain = Stack(0.1, 0.01, (Track(1e4), Track(1e4)), (Film(7e-10, FIRM.thinning),))
+    plain = Stack(0.1, 0.01, (Track(1e4), Track(1e4)), (Film(7e-10, FIRM.capacitive_strain),))
     assert plain.impedance(0.0) == np.inf
     with pytest.raises(OutOfRange, match="above 0"):
         plain.response(0.0, Press(1.0, 0.0, 0.01))
     with pytest.raises(OutOfRange, match="frequency"):
         plain.impedance(-1.0)
     with pytest.raises(OutOfRange, match="one track more"):
-        Stack(0.1, 0.01, (Track(1e4),), (Film(7e-10, FIRM.thinning),))
+        Stack(0.1, 0.01, (Track(1e4),), (Film(7e-10, FIRM.capacitive_strain),))
 
 
 def test_presses_that_do_not_broadcast_are_refused():

@@ -10,6 +10,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models.compression import unconfined
 from sensorgen.models.stack import Body, Film, Press, Stack, Track
+from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.double_layer import study
 from sensorgen.prediction.double_layer.designs import halves, press_at, stack_of, stacked
 from sensorgen.prediction.double_layer.differencing import bounds
@@ -19,8 +20,13 @@ from sensorgen.prediction.evaluate import TONES_HZ
 TONES = np.array(TONES_HZ)
 PRESS = Press(6.0, 0.04, 0.01)
 EVEN = (Track(45e3),) * 3
-TWINS = Stack(0.1, 0.01, EVEN, (Film(6.9e-10, unconfined(6e6).thinning),) * 2)
-STIFF_BELOW = Stack(0.1, 0.01, EVEN, (Film(6.9e-10, unconfined(6e9).thinning), Film(6.9e-10, unconfined(6e6).thinning)))
+TWINS = Stack(0.1, 0.01, EVEN, (Film(6.9e-10, unconfined(6e6).capacitive_strain),) * 2)
+STIFF_BELOW = Stack(
+    0.1,
+    0.01,
+    EVEN,
+    (Film(6.9e-10, unconfined(6e9).capacitive_strain), Film(6.9e-10, unconfined(6e6).capacitive_strain)),
+)
 
 
 def by_name(stack):
@@ -131,7 +137,7 @@ def test_the_table_of_what_a_second_film_tells():
     rows = [row for row in ROWS if row[0] in stiffer]
     assert len(rows) == len(stiffer)
     for name, *cells in rows:
-        films = tuple(Film(6.9e-10, unconfined(6e6 * times).thinning) for times in (stiffer[name], 1))
+        films = tuple(Film(6.9e-10, unconfined(6e6 * times).capacitive_strain) for times in (stiffer[name], 1))
         found = by_name(Stack(0.1, 0.01, EVEN, films))
         ways = [found[way].force_n for way in ("upper film alone", "both readings", "difference alone")]
         for cell, force in zip(
@@ -148,7 +154,7 @@ def test_the_table_of_what_a_touch_does():
     assert len(rows) == 2 * len(WIRINGS)
     for row, wiring in zip(rows, 2 * WIRINGS, strict=True):
         if row[0]:
-            found = stacked(make(next(designs)))
+            found = stacked(make(next(designs)), body=drawn)
             of = Touching(found.own, found.isolation_eps_r, TONES, press_at(found, 6.0, 0.045), 1e-3, Body())
         assert row[1] == wiring.words
         for cell, thickness in zip(row[2:6], (0.0, 0.1, 0.5, 1.0), strict=True):

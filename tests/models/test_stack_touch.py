@@ -7,7 +7,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.models.compression import unconfined
 from sensorgen.models.stack import Body, Film, Press, Stack, Touch, Track
 
-FIRM = unconfined(6e6).thinning
+FIRM = unconfined(6e6).capacitive_strain
 SINGLE = Stack(0.1, 0.01, (Track(67e3), Track(23e3)), (Film(7e-10, FIRM),))
 IDEAL = Stack(0.1, 0.01, (Track(0.0), Track(0.0)), (Film(7e-10, FIRM),))
 DOUBLE = Stack(0.1, 0.01, (Track(67e3), Track(23e3), Track(23e3)), (Film(7e-10, FIRM), Film(5e-10, FIRM)))

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from sensorgen.asprinted.rectilinear import plate
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import traxels
 from sensorgen.solvers.network import links as links
 from sensorgen.solvers.network.nodes import Lines, Nodes
+from sensorgen.verification.chart.rectilinear import plate
 
 RHO, W, H = 0.2, 0.42e-3, 0.1e-3
 ENDS = (-9e-3, 9e-3)

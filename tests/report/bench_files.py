@@ -17,7 +17,7 @@ TRUTH = {"resistivity": 0.5, "capacitance": 1.3, "leak_s": 2e-9, "stiffness": 0.
 def truth(design, resistivity=1.0, capacitance=1.0, leak_s=0.0, stiffness=1.0):
     """The sensor as it really is, by factors to what is predicted."""
     sensor = moved(sensor_model(default_body(design))[0].sensor, resistivity, capacitance, leak_s)
-    return replace(sensor, compression=sensor.compression.stiffer(stiffness))
+    return replace(sensor, compression=sensor.compression.scaled_modulus(stiffness))
 
 
 def write(folder, name, sensor, count=12, rate_hz=140.0, noise=1e-4, seed=1, **times):

@@ -52,13 +52,16 @@ class Beads:
 
     def corners_mm(self, convention: str) -> Floats:
         """Each line as a rectangle in plan, (n, 4, 2): half a width longer at both ends, wide by a convention [mm]."""
-        rounding = ROUND if convention == "stadium" else 0.0
         middle, way = (self.start_mm + self.end_mm) / 2, self.end_mm - self.start_mm
         length = np.hypot(*way.T)
         along = way * ((length + self.width_mm) / (2 * length))[:, None]
-        aside = way[:, ::-1] * [-1, 1] * ((self.width_mm + rounding * self.height_mm) / (2 * length))[:, None]
+        aside = way[:, ::-1] * [-1, 1] * (self.widths_mm(convention) / (2 * length))[:, None]
         corners = (middle + along + aside, middle + along - aside, middle - along - aside, middle - along + aside)
         return np.stack(corners, axis=1)
+
+    def widths_mm(self, convention: str) -> Floats:
+        """Width of each line by a convention [mm]."""
+        return self.width_mm + ROUND * self.height_mm if convention == "stadium" else self.width_mm
 
     def of(self, rows: NDArray[np.bool_]) -> "Beads":
         """The lines of a mask."""
@@ -209,8 +212,9 @@ def _merged(runs: Floats) -> tuple[Floats, Floats]:
 
 
 def _union(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convention: str) -> Region:
-    """All lines, with slits between touching ones closed."""
-    region = shapely.union_all(shapely.polygons(lines.corners_mm(convention)))
+    """All lines with round ends, slits between touching ones closed."""
+    ways = shapely.linestrings(np.stack([lines.start_mm, lines.end_mm], axis=1))
+    region = shapely.union_all(shapely.buffer(ways, lines.widths_mm(convention) / 2, quad_segs=4))
     if convention == "deposit":
         region = shapely.union_all([_pushed(part, lines) for part in parts(region)])
     slit = ROUND * layer.height_mm

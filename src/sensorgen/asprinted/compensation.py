@@ -1,9 +1,8 @@
-"""Parameters changed so that what is printed is what was asked for."""
+"""Compensation: parameters changed so that the print has the requested dimensions."""
 
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from sensorgen.asprinted.printed import body, drawn_gap_mm
 from sensorgen.checks.widths import GAP_CLOSES
@@ -37,26 +36,26 @@ class Change:
     after: float
     why: str
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, str | float]:
         """Plain data, for JSON."""
         return asdict(self)
 
 
 def compensated(design: Design, walls: str = "arachne", *, bake: bool = False) -> tuple[Design, list[Change]]:
-    """The design to print so that the one that was asked for comes out, and what differs.
+    """The design to print so that the requested one results, and what differs.
 
-    Heights go to whole layers, strips narrower than a line to a line, gaps that would close to one that does not; and
-    the electrode gap, as estimated for some walls, to what was asked: by a thinner film where cogs lose their tips and
-    the film is thick enough, else by a longer period, whose tips are wider.
+    Heights become whole layers, strips narrower than a line a line, gaps that would close gaps that stay open. The
+    electrode gap as printed becomes the requested one by a thinner film, where cogs lose their tips and the film is
+    thick enough, else by a longer period with wider tips.
 
     Parameters
     ----------
     design : Design
-        As it should come out.
+        As requested.
     walls : str
         One of :data:`sensorgen.checks.estimate.RULES`.
     bake : bool
-        Also print larger by what the bake takes off, where the design does not say by how much.
+        Also enlarge by what the bake shrinks, where the design gives no shrinkage.
 
     Raises
     ------
@@ -74,15 +73,10 @@ def compensated(design: Design, walls: str = "arachne", *, bake: bool = False) -
     asked, before = drawn_gap_mm(now), _printed_gap_mm(now, walls)
     now, moved = _gap_kept(now, asked, before, walls)
     after = _printed_gap_mm(now, walls)
-    changes += moved
     if moved or abs(after - asked) > SLIVER_MM:
-        kept = abs(after - asked) < SLIVER_MM
-        changes.append(
-            Change(
-                "electrode gap as printed [mm]", before, after, f"{asked:g} mm asked" + ("" if kept else ": NOT KEPT")
-            )
-        )
-    return now, changes
+        why = f"{asked:g} mm asked" + ("" if abs(after - asked) < SLIVER_MM else ": NOT KEPT")
+        moved.append(Change("electrode gap as printed [mm]", before, after, why))
+    return now, changes + moved
 
 
 def _with(design: Design, **changed: float) -> Design:
@@ -101,47 +95,28 @@ def _with(design: Design, **changed: float) -> Design:
 def _steps(design: Design) -> Iterator[tuple[str, float, str]]:
     """Heights off the layer grid and widths below what prints, with what they should be."""
     layer, larger = design.layers.layer_mm, 1.0 / (1.0 - design.shrinkage)
-    line, closes = design.machine.line_mm(), GAP_CLOSES * design.machine.nozzle_mm
     for name, value in asdict(design.params).items():
         if not isinstance(value, float) or not value:
             continue
-        whole = max(round(value / layer), 1) * layer
-        if _is_height(design, name):
+        try:
+            nudged = _with(design, **{name: value * 1.01})
+        except SensorgenError:
+            continue
+        if not _levels(design) <= _levels(nudged):  # a face has moved up or down: a cut at the end only adds levels
+            whole = max(round(value / layer), 1) * layer
             if abs(whole - value) > SLIVER_MM:
                 yield name, round(whole, 9), f"whole layers of {layer:g} mm"
         elif name.endswith("_width_mm"):
-            least, why = (line, "one line") if _fills(design, name) else (closes, "a gap that stays open")
+            is_material = _share(nudged) > _share(design)
+            least = design.machine.line_mm() if is_material else GAP_CLOSES * design.machine.nozzle_mm
             if value * larger < least - SLIVER_MM:
-                yield name, round(least / larger, 9), why
-
-
-def _is_height(design: Design, name: str) -> bool:
-    """Whether a parameter moves faces up or down: a level is gone; a cut at the sensor's end only makes new ones."""
-    changed = _nudged(design, name)
-    return changed is not None and not _levels(design) <= _levels(changed)
-
-
-def _fills(design: Design, name: str) -> bool:
-    """Whether there is more material where a parameter is larger."""
-    changed = _nudged(design, name)
-    return changed is not None and _share(changed) > _share(design)
-
-
-def _nudged(design: Design, name: str) -> Design | None:
-    try:
-        return _with(design, **{name: getattr(design.params, name) * 1.01})
-    except SensorgenError:
-        return None
+                yield name, round(least / larger, 9), "one line" if is_material else "a gap that stays open"
 
 
 def _levels(design: Design) -> set[float]:
-    return {
-        round(z, 6) for b in design.drawn.bodies for p in b.prisms for z in _heights(p.axis, p.outline, p.span("z"))
-    }
-
-
-def _heights(axis: str, outline: tuple[tuple[float, float], ...], span: tuple[float, float]) -> set[float]:
-    return set(span) if axis == "z" else {z for _, z in outline}
+    """Heights of all faces and corners [mm]."""
+    prisms = (p for b in design.drawn.bodies for p in b.prisms)
+    return {round(z, 6) for p in prisms for z in (p.span("z") if p.axis == "z" else (z for _, z in p.outline))}
 
 
 def _share(design: Design) -> float:

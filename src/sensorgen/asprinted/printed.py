@@ -44,7 +44,7 @@ class Cell:
 
 @dataclass(frozen=True, eq=False)
 class Printed:
-    """What is printed of a design.
+    """A design as printed.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ def body(
     slicer: str = "",
     centre_mm: Point | None = None,
 ) -> Printed:
-    """What is printed of a design.
+    """A design as printed.
 
     Parameters
     ----------

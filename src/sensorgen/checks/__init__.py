@@ -28,13 +28,14 @@ def findings(scene: Scene, printer: Printer, quality: Quality, gap_mm: float, wa
         Of the slicer, one of :data:`sensorgen.checks.estimate.RULES`.
     """
     slices = Slices(scene, quality)
+    printed = volumes.findings(volumes.rows(scene, estimate.layers(scene, printer, quality, walls)), scene)
     found = [
         *gap.check(slices, printer, quality, gap_mm),
         *grid.check(scene, slices.layers),
         *widths.check(slices, printer),
         *bed.check(scene, printer),
         *bridges.check(slices, printer, quality),
-        *volumes.findings(volumes.rows(scene, estimate.layers(scene, printer, quality, walls)), scene),
+        *(f for f in printed if f.severity == "error"),  # rules 4 and 5 have its warnings
     ]
     return sorted(_merged(found), key=lambda f: (SEVERITIES.index(f.severity), int(f.rule.partition("-")[0])))
 

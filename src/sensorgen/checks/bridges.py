@@ -28,7 +28,7 @@ class _Span(NamedTuple):
 
 
 def check(slices: Slices, printer: Printer, quality: Quality) -> Iterator[Finding]:
-    """Findings about bridges (held at both ends), overhangs (at one) and islands (at none)."""
+    """Findings about bridges (supported at both ends), overhangs (at one) and islands (at none)."""
     line, least = printer.line_mm(), VANISHES * printer.nozzle_mm
     known: dict[tuple[Region, Region], dict[str, _Span]] = {}
     for layer in range(1, len(slices.layers)):
@@ -106,7 +106,7 @@ def _spans(shape: Region, ground: Region, least_mm: float) -> dict[str, _Span]:
 
 
 def _best(filled: Mask, lines: tuple[Lengths, Lengths], air: Mask) -> tuple[NDArray[np.int64], Lengths, Lengths]:
-    """How every unsupported place is held best: at how many ends, over which length, and its narrower stretch [mm]."""
+    """Best support of every unsupported place: number of ends, length, and its narrower stretch [mm]."""
     ways = [_held(filled, air, lines[0]), tuple(m.T for m in _held(filled.T, air.T, lines[1]))]
     ends, lengths = (np.stack([way[k] for way in ways]) for k in (0, 1))
     # A bridge beats an overhang beats an island; among equals the shorter.
@@ -115,7 +115,7 @@ def _best(filled: Mask, lines: tuple[Lengths, Lengths], air: Mask) -> tuple[NDAr
 
 
 def _held(filled: Mask, air: Mask, line: Lengths) -> tuple[NDArray[np.int64], Lengths]:
-    """Along the first axis: at how many ends each unsupported stretch is held, and how long it is [mm]."""
+    """Along the first axis: number of supported ends of each unsupported stretch, and its length [mm]."""
     ends = np.zeros(filled.shape, np.int64)
     lengths = np.zeros(filled.shape)
     padded = np.pad(filled, ((1, 1), (0, 0)))

@@ -1,13 +1,13 @@
-"""Rules 1 and 2: the electrodes stay apart, and the film between them is printed as drawn."""
+"""Rules 1 and 2: the electrodes are apart, and the film between them is printed as drawn."""
 
 from collections.abc import Iterator
 from itertools import pairwise
 
-from sensorgen.checks.slices import TOUCH_MM, Layers, Slices
+from sensorgen.checks.slices import TOUCH_MM, Slices
 from sensorgen.checks.widths import VANISHES
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer, Quality
-from sensorgen.scene.scene import Body, Scene
+from sensorgen.scene.scene import Body
 
 Pair = tuple[Body, Body]
 
@@ -15,31 +15,31 @@ Pair = tuple[Body, Body]
 def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> Iterator[Finding]:
     """Findings about the electrode gaps; ``gap_mm`` is the exact smallest distance of the electrodes.
 
-    Of three electrodes or more, neighbours are held apart by plates: there the distance is that of their faces.
+    Of three electrodes or more, plates separate neighbours: there the distance is that of their faces.
     """
-    pairs = [pair for pair in pairwise(_electrodes(slices.scene)) if pair[0].terminal != pair[1].terminal]
-    for pair in pairs:
-        yield from _between_two(pair, slices, printer, quality, gap_mm if len(pairs) == 1 else _apart_mm(pair))
+    bodies = sorted((b for b in slices.scene.bodies if b.terminal), key=lambda b: min(p.span("z")[0] for p in b.prisms))
+    pairs = [pair for pair in pairwise(bodies) if pair[0].terminal != pair[1].terminal]
+    for low, high in pairs:
+        top = max(p.span("z")[1] for p in low.prisms)
+        apart = gap_mm if len(pairs) == 1 else round(min(p.span("z")[0] for p in high.prisms) - top, 9)
+        film = list(_film((low, high), (0.0, 0.0, top), slices, quality.layer_mm, apart))
+        yield from film
+        if not any(f.severity == "error" for f in film):
+            yield from _printed((low, high), (0.0, 0.0, top), slices, printer, apart)
 
 
-def _apart_mm(pair: Pair) -> float:
-    """Height from the lower electrode's top to the upper one's lowest place [mm]."""
-    low, high = pair
-    return round(min(p.span("z")[0] for p in high.prisms) - max(p.span("z")[1] for p in low.prisms), 9)
-
-
-def _between_two(pair: Pair, slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> Iterator[Finding]:
-    low, high = pair
-    names = f"{low.name} / {high.name}"
-    place = (0.0, 0.0, max(p.span("z")[1] for p in low.prisms))
-    layer = quality.layer_mm
+def _film(
+    pair: Pair, place: tuple[float, float, float], slices: Slices, layer: float, gap_mm: float
+) -> Iterator[Finding]:
+    """The film's thickness, drawn and printed."""
+    names = f"{pair[0].name} / {pair[1].name}"
     if gap_mm <= TOUCH_MM:
         yield Finding(
             "1-short", "error", names, "the electrodes touch: a short by design",
             "give the film a thickness (dielectric_mm)", round(gap_mm, 9), 0.0, place_mm=place,
         )  # fmt: skip
         return
-    printed_mm = _between(slices.layers, place[2], gap_mm)
+    printed_mm = round(slices.layers.printed_mm(place[2] + gap_mm) - slices.layers.printed_mm(place[2]), 9)
     if gap_mm < layer / 2 - TOUCH_MM or printed_mm <= 0:
         yield Finding(
             "2-film", "error", names,
@@ -48,18 +48,6 @@ def _between_two(pair: Pair, slices: Slices, printer: Printer, quality: Quality,
             round(gap_mm, 9), round(layer / 2, 9), place_mm=place,
         )  # fmt: skip
         return
-    yield from _film(names, place, layer, gap_mm, printed_mm)
-    yield from _printed(pair, slices, printer, gap_mm)
-
-
-def _between(layers: Layers, bottom_mm: float, thickness_mm: float) -> float:
-    """Thickness that something comes out with [mm]."""
-    return round(layers.printed_mm(bottom_mm + thickness_mm) - layers.printed_mm(bottom_mm), 9)
-
-
-def _film(
-    names: str, place: tuple[float, float, float], layer: float, gap_mm: float, printed_mm: float
-) -> Iterator[Finding]:
     if abs(printed_mm - gap_mm) > TOUCH_MM:
         count = gap_mm / layer
         below, above = max(1, int(count)) * layer, (int(count) + 1) * layer
@@ -76,40 +64,31 @@ def _film(
         )  # fmt: skip
 
 
-def _printed(pair: Pair, slices: Slices, printer: Printer, gap_mm: float) -> Iterator[Finding]:
-    """The gap as printed, where narrow parts vanish."""
-    tracks = {
+def _printed(
+    pair: Pair, place: tuple[float, float, float], slices: Slices, printer: Printer, gap_mm: float
+) -> Iterator[Finding]:
+    """The gap as printed, where narrow parts vanish: by walls, the width up to which they do."""
+    widths = {
         "Arachne": VANISHES * printer.nozzle_mm,
         "classic walls or plain Cura": printer.line_mm() - 2 * TOUCH_MM,  # a whole line prints
         "Cura filling outline gaps": 0.0,
     }
-    gaps = {slicer: printed_gap_mm(pair, slices, least) for slicer, least in tracks.items()}
-    if all(gap is not None and abs(gap - gap_mm) <= TOUCH_MM for gap in gaps.values()):
+    by_gap: dict[float | None, list[str]] = {}
+    for walls, least in widths.items():
+        by_gap.setdefault(_printed_gap_mm(pair, slices, least), []).append(walls)
+    if all(gap is not None and abs(gap - gap_mm) <= TOUCH_MM for gap in by_gap):
         return
-    by_gap = {gap: [slicer for slicer, other in gaps.items() if other == gap] for gap in gaps.values()}
-    said = ", ".join(
-        f"{'nothing' if gap is None else f'{gap:g} mm'} ({', '.join(slicers)})" for gap, slicers in by_gap.items()
-    )
-    low, high = pair
-    worst = max((gap for gap in gaps.values() if gap is not None), default=None)
+    said = (f"{'nothing' if gap is None else f'{gap:g} mm'} ({', '.join(walls)})" for gap, walls in by_gap.items())
     yield Finding(
-        "2-printed-gap", "warning", f"{low.name} / {high.name}",
-        f"electrode gap: {gap_mm:g} mm drawn, as printed {said}",
+        "2-printed-gap", "warning", f"{pair[0].name} / {pair[1].name}",
+        f"electrode gap: {gap_mm:g} mm drawn, as printed {', '.join(said)}",
         "widen narrow parts to a line, use thinner layers, or put the faces on layer boundaries",
-        worst, round(gap_mm, 9), place_mm=(0.0, 0.0, max(p.span("z")[1] for p in low.prisms)),
+        max((gap for gap in by_gap if gap is not None), default=None), round(gap_mm, 9), place_mm=place,
     )  # fmt: skip
 
 
-def printed_gap_mm(pair: Pair, slices: Slices, least_mm: float) -> float | None:
-    """Distance of the two electrodes when stretches up to ``least_mm`` wide are not printed; None without them [mm]."""
+def _printed_gap_mm(pair: Pair, slices: Slices, least_mm: float) -> float | None:
+    """Distance of two electrodes without parts up to ``least_mm`` wide; None if one vanishes [mm]."""
     low, high = (slices.printed_layers(body, least_mm) for body in pair)
-    if not low or not high:
-        return None
     boundaries = slices.layers.boundaries_mm
-    return round(boundaries[high[0]] - boundaries[low[-1] + 1], 9)
-
-
-def _electrodes(scene: Scene) -> list[Body]:
-    """The terminals' bodies, the one nearest to the bed first."""
-    bodies = [b for b in scene.bodies if b.terminal]
-    return sorted(bodies, key=lambda b: min(p.span("z")[0] for p in b.prisms))
+    return round(boundaries[high[0]] - boundaries[low[-1] + 1], 9) if low and high else None

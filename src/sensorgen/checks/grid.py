@@ -1,4 +1,4 @@
-"""Rules 3 and 4: faces on layer boundaries, and bodies that every sample misses."""
+"""Rules 3 and 4: faces on layer boundaries, and bodies between the sampling planes."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -9,14 +9,14 @@ from sensorgen.scene.scene import Body, Scene
 
 
 def check(scene: Scene, layers: Layers) -> Iterator[Finding]:
-    """Findings about where bodies lie on the layer grid."""
+    """Findings about bodies and the layer grid."""
     for body in scene.bodies:
         yield from _faces(body, layers)
         yield from _samples(body, layers)
 
 
 def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
-    levels = {z for p in body.prisms for z in _levels(p.axis, p.outline, p.span("z"))}
+    levels = {z for p in body.prisms for z in (p.span("z") if p.axis == "z" else (round(z, 9) for _, z in p.outline))}
     off = sorted(z for z in levels if layers.off_grid_mm(z) > TOUCH_MM)
     if not off:
         return
@@ -30,10 +30,6 @@ def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
         round(off[0], 9), round(layers.printed_mm(off[0]), 9),
         place_mm=_place(body, off[0]), count=len(off),
     )  # fmt: skip
-
-
-def _levels(axis: str, outline: tuple[tuple[float, float], ...], span: tuple[float, float]) -> set[float]:
-    return set(span) if axis == "z" else {round(z, 9) for _, z in outline}
 
 
 def _samples(body: Body, layers: Layers) -> Iterator[Finding]:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from sensorgen import checks
+from sensorgen.core.display import Displayed
 from sensorgen.core.findings import Finding
 from sensorgen.design import materials
 from sensorgen.design.design import Design, fields
@@ -20,7 +21,7 @@ _WIDENED = ("2-printed-gap", "5-width", LOST)  # rules that larger widths or a l
 
 
 @dataclass(frozen=True, eq=False)
-class Review:
+class Review(Displayed):
     """The printed bodies as meshes, by name, and all findings about them."""
 
     meshes: dict[str, Mesh]
@@ -66,7 +67,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "arachne") 
     design : Design
         What to check.
     step : callable
-        Told what comes next, for a progress display.
+        Called with the next step, for a progress display.
     walls : str
         Of the slicer, one of :data:`sensorgen.checks.estimate.RULES`; those of PrusaSlicer's profile if not given.
 

@@ -67,7 +67,7 @@ def rows(
     scene : Scene
         As drawn, on its bed.
     printed : sequence of LayerRegions
-        What is printed of it.
+        As printed.
     volumes_mm3 : mapping, optional
         Volume extruded by layer, from 0, and body [mm3]; area times height of what is printed if not given.
     """

@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
-from sensorgen import __version__
 from sensorgen.core.errors import SensorgenError, Unprintable
+from sensorgen.core.version import __version__
 
 COMMANDS = (
     "build",

@@ -41,11 +41,11 @@ def lines(found: "Identifiability") -> Iterator[str]:
     yield from _paragraph("over all", "; ".join(_over(found)))
     yield from _paragraph("best", "; ".join(_best(found)))
     if not found.changes:
-        yield f"{'would help':12}none of the changes that were tried"
+        yield f"{'to improve':12}none of the changes that were tried"
     for k, change in enumerate(found.changes):
-        yield from _paragraph("" if k else "would help", f"{k + 1}. {change.change}: {_known(change)}")
+        yield from _paragraph("" if k else "to improve", f"{k + 1}. {change.change}: {_known(change)}")
     if found.changes_together and len(found.changes) > 1:
-        yield f"{'':12}all at once: {_known(found.changes_together)}"
+        yield f"{'':12}all together: {_known(found.changes_together)}"
 
 
 def _frequency(row: "FrequencyInformation") -> str:

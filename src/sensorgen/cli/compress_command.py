@@ -66,7 +66,7 @@ def _work(
 
     _refuse_pairs(accuracy, how, check_mesh=check_mesh, swept=bool(sweep))
     _refuse_plot(how["plot"])
-    held = compressed.Held(**{f.name: how[f.name] for f in fields(compressed.Held)})
+    held = compressed.BoundaryConditions(**{f.name: how[f.name] for f in fields(compressed.BoundaryConditions)})
     asked = compressed.Asked(
         compressed.stresses_kpa(stress), held, model or "", accuracy or inf, check_mesh=check_mesh, keep=not no_cache
     )

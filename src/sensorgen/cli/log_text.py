@@ -1,7 +1,6 @@
 """The log as a person at a terminal, or a program, wants to read it."""
 
 import dataclasses
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -85,20 +84,20 @@ def run(b: "BenchRun") -> Iterator[str]:
     yield f"recording {b.number}: {visible(b.specimen)}"
     facts = {name: getattr(b, name) for name in ("file", "rig_file", "remark", "design", "batch", "logged_at")}
     yield from (f"  {name:11}{visible(fact)}" for name, fact in facts.items() if fact)
-    yield from (f"  {visible(line)}" for line in _counted(json.loads(b.facts)))
+    yield from (f"  {visible(line)}" for line in _summary(b))
 
 
-def _counted(facts: Mapping[str, Any]) -> Iterator[str]:
-    """What was counted in a recording when it came in."""
-    for one in facts.get("lockins", ()):
-        yield from counted(
-            one["lockin"], one["counts"], one["tones_hz"], one["seconds"], one["program"] or one["format"]
-        )
-    if "rig" in facts:
-        rig = facts["rig"]
-        marked = f"; {rig['samples']} samples beside them, or while it was silent" if rig.get("samples") else ""
-        yield rig_counted(rig) + marked
-        yield from (f"{'':11}{said}" for said in (rig["clocks"], *rig.get("notes", ())))
+def _summary(run: "BenchRun") -> Iterator[str]:
+    """Samples, marks and clocks of a recording as it was logged."""
+    from sensorgen.measure.log import facts
+
+    logged = facts.from_json(run.facts)
+    for one in logged.lockins:
+        yield from counted(one.lockin, one.counts, one.tones_hz, one.seconds, one.program or one.format)
+    if logged.rig:
+        marked = f"; {logged.rig.samples} samples beside them, or while it was silent" if logged.rig.samples else ""
+        yield rig_counted({"rows": logged.rig.rows, "errors": logged.rig.errors}) + marked
+        yield from (f"{'':11}{line}" for line in (logged.rig.clocks, *logged.rig.notes))
 
 
 def counted(

@@ -163,7 +163,7 @@ def _press(sensor: "Sensor", tip_m: float, force_n: float) -> tuple["Patch", dic
         )
     area = tip_m**2
     stress = np.asarray(force_n / area)
-    thinning, slope = (float(value) for value in sensor.compression.thinning(stress))
+    thinning, slope = (float(value) for value in sensor.compression.capacitive_strain(stress))
     sensor.check_tracks(stress)
     rises = [rise / area for rise in sensor.piezoresistance_per_pa]
     factor = 1 / (1 - thinning)

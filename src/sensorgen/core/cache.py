@@ -13,10 +13,10 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from sensorgen import __version__
 from sensorgen.core import files as store
 from sensorgen.core import paths as places
 from sensorgen.core.errors import Unwritable
+from sensorgen.core.version import __version__
 
 PLACE = "SENSORGEN_CACHE"  # environment variable with another folder
 _SOURCES = ("models", "solvers", "scene", "core/bounds.py", "core/units.py")  # what decides an answer

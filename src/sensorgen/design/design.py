@@ -13,12 +13,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from sensorgen import __version__
+from sensorgen.core import display, yamlfile
 from sensorgen.core import plugins as registry
-from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, shown
+from sensorgen.core.version import __version__
 from sensorgen.design import materials as material_files
 from sensorgen.design import shapes
 from sensorgen.design.materials import own
@@ -32,6 +32,13 @@ _NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,98}[A-Za-z0-9])?")
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
 Slot = Annotated[str, Field(pattern=r"^[a-z0-9-]+(@[a-z0-9.-]+)?$", examples=["x60", "x60@thesis-4.1"])]
+
+
+class SVG(str):
+    """A drawing that a notebook shows."""
+
+    def _repr_svg_(self) -> str:
+        return str(self)
 
 
 class Slots(Strict):
@@ -62,6 +69,13 @@ class Waiver(Strict):
 
 class Design(Strict):
     """A named variant of a sensor."""
+
+    def _repr_html_(self) -> str:
+        return display.html(self)
+
+    def show(self) -> "SVG":
+        """The dimensioned cross-section with layers and findings, as a notebook shows it; ``str()`` is the SVG."""
+        return SVG(display.html(self))
 
     name: str = Field(
         default="",

@@ -1,4 +1,4 @@
-"""CSV tables of numbers, read block by block.
+"""CSV tables: numbers block by block, or text row by row.
 
 The separator is the commonest of ``;``, tab and ``,`` in the header; with ``;``, numbers may have decimal commas. Empty
 cells are nan. Rows are counted as an editor counts them: the header is row 1. NumPy converts a block at once; where it
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from sensorgen.core.errors import BadInput
 
 BLOCK_ROWS = 1 << 14
-LONGEST_LINE = 1 << 16
+LONGEST_LINE = 1 << 18
 SAME_NAMES: Mapping[str, str] = {}
 
 
@@ -70,7 +70,7 @@ class Table:
         header = self._line()
         if not header.strip():
             raise BadInput(f"{name}: the file is empty; expected a header and rows below it")
-        self._separator = separator_of(header)
+        self._separator = max(";\t,", key=header.count)
         names = [cell.strip() for cell in self._cells(1, header)]
         for given in columns:
             if given not in names:
@@ -137,7 +137,7 @@ class Table:
         simple = all(line.count(self._separator) == len(self.names) - 1 and '"' not in line for line in lines)
         values = self._converted_at_once(lines, numbers) if simple else None
         if values is None:
-            cells = [self._cells(row, line) for row, line in zip(rows, lines, strict=True)]
+            cells = [self._counted(row, self._cells(row, line)) for row, line in zip(rows, lines, strict=True)]
         else:  # no quotes: every separator separates, and splitting is faster
             cells = [line.rstrip("\r\n").split(self._separator) if text else [] for line in lines]
         if values is None:
@@ -157,17 +157,41 @@ class Table:
             return None
         return None if np.isinf(values).any() else values
 
+    def text_rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Row number and cells of every row that is not blank; a cell may span lines.
+
+        Raises
+        ------
+        BadInput
+            As :meth:`blocks`.
+        """
+        rows = csv.reader(iter(self._line, ""), delimiter=self._separator, strict=True)
+        while True:
+            row = self._row + 1
+            try:
+                cells = next(rows)
+            except StopIteration:
+                return
+            except csv.Error as error:
+                raise self._no_csv(row, error) from None
+            if any(cell.strip() for cell in cells):
+                yield row, self._counted(row, cells)
+
     def _cells(self, row: int, line: str) -> list[str]:
-        separator = self._separator
         try:
-            cells = next(csv.reader([line], delimiter=separator, strict=True))
+            return next(csv.reader([line], delimiter=self._separator, strict=True))
         except csv.Error as error:
-            advice = "close every quotation mark just before a separator, and end rows with a line feed"
-            raise self.error(row, f"this is no row of a CSV file ({error}); {advice}") from None
-        wanted = len(self.names) if row > 1 else len(cells)
+            raise self._no_csv(row, error) from None
+
+    def _no_csv(self, row: int, error: csv.Error) -> BadInput:
+        advice = "close every quotation mark just before a separator, and end rows with a line feed"
+        return self.error(row, f"this is no row of a CSV file ({error}); {advice}")
+
+    def _counted(self, row: int, cells: list[str]) -> list[str]:
+        wanted = len(self.names)
         if len(cells) == wanted:
             return cells
-        decimal = separator == "," and len(cells) > wanted
+        decimal = self._separator == "," and len(cells) > wanted
         advice = "; if the numbers have decimal commas, write ';' between the columns" if decimal else ""
         raise self.error(row, f"{len(cells)} cells, but the header has {wanted}{advice}")
 
@@ -203,11 +227,6 @@ def _open(path: Path | str) -> IO[str]:
         return Path(path).open(encoding="utf-8-sig", errors="surrogateescape", newline="\n")
     except (OSError, ValueError) as error:
         raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
-
-
-def separator_of(header: str) -> str:
-    """Commonest of ``;``, tab and ``,`` in a header."""
-    return max(";\t,", key=header.count)
 
 
 def listed(names: Sequence[str]) -> str:

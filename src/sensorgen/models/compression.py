@@ -1,6 +1,6 @@
-"""How much thinner a film seems to its capacitance under stress: plates free or bonded, and curves that were solved.
+"""Capacitive strain 1 - C'(0)/C'(p) versus pressure p: free and bonded plates, and curves of solved cells.
 
-The *thinning* is the share by which a plate of the same capacitance would be thinner, 1 - C'(0)/C'(stress).
+A plate of the same capacitance is thinner by this share.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,30 +21,30 @@ if TYPE_CHECKING:
 SOURCE = "Thesis Eq. B.49; Gent and Lindley (1959) for the bonded plate; solved cells as their file says"
 COST = 0
 
-PROTOTYPE_PA = 6e6  # Young's modulus of the films of the cells that were solved once and for all [Pa]
-SOLVED_RATIO = 0.4999  # Poisson's ratio of all materials of the cells that were solved once and for all [-]
-REACH = 3.0  # how far beyond its last stress a curve is extended by its last slope, as a factor [-]
+PROTOTYPE_PA = 6e6  # Young's modulus of the films of the stored cells [Pa]
+SOLVED_RATIO = 0.4999  # Poisson's ratio of all materials of the stored cells [-]
+REACH = 3.0  # factor on its last stress up to which a curve is extrapolated by its last slope [-]
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _SAME = 1e-6  # relative difference up to which two parameters are one
-_EARLY = np.array([1 / 16, 1 / 4])  # of the first stress, where a curve that begins with a power of it is held
+_EARLY = np.array([1 / 16, 1 / 4])  # of the first stress: knots of a curve that begins with a power of the stress
 
 Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Plate:
-    r"""A plate that obeys Hooke's law, thinning = stress / modulus (B.49).
+    r"""A linearly elastic plate: capacitive strain = stress / modulus (thesis B.49).
 
     Attributes
     ----------
     name, source : str
-        What it is, and who says so.
+        Name of the law, and its source.
     modulus_pa : float
-        Stress per thinning [Pa].
+        Stress per strain [Pa].
 
     Examples
     --------
-    >>> [float(value) for value in Plate("free", "B.49", 6e6).thinning(np.asarray(60e3))]
+    >>> [float(value) for value in Plate("free", "B.49", 6e6).capacitive_strain(np.asarray(60e3))]
     [0.01, 1.6666666666666668e-07]
     """
 
@@ -52,49 +52,49 @@ class Plate:
     source: str
     modulus_pa: float
 
-    def thinning(self, stress_pa: Real) -> tuple[Real, Real]:
-        """Thinning [-] and its derivative [1/Pa]; from 1 on the electrodes touch, and it raises OutOfRange."""
+    def capacitive_strain(self, stress_pa: Real) -> tuple[Real, Real]:
+        """Capacitive strain [-] and its derivative [1/Pa]; OutOfRange from 1 on, where the electrodes touch."""
         share = stress_pa / self.modulus_pa
         if np.any(share >= 1):
             raise OutOfRange(f"the stress thins the film by {np.max(share):.3g}: at 1 its electrodes touch (Eq. B.49)")
         return share, np.full_like(share, 1 / self.modulus_pa)
 
-    def bed_pa_per_m(self, gap_m: float) -> float:
-        """Pressure per displacement of the top [Pa/m], of a plate that fills a gap between its electrodes [m]."""
+    def foundation_stiffness_pa_per_m(self, gap_m: float) -> float:
+        """Pressure per displacement of the top [Pa/m], for a gap between the electrodes [m]."""
         return self.modulus_pa / gap_m
 
-    def stiffer(self, factor: float) -> "Plate":
-        """The same of a material that many times as stiff."""
+    def scaled_modulus(self, factor: float) -> "Plate":
+        """The same plate with its Young's modulus multiplied by a factor."""
         return replace(self, modulus_pa=self.modulus_pa * factor)
 
     def doubt(self, stress_pa: float) -> str:  # noqa: ARG002 - a law has no last point
-        """Nothing."""
+        """Remark on a stress [Pa]: none."""
         return ""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Capacitance over stress, point by point, with a cubic between (Hermite) that keeps it rising.
+    """Capacitance versus stress: monotone cubic Hermite interpolation between points.
 
     Attributes
     ----------
     name, source : str
-        What it is, and who says so.
+        Name of the law, and its source.
     stress_pa, ratio, slope_per_pa : tuple of float
         Stress from 0 on [Pa]; C'(stress)/C'(0) [-], from 1 on, and its derivative [1/Pa].
     within : float
-        Share by which its rise may be off [-].
-    held : tuple of float
-        Shares by which the rise differs for the same cell held or touched otherwise [-].
-    moved_m : float or None
-        How far the top has come down at the last stress [m]; None where nobody says.
+        Relative error of the rise [-].
+    boundary_changes : tuple of float
+        Relative changes of the rise under other boundary and contact conditions [-].
+    displacement_m : float or None
+        Of the top at the last stress [m]; None if unknown.
     onset : float
-        How much further below 1 the power of the stress is with which it begins than it seems, as a factor [-].
+        Factor on the distance from 1 of the power of the stress with which the curve begins [-].
 
     Examples
     --------
     >>> law = curve("example", "made up", [0.0, 5e4, 1e5], [1.0, 1.25, 2.0])
-    >>> [round(float(value), 6) for value in law.thinning(np.asarray(1e5))]
+    >>> [round(float(value), 6) for value in law.capacitive_strain(np.asarray(1e5))]
     [0.5, 5e-06]
     """
 
@@ -104,12 +104,12 @@ class Curve:
     ratio: tuple[float, ...]
     slope_per_pa: tuple[float, ...]
     within: float = 0.0
-    held: tuple[float, ...] = ()
-    moved_m: float | None = None
+    boundary_changes: tuple[float, ...] = ()
+    displacement_m: float | None = None
     onset: float = 1.0
 
-    def thinning(self, stress_pa: Real) -> tuple[Real, Real]:
-        """Thinning [-] and its derivative [1/Pa]; raises OutOfRange for a pull and far beyond the last point."""
+    def capacitive_strain(self, stress_pa: Real) -> tuple[Real, Real]:
+        """Capacitive strain [-] and its derivative [1/Pa]; OutOfRange below 0 and far beyond the last point."""
         last = self.stress_pa[-1]
         if np.any(stress_pa < 0):
             raise OutOfRange(f"a stress of {np.min(stress_pa):.3g} Pa pulls; the curve {self.name!r} begins at 0")
@@ -121,22 +121,22 @@ class Curve:
         rise, slope = self._rise(stress_pa)
         return rise / (1 + rise), slope / (1 + rise) ** 2
 
-    def bed_pa_per_m(self, gap_m: float) -> float:  # noqa: ARG002 - the cell's own height is in it
-        """Pressure per displacement of the top up to the last stress [Pa/m]; raises MissingValue where nobody says."""
-        if self.moved_m is None:
-            raise MissingValue(f"the curve {self.name!r} does not say how far the top comes down")
-        return self.stress_pa[-1] / self.moved_m
+    def foundation_stiffness_pa_per_m(self, gap_m: float) -> float:  # noqa: ARG002 - the cell's own height is in it
+        """Pressure per displacement of the top up to the last stress [Pa/m]; MissingValue if this is unknown."""
+        if self.displacement_m is None:
+            raise MissingValue(f"the curve {self.name!r} does not give the displacement of the top")
+        return self.stress_pa[-1] / self.displacement_m
 
-    def stiffer(self, factor: float) -> "Curve":
-        """The same of materials that are all that many times as stiff: stresses scale."""
+    def scaled_modulus(self, factor: float) -> "Curve":
+        """The same cell with all Young's moduli multiplied by a factor: stresses scale."""
         return replace(
             self,
             stress_pa=tuple(p * factor for p in self.stress_pa),
             slope_per_pa=tuple(m / factor for m in self.slope_per_pa),
         )
 
-    def rising(self, factor: float) -> "Curve":
-        """A curve that rises that many times as much."""
+    def scaled_rise(self, factor: float) -> "Curve":
+        """The same curve with its rise C/C(0) - 1 multiplied by a factor."""
         return replace(
             self,
             ratio=tuple(1 + (g - 1) * factor for g in self.ratio),
@@ -144,22 +144,21 @@ class Curve:
         )
 
     def doubt(self, stress_pa: float) -> str:
-        """Whether the stress is beyond the last point."""
+        """Remark on a stress beyond the last point [Pa]."""
         last = self.stress_pa[-1]
         return f"above {last / _PA_PER_KPA:g} kPa the curve is extended by its last slope" if stress_pa > last else ""
 
     @cached_property
     def _cubics(self) -> tuple[Real, ...]:
-        """Stress where each piece begins, its length, and its coefficients in the share of that length."""
+        """Start and length of each piece [Pa], and its coefficients in powers of the share of that length."""
         p, r, m = self._knots()
         h, rise = np.diff(p), np.diff(r)
         return p[:-1], h, r[:-1], h * m[:-1], 3 * rise - h * (2 * m[:-1] + m[1:]), h * (m[:-1] + m[1:]) - 2 * rise
 
     def _knots(self) -> tuple[Real, Real, Real]:
-        """Stresses [Pa], rises [-] and slopes [1/Pa] between which cubics lie.
+        """Knots of the cubics: stress [Pa], rise [-] and slope [1/Pa].
 
-        Where the points bend down from the first on, a contact grows from nothing: up to there the rise goes with a
-        power of the stress, which a cubic by itself would begin too flat.
+        Concave data mean contact from zero load: a power law below the first load, where a cubic starts too flat.
         """
         p, r, m = np.asarray(self.stress_pa), np.asarray(self.ratio) - 1, np.asarray(self.slope_per_pa)
         power = 1 - self.onset * (1 - m[1] * p[1] / r[1])
@@ -171,7 +170,7 @@ class Curve:
         return np.insert(p, 1, early), np.insert(r, 1, begun), np.concatenate([[first], slope, m[1:]])
 
     def _rise(self, at: Real) -> tuple[Real, Real]:
-        """C'/C'(0) - 1, which keeps its digits where little presses, and its derivative [1/Pa]."""
+        """C'/C'(0) - 1, accurate for small stresses too [-], and its derivative [1/Pa]."""
         starts, *pieces = self._cubics
         k = np.clip(np.searchsorted(starts, at, side="right") - 1, 0, None)
         h, before, linear, quadratic, cubic = (piece[k] for piece in pieces)
@@ -186,8 +185,8 @@ Compression = Plate | Curve
 
 
 def unconfined(youngs_modulus_pa: float) -> Plate:
-    """A plate that is free to give way sideways: the softest case (B.49)."""
-    return Plate("unconfined", "thesis B.49: strain = stress / E, free to give way sideways", youngs_modulus_pa)
+    """A plate that is free to expand sideways: the softest case (thesis B.49)."""
+    return Plate("unconfined", "thesis B.49: strain = stress / E, free to expand sideways", youngs_modulus_pa)
 
 
 def bonded(youngs_modulus_pa: float, width_m: float, thickness_m: float) -> Plate:
@@ -203,7 +202,7 @@ def bonded(youngs_modulus_pa: float, width_m: float, thickness_m: float) -> Plat
     Notes
     -----
     Gent and Lindley, Proc. Inst. Mech. Eng. 173, 111 (1959), plane strain. At nu = 0.45 the film is at most 3.8 times
-    stiffer than E, however thin: the two laws bracket a plate.
+    as stiff as E, however thin: the two laws bracket a plate.
 
     Examples
     --------
@@ -220,7 +219,7 @@ def curve(name: str, source: str, stress_pa: Sequence[float], ratio: Sequence[fl
     Parameters
     ----------
     name, source : str
-        What it is, and who says so.
+        Name of the law, and its source.
     stress_pa, ratio : sequence of float
         Stress, from 0 on and rising [Pa]; C'(stress)/C'(0), from 1 on and rising [-].
 
@@ -251,9 +250,9 @@ def curve_of(pressed: "Pressed", name: str = "solved") -> Curve:
 
 
 def _slopes(p: Real, g: Real) -> Real:
-    """Harmonic means within (Fritsch and Butland, 1984), one-sided parabolas at the ends, never against the rise.
+    """Harmonic means within (Fritsch and Butland, 1984), one-sided parabolas at the ends, at least 0.
 
-    As SciPy's PCHIP, without its import: that takes longer than a whole prediction.
+    As SciPy's PCHIP, whose import takes longer than a whole prediction.
     """
     h, s = np.diff(p), np.diff(g) / np.diff(p)
     if len(s) == 1:
@@ -265,7 +264,7 @@ def _slopes(p: Real, g: Real) -> Real:
 
 
 def solved(shape: str, parameters: Mapping[str, Any], youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
-    """The solved curve of a cell, or None where this cell was not solved.
+    """The stored curve of a cell, or None if this cell is not stored.
 
     Parameters
     ----------
@@ -286,16 +285,16 @@ def solved(shape: str, parameters: Mapping[str, Any], youngs_modulus_pa: Mapping
 
 
 def prototype(shape: str) -> Curve:
-    """The first solved curve of a shape, of films of ``PROTOTYPE_PA``: what a cell like it can be expected to do."""
+    """The first stored curve of a shape, for films of ``PROTOTYPE_PA``: an estimate for similar cells."""
     return _curve(next(cell for cell in _cells()["cells"] if cell["shape"] == shape), 1.0)
 
 
-def _curve(cell: Mapping[str, Any], stiffer: float) -> Curve:
-    """A solved cell's curve, its materials that many times as stiff."""
-    stress = [kpa * _PA_PER_KPA * stiffer for kpa in cell["stress_kpa"]]
+def _curve(cell: Mapping[str, Any], scale: float) -> Curve:
+    """A stored cell's curve, its moduli multiplied by a factor."""
+    stress = [kpa * _PA_PER_KPA * scale for kpa in cell["stress_kpa"]]
     found = curve("solved", cell["source"], stress, [1 + percent / 100 for percent in cell["rise_percent"]])
-    moved_m = cell["displacement_um"] / _UM_PER_M
-    return replace(found, within=cell["within"], held=tuple(cell["held"].values()), moved_m=moved_m)
+    changes, displacement_m = tuple(cell["held"].values()), cell["displacement_um"] / _UM_PER_M
+    return replace(found, within=cell["within"], boundary_changes=changes, displacement_m=displacement_m)
 
 
 @cache

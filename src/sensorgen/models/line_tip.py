@@ -232,7 +232,7 @@ def _pieces(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> lis
     for k, share in enumerate(tip.pieces.length):
         weight = tip.pieces.pressure[..., k]
         stress = np.asarray(weight * mean)
-        thinning, slope = law.thinning(stress)
+        thinning, slope = law.capacitive_strain(stress)
         rise = track.rise_ohm_per_m_per_pa * stress
         thinned = film * (thinning / (1 - thinning))
         by_stress = film * (slope / (1 - thinning) ** 2)

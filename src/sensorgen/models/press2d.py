@@ -6,7 +6,6 @@ is checked: load reached, volume kept, faces not run into each other, work equal
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +13,14 @@ from numpy.typing import NDArray
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Scene
+from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.solvers.contact.cell import Cell, cell_of
-from sensorgen.solvers.contact.mesh import Fineness, Unmeshed, mesh_of
+from sensorgen.solvers.contact.mesh import Fineness, Mesh, Unmeshed, mesh_of
 from sensorgen.solvers.contact.pressed import (
     DEEPEST,
     Elastic,
     Pressed,
+    Run,
     check,
     compared,
     law_of,
@@ -27,10 +28,6 @@ from sensorgen.solvers.contact.pressed import (
     reached,
     with_capacitances,
 )
-from sensorgen.solvers.contact.support import Held
-
-if TYPE_CHECKING:
-    from sensorgen.solvers.contact.pressed import Run
 
 SOURCE = (
     "neo-Hookean plane strain, displacement with bubble and pressure (Crouzeix and Raviart 1973), penalty contact with "
@@ -38,7 +35,7 @@ SOURCE = (
 )
 COST = 2
 
-__all__ = ["Elastic", "Fineness", "Held", "Pressed", "cell", "compared", "press", "why_not_applicable"]
+__all__ = ["BoundaryConditions", "Elastic", "Fineness", "Pressed", "cell", "compared", "press", "why_not_applicable"]
 
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
 _STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid when they touched counts [-]
@@ -54,7 +51,7 @@ def press(
     solids: Mapping[str, Elastic],
     stress_pa: Sequence[float],
     permittivity: Mapping[str, float] | None = None,
-    held: Held | None = None,
+    boundary: BoundaryConditions | None = None,
     fineness: Fineness | None = None,
     step: Callable[[float], None] | None = None,
 ) -> Pressed:
@@ -70,7 +67,7 @@ def press(
         Pressures, from 0 on and rising [Pa].
     permittivity : mapping of str to float, optional
         Relative permittivity by material, with "air"; without it no capacitance is computed [-].
-    held : Held, optional
+    boundary : BoundaryConditions, optional
         Base, period, top and contact.
     fineness : Fineness, optional
         Of the mesh.
@@ -80,19 +77,19 @@ def press(
     Raises
     ------
     OutOfRange
-        Pressures do not rise from 0, or a choice of ``held`` is unknown.
+        Pressures do not rise from 0, or a choice of ``boundary`` is unknown.
     MissingValue
         The mesher is not installed.
     """
-    held, fineness = held or Held(), fineness or Fineness()
-    check(stress_pa, held)
+    boundary, fineness = boundary or BoundaryConditions(), fineness or Fineness()
+    check(stress_pa, boundary)
     told = step or (lambda _: None)
-    first, _ = best, run = _solved(cell, solids, stress_pa, held, fineness, told)
+    first, _ = best, run = _solved(cell, solids, stress_pa, boundary, fineness, told)
     for factor in _COARSER:
         if not best.faults:
             break
         coarser = replace(fineness, apex_mm=factor * fineness.apex_mm)
-        again, other = _solved(cell, solids, stress_pa, held, coarser, told)
+        again, other = _solved(cell, solids, stress_pa, boundary, coarser, told)
         if (again.converged_pa, -len(again.faults)) > (best.converged_pa, -len(best.faults)):
             best, run = replace(again, doubts=(*again.doubts, _coarsened(first, again, coarser))), other
     return _with_fields(best, cell, run, permittivity) if permittivity else best
@@ -110,14 +107,14 @@ def _solved(
     cell: Cell,
     solids: Mapping[str, Elastic],
     stress_pa: Sequence[float],
-    held: Held,
+    boundary: BoundaryConditions,
     fineness: Fineness,
     step: Callable[[float], None],
-) -> tuple[Pressed, "Run"]:
+) -> tuple[Pressed, Run[Mesh]]:
+    from sensorgen.solvers.contact.boundary import free_of, top_load
     from sensorgen.solvers.contact.contact import faces_of
     from sensorgen.solvers.contact.element import Elements
     from sensorgen.solvers.contact.load import Problem
-    from sensorgen.solvers.contact.support import free_of, top_load
 
     mesh = mesh_of(cell, fineness)
     law, softest_pa = law_of(["", *(r.material for r in cell.regions)], mesh.region, solids)
@@ -125,31 +122,31 @@ def _solved(
     problem = Problem(
         Elements(mesh, law),
         faces,
-        free_of(mesh.points_m, held),
+        free_of(mesh.points_m, boundary),
         top_load(mesh.points_m, *mesh.top()),
         penalty_pa(softest_pa),
-        held.contact == "stick",
+        boundary.contact == "stick",
         sound=lambda places_m: not faces.crossed(places_m, mesh.outline, DEEPEST),
     )
     longest_pa = softest_pa * (_STICKING_STEP if problem.stick else _STEP)
-    found, run = reached(problem, stress_pa, longest_pa, step, SOURCE)
+    found, states = reached(problem, stress_pa, longest_pa, step, SOURCE)
     if not cell.mirrored:
         said = "mirrors stand at both ends of the period, though it is not its own mirror image"
         found = replace(found, doubts=(said, *found.doubts))
-    return found, run
+    return found, Run(problem, mesh, states)
 
 
-def _with_fields(found: Pressed, cell: Cell, run: "Run", permittivity: Mapping[str, float]) -> Pressed:
+def _with_fields(found: Pressed, cell: Cell, run: Run[Mesh], permittivity: Mapping[str, float]) -> Pressed:
     """The same with the capacitance of the deformed outlines."""
     fields = [_field(cell, run, s.u_m, permittivity) for s in run.states]
     return with_capacitances(found, [c for c, _ in fields], tuple(outline for _, outline in fields))
 
 
-def _field(cell: Cell, run: "Run", u_m: Real, permittivity: Mapping[str, float]) -> tuple[Interval | None, Cell]:
+def _field(cell: Cell, run: Run[Mesh], u_m: Real, permittivity: Mapping[str, float]) -> tuple[Interval | None, Cell]:
     """Capacitance and outlines of a deformed cell; None where no sound mesh of them was found."""
     from sensorgen.solvers.contact import deformed, field
 
-    mesh = run.problem.elements.mesh
+    mesh = run.mesh
     outline = deformed.deformed(cell, mesh, run.problem.faces, u_m)
     if deformed.misfit(outline, mesh, u_m) > _MISFIT:
         return None, outline

@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Scene
+from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.solvers.contact.brick_field import Orders
 from sensorgen.solvers.contact.bricks import Bricks, bricks_of
 from sensorgen.solvers.contact.pressed import (
     Elastic,
     Pressed,
+    Run,
     check,
     compared,
     law_of,
@@ -26,11 +28,10 @@ from sensorgen.solvers.contact.pressed import (
     reached,
     with_capacitances,
 )
-from sensorgen.solvers.contact.support import Held
 
 if TYPE_CHECKING:
+    from sensorgen.solvers.contact.bricks import BrickMesh
     from sensorgen.solvers.contact.load import State
-    from sensorgen.solvers.contact.pressed import Run
 
 SOURCE = (
     "neo-Hookean in 3D, bricks with 27 nodes and a linear pressure each (Q2 / P1); bounds of the capacitance by "
@@ -38,7 +39,7 @@ SOURCE = (
 )
 COST = 3
 
-__all__ = ["Elastic", "Held", "Pieces", "Pressed", "cell", "compared", "press", "why_not_applicable"]
+__all__ = ["BoundaryConditions", "Elastic", "Pieces", "Pressed", "cell", "compared", "press", "why_not_applicable"]
 
 _STEP = 1 / 60  # longest load step over the least Young's modulus: 100 kPa for 6 MPa [-]
 _MOST = 4000  # solid bricks: more would take hours
@@ -93,7 +94,7 @@ def press(
     solids: Mapping[str, Elastic],
     stress_pa: Sequence[float],
     permittivity: Mapping[str, float] | None = None,
-    held: Held | None = None,
+    boundary: BoundaryConditions | None = None,
     fineness: Pieces | None = None,
     step: Callable[[float], None] | None = None,
 ) -> Pressed:
@@ -109,7 +110,7 @@ def press(
         Pressures, from 0 on and rising [Pa].
     permittivity : mapping of str to float, optional
         Relative permittivity by material, with "air"; without it no capacitance is computed [-].
-    held : Held, optional
+    boundary : BoundaryConditions, optional
         Base, period ("free": in both directions), top and contact.
     fineness : Pieces, optional
         Of the mesh; fewer pieces, which is said, where they would be too many.
@@ -121,14 +122,14 @@ def press(
     OutOfRange
         Pressures do not rise from 0, or the electrodes touch.
     BadInput
-        A choice of ``held`` is unknown, or an electrode does not cover the cell.
+        A choice of ``boundary`` is unknown, or an electrode does not cover the cell.
     """
-    held, wanted = held or Held(), fineness or Pieces()
-    check(stress_pa, held)
+    boundary, wanted = boundary or BoundaryConditions(), fineness or Pieces()
+    check(stress_pa, boundary)
     most = int((_MOST / max((bricks.fill > 0).sum(), 1)) ** (1 / 3))
     fineness = replace(wanted, pieces=min(wanted.pieces, max(most, 1)))
     found, run = _solved(
-        bricks.cut(fineness.pieces, fineness.shrink), solids, stress_pa, held, step or (lambda _: None)
+        bricks.cut(fineness.pieces, fineness.shrink), solids, stress_pa, boundary, step or (lambda _: None)
     )
     if fineness != wanted:
         said = f"every box cut into {fineness.pieces} pieces along each axis, not {wanted.pieces}: there are many"
@@ -140,21 +141,21 @@ def _solved(
     cut: Bricks,
     solids: Mapping[str, Elastic],
     stress_pa: Sequence[float],
-    held: Held,
+    boundary: BoundaryConditions,
     step: Callable[[float], None],
-) -> tuple[Pressed, "Run"]:
+) -> "tuple[Pressed, Run[BrickMesh]]":
+    from sensorgen.solvers.contact.boundary import free_of, top_load
     from sensorgen.solvers.contact.bricks import mesh_of
     from sensorgen.solvers.contact.contact import brick_faces_of
     from sensorgen.solvers.contact.element import Elements
     from sensorgen.solvers.contact.factors import Solver
     from sensorgen.solvers.contact.load import Problem
-    from sensorgen.solvers.contact.support import free_of, top_load
 
     mesh = mesh_of(cut, cut.fill > 0)
     law, softest_pa = law_of([r.material for r in cut.regions], mesh.region, solids)
     used = np.zeros(len(mesh.points_m), bool)
     used[mesh.outer] = True
-    free = free_of(mesh.points_m, held, cut.spans_m(), used)
+    free = free_of(mesh.points_m, boundary, cut.spans_m(), used)
     first = free.tocsc().indices[free.tocsc().indptr[:-1]]
     problem = Problem(
         Elements(mesh, law),
@@ -162,25 +163,25 @@ def _solved(
         free,
         top_load(mesh.points_m, *mesh.top()),
         penalty_pa(softest_pa),
-        held.contact == "stick",
+        boundary.contact == "stick",
         solver=Solver(mesh.lattice[first // 3]),
     )
-    found, run = reached(problem, stress_pa, _STEP * softest_pa, step, SOURCE)
-    last = run.states[-1]
+    found, states = reached(problem, stress_pa, _STEP * softest_pa, step, SOURCE)
+    last = states[-1]
     if (problem.gaps(last.pairs, last.u_m) < 0).any():
-        how = "and hold fast" if held.contact == "stick" else "without friction"
+        how = "and hold fast" if boundary.contact == "stick" else "without friction"
         found = replace(found, doubts=(*found.doubts, f"faces of gaps touch, {how}"))
-    return found, run
+    return found, Run(problem, mesh, states)
 
 
-def _with_fields(found: Pressed, run: "Run", permittivity: Mapping[str, float], orders: Orders) -> Pressed:
-    """The same with the capacitance of the deformed boxes; gaps that are shut are held open by a little."""
+def _with_fields(found: Pressed, run: "Run[BrickMesh]", permittivity: Mapping[str, float], orders: Orders) -> Pressed:
+    """The same with the capacitance of the deformed boxes; gaps that are shut are boundary open by a little."""
     from sensorgen.solvers.contact.air import AirMap
     from sensorgen.solvers.contact.brick_field import Field, Folded
     from sensorgen.solvers.contact.bricks import mesh_of
 
-    solid = run.problem.elements.mesh
-    whole = mesh_of(solid.bricks, np.ones(solid.bricks.fill.shape, bool))
+    solid = run.mesh
+    whole = mesh_of(solid.bricks, np.ones_like(solid.bricks.fill, dtype=np.bool_))
     field, air = Field(whole, permittivity, orders), AirMap(whole, solid)
 
     def bounds(state: "State") -> Interval | None:

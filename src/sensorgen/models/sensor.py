@@ -24,7 +24,7 @@ Complex = NDArray[np.complex128]
 
 
 class Patch(NamedTuple):
-    """Part of the sensor under the tip; arrays of the positions' shape, or numbers where they are all the same."""
+    """Part of the sensor under the tip; arrays of the positions' shape, or numbers where they are equal."""
 
     left_m: Real
     length_m: Real

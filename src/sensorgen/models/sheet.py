@@ -175,7 +175,7 @@ def localise(
     Notes
     -----
     Impedances within 3 % (resolution chosen with the patch in the middle). A bound on unbiased estimates: where it
-    exceeds the spread of a guess, the readings have no information on position.
+    exceeds the spread of a uniform distribution over the sheet, the readings have no information on position.
 
     Examples
     --------

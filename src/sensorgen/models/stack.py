@@ -149,9 +149,9 @@ class Film(NamedTuple):
     ----------
     capacitance_f_per_m : float
         Unloaded, per length [F/m].
-    thinning : callable
+    capacitive_strain : callable
         Pressure [Pa] to capacitive strain [-] and its derivative [1/Pa], as
-        :meth:`sensorgen.models.compression.Plate.thinning`.
+        :meth:`sensorgen.models.compression.Plate.capacitive_strain`.
     tan_delta : float
         Loss tangent [-].
     leak_s_per_m : float
@@ -159,7 +159,7 @@ class Film(NamedTuple):
     """
 
     capacitance_f_per_m: float
-    thinning: Law
+    capacitive_strain: Law
     tan_delta: float = 0.0
     leak_s_per_m: float = 0.0
 
@@ -200,7 +200,7 @@ class Stack:
     Examples
     --------
     >>> from sensorgen.models.compression import unconfined
-    >>> film = Film(69e-11, unconfined(6e6).thinning)
+    >>> film = Film(69e-11, unconfined(6e6).capacitive_strain)
     >>> double = Stack(0.1, 0.01, (Track(45e3),) * 3, (film, film))
     >>> z = double.response(99.7e3, Press(6.0, 0.04, 0.01))
     >>> [round(abs(complex(m)), 2) for m in z.by_force_ohm_per_n.diagonal()]
@@ -280,7 +280,7 @@ class Stack:
     def _changes(self, omega: Real, press: Press) -> tuple[list[Any], list[Any]]:
         """What pressing adds to each track and each film, exactly 0 without force."""
         stress = np.asarray(press.force_n, float) / (self.width_m * np.asarray(press.length_m, float))
-        thinner = [film.thinning(stress)[0] for film in self.films]
+        thinner = [film.capacitive_strain(stress)[0] for film in self.films]
         denser = [_turned(film, omega) * (s / (1 - s)) for film, s in zip(self.films, thinner, strict=True)]
         return [track.r_ohm_per_m * track.piezoresistance_per_pa * stress for track in self.tracks], denser
 
@@ -339,7 +339,7 @@ class Stack:
         area = self.width_m * np.asarray(press.length_m, float)
         rise = [track.r_ohm_per_m * track.piezoresistance_per_pa / area for track in self.tracks]
         stress = np.asarray(press.force_n, float) / area
-        thinner = [film.thinning(stress) for film in self.films]
+        thinner = [film.capacitive_strain(stress) for film in self.films]
         slopes = [
             _turned(film, omega) / (1 - share) ** 2 * slope / area
             for film, (share, slope) in zip(self.films, thinner, strict=True)

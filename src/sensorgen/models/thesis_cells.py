@@ -172,11 +172,6 @@ def bulging_f_per_m2(p: rect.Params, eps_r: float, press_mm: float = 0.0, printe
     return strips_f_per_m2(p, eps_r) + 8 / 16 * (term(press_mm) - (0.0 if printed else term(0.0)))
 
 
-def _film_only_f_per_m2(p: tri.Params | rect.Params, eps_r: float) -> float:
-    """Capacitance per area if the film alone counted, as though a plate lay on it [F/m2]."""
-    return EPS0_F_PER_M * eps_r / _film_m(p)
-
-
 def _swept(p: Any, eps_r: float, press_mm: float, formula: Callable[..., float]) -> float:
     """What a formula gives for the sizes that 3.1.2 makes of a pressed cell, per area of the sensor at rest [F/m2]."""
     q = thesis_swept.swept(p, press_mm)
@@ -209,7 +204,7 @@ class Named:
 _OWN_WIDTHS = partial(strips_f_per_m2, even=False)
 
 NAMED = {
-    "thesis-film-only": Named(("tri", "rect"), _film_only_f_per_m2),
+    "thesis-film-only": Named(("tri", "rect"), lambda p, eps_r: EPS0_F_PER_M * eps_r / _film_m(p)),
     "thesis-3.35": Named(("tri",), triangles_f_per_m2),
     "thesis-3.34-printed": Named(("tri",), partial(triangles_f_per_m2, printed=True)),
     "thesis-3.35-swept": Named(("tri",), partial(_swept, formula=triangles_f_per_m2), pressed=True),

@@ -1,4 +1,4 @@
-"""How far a top comes down, by laws that solve no field: at once, and of no known error where none is told."""
+"""Closed-form displacement under pressure; error unknown unless stated."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,58 +17,64 @@ from sensorgen.prediction.mesh_ladder import Piece, refuse_crushing
 
 
 @dataclass(frozen=True)
-class Guess:
-    """A displacement that no field was solved for.
+class ClosedForm:
+    """A closed-form estimate of the displacement.
 
     Attributes
     ----------
     displacement_m : (n,) array
         Of the top, at every stress [m].
-    held : dict of str to str
-        How the law takes the piece to be held.
+    boundary : dict of str to str
+        Boundary conditions that the law assumes.
     doubts : tuple of str
-        What it is worth.
+        Limits of its validity.
     """
 
     displacement_m: NDArray[np.float64]
-    held: dict[str, str]
+    boundary: dict[str, str]
     doubts: tuple[str, ...]
 
 
-def _springs(design: Design, piece: Piece, stress_pa: Sequence[float]) -> Guess:
+def _springs(design: Design, piece: Piece, stress_pa: Sequence[float]) -> ClosedForm:
     """Columns as springs side by side, for any scene."""
     scene, why = piece.scene, press2d.why_not_applicable(piece.scene)
     solids = elastic(design, scene)
     moduli = {n: s.youngs_modulus_pa / (1.0 if why else 1 - s.poisson_ratio**2) for n, s in solids.items()}
     boxes = all(prism.is_box() for body in scene.bodies for prism in body.prisms)
-    said = "at most this, at small strain under a stiff plate" if boxes else "a guess: columns that know no neighbours"
+    said = (
+        "at most this, at small strain under a stiff plate"
+        if boxes
+        else "an estimate: columns without their neighbours"
+    )
     doubts = (
-        f"displacement: {said}", "no capacitance under stress: springs do not know outlines", *([why] if why else [])
+        f"displacement: {said}", "no capacitance under stress: springs have no outlines", *([why] if why else [])
     )  # fmt: skip
-    return Guess(springs.displacement_m(scene, moduli, stress_pa), {"top": "rigid"}, doubts)
+    return ClosedForm(springs.displacement_m(scene, moduli, stress_pa), {"top": "rigid"}, doubts)
 
 
-def _plate(name: str, design: Design, piece: Piece, stress_pa: Sequence[float]) -> Guess:
-    """A law of solid plates, its electrodes taken to be stiff."""
+def _plate(name: str, design: Design, piece: Piece, stress_pa: Sequence[float]) -> ClosedForm:
+    """A law of solid plates, with rigid electrodes."""
     known = capacitance(piece.scene, {t.material: t.value for t in permittivities(design)}, model="columns", keep=False)
     between = {body.material for body in piece.scene.bodies if not body.terminal}
     if not is_plate(known) or between != {film(design)}:
-        raise BadInput(f"--model {name} speaks of a solid plate of one material, {design.shape} is none: try springs")
+        raise BadInput(f"--model {name} applies to a solid plate of one material, {design.shape} is none: try springs")
     refuse_crushing(
         stress_pa[-1], {n: taken.value for n, taken in of_all_materials(design, "youngs_modulus_pa").items()}
     )
     law, gap = law_of(design, known, name, printed=piece).compression, gap_m(piece.scene)
-    moved_m = np.asarray(stress_pa) / law.bed_pa_per_m(gap)
+    displacement_m = np.asarray(stress_pa) / law.foundation_stiffness_pa_per_m(gap)
     doubts = (
         f"displacement: of the film between stiff electrodes, {law.source}",
-        "no capacitance under stress: sensorgen predict tells what the law makes of it",
+        "no capacitance under stress: sensorgen predict gives it by this law",
     )
-    return Guess(moved_m, {"sides": "free" if name == "unconfined" else "bonded to both electrodes"}, doubts)
+    return ClosedForm(
+        displacement_m, {"sides": "free" if name == "unconfined" else "bonded to both electrodes"}, doubts
+    )
 
 
-MODELS: dict[str, Callable[[Design, Piece, Sequence[float]], Guess]] = {
+MODELS: dict[str, Callable[[Design, Piece, Sequence[float]], ClosedForm]] = {
     "springs": _springs,
     "unconfined": partial(_plate, "unconfined"),
     "bonded": partial(_plate, "bonded"),
 }
-FIRST = "springs"  # that is asked where no field can be solved: it speaks of any scene
+FIRST = "springs"  # applies to any scene: the default where no field can be solved

@@ -15,31 +15,31 @@ from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.values import permittivities
 from sensorgen.models import press2d
-from sensorgen.models.press2d import Held, Pressed
+from sensorgen.models.press2d import BoundaryConditions, Pressed
 from sensorgen.prediction import capacitance_answer as bounds
-from sensorgen.prediction import closed_form_compression as guesses
+from sensorgen.prediction import closed_form_compression as closed_form
 from sensorgen.prediction.compression_law import elastic, expected
 from sensorgen.prediction.mesh_ladder import (
     MODELS,
     SAFETY,
     USUAL,
     Case,
+    MeshLevel,
     Piece,
-    Rung,
+    mesh_levels,
     pressed,
-    rungs,
     why_not_applicable,
 )
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, plain, run_until_within
 from sensorgen.prediction.sensor_model import piece
 from sensorgen.scene.scene import Scene
 
-__all__ = ["ALL", "Asked", "Held", "answer", "planned", "stresses_kpa"]
+__all__ = ["ALL", "Asked", "BoundaryConditions", "answer", "planned", "stresses_kpa"]
 
 Data = dict[str, Any]
 Step = Callable[[float], None]
 Told = tuple[Pressed, tuple[float, ...]]
-ALL = (*MODELS, *guesses.MODELS)
+ALL = (*MODELS, *closed_form.MODELS)
 
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _OF_OUTLINES = "of the capacitance of the deformed outlines as computed; the outlines' own error is not in them"
@@ -59,7 +59,7 @@ class Asked:
     ----------
     stress_kpa : tuple of float
         Rising, 0 first [kPa].
-    held : Held
+    boundary : BoundaryConditions
         Base, period, top and contact.
     model : str
         One of ``ALL``, or "" for the first that can speak of the scene.
@@ -73,7 +73,7 @@ class Asked:
     """
 
     stress_kpa: tuple[float, ...]
-    held: Held
+    boundary: BoundaryConditions
     model: str = ""
     accuracy: float = inf
     check_mesh: bool = False
@@ -114,8 +114,8 @@ def answer(body: Body, asked: Asked, *, step: Step | None = None) -> Data:
 def _answer(design: Design, piece: Piece, asked: Asked, step: Step | None) -> Data:
     if asked.accuracy < inf:
         return _as_near(design, piece, asked, step)
-    if _model(piece, asked) in guesses.MODELS:
-        return _guess(design, piece, asked)
+    if _model(piece, asked) in closed_form.MODELS:
+        return _closed_form(design, piece, asked)
     case = _case(design, piece, asked)
     found = _pressed(case, asked, USUAL, step)
     if asked.check_mesh:
@@ -132,11 +132,11 @@ def _planned(design: Design, piece: Piece, asked: Asked) -> Plan:
     if not asked.accuracy > 0:
         raise OutOfRange(f"an accuracy of {asked.accuracy:g}; expected a number above 0, as 1e-2")
     model = _model(piece, asked)
-    if model in guesses.MODELS:
+    if model in closed_form.MODELS:
         why = f"--model {model}" if asked.model else why_not_applicable(piece, MODELS[0])
         raise BadInput(f"an accuracy of C, and {why}: {model} tells {_NO_C}; leave out --accuracy")
     others = [Candidate(name, passed_over=_reason(piece, name, asked.model)) for name in ALL if name != model]
-    meshes = [_candidate(design, asked, rung) for rung in _rungs(piece, model, asked)]
+    meshes = [_candidate(design, asked, mesh) for mesh in _mesh_levels(piece, model, asked)]
     candidates = (*others, *meshes)
     level = Level(
         "compression", _MEASURE, asked.accuracy, candidates, cheapest(candidates, asked.accuracy)
@@ -145,33 +145,35 @@ def _planned(design: Design, piece: Piece, asked: Asked) -> Plan:
 
 
 def _model(piece: Piece, asked: Asked) -> str:
-    return asked.model or next((name for name in MODELS if not why_not_applicable(piece, name)), guesses.FIRST)
+    return asked.model or next((name for name in MODELS if not why_not_applicable(piece, name)), closed_form.FIRST)
 
 
-def _rungs(piece: Piece, model: str, asked: Asked) -> list[Rung]:
-    return rungs(piece, model, len(asked.stress_kpa) - 1)
+def _mesh_levels(piece: Piece, model: str, asked: Asked) -> list[MeshLevel]:
+    return mesh_levels(piece, model, len(asked.stress_kpa) - 1)
 
 
 def _reason(piece: Piece, name: str, forced: str) -> str:
     if forced:
         return f"--model {forced}"
     return (
-        _NO_C if name in guesses.MODELS else why_not_applicable(piece, name) or "the model before it speaks of the cell"
+        _NO_C
+        if name in closed_form.MODELS
+        else why_not_applicable(piece, name) or "the model before it speaks of the cell"
     )
 
 
-def _candidate(design: Design, asked: Asked, rung: Rung) -> Candidate:
+def _candidate(design: Design, asked: Asked, mesh: MeshLevel) -> Candidate:
     """A mesh, as near as it should come where the cell rises like a prototype."""
-    curve = expected(design, rung)
-    share = float(curve.thinning(np.minimum(asked.stress_kpa[-1] * _PA_PER_KPA, curve.stress_pa[-1]))[0])
-    return Candidate(rung.name, _BRACKET[rung.model] + 2 * rung.rise * share, rung.seconds)
+    curve = expected(design, mesh)
+    share = float(curve.capacitive_strain(np.minimum(asked.stress_kpa[-1] * _PA_PER_KPA, curve.stress_pa[-1]))[0])
+    return Candidate(mesh.name, _BRACKET[mesh.model] + 2 * mesh.rise_error * share, mesh.seconds)
 
 
 def _as_near(design: Design, piece: Piece, asked: Asked, step: Step | None) -> Data:
     """The first mesh that is near enough, from the one on that should be; the nearest where none is."""
     plan = _planned(design, piece, asked)
     case = _case(design, piece, asked)
-    find = {rung.name: partial(_told, case, asked, rung, step) for rung in _rungs(piece, case.model, asked)}
+    find = {mesh.name: partial(_told, case, asked, mesh, step) for mesh in _mesh_levels(piece, case.model, asked)}
     (found, off), level = run_until_within(plan.levels[0], find, lambda answer: _width(*answer))
     data = _plain(_widened(found, off), case) | {"bounds": _OF_ALL}
     return data | {
@@ -182,11 +184,11 @@ def _as_near(design: Design, piece: Piece, asked: Asked, step: Step | None) -> D
     }
 
 
-def _told(case: Case, asked: Asked, rung: Rung, step: Step | None) -> Told:
+def _told(case: Case, asked: Asked, mesh: MeshLevel, step: Step | None) -> Told:
     """A case on one mesh, and the share by which each capacitance may be off for it [-]."""
-    fine, coarse = (_pressed(case, asked, level, step) for level in (rung.level, rung.level - 1))
+    fine, coarse = (_pressed(case, asked, level, step) for level in (mesh.level, mesh.level - 1))
     rises, others = (_rises(found) for found in (fine, coarse))
-    off = [max(rung.rise * a, SAFETY * abs(a - b)) / (1 + a) for a, b in zip(rises, others, strict=False)]
+    off = [max(mesh.rise_error * a, SAFETY * abs(a - b)) / (1 + a) for a, b in zip(rises, others, strict=False)]
     return fine, tuple(off)
 
 
@@ -213,9 +215,9 @@ def _width(found: Pressed, off: Sequence[float]) -> float:
 
 
 def _case(design: Design, piece: Piece, asked: Asked) -> Case:
-    _refuse_unpressable(piece.scene, asked.held)
+    _refuse_unpressable(piece.scene, asked.boundary)
     permittivity = {t.material: t.value for t in permittivities(design)}
-    return Case(piece, _model(piece, asked), elastic(design, piece.scene), permittivity, asked.held)
+    return Case(piece, _model(piece, asked), elastic(design, piece.scene), permittivity, asked.boundary)
 
 
 def _pressed(case: Case, asked: Asked, level: int, step: Step | None) -> Pressed:
@@ -223,7 +225,7 @@ def _pressed(case: Case, asked: Asked, level: int, step: Step | None) -> Pressed
     return pressed(case, stress_pa, level, keep=asked.keep, step=step)
 
 
-def _refuse_unpressable(scene: Scene, held: Held) -> None:
+def _refuse_unpressable(scene: Scene, boundary: BoundaryConditions) -> None:
     """Refuse what would be answered, but not as it was asked."""
     ends = sorted({body.terminal for body in scene.bodies if body.terminal})
     if ends != ["bottom", "top"]:
@@ -231,7 +233,7 @@ def _refuse_unpressable(scene: Scene, held: Held) -> None:
             f"a cell with electrodes {', '.join(ends) or 'of no kind'}: expected two, bottom and top, whose "
             "capacitance a press changes; --model springs tells the displacement alone"
         )
-    if held.period == "free" and held.base == "bonded":
+    if boundary.period == "free" and boundary.base == "bonded":
         raise BadInput("sides that give way over a base that is bonded cannot: expected base 'sliding' with them")
 
 
@@ -239,7 +241,7 @@ def _plain(found: Pressed, case: Case) -> Data:
     bounds = found.capacitance_f_per_m2
     return {
         "model": case.model,
-        "held": dict(vars(case.held)),
+        "held": dict(vars(case.boundary)),
         "stress_kpa": [p / _PA_PER_KPA for p in found.stress_pa.tolist()],
         "displacement_um": [d * _UM_PER_M for d in found.displacement_m.tolist()],
         "lower_f_per_m2": [c.lower if c else None for c in bounds],
@@ -251,13 +253,13 @@ def _plain(found: Pressed, case: Case) -> Data:
     }
 
 
-def _guess(design: Design, piece: Piece, asked: Asked) -> Data:
+def _closed_form(design: Design, piece: Piece, asked: Asked) -> Data:
     """What a law knows that solves no field: a displacement, and no capacitance."""
     name, unknown = _model(piece, asked), [None] * len(asked.stress_kpa)
-    found = guesses.MODELS[name](design, piece, [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
+    found = closed_form.MODELS[name](design, piece, [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
     return {
         "model": name,
-        "held": found.held,
+        "held": found.boundary,
         "stress_kpa": list(asked.stress_kpa),
         "displacement_um": (found.displacement_m * _UM_PER_M).tolist(),
         "lower_f_per_m2": unknown,
@@ -270,8 +272,8 @@ def _guess(design: Design, piece: Piece, asked: Asked) -> Data:
 
 
 def _unsolved(design: Design, piece: Piece, asked: Asked, why: str) -> Data:
-    """What is known where no field can be solved for want of a library: a guess, and no accuracy."""
-    data = _guess(design, piece, replace(asked, model=guesses.FIRST))
+    """What is known where no field can be solved for want of a library: a closed-form estimate, and no accuracy."""
+    data = _closed_form(design, piece, replace(asked, model=closed_form.FIRST))
     data["doubts"] += [f"not solved: {why}"]
     if asked.accuracy == inf:
         return data

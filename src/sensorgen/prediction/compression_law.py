@@ -1,11 +1,12 @@
-"""How the film of a design gives way, by the best that is known of its cell; and by how much that may be wrong.
+"""Choose the pressure law of a cell, with its uncertainty.
 
-A plate has two laws, free to give way sideways and bonded, which bracket it. A cell with gaps is solved once and for
-all where it is a prototype's as drawn; any other one, as a printed cell, is solved when asked for, and kept.
+A plate is bracketed by two laws, free to expand sideways and bonded. Solutions of the prototypes' cells are stored; any
+other cell with gaps is solved on request, and kept.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import takewhile
 from typing import TYPE_CHECKING
 
@@ -16,50 +17,60 @@ from sensorgen.design.values import MaterialValue, film, of_all_materials, permi
 from sensorgen.models import compression
 from sensorgen.models.compression import Compression, Curve, curve_of
 from sensorgen.prediction.capacitance import Answer, is_plate
-from sensorgen.prediction.mesh_ladder import SAFETY, USUAL, Case, Piece, Rung, drawn, model_of, pressed, rungs
+from sensorgen.prediction.mesh_ladder import (
+    SAFETY,
+    USUAL,
+    Case,
+    MeshLevel,
+    Piece,
+    drawn,
+    mesh_levels,
+    model_of,
+    pressed,
+)
 from sensorgen.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from sensorgen.models.press2d import Elastic, Pressed
+    from sensorgen.models.press2d import BoundaryConditions, Elastic
 
 LAWS = ("unconfined", "bonded", "solved")
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)))  # 6 N on a tip of 10 x 10 mm are 60 kPa
-_LANDING = f"feet land at no force to speak of: what C rises by up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
-_SAME_RATIO = 1e-3  # of Poisson: 0.4999 and 0.5 make the same cell, 0.45 one that gives way by 11 % more
-_ONSET = 0.25  # share by which a curve's onset is off at most, on films of 0.02 to 0.2 mm from 0.5 kPa on
-_LIKE = {"press2d": "tri", "press3d": "rect"}  # prototypes that other cells are expected to be like
+_LANDING = f"feet land at negligible force: the rise of C up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
+_SAME_RATIO = 1e-3  # difference of Poisson's ratios: 0.4999 and 0.5 are one cell, 0.45 deforms by 11 % more
+_ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 0.2 mm from 0.5 kPa on
+_LIKE = {"press2d": "tri", "press3d": "rect"}  # prototypes that other cells are assumed to resemble
 
 
 @dataclass(frozen=True)
 class Law:
-    """How a film gives way.
+    """Pressure law of a film.
 
     Attributes
     ----------
     compression : Compression
-        Thinning over stress.
+        Capacitive strain versus stress.
     taken : tuple of MaterialValue
-        Moduli that it rests on.
+        Moduli.
     doubts : tuple of str
-        Why it is to be taken with care.
+        Limits of its validity.
     others : tuple of Compression
-        As good as it within its own error: of the mesh, or the other law of a plate.
-    held : tuple of Compression
-        The same cell held or touched otherwise.
+        Laws within its error: of the mesh, or the other law of a plate.
+    other_boundaries : tuple of Compression
+        The same cell under other boundary and contact conditions.
     bounded : bool
-        Whether its error is known: not where a cell with gaps is taken for a plate.
+        Whether its error is known: not where a cell with gaps is approximated by a plate.
     """
 
     compression: Compression
     taken: tuple[MaterialValue, ...]
     doubts: tuple[str, ...] = ()
     others: tuple[Compression, ...] = ()
-    held: tuple[Compression, ...] = ()
+    other_boundaries: tuple[Compression, ...] = ()
     bounded: bool = True
 
 
 def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | None = None) -> Law:
-    """The law of compression of a design, as well as it is known at once; for "solved", in a minute or two.
+    """The best available pressure law of a design; "solved" takes a minute or two.
 
     Parameters
     ----------
@@ -68,14 +79,14 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
     answer : Answer
         Its unloaded capacitance.
     name : str
-        One of ``LAWS``, or "" for the best that is known.
+        One of ``LAWS``, or "" for the best available without solving.
     printed : Piece, optional
-        What is printed of it; as drawn where not given.
+        As printed; as drawn where not given.
 
     Raises
     ------
     UnknownName, OutOfRange
-        No such law; or a law that does not speak of this shape.
+        No such law; or a law that does not apply to this shape.
     MissingValue, BadInput
         For "solved": no modulus or Poisson's ratio, no NGSolve, a cell that is no prism.
     """
@@ -85,29 +96,34 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
     if is_plate(answer):
         return _plate(design, moduli, name, printed or drawn(design))
     if name == "bonded":
-        raise OutOfRange(f"the law 'bonded' speaks of a solid plate; {design.shape} has gaps: expected 'unconfined'")
+        raise OutOfRange(f"the law 'bonded' applies to a solid plate; {design.shape} has gaps: expected 'unconfined'")
     known = None if printed else _stored(design, {n: t.value for n, t in moduli.items()})
     if known and name != "unconfined":
         return _cell(known, moduli)
     if name == "solved":
         return solved(design, printed)
-    return _as_plate(design, moduli, "ask for the law 'solved', which takes from seconds to a minute")
+    soft = moduli[film(design)]
+    doubt = (
+        f"{design.shape} approximated by a free solid plate of {soft.material} (B.49): its cell was not solved; "
+        "ask for the law 'solved', which takes from seconds to a minute"
+    )
+    return Law(compression.unconfined(soft.value), (soft,), (doubt,), bounded=False)
 
 
 @dataclass(frozen=True)
 class Option:
-    """A law that could be had.
+    """An available law.
 
     Attributes
     ----------
     name : str
-        How it is found.
+        Method.
     seconds : float
-        That it should take [s].
+        Expected time [s].
     expected : Law
-        What it should be like, for what its error is worth.
+        Estimate of the law, to judge its error.
     find : function
-        The law itself; raises as :func:`solved`.
+        Computes the law; raises as :func:`solved`.
     """
 
     name: str
@@ -117,32 +133,31 @@ class Option:
 
 
 def options(design: Design, answer: Answer, name: str = "", *, printed: Piece | None = None) -> list[Option]:
-    """The laws that could be had of a design, the cheapest first; parameters and errors as of :func:`law_of`."""
+    """The available laws of a design, the least expensive first; parameters and errors as of :func:`law_of`."""
     asked = name == "solved" and not is_plate(answer)
     at_once = law_of(design, answer, "" if asked else name, printed=printed)
     known = Option(at_once.compression.name, 0.0, at_once, lambda: at_once)
     if at_once.bounded or name == "unconfined":
         return [known]
-    piece = printed or drawn(design)
-    meshes = rungs(piece, model_of(piece), len(STRESS_PA) - 1)
-    return [*([] if asked else [known]), *(_option(design, printed, rung) for rung in meshes)]
+    piece, moduli = printed or drawn(design), of_all_materials(design, "youngs_modulus_pa")
+    meshes = [
+        Option(
+            mesh.name, mesh.seconds, _cell(expected(design, mesh), moduli), partial(solved, design, printed, mesh.level)
+        )
+        for mesh in mesh_levels(piece, model_of(piece), len(STRESS_PA) - 1)
+    ]
+    return meshes if asked else [known, *meshes]
 
 
-def _option(design: Design, printed: Piece | None, rung: Rung) -> Option:
-    """A mesh of the cell; until it is solved, it is taken to rise as the nearest prototype does."""
-    law = _cell(expected(design, rung), of_all_materials(design, "youngs_modulus_pa"))
-    return Option(rung.name, rung.seconds, law, lambda: solved(design, printed, rung.level))
-
-
-def expected(design: Design, rung: Rung) -> Curve:
-    """What a mesh of an unknown cell should find: the curve of the prototype that it is nearest to."""
+def expected(design: Design, mesh: MeshLevel) -> Curve:
+    """Estimate of an unknown cell's curve on a mesh: that of the prototype that it resembles."""
     modulus_pa = of_all_materials(design, "youngs_modulus_pa")[film(design)].value
-    stiffer = max(modulus_pa / compression.PROTOTYPE_PA, 1 / compression.REACH)  # softer ones could not be extended
-    return replace(compression.prototype(_LIKE[rung.model]).stiffer(stiffer), within=rung.rise)
+    scale = max(modulus_pa / compression.PROTOTYPE_PA, 1 / compression.REACH)  # softer ones could not be extrapolated
+    return replace(compression.prototype(_LIKE[mesh.model]).scaled_modulus(scale), within=mesh.rise_error)
 
 
 def _stored(design: Design, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
-    """The curve that was solved once and for all, if it was this cell's, of materials as near to incompressible."""
+    """The stored curve of this cell, for materials of the same Poisson's ratio; else None."""
     known = compression.solved(design.shape, vars(design.params), youngs_modulus_pa)
     if not known:
         return None
@@ -151,7 +166,7 @@ def _stored(design: Design, youngs_modulus_pa: Mapping[str, float]) -> Curve | N
 
 
 def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece: Piece) -> Law:
-    """Free or bonded, the other one being as good as it."""
+    """A plate, free or bonded; the other law brackets it."""
     if name == "solved":
         raise OutOfRange(f"{design.shape} is a solid plate: expected the law 'unconfined' or 'bonded'")
     soft = moduli[film(design)]
@@ -159,85 +174,70 @@ def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece
     tied = compression.bonded(soft.value, design.params.width_mm * M_PER_MM, gap_m(piece.scene))
     if name == "bonded":
         return Law(tied, (soft,), others=(free,))
-    return Law(
-        free, (soft,), ("a plate free to give way sideways: bonded to its electrodes it would be stiffer",), (tied,)
-    )
-
-
-def _as_plate(design: Design, moduli: Mapping[str, MaterialValue], why: str) -> Law:
-    soft = moduli[film(design)]
-    doubt = f"{design.shape} taken to give way as a free solid plate of {soft.material} (B.49): its cell was not solved"
-    return Law(compression.unconfined(soft.value), (soft,), (f"{doubt}; {why}",), bounded=False)
+    return Law(free, (soft,), ("plate free to expand sideways: bonded to its electrodes it would be stiffer",), (tied,))
 
 
 def _cell(found: Curve, moduli: Mapping[str, MaterialValue], doubts: tuple[str, ...] = ()) -> Law:
-    """A solved cell: rise and onset known to a share, and what other ways to hold it would make of it."""
-    others = tuple(replace(found.rising(1 + sign * found.within), onset=1 + sign * _ONSET) for sign in (-1, 1))
-    held = tuple(found.rising(1 + change) for change in found.held)
-    return Law(found, tuple(moduli.values()), doubts, others, held)
+    """Law of a solved cell, with the errors of its rise and onset, and under other boundary conditions."""
+    others = tuple(replace(found.scaled_rise(1 + sign * found.within), onset=1 + sign * _ONSET) for sign in (-1, 1))
+    other_boundaries = tuple(found.scaled_rise(1 + change) for change in found.boundary_changes)
+    return Law(found, tuple(moduli.values()), doubts, others, other_boundaries)
 
 
-def solved(design: Design, printed: Piece | None = None, level: int = USUAL, **held: str) -> Law:
-    """The law of a cell by finite elements on one mesh, held against the next coarser one.
+def solved(
+    design: Design,
+    printed: Piece | None = None,
+    level: int = USUAL,
+    boundary: "BoundaryConditions | None" = None,
+) -> Law:
+    """The law of a cell by finite elements on one mesh, its error by the next coarser one.
 
     Parameters
     ----------
     design : Design
         As drawn.
     printed : Piece, optional
-        What is printed of it; as drawn where not given.
+        As printed; as drawn where not given.
     level : int
         Of the mesh, as of :func:`sensorgen.prediction.mesh_ladder.pressed`.
-    **held : str
-        How it is held and touched, as of :class:`sensorgen.solvers.contact.support.Held`.
+    boundary : BoundaryConditions, optional
+        Boundary and contact conditions.
 
     Raises
     ------
     MissingValue, BadInput, OutOfRange
         No modulus or Poisson's ratio, no NGSolve; a cell that is no prism; a solution that is not to be trusted.
     """
-    from sensorgen.models.press2d import Held
+    from sensorgen.models.press2d import BoundaryConditions
 
     moduli, ratios = of_all_materials(design, "youngs_modulus_pa"), of_all_materials(design, "poisson_ratio")
     piece = printed or drawn(design)
     model = model_of(piece)
     eps = {t.material: t.value for t in permittivities(design)}
-    case = Case(piece, model, elastic(design, piece.scene), eps, Held(**held))
-    found = _as_far(case, level)
+    case = Case(piece, model, elastic(design, piece.scene), eps, boundary or BoundaryConditions())
+    found = pressed(case, STRESS_PA, level)
+    pairs = zip(found.stress_pa.tolist(), found.capacitance_f_per_m2, strict=True)
+    last_pa = max((p for p, _ in takewhile(lambda pair: pair[1] is not None, pairs)), default=0.0)
+    if 0 < last_pa < STRESS_PA[-1]:
+        found = pressed(case, [p for p in STRESS_PA if p <= last_pa], level)
     curve = curve_of(found)
     other = curve_of(pressed(case, curve.stress_pa, level - 1))
     rises = zip(curve.ratio[1:], other.ratio[1:], strict=False)
-    least = next(rung.rise for rung in rungs(piece, model, 1) if rung.level == level)
+    least = next(mesh.rise_error for mesh in mesh_levels(piece, model, 1) if mesh.level == level)
     curve = replace(
         curve,
         within=max(least, *(SAFETY * abs((b - 1) / (a - 1) - 1) for a, b in rises)),
-        held=compression.prototype(_LIKE[model]).held,
-        moved_m=float(found.displacement_m[-1]) - found.fall_m,
+        boundary_changes=compression.prototype(_LIKE[model]).boundary_changes,
+        displacement_m=float(found.displacement_m[-1]) - found.fall_m,
     )
-    doubts = (*found.doubts, *([_LANDING] if found.fall_m else []), *_short(curve))
+    short = curve.stress_pa[-1] < STRESS_PA[-1]
+    ended = [f"the solution of the cell ended at {curve.stress_pa[-1] / 1e3:.3g} kPa"] if short else []
+    doubts = (*found.doubts, *([_LANDING] if found.fall_m else []), *ended)
     return _cell(curve, {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, doubts)
 
 
-def _as_far(case: Case, level: int) -> "Pressed":
-    """A case pressed as far as it converges and its capacitance is known."""
-    found = pressed(case, STRESS_PA, level)
-    reach = _reach_pa(found)
-    return pressed(case, [p for p in STRESS_PA if p <= reach], level) if 0 < reach < STRESS_PA[-1] else found
-
-
-def _reach_pa(found: "Pressed") -> float:
-    """Highest pressure up to which every capacitance is known; 0 where only that at rest is [Pa]."""
-    pairs = zip(found.stress_pa.tolist(), found.capacitance_f_per_m2, strict=True)
-    return max((p for p, _ in takewhile(lambda pair: pair[1] is not None, pairs)), default=0.0)
-
-
-def _short(curve: Curve) -> list[str]:
-    last = curve.stress_pa[-1]
-    return [f"the solution of the cell ended at {last / 1e3:.3g} kPa"] if last < STRESS_PA[-1] else []
-
-
 def elastic(design: Design, scene: Scene) -> "dict[str, Elastic]":
-    """How each material of a scene gives way."""
+    """Elastic constants of each material of a scene."""
     from sensorgen.models.press2d import Elastic
 
     used = design.used()
@@ -249,7 +249,7 @@ def elastic(design: Design, scene: Scene) -> "dict[str, Elastic]":
 
 
 def gap_m(scene: Scene) -> float:
-    """Distance of the electrodes' plates, whatever stands on them [m]."""
+    """Distance between the electrodes' plates, without their teeth [m]."""
     spans = {
         end: [p.span("z") for b in scene.bodies if b.terminal == end for p in b.prisms] for end in ("top", "bottom")
     }

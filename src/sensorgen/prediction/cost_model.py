@@ -39,7 +39,7 @@ class Size(NamedTuple):
 
 
 def expected(model: str, scene: Scene, width: float) -> tuple[float | None, float | None]:
-    """Width and seconds of the cheapest measurement that did, or of the one that came nearest, scaled to a scene.
+    """Width and seconds of the fastest measurement that did, or of the one that came nearest, scaled to a scene.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def expected(model: str, scene: Scene, width: float) -> tuple[float | None, floa
 
     Notes
     -----
-    In a cross-section that is cut amid a cell the energy of its own length counts; its bounds are apart by the root of
+    In a cross-section that is cut amid a cell the energy of its own length counts; the relative width is the root of
     the cell's.
     """
     if model not in measured():
@@ -102,11 +102,6 @@ def _bands(scene: Scene) -> Size:
     return Size(sum(len(s.bands) for s in found.slices), len(set(found.shares)) > 1)
 
 
-def _pieces(scene: Scene) -> Size:
-    """The same of a cell that is pressed by itself."""
-    return _bands(scene)._replace(is_cut=False)
-
-
 def _boxes(scene: Scene) -> Size:
     """Boxes between the electrodes."""
     from sensorgen.solvers.electrostatics.bricks import grid
@@ -114,4 +109,8 @@ def _boxes(scene: Scene) -> Size:
     return Size(int((grid(scene).fill > 1).sum()), is_cut=False)
 
 
-COUNTED: dict[str, Callable[[Scene], Size]] = {"bands": _bands, "pieces": _pieces, "boxes": _boxes}
+COUNTED: dict[str, Callable[[Scene], Size]] = {
+    "bands": _bands,
+    "pieces": lambda scene: _bands(scene)._replace(is_cut=False),  # of a cell that is pressed by itself
+    "boxes": _boxes,
+}

@@ -206,8 +206,8 @@ def _models(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
     if law.others and law.others[0].name != law.compression.name:
         why = f"{law.compression.name} or {law.others[0].name}"
     yield Term("compression", why, "model", others)
-    if law.held:
-        held = reference.change(*(replace(sensor, compression=o) for o in law.held))
+    if law.other_boundaries:
+        held = reference.change(*(replace(sensor, compression=o) for o in law.other_boundaries))
         yield Term("boundary", "faces that stick, a stiff tip, or a cell free to widen", "model", held)
     if sensor.profile == UNIFORM:
         yield Term("line", "one section under the tip is exact", "model", reference.change(sensor))
@@ -267,7 +267,7 @@ def _stiffness(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
             parts.append(f"{value.material} {low / 1e6:g} to {high / 1e6:g} MPa")
     if softest < stiffest:
         least = _least_modulus(sensor, softest, reference)
-        ends = [replace(sensor, compression=sensor.compression.stiffer(factor)) for factor in (least, stiffest)]
+        ends = [replace(sensor, compression=sensor.compression.scaled_modulus(factor)) for factor in (least, stiffest)]
         beyond = f": below {least:.2g} of it the load exceeds the compression law" if least > softest else ""
         what = ", ".join(parts) + beyond
         yield Term("stiffness", what, "material", reference.change(*ends), at_least=least > softest)
@@ -277,11 +277,11 @@ def _least_modulus(sensor: Sensor, softest: float, reference: ReferenceLoad) -> 
     """Factor of the modulus above which the load is within the law: ``softest``, or a per cent above the limit."""
     law = sensor.compression
     low, high = softest, 1.0
-    if reference.change(replace(sensor, compression=law.stiffer(low))):
+    if reference.change(replace(sensor, compression=law.scaled_modulus(low))):
         return low
     while high / low > _NEAR:
         middle = (low * high) ** 0.5
-        bearable = reference.change(replace(sensor, compression=law.stiffer(middle)))
+        bearable = reference.change(replace(sensor, compression=law.scaled_modulus(middle)))
         low, high = (low, middle) if bearable else (middle, high)
     return high
 

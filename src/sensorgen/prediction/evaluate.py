@@ -224,7 +224,7 @@ def _sensitivity(model: SensorModel, load: Load) -> Bounds:
     pressure_pa = float(model.sensor.stress_pa(load.force_n or FORCE_N, load.position_m))
 
     def of(law: Compression) -> float:
-        strain = float(law.thinning(np.asarray(pressure_pa))[0])
+        strain = float(law.capacitive_strain(np.asarray(pressure_pa))[0])
         return strain / (1 - strain) / pressure_pa * _PA_PER_KPA
 
     value = of(model.law.compression)
@@ -251,7 +251,7 @@ def _moduli(model: SensorModel) -> list[Compression]:
         if value.quantity == "youngs_modulus_pa"
         for end in spread(design, material_value(design.material(value.material), used[value.material], value.quantity))
     }
-    return [model.law.compression.stiffer(factor) for factor in sorted(factors) if factor != 1]
+    return [model.law.compression.scaled_modulus(factor) for factor in sorted(factors) if factor != 1]
 
 
 def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:

@@ -151,7 +151,7 @@ def _refusal(sensor: Sensor, force_n: float, position_m: float) -> str:
     """Why a press has no answer, "" if it has one."""
     try:
         stress = sensor.stress_pa(force_n, position_m)
-        sensor.compression.thinning(stress)
+        sensor.compression.capacitive_strain(stress)
         sensor.check_tracks(stress)
     except OutOfRange as error:
         return str(error).partition(": press less")[0]

@@ -1,10 +1,10 @@
-"""A piece of a sensor under pressure by finite elements, on a ladder of meshes each finer than the one before.
+"""A piece of a sensor under pressure by finite elements, on mesh levels of increasing fineness.
 
-What a mesh is worth is told by the next coarser one: solutions are kept, so that a finer answer costs one mesh more.
+The error of a mesh is estimated from the next coarser one; solutions are kept, so that refinement costs one mesh more.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from importlib import import_module
 from itertools import pairwise
@@ -21,14 +21,14 @@ from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import overlap
 
 if TYPE_CHECKING:
-    from sensorgen.models.press2d import Elastic, Fineness, Held, Pressed
+    from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness, Pressed
     from sensorgen.models.press3d import Pieces
 
 MODELS = ("press2d", "press3d")
-USUAL = 0  # level of the mesh that is taken where nothing is said; those below it are coarser
-COARSEST = -2  # level that others are held against only
+USUAL = 0  # default mesh level; those below it are coarser
+COARSEST = -2  # level that serves for comparison only
 _TIMES = {-2: 2.0, -1: 1.5, USUAL: 1.0, 1: 0.7, 2: 0.5}  # size of triangles by level, over the usual one [-]
-SAFETY = 2.0  # times that two meshes differ, or that one was off where it was measured; 1.8 times were found
+SAFETY = 2.0  # error bound over the difference of two meshes, or over a measured error; 1.8 was observed
 _ARRAYS = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
 _MEASURED_LOADS = 11  # under which expected times were measured, besides the one of 0
 
@@ -37,7 +37,7 @@ Data = dict[str, Any]
 
 @dataclass(frozen=True)
 class Piece:
-    """What is pressed of a sensor: a scene with its support gone, and the period of its pattern, if it has one [mm]."""
+    """The part of a sensor that is pressed: a scene without support, and the period of its pattern, if any [mm]."""
 
     scene: Scene
     period_mm: float | None
@@ -50,7 +50,7 @@ def drawn(design: Design) -> Piece:
 
 @dataclass(frozen=True)
 class Case:
-    """A piece, what it is made of, and how it is held.
+    """A piece with its materials and boundary conditions.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Case:
         By material.
     permittivity : mapping of str to float
         By material, with "air" [-].
-    held : Held
+    boundary : BoundaryConditions
         Base, period, top and contact.
     """
 
@@ -70,46 +70,46 @@ class Case:
     model: str
     solids: "Mapping[str, Elastic]"
     permittivity: Mapping[str, float]
-    held: "Held"
+    boundary: "BoundaryConditions"
 
 
 @dataclass(frozen=True)
-class Rung:
-    """A mesh of a case, and what it should be worth.
+class MeshLevel:
+    """A mesh of a case, with its expected error and cost.
 
     Attributes
     ----------
     name, model : str
-        The model, and how much finer or coarser than usual its mesh is; the model alone.
+        The model with the fineness of its mesh; the model alone.
     level : int
         0 for the usual mesh, above it finer.
-    rise : float
-        Share by which the rise of the capacitance should be off [-].
+    rise_error : float
+        Expected relative error of the rise of the capacitance [-].
     seconds : float
-        That it should take, with the coarser mesh it is held against [s].
+        Expected time, with the coarser mesh that it is compared with [s].
     """
 
     name: str
     model: str
     level: int
-    rise: float
+    rise_error: float
     seconds: float
 
 
 @lru_cache(maxsize=16)
 def why_not_applicable(piece: Piece, model: str) -> str | None:
-    """Why a model cannot speak of a piece, or None."""
+    """Why a model does not apply to a piece, or None."""
     said: str | None = import_module(f"sensorgen.models.{model}").why_not_applicable(piece.scene)
     return said
 
 
 def model_of(piece: Piece) -> str:
-    """The first of ``MODELS`` that can speak of a piece; the first of all, which says why not, where none can."""
+    """The first of ``MODELS`` that applies to a piece; where none does, the first of all."""
     return next((model for model in MODELS if not why_not_applicable(piece, model)), MODELS[0])
 
 
-def rungs(piece: Piece, model: str, loads: int) -> list[Rung]:
-    """The meshes of a model, coarsest first.
+def mesh_levels(piece: Piece, model: str, loads: int) -> list[MeshLevel]:
+    """The mesh levels of a model, coarsest first.
 
     Parameters
     ----------
@@ -123,13 +123,13 @@ def rungs(piece: Piece, model: str, loads: int) -> list[Rung]:
     points = expectations.points(model, piece.scene)
     share = loads / _MEASURED_LOADS
     return [
-        Rung(_name(model, level), model, level, SAFETY * rise, (seconds + before) * share)
+        MeshLevel(_name(model, level), model, level, SAFETY * rise, (seconds + before) * share)
         for level, ((_, before), (rise, seconds)) in enumerate(pairwise(points), COARSEST + 1)
     ]
 
 
 def _name(model: str, level: int) -> str:
-    """How a mesh is called: triangles by their size over the usual one, bricks by how many a box is cut into."""
+    """Name of a mesh: triangles by their size over the usual one, bricks by the number that a box is cut into."""
     if level == USUAL:
         return model
     if model == "press2d":
@@ -151,7 +151,7 @@ def pressed(
     case: Case, stress_pa: Sequence[float], level: int = USUAL, *, keep: bool = True,
     step: Callable[[float], None] | None = None,
 ) -> "Pressed":  # fmt: skip
-    """A case under rising pressure on one mesh, or what is known of it from before; without the deformed outlines.
+    """A case under increasing pressure on one mesh, computed or from the cache; without the deformed outlines.
 
     Parameters
     ----------
@@ -162,9 +162,9 @@ def pressed(
     level : int
         Of the mesh.
     keep : bool
-        Take a solution that is known, and keep a new one.
+        Use the cache.
     step : callable, optional
-        Told every pressure that is reached [Pa].
+        Called with every pressure that is reached [Pa].
 
     Raises
     ------
@@ -180,7 +180,7 @@ def pressed(
     press, cell = _press(case)
 
     def work() -> Data:
-        return _plain(press(case.solids, stress, case.permittivity, case.held, mesh, step=step))
+        return _plain(press(case.solids, stress, case.permittivity, case.boundary, mesh, step=step))
 
     if not keep:
         return _of_plain(work())
@@ -192,13 +192,13 @@ def pressed(
         "solids": {name: [s.youngs_modulus_pa, s.poisson_ratio] for name, s in case.solids.items()},
         "permittivity": dict(case.permittivity),
         "stress_pa": stress,
-        "held": vars(case.held),
+        "held": vars(case.boundary),
     }
     return _of_plain(cached.answer(question, work))
 
 
 def _press(case: Case) -> "tuple[Callable[..., Pressed], str]":
-    """How to press a case, and all of its cell as text."""
+    """The solver of a case, and its cell as text."""
     from sensorgen.models import press2d, press3d
 
     if case.model == "press3d":
@@ -209,7 +209,8 @@ def _press(case: Case) -> "tuple[Callable[..., Pressed], str]":
 
 
 def _plain(found: "Pressed") -> Data:
-    data = {f.name: getattr(found, f.name) for f in fields(found)}
+    """As JSON holds it."""
+    data = vars(found)
     bounds = [[c.lower, c.upper] if c else None for c in found.capacitance_f_per_m2]
     lists = {name: getattr(found, name).tolist() for name in _ARRAYS}
     return data | lists | {"capacitance_f_per_m2": bounds, "outlines": []}
@@ -225,7 +226,7 @@ def _of_plain(data: Data) -> "Pressed":
 
 
 def refuse_crushing(stress_pa: float, youngs_modulus_pa: Mapping[str, float]) -> None:
-    """Refuse a stress above the least modulus [Pa], by material: it would be reached in no time that anyone waits."""
+    """Refuse a stress above the least Young's modulus [Pa], by material: it would take too long to reach."""
     softest = min(youngs_modulus_pa, key=lambda name: youngs_modulus_pa[name])
     if stress_pa > youngs_modulus_pa[softest]:
         raise OutOfRange(

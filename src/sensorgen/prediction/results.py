@@ -7,6 +7,7 @@ from math import nan
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from sensorgen.core.bounds import Bounds, Interval
+from sensorgen.core.display import Displayed
 from sensorgen.core.errors import BadInput
 from sensorgen.design.values import MaterialValue
 from sensorgen.prediction.error_budget import ErrorBudget
@@ -37,7 +38,7 @@ class Impedance:
 
 
 @dataclass(frozen=True)
-class Prediction:
+class Prediction(Displayed):
     """What a sensor should measure.
 
     Attributes

@@ -1,19 +1,19 @@
 """Sensitivity of a microstructure to a press, beside a plate under the same boundary conditions."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from sensorgen.design.design import Design
 from sensorgen.models.compression import Compression
+from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.prediction import bodies
 from sensorgen.prediction.compression_law import solved
 from sensorgen.prediction.identifiability.fisher import bounds, slopes
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import build_sensor
 
-HELD: dict[str, dict[str, Any]] = {"free": {"base": "sliding", "period": "free"}, "bonded": {}}
+BOUNDARIES = {"free": BoundaryConditions("sliding", "free"), "bonded": BoundaryConditions()}
 NOISE = 1e-3
 
 
@@ -78,12 +78,12 @@ def sensitivity(
     """
     body = bodies.drawn(design)
     given = build_sensor(body, "unconfined", rest=rest_state(body, accuracy)).sensor
-    how = solved(design, **HELD[law]).compression if isinstance(law, str) else law
+    how = solved(design, boundary=BOUNDARIES[law]).compression if isinstance(law, str) else law
     sensor = replace(given, compression=how)
     if resistivity_ohm_m is not None:
         sensor = replace(sensor, resistivity_ohm_m=(resistivity_ohm_m,) * 2)
     middle = sensor.length_m / 2
-    thinning, slope = how.thinning(sensor.stress_pa(force_n, middle))
+    thinning, slope = how.capacitive_strain(sensor.stress_pa(force_n, middle))
     known = bounds(slopes(sensor, frequency_hz, force_n, middle), NOISE)
     return Sensitivity(
         sensor.capacitance_f(),

@@ -149,7 +149,7 @@ def _contact(body: Body, law: Law, pressed: Piece, profile: str, radius_m: float
         modulus, ratio = (of_all_materials(body.design, q)[soft].value for q in ("youngs_modulus_pa", "poisson_ratio"))
         return pressure.hertz(radius_m, modulus / (1 - ratio**2))
     if profile == "parabola":
-        return pressure.bed(radius_m, law.compression.bed_pa_per_m(gap_m(pressed.scene)))
+        return pressure.bed(radius_m, law.compression.foundation_stiffness_pa_per_m(gap_m(pressed.scene)))
     raise BadInput(
         f"a tip with a pressure like a {profile!r} one is flat and has no radius; expected hertz or parabola"
     )

@@ -130,8 +130,8 @@ def _along(regions: Mapping[str, Region], scene: Scene) -> str:
     if not all(map(is_box, found)):
         return ""
     low, high = np.array([part.bounds for part in found]).reshape(-1, 2, 2).swapaxes(0, 1)
-    along_x, along_y = ((low < SLIVER_MM) & (high > np.array(scene.size_mm[:2]) - SLIVER_MM)).all(axis=0).tolist()
-    return "y" if along_y else "x" if along_x else ""
+    whole = np.asarray((low < SLIVER_MM) & (high > np.array(scene.size_mm[:2]) - SLIVER_MM))
+    return "y" if whole[:, 1].all() else "x" if whole[:, 0].all() else ""
 
 
 def scene_of(layers: Sequence[LayerRegions], like: Scene) -> Scene:

@@ -10,10 +10,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from sensorgen import __version__
 from sensorgen.checks.review import Review, Step, draw, report, review
 from sensorgen.core import files as store
 from sensorgen.core.errors import Unprintable
+from sensorgen.core.version import __version__
 from sensorgen.design import materials, printer
 from sensorgen.design.design import Design
 from sensorgen.export import slicing, threemf

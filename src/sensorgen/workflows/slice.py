@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sensorgen import __version__
 from sensorgen.asprinted.printed import rule7
 from sensorgen.checks.review import Review, review
 from sensorgen.checks.volumes import Row
 from sensorgen.core import files as store
 from sensorgen.core.errors import Unprintable
 from sensorgen.core.findings import Finding
+from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.check import Checked, check
 from sensorgen.export.slicers import TIME_LIMIT_S, WALLS

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sensorgen import __version__
 from sensorgen.core.bounds import Interval
+from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
 from sensorgen.measure import log
 from sensorgen.prediction import bodies

@@ -2,8 +2,8 @@
 
 import json
 
-from sensorgen import __version__
 from sensorgen.analysis.fit.results import Fit
+from sensorgen.core.version import __version__
 
 
 def text(made: Fit) -> str:

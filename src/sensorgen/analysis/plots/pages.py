@@ -5,10 +5,10 @@ from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
-from sensorgen import __version__
 from sensorgen.analysis.plots.figure import Figure
 from sensorgen.analysis.plots.interactive import data, height_px
 from sensorgen.analysis.plots.libraries import needed
+from sensorgen.core.version import __version__
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -7,9 +7,9 @@ from hashlib import file_digest
 from importlib.metadata import version
 from typing import Annotated
 
-from sensorgen import __version__
 from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.report.tables import Column, Table
+from sensorgen.core.version import __version__
 from sensorgen.design.materials import SET, citations
 from sensorgen.measure.log import Log, RawFile
 

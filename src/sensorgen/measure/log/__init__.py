@@ -1,4 +1,4 @@
-"""Readings of printed specimens, the bench's recordings and what was predicted, kept in one file that only grows."""
+"""Append-only log of readings, recordings and predictions of printed specimens."""
 
 from sensorgen.measure.log.entries import Batch, BenchRun, Entry, Prediction, Print, RawFile, Reading, Specimen
 from sensorgen.measure.log.logbook import PLACE, TABLES, Log, place

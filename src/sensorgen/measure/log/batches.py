@@ -7,9 +7,10 @@ from typing import Any
 
 from pydantic import Field
 
-from sensorgen import __version__
 from sensorgen.core.errors import BadInput
 from sensorgen.core.records import Strict, checked
+from sensorgen.core.version import __version__
+from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log import notes
 from sensorgen.measure.log.entries import Batch, Entry, Prediction, Print, RawFile
 from sensorgen.measure.log.verify import prediction_uid
@@ -55,8 +56,9 @@ def rows(path: Path, file: RawFile) -> Iterator[Entry]:
     BadInput
         Not the record of a batch; with the file's name, and the key.
     """
+    data = _json(path)
     try:
-        record = checked(_Record, _json(path))
+        record = checked(_Record, data)
         yield file
         yield Batch(uid=file.uid, batch=record.batch or path.absolute().parent.name, file=file.uid)
         pieces = (row for name, piece in record.specimens.items() for row in _piece(file.uid, name, piece, record))
@@ -95,11 +97,8 @@ def prediction(design_id: str, design: str, data: Mapping[str, Any]) -> Predicti
 
 
 def _json(path: Path) -> Any:
+    checked_head(path, MOST_BYTES, "the record of a batch", foreign=False)
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise BadInput(f"{path.stat().st_size} bytes; expected the record of a batch")
         return json.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise BadInput(f"cannot read it: {error.strerror or error}") from None
-    except (ValueError, RecursionError) as error:
-        raise BadInput(f"not the record of a batch: {str(error)[:100]}") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise BadInput(f"{path}: not the record of a batch: {str(error)[:100]}") from None

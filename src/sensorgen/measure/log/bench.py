@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import BadInput
+from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log import facts, files, notes
 from sensorgen.measure.log.entries import BenchRun, Entry
 from sensorgen.measure.log.logbook import Log
@@ -56,11 +57,12 @@ def log_recording(
         A name or a file that cannot be read. Nothing is logged or kept then.
     """
     from sensorgen.measure import recording as recordings
+    from sensorgen.measure.recording.matfive import MOST_BYTES
 
     of = notes.specimen(specimen)
     paths = [recording, *([rig] if rig else [])]
-    for path in paths:
-        _check_size(path)
+    for path in paths:  # before their SHA-256 is computed
+        checked_head(path, MOST_BYTES, "a recording")
     before = [files.raw_file(path) for path in paths]
     rig_log = recordings.rig(rig, rig_columns) if rig else None
     summary = facts.summarised(recordings.read_all(recording, columns), dict(columns), rig_log, dict(rig_columns))
@@ -75,14 +77,6 @@ def log_recording(
         rig_file=kept[1].uid if rig else "", facts=facts.to_json(summary),
     )  # fmt: skip
     return [row for row in log.add([*kept, run]) if isinstance(row, BenchRun)]
-
-
-def _check_size(path: Path) -> None:
-    """Refuse a file that is too large before its SHA-256 is computed."""
-    from sensorgen.measure.recording.matfive import MOST_BYTES
-
-    if path.is_file() and (size := path.stat().st_size) > MOST_BYTES:
-        raise BadInput(f"{str(path)!r}: {size / 2**30:.3g} GB; expected up to {MOST_BYTES >> 30} GB: split the run")
 
 
 def read_again(log: Log, run: BenchRun) -> "tuple[tuple[Recording, ...], RigLog | None]":

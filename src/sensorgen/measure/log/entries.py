@@ -1,6 +1,6 @@
-"""What the log holds, row by row; every kind of row has a name of its own for life, its ``uid``.
+"""Records of the log, one dataclass for each table.
 
-Nothing in the log is changed or taken out. A row that corrects another names it in ``supersedes``.
+Rows are never changed or deleted. A correction is a new row that names the old one in ``supersedes``.
 """
 
 from dataclasses import dataclass, fields
@@ -9,16 +9,16 @@ from typing import Any, get_type_hints
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """Any row.
+    """Row of any kind.
 
     Attributes
     ----------
     uid : str
-        Its name, the same in every copy of the log: a hash of what an imported row says, else random.
+        Identity, the same in every copy of the log: a hash of an imported row's content, else random.
     logged_at : str
-        When the log took it, UTC, ISO 8601; "" before that.
+        Time of logging, UTC, ISO 8601; "" before.
     number : int
-        Its number among its kind in this log, from 1; 0 before it is logged.
+        Number among the rows of its kind in this log, from 1; 0 before.
     """
 
     uid: str
@@ -28,24 +28,24 @@ class Entry:
 
 @dataclass(frozen=True, kw_only=True)
 class Specimen:
-    """A printed sensor, as its name has it.
+    """A printed sensor, by its name.
 
     Attributes
     ----------
     specimen : str
-        Its name in normal form.
+        Name in normal form.
     iteration : int or None
-        Of the design.
+        Iteration of the design.
     shape, axes : str
-        As designs call them; "" where the name does not tell.
+        As in designs; "" if the name has none.
     film_mm : float or None
-        Thickness of the film [mm], 0 for none; None where the name does not tell.
+        Thickness of the film [mm], 0 for none; None if unknown.
     size_mm : float or None
-        A size in the name that is no film [mm].
+        Size in the name that is no film [mm].
     replicate : int or None
-        Which copy.
+        Number of the copy.
     slicing, place : str
-        Slicing as written; where on the plate, as it seems.
+        Slicing as written; place on the plate, as far as the name has it.
     """
 
     specimen: str
@@ -60,7 +60,7 @@ class Specimen:
 
 
 def columns(kind: type[Any]) -> dict[str, Any]:
-    """Names of a kind's fields, in order, with their types."""
+    """Fields of a record with their types."""
     hints = get_type_hints(kind)
     return {field.name: hints[field.name] for field in fields(kind)}
 
@@ -75,17 +75,17 @@ class _OfSpecimen(Specimen, Entry):
     Attributes
     ----------
     written : str
-        The specimen's name as it was written down.
+        Name of the specimen as written.
     design_id, design : str
-        Identity and name of the design that it was made from; "" where nobody knows.
+        Identity and name of its design; "" if unknown.
     batch : str
-        The batch that it was printed in, "" where nobody knows.
+        Name of the batch in which it was printed; "" if unknown.
     remark : str
-        In the words of whoever measured.
+        Any text.
     source : str
-        Where the row comes from: ``typed``, ``thesis Table D.1``, a file's name, an instrument.
+        Origin: ``typed``, ``thesis Table D.1``, name of a file, address of an instrument.
     supersedes : str
-        The row that this one corrects, "" if it corrects none.
+        ``uid`` of the row that this one corrects; "" if it corrects none.
     """
 
     written: str
@@ -99,24 +99,24 @@ class _OfSpecimen(Specimen, Entry):
 
 @dataclass(frozen=True, kw_only=True)
 class Reading(_OfSpecimen):
-    """What a multimeter said of a specimen at one sitting.
+    """Resistances of a specimen by a multimeter, measured together.
 
     Attributes
     ----------
     y_words, z_words : str
-        Resistance along an electrode, and between the electrodes, as written down.
+        Resistance along an electrode and between the electrodes, as written.
     y_ohm, z_ohm : tuple of float
-        The readings that the words stand for [ohm]; infinite for an overload, none where nothing was measured.
+        Readings [ohm]; infinite for an overload, empty if not measured.
     baked : bool or None
-        Whether the specimen had been baked; None where nobody says.
+        Whether the specimen had been baked; None if unknown.
     doubts : tuple of str
-        What was read otherwise than written, in the name too, and what stays doubtful.
+        Assumptions and doubts about name and readings.
     measured_at : str
-        When, as written down; "" where nobody says.
+        Time of the measurement as written; "" if unknown.
     instrument : str
-        What an instrument calls itself; "" for words that a person wrote down.
+        Identification of the instrument; "" for typed readings.
     source_row : int or None
-        Row of the table that it comes from, counted from 1 below its header.
+        Row of the imported table, from 1 below its header.
     """
 
     y_words: str = ""
@@ -132,14 +132,14 @@ class Reading(_OfSpecimen):
 
 @dataclass(frozen=True, kw_only=True)
 class BenchRun(_OfSpecimen):
-    """A recording of the bench, its files kept whole.
+    """A recording of the bench.
 
     Attributes
     ----------
     file, rig_file : str
-        SHA-256 of the impedance's file and of the rig's; the latter "" where there is none.
+        SHA-256 of the impedance analyser's file and of the rig's; "" without a rig.
     facts : str
-        What was counted when it came in, as JSON: samples, tones, marks, the offset between the clocks.
+        Summary as JSON, see :mod:`sensorgen.measure.log.facts`.
     """
 
     file: str
@@ -149,16 +149,16 @@ class BenchRun(_OfSpecimen):
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction(Entry):
-    """What a design was expected to measure, kept from the moment that it was made.
+    """Prediction of a design's readings.
 
     Attributes
     ----------
     design_id, design : str
         Identity and name of the design.
     version : str
-        Of sensorgen, which made it.
+        Version of sensorgen.
     data : str
-        The whole prediction, as JSON.
+        The prediction as JSON.
     """
 
     design_id: str
@@ -169,12 +169,12 @@ class Prediction(Entry):
 
 @dataclass(frozen=True, kw_only=True)
 class Batch(Entry):
-    """A print bed, its file kept whole.
+    """A print bed.
 
     Attributes
     ----------
     batch : str
-        Its name.
+        Name.
     file : str
         SHA-256 of ``batch.json``.
     """
@@ -185,14 +185,14 @@ class Batch(Entry):
 
 @dataclass(frozen=True, kw_only=True)
 class Print(Specimen, Entry):
-    """A specimen on a print bed: from then on its rows carry design and batch.
+    """A specimen on a print bed; later rows of the specimen get its design and batch.
 
     Attributes
     ----------
     batch_uid : str
-        The batch.
+        ``uid`` of the batch.
     design_id, design : str
-        Identity and name of its design.
+        Identity and name of the design.
     """
 
     batch_uid: str
@@ -202,16 +202,16 @@ class Print(Specimen, Entry):
 
 @dataclass(frozen=True, kw_only=True)
 class RawFile(Entry):
-    """A file of an instrument, kept whole beside the log.
+    """A file of an instrument, kept beside the log.
 
     Attributes
     ----------
     uid : str
-        Its SHA-256.
+        SHA-256.
     name : str
-        As it was called.
+        Original name.
     size : int
-        Its length [bytes].
+        Size [bytes].
     """
 
     name: str

@@ -16,12 +16,12 @@ from typing import Any
 from sensorgen.core import files as store
 from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
+from sensorgen.measure.csv_table import Table
 from sensorgen.measure.log import entries, files
 from sensorgen.measure.log.durable import part_of
 from sensorgen.measure.log.entries import Entry, RawFile, Reading
 from sensorgen.measure.log.fields import Value, from_cell, from_sql, to_cell, to_sql
 from sensorgen.measure.log.logbook import TABLES, Log
-from sensorgen.measure.log.tables import Sheet
 
 FORMATS = ("csv", "parquet")
 FILES = {kind: f"{table.replace('_', '-')}s" if table != "batch" else "batches" for kind, table in TABLES.items()}
@@ -113,7 +113,7 @@ def _line(cells: list[str]) -> str:
     return text.getvalue()
 
 
-def from_sheet(kind: type[Entry], sheet: Sheet) -> Iterator[Entry]:
+def from_csv(kind: type[Entry], table: Table) -> Iterator[Entry]:
     """Rows of an exported CSV table.
 
     Raises
@@ -121,9 +121,9 @@ def from_sheet(kind: type[Entry], sheet: Sheet) -> Iterator[Entry]:
     BadInput
         A cell that the export did not write; with file, row and column.
     """
-    for number, cells in zip(sheet.numbers, sheet.rows, strict=True):
-        values = dict(zip(sheet.columns, cells, strict=True))
-        yield _entry(kind, values, f"{sheet.name}, row {number}", _from_cell)
+    for number, cells in table.text_rows():
+        values = dict(zip(table.names, cells, strict=True))
+        yield _entry(kind, values, f"{table.name}, row {number}", _from_cell)
 
 
 def _from_cell(annotation: Any, cell: str) -> Value:

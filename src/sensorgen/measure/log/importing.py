@@ -72,9 +72,9 @@ def _table(path: Path, columns: Mapping[str, str]) -> tuple[Sequence[Entry], Seq
     """Rows of a table, and the columns that are ignored."""
     if path.suffix.lower() == ".parquet":
         return exchange.from_parquet(path)[1], ()
-    sheet = tables.sheet(path)
-    kind = exchange.kind_of(sheet.columns)
-    return (list(exchange.from_sheet(kind, sheet)), ()) if kind else tables.readings(sheet, columns, path.name)
+    with tables.opened(path) as table:
+        kind = exchange.kind_of(table.names)
+        return (list(exchange.from_csv(kind, table)), ()) if kind else tables.readings(table, columns, path.name)
 
 
 def _exported(log: Log, folder: Path) -> list[Entry]:

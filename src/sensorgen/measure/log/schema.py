@@ -1,4 +1,4 @@
-"""The log's tables, version by version: a new file takes the same steps as an old one."""
+"""Tables and migrations of the log: a new file takes the same steps as an old one."""
 
 APPLICATION_ID = 0x53474C47  # in the header of the file: "SGLG"
 
@@ -111,8 +111,8 @@ _BENCH_AND_BATCHES = (
 )
 
 
-def _kept(*tables: str) -> tuple[str, ...]:
-    """Triggers that refuse to change or take out a row, whoever asks."""
+def _append_only(*tables: str) -> tuple[str, ...]:
+    """Triggers that refuse to change or delete a row, for every program."""
     return tuple(
         f"CREATE TRIGGER {table}_no_{event.lower()} BEFORE {event} ON {table} BEGIN "
         "SELECT RAISE(ABORT, 'nothing in the log is changed or taken out: log a correction'); END"
@@ -121,8 +121,8 @@ def _kept(*tables: str) -> tuple[str, ...]:
     )
 
 
-STEPS = (  # the statements that lead from each version to the next
-    (*_READINGS, *_kept("specimen", "reading")),
-    (*_BENCH_AND_BATCHES, *_kept("raw_file", "batch", "print", "bench_run", "prediction")),
+STEPS = (  # migrations from each version to the next
+    (*_READINGS, *_append_only("specimen", "reading")),
+    (*_BENCH_AND_BATCHES, *_append_only("raw_file", "batch", "print", "bench_run", "prediction")),
 )
 VERSION = len(STEPS)

@@ -4,22 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.recording import hdf, matfive, table, tiepie
 from sensorgen.measure.recording.matfive import MOST_BYTES
 from sensorgen.measure.recording.samples import Recording, Source
 
-_REFUSED = {
-    b"PK\x03\x04": "a zip archive (an .npz or .xlsx is one, too): unpack it, or export the table as CSV",
-    b"\x1f\x8b": "packed with gzip: unpack it first",
-    b"BZh": "packed with bzip2: unpack it first",
-    b"\xfd7zXZ": "packed with xz: unpack it first",
-    b"7z\xbc\xaf": "a 7z archive: unpack it first",
-    b"\x93NUMPY": "a NumPy file, which may hold pickled objects: save the numbers as CSV, .mat or HDF5",
-    b"\x80\x02": "a Python pickle, which could run anything: it is not opened; save the numbers as CSV, .mat or HDF5",
-    b"PAR1": "a Parquet file: save the numbers as CSV, .mat or HDF5",
-    b"SQLite format 3": "a database: export the table as CSV",
-}
-_REFUSED |= {b"\x80" + bytes([n]): _REFUSED[b"\x80\x02"] for n in (3, 4, 5)}
 _HDF = b"\x89HDF\r\n\x1a\n"
 _HDF_PLACES = (0, 512, 1024, 2048)
 
@@ -53,8 +42,7 @@ def read_all(path: Path | str, columns: Mapping[str, str] | None = None) -> tupl
         HDF5 without h5py.
     """
     path = Path(path)
-    head = _head(path)
-    file_format = _format(head)
+    file_format = _format(checked_head(path, MOST_BYTES, "a recording as .mat, HDF5 or CSV"))
     try:
         if file_format == "CSV":
             return (table.recording(path, columns or {}),)
@@ -74,24 +62,3 @@ def _format(head: bytes) -> str:
     if any(head[at : at + len(_HDF)] == _HDF for at in _HDF_PLACES):
         return "MATLAB 7.3" if head.startswith(b"MATLAB") else "HDF5"
     return "MATLAB 5" if head.startswith(b"MATLAB") or head[126:128] in (b"IM", b"MI") else "CSV"
-
-
-def _head(path: Path) -> bytes:
-    try:
-        if path.is_dir():
-            raise BadInput(f"{path} is a folder; expected a file of readings")
-        if not path.is_file():
-            raise BadInput(f"cannot read {str(path)!r}: there is no such file")
-        size = path.stat().st_size
-        with path.open("rb") as file:
-            head = file.read(_HDF_PLACES[-1] + len(_HDF))
-    except (OSError, ValueError) as error:
-        raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
-    if not head:
-        raise BadInput(f"{path}: the file is empty")
-    if size > MOST_BYTES:
-        raise BadInput(f"{path}: {size / 2**30:.3g} GB; expected up to {MOST_BYTES >> 30} GB: split the run")
-    for magic, why in _REFUSED.items():
-        if head.startswith(magic):
-            raise BadInput(f"{path} is {why}")
-    return head

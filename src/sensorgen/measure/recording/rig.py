@@ -9,6 +9,7 @@ import numpy as np
 from sensorgen.core.errors import BadInput
 from sensorgen.measure import csv_table
 from sensorgen.measure.csv_table import SAME_NAMES, Table, listed
+from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.recording.matfive import MOST_BYTES
 from sensorgen.measure.recording.samples import Bools, Real
 
@@ -64,13 +65,12 @@ def rig(path: Path | str, columns: Mapping[str, str] | None = None) -> RigLog:
         A file that cannot be read, lacks a column or has a cell that is no number, with file, row and column.
     """
     path = Path(path)
+    checked_head(path, MOST_BYTES, "a rig's log as CSV")
     try:
-        if path.is_file() and path.stat().st_size > MOST_BYTES:
-            raise BadInput(f"{path}: more than {MOST_BYTES >> 30} GB; expected a rig's log: split the run")
         with csv_table.opened(path, columns or SAME_NAMES) as table:
             return _read(table)
-    except (OSError, ValueError) as error:
-        raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
+    except OSError as error:
+        raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None
 
 
 def _read(table: Table) -> RigLog:

@@ -105,8 +105,8 @@ def fitted(
     z, start = impedance_ohm[rest], float(time_s[0])
     bins = laws.binned(time_s[rest], np.log(np.abs(z)) + 1j * np.unwrap(np.angle(z), axis=0))
     seconds = max(float(time_s[-1]) - start, 1e-9)
-    smooth = laws.explained(bins, (laws.Smooth(start, seconds),))
-    fits = {"line": laws.explained(bins, (laws.Line(start, seconds),)), "smooth": smooth}
+    smooth = laws.explained(bins, (laws.smooth(start, seconds),))
+    fits = {"line": laws.explained(bins, (laws.linear(start, seconds),)), "smooth": smooth}
     if any("memory" in name for name in among):
         fits["memory"] = laws.relaxing(bins, smooth, time_s, force_n, settle_s / 2)
     for name in among:

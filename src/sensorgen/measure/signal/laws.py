@@ -10,7 +10,6 @@ linearly from rest to rest.
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, log
-from typing import Protocol
 
 import numpy as np
 
@@ -26,11 +25,8 @@ _SCAN, _MOST_MEMORIES = 24, 3
 _KNOTS_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 
 
-class Term(Protocol):
-    """Part of a law."""
-
-    def columns(self, time_s: Real) -> Real:
-        """Its functions of time, side by side (n, k)."""
+Term = Callable[[Real], Real]
+"""Part of a law: from times (n,) [s] to its functions of time, side by side (n, k)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,30 +48,20 @@ class Bins:
     weight: Real
 
 
-@dataclass(frozen=True)
-class Line:
+def linear(start_s: float, seconds: float) -> Term:
     """Linear in time."""
-
-    start_s: float
-    seconds: float
-
-    def columns(self, time_s: Real) -> Real:
-        """One column."""
-        return np.maximum(time_s - self.start_s, 0)[:, None] / self.seconds
+    return lambda time_s: np.maximum(time_s - start_s, 0)[:, None] / seconds
 
 
-@dataclass(frozen=True)
-class Smooth:
+def smooth(start_s: float, seconds: float) -> Term:
     """Cubic and logarithms of time."""
+    taus = np.geomspace(1 / _FASTEST, 1, _TAUS)
 
-    start_s: float
-    seconds: float
-
-    def columns(self, time_s: Real) -> Real:
-        """Eight columns."""
-        u = np.maximum(time_s - self.start_s, 0) / self.seconds
-        taus = np.geomspace(1 / _FASTEST, 1, _TAUS)
+    def columns(time_s: Real) -> Real:
+        u = np.maximum(time_s - start_s, 0) / seconds
         return np.column_stack([*(u**n for n in _POWERS), *(np.log1p(u / tau) for tau in taus)])
+
+    return columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +71,8 @@ class Relaxation:
     tau_s: float
     response_n: Callable[[Real], Real]
 
-    def columns(self, time_s: Real) -> Real:
-        """One column [N]."""
+    def __call__(self, time_s: Real) -> Real:
+        """Response [N] (n, 1)."""
         return self.response_n(time_s)[:, None]
 
 
@@ -189,7 +175,7 @@ def relaxing(bins: Bins, fit: Fit, time_s: Real, force_n: Real, fastest_s: float
     base, weight = np.linalg.qr(_basis(fit.terms, bins.time_s) * bins.weight[:, None])[0], bins.weight[:, None]
 
     def misfit(logs: Real) -> float:
-        columns = weight * np.hstack([memory(x).columns(bins.time_s) for x in logs])
+        columns = weight * np.hstack([memory(x)(bins.time_s) for x in logs])
         new = np.linalg.qr(columns - base @ (base.T @ columns))[0]
         return _misfit(_squares(fit.left) - _squares(new.T @ fit.left))
 
@@ -229,7 +215,7 @@ def wandering(bins: Bins, fit: Fit) -> Fit:
 
 
 def _basis(terms: tuple[Term, ...], time_s: Real) -> Real:
-    return np.column_stack([np.ones_like(time_s), *(term.columns(time_s) for term in terms)])
+    return np.column_stack([np.ones_like(time_s), *(term(time_s) for term in terms)])
 
 
 def _squares(left: Complex) -> Real:

@@ -1,11 +1,12 @@
 """Stacks of tracks and films made from a design."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
+from sensorgen.design.body import Body
 from sensorgen.design.design import Design, make
 from sensorgen.design.values import MaterialValue
 from sensorgen.models.sensor import Sensor
@@ -41,10 +42,26 @@ class Stacked:
     doubts: tuple[str, ...]
 
 
-def stacked(design: Design, law: str = "", tip_m: float = TIP_M) -> Stacked:
-    """The stacks of a design; parameters and errors as :func:`sensorgen.prediction.evaluate.sensor_model`."""
-    query = Query(tip=Tip(tip_m), law=law)
-    found = [sensor_model(bodies.default_body(half), query)[0] for half in halves(design)]
+def stacked(
+    design: Design, law: str = "", tip_m: float = TIP_M, body: Callable[[Design], Body] = bodies.default_body
+) -> Stacked:
+    """The stacks of a design.
+
+    Parameters
+    ----------
+    design : Design
+        Double, or any other.
+    law, tip_m : str, float
+        Law of compression, "" for the default; length of the tip and of the touch [m].
+    body : callable
+        The body of a design: as printed unless given, or :func:`sensorgen.prediction.bodies.drawn`.
+
+    Raises
+    ------
+    SensorgenError
+        As :func:`sensorgen.prediction.evaluate.sensor_model`.
+    """
+    found = [sensor_model(body(half), Query(tip=Tip(tip_m), law=law))[0] for half in halves(design)]
     lower, upper = found[0], found[-1]
     double = stack_of([lower.sensor, upper.sensor])
     own = double if len(found) > 1 else stack_of([lower.sensor])
@@ -91,7 +108,7 @@ def stack_of(sensors: Sequence[Sensor]) -> Stack:
         return Track(sensor.resistivity_ohm_m[end] / section, sensor.piezoresistance_per_pa[end])
 
     first = sensors[0]
-    films = [Film(s.capacitance_f_per_m, s.compression.thinning, s.tan_delta, s.leak_s_per_m) for s in sensors]
+    films = [Film(s.capacitance_f_per_m, s.compression.capacitive_strain, s.tan_delta, s.leak_s_per_m) for s in sensors]
     tracks = (track(first, 1), *(track(sensor, 0) for sensor in sensors))
     return Stack(first.length_m, first.width_m, tracks, tuple(films))
 

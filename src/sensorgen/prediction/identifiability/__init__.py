@@ -82,7 +82,7 @@ def identify(
     -----
     Force is *sensed* where its standard error (:mod:`sensorgen.prediction.identifiability.fisher`) is a tenth of the
     force or less, a press *located* where it is the tip's length or less; a quantity is not sensed where the error is
-    that of a blind guess (range over the root of 12), and "roughly" in between.
+    that of a uniform distribution (range over the root of 12), and "roughly" in between.
     """
     setup = replace(_setup(sensor, frequency_hz, noise, force_n, position_m, highest_hz), assumed=assumed)
     found = slopes(sensor, setup.frequency_hz, force_n, setup.position_m)
@@ -91,7 +91,7 @@ def identify(
     together = changes.together(setup, tried) if tried else None
     stiff = setup.on(stiffest).bounds() if stiffest else None
     stress = sensor.stress_pa(force_n, setup.position_m)
-    strain = float(sensor.compression.thinning(stress)[0])
+    strain = float(sensor.compression.capacitive_strain(stress)[0])
     return Identifiability(
         **vars(standard_errors(limits)),
         noise=noise,

@@ -36,7 +36,7 @@ class Change:
     kind : str
         Part of the sensor or readout; of each kind only the most helpful change is advised.
     name : str
-        In words; ``{lowest}`` and ``{highest}`` stand for the frequencies.
+        As text; ``{lowest}`` and ``{highest}`` stand for the frequencies.
     risk : str
         Its disadvantage.
     apply : callable

@@ -164,7 +164,7 @@ def bearable(sensor: Sensor, force_n: Real, position_m: Real) -> NDArray[np.bool
 
     def defined(stress_pa: Real) -> bool:
         try:
-            sensor.compression.thinning(stress_pa)
+            sensor.compression.capacitive_strain(stress_pa)
         except OutOfRange:
             return False
         return True

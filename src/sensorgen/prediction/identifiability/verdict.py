@@ -1,4 +1,4 @@
-"""Verdict on the bounds: whether a design senses force and locates a press, in words."""
+"""Verdict on the bounds: whether a design senses force and locates a press, as text."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from sensorgen.prediction.identifiability.fisher import Bounds, Real, Setup
 from sensorgen.prediction.identifiability.results import StandardErrors
 
 FORCE_SHARE = 0.1  # force is sensed where its standard error is a tenth of it
-GUESS = 12**-0.5  # standard deviation of a blind guess between two ends, relative to their distance [-]
+GUESS = 12**-0.5  # standard deviation of a uniform distribution, relative to its range [-]
 
 _FORCE = {"yes": "senses force", "roughly": "senses force only roughly", "no": "cannot sense force"}
 _POSITION = {"yes": "locates a press", "roughly": "locates a press only roughly", "no": "cannot locate a press"}
@@ -19,15 +19,15 @@ class Required:
     """Required standard errors of a press.
 
     A quantity is sensed ("yes") where its standard error is at most the required one: a tenth of the force, one length
-    of the tip. It is not ("no") where the error is that of a blind guess or more: force range/sqrt(12), sensor
-    length/sqrt(12); a reading then has no information. Between the two it is sensed "roughly".
+    of the tip. It is not ("no") where the error is that of a uniform distribution or more: force range/sqrt(12),
+    sensor length/sqrt(12); a reading then has no information. Between the two it is sensed "roughly".
 
     Attributes
     ----------
     force_n, position_m : float
         Required standard errors [N], [m].
     guess_force_n, guess_position_m : float
-        Those of a blind guess [N], [m].
+        Those of a uniform distribution [N], [m].
     """
 
     force_n: float

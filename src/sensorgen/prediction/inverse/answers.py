@@ -151,7 +151,7 @@ class Summary:
             )
         if self._most(Status.NOT_IDENTIFIABLE, Status.FORCE_ONLY):
             yield (
-                "most readings have less information than a guess: average them, choose frequencies nearer to the "
+                "most readings have too little information: average them, choose frequencies nearer to the "
                 "corner frequency, more resistive electrodes or a softer cell (see sensorgen predict), or set --prior"
             )
         if self._most(Status.AT_THE_END):

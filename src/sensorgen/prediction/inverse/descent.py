@@ -1,4 +1,4 @@
-"""Weighted least squares on the unit square: Gauss-Newton, damped where it fails, for many samples at once."""
+"""Weighted least squares on the unit square: Gauss-Newton, damped where it fails, for many samples together."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -116,12 +116,9 @@ def descend(target: Target, model: Model, start: Real, offset: float) -> Fit:
         new = target.rows(active).fit(trial, model(trial))
         better = new.chi2 <= best.chi2[active]
         best.put(active[better], new.rows(np.flatnonzero(better)))
-        damping[active] = np.where(better, _eased(damping[active]), np.maximum(damping[active] * 10, _DAMPING))
+        eased = np.where(damping[active] > _DAMPING, damping[active] / 10, 0.0)
+        damping[active] = np.where(better, eased, np.maximum(damping[active] * 10, _DAMPING))
     return best
-
-
-def _eased(damping: Real) -> Real:
-    return np.where(damping > _DAMPING, damping / 10, 0.0)
 
 
 def _step(fit: Fit, damping: Real) -> Real:

@@ -54,7 +54,7 @@ class Forward:
         sensor, force = self.sensor, force_n[:, None]
         patch = sensor.patch(position_m[:, None])
         stress = force / (sensor.width_m * patch.length_m)
-        thinning, _ = sensor.compression.thinning(stress)
+        thinning, _ = sensor.compression.capacitive_strain(stress)
         pressed = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * (self.susceptance / (1 - thinning))
         under = self.track + stress * self.track_per_pascal
         right = np.maximum(sensor.length_m - patch.left_m - patch.length_m, 0.0)
@@ -142,7 +142,7 @@ class Scalar:
         left = max(position_m - sensor.tip_m / 2, 0.0)
         end = min(position_m + sensor.tip_m / 2, sensor.length_m)
         stress = force_n / (sensor.width_m * (end - left))
-        stiffer = (sensor.tan_delta + 1j) / (1 - float(sensor.compression.thinning(np.asarray(stress))[0]))
+        stiffer = (sensor.tan_delta + 1j) / (1 - float(sensor.compression.capacitive_strain(np.asarray(stress))[0]))
         pressed = [sensor.leak_s_per_m + stiffer * b for b in self._susceptance]
         right = sensor.length_m - end, self._loose, track
         return self._from_far_end(right, (end - left, pressed, track + stress * per_pascal), (left, self._loose, track))

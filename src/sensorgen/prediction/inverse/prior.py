@@ -1,4 +1,4 @@
-"""What is known of a press before it is measured, and what is known after: means and intervals by quadrature."""
+"""Prior of a press, and its posterior: means and intervals by quadrature."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -52,7 +52,7 @@ class Prior:
 
 
 class Posterior(NamedTuple):
-    """What is known of scaled presses after the measurement; rows are samples."""
+    """Posterior of scaled presses; rows are samples."""
 
     mean: Real
     covariance: Real

@@ -51,19 +51,17 @@ class Table:
     def __init__(self, forward: Forward, force_limit_n: float) -> None:
         self.scale = np.array([force_limit_n, forward.sensor.length_m])
         self.edges = _edges(forward)
-        inner = [_inner(edges) for edges in self.edges]
-        values = _grid(forward, inner[0] * self.scale[0], inner[1] * self.scale[1])
-        self.coefficients = _cubics(values)
+        force, position = (_thirds(edges) * scale for edges, scale in zip(self.edges, self.scale, strict=True))
+        values = parts(forward.log_impedance(*_pairs(force, position).T))
+        self.coefficients = _cubics(values.reshape(len(force), len(position), -1))
         self._borders = [edges[1:-1] for edges in self.edges]
         self._per_width = [1 / np.diff(edges) for edges in self.edges]
         self.shape = len(self.edges[0]) - 1, len(self.edges[1]) - 1
         forces, positions = ((edges[1:] + edges[:-1]) / 2 for edges in self.edges)
         self.middles = _pairs(forces, positions)
-        self._filters = self._matched(_pairs(self.edges[0][1::2], positions), np.diff(self.edges[0][::2]))
-
-    def _matched(self, seeds: Real, reach: Real) -> "_Filters":
-        local = self.at(seeds)
-        return _Filters.around(seeds, local.value, local.slope[:, 0], np.repeat(reach, len(seeds) // len(reach)))
+        seeds = _pairs(self.edges[0][1::2], positions)
+        local, reach = self.at(seeds), np.repeat(np.diff(self.edges[0][::2]), len(positions))
+        self._filters = _Filters.around(seeds, local.value, local.slope[:, 0], reach)
 
     def at(self, press: Real) -> Local:
         """Interpolated response at scaled presses (n, 2)."""
@@ -112,7 +110,7 @@ class Table:
         return np.asarray(force * self.shape[1] + position)
 
     def rivals(self, sigma: Real) -> tuple[Index, Real]:
-        """For every cell, the cell of the nearest other minimum of the distance to it, or -1; and how near it may be.
+        """For every cell, the cell of the nearest other minimum of the distance, or -1; and a lower limit of it.
 
         The distance, in units of noise, is the one that is left for a press anywhere in the two cells.
         """
@@ -194,16 +192,10 @@ def _pairs(forces: Real, positions: Real) -> Real:
     return np.stack(np.meshgrid(forces, positions, indexing="ij"), -1).reshape(-1, 2)
 
 
-def _inner(edges: Real) -> Real:
+def _thirds(edges: Real) -> Real:
     """Points at the thirds of every cell."""
     thirds = edges[:-1, None] + np.diff(edges)[:, None] * np.arange(3) / 3
     return np.append(thirds.ravel(), edges[-1])
-
-
-def _grid(forward: Forward, force_n: Real, position_m: Real) -> Real:
-    """Responses at all pairs, (forces, positions, 2 n_tones)."""
-    force, position = (a.ravel() for a in np.meshgrid(force_n, position_m, indexing="ij"))
-    return parts(forward.log_impedance(force, position)).reshape(len(force_n), len(position_m), -1)
 
 
 def parts(logarithm: Complex) -> Real:

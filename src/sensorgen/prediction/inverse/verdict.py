@@ -23,9 +23,9 @@ class Status(IntEnum):
     AT_THE_END = 2
     """The best press lies on the border: no force, the force limit, or an end of the sensor."""
     FORCE_ONLY = 3
-    """Less information on position than a guess."""
+    """Less information on position than a uniform prior."""
     NOT_IDENTIFIABLE = 4
-    """Less information on force, too."""
+    """Less information on force than a uniform prior, too."""
     NO_FIT = 5
     """No press fits: the residual is far above the noise."""
     MISSING = 6

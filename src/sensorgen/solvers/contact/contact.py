@@ -110,7 +110,7 @@ class Faces:
     @property
     def _ways(self) -> int:
         """Directions along a face."""
-        return self.points_m.shape[1] - 1
+        return len(self.points_m[0]) - 1
 
     @cached_property
     def _at(self) -> Real:

@@ -143,7 +143,7 @@ def _between(triangles: Whole, dielectric: Mask, ends: list[Mask]) -> Whole:
     beside = coo_matrix((np.ones(middles.size), (middles.ravel(), middles[:, [1, 2, 0]].ravel())), (len(ends[0]),) * 2)
     _, piece = connected_components(beside)
     touched = [np.unique(piece[middles[end[middles].any(axis=1), 0]]) for end in ends]
-    return np.flatnonzero(dielectric)[np.isin(piece[middles[:, 0]], np.intersect1d(*touched))]
+    return np.flatnonzero(dielectric)[np.isin(piece[middles[:, 0]], np.intersect1d(touched[0], touched[1]))]
 
 
 def _energy(triangles: Whole, local: Real, zero: Mask, one: Mask) -> float:

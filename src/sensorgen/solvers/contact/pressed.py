@@ -3,15 +3,15 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.solvers.contact.boundary import CHOICES, BoundaryConditions
 from sensorgen.solvers.contact.cell import Cell
-from sensorgen.solvers.contact.support import CHOICES, Held
 
 if TYPE_CHECKING:
     from sensorgen.solvers.contact.element import Law
@@ -25,6 +25,7 @@ _LEVELS = 0.01  # by which two meshes may differ [-]
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
+AnyMesh = TypeVar("AnyMesh")
 
 
 @dataclass(frozen=True)
@@ -86,20 +87,21 @@ class Pressed:
 
 
 @dataclass(frozen=True)
-class Run:
-    """A problem and its equilibria, load by load."""
+class Run(Generic[AnyMesh]):
+    """A problem on a mesh and its equilibria, load by load."""
 
     problem: "Problem"
+    mesh: AnyMesh
     states: "list[State]"
 
 
-def check(stress_pa: Sequence[float], held: Held) -> None:
+def check(stress_pa: Sequence[float], boundary: BoundaryConditions) -> None:
     """Refuse stresses that do not rise from 0, and unknown choices."""
     if len(stress_pa) < 2 or stress_pa[0] != 0 or any(b <= a for a, b in pairwise(stress_pa)):
         raise OutOfRange("stresses must begin with 0 and rise, as in 0:100:10")
     for key, choices in CHOICES.items():
-        if getattr(held, key) not in choices:
-            raise BadInput(f"{key} {getattr(held, key)!r}: expected {' or '.join(choices)}")
+        if getattr(boundary, key) not in choices:
+            raise BadInput(f"{key} {getattr(boundary, key)!r}: expected {' or '.join(choices)}")
 
 
 def law_of(materials: Sequence[str], region: Whole, solids: Mapping[str, Elastic]) -> "tuple[Law, float]":
@@ -118,7 +120,7 @@ def penalty_pa(softest_pa: float) -> float:
 
 def reached(
     problem: "Problem", stress_pa: Sequence[float], longest_pa: float, step: Callable[[float], None], source: str
-) -> tuple[Pressed, Run]:
+) -> tuple[Pressed, "list[State]"]:
     """Press in load steps of at most ``longest_pa``, as far as it converges, and check the result.
 
     ``step`` is called with each pressure that is reached [Pa].
@@ -145,7 +147,7 @@ def reached(
     }
     said = (f"feet hang free as drawn: the top falls {fall * 1e6:.4g} um before they carry",) if fall > 0 else ()
     wrong = tuple(words for words, holds in faults.items() if holds)
-    return Pressed(stress, down, (), (), volume, depth, imbalance, fall, wrong, said, source), Run(problem, states)
+    return Pressed(stress, down, (), (), volume, depth, imbalance, fall, wrong, said, source), states
 
 
 def _imbalance(stress: Real, moved: Real, energy: Real) -> Real:

@@ -6,7 +6,7 @@ Thomson: any D of continuous normal component, without sources, tangential at th
 Both are stationary at their best field: what a solver leaves unsolved enters squared, and to the safe side.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -165,23 +165,12 @@ def disc(found: Fields, turn: Turned, shares: Sequence[float]) -> Disc:
     """
     least, most = min(shares), max(shares) - min(shares)
     beyond = 2 * np.sqrt(most * found.size * found.apart) + most * found.apart
-    return min(
-        (
-            _grown(least * c + found.part, least * off + turn.kappa() * beyond, found.rounding)
-            for c, off in _whole(found, turn)
-        ),
-        key=lambda near: near.radius,
-    )
-
-
-def _whole(found: Fields, turn: Turned) -> Iterator[tuple[complex, float]]:
-    """Values of the whole cell, and how far each may be off."""
     t = turn.tangent
-    yield found.energy, turn.kappa() * found.apart
+    cells = [(found.energy, turn.kappa() * found.apart)]  # values of the whole cell, and their errors
     if t < 1:
-        yield (found.energy + found.lower) / 2, found.apart / 2 * np.sqrt((1 + t) / (1 - t))
-
-
-def _grown(centre: complex, off: float, rounding: float) -> Disc:
-    """A disc with room for rounding."""
-    return Disc(complex(centre), float(off + max(rounding, ROUNDING) * abs(centre)))
+        cells.append(((found.energy + found.lower) / 2, found.apart / 2 * np.sqrt((1 + t) / (1 - t))))
+    discs = []
+    for value, error in cells:
+        centre, off = complex(least * value + found.part), least * error + turn.kappa() * beyond
+        discs.append(Disc(centre, float(off + max(found.rounding, ROUNDING) * abs(centre))))
+    return min(discs, key=lambda disc: disc.radius)

@@ -77,8 +77,9 @@ def insulated(scene: Scene, axis: int) -> Grid:
 def _cell(planes: tuple[NDArray[np.float64], ...], fill: Ints, names: list[str], evenly: bool = True) -> Grid:
     """The part of a raster between its mirrors."""
     across, along = (mirrored(_slices(planes[axis], np.moveaxis(fill, axis, 0)), evenly) for axis in (0, 1))
-    at = [_taken(cell, planes[axis]) for axis, cell in ((0, across), (1, along))]
-    shares = np.outer(*(_shares(cell) for cell in (across, along)))
+    middles = [[(s.left_mm + s.right_mm) / 2 for s in cell.slices] for cell in (across, along)]
+    at = [np.searchsorted(planes[axis], middles[axis]) - 1 for axis in (0, 1)]  # layers of the scene in the cell
+    shares = np.outer(across.shares, along.shares)
     return Grid((_edges(across), _edges(along), planes[2]), fill[np.ix_(at[0], at[1])], names, shares)
 
 
@@ -120,16 +121,6 @@ def _slices(planes: NDArray[np.float64], fill: Ints) -> list[Slice]:
 
 def _edges(cell: Cell) -> NDArray[np.float64]:
     return np.array([cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)])
-
-
-def _shares(cell: Cell) -> NDArray[np.float64]:
-    return np.array(cell.shares)
-
-
-def _taken(cell: Cell, planes: NDArray[np.float64]) -> Ints:
-    """In which layer of the whole scene each slice of the cell lies."""
-    middles = [(s.left_mm + s.right_mm) / 2 for s in cell.slices]
-    return np.searchsorted(planes, middles) - 1
 
 
 def _refuse_contact(fill: Ints) -> None:

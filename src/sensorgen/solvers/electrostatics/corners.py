@@ -38,7 +38,8 @@ def exponents(mesh: Triangles, permittivity: Mapping[str, float]) -> dict[int, f
     """
     found: dict[int, float] = {}
     for corner, (around,) in fans(mesh.triangles).items():
-        ends = None if around.closed else tuple(_on_terminal(mesh, corner, around.spokes[k]) for k in (0, -1))
+        edges = [tuple(sorted((corner, around.spokes[k]))) for k in (0, -1)]
+        ends = None if around.closed else tuple(edge in mesh.terminals for edge in edges)
         value = exponent(_sectors(mesh, corner, around, permittivity), ends)
         if value < _HIGHEST:
             found[corner] = value
@@ -55,10 +56,6 @@ def _sectors(mesh: Triangles, corner: int, fan: Fan, permittivity: Mapping[str, 
         away[:-1, 0] * away[1:, 1] - away[:-1, 1] * away[1:, 0], (away[:-1] * away[1:]).sum(axis=1)
     ).tolist()
     return _merged((angle, permittivity[mesh.regions[n][0]]) for angle, n in zip(angles, fan.members, strict=False))
-
-
-def _on_terminal(mesh: Triangles, a: int, b: int) -> bool:
-    return (min(a, b), max(a, b)) in mesh.terminals
 
 
 def _merged(sectors: Iterable[tuple[float, float]]) -> _Sectors:
@@ -96,22 +93,18 @@ def exponent(sectors: _Sectors, fixed: tuple[bool, ...] | None) -> float:
         here = slice(_DEGREE * k, _DEGREE * (k + 1) + 1)
         stiffness[here, here] += eps / angle * _reference()[0]
         mass[here, here] += eps * angle * _reference()[1]
-    keep = _kept(size, fixed)
+    keep = np.eye(size)  # from free values to all: 0 on electrodes, the same at both ends of a ring
+    if fixed is None:
+        keep[-1, 0] = 1.0
+        keep = keep[:, :-1]
+    else:
+        keep = keep[:, int(fixed[0]) : size - int(fixed[1])]
     stiffness, mass = (keep.T @ m @ keep for m in (stiffness, mass))
     root = np.linalg.inv(np.linalg.cholesky(mass))
     squares = np.linalg.eigvalsh(root @ stiffness @ root.T)
     values = np.sqrt(squares[squares > _NO_FIELD])
     odd = values[np.abs(values - np.round(values)) > _SMOOTH]
     return float(odd.min()) if len(odd) else np.inf
-
-
-def _kept(size: int, fixed: tuple[bool, ...] | None) -> NDArray[np.float64]:
-    """From free values to all values: 0 on electrodes, the same at both ends of a ring."""
-    if fixed is None:
-        keep = np.eye(size)[:, :-1]
-        keep[-1, 0] = 1.0
-        return keep
-    return np.eye(size)[:, int(fixed[0]) : size - int(fixed[1])]
 
 
 _RATIO = 0.25  # of one ring's radius to the next

@@ -1,7 +1,7 @@
 """Least energy of elements that share unknowns, by elimination from the inside out (nested dissection; George, 1973).
 
 A block of boxes is halved until one box is left. Going back, two halves are added, and what no box outside shares is
-eliminated at once, by dense algebra. What remains at the end is one number: the energy at 1 V.
+eliminated by dense algebra. What remains at the end is one number: the energy at 1 V.
 """
 
 from collections.abc import Callable

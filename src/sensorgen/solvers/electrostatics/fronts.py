@@ -1,4 +1,4 @@
-"""Least energy of many dense blocks: neighbours are joined, and what no other block needs is eliminated at once.
+"""Least energy of many dense blocks: neighbours are joined, and unknowns that no other block shares are eliminated.
 
 A direct solve from the inside out, in dense algebra only. Matrices are positive definite, or complex symmetric with a
 real part that is after a turn: no pivots are looked for between blocks.

@@ -1,7 +1,7 @@
-"""Where a stream function has one value, and where it jumps.
+"""Mesh with rings at singular corners, and its boundary as a stream function sees it: constant values and jumps.
 
 No flux crosses a mirror: the function has one value along each. Around an island of electrode it grows by all the flux
-that ends there: a cut from each island to another boundary lets it jump by a value of its own.
+that ends there: along a cut from each island to another boundary it jumps by an unknown value.
 """
 
 from collections import defaultdict, deque
@@ -113,7 +113,8 @@ def _cuts(
     todo = deque(before)
     while todo and reached < carrying:
         here = todo.popleft()
-        for spoke in _inner(around[here]):
+        fan = around[here]
+        for spoke in fan.spokes if fan.closed else fan.spokes[1:-1]:
             if spoke in before or spoke in cones:
                 continue
             if spoke not in loops:
@@ -125,10 +126,6 @@ def _cuts(
                 new = [k for k in loops if loops[k] == loops[spoke] and k in ends]
                 before |= {k: k for k in new}
                 todo += new
-
-
-def _inner(fan: Fan) -> list[int]:
-    return fan.spokes if fan.closed else fan.spokes[1:-1]
 
 
 def _path(before: dict[int, int], end: int) -> list[int]:

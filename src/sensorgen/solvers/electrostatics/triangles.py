@@ -124,11 +124,12 @@ def _all(cell: Cell) -> tuple[NDArray[np.float64], _Found]:
     for k, (here, share) in enumerate(zip(cell.slices, cell.shares, strict=True)):
         for band in here.bands:
             left, right = (
-                [int(first[k + side]) + n for n in _run(levels[k + side], band.bottom_mm[side], band.top_mm[side])]
-                for side in (0, 1)
+                [int(first[k + side]) + n for n in _between_levels(levels[k + side], *ends)]
+                for side, ends in enumerate(zip(band.bottom_mm, band.top_mm, strict=True))
             )
             region = (f"@{band.terminal}" if band.terminal else band.material, share)
-            found += [(corners, region) for corners in _fanned(points, [*left[::-1], *right])]
+            polygon = [*left[::-1], *right]
+            found += [(corners, region) for corners in fan(points[polygon], polygon)]
     return points, found
 
 
@@ -139,13 +140,9 @@ def _levels(slices: tuple[Slice, ...], k: int) -> list[float]:
     return [z for n, z in enumerate(heights) if n == 0 or z - heights[n - 1] > ROUNDING_MM]
 
 
-def _run(levels: list[float], low: float, high: float) -> range:
+def _between_levels(levels: list[float], low: float, high: float) -> range:
     """Which of the levels a band takes in, from its lower to its upper line."""
     return range(bisect_left(levels, low - 2 * ROUNDING_MM), bisect_left(levels, high + 2 * ROUNDING_MM))
-
-
-def _fanned(points: NDArray[np.float64], polygon: list[int]) -> Iterable[Triangle]:
-    return fan(points[polygon], polygon)
 
 
 def fan(places: NDArray[np.float64], polygon: list[int]) -> Iterable[Triangle]:

@@ -40,7 +40,7 @@ def product(matrix: "csr_array[np.float64]", one: Floats, other: Floats) -> floa
     Raises
     ------
     OutOfRange
-        The matrix is not positive definite in doubles: parts hang together by next to nothing.
+        The matrix is not positive definite in doubles: parts are hardly connected.
 
     Examples
     --------
@@ -99,9 +99,7 @@ def _eliminated(band: Floats, sides: Floats, rest: _Rest) -> tuple[float, _Rest]
     sides[:wide] += rest.sides[:count]
     factor, failed = dpbtrf(band, lower=1, overwrite_ab=1)
     if failed:
-        raise OutOfRange(
-            "these lines hang together by next to nothing: expected contacts that conduct as lines do, or not at all"
-        )
+        raise OutOfRange("these lines are hardly connected: expected contacts that conduct as lines do, or not at all")
     solved, _ = dtbtrs(factor, sides, uplo="L")
     part = float(solved[:, 0] @ solved[:, 1])
     if count < wide:  # the last

@@ -260,9 +260,10 @@ def network(
     for side, ohm in enumerate(sheet.sheet_resistance_ohm):
         if ohm == 0:
             joined[side::2] = side
-    first = {side: _reference(side, contacts, places) for side in range(2)}
+    # a node under a contact of each sheet, or its first node where it has none
+    first = [next((int(places[c][0]) for c in contacts if c.side == SIDES[k]), k) for k in range(2)]
     kept, label = np.unique(joined, return_inverse=True)
-    references = label[[first[0], first[1]]]
+    references = label[first]
     number = np.full(len(kept), -1)
     free = np.setdiff1d(np.arange(len(kept)), references)
     number[free] = np.arange(len(free))
@@ -279,8 +280,3 @@ def network(
 def _nodes(axes: tuple[Axis, Axis], contact: Contact) -> Index:
     x, y = axes[0].nodes(*contact.x_m), axes[1].nodes(*contact.y_m)
     return np.asarray(2 * (x[:, None] * len(axes[1].lines_m) + y).ravel() + SIDES.index(contact.side))
-
-
-def _reference(side: int, contacts: Sequence[Contact], places: dict[Contact, Index]) -> int:
-    """A node under a contact of that sheet, or its first node where it has none."""
-    return next((int(places[c][0]) for c in contacts if c.side == SIDES[side]), side)

@@ -210,15 +210,16 @@ class Bounds:
         tones : sequence of int
             Which frequencies, counted from 0; all unless given.
         outline : bool
-            Whether it is known that the press is on the sheet, as a prior of its spread (van Trees): errors of place
-            then never exceed a guess, and an undetermined position does not affect the other errors.
+            Whether it is known that the press is on the sheet, as a prior of its spread (van Trees): errors of
+            position then never exceed that of a uniform distribution, and an undetermined position does not affect the
+            other errors.
         """
         chosen = self.information if tones is None else self.information[:, :, list(tones)]
         known = np.diag([0.0, *(1 / spread**2 for spread in self.guess_m)]) if outline else 0.0
         return _standard_errors(chosen.sum(2) + known)
 
     def located(self) -> float:
-        """Share of the places where both x and y are known twice as well as by a guess [-]."""
+        """Share of the places where both x and y are known twice as well as from a uniform distribution [-]."""
         sigma = self.sigma(outline=True)
         return float(np.mean((sigma[..., 1] < self.guess_m[0] / 2) & (sigma[..., 2] < self.guess_m[1] / 2)))
 
@@ -236,7 +237,7 @@ class Bounds:
         share = self.located()
         where = "everywhere" if share == 1 else f"on {share:.0%} of the sheet" if share else "nowhere"
         x, y = (float(np.median(self.sigma(outline=True)[..., k])) / self.guess_m[k - 1] for k in (1, 2))
-        return f"locates a press {where}: typical error {x:.0%} of a guess's in x, {y:.0%} in y"
+        return f"locates a press {where}: typical error {x:.0%} of a uniform prior's in x, {y:.0%} in y"
 
 
 def contact_sets(sheet: Sheet) -> dict[str, tuple[Port, ...]]:
@@ -292,7 +293,7 @@ def bounds(
 
 
 def _refuse_depth(sheet: Sheet, highest_hz: float, press: Patch) -> None:
-    """Refuse at once what would compute for hours: cells have to be as small as the depth, and each place has them."""
+    """Refuse frequencies that would compute for hours: cells have to be as small as the depth."""
     depth, side = depth_m(sheet, highest_hz, press), max(sheet.length_m, sheet.width_m)
     if depth < SHALLOWEST * side:
         most = highest_hz * (depth / (SHALLOWEST * side)) ** 2

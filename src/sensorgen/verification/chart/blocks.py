@@ -17,7 +17,7 @@ from sensorgen.design import design as designs
 from sensorgen.models import compression, press2d, press3d, springs
 from sensorgen.models.compression import Plate
 from sensorgen.models.press2d import Elastic, Fineness
-from sensorgen.models.press3d import Held, Pieces, Pressed
+from sensorgen.models.press3d import BoundaryConditions, Pieces, Pressed
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.verification.chart.measured import DIGITS, Point, timed
 from sensorgen.verification.chart.presses import has_mesher
@@ -45,8 +45,8 @@ class Standard:
         What is pressed, and its period [mm].
     solids : dict of str to Elastic
         By material.
-    held : Held
-        How it is held.
+    boundary : BoundaryConditions
+        Boundary and contact conditions.
     stress_pa, down_m : array
         Loads [Pa] and how far its top comes down [m].
     known_to : float
@@ -62,7 +62,7 @@ class Standard:
     scene: Scene
     period_mm: float | None
     solids: dict[str, Elastic]
-    held: Held
+    boundary: BoundaryConditions
     stress_pa: Real
     down_m: Real
     known_to: float
@@ -77,7 +77,7 @@ def _block(stress_over_mu: Callable[[Real], Real], *, plane: bool) -> Standard:
     stress = _RUBBER.youngs_modulus_pa / 3 * stress_over_mu(_STRETCHES)
     height = _BLOCK_MM * M_PER_MM
     laws = (compression.unconfined(_RUBBER.youngs_modulus_pa),)
-    solids, held = dict.fromkeys(("x60", "etpu"), _RUBBER), Held("sliding", "free")
+    solids, held = dict.fromkeys(("x60", "etpu"), _RUBBER), BoundaryConditions("sliding", "free")
     return Standard(scene, None, solids, held, stress, (1 - _STRETCHES) * height, DIGITS, laws, height, plane)
 
 
@@ -104,8 +104,8 @@ def strip() -> Standard:
     e, strain, height = _RUBBER.youngs_modulus_pa, np.array([1e-4]), _HALF_MM * M_PER_MM
     laws = compression.unconfined(e), compression.bonded(e, _STRIP_MM * M_PER_MM, 2 * height)
     return Standard(
-        scene, _STRIP_MM + 1, solids, Held(top="rigid"), _BONDED * e * strain, strain * height, 1e-4, laws,
-        height, columns=False,
+        scene, _STRIP_MM + 1, solids, BoundaryConditions(top="rigid"), _BONDED * e * strain, strain * height, 1e-4,
+        laws, height, columns=False,
     )  # fmt: skip
 
 
@@ -114,7 +114,7 @@ def rect() -> Standard:
     scene = designs.make({"shape": "rect", "parameters": {"dielectric_mm": 0.1}}).in_use
     solids = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
     laws = (compression.unconfined(6e6), compression.bonded(6e6, 10e-3, 0.7e-3))
-    return Standard(scene, None, solids, Held(), np.array([1e3]), np.array([_RECT_M]), 0.01, laws, 0.7e-3)
+    return Standard(scene, None, solids, BoundaryConditions(), np.array([1e3]), np.array([_RECT_M]), 0.01, laws, 0.7e-3)
 
 
 STANDARD: dict[str, Callable[[], Standard]] = {
@@ -156,7 +156,7 @@ Found = Iterator[tuple[str, str, Real, float]]
 def _cheap(standard: Standard) -> Found:
     """Displacement by laws of plates and by springs, with the seconds that they took [m]."""
     for law in standard.laws:
-        value, seconds = timed(lambda law=law: law.thinning(standard.stress_pa)[0])  # type: ignore[misc]
+        value, seconds = timed(lambda law=law: law.capacitive_strain(standard.stress_pa)[0])  # type: ignore[misc]
         yield f"compression: {law.name}", "", value * standard.height_m, seconds
     if not standard.columns:
         return
@@ -173,7 +173,7 @@ def _solved(standard: Standard, budget_s: float) -> Found:
         yield from _finer(
             "press2d", [(f"mesh {k}, ", partial(_flat, standard, m)) for k, m in enumerate(_MESHES, 1)], budget_s
         )
-    if not (standard.plane and standard.held.period == "free"):
+    if not (standard.plane and standard.boundary.period == "free"):
         yield from _finer("press3d", [(f"{n} pieces, ", partial(_deep, standard, n)) for n in _PIECES], budget_s)
 
 
@@ -188,12 +188,12 @@ def _finer(model: str, meshes: list[tuple[str, Callable[[], Pressed]]], budget_s
 
 def _flat(standard: Standard, mesh: Fineness) -> Pressed:
     cell = press2d.cell(standard.scene, standard.period_mm)
-    return press2d.press(cell, standard.solids, [0.0, *standard.stress_pa], None, standard.held, mesh)
+    return press2d.press(cell, standard.solids, [0.0, *standard.stress_pa], None, standard.boundary, mesh)
 
 
 def _deep(standard: Standard, pieces: int) -> Pressed:
     cell = press3d.cell(standard.scene)
-    return press3d.press(cell, standard.solids, [0.0, *standard.stress_pa], None, standard.held, Pieces(pieces))
+    return press3d.press(cell, standard.solids, [0.0, *standard.stress_pa], None, standard.boundary, Pieces(pieces))
 
 
 def _point(scene: str, standard: Standard, model: str, said: str, value: Real, seconds: float) -> Point:

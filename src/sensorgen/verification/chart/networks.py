@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.asprinted.rectilinear import plate
 from sensorgen.models import line, sheet, stack, traxels
 from sensorgen.models.sheet import Sheet
 from sensorgen.solvers.network.nodes import Lines
 from sensorgen.verification.chart.measured import DIGITS, Point, timed
+from sensorgen.verification.chart.rectilinear import plate
 
 ASKED = "what a network of tracks, sheets or lines conducts"
 

@@ -115,7 +115,7 @@ Found = Iterator[tuple[str, str, Real, float]]
 def _down(known: Known, budget_s: float) -> Found:
     """Displacement of the top by each model, in um."""
     for name, law in _laws(known).items():
-        value, seconds = timed(lambda law=law: law.thinning(known.stress_pa())[0] * known.height_m())  # type: ignore[misc]
+        value, seconds = timed(lambda law=law: law.capacitive_strain(known.stress_pa())[0] * known.height_m())  # type: ignore[misc]
         yield f"compression: {name}", "", 1e6 * value, seconds
     plane = {name: s.youngs_modulus_pa / (1 - s.poisson_ratio**2) for name, s in _SOLIDS.items()}
     value, seconds = timed(lambda: springs.displacement_m(_scene(known), plane, list(known.stress_pa())))
@@ -127,7 +127,7 @@ def _down(known: Known, budget_s: float) -> Found:
 def _rise(known: Known, budget_s: float) -> Found:
     """Rise of the capacitance by each model, in pF/m."""
     for name, law in _laws(known).items():
-        value, seconds = timed(lambda law=law: 1 / (1 - law.thinning(known.stress_pa())[0]) - 1)  # type: ignore[misc]
+        value, seconds = timed(lambda law=law: 1 / (1 - law.capacitive_strain(known.stress_pa())[0]) - 1)  # type: ignore[misc]
         yield f"compression: {name}", "", known.rest_pf_per_m * value, seconds
     by_hand = {"thesis_swept: formula 3.35": _swept_formula, "thesis_swept: field": _swept_field}
     for name, work in by_hand.items():

@@ -10,7 +10,7 @@ import numpy as np
 
 from sensorgen.core.units import M_PER_MM
 from sensorgen.models import press2d, pressure
-from sensorgen.models.press2d import Elastic, Fineness, Held
+from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.scene.scene import Body, Prism, Scene, box
 from sensorgen.solvers.contact.cell import Cell
 from sensorgen.verification.chart.measured import DIGITS, Point, timed
@@ -70,7 +70,9 @@ def _solved(side_mm: float) -> float:
     """Length of a half ellipse of pressure that has the second moment of what the faces push."""
     stress = [0.0, _load_n_per_m() / (2 * _RADIUS_MM * M_PER_MM)]
     fineness = Fineness(side_mm, 0.1, 0.1, 0.3)
-    _, run = press2d._solved(_cylinder(side_mm), _SOLIDS, stress, Held(top="rigid"), fineness, lambda _: None)
+    _, run = press2d._solved(
+        _cylinder(side_mm), _SOLIDS, stress, BoundaryConditions(top="rigid"), fineness, lambda _: None
+    )
     state = run.states[-1]
     places = run.problem.places(state.u_m)
     here = run.problem.faces.rays(places).here_m

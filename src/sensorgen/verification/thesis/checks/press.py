@@ -26,7 +26,9 @@ def _pressed(
 ) -> compressed.Data:
     """A cell under 100 kPa, of the cache where it was solved before."""
     made = designs.make({"shape": shape, "parameters": parameters})
-    found = compressed.answer(drawn(made), compressed.Asked((0.0, _KPA), compressed.Held(base=base, period=period)))
+    found = compressed.answer(
+        drawn(made), compressed.Asked((0.0, _KPA), compressed.BoundaryConditions(base=base, period=period))
+    )
     if found["faults"]:
         raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {found['faults'][0]}")
     return found

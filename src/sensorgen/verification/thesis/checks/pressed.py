@@ -93,7 +93,7 @@ def thinner() -> list[Part]:
     """B.49: by the area of the electrodes, and by that under the tip."""
     law = compression.unconfined(_MODULUS_PA)
     stress = np.asarray(_FORCE_N / (WIDTH_M * _PATCH_M))
-    ours = -float(law.thinning(stress)[0]) * FILM_M
+    ours = -float(law.capacitive_strain(stress)[0]) * FILM_M
 
     def by(area_m2: float) -> float:
         return -_FORCE_N * FILM_M / (area_m2 * _MODULUS_PA)

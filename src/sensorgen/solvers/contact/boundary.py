@@ -1,4 +1,4 @@
-"""How a cell is held and loaded: which displacements are fixed or equal, and the pressure on its top."""
+"""How a cell is boundary and loaded: which displacements are fixed or equal, and the pressure on its top."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ _SAME = 1e-9  # of the cell's width: places nearer than this are one
 
 
 @dataclass(frozen=True)
-class Held:
+class BoundaryConditions:
     """Choices of the boundary.
 
     Attributes
@@ -46,7 +46,7 @@ CHOICES = {
 
 
 def free_of(
-    points_m: Real, held: Held, spans_m: Real | None = None, used: NDArray[np.bool_] | None = None
+    points_m: Real, boundary: BoundaryConditions, spans_m: Real | None = None, used: NDArray[np.bool_] | None = None
 ) -> "csr_matrix":
     """Displacements (x, y of each node, or x, y, z) from the free ones, as a sparse matrix of ones.
 
@@ -54,7 +54,7 @@ def free_of(
     ----------
     points_m : (n, d) array
         Places of the nodes, the height last; all sides of the cell are mirrors [m].
-    held : Held
+    boundary : BoundaryConditions
         Choices of the boundary.
     spans_m : (d, 2) array, optional
         Where the cell begins and ends; as far as its nodes reach where not given [m].
@@ -76,11 +76,11 @@ def free_of(
     floor, roof = ends[-1]
     fixed[d * floor + d - 1] = True
     for axis in range(d - 1):
-        fixed[d * floor + axis] |= held.base == "bonded"
-    fixed[wide] = held.period == "fixed" or held.base == "bonded"
+        fixed[d * floor + axis] |= boundary.base == "bonded"
+    fixed[wide] = boundary.period == "fixed" or boundary.base == "bonded"
     if used is not None:
         fixed[: d * nodes] |= ~np.repeat(used, d)
-    if held.top == "rigid":
+    if boundary.top == "rigid":
         leader[d * roof + d - 1] = d * roof[0] + d - 1
     while (leader[leader] != leader).any():
         leader = leader[leader]

@@ -1,0 +1,28 @@
+"""How results show themselves in a notebook: implementations are registered by the packages above."""
+
+from functools import singledispatch
+from html import escape
+from typing import Any
+
+
+@singledispatch
+def html(thing: object) -> str:
+    """A result as HTML."""
+    return f"<pre>{escape(repr(thing))}</pre>"
+
+
+@singledispatch
+def figure(thing: object) -> Any:
+    """A result as a matplotlib figure; raises TypeError where it has none."""
+    raise TypeError(f"{type(thing).__name__} has no figure; import sensorgen first")
+
+
+class Displayed:
+    """A result that a notebook shows as a table, with a figure by :meth:`plot`."""
+
+    def _repr_html_(self) -> str:
+        return html(self)
+
+    def plot(self) -> Any:
+        """The result as a matplotlib figure."""
+        return figure(self)

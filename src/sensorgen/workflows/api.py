@@ -1,0 +1,326 @@
+"""The public functions, for notebooks and programs: ``import sensorgen as sg``."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sensorgen.analysis.comparison import Comparison, of_iteration
+from sensorgen.analysis.fit import Fit
+from sensorgen.analysis.fit import fit as fit_values
+from sensorgen.asprinted import printed
+from sensorgen.checks.review import Review, review
+from sensorgen.core.display import Displayed
+from sensorgen.core.errors import BadInput
+from sensorgen.design import design as designs
+from sensorgen.design.body import Body
+from sensorgen.design.design import Design
+from sensorgen.export.gcode import paths
+from sensorgen.measure.log import Log
+from sensorgen.prediction import bodies, compression, evaluate, grid
+from sensorgen.prediction.identifiability import NOISE
+from sensorgen.prediction.inverse.estimator import Estimates, Estimator
+from sensorgen.prediction.results import Prediction
+from sensorgen.prediction.sensor_model import FLAT, Tip
+from sensorgen.solvers.contact.boundary import BoundaryConditions
+from sensorgen.workflows import build as builds
+from sensorgen.workflows import display as display
+from sensorgen.workflows import slice as slicing
+from sensorgen.workflows.build import Built
+from sensorgen.workflows.slice import Printed
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded(Displayed):
+    """A prediction, and the impedance over force and position.
+
+    Attributes
+    ----------
+    prediction : Prediction
+        At rest, and at the largest force in the middle position.
+    impedance : ImpedanceGrid
+        Over frequency, force and position [ohm].
+    """
+
+    prediction: Prediction
+    impedance: grid.ImpedanceGrid
+
+
+@dataclass(frozen=True, eq=False)
+class Compressed(Displayed):
+    """A unit cell under pressure.
+
+    Attributes
+    ----------
+    pressure_kpa : (n,) array
+        Pressure on the top [kPa].
+    displacement_um : (n,) array
+        Of the top [um].
+    lower_f_per_m2, upper_f_per_m2 : (n,) array
+        Bounds of the capacitance per area [F/m2]; nan where unknown.
+    model : str
+        That was used.
+    doubts : tuple of str
+        Why the numbers are to be taken with care.
+    """
+
+    pressure_kpa: np.ndarray
+    displacement_um: np.ndarray
+    lower_f_per_m2: np.ndarray
+    upper_f_per_m2: np.ndarray
+    model: str
+    doubts: tuple[str, ...]
+
+
+def load(path: str | Path) -> Design:
+    r"""Read a design file.
+
+    Parameters
+    ----------
+    path : str or Path
+        YAML.
+
+    Raises
+    ------
+    BadInput
+        Not readable, not YAML, or not a design; the message names file and key.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> file = Path("plate.yaml")
+    >>> _ = file.write_text("shape: reference\nparameters: {dielectric_mm: 0.5}\n")
+    >>> load(file).params.dielectric_mm
+    0.5
+    >>> file.unlink()
+    """
+    return designs.load(Path(path))
+
+
+def check(design: Design) -> Review:
+    """Check a design against nozzle, layers and bed.
+
+    Parameters
+    ----------
+    design : Design
+        What to check.
+
+    Returns
+    -------
+    Review
+        Its ``findings``, each with place, limit and advice.
+
+    Examples
+    --------
+    >>> check(Design(shape="reference")).counts()["error"]
+    0
+    """
+    return review(_named(design))
+
+
+def predict(
+    what: Design | Body, *, force_n: Sequence[float] = (), position_mm: Sequence[float] = (),
+    frequency_hz: Sequence[float] = evaluate.TONES_HZ, accuracy: float | None = None, law: str = "", tip: Tip = FLAT,
+    noise: float = NOISE,
+) -> Any:  # fmt: skip
+    """What a sensor should measure: of the print, with the drawing beside it.
+
+    Parameters
+    ----------
+    what : Design or Body
+        A design is printed: by the G-code in ``out/NAME`` where there is one, else as slicers should print it.
+    force_n, position_mm : sequence of float
+        Rising [N], [mm]; if either is given, impedance over both comes with the prediction.
+    frequency_hz : sequence of float
+        Frequencies [Hz].
+    accuracy : float, optional
+        Of abs(Z), relative [-]; the default of all commands if not given.
+    law : str
+        Law of compression: "unconfined", "bonded" or "solved"; the best within seconds if not given.
+    tip : Tip
+        What presses.
+    noise : float
+        Standard deviation of Re Z and of Im Z of a reading, relative to abs(Z) [-].
+
+    Returns
+    -------
+    Prediction or Loaded
+        Each quantity with its range, divided into model, print and material.
+
+    Examples
+    --------
+    >>> p = predict(Design(shape="reference"))
+    >>> p.status, round(p.drawn.resistance["top"].value)  # ohm
+    ('predicted', 2333)
+    """
+    body = _body(what)
+    query = evaluate.Query(tuple(frequency_hz), law=law, tip=tip, accuracy=accuracy, noise=noise)
+    if not len(force_n) and not len(position_mm):
+        return evaluate.evaluate(body, query)
+    axes = (
+        tuple(frequency_hz), tuple(force_n) or grid.FORCES_N, tuple(position_mm) or grid.positions_mm(body.design)
+    )  # fmt: skip
+    reference = grid.hardest(*axes)
+    query = evaluate.Query(
+        tuple(frequency_hz), reference.force_n, reference.position_m, tip, law, accuracy, noise
+    )  # fmt: skip
+    model, _ = evaluate.sensor_model(body, query)
+    return Loaded(evaluate.evaluate(body, query), grid.impedance_grid(model.sensor, *axes))
+
+
+def compress(what: Design | Body, pressure_kpa: Sequence[float], *, accuracy: float | None = None) -> Compressed:
+    """Displacement and capacitance of a unit cell under pressure.
+
+    Parameters
+    ----------
+    what : Design or Body
+        As of :func:`predict`.
+    pressure_kpa : sequence of float
+        Rising [kPa].
+    accuracy : float, optional
+        Relative width of the bounds of the capacitance, the error of the mesh in them [-].
+
+    Raises
+    ------
+    SensorgenError
+        A pressure that the models cannot take, or a material value that no source gives.
+
+    Examples
+    --------
+    >>> found = compress(as_printed(Design(shape="reference"), walls="arachne"), [10.0])
+    >>> float(found.pressure_kpa[-1])
+    10.0
+    """
+    asked = compression.Asked(
+        compression.stresses_kpa(tuple(pressure_kpa)),
+        BoundaryConditions(),
+        accuracy=float("inf") if accuracy is None else accuracy,
+    )
+    data = compression.answer(_body(what), asked)
+    pressure, displacement, lower, upper = (
+        np.array(data[name], float) for name in ("stress_kpa", "displacement_um", "lower_f_per_m2", "upper_f_per_m2")
+    )
+    return Compressed(pressure, displacement, lower, upper, data["model"], tuple(data["doubts"]))
+
+
+def as_printed(design: Design, gcode: str | Path | None = None, *, walls: str = "") -> Body:
+    """The body that is printed of a design.
+
+    Parameters
+    ----------
+    design : Design
+        What is printed.
+    gcode : str or Path, optional
+        Printer-ready G-code of this design, alone in the middle of the bed; estimated if not given.
+    walls : str
+        For an estimate: "arachne", "classic", "cura" or "cura-gaps" alone; all of them if not given.
+
+    Raises
+    ------
+    BadInput
+        The file prints nothing at the design's place.
+
+    Examples
+    --------
+    >>> as_printed(Design(shape="reference"), walls="classic").kind
+    'estimated'
+    """
+    design = _named(design)
+    if gcode is None:
+        return bodies.estimated(design, walls)
+    file = Path(gcode)
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise BadInput(f"cannot read {str(file)!r}: {error.strerror or error}") from None
+
+    def read() -> printed.Printed:
+        return printed.body(design, paths.read(file, design.machine), slicer=file.name)
+
+    return bodies.sliced(design, read, file.name, content)
+
+
+def build(design: Design, out: str | Path = "out", *, cad: bool = True, force: bool = False) -> Built:
+    """Write all files of a design into ``out/NAME``.
+
+    Parameters and errors as of :func:`sensorgen.workflows.build.build`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     build(Design(shape="reference"), folder, cad=False).verdict
+    'PRINT'
+    """
+    return builds.build(_named(design), Path(out), cad=cad, force=force)
+
+
+def slice_design(design: Design, out: str | Path = "out", *, slicer: str = "prusa", force: bool = False) -> Printed:
+    """Write printer-ready G-code into ``out/NAME``, by a real slicer.
+
+    Parameters and errors as of :func:`sensorgen.workflows.slice.slice_design`.
+
+    Examples
+    --------
+    >>> slice_design(Design(shape="reference"), slicer="slic3r")
+    Traceback (most recent call last):
+    sensorgen.core.errors.UnknownName: unknown slicer 'slic3r'. Known: cura, prusa
+    """
+    return slicing.slice_design(_named(design), Path(out), slicer, force=force)
+
+
+def invert(what: Design | Body, frequency_hz: Sequence[float], impedance_ohm: ArrayLike, *, noise: float) -> Estimates:
+    """Force and position from measured impedances.
+
+    Parameters
+    ----------
+    what : Design or Body
+        As of :func:`predict`.
+    frequency_hz : (m,) sequence of float
+        Frequencies [Hz].
+    impedance_ohm : (n, m) complex array
+        Readings [ohm].
+    noise : float
+        Standard deviation of Re Z and of Im Z of a reading, relative to abs(Z) [-].
+
+    Returns
+    -------
+    Estimates
+        Force [N] and position [m] of each reading with their covariance and status.
+
+    Examples
+    --------
+    >>> plate = Design(shape="reference")
+    >>> measured = predict(plate, force_n=[2.0], position_mm=[30.0]).impedance.impedance_ohm.reshape(1, -1)
+    >>> found = invert(plate, evaluate.TONES_HZ, measured, noise=1e-6)
+    >>> round(float(found.force_n[0]), 2), round(float(found.position_m[0]), 3)
+    (2.0, 0.03)
+    """
+    model, _ = evaluate.sensor_model(_body(what))
+    return Estimator(model.sensor, tuple(frequency_hz), noise).batch(np.asarray(impedance_ohm))
+
+
+def compare(log: Log, iteration: int) -> Comparison:
+    """Readings of an iteration beside the predictions of their designs; as :func:`of_iteration`."""
+    return of_iteration(log, iteration)
+
+
+def fit(log: Log, iteration: int) -> Fit:
+    """Material values from the readings and recordings of an iteration; as :func:`sensorgen.analysis.fit.fit`."""
+    return fit_values(log, iteration)
+
+
+def _named(design: Design) -> Design:
+    """A design as :func:`sensorgen.design.design.make` completes it, also where it was constructed by hand."""
+    return design if design.name else designs.make(design.model_dump(exclude_defaults=True, mode="json"))
+
+
+def _body(what: Design | Body) -> Body:
+    if isinstance(what, Body):
+        return what
+    design = _named(what)
+    return bodies.default_body(design, Path("out") / design.name)

@@ -1,0 +1,102 @@
+"""Round posts and strips at 45 degrees: layers of any shape, estimated and from lines, as scenes."""
+
+from math import cos, pi, sin
+
+import numpy as np
+import pytest
+import shapely
+
+from sensorgen.asprinted import window
+from sensorgen.asprinted.beads import Beads, layers
+from sensorgen.asprinted.printed import gap_mm
+from sensorgen.checks import estimate
+from sensorgen.design.printer import load_printer, load_quality
+from sensorgen.scene.layers import drawn, scene_of
+from sensorgen.scene.scene import Body, Prism, Scene, box, rounded
+
+PRINTER, FINE = load_printer("diabase-h5"), load_quality("fine")
+SIZE = 12.0
+PERIOD = 3.0
+
+
+def sensor(pattern):
+    """A pattern of 0.4 mm between two electrodes, on a film of 0.2 mm."""
+
+    def plate(low, high):
+        return (box(0, SIZE, 0, SIZE, low, high),)
+
+    bodies = (
+        Body("low", "etpu", plate(0, 0.3), "bottom"),
+        Body("film", "x60", plate(0.3, 0.5)),
+        Body("pattern", "etpu", tuple(Prism("z", o, 0.5, 0.9) for o in pattern), "top"),
+        Body("high", "etpu", plate(0.9, 1.2), "top"),
+    )
+    return Scene(bodies, (SIZE, SIZE, 1.2))
+
+
+def post(x, y, radius=0.8):
+    return tuple((rounded(x + radius * cos(a)), rounded(y + radius * sin(a))) for a in np.arange(32) * pi / 16)
+
+
+PLACES = np.arange(PERIOD / 2, SIZE, PERIOD)
+POSTS = sensor([post(x, y) for x in PLACES for y in PLACES])
+LAYERS = drawn(POSTS, FINE.boundaries_mm(1.2))
+
+
+def test_a_pattern_of_posts_repeats_both_ways():
+    found = window.window(LAYERS, POSTS)
+    assert found.sides_mm() == pytest.approx((PERIOD, PERIOD))
+    assert found.x_mm[0] % PERIOD == pytest.approx(0.0)  # from the middle between two posts: no post is cut
+
+
+def test_a_pattern_without_mirrors_is_solved_as_a_whole():
+    steps = np.arange(0.5, SIZE - 4, PERIOD)
+    slanted = sensor([((x, 0.0), (x + 1, 0.0), (x + 4, 3.0), (x + 3, 3.0)) for x in steps])
+    found = window.window(drawn(slanted, FINE.boundaries_mm(1.2)), slanted)
+    assert found.sides_mm() == (SIZE, SIZE)
+
+
+def test_the_estimate_of_a_post_is_a_rounding_narrower():
+    made = estimate.layers(POSTS, PRINTER, FINE)
+    less = estimate.ROUND * 0.1 / 2
+    apothem = 0.8 * cos(pi / 32) - less
+    assert made[6].region("pattern").area == pytest.approx(16 * 32 * apothem**2 * np.tan(pi / 32), rel=1e-6)
+
+
+def test_the_cell_of_a_print_has_the_gap_and_volume_of_its_layers():
+    made = estimate.layers(POSTS, PRINTER, FINE)
+    cell = scene_of(window.cut(made, window.window(LAYERS, POSTS)), POSTS)
+    assert gap_mm(cell) == pytest.approx(0.2)
+    assert cell.body("pattern").volume_mm3() == pytest.approx(0.4 * made[6].region("pattern").area / 16, rel=1e-3)
+
+
+class Sliced:
+    """What ``layers`` reads of a design."""
+
+    printed, layers = POSTS, FINE
+
+
+def ring(x, y, radius, width, corners=64):
+    """Lines around a post, their volume that of a rectangle of 0.1 mm height."""
+    turn = np.arange(corners + 1) * 2 * pi / corners
+    points = np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
+    start, end = points[:-1], points[1:]
+    length = np.hypot(*(end - start).T)
+    return start, end, np.full(corners, width), np.full(corners, 0.1), length * width * 0.1
+
+
+@pytest.mark.parametrize(
+    ("convention", "more"), [("vol", 0.0), ("stadium", estimate.ROUND * 0.1 / 2), ("deposit", 0.0)]
+)
+def test_rings_of_lines_make_a_round_post(convention, more):
+    """Two walls of 0.4 mm fill a post of radius 0.8 mm."""
+    start, end, width, height, volume = map(
+        np.concatenate, zip(ring(1.5, 1.5, 0.6, 0.4), ring(1.5, 1.5, 0.2, 0.4), strict=True)
+    )
+    count = len(start)
+    lines = Beads(
+        start, end, width, height, volume, np.full(count, 6), np.full(count, 2), np.full(count, 1), np.arange(count)
+    )  # fmt: skip
+    found = layers(Sliced, lines, convention)[6].region("pattern")
+    assert found.area == pytest.approx(pi * (0.8 + more) ** 2, rel=0.01)
+    assert shapely.get_num_interior_rings(shapely.get_parts(found)).sum() == 0

@@ -1,0 +1,44 @@
+"""The notebooks of the gallery run as they stand, and a notebook's results show themselves."""
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+import sensorgen as sg
+
+GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
+
+pytestmark = pytest.mark.usefixtures("shared_cache")
+
+
+@pytest.mark.parametrize("notebook", sorted(GALLERY.glob("*.py")), ids=lambda path: path.stem)
+def test_a_notebook_runs(notebook, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(notebook))
+
+
+def test_names_are_imported_when_they_are_used():
+    import subprocess
+    import sys
+
+    code = "import sys, sensorgen; print(any(m.startswith('sensorgen.') for m in sys.modules)); sensorgen.predict"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+    assert len(sg.__all__) == len([name for name in sg.__all__ if getattr(sg, name)]) == 15
+    with pytest.raises(AttributeError, match="no attribute 'predikt'"):
+        sg.predikt  # noqa: B018
+
+
+def test_results_show_themselves():
+    design = sg.Design(shape="reference")
+    found = sg.predict(design)
+    assert "<table>" in found._repr_html_()
+    assert "69.06" not in found._repr_html_()  # a range of the materials' sources is there
+    assert "capacitance" in found._repr_html_()
+    assert found.plot().axes
+    assert design._repr_html_().startswith("<svg")
+    assert "<svg" in design.show()._repr_svg_()
+    assert "<table>" in sg.check(design)._repr_html_()
+    with pytest.raises(TypeError, match="has no figure"):
+        sg.check(design).plot()
