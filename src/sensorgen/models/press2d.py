@@ -72,7 +72,7 @@ def press(
     fineness : Fineness, optional
         Of the mesh.
     step : callable, optional
-        Told every pressure of ``stress_pa`` that is reached [Pa].
+        Called with every pressure of ``stress_pa`` that is reached [Pa].
 
     Raises
     ------
@@ -157,7 +157,7 @@ def _field(cell: Cell, run: Run[Mesh], u_m: Real, permittivity: Mapping[str, flo
 
 
 def why_not_applicable(scene: Scene) -> str | None:
-    """Why this model cannot speak of a scene, or None."""
+    """Why this model does not apply to a scene, or None."""
     try:
         cell_of(scene, None)
     except BadInput as error:

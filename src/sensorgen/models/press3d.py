@@ -66,7 +66,7 @@ class Pieces:
 
 
 def why_not_applicable(scene: Scene) -> str | None:
-    """Why this model cannot speak of a scene, or None."""
+    """Why this model does not apply to a scene, or None."""
     try:
         cell(scene)
     except BadInput as error:
@@ -115,7 +115,7 @@ def press(
     fineness : Pieces, optional
         Of the mesh; fewer pieces, which is said, where they would be too many.
     step : callable, optional
-        Told every pressure of ``stress_pa`` that is reached [Pa].
+        Called with every pressure of ``stress_pa`` that is reached [Pa].
 
     Raises
     ------

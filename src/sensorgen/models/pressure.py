@@ -132,7 +132,7 @@ def hertz(radius_m: float, plane_modulus_pa: float) -> Contact:
 
 
 def bed(radius_m: float, stiffness_pa_per_m: float) -> Contact:
-    r"""A hard cylinder on a thin layer that gives way as a bed of springs, each by its own pressure.
+    r"""A hard cylinder on a thin layer that deforms as a bed of springs, each by its own pressure.
 
     .. math:: l = 2 a = 2 \sqrt[3]{\frac{3 F R}{2 W k}}, \quad p = \frac{k}{2 R} (a^2 - x^2)
 

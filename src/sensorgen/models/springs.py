@@ -1,4 +1,4 @@
-"""Columns as springs in series, side by side under a stiff plate: the cheapest guess at how a cell gives way.
+"""Columns as springs in series, side by side under a stiff plate: a closed-form estimate of compression.
 
 Each column is free to bulge, knows nothing of its neighbours, and carries once its gap is closed.
 """
@@ -23,7 +23,7 @@ Real = NDArray[np.float64]
 
 
 def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Sequence[float]) -> Real:
-    r"""How far a stiff plate on a scene comes down.
+    r"""Displacement of a stiff plate on a scene.
 
     .. math:: \sigma = \frac{1}{L} \int \frac{\max(\delta - g, 0)}{\sum_k t_k / M_k} dx
 
