@@ -176,5 +176,5 @@ def _press(sensor: "Sensor", tip_m: float, force_n: float) -> tuple["Patch", dic
 command = DesignGroup(
     _work, OWN, name="sheet",
     help="Bounds on force and place of a press in two dimensions, for the usual sets of contacts.",
-    short_help="Which contacts and tones locate a press in two dimensions.",
+    short_help="Which contacts and frequencies locate a load in two dimensions.",
 )  # fmt: skip
