@@ -43,7 +43,7 @@ ALL = (*MODELS, *closed_form.MODELS)
 
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _OF_OUTLINES = "of the capacitance of the deformed outlines as computed; the outlines' own error is not in them"
-_OF_ALL = "of the capacitance of the deformed outlines, moved outwards by the difference from the next coarser mesh: an estimate"
+_OF_ALL = "of the capacitance of the deformed outlines, plus the difference from the next coarser mesh: an estimate"
 _NO_C = "displacement alone, no capacitance"
 _MEASURE = "bounds of C apart, at the worst stress"
 _BRACKET = {"press2d": 3.4e-4, "press3d": 2e-3}  # how far the outlines' own bounds are apart, on prototypes [-]
