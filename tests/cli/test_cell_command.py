@@ -98,7 +98,7 @@ def test_a_formula_of_the_thesis_by_its_number(run):
     half = answer(run("cell", "tri", "--model", "thesis-film-only", "--set", "eps_x60=2.34", "--json"))
     whole = answer(run("cell", "tri", "--model", "thesis-film-only", "--json"))
     assert 2 * half["value_f_per_m2"] == pytest.approx(whole["value_f_per_m2"], rel=1e-12, abs=0)
-    assert "thesis-3.35 speaks of tri, not of rect" in run("cell", "rect", "--model", "thesis-3.35").line
+    assert "thesis-3.35 applies to tri, not to rect" in run("cell", "rect", "--model", "thesis-3.35").line
 
 
 @pytest.mark.parametrize("period", [2.0, 0.3])
@@ -219,7 +219,7 @@ def test_a_sweep_of_a_formula(run):
     table = list(csv.DictReader(io.StringIO(run(*words, "--csv").out)))
     assert [float(r["value_f_per_m2"]) for r in table] == [r["value_f_per_m2"] for r in rows]
     assert len(run(*words).out.splitlines()) == 3
-    assert "thesis-3.49-own-widths speaks of rect, not of tri" in run("cell", "tri", *words[2:]).err
+    assert "thesis-3.49-own-widths applies to rect, not to tri" in run("cell", "tri", *words[2:]).err
 
 
 def test_a_sweep_over_a_material_and_over_words(run):

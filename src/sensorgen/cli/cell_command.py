@@ -1,4 +1,4 @@
-"""``sensorgen cell``: capacitance per area between bounds as near as asked, for one design or along a sweep."""
+"""``sensorgen cell``: capacitance per area between certified bounds, for one design or along a sweep."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -34,7 +34,7 @@ OWN: list[click.Parameter] = [
     ),
     click.Option(
         ["--press", "press_mm"], type=Values(LENGTH_MM, zero=True), default=None,
-        help="How far the top has come down, as 20um or 0:0.05:0.01, for formulas of it; solved: compress.",
+        help="Displacement of the top, as 20um or 0:0.05:0.01, for formulas of it; solved: compress.",
     ),
     click.Option(["--explain"], is_flag=True, help="Print the plan, and what came of it."),
     click.Option(["--no-cache"], is_flag=True, help="Solve anew, and keep nothing."),

@@ -159,7 +159,7 @@ def _press(sensor: "Sensor", tip_m: float, force_n: float) -> tuple["Patch", dic
     if not 0 < tip_m < shorter:
         raise OutOfRange(
             f"a tip of {tip_m * MM_PER_M:g} mm on a sheet {shorter * MM_PER_M:g} mm wide leaves no place to find: take "
-            "a smaller --tip or a wider sensor, as with --size 100x100 (`sensorgen predict` speaks of strips)"
+            "a smaller --tip or a wider sensor, as with --size 100x100 (for strips: `sensorgen predict`)"
         )
     area = tip_m**2
     stress = np.asarray(force_n / area)

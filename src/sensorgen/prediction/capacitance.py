@@ -1,8 +1,7 @@
-"""The cheapest model that can speak of a design, for each thing that has to be known of it before it is pressed.
+"""Select the least expensive capacitance model that applies to a scene and meets a tolerance.
 
-Models that cost next to nothing are always asked: their own bounds tell whether more is needed. The dear ones are
-weighed first, by what they should cost and reach (:mod:`sensorgen.prediction.cost_model`), and asked one after the
-other.
+Models that take milliseconds always run: their bounds show whether more is needed. The others are ranked by their
+expected time and error (:mod:`sensorgen.prediction.cost_model`), and run one after the other.
 """
 
 import time
@@ -28,7 +27,7 @@ _CHEAP = 1  # up to this cost, a model is asked before it is weighed
 
 
 class Unpredictable(SensorgenError):
-    """No model can speak of the scene; the message holds what each one said."""
+    """No model applies to the scene; the message holds every reason."""
 
 
 class Contradiction(SensorgenError):
@@ -46,7 +45,7 @@ class Answer:
     capacitance_f : Interval
         Of the whole sensor [F]; its real part where dielectrics lose.
     refused : tuple of str
-        Why other models cannot speak of the scene.
+        Why other models do not apply to the scene.
     wanted : float
         How wide the interval might be, relative to its middle [-].
     plan : tuple of Candidate
@@ -89,7 +88,7 @@ class Answer:
 def capacitance(
     scene: Scene, permittivity: Mapping[str, complex], width: float = inf, model: str = "", keep: bool = True
 ) -> Answer:
-    """Ask models, the cheapest that will do, for the capacitance of a scene.
+    """Capacitance of a scene by the least expensive model that suffices.
 
     Parameters
     ----------
@@ -102,13 +101,13 @@ def capacitance(
     model : str
         The only model to ask, or "".
     keep : bool
-        Take an answer that is known from before, and keep a new one. Answers of any width are never kept: they cost
-        next to nothing.
+        Take an answer that is known from before, and keep a new one. Answers of any width are never kept: they take
+        milliseconds.
 
     Raises
     ------
     Unpredictable
-        Bodies overlap; no model can speak of the scene, or the one that is named cannot.
+        Bodies overlap; no model applies to the scene, or the one that is named does not.
     Contradiction
         The bounds of two models exclude each other.
     UnknownName
@@ -175,7 +174,7 @@ def _unfit(candidate: Candidate, scene: Scene, kind: str) -> str:
 
 
 def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float]:
-    """Cheap models first, then those that should do by their cost, then the others by what they should reach."""
+    """Models in milliseconds first, then those that should suffice by their cost, then the others by expected width."""
     short = cost > _CHEAP and candidate.reach() > width
     return short, candidate.reach() if short else 0.0, cost
 
@@ -224,7 +223,7 @@ def _together(refused: Sequence[str]) -> str:
 
 
 def _kind(permittivity: Mapping[str, complex]) -> str:
-    """Which of a model's functions speaks of these permittivities."""
+    """The function of a model for these permittivities."""
     return _LOSSY if any(isinstance(value, complex) for value in permittivity.values()) else _LOSSLESS
 
 
@@ -255,7 +254,7 @@ def _refuse_apart(bounds: Mapping[str, Interval]) -> None:
 
 
 def _idle(candidate: Candidate, bounds: Mapping[str, Interval | Disc], width: float) -> str:
-    """Why a model that might speak need not."""
+    """Why a model that applies is not needed."""
     best = min((found.width() for found in bounds.values()), default=inf)
     if bounds and best <= width:
         return "not needed"

@@ -60,7 +60,7 @@ def answer(body: Body, asked: Asked) -> dict[str, Any]:
 def answers(bodies: Sequence[Body], asked: Asked, jobs: int, done: Callable[[], None]) -> list[dict[str, Any]]:
     """The same for many bodies, those that are not known from before in several processes.
 
-    A design that no model can speak of, or at which one fails, has a reason in place of numbers.
+    A design to which no model applies, or at which one fails, has a reason in place of numbers.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def _said(scene: Scene, permittivity: dict[str, complex], asked: Asked) -> Answe
 
 
 def _plain(body: Body, found: Answer | str, asked: Asked) -> dict[str, Any]:
-    """What is printed of an answer."""
+    """Lines of an answer."""
     design = body.design
     data: dict[str, Any] = {
         "design": design.name,

@@ -1,4 +1,4 @@
-"""How a design's cell gives way under stress, as plain data: what ``sensorgen compress`` answers."""
+"""Displacement and capacitance of a design's cell under pressure: results of ``sensorgen compress``."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -43,9 +43,7 @@ ALL = (*MODELS, *closed_form.MODELS)
 
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _OF_OUTLINES = "of the capacitance of the deformed outlines as computed; the outlines' own error is not in them"
-_OF_ALL = (
-    "of the capacitance of the deformed outlines, moved apart by what the next coarser mesh differs by: an estimate"
-)
+_OF_ALL = "of the capacitance of the deformed outlines, plus the difference from the next coarser mesh: an estimate"
 _NO_C = "displacement alone, no capacitance"
 _MEASURE = "bounds of C apart, at the worst stress"
 _BRACKET = {"press2d": 3.4e-4, "press3d": 2e-3}  # how far the outlines' own bounds are apart, on prototypes [-]
@@ -62,14 +60,14 @@ class Asked:
     boundary : BoundaryConditions
         Base, period, top and contact.
     model : str
-        One of ``ALL``, or "" for the first that can speak of the scene.
+        One of ``ALL``, or "" for the first that applies to the scene.
     accuracy : float
         How far the bounds of the capacitance may be apart at every stress, relative to their middle, the outlines' own
-        error in them; where infinite, the usual mesh is taken, and its error not told [-].
+        error in them; where infinite, the usual mesh is taken, without an error [-].
     check_mesh : bool
         Hold the displacement against the next coarser mesh.
     keep : bool
-        Take what is known from before, and keep what is new.
+        Read cached solutions, and store new ones.
     """
 
     stress_kpa: tuple[float, ...]
@@ -90,7 +88,7 @@ def answer(body: Body, asked: Asked, *, step: Step | None = None) -> Data:
     asked : Asked
         Stresses, boundary conditions and accuracy.
     step : callable, optional
-        Told every stress that is reached [Pa].
+        Called with every stress that is reached [Pa].
 
     Raises
     ------
@@ -158,19 +156,19 @@ def _reason(piece: Piece, name: str, forced: str) -> str:
     return (
         _NO_C
         if name in closed_form.MODELS
-        else why_not_applicable(piece, name) or "the model before it speaks of the cell"
+        else why_not_applicable(piece, name) or "the model before it applies to the cell"
     )
 
 
 def _candidate(design: Design, asked: Asked, mesh: MeshLevel) -> Candidate:
-    """A mesh, as near as it should come where the cell rises like a prototype."""
+    """A mesh, with the error expected where the cell rises like a prototype."""
     curve = expected(design, mesh)
     share = float(curve.capacitive_strain(np.minimum(asked.stress_kpa[-1] * _PA_PER_KPA, curve.stress_pa[-1]))[0])
     return Candidate(mesh.name, _BRACKET[mesh.model] + 2 * mesh.rise_error * share, mesh.seconds)
 
 
 def _as_near(design: Design, piece: Piece, asked: Asked, step: Step | None) -> Data:
-    """The first mesh that is near enough, from the one on that should be; the nearest where none is."""
+    """The first mesh within tolerance, from the expected one upwards; the best where none is."""
     plan = _planned(design, piece, asked)
     case = _case(design, piece, asked)
     find = {mesh.name: partial(_told, case, asked, mesh, step) for mesh in _mesh_levels(piece, case.model, asked)}
@@ -199,7 +197,7 @@ def _rises(found: Pressed) -> list[float]:
 
 
 def _widened(found: Pressed, off: Sequence[float]) -> Pressed:
-    """The same, its bounds moved apart by a share of their middle; none where no share is known."""
+    """The same, its bounds moved outwards by a share of their middle; none where no share is known."""
     bounds = (
         Interval(c.lower - share * c.middle(), c.upper + share * c.middle()) if c else None
         for c, share in zip(found.capacitance_f_per_m2, off, strict=False)
@@ -234,7 +232,7 @@ def _refuse_unpressable(scene: Scene, boundary: BoundaryConditions) -> None:
             "capacitance a press changes; --model springs tells the displacement alone"
         )
     if boundary.period == "free" and boundary.base == "bonded":
-        raise BadInput("sides that give way over a base that is bonded cannot: expected base 'sliding' with them")
+        raise BadInput("free sides over a bonded base are not possible: expected base 'sliding' with them")
 
 
 def _plain(found: Pressed, case: Case) -> Data:
@@ -272,7 +270,7 @@ def _closed_form(design: Design, piece: Piece, asked: Asked) -> Data:
 
 
 def _unsolved(design: Design, piece: Piece, asked: Asked, why: str) -> Data:
-    """What is known where no field can be solved for want of a library: a closed-form estimate, and no accuracy."""
+    """Without the library for fields: a closed-form estimate, and no accuracy."""
     data = _closed_form(design, piece, replace(asked, model=closed_form.FIRST))
     data["doubts"] += [f"not solved: {why}"]
     if asked.accuracy == inf:

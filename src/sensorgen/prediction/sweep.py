@@ -1,4 +1,4 @@
-"""Designs pressed along a sweep: what is known at once, and the others in processes of their own."""
+"""Compression along a sweep: cached designs first, the others in parallel processes."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -15,7 +15,7 @@ Kept = list[tuple[Any, Any]]
 
 
 def answers(points: Sequence[Body], asked: Asked, jobs: int, done: Callable[[], None]) -> list[Data | str]:
-    """How designs give way, those that are not known from before in several processes; a reason where one fails.
+    """Compression of designs, those that are not cached in several processes; a reason where one fails.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """What the thesis's own formulas, and its geometry of a pressed cell, give for designs, as plain data.
 
-A formula gives a value without bounds: nothing in it tells how far it is off. Measured errors stand in docs/cells.md.
+A formula gives a value without bounds: it has no error estimate. Measured errors: docs/cells.md.
 """
 
 import time
@@ -34,16 +34,16 @@ def answer(design: Design, asked: Asked, press_mm: float | None = None) -> Data:
     Parameters
     ----------
     design : Design
-        Of a shape that the formula speaks of.
+        Of a shape that the formula applies to.
     asked : Asked
         The formula as its model; the accuracy of the field on the pressed geometry of 3.1.2.
     press_mm : float, optional
-        By how much the top has come down [mm]; only for those in ``PRESSED``.
+        Displacement of the top [mm]; only for those in ``PRESSED``.
 
     Raises
     ------
     Unpredictable
-        The formula speaks of other shapes, or knows no losses.
+        The formula applies to other shapes, or has no losses.
     BadInput
         The formula knows no press.
     OutOfRange
@@ -80,7 +80,7 @@ def _answer_or_why(design: Design, asked: Asked, press_mm: float | None) -> Data
 
 def _refuse(design: Design, name: str, press_mm: float | None) -> None:
     if design.shape not in SHAPES[name]:
-        raise Unpredictable(f"{name} speaks of {' and '.join(SHAPES[name])}, not of {design.shape}")
+        raise Unpredictable(f"{name} applies to {' and '.join(SHAPES[name])}, not to {design.shape}")
     if losses.set_losses(design):
         raise Unpredictable(f"{name} knows no losses; leave out --model, or the loss")
     if press_mm is not None and name not in PRESSED:
@@ -99,7 +99,7 @@ def _formula(design: Design, asked: Asked, press_mm: float) -> Found:
 
 
 def _field(design: Design, asked: Asked, press_mm: float) -> Found:
-    """The field on the sizes that 3.1.2 makes of some whole periods, by the cheapest model that is as near as asked."""
+    """The field on the sizes that 3.1.2 makes of some whole periods, by the least expensive model within tolerance."""
     rest: Any = design.params
     now = thesis_swept.swept(rest, press_mm)
     side_mm = ceil(1 / now.period_mm) * now.period_mm
@@ -111,4 +111,4 @@ def _field(design: Design, asked: Asked, press_mm: float) -> Found:
     )
     value = found.capacitance_f.middle() / (side_mm * M_PER_MM) ** 2 * thesis_swept.stretch(rest, now)
     said = f"{thesis_swept.SOURCE}: sizes changed by hand, their field by {found.model} within {found.width():.2g}"
-    return value, f"{said}; how cells really give way: compress", taken
+    return value, f"{said}; solved compression: compress", taken

@@ -33,7 +33,7 @@ class Compared:
 
     @property
     def residual(self) -> float:
-        """Ln of the least R_Y over the prediction's middle [-]; nan where one is missing."""
+        """Ln of the least R_Y over the predicted value [-]; nan where one is missing."""
         ry, expected = self.verdict.ry_ohm, self.predicted.ry_ohm if self.predicted else None
         return log(ry / expected.middle()) if expected and isfinite(ry) and ry > 0 else nan
 
@@ -127,7 +127,7 @@ def _by_specimen(log: Log, iteration: int, left_out: list[tuple[str, str]]) -> d
             left_out.append((f"design of {specimen.specimen}", str(error)))
             continue
         if design is None:
-            left_out.append((f"design of {specimen.specimen}", "its name does not tell which design it is"))
+            left_out.append((f"design of {specimen.specimen}", "its name stands for no design"))
         else:
             found[specimen.specimen] = design
     return found
@@ -149,7 +149,7 @@ def _stored(log: Log, design: Design) -> Sequence[Prediction]:
 
 
 def _evidence(reading: Reading, of: Predicted | None) -> Evidence:
-    """Readings that a resistance can have; a slip below 0 is kept in the log and told as a doubt there."""
+    """Readings that a resistance can have; a slip below 0 is kept in the log, with a doubt."""
     ry, rz = (tuple(v for v in values if v >= 0) for values in (reading.y_ohm, reading.z_ohm))
     return Evidence(
         reading.specimen, ry, rz, nan, reading.shape, reading.film_mm, reading.remark,

@@ -90,7 +90,9 @@ def findings(found: Comparison) -> Iterator[str]:
     of = ", ".join(
         f"{n} {words}" for n, words in ((design, "by design"), (implausible, "with an implausible electrode")) if n
     )
-    ratio = f"Median ratio {whole.median_ratio:.3g}." if isfinite(whole.median_ratio) else "The median film reads open."
+    ratio = (
+        f"Median ratio {whole.median_ratio:.3g}." if isfinite(whole.median_ratio) else "The median R_Z is an overload."
+    )
     yield (
         f"{len(such)} of {len(both)} sensors are shorted or leaking{f' ({of})' if of else ''}: film "
         f"resistance at most {ORDER:g} times the electrode's. {ratio}"
