@@ -284,6 +284,13 @@ def solved(shape: str, parameters: Mapping[str, Any], youngs_modulus_pa: Mapping
     return None
 
 
+def solved_print(content: str, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
+    """The stored curve of a printed cell, by the identity of its cross-section, for the same moduli [Pa]; else None."""
+    found = _read("solved_prints.yaml")
+    cell = found["cells"].get(content)
+    return _curve(found | cell, 1.0) if cell and found["youngs_modulus_pa"] == dict(youngs_modulus_pa) else None
+
+
 def prototype(shape: str) -> Curve:
     """The first stored curve of a shape, for films of ``PROTOTYPE_PA``: an estimate for similar cells."""
     return _curve(next(cell for cell in _cells()["cells"] if cell["shape"] == shape), 1.0)
@@ -297,7 +304,10 @@ def _curve(cell: Mapping[str, Any], scale: float) -> Curve:
     return replace(found, within=cell["within"], boundary_changes=changes, displacement_m=displacement_m)
 
 
-@cache
 def _cells() -> dict[str, Any]:
-    file = "solved_cells.yaml"
+    return _read("solved_cells.yaml")
+
+
+@cache
+def _read(file: str) -> dict[str, Any]:
     return yamlfile.parse((resources.files("sensorgen.models") / file).read_text("utf-8"), file)

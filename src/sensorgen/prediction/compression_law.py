@@ -7,7 +7,9 @@ other cell with gaps is solved on request, and kept.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from hashlib import sha256
 from itertools import takewhile
+from json import dumps
 from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import OutOfRange, UnknownName
@@ -29,6 +31,7 @@ from sensorgen.prediction.mesh_ladder import (
     pressed,
 )
 from sensorgen.scene.scene import Scene
+from sensorgen.scene.sections import sections
 
 if TYPE_CHECKING:
     from sensorgen.models.press2d import BoundaryConditions, Elastic
@@ -97,7 +100,8 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
         return _plate(design, moduli, name, printed or drawn(design))
     if name == "bonded":
         raise OutOfRange(f"the law 'bonded' applies to a solid plate; {design.shape} has gaps: expected 'unconfined'")
-    known = None if printed else _stored(design, {n: t.value for n, t in moduli.items()})
+    values = {n: t.value for n, t in moduli.items()}
+    known = _stored_print(design, printed, values) if printed else _stored(design, values)
     if known and name != "unconfined":
         return _cell(known, moduli)
     if name == "solved":
@@ -159,10 +163,34 @@ def expected(design: Design, mesh: MeshLevel) -> Curve:
 def _stored(design: Design, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
     """The stored curve of this cell, for materials of the same Poisson's ratio; else None."""
     known = compression.solved(design.shape, vars(design.params), youngs_modulus_pa)
-    if not known:
-        return None
+    return known if known and _incompressible(design) else None
+
+
+def _incompressible(design: Design) -> bool:
+    """Whether all materials have the Poisson's ratio of the stored cells."""
     ratios = (taken.value for taken in of_all_materials(design, "poisson_ratio").values())
-    return known if all(abs(ratio - compression.SOLVED_RATIO) < _SAME_RATIO for ratio in ratios) else None
+    return all(abs(ratio - compression.SOLVED_RATIO) < _SAME_RATIO for ratio in ratios)
+
+
+def _stored_print(design: Design, printed: Piece, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
+    """The stored curve of a printed cell, as those of the thesis's designs are."""
+    found = compression.solved_print(content(printed), youngs_modulus_pa)
+    return found if found and _incompressible(design) else None
+
+
+def content(piece: Piece) -> str:
+    """Identity of a cell's cross-section, to a nanometre; "" where it has several."""
+    try:
+        section, *others = sections(piece.scene)
+    except ValueError:
+        return ""
+    if others:
+        return ""
+    regions = sorted(
+        (body.material, body.terminal, [[round(v, 6) for v in corner] for corner in outline])
+        for body, outline in section.regions
+    )
+    return sha256(dumps([regions, piece.period_mm]).encode()).hexdigest()[:16]
 
 
 def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece: Piece) -> Law:
