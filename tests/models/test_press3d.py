@@ -262,6 +262,16 @@ def test_stairs_as_boxes_are_stairs_as_a_cross_section(lift):
     assert grown[1][2] / grown[1][0] - 1 == pytest.approx(grown[0][2] / grown[0][0] - 1, rel=0.01 if lift else 0.04)
 
 
+def test_the_side_of_a_foot_that_rolls_onto_the_film_touches_it():
+    """A soft foot bulges over the film that it is bonded to: faces that were square as drawn meet."""
+    soft, stress = solids(x60=1e6), [0.0, 5e4, 1e5]
+    flat = press2d.press(press2d.cell(stairs(0.3, 0.3), 2.0), soft, stress)
+    solid = press3d.press(press3d.cell(stairs(0.3, 0.3)), soft, stress, fineness=Pieces(3, 0.3))
+    assert flat.faults == solid.faults == ()
+    assert "faces of gaps touch, without friction" in solid.doubts
+    assert solid.displacement_m[1:] == pytest.approx(flat.displacement_m[1:], rel=0.04)  # 0.046 where they overlap
+
+
 def test_feet_that_stick_are_stiffer_by_as_much_as_in_a_cross_section():
     """By how much sticking stiffens, against a fine mesh of the plane model: its first one is 4 % off in that."""
     scene, stress = stairs(0.3, lift=0.02), [0.0, 1e4, 2e4, 5e4]

@@ -267,7 +267,7 @@ class Elements:
         h, w, volume = self._stretch(u, inner, which), self._weights[which], self._volumes[which, None]
         table, metric = self.mesh.reference, self._metric[which, None]
         m, d, n = len(w), h.shape[-1], table.gradients.shape[1]
-        g = table.gradients.transpose(0, 2, 1)  # (q, d, n)
+        g = np.ascontiguousarray(table.gradients.transpose(0, 2, 1))  # (q, d, n)
         flat, size = g.reshape(-1, n), d * n
         mu, p = self.law.mu_pa[which, None], inner.pressure[which] @ table.pressures.T
         j, rate = determinant(h) / volume, cofactor(h) / volume[..., None, None]  # J and its derivative to h
