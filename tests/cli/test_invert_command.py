@@ -128,7 +128,7 @@ def test_blank_where_the_reading_does_not_say(run, tmp_path):
 
 def test_what_to_do_is_said(run, tmp_path):
     (tmp_path / "m.csv").write_text(table(np.zeros(3), np.full(3, 50.0)))
-    assert "average them, choose tones nearer" in run("invert", *DESIGN, "m.csv").out
+    assert "average them, choose frequencies nearer" in run("invert", *DESIGN, "m.csv").out
     (tmp_path / "m.csv").write_text(table())
     said = run("invert", "tri", "--dielectric", "0.2", "m.csv")
     assert "no fit" in said.out
