@@ -20,7 +20,7 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.overlay import Part, parts
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import ROUNDING_MM, Column, Layer, sections
-from sensorgen.solvers.line.straight import energy as straight
+from sensorgen.solvers.electrostatics.linear import energy as straight
 
 SOURCE = "Thesis 3.2.1 and 3.2.2, Eqs. 3.10 to 3.49, corrected; Dirichlet's and Thomson's principles"
 COST = 1

@@ -1,1 +1,1 @@
-"""Transmission lines with position-dependent sections: inputs, slopes, series."""
+"""Pressed transmission line: checked inputs, derivatives, tanh(z)/z."""

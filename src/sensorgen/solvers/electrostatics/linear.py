@@ -1,4 +1,4 @@
-"""The best potential that is straight on each of a section's few triangles: an upper bound for any polygons."""
+"""Linear potential on the few triangles of a section: an upper bound of the capacitance for any polygons."""
 
 from collections.abc import Mapping
 
