@@ -1,16 +1,20 @@
 """Values of the user's own: they go before every source's, everywhere, and are told as such."""
 
+import math
+
 import numpy as np
 import pytest
 from drawn_sensor import sensor_of
-from sensorgen.prediction.prediction import prediction
 
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.design import materials
 from sensorgen.design.design import make
-from sensorgen.prediction.capacitance import permittivities, unloaded
+from sensorgen.design.values import permittivities
+from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.compression_law import elastic
 from sensorgen.prediction.double_layer.designs import stacked
+from sensorgen.prediction.electrodes import electrode_resistance
+from sensorgen.prediction.rest_state import rest_state
 
 
 def design(values, shape="reference", **rest):
@@ -34,14 +38,14 @@ def test_a_missing_value_can_be_set():
 def test_permittivity_scales_a_plate():
     """C = eps0 eps A / d."""
     plain, half = (
-        unloaded(design(v)).answer.capacitance_f.lower for v in ({}, {"x60": {"relative_permittivity": 2.34}})
+        rest_state(drawn(design(v))).answer.capacitance_f.lower for v in ({}, {"x60": {"relative_permittivity": 2.34}})
     )
     assert half == pytest.approx(plain / 2, rel=1e-12, abs=0)
 
 
 def test_the_source_is_told_and_the_name_of_the_design_is_another():
     own = design({"x60": {"relative_permittivity": 3.0}})
-    taken = {(t.material, t.quantity): (t.value, t.source) for t in unloaded(own).taken}
+    taken = {(t.material, t.quantity): (t.value, t.source) for t in rest_state(drawn(own)).values}
     assert taken["x60", "relative_permittivity"] == (3.0, "set by the user")
     assert taken["air", "relative_permittivity"] == (1.00059, "thesis-3.2")
     assert own.name != design({}).name == "reference"
@@ -51,7 +55,8 @@ def test_the_source_is_told_and_the_name_of_the_design_is_another():
 
 
 def test_resistivity_reaches_both_electrodes():
-    found = prediction(design({"etpu": {"resistivity_ohm_m": 0.1}}))["electrode_resistance_ohm"]
+    body = drawn(design({"etpu": {"resistivity_ohm_m": 0.1}}))
+    found = {end: r.value for end, r in electrode_resistance(body).items()}
     assert found == pytest.approx({"top": 0.1 * 0.1 / (3e-4 * 0.01), "bottom": 0.1 * 0.1 / (3e-4 * 0.01)})
 
 
@@ -112,8 +117,10 @@ def test_limits_of_nu(nu):
 @pytest.mark.parametrize("shape", ["tri", "rect"])
 def test_the_bounds_hold_over_the_whole_range_of_permittivities(shape, value):
     """More permittivity never makes less capacitance, nor less of its bounds."""
-    found = unloaded(design({"x60": {"relative_permittivity": value}}, shape)).answer.capacitance_f
-    more = unloaded(design({"x60": {"relative_permittivity": min(2 * value, 1e9)}}, shape)).answer.capacitance_f
+    found = rest_state(drawn(design({"x60": {"relative_permittivity": value}}, shape)), math.inf).answer.capacitance_f
+    more = rest_state(
+        drawn(design({"x60": {"relative_permittivity": min(2 * value, 1e9)}}, shape)), math.inf
+    ).answer.capacitance_f
     assert 0 < found.lower <= found.upper < np.inf
     assert found.lower <= more.lower
     assert found.upper <= more.upper

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from drawn_sensor import sensor_of
 from line_cases import TONES, exact
-from sensorgen.prediction.prediction import check_presses, prediction
 
 from sensorgen.cli.sheet_command import _press
 from sensorgen.core.errors import OutOfRange, UnknownName
@@ -19,8 +18,11 @@ from sensorgen.design.values import piezoresistance
 from sensorgen.models import compression, line
 from sensorgen.models.pressure import bed, hertz
 from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.bodies import drawn as drawn_body
 from sensorgen.prediction.double_layer.designs import stack_of
-from sensorgen.prediction.error_budget import budget
+from sensorgen.prediction.error_budget import Load, error_budget
+from sensorgen.prediction.evaluate import Query, evaluate
+from sensorgen.prediction.grid import check_presses
 from sensorgen.prediction.inverse.forward import Forward, Scalar
 
 K = 2e-6  # 1/Pa: 12 % at 60 kPa
@@ -158,30 +160,30 @@ def source(name, rise):
     return f"etpu@{name}"
 
 
+def prediction(of):
+    return evaluate(drawn_body(of), Query(law="unconfined"))
+
+
 def test_no_source_that_ships_gives_one():
     assert piezoresistance(design()) == {}
     assert sensor_of(design()).sensor.piezoresistance_per_pa == (0.0, 0.0)
-    assert (
-        "resistivity under the tip as elsewhere: no source says how it moves with pressure"
-        in (prediction(design())["assumptions"])
-    )
+    told = "resistivity under the tip as elsewhere: no source says how it changes with pressure"
+    assert told in prediction(design()).assumptions
     assert all(materials.load(name).properties.get("piezoresistance_per_pa", []) == [] for name in materials.names())
 
 
 def test_a_design_sets_it_and_the_prediction_says_so():
     sensed = sensor_of(design(K))
     assert sensed.sensor.piezoresistance_per_pa == (K, K)
-    assert [t.value for t in sensed.taken if t.quantity == "piezoresistance_per_pa"] == [K, K]
+    assert [t.value for t in sensed.values if t.quantity == "piezoresistance_per_pa"] == [K]  # of one material, once
     found = prediction(design(K))
-    (said,) = [text for text in found["assumptions"] if "under the tip" in text]
-    assert said == (
-        "resistivity rises in proportion to the pressure under the tip: 2e-06 1/Pa (top electrode, etpu, set by the "
-        "user), 2e-06 1/Pa (bottom electrode, etpu, set by the user)"
-    )
-    assert [v["value"] for v in found["values"] if v["quantity"] == "piezoresistance_per_pa"] == [K, K]
-    assert "piezoresistance" not in {term["name"] for term in found["budget"]["terms"]}
-    unpressed, plain = found["impedance_ohm"], prediction(design())["impedance_ohm"]
-    assert unpressed == plain
+    assert [text for text in found.assumptions if "rises with pressure" in text] == [
+        f"resistivity of the {end} electrode rises with pressure by 2e-06 1/Pa (etpu, set by the user)"
+        for end in ("top", "bottom")
+    ]
+    assert [v.value for v in found.values if v.quantity == "piezoresistance_per_pa"] == [K]
+    assert "piezoresistance" not in {term.name for term in found.budget.terms}
+    assert found.impedance == prediction(design()).impedance
 
 
 def test_a_source_of_ones_own_gives_it():
@@ -189,8 +191,8 @@ def test_a_source_of_ones_own_gives_it():
     assert sensor_of(design(materials=electrodes)).sensor.piezoresistance_per_pa == (K, K)
     one = design(materials={"top_electrode": electrodes["top_electrode"]})
     assert sensor_of(one).sensor.piezoresistance_per_pa == (K, 0.0)
-    (said,) = [text for text in prediction(one)["assumptions"] if "under the tip" in text]
-    assert said.endswith("tip: 2e-06 1/Pa (top electrode, etpu, lab), not (bottom electrode, no source)")
+    (said,) = [text for text in prediction(one).assumptions if "rises with pressure" in text]
+    assert said == "resistivity of the top electrode rises with pressure by 2e-06 1/Pa (etpu, lab)"
 
 
 @pytest.mark.parametrize(
@@ -203,19 +205,21 @@ def test_the_budget_has_what_sources_disagree_on(top, bottom, ends):
     named = {f"{end}_electrode": source(name, values[name]) for end, name in (("top", top), ("bottom", bottom)) if name}
     drawn = design(materials=named)
     sensed = sensor_of(drawn)
-    terms = {term["name"]: term for term in budget(drawn, sensed, TONES, 6.0, 0.05)["terms"]}
+    load = Load(tuple(TONES), 6.0, 0.05)
+    terms = {term.name: term for term in error_budget(sensed, load).terms}
     rho = dict(zip(("top_resistivity_ohm_m", "bottom_resistivity_ohm_m"), sensed.sensor.resistivity_ohm_m, strict=True))
 
     def z(rises):
         return line.impedance(line.PressedLine(**by_hand(6.0, 0.05, *rises) | rho, frequency_hz=TONE))
 
-    ref, found = z(sensed.sensor.piezoresistance_per_pa), terms["piezoresistance"]["shares"]
+    ref, found = z(sensed.sensor.piezoresistance_per_pa), terms["piezoresistance"].changes
     for measure, part in {"magnitude": np.abs, "re": np.real, "im": np.imag}.items():
-        assert found[measure] == pytest.approx(max(abs(part(z(e)) / part(ref) - 1).max() for e in ends), rel=1e-8)
-    assert "1/Pa" in terms["piezoresistance"]["what"]
+        assert getattr(found, measure) == pytest.approx(
+            max(abs(part(z(e)) / part(ref) - 1).max() for e in ends), rel=1e-8
+        )
+    assert "1/Pa" in terms["piezoresistance"].what
     sure = design(K, materials=named)  # the user's own value is not doubted
-    terms = budget(sure, sensor_of(sure), TONES, 6.0, 0.05)["terms"]
-    assert "piezoresistance" not in {term["name"] for term in terms}
+    assert "piezoresistance" not in {term.name for term in error_budget(sensor_of(sure), load).terms}
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])

@@ -5,10 +5,8 @@ from math import inf, log
 
 import numpy as np
 import pytest
-from sensorgen.prediction.prediction import prediction as plain_prediction
 
 from sensorgen.analysis.comparison import of_iteration, predicted
-from sensorgen.analysis.comparison.expected import electrode_ohm
 from sensorgen.analysis.comparison.leaky import across_ohm, along_ohm, electrode_and_leak
 from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
 from sensorgen.core.errors import OutOfRange
@@ -19,6 +17,9 @@ from sensorgen.measure.log.batches import prediction
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.bodies import drawn
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.results import to_json
 
 
 def ladder(electrode, leak, sections):
@@ -70,24 +71,15 @@ def test_a_plain_electrode_has_its_own_resistance_for_both_bounds():
     design = make({"shape": "reference"})
     p = design.params
     squares = p.length_mm / (p.electrode_mm * p.width_mm) * 1e3
-    found = electrode_ohm(design)
+    found = predicted(design).ry_ohm
     assert (found.lower, found.upper) == (pytest.approx(0.07 * squares), pytest.approx(0.2 * squares))
 
 
-def test_cogs_lower_the_lower_bound_by_the_share_of_their_volume():
-    design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})
-    p = design.params
-    plate = 0.07 * p.length_mm / (p.electrode_mm * p.width_mm) * 1e3
-    volume = design.drawn.body("top_electrode_with_cogs").volume_mm3()
-    assert electrode_ohm(design).lower == pytest.approx(plate * p.length_mm * p.width_mm * p.electrode_mm / volume)
-    assert volume > p.length_mm * p.width_mm * p.electrode_mm * 1.2
-
-
 def test_the_earliest_stored_prediction_is_taken_as_it_was(tmp_path):
+    """In the JSON of version 0.1.0, which held the drawing alone."""
     design = design_of(parse("40 triX .1mm"))
-    tuned = plain_prediction(design)
-    tuned["electrode_resistance_ohm"] = {"top": 1.0, "bottom": 2.0}
-    first = tuned | {"electrode_resistance_ohm": {"top": 1000.0, "bottom": 3000.0}}
+    tuned = {"electrode_resistance_ohm": {"top": 1.0, "bottom": 2.0}}
+    first = {"electrode_resistance_ohm": {"top": 1000.0, "bottom": 3000.0}}
     with Log(tmp_path / "log.db", create=True) as book:
         book.add([prediction(design.id(), design.name, data) for data in (first, tuned)])
         book.add([notes.reading("40 triX .1mm", "0.65k", "40")])
@@ -96,7 +88,7 @@ def test_the_earliest_stored_prediction_is_taken_as_it_was(tmp_path):
     assert row.predicted.stored_at
     assert row.predicted.provenance.startswith("stored ")
     assert row.residual == pytest.approx(log(650 / row.predicted.ry_ohm.middle()))
-    afterwards = predicted(design)
+    afterwards = predicted(make({"shape": "reference"}))
     assert not afterwards.stored_at
     assert "made afterwards" in afterwards.provenance
 
@@ -173,6 +165,8 @@ def test_the_film_of_a_cell_moves_less_than_in_proportion_and_thicker_is_less():
 
 
 def test_stored_predictions_are_plain_data(tmp_path):
-    design = design_of(parse("40 triX .1mm"))
-    row = prediction(design.id(), design.name, plain_prediction(design))
-    assert json.loads(row.data)["capacitance_f"]["middle"] == predicted(design, [row]).capacitance_f.middle()
+    design = make({"shape": "reference"})
+    found = evaluate(drawn(design))
+    row = prediction(design.id(), design.name, json.loads(to_json(found)))
+    assert json.loads(row.data)["capacitance"]["lower"] == predicted(design, [row]).capacitance_f.lower
+    assert predicted(design, [row]).prediction == found

@@ -55,11 +55,14 @@ class Movable:
     @cached_property
     def by_permittivity(self) -> tuple[Real, Real]:
         """Ln of the capacitance's middle, relative to the predicted one, over ln of the permittivity's factor."""
-        return self._curve(lambda factor: self.capacitance_f(self.permittivity * factor))
+        return _curve(lambda factor: self.capacitance_f(self.permittivity * factor), self.model.rest.capacitance.value)
 
     @cached_property
     def by_film(self) -> tuple[Real, Real]:
-        """The same over ln of the film's factor; flat where a design has no film."""
+        """The same over ln of the film's factor, of the drawing; flat where a design has no film.
+
+        A print has whole layers, so that its capacitance jumps with the film that is asked for.
+        """
         data = self.design.model_dump(exclude={"name"}, exclude_defaults=True, mode="json")
         d = getattr(self.design.params, "dielectric_mm", 0.0)
         if not d:
@@ -67,13 +70,13 @@ class Movable:
 
         def at(factor: float) -> float:
             parameters = data.get("parameters", {}) | {"dielectric_mm": d * factor}
-            return _capacitance_f(make(data | {"parameters": parameters}))
+            return rest_state(bodies.drawn(make(data | {"parameters": parameters}))).capacitance.value
 
-        return self._curve(at)
+        return _curve(at, at(1.0))
 
-    def _curve(self, at: Callable[[float], float]) -> tuple[Real, Real]:
-        known = self.model.rest.capacitance.value
-        return np.log(FACTORS), np.log([at(k) / known if k != 1 else 1.0 for k in FACTORS])
+
+def _curve(at: Callable[[float], float], known: float) -> tuple[Real, Real]:
+    return np.log(FACTORS), np.log([at(k) / known if k != 1 else 1.0 for k in FACTORS])
 
 
 def _capacitance_f(design: Design) -> float:
