@@ -20,6 +20,7 @@ from sensorgen.prediction.evaluate import TONES_HZ
 from sensorgen.prediction.identifiability import Identifiability, identify, surface
 from sensorgen.prediction.identifiability.fisher import Setup, Slopes, bearable, bounds, shares, slopes
 from sensorgen.prediction.identifiability.frequencies import spread
+from sensorgen.prediction.identifiability.results import of_schema_1
 from sensorgen.prediction.identifiability.verdict import Required, bracket, metres, newtons, required, verdict
 
 EPS0 = 8.8541878128e-12
@@ -526,3 +527,30 @@ def test_the_table_of_the_documents():
         sensor = cells[name](float(rho))
         found = (*sigmas(sensor), *sigmas(sensor, TEN_TIMES))
         assert [float(n) for n in numbers] == pytest.approx(found, rel=5e-3)
+
+
+OLD = json.loads((Path(__file__).parent / "reference" / "identifiability_schema_1.json").read_text("utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("name", "sensor"),
+    [
+        ("plate", replace(plate(), resistivity_ohm_m=(0.07, 0.2))),
+        ("capacitor", replace(plate(), resistivity_ohm_m=(0.0, 0.0))),
+    ],
+)
+def test_predictions_of_version_0_1_0_still_read(name, sensor):
+    """Numbers that another version stored, and what this one finds."""
+    old, new = of_schema_1(OLD[name]), identify(sensor, TONES_HZ, stiffest=None if name == "capacitor" else bonded())
+    numbers = ("sigma_force_n", "sigma_position_m", "correlation", "corner_frequency_hz")
+    for key in numbers:
+        one, other = getattr(old, key), getattr(new, key)
+        assert one == other or one == pytest.approx(other, rel=1e-9)
+    assert (old.senses_force, old.locates) == (new.senses_force, new.locates)
+    assert vars(old.press) == pytest.approx(vars(new.press))
+    assert old.map.of_force.worst == pytest.approx(new.map.of_force.worst, rel=1e-9)
+    assert old.map.of_force.worst_force_n == new.map.of_force.worst_force_n
+    assert [c.frequency_hz for c in old.best_frequencies] == [c.frequency_hz for c in new.best_frequencies]
+    assert old.frequencies[6].share_of_force_information == pytest.approx(new.frequencies[6].share_of_force_information)
+    assert of_schema_1({"verdict": None, "reason": "a short"}) is None
+    plain(old)

@@ -354,7 +354,7 @@ def test_a_cylinder_touches_as_hertz_says():
 
 def test_ways_back():
     """The fit as printed is off by centimetres, its root by metres; all tones together find the press."""
-    found, _ = by_model("press read back")
+    found, _ = by_model("inversion of a load")
     assert found["invert: seven tones"].error < 1e-9
     assert found["line_fit: corrected"].error < 3e-3 < found["line_fit: printed"].error < 0.05
     assert found["line_fit: C.5 as printed"].error > 1
@@ -403,7 +403,7 @@ def test_every_model_is_on_the_chart():
         "rect, 0.2 mm",
         "tri pressed, 0.1 mm: rise of C",
         "block, free all round",
-        "press read back",
+        "inversion of a load",
     ]
     names += ["cylinder on a flat", "line, seven tones", ROUND, "printed lines across the current"]
     found = chart.points(names, 0.0, lambda _: None)

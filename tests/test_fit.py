@@ -269,7 +269,7 @@ def test_the_command(tmp_path, capsys):
     cli.main(["fit", "--iteration", "60", "--log", place], standalone_mode=False)
     said = capsys.readouterr().out
     assert "--material electrode=etpu@fit-60" in said
-    assert "not told: relative_permittivity" in said
+    assert "not determined: relative_permittivity" in said
     assert own.names() == ["fit-60"]
     with pytest.raises(SensorgenError):
         cli.main(["fit", "--iteration", "61", "--log", place], standalone_mode=False)

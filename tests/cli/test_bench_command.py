@@ -134,7 +134,7 @@ def test_a_recording_of_the_log_by_its_number_with_tables_and_pictures(run, file
         (("two.mat",), "2 lock-ins; choose one with --lockin 1 to 2"),
         (("two.mat", "--lockin", "3"), "--lockin 3: expected 1 to 2"),
         (("run.mat", "--lockin", "2"), "expected 1, the only one"),
-        (("none.mat",), "there is no such file"),
+        (("none.mat",), "No such file"),
         (("rig.csv",), "rig.csv"),
         (("run.mat", "--rig", "run.mat"), "run.mat"),
         (("run.mat", "--cutoff", "50"), "a cut-off of 50 Hz at 70 samples/s"),

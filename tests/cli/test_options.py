@@ -191,6 +191,10 @@ def test_draw(run, tmp_path):
     assert run("draw", "tri", "--output", "some/where.svg").code == 0
     assert (tmp_path / "some/where.svg").read_text("utf-8") == drawn
     assert drawn.startswith("<svg")
+    refused = run("draw", "tri", "-o", "x.png")
+    assert (refused.code, refused.line) == (
+        2, "sensorgen: --output x.png: the drawing is SVG; expected a name that ends in .svg, or - to print it"
+    )  # fmt: skip
 
 
 def test_the_terminal_shows_all_numbers_at_80_columns(run):

@@ -221,7 +221,7 @@ def test_a_print_bed_ties_its_specimens(run, path, tmp_path):
         ('{"specimens": {"26 triX": {"design": "a"}}}', "specimens.26 triX.design_id is missing"),
         ('{"specimens": {"26 triX": 3}}', "specimens.26 triX is 3; expected a mapping"),
         ("[" * 9999, "not the record of a batch"),
-        ("", "not the record of a batch"),
+        ("", "is empty; expected the record of a batch"),
     ):
         (tmp_path / "bad.json").write_text(text)
         said = run("import", "bad.json")

@@ -1,5 +1,7 @@
 """Electrodes with cogs: closed forms, scikit-fem, limits, bricks beside triangles, planted faults, bad input."""
 
+import subprocess
+import sys
 from itertools import pairwise
 from math import log, pi
 
@@ -226,6 +228,20 @@ def test_round_cogs_have_rayleighs_bounds():
     found = ratio(scene)
     volume = 10 * 2 * 0.3 + sum(p.volume_mm3() for p in pins)
     assert (found.lower, found.upper) == close((6.0 / volume, 1.0), 1e-12)
+
+
+def test_no_field_solver_is_loaded_where_none_is_needed():
+    code = (
+        "import sys\nfrom sensorgen.design.design import make\n"
+        "from sensorgen.models.conduction import electrode_resistance\n"
+        "for parameters in ({'along': 'y'}, {}):\n"
+        "    scene = make({'shape': 'tri', 'parameters': parameters}).in_use\n"
+        "    electrode_resistance(scene, 'bottom', 0.2)\n"
+        "    if parameters: electrode_resistance(scene, 'top', 0.07)\n"
+        "print([m for m in sys.modules if '.solvers' in m or 'fem' in m or m == 'scipy'])"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
 
 
 def test_a_solver_that_fails_is_seen(monkeypatch):

@@ -18,7 +18,7 @@ from sensorgen.models import columns, fem3d
 from sensorgen.scene.scene import Body, Fill, Scene, box
 from sensorgen.solvers.electrostatics.boxes import Pair, boxes_of, flux, potential, whole
 from sensorgen.solvers.electrostatics.bricks import grid, layered
-from sensorgen.solvers.electrostatics.dissection import least
+from sensorgen.solvers.electrostatics.elimination import HELD
 
 CELLS = json.loads((Path(__file__).parents[1] / "reference" / "cells.json").read_text("utf-8"))
 
@@ -206,14 +206,12 @@ def test_what_both_fields_cannot_make_is_the_difference_of_their_energies():
     energy, unmet = pair.part(level, pair.flux.eps)
     load = (pair.flux.shares - pair.flux.shares.min())[:, None] * pair.flux.answers(level)
     drives = (pair.flux.pushed(load), pair.potential.pushed(load @ pair.seen))
-    dual, primal = (-least(driven.elements).energy for driven in drives)
+    dual, primal = (-driven.least().energy for driven in drives)
     for driven in drives:  # forces are in balance, at 0 V on both electrodes: what leaves a box enters its neighbour
-        elements, found = driven.elements, driven.solved()
-        keys, at = np.unique(elements.keys, return_inverse=True)
-        left = np.bincount(at.ravel(), (elements.load - driven.answers(found)).ravel())
-        free = np.isin(keys, elements.keys[np.isnan(elements.held)])
-        assert np.abs(left[free]).max() < 1e-9 * np.abs(load).max()
-        assert (found[~np.isnan(elements.held)] == 0).all()
+        found = driven.solved()
+        left = np.bincount(driven.ids.ravel(), (driven.load - driven.answers(found)).ravel())
+        assert np.abs(left[HELD:]).max() < 1e-9 * np.abs(load).max()
+        assert (found[driven.ids < HELD] == 0).all()
     assert unmet == close(dual - primal, 1e-6)
     assert 0 < unmet < 0.2 * dual
     assert energy > 0
@@ -266,7 +264,7 @@ def test_elimination_is_the_dense_solution():
     free = np.isnan(values)
     values[free] = np.linalg.solve(whole[free][:, free], -whole[free][:, ~free] @ values[~free])
     boxes = boxes_of(fine, [0, 0, 1.00059, 4.68], kind)
-    assert least(boxes.elements).energy == close(values @ whole @ values, 1e-10)
+    assert boxes.least().energy == close(values @ whole @ values, 1e-10)
     assert boxes.unknowns() == free.sum()
 
 

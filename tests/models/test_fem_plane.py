@@ -14,7 +14,7 @@ from sensorgen.models import fem2d, fem3d
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.electrostatics import bounds
 from sensorgen.solvers.electrostatics.cones import Cone, Layout, ring_corners
-from sensorgen.solvers.electrostatics.fronts import Block, least
+from sensorgen.solvers.electrostatics.elimination import Block, least
 from sensorgen.solvers.electrostatics.plane import Plane
 from sensorgen.solvers.electrostatics.polynomials import SIDES, condensed, crossed
 
@@ -246,7 +246,7 @@ def test_blocks_are_solved_as_one_system():
                 whole[k, m] += (root @ root.T)[i, j]
     used = np.union1d(np.concatenate([b.ids for b in blocks]), [0, 1])
     free = used[used > 1]
-    values = least(blocks, count)
+    values = least(blocks, count).values()
     assert values[[0, 1]].tolist() == [0.0, 1.0]
     assert values[free] == pytest.approx(
         -np.linalg.solve(whole[np.ix_(free, free)], whole[free, 1]), rel=1e-8, abs=1e-10

@@ -15,16 +15,16 @@ from sensorgen.models.press3d import BoundaryConditions, Elastic, Pieces
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.contact import (
     air,
-    brick_field,
     contact,
     element,
     factors,
     load,
+    mapped_field,
     pressed,
 )
-from sensorgen.solvers.contact.brick_field import Orders
 from sensorgen.solvers.contact.bricks import Bricks, mesh_of
 from sensorgen.solvers.contact.cell import Region
+from sensorgen.solvers.contact.mapped_field import Orders
 
 EPS = {"x60": 4.68, "air": 1.00059}
 REGIONS = (Region("air", ""), Region("x60", ""), Region("etpu", "bottom"), Region("etpu", "top"))
@@ -154,7 +154,7 @@ def test_bounds_hold_the_reference_and_close_in():
 
 def unmoved(bricks, orders):
     mesh = mesh_of(bricks, np.ones(bricks.fill.shape, bool))
-    return brick_field.Field(mesh, EPS, orders).capacitance(np.zeros(3 * len(mesh.points_m)))
+    return mapped_field.Field(mesh, EPS, orders).capacitance(np.zeros(3 * len(mesh.points_m)))
 
 
 def test_a_thinner_film_by_displacement_is_one_by_drawing():
@@ -163,7 +163,7 @@ def test_a_thinner_film_by_displacement_is_one_by_drawing():
     mesh = mesh_of(bricks, np.ones(bricks.fill.shape, bool))
     u = np.zeros((len(mesh.points_m), 3))
     u[:, 2] = -20e-6 * np.clip((mesh.points_m[:, 2] - 0.3e-3) / 0.1e-3, 0, 1)
-    moved = brick_field.Field(mesh, EPS, Orders()).capacitance(u.ravel())
+    moved = mapped_field.Field(mesh, EPS, Orders()).capacitance(u.ravel())
     drawn = fem3d.capacitance(rect(0.08), EPS, 1e-2).times(1 / 1e-3)
     assert max(moved.lower, drawn.lower) < min(moved.upper, drawn.upper)
     assert moved.middle() == pytest.approx(drawn.middle(), rel=4e-3)
@@ -176,15 +176,15 @@ def test_bounds_from_the_factors_of_an_earlier_load_hold_those_of_new_ones(monke
     u = np.zeros((len(mesh.points_m), 3))
     u[:, 2] = -20e-6 * np.clip((mesh.points_m[:, 2] - 0.3e-3) / 0.1e-3, 0, 1)
     for small in (1e-2, 1e-7):
-        monkeypatch.setattr(brick_field, "_SMALL", small)
-        cell = brick_field.Field(mesh, EPS, Orders())
+        monkeypatch.setattr(mapped_field, "_SMALL", small)
+        cell = mapped_field.Field(mesh, EPS, Orders())
         cell.capacitance(0 * u.ravel())
         made = {name: kept.factors for name, kept in cell.systems.items()}
         for share in (0.5, 1.0, -1.0):
             found = cell.capacitance(share * u.ravel())
-            monkeypatch.setattr(brick_field, "_SMALL", 1e-12)
-            new = brick_field.Field(mesh, EPS, Orders()).capacitance(share * u.ravel())
-            monkeypatch.setattr(brick_field, "_SMALL", small)
+            monkeypatch.setattr(mapped_field, "_SMALL", 1e-12)
+            new = mapped_field.Field(mesh, EPS, Orders()).capacitance(share * u.ravel())
+            monkeypatch.setattr(mapped_field, "_SMALL", small)
             assert new.lower * (1 - 2 * small) < found.lower <= new.lower * (1 + 1e-12)
             assert new.upper * (1 - 1e-12) <= found.upper < new.upper * (1 + 2 * small)
         assert all(kept.factors is made[name] for name, kept in cell.systems.items())
@@ -202,12 +202,12 @@ def test_where_a_plates_inner_places_go_does_not_matter():
     exact = 8.8541878128e-12 * 4.68 / 0.6e-3
     widths = []
     for orders in (Orders(2, 1), Orders(4, 3)):
-        found = brick_field.Field(mesh, EPS, orders).capacitance(u.ravel())
+        found = mapped_field.Field(mesh, EPS, orders).capacitance(u.ravel())
         assert found.lower < exact < found.upper
         widths.append(found.width())
     assert widths[1] < 0.02 * widths[0]
-    with pytest.raises(brick_field.Folded):
-        brick_field.Field(mesh, EPS, Orders(2, 1)).capacitance(12 * u.ravel())
+    with pytest.raises(mapped_field.Folded):
+        mapped_field.Field(mesh, EPS, Orders(2, 1)).capacitance(12 * u.ravel())
 
 
 def stairs(*widths, lift=0.0, film=0.1):
@@ -239,7 +239,7 @@ def test_a_foot_that_has_landed_and_widened_is_one_drawn_so(slid_mm):
     moved[above, 0] = 1e-3 * np.interp(x[above], [0.5, 0.7, 1.5], [0.0, slid_mm, 0.0])
     moved[above, 2] = -2e-5
     u = air.AirMap(whole, solid).displacements_m(moved, 1e-4)
-    found = brick_field.Field(whole, EPS, Orders()).capacitance(u)
+    found = mapped_field.Field(whole, EPS, Orders()).capacitance(u)
     drawn = fem2d.capacitance(stairs(0.2 + slid_mm), EPS, 1e-5).times(1 / 32e-6)
     assert found.width() < 2e-3
     assert found.lower < drawn.upper * (1 + 1e-4)

@@ -9,7 +9,7 @@ from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
-from sensorgen.solvers.contact import field
+from sensorgen.solvers.contact import plane_field
 
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
 EPS = {"x60": 4.68, "air": 1.00059}
@@ -153,6 +153,6 @@ def test_a_peak_between_the_same_bodies_stays_and_a_line_that_runs_on_is_one():
 
 
 def test_outlines_that_cross_never_reach_the_mesher():
-    with pytest.raises(field.Unmeshed, match="run into each other"):
-        field._refuse_crossings(np.array([[(0.0, 0.0), (1.0, 1.0)], [(0.0, 1.0), (1.0, 0.0)]]))
-    field._refuse_crossings(np.array([[(0.0, 0.0), (1.0, 1.0)], [(1.0, 1.0), (2.0, 0.0)]]))  # they only touch
+    with pytest.raises(plane_field.Unmeshed, match="run into each other"):
+        plane_field._refuse_crossings(np.array([[(0.0, 0.0), (1.0, 1.0)], [(0.0, 1.0), (1.0, 0.0)]]))
+    plane_field._refuse_crossings(np.array([[(0.0, 0.0), (1.0, 1.0)], [(1.0, 1.0), (2.0, 0.0)]]))  # they only touch

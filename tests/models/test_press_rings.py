@@ -8,7 +8,7 @@ pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import fem2d, press2d
 from sensorgen.models.press2d import Fineness
 from sensorgen.scene.scene import Body, Scene, box
-from sensorgen.solvers.contact import field, mesh, rings, wedge
+from sensorgen.solvers.contact import mesh, plane_field, rings, wedge
 from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Region
 
 EPS = {"x60": 4.68, "air": 1.00059}
@@ -53,11 +53,11 @@ def test_corners_are_where_solid_and_air_or_plates_turn_and_where_three_meet():
 
 def test_the_bounds_of_stairs_hold_those_of_other_elements_and_are_narrow(monkeypatch):
     cell, known = press2d.cell(stairs(), 2.0), fem2d.capacitance(stairs(), EPS, 1e-5).times(1 / (4e-3 * 8e-3))
-    found = field.capacitance(cell, EPS, cell.width_mm() / 4, 0.5)
+    found = plane_field.capacitance(cell, EPS, cell.width_mm() / 4, 0.5)
     assert found.lower < known.lower < known.upper < found.upper
     assert found.width() < 2e-3
-    monkeypatch.setattr(field, "_RINGS", 0)
-    assert field.capacitance(cell, EPS, cell.width_mm() / 4, 0.5).width() > 4 * found.width()
+    monkeypatch.setattr(plane_field, "_RINGS", 0)
+    assert plane_field.capacitance(cell, EPS, cell.width_mm() / 4, 0.5).width() > 4 * found.width()
 
 
 def test_notches_are_where_solids_fill_more_than_half_a_turn_mirrors_included():

@@ -73,7 +73,7 @@ def test_lock_ins_share_the_clock_of_the_one_that_tells_it_best(tmp_path, run):
         assert one.recording.counts()["rig error"] == np.count_nonzero(alone.recording.marks["rig error"][:count])
     with pytest.raises(BadInput, match="too little to find the offset"):
         joined_all((deaf, deaf), log)
-    with pytest.raises(BadInput, match="all the same"):
+    with pytest.raises(BadInput, match="do not change"):
         joined_all((dead, dead), log)
 
 

@@ -3,6 +3,7 @@
 import base64
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -108,15 +109,15 @@ def test_differences_of_all_recordings_on_scales_of_their_own(recorded):
 
 
 def test_what_impedance_could_tell_is_the_cards_map():
-    card = {
-        "required": {"sigma_force_n": 0.6, "sigma_position_m": 0.01},
-        "map": {
-            "force_n": [0.0, 1.0, 2.0, 3.0, 4.0], "position_m": [0.0, 0.05],
-            "sigma_force_n": [[k, 10.0 + k] for k in range(5)],
-            "sigma_position_m": [[None, k / 1e3] for k in range(5)],
-        },
-    }  # fmt: skip
-    above, under = errors(card)
+    of = SimpleNamespace(
+        required=SimpleNamespace(sigma_force_n=0.6, sigma_position_m=0.01),
+        map=SimpleNamespace(
+            force_n=[0.0, 1.0, 2.0, 3.0, 4.0], position_m=[0.0, 0.05],
+            sigma_force_n=[[k, 10.0 + k] for k in range(5)],
+            sigma_position_m=[[None, k / 1e3] for k in range(5)],
+        ),
+    )  # fmt: skip
+    above, under = errors(of)
     (weak, middling, strong, needed), below = above.content, under.content
     assert [list(t.y) for t in (weak, middling, strong, needed)] == [[1, 11], [2, 12], [4, 14], [0.6, 0.6]]
     assert [t.name for t in (weak, middling, strong)] == ["1 N", "2 N", "4 N"]

@@ -36,8 +36,6 @@ def check(slices: Slices, printer: Printer, quality: Quality) -> Iterator[Findin
         ground = shapely.union_all([slices.printed(b, layer - 1, least) for b in slices.scene.bodies])
         for body in slices.scene.bodies:
             shape = slices.printed(body, layer, least)
-            if cleaned(shapely.difference(shape, ground)).is_empty:
-                continue
             if (shape, ground) not in known:
                 known[shape, ground] = _spans(shape, ground, least)
             yield from _judged(body, layer + 1, slices.layers.mids_mm[layer], known[shape, ground], quality, line)
@@ -84,9 +82,11 @@ def _spans(shape: Region, ground: Region, least_mm: float) -> dict[str, _Span]:
     Every unsupported place is held along x or along y; the better way counts. Places that are held neither way,
     as the corners of a roof that juts out on two sides, hold on to those that are.
     """
+    found = dict.fromkeys(("bridge", "overhang", "island"), _Span())
+    if cleaned(shapely.difference(shape, ground)).is_empty:
+        return found
     lines, filled, below = _grid(shape, ground, least_mm / 2)
     air = filled & ~below
-    found = dict.fromkeys(("bridge", "overhang", "island"), _Span())
 
     def note(kind: str, lengths: Lengths, where: Mask) -> None:
         i, j = np.unravel_index(np.argmax(np.where(where, lengths, 0.0)), where.shape)

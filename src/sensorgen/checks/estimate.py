@@ -14,7 +14,7 @@ import shapely
 from sensorgen.checks.widths import SWELLS, VANISHES
 from sensorgen.core.errors import UnknownName
 from sensorgen.design.printer import Printer, Quality
-from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, narrow_mm, parts
+from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, narrow_mm, parts, united
 from sensorgen.scene.scene import SLIVER_MM, Body, Scene
 
 ROUND = 1 - pi / 4  # a bead's rounded sides take this share of its height from its width
@@ -86,7 +86,7 @@ def _printed(layer: LayerRegions, scene: Scene, printer: Printer, wide: Rule) ->
         found = _widened(layer, body.name, length * width, partial(_width, wide, layer.height_mm, printer))
         widened = shapely.clip_by_rect(found, 0.0, 0.0, length, width)
         others = shapely.union_all(list(regions.values()))
-        regions[body.name] = cleaned(shapely.difference(shapely.union_all(widened), others))
+        regions[body.name] = cleaned(shapely.difference(united(widened), others))
     return layer.mapped(regions)
 
 

@@ -101,7 +101,8 @@ def _advised(finding: Finding, parameters: list[str]) -> Finding:
     """A finding whose advice names parameters that the shape has."""
     wider = [name for name in parameters if name == "period_mm" or name.endswith("_width_mm")]
     if finding.rule in _WIDENED and finding.severity != "info" and wider:
-        return replace(finding, advice=f"{finding.advice} (increase {' or '.join(wider)})")
+        what, comma, more = finding.advice.partition(",")
+        return replace(finding, advice=f"{what} (increase {' or '.join(wider)}){comma}{more}")
     films = " or ".join(name for name in parameters if name.endswith("dielectric_mm"))
     return replace(finding, advice=finding.advice.replace("dielectric_mm", films)) if films else finding
 

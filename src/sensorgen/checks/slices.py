@@ -46,6 +46,7 @@ class Slices:
         self.scene = scene
         self.layers = Layers(tuple(quality.boundaries_mm(scene.size_mm[2])))
         self._drawn = drawn(scene, self.layers.boundaries_mm)
+        self._wider: dict[tuple[Region, float], Region] = {}
 
     def body(self, body: Body, layer: int) -> Region:
         """Region of a body in a layer."""
@@ -57,7 +58,10 @@ class Slices:
 
     def printed(self, body: Body, layer: int, least_mm: float) -> Region:
         """What of a body is wider than ``least_mm`` in a layer."""
-        return MultiPolygon([p for p in parts(self.body(body, layer)) if narrow_mm(p) > least_mm + TOUCH_MM])
+        key = self.body(body, layer), least_mm
+        if key not in self._wider:
+            self._wider[key] = MultiPolygon([p for p in parts(key[0]) if narrow_mm(p) > least_mm + TOUCH_MM])
+        return self._wider[key]
 
     def printed_layers(self, body: Body, least_mm: float) -> list[int]:
         """Layers in which some part of a body is wider than ``least_mm``."""

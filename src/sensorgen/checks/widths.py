@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sensorgen.checks.slices import TOUCH_MM, Slices
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer
-from sensorgen.scene.layers import Region, is_rectilinear
+from sensorgen.scene.layers import Region, is_box, is_rectilinear, parts
 from sensorgen.scene.scene import Body, Point
 
 # As shares of the nozzle.
@@ -153,7 +153,8 @@ def stretches(region: Region, limit_mm: float, *, gaps: bool = False) -> list[St
     way /= np.hypot(*way.T)[:, None] * (-1.0 if gaps else 1.0)
     tree = shapely.STRtree(shapely.boundary(shapely.get_parts(region)))
     found: dict[tuple[float, ...], Stretch] = {}
-    for share in (0.5, 1e-6, 1 - 1e-6) if is_rectilinear(region) else (0.5,):
+    has_corners = is_rectilinear(region) and not all(map(is_box, parts(region)))
+    for share in (0.5, 1e-6, 1 - 1e-6) if has_corners else (0.5,):
         known = {stretch.width_mm for stretch in found.values()}
         places = starts + share * (ends - starts)
         for k, width in _across(tree, places, way, limit_mm):

@@ -12,29 +12,14 @@ import click
 from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.version import __version__
 
-COMMANDS = (
-    "build",
-    "batch",
-    "check",
-    "slice",
-    "gcode",
-    "draw",
-    "predict",
-    "cell",
-    "chart",
-    "compress",
-    "invert",
-    "sheet",
-    "stack",
-    "log",
-    "bench",
-    "thesis",
-    "report",
-    "fit",
-    "list",
-    "schema",
-    "completion",
-)
+SECTIONS = {
+    "Design": ("build", "batch", "check", "slice", "gcode", "draw"),
+    "Predict": ("predict", "cell", "compress", "invert", "sheet", "stack"),
+    "Measure": ("log", "bench", "report", "fit"),
+    "Reference": ("list", "schema", "completion"),
+    "For developers": ("chart", "thesis"),
+}
+COMMANDS = tuple(name for names in SECTIONS.values() for name in names)
 _PACKAGE = {"chart": "verification", "thesis": "verification"}  # of a command's module, where it is not ``cli``
 WRONG_INPUT = 2
 FOUND_ERRORS = 1
@@ -45,6 +30,13 @@ class _Lazy(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         return list(COMMANDS)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The commands in sections."""
+        for title, names in SECTIONS.items():
+            found = [(name, self.get_command(ctx, name)) for name in names]
+            with formatter.section(title):
+                formatter.write_dl([(name, made.get_short_help_str(limit=100)) for name, made in found if made])
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
         if name not in COMMANDS:
@@ -97,7 +89,7 @@ def main() -> None:
     except (KeyboardInterrupt, click.Abort):
         code = _complain("interrupted; no file is half-written", 128 + signal.SIGINT)
     except _Terminated:
-        code = _complain("told to end; no file is half-written", 128 + signal.SIGTERM)
+        code = _complain("stopped; no file is half-written", 128 + signal.SIGTERM)
     except (OSError, UnicodeEncodeError) as error:
         _silence()
         code = _complain(f"cannot write the output: {getattr(error, 'strerror', None) or error}", WRONG_INPUT)

@@ -24,7 +24,7 @@ def compensate_option() -> click.Option:
 def compensated(
     design: "Design", word: str | None, walls: str, *, silent: bool
 ) -> tuple["Design", list[dict[str, Any]]]:
-    """The design to print, and what was changed, which is also told."""
+    """The design to print, and what was changed, which is also printed."""
     if word is None:
         return design, []
     from sensorgen.asprinted.compensation import compensated as changed

@@ -53,7 +53,7 @@ def _plan_command(name: str) -> click.Command:
                 metavar="SECONDS",
                 help="End a slicer after this time.",
             ),
-            click.Option(["--force"], is_flag=True, help="Write the files in spite of findings of severity error."),
+            click.Option(["--force"], is_flag=True, help="Write the files even if checks report errors."),
             click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
             click.Option(["--json", "as_json"], is_flag=True, help="Print the record as JSON."),
         ],
@@ -126,7 +126,7 @@ def _expected(expected: dict[str, Any]) -> str:
 
 
 def _printed(printed: dict[str, Any]) -> str:
-    """What is printed of a design, in one line."""
+    """The print of a design, in one line."""
     if "reason" in printed:
         return str(printed["reason"])
     gaps, drawn = printed["electrode_gap_mm"]["printed"], printed["electrode_gap_mm"]["drawn"]

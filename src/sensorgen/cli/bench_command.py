@@ -48,7 +48,7 @@ PLAN: list[click.Parameter] = [
 ]  # fmt: skip
 
 
-@click.group("bench", short_help="Plan what a rig presses, and see what came of it.")
+@click.group("bench", short_help="Plan a run of loads, and evaluate its recording.")
 def command() -> None:
     """Plans for the rig that presses sensors, and its recordings."""
 

@@ -53,7 +53,7 @@ def body_of(drawn: bool, slicer: str | None, walls: str | None) -> "Callable[[De
 
 
 def printed_of(design: "Design", slicer: str | None, walls: str | None) -> "Printed":
-    """What is printed of a design, with its layers: sliced now, or estimated."""
+    """The print of a design, with its layers: sliced now, or estimated."""
     from sensorgen.asprinted.printed import body
 
     if slicer and walls:

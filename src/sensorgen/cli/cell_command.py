@@ -178,7 +178,7 @@ def _deliver(pieces: Iterable[str], output: str | None) -> None:
 
 command = DesignGroup(
     _work, OWN, name="cell",
-    help="Bound the capacitance per area from both sides, by the cheapest model that is as near as asked. Exit code 1 "
-    "where none is.",
-    short_help="Capacitance between bounds as near as asked.",
+    help="Certified bounds of the capacitance per area, by the least expensive model within the accuracy. Exit code 1 "
+    "where none reaches it.",
+    short_help="Capacitance between certified bounds.",
 )  # fmt: skip

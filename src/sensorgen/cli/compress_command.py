@@ -1,4 +1,4 @@
-"""``sensorgen compress``: how a cell gives way under stress, and what that does to its capacitance."""
+"""``sensorgen compress``: displacement and capacitance of a cell under pressure."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -33,13 +33,13 @@ OWN: list[click.Parameter] = [
         ["--stress"], type=Values(units.STRESS_KPA, zero=True), default="0:100:10", show_default=True,
         help="Stresses on the top [kPa]; 0 is put before them.",
     ),
-    _choice("--base", "base", ["bonded", "sliding"], "How the bottom is held."),
-    _choice("--sides", "period", ["fixed", "free"], "Whether its sides stay, or give way (with --base sliding)."),
+    _choice("--base", "base", ["bonded", "sliding"], "Boundary condition of the bottom."),
+    _choice("--sides", "period", ["fixed", "free"], "Sides: fixed, or free to move (with --base sliding)."),
     _choice("--top", "top", ["even", "rigid"], "Even pressure, or a stiff plate."),
     _choice("--contact", "contact", ["frictionless", "stick"], "What faces do that touch."),
     click.Option(
         ["--model"], type=OneOf(["press2d", "press3d", "springs", "unconfined", "bonded"]), default=None,
-        help="Finite elements of a cross-section or of boxes, springs of columns, or laws of a plate, free to give way "
+        help="Finite elements of a cross-section or of boxes, springs of columns, or laws of a plate, free to widen "
         "sideways (B.49) or bonded; the first that fits if not given.",
     ),
     click.Option(

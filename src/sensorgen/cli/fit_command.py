@@ -56,7 +56,7 @@ def _lines(made: "Fit") -> Iterator[str]:
         yield f"  {value.material} {value.quantity} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})"
         yield f"    {value.note}"
     for untold in made.untold:
-        yield f"  not told: {untold.parameter}: {untold.why}"
+        yield f"  not determined: {untold.parameter}: {untold.why}"
     for error in made.errors:
         before, after = (f"a factor of {exp(e):.3g}" for e in (error.before, error.after))
         yield f"  {error.observable} of {error.count} held back: off by {before} before, {after} after (rms)"

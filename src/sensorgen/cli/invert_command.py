@@ -48,13 +48,13 @@ OWN: list[click.Parameter] = [
     ),
     click.Option(
         ["--prior"], metavar="WHAT",
-        help="What is known beforehand: uniform, or force=3+-1, position=50+-20 (N, mm), or both with a comma.",
+        help="Prior: uniform, or force=3+-1, position=50+-20 (N, mm), or both with a comma.",
     ),
     click.Option(["--force-limit", "force_limit_n"], type=_Force(), help="Largest force to look for [default: 13 N]."),
     click.Option(["--tip", "tip_mm"], type=Length(), default="10mm", show_default=True, help="Length of the tip."),
     click.Option(
         ["--compression"], type=OneOf(("unconfined", "bonded")),
-        help="How a plate gives way; the best that is known of the cell if not given.",
+        help="Compression law of a plate; the best of the cell if not given.",
     ),
     click.Option(
         ["--output", "-o"], metavar="FILE.csv",
@@ -178,5 +178,5 @@ command = DesignGroup(
     _work, OWN, name="invert",
     help="Force and position behind the impedances in MEASURED.csv ('-' reads the standard input): one row per sample, "
     "columns re_ohm_1.1kHz and im_ohm_1.1kHz for every tone.",
-    short_help="Force and position back from measured impedances.",
+    short_help="Force and position from measured impedances.",
 )  # fmt: skip

@@ -20,9 +20,9 @@ class _Group(click.Group):
         return super().resolve_command(ctx, args)
 
 
-@click.group("log", cls=_Group, short_help="Keep what was measured of printed specimens.")
+@click.group("log", cls=_Group, short_help="Log of readings, recordings, prints and predictions.")
 def command() -> None:
-    """Keep what was measured of printed specimens.
+    """Log of readings, recordings, prints and predictions.
 
     Readings of a multimeter, recordings of the bench and what was predicted, in one file that only grows: nothing is
     taken out, and a correction is a new row.

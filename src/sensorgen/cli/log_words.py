@@ -64,5 +64,5 @@ def opened(file: str | None, *, create: bool = False) -> "Log":
 
 
 def columns_of(words: tuple[str, ...], option: str) -> dict[str, str]:
-    """Columns as told by OURS=THEIRS: what the file calls them, to what we do."""
+    """Columns given by OURS=THEIRS: names in the file, to ours."""
     return {theirs: ours for ours, theirs in pairs(words, option)}

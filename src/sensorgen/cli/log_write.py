@@ -61,7 +61,7 @@ def _ahead(specimen: str, file: str | None, *, wanted: bool, as_json: bool) -> N
 
 
 def _asked_mega(**typed: str) -> bool:
-    """Whether a person says that a small m means mega; nobody is asked where there is no m, or no person."""
+    """Whether a person says that a small m means mega; no question where there is no m, or no person."""
     from sensorgen.measure.log.notes import resistance
 
     found = [word for axis, words in typed.items() for word in resistance(axis, words).mega]

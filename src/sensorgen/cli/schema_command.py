@@ -1,11 +1,24 @@
-"""``sensorgen schema``: what a design file may hold."""
+"""``sensorgen schema``: JSON schemas of files."""
+
+from typing import Any
 
 import click
 
+from sensorgen.cli import show
 
-@click.command("schema", short_help="Print the JSON Schema of the design file.")
-def command() -> None:
-    """Print the JSON Schema of the design file, for editors that check while you type."""
-    from sensorgen.cli import catalogue, show
 
-    show.as_json(catalogue.schema())
+def _schema(name: str) -> dict[str, Any]:
+    if name == "prediction":
+        from sensorgen.prediction.results import adapter
+
+        return adapter().json_schema(mode="serialization")
+    from sensorgen.cli import catalogue
+
+    return catalogue.schema()
+
+
+@click.command("schema", help="Print the JSON schema of a design file or of prediction.json.")
+@click.argument("of", type=click.Choice(["design", "prediction"]), default="design")
+def command(of: str) -> None:
+    """Print a schema."""
+    show.as_json(_schema(of))

@@ -67,7 +67,7 @@ OWN: list[click.Parameter] = [
     ),
     click.Option(
         ["--compression"], type=OneOf(("unconfined", "bonded")),
-        help="How a plate gives way; the best that is known of the cell if not given.",
+        help="Compression law of a plate; the best of the cell if not given.",
     ),
     *body_options.body_options(),
     click.Option(["--json", "as_json"], is_flag=True, help="Print impedances, bounds, and their maps, as JSON."),
@@ -176,5 +176,5 @@ def _press(sensor: "Sensor", tip_m: float, force_n: float) -> tuple["Patch", dic
 command = DesignGroup(
     _work, OWN, name="sheet",
     help="Bounds on force and place of a press in two dimensions, for the usual sets of contacts.",
-    short_help="Which contacts and tones locate a press in two dimensions.",
+    short_help="Which contacts and frequencies locate a load in two dimensions.",
 )  # fmt: skip

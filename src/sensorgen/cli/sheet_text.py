@@ -23,7 +23,8 @@ def lines(film: "Sheet", press: "Patch", bounds: Mapping[str, "Bounds"], given: 
         yield _row(name, found)
     yield ""
     yield from textwrap.wrap(
-        "Medians over the sheet of the smallest standard errors; located: twice as well as by a guess, in x and in y.",
+        "Medians over the sheet of the smallest standard errors; located: twice as well as a uniform distribution, in "
+        "x and in y.",
         WIDTH,
     )
     for name, found in bounds.items():

@@ -87,8 +87,7 @@ def loaded(found: "Prediction", model: "SensorModel", grid: "ImpedanceGrid", noi
     spread = "" if sensor.profile == "uniform" else f" ({sensor.profile}{grown})"
     yield f"{found.design}, {found.body}: {_axis(force, 'force', 'N')}, {_axis(at, 'position', 'mm')};"
     yield f"tip {sensor.tip_m * 1e3:g} mm{spread}, compression {sensor.compression.name}"
-    beyond = sensor.compression.doubt(float(sensor.stress_pa(force[-1], [x * 1e-3 for x in at]).max()))
-    for doubt in (*model.doubts, *([beyond] if beyond else [])):
+    for doubt in _doubts(model, grid):
         yield from textwrap.wrap(f"doubtful: {doubt}", WIDTH)
     yield ""
     yield f"{'':9} {'R [ohm]':^17}  {'X [ohm]':^25}  change of R  change of X"
@@ -109,6 +108,15 @@ def loaded(found: "Prediction", model: "SensorModel", grid: "ImpedanceGrid", noi
         yield f"{f'{force[j]:g} N':>7}" + "".join(f"  {z.real:9.7g} {z.imag:12.7g}" for z in cells)
 
 
+def _doubts(model: "SensorModel", grid: "ImpedanceGrid") -> Iterator[str]:
+    """Of the sensor, and of pressures beyond the solved ones."""
+    yield from model.doubts
+    stress_pa = model.sensor.stress_pa(grid.force_n[-1], [x * 1e-3 for x in grid.position_mm])
+    beyond = model.sensor.compression.doubt(float(stress_pa.max()))
+    if beyond:
+        yield beyond
+
+
 def grid_json(found: "Prediction", model: "SensorModel", grid: "ImpedanceGrid") -> Iterator[str]:
     """Prediction and impedances as JSON, a line per key: for long lists of numbers."""
     from sensorgen.prediction.results import to_json
@@ -117,7 +125,9 @@ def grid_json(found: "Prediction", model: "SensorModel", grid: "ImpedanceGrid") 
         "prediction": json.loads(to_json(found)),
         "tip_mm": model.sensor.tip_m * 1e3,
         "profile": model.sensor.profile,
-        "compression": model.law.compression.source,
+        "contact_mm": float(model.sensor.contact_m(grid.force_n[-1])[0]) * 1e3,
+        "compression": model.law.compression.name,
+        "doubts": list(_doubts(model, grid)),
         "axes": ["frequency_hz", "force_n", "position_mm"],
         "frequency_hz": list(grid.frequency_hz),
         "force_n": list(grid.force_n),

@@ -25,7 +25,7 @@ OWN: list[click.Parameter] = [
         help="End the slicer after this time.",
     ),
     click.Option(["--out"], default="out", show_default=True, metavar="DIR", help="Folder for the designs' folders."),
-    click.Option(["--force"], is_flag=True, help="Slice in spite of findings of severity error."),
+    click.Option(["--force"], is_flag=True, help="Slice even if checks report errors."),
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
     asprinted_text.compensate_option(),
     click.Option(["--json", "as_json"], is_flag=True, help="Print the result as JSON."),

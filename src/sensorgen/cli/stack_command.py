@@ -49,7 +49,7 @@ OWN: list[click.Parameter] = [
     ),
     click.Option(
         ["--compression"], type=OneOf(("unconfined", "bonded")),
-        help="How a plate gives way; the best that is known of the cell if not given.",
+        help="Compression law of a plate; the best of the cell if not given.",
     ),
     click.Option(["--json", "as_json"], is_flag=True, help="Print as JSON."),
 ]  # fmt: skip

@@ -26,7 +26,7 @@ def options() -> list[click.Parameter]:
 
 
 def at_once(jobs: int | None) -> int:
-    """How many processes, where nobody says."""
+    """Default number of processes."""
     return jobs or os.cpu_count() or 1
 
 

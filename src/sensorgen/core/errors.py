@@ -50,7 +50,7 @@ class Unprintable(SensorgenError):
         self.findings = list(findings)
         open_ones = [f for f in self.findings if not f.waiver]
         first = f"{open_ones[0].rule}, {open_ones[0].message}" if open_ones else "the checks found errors"
-        super().__init__(f"{first}; nothing was written (--force writes the files all the same)")
+        super().__init__(f"{first}; nothing was written (--force writes the files anyway)")
 
 
 class Unwritable(SensorgenError):

@@ -1,4 +1,4 @@
-"""Plain data from a file, held against the record that it should be; what is wrong is said in our words."""
+"""Plain data from a file, validated against a record type; faults become our errors."""
 
 import reprlib
 from collections.abc import Iterator, Mapping
@@ -64,7 +64,7 @@ def shown(value: object) -> str:
 
 
 def _plain(kind: type[Strict], first: Mapping[str, Any]) -> str:
-    """What pydantic found, in our words."""
+    """Pydantic's faults as our error."""
     place = [str(part) for part in first["loc"] if part not in ("float", "str")]
     key, error = ".".join(place) or f"a {kind.__name__.lower()}", first["type"]
     if error == "value_error":
@@ -88,7 +88,7 @@ def _record_at(kind: type[Strict], place: tuple[Any, ...]) -> type[Strict]:
 
 
 def _records(annotation: Any) -> Iterator[type[Strict]]:
-    """Records that a type speaks of, as ``Waiver`` in ``tuple[Waiver, ...]``."""
+    """Records that a type contains, as ``Waiver`` in ``tuple[Waiver, ...]``."""
     if isinstance(annotation, type) and issubclass(annotation, Strict):
         yield annotation
     for part in get_args(annotation):

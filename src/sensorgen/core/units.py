@@ -56,7 +56,7 @@ class Quantity:
         raise self._no(text, "; decimals take a point, as in 1.5" if "," in text else "")
 
     def factor(self, text: str, unit: str) -> Decimal:
-        """What the number is to be multiplied by; m and M are told apart wherever both have a meaning."""
+        """What the number is to be multiplied by; m and M are distinct wherever both have a meaning."""
         if not unit:
             return Decimal(1)
         if unit in self.units:

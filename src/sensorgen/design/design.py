@@ -310,7 +310,7 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
 
 
 def _check_names(design: Design) -> None:
-    """Look up every name that a design uses, so that a wrong one is told before any work."""
+    """Look up every name that a design uses, so that a wrong one is reported before any work."""
     _ = design.params, design.machine, design.layers
     for part in Slots.model_fields:
         if getattr(design.materials, part):

@@ -180,5 +180,5 @@ def _load(kind: type[_Profile], word: str, name: str, known: list[str]) -> _Prof
 
 
 def _safe(stem: str) -> str:
-    """A file's name as it can stand in the names of other files, and in a slicer's profile."""
+    """A file's name as part of the names of other files, and in a slicer's profile."""
     return re.sub("[^A-Za-z0-9._-]+", "-", stem)[:60].strip("._-") or "own"

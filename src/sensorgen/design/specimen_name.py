@@ -10,7 +10,7 @@
     |    shape with its axes: triX, triY, sqXY, sqYX, SX60 (the plain plate), double
     iteration of the design
 
-The grammar is that of Table D.1 of the thesis, and its slips are read too: each is told in ``assumed``.
+The grammar is that of Table D.1 of the thesis, and its slips are read too: each is listed in ``assumed``.
 """
 
 import re
@@ -56,7 +56,7 @@ class Specimen:
     shape : str
         Shape as designs call it: ``tri``, ``rect``, ``reference``, ``double``.
     axes : str
-        ``X``, ``Y``, ``XY``, ``YX``, or "" where the name does not tell, or the shape has none.
+        ``X``, ``Y``, ``XY``, ``YX``, or "" where the name lacks it, or the shape has none.
     film_mm : float or None
         Thickness of the film [mm], 0 where the name has none; None where it has a size that is no film.
     replicate : int or None
@@ -70,7 +70,7 @@ class Specimen:
     raw : str
         The name as it was given.
     assumed : tuple of str
-        What was read otherwise than written, and what stays doubtful.
+        What was read otherwise than written, and what remains uncertain.
     """
 
     iteration: int | None
@@ -247,7 +247,7 @@ def _slicing(found: re.Match[str] | None) -> tuple[str, str]:
 
 
 def design_of(specimen: Specimen) -> Design | None:
-    """The design that a name stands for, everything else at its default; None where the name does not tell.
+    """The design that a name stands for, everything else at its default; None where the name lacks it.
 
     >>> design_of(parse("23 triY .2mm x fine")).name
     'triy-d0.2-extrafine'

@@ -123,7 +123,7 @@ def sliced(
     time_limit_s : float
         How long the slicer may take [s].
     step : callable
-        Told what comes next, and again while the slicer works, for a progress display.
+        Called with the next step, and again while the slicer works, for a progress display.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """CSV tables: numbers block by block, or text row by row.
 
 The separator is the commonest of ``;``, tab and ``,`` in the header; with ``;``, numbers may have decimal commas. Empty
-cells are nan. Rows are counted as an editor counts them: the header is row 1. NumPy converts a block at once; where it
+cells are nan. Rows are counted as an editor counts them: the header is row 1. NumPy converts a whole block; where it
 fails, cells are converted one by one, so that the message can name the cell.
 """
 

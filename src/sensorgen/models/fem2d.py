@@ -21,7 +21,7 @@ from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.bounds import Fields, Turned, disc, turned
 from sensorgen.solvers.electrostatics.cones import RATIO
 from sensorgen.solvers.electrostatics.corners import exponents, graded
-from sensorgen.solvers.electrostatics.fronts import Numbers
+from sensorgen.solvers.electrostatics.elimination import Numbers
 from sensorgen.solvers.electrostatics.mesh import Cones
 from sensorgen.solvers.electrostatics.plane import Field, Plane
 from sensorgen.solvers.electrostatics.triangles import Triangles, triangles

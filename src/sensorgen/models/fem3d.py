@@ -17,7 +17,6 @@ from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.bounds import Fields, Turned, disc, turned
 from sensorgen.solvers.electrostatics.boxes import Pair, whole
 from sensorgen.solvers.electrostatics.bricks import Grid, grid, layered
-from sensorgen.solvers.electrostatics.dissection import least, unknowns_of
 
 SOURCE = "Dirichlet's and Thomson's principles; graded boxes, H1 and hybrid H(div), nested dissection"
 COST = 3
@@ -116,12 +115,12 @@ def pairs(coarse: Grid, values: Sequence[float]) -> Iterator[Pair]:
 def total(pair: Pair) -> Interval:
     """Energy at 1 V over eps0 of all that the sensor holds, cut cells among it [mm]."""
     shares, rho = pair.flux.shares, np.real(pair.flux.eps)
-    upper = least(pair.potential.elements).energy
-    flux = least(pair.flux.elements, keep=bool(np.ptp(shares)))
+    upper, cut = pair.potential.least().energy, bool(np.ptp(shares))
+    flux = pair.flux.least(keep=cut)
     cell = fem.whole(fem.Energies(flux.energy, upper, 0.0, pair.unknowns()), [1.0])
-    if not flux.steps:
+    if not cut:
         return cell.times(float(shares.min()))
-    part, unmet = pair.part(unknowns_of(pair.flux.elements, flux.values()), rho)
+    part, unmet = pair.part(flux.values()[pair.flux.ids] * pair.flux.scale, rho)
     return whole(cell, float(part), unmet, shares)
 
 

@@ -1,7 +1,7 @@
-"""Prismatic cells under pressure: plane-strain finite elements with contact, and the capacitance when deformed.
+"""Prismatic cells under pressure: plane-strain finite elements with contact, and the capacitance of the deformed cell.
 
-Near-incompressible neo-Hookean solids at large strain; gaps close and open, without friction or sticking. Each answer
-is checked: load reached, volume kept, faces not run into each other, work equal to the energy stored.
+Nearly incompressible neo-Hookean solids at large strain; contact without friction or sticking. Each result is checked:
+load reached, volume, penetration of faces, work equal to the energy stored.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -14,7 +14,8 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.contact.boundary import BoundaryConditions
-from sensorgen.solvers.contact.cell import Cell, cell_of
+from sensorgen.solvers.contact.cell import Cell
+from sensorgen.solvers.contact.cell import cell_of as cell
 from sensorgen.solvers.contact.mesh import Fineness, Mesh, Unmeshed, mesh_of
 from sensorgen.solvers.contact.pressed import (
     DEEPEST,
@@ -55,7 +56,7 @@ def press(
     fineness: Fineness | None = None,
     step: Callable[[float], None] | None = None,
 ) -> Pressed:
-    """Press a cell from above.
+    """Solve a cell under pressure on its top.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ def press(
     solids : mapping of str to Elastic
         By material.
     stress_pa : sequence of float
-        Pressures, from 0 on and rising [Pa].
+        Increasing pressures, from 0 on [Pa].
     permittivity : mapping of str to float, optional
         Relative permittivity by material, with "air"; without it no capacitance is computed [-].
     boundary : BoundaryConditions, optional
@@ -72,12 +73,12 @@ def press(
     fineness : Fineness, optional
         Of the mesh.
     step : callable, optional
-        Told every pressure of ``stress_pa`` that is reached [Pa].
+        Called with every pressure of ``stress_pa`` that is reached [Pa].
 
     Raises
     ------
     OutOfRange
-        Pressures do not rise from 0, or a choice of ``boundary`` is unknown.
+        Pressures do not increase from 0, or a boundary condition is unknown.
     MissingValue
         The mesher is not installed.
     """
@@ -96,7 +97,7 @@ def press(
 
 
 def _coarsened(first: Pressed, again: Pressed, coarser: Fineness) -> str:
-    """What coarser triangles at the apex cost, where the finer ones converged too."""
+    """Error of coarser triangles at the apex, as far as the finer ones converged."""
     both = len(first.stress_pa)
     apart = float(np.abs(again.displacement_m[1:both] / first.displacement_m[1:] - 1).max(initial=0.0))
     known = f"displacement {apart:.1%} off up to {first.converged_pa / 1e3:.4g} kPa" if both > 1 else "error not known"
@@ -144,40 +145,22 @@ def _with_fields(found: Pressed, cell: Cell, run: Run[Mesh], permittivity: Mappi
 
 def _field(cell: Cell, run: Run[Mesh], u_m: Real, permittivity: Mapping[str, float]) -> tuple[Interval | None, Cell]:
     """Capacitance and outlines of a deformed cell; None where no sound mesh of them was found."""
-    from sensorgen.solvers.contact import deformed, field
+    from sensorgen.solvers.contact import deformed, plane_field
 
     mesh = run.mesh
     outline = deformed.deformed(cell, mesh, run.problem.faces, u_m)
     if deformed.misfit(outline, mesh, u_m) > _MISFIT:
         return None, outline
     try:
-        return field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH), outline
+        return plane_field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH), outline
     except Unmeshed:
         return None, outline
 
 
 def why_not_applicable(scene: Scene) -> str | None:
-    """Why this model cannot speak of a scene, or None."""
+    """Why this model does not apply to a scene, or None."""
     try:
-        cell_of(scene, None)
+        cell(scene, None)
     except BadInput as error:
         return str(error)
     return None
-
-
-def cell(scene: Scene, period_mm: float | None) -> Cell:
-    """The cell of a prismatic scene: half a period between two mirrors where there are such, else a whole one.
-
-    Parameters
-    ----------
-    scene : Scene
-        As drawn or as printed, its support gone.
-    period_mm : float or None
-        Period of the pattern; None for a scene without one, as a plate [mm].
-
-    Raises
-    ------
-    BadInput
-        The scene is no prism, or shorter than its period.
-    """
-    return cell_of(scene, period_mm)

@@ -1,7 +1,7 @@
-"""Scenes of boxes under pressure, as crossed strips: bricks at large strain, and the capacitance when deformed.
+"""Scenes of boxes under pressure, as crossed strips: bricks at large strain, and the capacitance of the deformed cell.
 
-Near-incompressible neo-Hookean solids between four mirrors; faces of gaps hold each other apart where they meet. The
-field is solved on the boxes as drawn, with the displacement drawn into the permittivity. Checked as press2d is.
+Nearly incompressible neo-Hookean solids between four mirrors, with contact. The field is solved on the undeformed
+boxes, the displacement being mapped into the permittivity. The checks are those of press2d.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,8 +15,8 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.contact.boundary import BoundaryConditions
-from sensorgen.solvers.contact.brick_field import Orders
 from sensorgen.solvers.contact.bricks import Bricks, bricks_of
+from sensorgen.solvers.contact.mapped_field import Orders
 from sensorgen.solvers.contact.pressed import (
     Elastic,
     Pressed,
@@ -66,7 +66,7 @@ class Pieces:
 
 
 def why_not_applicable(scene: Scene) -> str | None:
-    """Why this model cannot speak of a scene, or None."""
+    """Why this model does not apply to a scene, or None."""
     try:
         cell(scene)
     except BadInput as error:
@@ -98,7 +98,7 @@ def press(
     fineness: Pieces | None = None,
     step: Callable[[float], None] | None = None,
 ) -> Pressed:
-    """Press a cell from above.
+    """Solve a cell under pressure on its top.
 
     Parameters
     ----------
@@ -107,22 +107,22 @@ def press(
     solids : mapping of str to Elastic
         By material.
     stress_pa : sequence of float
-        Pressures, from 0 on and rising [Pa].
+        Increasing pressures, from 0 on [Pa].
     permittivity : mapping of str to float, optional
         Relative permittivity by material, with "air"; without it no capacitance is computed [-].
     boundary : BoundaryConditions, optional
         Base, period ("free": in both directions), top and contact.
     fineness : Pieces, optional
-        Of the mesh; fewer pieces, which is said, where they would be too many.
+        Of the mesh; fewer pieces, with a remark, where they would be too many.
     step : callable, optional
-        Told every pressure of ``stress_pa`` that is reached [Pa].
+        Called with every pressure of ``stress_pa`` that is reached [Pa].
 
     Raises
     ------
     OutOfRange
-        Pressures do not rise from 0, or the electrodes touch.
+        Pressures do not increase from 0, or the electrodes touch.
     BadInput
-        A choice of ``boundary`` is unknown, or an electrode does not cover the cell.
+        A boundary condition is unknown, or an electrode does not cover the cell.
     """
     boundary, wanted = boundary or BoundaryConditions(), fineness or Pieces()
     check(stress_pa, boundary)
@@ -177,8 +177,8 @@ def _solved(
 def _with_fields(found: Pressed, run: "Run[BrickMesh]", permittivity: Mapping[str, float], orders: Orders) -> Pressed:
     """The same with the capacitance of the deformed boxes; gaps that are shut are boundary open by a little."""
     from sensorgen.solvers.contact.air import AirMap
-    from sensorgen.solvers.contact.brick_field import Field, Folded
     from sensorgen.solvers.contact.bricks import mesh_of
+    from sensorgen.solvers.contact.mapped_field import Field, Folded
 
     solid = run.mesh
     whole = mesh_of(solid.bricks, np.ones_like(solid.bricks.fill, dtype=np.bool_))

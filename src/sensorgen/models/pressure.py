@@ -1,4 +1,4 @@
-r"""How pressure is spread along a tip: a profile is the share of the force that rests on the tip up to a place.
+r"""Distribution of pressure along a tip: a profile is the share of the force on the tip up to a place.
 
 Between two places the mean pressure is then exact, whatever the profile, and the pieces of a tip carry its whole force.
 The contact of a round tip grows with the force, by a law that goes with its profile.
@@ -28,7 +28,7 @@ class Profile:
     Attributes
     ----------
     name, source : str
-        What it is, and who says so.
+        Name of the profile, and its source.
     share : function
         Share of the force up to a place, from 0 at one end of the tip to 1 at the other [-].
     density : function
@@ -72,7 +72,7 @@ def profile(name: str) -> Profile:
 
 @dataclass(frozen=True)
 class Contact:
-    r"""How long a round tip touches: :math:`l = c\,(F/W)^n`, up to the tip's own length.
+    r"""Contact length of a round tip: :math:`l = c\,(F/W)^n`, up to the tip's own length.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ def hertz(radius_m: float, plane_modulus_pa: float) -> Contact:
 
 
 def bed(radius_m: float, stiffness_pa_per_m: float) -> Contact:
-    r"""A hard cylinder on a thin layer that gives way as a bed of springs, each by its own pressure.
+    r"""A hard cylinder on a thin layer that deforms as a Winkler foundation, in proportion to the local pressure.
 
     .. math:: l = 2 a = 2 \sqrt[3]{\frac{3 F R}{2 W k}}, \quad p = \frac{k}{2 R} (a^2 - x^2)
 

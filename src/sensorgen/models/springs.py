@@ -1,6 +1,6 @@
-"""Columns as springs in series, side by side under a stiff plate: the cheapest guess at how a cell gives way.
+"""Columns as springs in series, in parallel under a stiff plate: a closed-form estimate of the displacement.
 
-Each column is free to bulge, knows nothing of its neighbours, and carries once its gap is closed.
+Each column is free to bulge, independent of its neighbours, and carries load once its gap is closed.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.units import M_PER_MM
-from sensorgen.scene.overlay import Part, parts
+from sensorgen.scene.overlay import parts
 from sensorgen.scene.scene import Scene
 
 SOURCE = "Hooke's law, column by column; plane strain, E / (1 - nu^2)"
@@ -23,7 +23,7 @@ Real = NDArray[np.float64]
 
 
 def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Sequence[float]) -> Real:
-    r"""How far a stiff plate on a scene comes down.
+    r"""Displacement of a stiff plate on a scene.
 
     .. math:: \sigma = \frac{1}{L} \int \frac{\max(\delta - g, 0)}{\sum_k t_k / M_k} dx
 
@@ -32,7 +32,7 @@ def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Seq
     Parameters
     ----------
     scene : Scene
-        That has columns, its support gone.
+        Of columns, without support.
     modulus_pa : mapping of str to float
         M of each material, as E / (1 - nu^2) [Pa].
     stress_pa : sequence of float
@@ -54,37 +54,34 @@ def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Seq
     -----
     It ignores that columns hold each other and that rubber keeps its volume: see ``docs/compression.md`` for its error.
     """
-    gap, yielding, width, height = _columns(scene, modulus_pa)
+    gap, compliance, width, height = _columns(scene, modulus_pa)
     stress = np.asarray(stress_pa, float)
     if (stress < 0).any():
         raise OutOfRange(f"a stress of {stress.min():g} Pa pulls; expected 0 or more")
     low, high = np.zeros(len(stress)), np.full(len(stress), height)
-    if (_stress(high[:1], gap, yielding, width) <= stress.max(initial=0.0)).any():
+    if (_stress(high[:1], gap, compliance, width) <= stress.max(initial=0.0)).any():
         raise OutOfRange(f"{stress.max():g} Pa presses the cell flat")
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        beyond = _stress(middle, gap, yielding, width) > stress
+        beyond = _stress(middle, gap, compliance, width) > stress
         low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
     return np.where(stress > 0, high, 0.0)
 
 
-def _stress(moved: Real, gap: Real, yielding: Real, width: Real) -> Real:
-    share = np.maximum(moved[:, None] - gap, 0.0) / yielding
+def _stress(displacement_m: Real, gap: Real, compliance: Real, width: Real) -> Real:
+    share = np.maximum(displacement_m[:, None] - gap, 0.0) / compliance
     return np.asarray(share @ width / width.sum())
 
 
-def _parts(scene: Scene) -> list[Part]:
-    try:
-        return parts(scene)
-    except ValueError as error:
-        raise BadInput(f"no springs of columns: {error}") from None
-
-
 def _columns(scene: Scene, modulus_pa: Mapping[str, float]) -> tuple[Real, Real, Real, float]:
-    """Gap [m], yielding t / M [m/Pa] and width [m] at places in all columns, and the least sum of thicknesses [m]."""
+    """Gap [m], compliance t / M [m/Pa] and width [m] at places in all columns, and the least total thickness [m]."""
     share = _PLACES
     rows = []
-    for part in _parts(scene):
+    try:
+        found = parts(scene)
+    except ValueError as error:
+        raise BadInput(f"no springs of columns: {error}") from None
+    for part in found:
         for column in part.columns:
             bottoms, tops = (
                 np.array([getattr(layer, key) for layer in column.layers]) @ np.array([1 - share, share])
@@ -95,5 +92,5 @@ def _columns(scene: Scene, modulus_pa: Mapping[str, float]) -> tuple[Real, Real,
             moduli = np.array([modulus_pa[layer.body.material] for layer in column.layers])
             weight = np.full(len(share), (column.right_mm - column.left_mm) * part.depth_mm)
             rows.append(np.array([gap, (solid / moduli[:, None]).sum(axis=0), weight, solid.sum(axis=0)]))
-    gap, yielding, weight, solid = np.concatenate(rows, axis=1)
-    return gap * M_PER_MM, yielding * M_PER_MM, weight, float((gap + solid).min() * M_PER_MM)
+    gap, compliance, weight, solid = np.concatenate(rows, axis=1)
+    return gap * M_PER_MM, compliance * M_PER_MM, weight, float((gap + solid).min() * M_PER_MM)

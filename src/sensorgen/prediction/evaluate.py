@@ -19,6 +19,7 @@ from sensorgen.models import line
 from sensorgen.models.compression import Compression
 from sensorgen.prediction import bodies, planning
 from sensorgen.prediction.capacitance import Unpredictable
+from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.prediction.error_budget import Load, error_budget
 from sensorgen.prediction.identifiability import FORCE_N, NOISE, identify
 from sensorgen.prediction.losses import Lost, lost
@@ -122,6 +123,8 @@ def _prediction(body: Body, query: Query) -> Prediction:
         found = _at_rest(replace(found, status="predicted", reason=reason), body, rest, query.frequency_hz)
     except (Unpredictable, MissingValue) as error:
         touches = found.gap is not None and found.gap.value == 0
+        with suppress(SensorgenError):  # as a resistivity that is missing
+            found = replace(found, resistance=electrode_resistance(body))
         return replace(found, status="short" if touches else "not predicted", reason=str(error))
     values, doubts = (model.values, model.doubts) if model else (rest.values, rest.doubts)
     found = replace(found, plan=plan, values=values, assumptions=(*_assumptions(body, model), *doubts))

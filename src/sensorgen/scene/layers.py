@@ -56,6 +56,18 @@ def parts(region: Region) -> list[Polygon]:
     return order
 
 
+def united(polygons: Sequence[Polygon]) -> Region:
+    """Union of polygons; those that a line along y or x parts from their neighbours need no overlay."""
+    found = shapely.get_parts(np.array(polygons, dtype=object))
+    found = found[shapely.area(found) > 0]
+    bounds = shapely.bounds(found)
+    for axis in (0, 1):
+        rising = bounds[bounds[:, axis].argsort()]
+        if (rising[1:, axis] > rising[:-1, axis + 2] + SLIVER_MM).all():
+            return shapely.multipolygons(found) if len(found) != 1 else found[0]
+    return shapely.union_all(found)
+
+
 def cleaned(region: Region) -> Region:
     """A region without parts narrower than a sliver, which are rounding."""
     found = shapely.get_parts(region)
@@ -120,8 +132,7 @@ def region_at(body: Body, z_mm: float) -> Region:
 @lru_cache(maxsize=64)
 def _united(outlines: frozenset[Outline]) -> Region:
     """Union of outlines; equal layers share one."""
-    polygons = [Polygon(outline) for outline in outlines]
-    return polygons[0] if len(polygons) == 1 else shapely.union_all(polygons)
+    return united([Polygon(outline) for outline in outlines])
 
 
 def _along(regions: Mapping[str, Region], scene: Scene) -> str:
@@ -129,8 +140,8 @@ def _along(regions: Mapping[str, Region], scene: Scene) -> str:
     found = [part for region in regions.values() for part in parts(region)]
     if not all(map(is_box, found)):
         return ""
-    low, high = np.array([part.bounds for part in found]).reshape(-1, 2, 2).swapaxes(0, 1)
-    whole = np.asarray((low < SLIVER_MM) & (high > np.array(scene.size_mm[:2]) - SLIVER_MM))
+    low, high = shapely.bounds(found).reshape(-1, 2, 2).swapaxes(0, 1)
+    whole = (low < SLIVER_MM) & (high > np.array(scene.size_mm[:2]) - SLIVER_MM)
     return "y" if whole[:, 1].all() else "x" if whole[:, 0].all() else ""
 
 

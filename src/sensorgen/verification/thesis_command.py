@@ -28,7 +28,7 @@ FORMATS = ("html", "md", "json")
 def command(output: str, formats: tuple[str, ...]) -> int:
     """Compute every numbered equation, table and figure of the thesis, and say how far it agrees.
 
-    Ends with 1 where a value differs and nobody knows why. What takes long is solved once and kept.
+    Ends with 1 where a value differs for an unknown reason. What takes long is solved once and kept.
     """
     from sensorgen.verification import thesis
     from sensorgen.verification.thesis.items import CHAPTERS

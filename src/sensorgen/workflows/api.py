@@ -195,11 +195,8 @@ def compress(what: Design | Body, pressure_kpa: Sequence[float], *, accuracy: fl
     >>> float(found.pressure_kpa[-1])
     10.0
     """
-    asked = compression.Asked(
-        compression.stresses_kpa(tuple(pressure_kpa)),
-        BoundaryConditions(),
-        accuracy=float("inf") if accuracy is None else accuracy,
-    )
+    wanted = inf if accuracy is None else accuracy
+    asked = compression.Asked(compression.stresses_kpa(tuple(pressure_kpa)), BoundaryConditions(), accuracy=wanted)
     data = compression.answer(_body(what), asked)
     pressure, displacement, lower, upper = (
         np.array(data[name], float) for name in ("stress_kpa", "displacement_um", "lower_f_per_m2", "upper_f_per_m2")

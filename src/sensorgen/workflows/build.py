@@ -73,11 +73,11 @@ def build(
     cad : bool
         Also write the STEP file; it takes the CAD kernel some seconds.
     force : bool
-        Write the files in spite of findings of severity error.
+        Write the files even if checks report errors.
     strict : bool
         Take warnings for errors.
     step : callable
-        Told what comes next, for a progress display.
+        Called with the next step, for a progress display.
 
     Raises
     ------

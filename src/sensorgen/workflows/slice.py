@@ -108,11 +108,11 @@ def slice_design(
     time_limit_s : float
         How long the slicer may take [s].
     force : bool
-        Slice in spite of findings of severity error.
+        Slice even if checks report errors.
     strict : bool
         Take warnings for errors.
     step : callable
-        Told what comes next, for a progress display.
+        Called with the next step, for a progress display.
 
     Raises
     ------

@@ -55,8 +55,8 @@ class Predicted:
 
     @property
     def touches(self) -> bool:
-        """Whether the electrodes touch, so that the film is a short by design."""
-        return self.prediction.status == "short"
+        """Whether the electrodes touch as drawn, so that the film is a short by design."""
+        return (self.prediction.drawn or self.prediction).status == "short"
 
     @property
     def reason(self) -> str:

@@ -1,4 +1,4 @@
-"""Recordings of the log, brought to where a prediction can be held against them: rest, presses, differences."""
+"""Recordings of the log, reduced to what a prediction gives: rest, loads, differences."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

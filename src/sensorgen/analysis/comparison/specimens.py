@@ -1,6 +1,6 @@
 """Specimens of an iteration: readings, designs, predictions and verdicts, row by row; and what cannot be compared."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, log, nan
 
@@ -76,7 +76,7 @@ class Comparison:
         return tuple({row.reading.specimen: row for row in self.rows}.values())
 
 
-def of_iteration(log: Log, iteration: int) -> Comparison:
+def of_iteration(log: Log, iteration: int, step: Callable[[str], None] = lambda _: None) -> Comparison:
     """Everything in the log about an iteration, compared.
 
     Parameters
@@ -85,6 +85,8 @@ def of_iteration(log: Log, iteration: int) -> Comparison:
         An open one.
     iteration : int
         Of the design.
+    step : callable
+        Called with the name of each design before it is predicted.
     """
     readings = log.readings(iteration=iteration)
     left_out: list[tuple[str, str]] = [
@@ -94,7 +96,10 @@ def of_iteration(log: Log, iteration: int) -> Comparison:
     names = {specimen: design.name for specimen, design in by_specimen.items()}
     designs = dict(sorted((design.name, design) for design in by_specimen.values()))
     left_out += _other_designs(readings, designs.values())
-    found = {name: predicted(design, _stored(log, design)) for name, design in designs.items()}
+    found = {}
+    for name, design in designs.items():
+        step(name)
+        found[name] = predicted(design, _stored(log, design))
     evidence = [_evidence(reading, found.get(names.get(reading.specimen, ""))) for reading in readings]
     usual = {shape: expected_from([e for e in evidence if e.shape == shape]) for shape in {e.shape for e in evidence}}
     rows = []

@@ -2,7 +2,7 @@ r"""Resistivity and leak from a multimeter's readings.
 
 An electrode's resistance over its resistivity is known between bounds, so that each reading allows a range of
 :math:`\varrho`. A film that leaks evenly lets R_Y read less than the electrode has; a bridge at the contacts does not:
-nobody knows which it was, so the range runs from R_Y as it was read to R_Y as an even leak would have it.
+which it was is not recorded, so the range runs from R_Y as it was read to R_Y as an even leak would have it.
 """
 
 from collections.abc import Sequence

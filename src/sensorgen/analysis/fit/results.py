@@ -1,4 +1,4 @@
-"""What a fit gives: values with their uncertainty, what the data cannot tell, and errors before and after."""
+"""What a fit gives: values with their uncertainty, what the data do not determine, and errors before and after."""
 
 from dataclasses import dataclass
 
@@ -29,7 +29,7 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Untold:
-    """A parameter that the data do not tell, and why."""
+    """A parameter that the data do not determine, and why."""
 
     parameter: str
     why: str

@@ -38,7 +38,7 @@ def of_run(run: Run, of: Movable) -> OfRun:
     Raises
     ------
     SensorgenError
-        The design has no sensor that a line speaks of.
+        The line model does not apply to the design.
     """
     from scipy.optimize import least_squares
 

@@ -24,7 +24,7 @@ def text(made: Fit) -> str:
             if value.material == material:
                 numbers = ", ".join(f"{name}: {getattr(value, name):.6g}" for name in ("value", "low", "high"))
                 lines.append(f"    {value.quantity}: {{{numbers}, note: {_said(value.note)}}}")
-    lines += [f"# not told: {' '.join(f'{u.parameter}: {u.why}'.split())}" for u in made.untold]
+    lines += [f"# not determined: {' '.join(f'{u.parameter}: {u.why}'.split())}" for u in made.untold]
     return "\n".join(lines) + "\n"
 
 

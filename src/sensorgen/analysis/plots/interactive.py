@@ -93,7 +93,7 @@ def _domain(panels: Sequence[Panel], k: int) -> list[float]:
 def _axis(axis: Axis) -> Data:
     found: Data = {"title": {"text": escape(axis.title)}, "automargin": True, "zeroline": False}
     if axis.log:
-        found |= {"type": "log", "exponentformat": "SI"}
+        found |= {"type": "log", "exponentformat": "power" if "[-]" in axis.title else "SI"}
     if isfinite(axis.low) and isfinite(axis.high):
         found["range"] = [log10(end) if axis.log else end for end in (axis.low, axis.high)]
     elif isfinite(axis.low):

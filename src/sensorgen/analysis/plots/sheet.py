@@ -12,13 +12,13 @@ from sensorgen.core.units import M_PER_MM
 if TYPE_CHECKING:
     from sensorgen.models.sheet import Bounds, Port, Sheet
 
-_LEAST = 1 / 30  # of the guess's error, at which the colours begin
+_LEAST = 1 / 30  # of the error without information, at which the colours begin
 
 
 def png(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Sequence["Port"]]) -> bytes:
     """Standard errors of x and y over the sheet, one column per set of contacts, as PNG.
 
-    The colours end at the error of a guess, that is of a reading without any information.
+    The colours end at the error without a reading: of a uniform distribution over the sheet.
 
     Parameters
     ----------
@@ -35,17 +35,17 @@ def png(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Seque
         Matplotlib is not installed.
     """
     panels = tuple(_panel(film, name, bounds[name], ports[name], row) for row in (0, 1) for name in bounds)
-    title = "Standard error of a load's position, outline known; contacts red; the scale ends at a guess"
+    title = "Standard error of a load's position, outline known; contacts red; scale up to the error without a reading"
     alt = "Standard errors of x above and of y below, over the sheet, one column per set of contacts."
     return static.png(Figure("sheet", title, alt, {"": panels}, columns=len(bounds)))
 
 
 def _panel(film: "Sheet", name: str, found: "Bounds", ports: Sequence["Port"], row: int) -> Panel:
-    guess_mm = found.guess_m[row] / M_PER_MM
+    none_mm = found.guess_m[row] / M_PER_MM
     sigma_mm = found.sigma(outline=True)[..., 1 + row].T / M_PER_MM
-    shown = np.clip(sigma_mm, guess_mm * _LEAST, guess_mm)
-    drawn = Map(found.x_m / M_PER_MM, found.y_m / M_PER_MM, shown, f"error of {'xy'[row]} [mm]", guess_mm * _LEAST,
-                guess_mm, log=True)  # fmt: skip
+    shown = np.clip(sigma_mm, none_mm * _LEAST, none_mm)
+    drawn = Map(found.x_m / M_PER_MM, found.y_m / M_PER_MM, shown, f"error of {'xy'[row]} [mm]", none_mm * _LEAST,
+                none_mm, log=True)  # fmt: skip
     contacts = []
     for plus, _ in ports:
         (left, right), (front, back) = ((a / M_PER_MM for a in span) for span in (plus.x_m, plus.y_m))

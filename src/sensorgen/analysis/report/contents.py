@@ -101,7 +101,7 @@ def report(log: Log, iteration: int, step: Callable[[str], None] = lambda _: Non
     iteration : int
         Of the design.
     step : callable
-        Called with each of ``STEPS`` before it is done.
+        Called with each of ``STEPS``, and with the name of each design to predict, before it is done.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def report(log: Log, iteration: int, step: Callable[[str], None] = lambda _: Non
         The log has no readings of the iteration.
     """
     step("readings")
-    found = of_iteration(log, iteration)
+    found = of_iteration(log, iteration, step)
     left_out = list(found.left_out)
     step("recordings")
     recorded = list(runs(log, iteration, left_out))
@@ -168,7 +168,7 @@ def _verdicts(found: Comparison) -> Section:
 
 def _explained(found: Sequence[explained.Explanation]) -> Section:
     notes = (
-        "Each parameter is moved alone, for all specimens at once, until the squared residuals are least. Film "
+        "Each parameter is moved alone, for all specimens together, until the squared residuals are least. Film "
         "resistance is compared up to the meter's highest range, the prediction for a film without leakage; it is not "
         "compared where the electrodes touch as drawn.",
     )

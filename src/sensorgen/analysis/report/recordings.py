@@ -39,6 +39,7 @@ class ImpedanceRow:
     r_residual: Annotated[float | None, Column("residual of R", "", "(measured - predicted) / abs(Z predicted)")]
     x_residual: Annotated[float | None, Column("residual of X", "", "(measured - predicted) / abs(Z predicted)")]
     c_pf: Annotated[float, Column("C measured", "pF", "-1 / (omega X)")]
+    c_predicted_pf: Annotated[Cell, Column("C predicted", "pF")]
     c_from_pf: Annotated[Cell, Column("C from", "pF")]
     c_to_pf: Annotated[Cell, Column("C to", "pF")]
 
@@ -68,8 +69,8 @@ def impedances(recorded: Sequence[Run], found: Comparison) -> Table:
 
 
 def _rows(run: Run, of: Predicted | None) -> Iterator[ImpedanceRow]:
-    c = of.capacitance_f if of else None
-    bounds = (c.lower / _F_PER_PF, c.upper / _F_PER_PF) if c else (None, None)
+    c = of.prediction.capacitance if of else None
+    capacitance = (c.value / _F_PER_PF, c.lower / _F_PER_PF, c.upper / _F_PER_PF) if c else (None, None, None)
     for f, z, error in zip(run.recording.tones_hz.tolist(), run.rest_ohm, run.rest_error_ohm, strict=True):
         known = of.prediction.impedance if of else ()
         expected = next((e for e in known if abs(e.frequency_hz / f - 1) < _SAME), None)
@@ -82,7 +83,7 @@ def _rows(run: Run, of: Predicted | None) -> Iterator[ImpedanceRow]:
             run.name, of.design if of else "", f,
             float(z.real), float(error.real), *_predicted(expected.re if expected else None),
             float(z.imag), float(error.imag), *_predicted(expected.im if expected else None),
-            off.real if off is not None else None, off.imag if off is not None else None, c_pf, *bounds,
+            off.real if off is not None else None, off.imag if off is not None else None, c_pf, *capacitance,
         )  # fmt: skip
 
 

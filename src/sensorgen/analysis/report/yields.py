@@ -86,11 +86,14 @@ def findings(found: Comparison) -> Iterator[str]:
         return
     such, whole = [row for row in both if row.verdict.same_order], everything(found)
     design = sum(row.evidence.touching for row in such)
-    doubtful = sum(row.verdict.electrode != "sound" for row in such)
-    of = ", ".join(f"{n} {words}" for n, words in ((design, "by design"), (doubtful, "with a doubtful electrode")) if n)
+    implausible = sum(row.verdict.electrode != "sound" for row in such)
+    of = ", ".join(
+        f"{n} {words}" for n, words in ((design, "by design"), (implausible, "with an implausible electrode")) if n
+    )
+    ratio = f"Median ratio {whole.median_ratio:.3g}." if isfinite(whole.median_ratio) else "The median film reads open."
     yield (
         f"{len(such)} of {len(both)} sensors are shorted or leaking{f' ({of})' if of else ''}: film "
-        f"resistance at most {ORDER:g} times the electrode's. Median ratio {whole.median_ratio:.3g}."
+        f"resistance at most {ORDER:g} times the electrode's. {ratio}"
     )
     if design and whole.shorted.total:
         yield (

@@ -3,7 +3,7 @@
 A material is a YAML file beside this one; see ``etpu.yaml``. A design names a material and, if it
 likes, the source to take: ``x60`` or ``x60@thesis-4.1``. Sources of the user's own, as a fit to
 measurements, are files in a folder of theirs (:mod:`sensorgen.design.materials.own`); a design that names
-none of them never sees them, so that its identity does not hang on who looks at it.
+none of them never sees them, so that its identity does not depend on the reader.
 """
 
 from collections.abc import Iterable, Mapping

@@ -8,7 +8,7 @@
     ,,,,,,,,,,,,,,,,  lower dielectric, of the part 'film'
     ================  bottom electrode
 
-A press strains both films: what tells them apart is how they give way, so each has its thickness and material.
+A load strains both films: they differ by how they deform, so each has its thickness and material.
 """
 
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""A file of G-code held against a printer: what it would do wrong, and what it takes."""
+"""Check of a G-code file on a simulated printer: faults, time, filament."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

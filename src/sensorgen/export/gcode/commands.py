@@ -186,7 +186,7 @@ class _Simulation:
         if event.number not in self.changes and name not in self.control.macros:
             known = ", ".join(filter(None, (self.control.prime_macro, *self.control.macros))) or "none"
             yield error(
-                "macro", event.number, f"nobody knows the macro {name[:60]!r}; {self.machine.name} has {known}",
+                "macro", event.number, f"unknown macro {name[:60]!r}; {self.machine.name} has {known}",
                 "leave it out, or add it to the printer's file (control: macros)",
             )  # fmt: skip
 

@@ -58,7 +58,7 @@ class Effect:
 
 
 _EFFECTS = {
-    **dict.fromkeys(PLACES, Effect("place of work", "whose offset nobody knows")),
+    **dict.fromkeys(PLACES, Effect("place of work", "whose offset is unknown")),
     "G68": Effect("rotation", "turned in the plane of the bed"),
     "G93": Effect("feed", "with feeds that are times"),
     "M28": Effect("file", "into a file on the machine's card"),
@@ -103,7 +103,7 @@ class Effects:
             self.held[key] = event.number, f"lines are printed {effect.says} ({_text(command)})"
 
     def printing(self) -> Iterator[Found]:
-        """What is wrong with lines printed now; each told once."""
+        """What is wrong with lines printed now; each reported once."""
         for number, message in self.held.values():
             yield error("effect", number, message, "leave it out, and let the slicer place, scale and meter the print")
         self.held.clear()
@@ -121,7 +121,7 @@ def judge(command: Command, number: int) -> Iterator[Found]:
     """
     code = command.code
     if code[0] == "G" and code not in _KNOWN_G:
-        yield error("read", number, f"{code} is not followed: nobody knows where it goes", "write plain moves")
+        yield error("read", number, f"{code} is not simulated: its target is unknown", "write plain moves")
     elif code in ("M112", "M999"):
         yield error("end", number, f"{code} stops the machine at once", "leave it out")
     elif code in ("M23", "M32", "M701", "M702", "M997"):

@@ -1,4 +1,4 @@
-"""What the heaters of a printer are told, and whether it may be."""
+"""Temperatures set for the heaters of a printer, and their limits."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ SWITCHES_ON = frozenset({"M104", "M109"})  # G10 and M568 S say how hot, and lea
 
 @dataclass
 class Heat:
-    """What a tool is told: temperatures while it prints and while it waits [C], and whether it is on."""
+    """Settings of a tool: temperatures while printing and waiting [C], and whether it is on."""
 
     active_c: float = 0.0
     standby_c: float = 0.0
@@ -60,7 +60,7 @@ class Heaters:
             )  # fmt: skip
 
     def told(self, event: Event, letter: str, in_hand: int) -> Iterator[Found]:
-        """A tool is told its temperatures: the one that ``letter`` names, or else the one in hand."""
+        """Set a tool's temperatures: of the one that ``letter`` names, or else the one in hand."""
         command, tool = event.command, _tool(event, letter, in_hand)
         if command.has(letter):
             yield from known_tool(self.machine, event, letter, "gets a temperature")
@@ -76,7 +76,7 @@ class Heaters:
             self.tools[int(tool)].on |= command.code in SWITCHES_ON
 
     def state(self, event: Event, in_hand: int) -> Iterator[Found]:
-        """A tool is switched off, to standby or on, and perhaps told its temperatures (M568)."""
+        """Switch a tool off, to standby or on, and perhaps set its temperatures (M568)."""
         if event.command.has("SR"):
             yield from self.told(event, "P", in_hand)
         else:
@@ -86,7 +86,7 @@ class Heaters:
             self.tools[int(tool)].on = event.command.number("A") != 0
 
     def bed(self, event: Event) -> Iterator[Found]:
-        """The bed is told its temperature."""
+        """Set the bed's temperature."""
         values_c = event.command.number("S"), event.command.number("R")
         yield from _too_hot(event.number, "the bed", values_c, self.machine.max_bed_c)
 

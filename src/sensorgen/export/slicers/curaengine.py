@@ -25,9 +25,9 @@ RESOURCES = (Path("/usr/share/cura/resources"), Path("/usr/local/share/cura/reso
 
 @dataclass(frozen=True)
 class EngineSettings:
-    """What the engine must be told: files it reads, settings for all, and settings by tool (from 0).
+    """Input of the engine: files, settings for all, and settings by tool (from 0).
 
-    ``tools`` are those with a material; ``unused`` are the others, which the engine knows all the same.
+    ``tools`` are those with a material; ``unused`` are the others, which the engine knows, too.
     """
 
     printer: str

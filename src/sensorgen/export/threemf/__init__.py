@@ -1,8 +1,8 @@
 """Bodies to multi-material 3MF: the same bodies in one file per family of slicers.
 
 No slicer takes its tools from the 3MF standard, and each family keeps them elsewhere: see ``prusa``,
-``cura`` and ``orca``. Every file is valid 3MF all the same, with named bodies and coloured materials, so
-that any viewer shows it. Bodies stand in the order of their names.
+``cura`` and ``orca``. Every file is valid 3MF, too, with named bodies and coloured materials, so
+that any viewer shows it. Bodies are in the order of their names.
 """
 
 from collections.abc import Sequence

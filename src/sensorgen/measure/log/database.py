@@ -1,7 +1,7 @@
 """Open, check and migrate the log's SQLite file; transactions that survive a crash.
 
 A commit is on the disk before it returns (WAL, ``synchronous=FULL``). A new file is completed beside its path and then
-linked there, so that two programs that start at once share one log, and a killed program leaves no incomplete log.
+linked there, so that two programs that start together share one log, and a killed program leaves no incomplete log.
 """
 
 import os

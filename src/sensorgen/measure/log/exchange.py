@@ -1,4 +1,4 @@
-"""Export of the log as CSV or Parquet, and the exact way back.
+"""Export the log as CSV or Parquet, and read an export back exactly.
 
 Spreadsheets run text that begins with ``=``, ``+``, ``-`` or ``@``. Such text gets a leading apostrophe, and so does
 text that begins with an apostrophe: the import removes one, so that every text comes back unchanged.

@@ -1,4 +1,4 @@
-"""Transcribe notes of a measurement to a row of the log, with everything in them that is doubtful."""
+"""Transcribe notes of a measurement to a row of the log, with a list of doubts."""
 
 import dataclasses
 import re
@@ -54,7 +54,7 @@ def reading(
     table : bool
         Whether the text comes from a table, where a blank beside a reading may be an overload.
     mega : bool
-        Whether a small m is known to mean mega, so that it is not doubtful.
+        Whether a small m is known to mean mega, so that it raises no doubt.
 
     Raises
     ------

@@ -57,7 +57,7 @@ def parse(text: str, *, mega: bool = False) -> Resistances:
     text : str
         Readings with ``/`` or ``;`` between them; in ohms unless they have a unit.
     mega : bool
-        Whether a small m is known to mean mega, so that it is not doubtful.
+        Whether a small m is known to mean mega, so that it raises no doubt.
 
     Raises
     ------

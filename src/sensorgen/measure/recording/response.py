@@ -34,7 +34,7 @@ def principal_component(impedance_ohm: Complex) -> Real:
     spread = np.ptp(channels, axis=0)
     changing = spread > 0
     if not changing.any():
-        raise BadInput("the readings are all the same: they show no presses")
+        raise BadInput("the readings do not change: they show no presses")
     channels = channels[:, changing] / np.where(noise > _NOISELESS * spread, noise, spread)[changing]
     t = np.linspace(-1, 1, len(channels))
     basis = np.column_stack([np.ones_like(t), t])

@@ -1,4 +1,4 @@
-r"""Demodulate several tones at once: discrete Fourier transform of raw waveforms over whole periods.
+r"""Demodulate several tones together: discrete Fourier transform of raw waveforms over whole periods.
 
 In a window of whole periods of every tone the tones are orthogonal, so that no window function, filter or reference is
 needed. Only a few coefficients are needed, so the transform has two steps: segments of B samples are multiplied by one

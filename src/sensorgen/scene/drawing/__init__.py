@@ -14,12 +14,12 @@ It reads the scene alone and knows no shapes. The same input gives the same byte
 """
 
 from collections.abc import Iterator, Sequence
+from importlib import resources
 
 from sensorgen.core.findings import Finding
 from sensorgen.scene.drawing import dimensions, layers, markers, measures, overview, panels, titleblock
 from sensorgen.scene.drawing.panels import Colours, Panel
-from sensorgen.scene.drawing.paper import ARROWS, STYLE, box, element, escaped, line
-from sensorgen.scene.drawing.printed import over
+from sensorgen.scene.drawing.paper import ARROWS, box, element, escaped, line
 from sensorgen.scene.drawing.view import views
 from sensorgen.scene.scene import Point, Scene
 
@@ -57,7 +57,7 @@ def svg(
     notes : sequence of str
         Further lines for the title block.
     printed : Scene, optional
-        What is printed of it, in boxes, to be outlined over the sections.
+        As printed, in boxes, to be outlined over the sections.
 
     Returns
     -------
@@ -67,18 +67,25 @@ def svg(
     grid = list(boundaries_mm) or [0.0, scene.size_mm[2]]
     lanes, details = _details(scene, grid)
     wholes = overview.arrange(details, scene.size_mm[2], LEFT, RIGHT, OVERVIEW + 10)
-    marked = markers.ranked(findings)
-    entries = markers.placed(marked, panels.letters(scene.bodies), (LEFT + 2, FOOT + 8.5, SPLIT - 3, BOTTOM - 2))
+    letters, marked = panels.letters(scene.bodies), markers.ranked(findings)
+    entries = markers.placed(marked, letters, (LEFT + 2, FOOT + 8.5, SPLIT - 3, BOTTOM - 2))
     shown = [entry.mark for entry in entries]
-    gap = _gap(details)
+    gaps = [(nearest, panel) for panel in details if (nearest := measures.nearest(panel.view))]
+    gap = min(gaps, key=lambda pair: round(pair[0].value_mm, 6), default=None)
+    taken: list[Point] = [place for panel in details for place in panels.letter_places(panel).values()]
+    left, room = SPLIT + 3, RIGHT - SPLIT - 3
+    rows = titleblock.rows(scene, details[0].frame, grid, gap[0] if gap else None, notes)
     parts = [
-        *_detail_parts(scene, details, lanes, grid, materials),
-        *(part for panel in details if printed for part in over(panel, printed)),
-        *_notes(details, gap, shown, grid),
+        *_sections(scene, details, lanes, grid, materials),
+        *(part for panel in details if printed for part in panels.outlined(panel, printed)),
+        *_gap_mark(gap, taken),
+        *markers.on_detail(shown, details, grid, taken),
         *(p for d, w, n in zip(details, wholes, NAMES, strict=False) for p in overview.draw(d, w, n, scene, materials)),
         *markers.on_overview(shown, details, wholes),
         *markers.listed(entries, marked, LEFT + 2, FOOT + 3.5, SPLIT - LEFT - 5),
-        *_foot(scene, title, titleblock.rows(scene, details[0].frame, grid, gap[0] if gap else None, notes), materials),
+        line("frame", 6, FOOT - 2, WIDTH - 6, FOOT - 2) + line("frame", SPLIT, FOOT - 2, SPLIT, HEIGHT - 6),
+        *titleblock.legend(scene, letters, materials, left, FOOT + 3, room),
+        *titleblock.block(title, rows, left, BOTTOM - 3.5, room),
     ]
     return _page(title, parts)
 
@@ -95,11 +102,11 @@ def _details(scene: Scene, grid: Sequence[float]) -> tuple[Lanes, list[Panel]]:
     return lanes, panels.arrange(seen, max(grid[-1], height), height, (left, top, RIGHT - layers.WIDTH, bottom))
 
 
-def _detail_parts(
+def _sections(
     scene: Scene, details: Sequence[Panel], lanes: Lanes, grid: Sequence[float], colours: Colours
 ) -> Iterator[str]:
-    """The sections with grid, dimensions and letters."""
-    names = panels.letters(scene.bodies)
+    """The sections with layer grid, dimensions, captions and letters."""
+    letters = panels.letters(scene.bodies)
     first, right = details[0].frame, details[-1].frame.right
     yield box("bed", first.left - 2, first.bed, right - first.left + 4, 0.9)
     for panel in details:
@@ -109,61 +116,29 @@ def _detail_parts(
     yield from layers.labels(first, grid, right + panels.GUTTER)
     yield from dimensions.beside(first, lanes)
     for panel, name in zip(details, NAMES, strict=False):
-        yield from _around(panel, name)
-        yield from panels.lettered(panel, names, colours)
+        above, below = measures.widths(panel.view)
+        over = panel.frame.top - 3
+        yield panels.caption(panel, name, min(over - dimensions.ROW * len(above) - 1.5, panel.frame.top - 5.8))
+        yield from dimensions.rows(panel.frame, above, over, -dimensions.ROW)
+        yield from dimensions.rows(panel.frame, below, panel.frame.bed + 5.4, dimensions.ROW)
+        yield panels.broken(panel)
+        yield from panels.lettered(panel, letters, colours)
 
 
-def _around(panel: Panel, name: str) -> Iterator[str]:
-    """Caption, widths and break line of one detail view."""
-    above, below = measures.widths(panel.view)
-    over = panel.frame.top - 3
-    yield panels.caption(panel, name, min(over - dimensions.ROW * len(above) - 1.5, panel.frame.top - 5.8))
-    yield from dimensions.rows(panel.frame, above, over, -dimensions.ROW)
-    yield from dimensions.rows(panel.frame, below, panel.frame.bed + 5.4, dimensions.ROW)
-    yield panels.broken(panel)
-
-
-def _gap(details: Sequence[Panel]) -> tuple[measures.Gap, Panel] | None:
-    """The electrode gap, and the view that shows it smallest."""
-    found = [(gap, panel) for panel in details if (gap := measures.nearest(panel.view))]
-    return min(found, key=lambda pair: round(pair[0].value_mm, 6), default=None)
-
-
-def _notes(
-    details: Sequence[Panel],
-    gap: tuple[measures.Gap, Panel] | None,
-    shown: Sequence[markers.Marked],
-    grid: Sequence[float],
-) -> Iterator[str]:
-    """The gap and the findings, over everything else and clear of the letters."""
-    taken: list[Point] = [place for panel in details for place in panels.letter_places(panel).values()]
+def _gap_mark(gap: tuple[measures.Gap, Panel] | None, taken: list[Point]) -> Iterator[str]:
+    """The electrode gap in the view that shows it smallest; the room that it takes is added to ``taken``."""
     if gap and gap[0].near[0] <= gap[1].view.end_mm:
         marks, room = dimensions.gap(gap[1], gap[0])
         taken += room
         yield marks
-    yield from markers.on_detail(shown, details, grid, taken)
-
-
-def _foot(scene: Scene, title: str, rows: Sequence[str], colours: Colours) -> Iterator[str]:
-    """Rules, legend and title block."""
-    left, room = SPLIT + 3, RIGHT - SPLIT - 3
-    yield line("frame", 6, FOOT - 2, WIDTH - 6, FOOT - 2) + line("frame", SPLIT, FOOT - 2, SPLIT, HEIGHT - 6)
-    yield from titleblock.legend(scene, panels.letters(scene.bodies), colours, left, FOOT + 3, room)
-    yield from titleblock.block(title, rows, left, BOTTOM - 3.5, room)
 
 
 def _page(title: str, parts: Sequence[str]) -> str:
-    root = {
-        "xmlns": "http://www.w3.org/2000/svg",
-        "width": "297mm",
-        "height": "210mm",
-        "viewBox": "0 0 297 210",
-    }
+    style = "\n" + (resources.files("sensorgen.scene.drawing") / "style.css").read_text("utf-8")
     head = [
-        element("title", "", escaped(title)),
-        element("style", "", STYLE),
-        element("defs", "", ARROWS),
-        box("", 0, 0, WIDTH, HEIGHT, fill="#ffffff"),
-        box("frame", 6, 6, WIDTH - 12, HEIGHT - 12),
-    ]
-    return element("svg", "", "\n".join(["", *head, *(p for p in parts if p), ""]), **root) + "\n"
+        element("title", "", escaped(title)), element("style", "", style), element("defs", "", ARROWS),
+        box("", 0, 0, WIDTH, HEIGHT, fill="#ffffff"), box("frame", 6, 6, WIDTH - 12, HEIGHT - 12),
+    ]  # fmt: skip
+    size = {"width": "297mm", "height": "210mm", "viewBox": "0 0 297 210"}
+    inside = "\n".join(["", *head, *(p for p in parts if p), ""])
+    return element("svg", "", inside, xmlns="http://www.w3.org/2000/svg", **size) + "\n"

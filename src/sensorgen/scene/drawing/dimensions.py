@@ -91,12 +91,8 @@ def gap(panel: Panel, found: Gap) -> tuple[str, list[Point]]:
     (x0, y0), (x1, y1) = panel.place(found.near), panel.place(found.far)
     words = f"gap {number(found.value_mm)}" if found.value_mm > 1e-6 else "gap 0: short"
     room = width(words) * 1.08
-    x = next((x for x in (max(x0, x1) + 1.4, min(x0, x1) - 1.4 - room) if _inside(panel.frame, x, room)), None)
-    x = panel.frame.right + 1.4 if x is None else x
+    sides, frame = (max(x0, x1) + 1.4, min(x0, x1) - 1.4 - room), panel.frame
+    x = next((x for x in sides if frame.left <= x and x + room <= frame.right), frame.right + 1.4)
     y = (y0 + y1) / 2 + 0.9
     marks = seen("gap", x0, y0, x1, y1) + text("gaptext halo", x, y, words)
     return marks, [(x + share * room, y - 0.9) for share in (0.0, 0.35, 0.7, 1.0)]
-
-
-def _inside(frame: Frame, x: float, room: float) -> bool:
-    return frame.left <= x and x + room <= frame.right

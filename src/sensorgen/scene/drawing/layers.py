@@ -15,7 +15,8 @@ def grid(frame: Frame, boundaries_mm: Sequence[float], right: float) -> Iterator
     """Lines at the boundaries up to ``right`` on the page [mm], and dashed ones where slicers sample."""
     pitch = _pitch(frame, boundaries_mm)
     mids = [(a + b) / 2 for a, b in pairwise(boundaries_mm)] if pitch >= MID_PITCH else []
-    lines = _path(frame, _every(boundaries_mm, _step(pitch, LINE_PITCH)), right)
+    step, last = _step(pitch, LINE_PITCH), len(boundaries_mm) - 1
+    lines = _path(frame, [z for k, z in enumerate(boundaries_mm) if k % step == 0 or k == last], right)
     if pitch >= MID_PITCH:
         yield element("path", "under", d=lines)
     yield element("path", "grid" if pitch >= MID_PITCH else "grid dense", d=lines)
@@ -25,21 +26,17 @@ def grid(frame: Frame, boundaries_mm: Sequence[float], right: float) -> Iterator
 
 def labels(frame: Frame, boundaries_mm: Sequence[float], left: float) -> Iterator[str]:
     """Number of each layer at its middle, height at its boundary, from ``left`` on the page [mm]."""
-    step = label_step(frame, boundaries_mm)
+    step = _step(_pitch(frame, boundaries_mm), LABEL_PITCH)
+    step = max(step, 10) if len(boundaries_mm) > MANY + 1 else step
+    decimals = max(len(number(z).partition(".")[2]) for z in boundaries_mm)
     yield text("small faint middle", left + 4, frame.top - 2.2, "layer")
     yield text("small faint end", left + 18, frame.top - 2.2, "z [mm]")
     yield text("small end", left + 18, frame.bed + 0.8, "0")
     for k, (low, high) in enumerate(pairwise(boundaries_mm), start=1):
         if k % step == 0:
             yield text("small bold middle", left + 4, frame.y((low + high) / 2) + 0.8, str(k))
-            yield text("small end", left + 18, frame.y(high) + 0.8, f"{high:.{_decimals(boundaries_mm)}f}")
+            yield text("small end", left + 18, frame.y(high) + 0.8, f"{high:.{decimals}f}")
             yield line("grid", left + 7.5, frame.y(high), left + 9.5, frame.y(high))
-
-
-def label_step(frame: Frame, boundaries_mm: Sequence[float]) -> int:
-    """Of how many layers one gets a number [-]."""
-    step = _step(_pitch(frame, boundaries_mm), LABEL_PITCH)
-    return max(step, 10) if len(boundaries_mm) > MANY + 1 else step
 
 
 def words(frame: Frame, boundaries_mm: Sequence[float]) -> str:
@@ -63,13 +60,5 @@ def _step(pitch: float, least: float) -> int:
     return next((step for step in STEPS if step * pitch >= least), STEPS[-1])
 
 
-def _every(boundaries_mm: Sequence[float], step: int) -> list[float]:
-    return [z for k, z in enumerate(boundaries_mm) if k % step == 0 or k == len(boundaries_mm) - 1]
-
-
 def _path(frame: Frame, heights_mm: Sequence[float], right: float) -> str:
     return "".join(f"M{number(frame.left - 1)} {number(frame.y(z))}H{number(right)}" for z in heights_mm)
-
-
-def _decimals(boundaries_mm: Sequence[float]) -> int:
-    return max(len(number(z).partition(".")[2]) for z in boundaries_mm)

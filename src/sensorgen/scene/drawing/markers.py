@@ -123,20 +123,17 @@ def _spot(panel: Panel, along: float | None, z: float) -> Point:
 
 def on_overview(marked: Sequence[Marked], details: Sequence[Panel], wholes: Sequence[Panel]) -> Iterator[str]:
     """Markers on the overview strips, for those that lie outside of the detail views."""
-    for k, whole in enumerate(wholes):
-        far = [(spot, mark) for mark in marked if (spot := _far_spot(mark.finding, details, k, whole))]
+    for k, (detail, whole) in enumerate(zip(details, wholes, strict=True)):
+        far = []
+        for mark in marked:
+            at, along = mark.finding.place_mm, along_mm(mark.finding, whole)
+            hidden = at and along_mm(mark.finding, detail) is None and panel_of(mark.finding, details) == k
+            if at and hidden and along is not None:
+                far.append((_spot(whole, along, at[2]), mark))
         far.sort(key=lambda pair: (pair[0], pair[1].number))
         places = spread([spot[0] for spot, _ in far], [CLEAR] * len(far), whole.frame.left, whole.frame.right)
         for (spot, mark), x in zip(far, places, strict=True):
             yield _marker(mark, spot, (x, whole.frame.top - 3.2))
-
-
-def _far_spot(finding: Finding, details: Sequence[Panel], k: int, whole: Panel) -> Point | None:
-    """Place on strip k of a finding that the detail views do not hold."""
-    along = along_mm(finding, whole)
-    if finding.place_mm is None or along is None or panel_of(finding, details) != k:
-        return None
-    return None if along_mm(finding, details[k]) is not None else _spot(whole, along, finding.place_mm[2])
 
 
 def _free(spot: Point, panel: Panel, taken: Sequence[Point]) -> Point | None:

@@ -57,20 +57,22 @@ def heights(views: Sequence[View], height_mm: float) -> list[list[Measure]]:
     chain = [Measure(low, high) for low, high in pairwise(levels[:MOST_LEVELS])]
     whole = Measure(0.0, height_mm)
     bodies = _new((Measure(*span) for view in views for span in _extents(view)), [*chain, whole])
-    bodies = sorted(sorted(bodies, key=_value)[:MOST_EXTENTS], key=lambda m: m.low_mm)
+    bodies = sorted(sorted(bodies, key=lambda m: m.value_mm)[:MOST_EXTENTS], key=lambda m: m.low_mm)
     return [lane for lane in (chain, *_lanes(bodies), [whole]) if lane and (lane != chain or len(chain) > 1)]
 
 
 def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
     """Horizontal measures in rows from the sensor outwards: those above the view, and those below it."""
     middle = max(z for _, outline in view.regions for _, z in outline) / 2
-    edges = [u for u in view.period_mm or _edges(view) if u <= view.end_mm + SAME_MM]
+    columns = [*(column.left_mm for column in view.columns), view.columns[-1].right_mm]  # where nothing repeats
+    edges = [u for u in view.period_mm or columns if u <= view.end_mm + SAME_MM]
     lowest = [_reach(view, u, min) for u in edges]
     above = bool(edges) and min(lowest) > middle
     reach = [_reach(view, u, max) for u in edges] if above else lowest
     chain = [Measure(a, b, ends) for (a, b), ends in zip(pairwise(edges), pairwise(reach), strict=True)]
     chain = chain if 1 < len(chain) <= MOST_COLUMNS else []
-    whole = _repeat(view, edges, reach)
+    repeats = view.period_mm and len(edges) == len(view.period_mm)  # the view shows all of a period
+    whole = [Measure(edges[0], edges[-1], (reach[0], reach[-1]))] if repeats else []
     pieces = _new(_pieces(view), [*chain, *whole, Measure(0.0, view.end_mm)], by_value=True)[:MOST_PIECES]
     rows: tuple[list[list[Measure]], list[list[Measure]]] = ([], [])
     rows[not above].append(chain)
@@ -112,18 +114,6 @@ def _extents(view: View) -> Iterator[Point]:
     for body, outline in view.regions:
         by_body.setdefault(body.name, []).extend(z for _, z in outline)
     return ((min(zs), max(zs)) for zs in by_body.values())
-
-
-def _edges(view: View) -> list[float]:
-    """Edges of the columns, where nothing repeats."""
-    return [column.left_mm for column in view.columns] + [view.columns[-1].right_mm]
-
-
-def _repeat(view: View, edges: list[float], reach: list[float]) -> list[Measure]:
-    """The period, where the view shows all of it."""
-    if view.period_mm and len(edges) == len(view.period_mm):
-        return [Measure(edges[0], edges[-1], (reach[0], reach[-1]))]
-    return []
 
 
 def _pieces(view: View) -> Iterator[Measure]:
@@ -171,10 +161,6 @@ def _distinct(values: Iterable[float]) -> list[float]:
         if not kept or value - kept[-1] > SAME_MM:
             kept.append(value)
     return kept
-
-
-def _value(measure: Measure) -> float:
-    return measure.value_mm
 
 
 def _gaps(corners: Sequence[Outline], others: Sequence[Outline]) -> Iterator[Gap]:

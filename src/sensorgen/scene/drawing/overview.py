@@ -30,34 +30,23 @@ def arrange(details: Sequence[Panel], height_mm: float, left: float, right: floa
 
 def draw(detail: Panel, whole: Panel, name: str, scene: Scene, colours: Colours) -> Iterator[str]:
     """The strip with its detail window, its length and its height."""
-    frame = whole.frame
-    yield text("bold", frame.left, frame.top - 6.6, "; ".join(_caption(detail, whole, name, scene)))
-    yield from _filled(whole, colours)
-    if detail.view.end_mm < whole.view.extent_mm:
-        window = detail.view.end_mm * frame.per_mm
-        yield box("window", frame.left - 0.4, frame.top - 0.6, window + 0.8, HEIGHT + 1.2)
-    yield from dimensions.beside(frame, [[Measure(0.0, scene.size_mm[2])]])
-    yield from dimensions.rows(frame, [[Measure(0.0, whole.view.extent_mm)]], frame.bed + 4.6, dimensions.ROW)
-
-
-def _caption(detail: Panel, whole: Panel, name: str, scene: Scene) -> Iterator[str]:
     frame, view = whole.frame, whole.view
-    ratio = frame.per_mm_up / frame.per_mm
-    yield f"Overview {name}: all of {view.section.across}, {number(scene.size_mm[AXES.index(view.normal)])} mm deep"
-    if view.period_mm:
-        yield f"period {number(view.repeat_mm())} mm"
-    yield f"height × {ratio:.3g}" if ratio > 1.0005 else "true to scale"
-    if detail.view.end_mm < view.extent_mm:
-        yield "dashed: the detail above"
-
-
-def _filled(whole: Panel, colours: Colours) -> Iterator[str]:
-    frame, view = whole.frame, whole.view
+    long, ratio = frame.right - frame.left, frame.per_mm_up / frame.per_mm
+    shortened = detail.view.end_mm < view.extent_mm
+    words = [f"Overview {name}: all of {view.section.across}, {number(scene.size_mm[AXES.index(view.normal)])} mm deep"]
+    words += [f"period {number(view.repeat_mm())} mm"] if view.period_mm else []
+    words.append(f"height × {ratio:.3g}" if ratio > 1.0005 else "true to scale")
+    words += ["dashed: the detail above"] if shortened else []
+    yield text("bold", frame.left, frame.top - 6.6, "; ".join(words))
     corners = sum(len(outline) for _, outline in view.section.regions)
     if corners <= MOST_CORNERS and not 0 < view.repeat_mm() * frame.per_mm < FINEST:
         yield from materials(whole, colours, "body far")
-        return
-    long = frame.right - frame.left
-    yield box("fine", frame.left, frame.top, long, HEIGHT)
-    words = f"a period of {number(view.repeat_mm())} mm is too fine to be drawn here"
-    yield text("small middle", frame.left + long / 2, frame.top + HEIGHT / 2 + 0.8, fitted(words, long))
+    else:
+        fine = fitted(f"a period of {number(view.repeat_mm())} mm is too fine to be drawn here", long)
+        yield box("fine", frame.left, frame.top, long, HEIGHT)
+        yield text("small middle", frame.left + long / 2, frame.top + HEIGHT / 2 + 0.8, fine)
+    if shortened:
+        window = detail.view.end_mm * frame.per_mm
+        yield box("window", frame.left - 0.4, frame.top - 0.6, window + 0.8, HEIGHT + 1.2)
+    yield from dimensions.beside(frame, [[Measure(0.0, scene.size_mm[2])]])
+    yield from dimensions.rows(frame, [[Measure(0.0, view.extent_mm)]], frame.bed + 4.6, dimensions.ROW)

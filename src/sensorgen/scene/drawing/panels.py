@@ -6,13 +6,14 @@ from math import floor, log10
 
 from sensorgen.scene.drawing.paper import Frame, element, fitted, number, text
 from sensorgen.scene.drawing.view import View
-from sensorgen.scene.scene import Body, Point
+from sensorgen.scene.scene import Body, Point, Scene, clipped
 
 GUTTER = 8.0  # between a view and what is right of it: room for markers [mm]
 CAPTION = 78.0  # room for the words over a view [mm]
 REPEATS, MOST_REPEATS = 1.7, 60.0
 LOWEST = 12.0  # a view that is flatter on paper shows nothing [mm]
 LARGER = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
+ASIDE = 0.4  # place of a letter across its column: left of the middle, where no line of symmetry runs
 SMALLER = (1.0, 2.0, 5.0)  # 1:2 and 1:5 are read at a glance, 1:1.67 is not
 
 Colours = Mapping[str, tuple[str, str]]
@@ -41,29 +42,22 @@ def arrange(views: Sequence[View], grid_mm: float, height_mm: float, room: Room)
     """
     left, top, right, bottom = room
     each = (right - left) / len(views) - GUTTER
-    wanted = max(min(_wanted_mm(view, height_mm), each / LOWEST * height_mm) for view in views)
+    # of each view a period and most of the next or, where nothing repeats, four heights
+    lengths = (max(REPEATS * v.repeat_mm(), height_mm) if v.period_mm else 4 * height_mm for v in views)
+    wanted = max(
+        min(length, view.extent_mm, each / LOWEST * height_mm) for view, length in zip(views, lengths, strict=True)
+    )
     scale = round_scale(min((bottom - top) / grid_mm, each / wanted))
     bottom -= (bottom - top - grid_mm * scale) / 2
     panels = []
     for view in views:
-        end = _end_mm(view, each / scale)
+        most = min(each / scale, MOST_REPEATS * view.repeat_mm() or each / scale)
+        digit = 10.0 ** (floor(log10(most)) - 1)
+        end = min(view.extent_mm, round(floor(most / digit + 1e-9) * digit, 12))  # all of it, or a round length
         frame = Frame(left, bottom, left + end * scale, bottom - grid_mm * scale, scale, scale)
         panels.append(Panel(replace(view, end_mm=end), frame))
         left = max(frame.right + GUTTER, left + CAPTION)
     return panels
-
-
-def _wanted_mm(view: View, height_mm: float) -> float:
-    """A period and most of the next or, where nothing repeats, four heights [mm]."""
-    wanted = max(REPEATS * view.repeat_mm(), height_mm) if view.period_mm else 4 * height_mm
-    return min(wanted, view.extent_mm)
-
-
-def _end_mm(view: View, room_mm: float) -> float:
-    """All of the sensor if there is room, else a round length."""
-    most = min(room_mm, MOST_REPEATS * view.repeat_mm() or room_mm)
-    digit = 10.0 ** (floor(log10(most)) - 1)
-    return min(view.extent_mm, round(floor(most / digit + 1e-9) * digit, 12))
 
 
 def round_scale(most: float) -> float:
@@ -117,9 +111,9 @@ def letter_places(panel: Panel) -> dict[str, Point]:
     """For each body, where its letter has most room on the page [mm]."""
     best: dict[str, tuple[float, Point]] = {}
     for column in panel.view.columns:
-        along = _aside((column.left_mm, column.right_mm))
+        along = column.left_mm + ASIDE * (column.right_mm - column.left_mm)
         for layer in column.layers:
-            low, high = _aside(layer.bottom_mm), _aside(layer.top_mm)
+            low, high = (left + ASIDE * (right - left) for left, right in (layer.bottom_mm, layer.top_mm))
             room = round(min(column.right_mm - column.left_mm, high - low), 6)
             if room > best.get(layer.body.name, (0.0,))[0]:
                 best[layer.body.name] = (room, panel.place((along, (low + high) / 2)))
@@ -127,23 +121,14 @@ def letter_places(panel: Panel) -> dict[str, Point]:
     return {name: (min(max(x, left), right), y) for name, (_, (x, y)) in best.items()}
 
 
-def _aside(ends: Point) -> float:
-    """A little left of the middle, where no line of symmetry runs."""
-    return ends[0] + 0.4 * (ends[1] - ends[0])
-
-
 def lettered(panel: Panel, names: Mapping[str, str], colours: Colours) -> Iterator[str]:
     """The bodies' letters, in ink that shows on their colour."""
     materials_of = {body.name: body.material for body, _ in panel.view.regions}
     for name, (x, y) in letter_places(panel).items():
         fill = colour(colours, materials_of[name])
-        ink = "#ffffff" if _is_dark(fill) else "#1f2328"
+        red, green, blue = (int(fill[k : k + 2], 16) for k in (1, 3, 5))
+        ink = "#ffffff" if 0.3 * red + 0.59 * green + 0.11 * blue < 128 else "#1f2328"
         yield text("bold middle halo", x, y + 0.9, names[name], style=f"fill:{ink};stroke:{fill}")
-
-
-def _is_dark(fill: str) -> bool:
-    red, green, blue = (int(fill[k : k + 2], 16) for k in (1, 3, 5))
-    return 0.3 * red + 0.59 * green + 0.11 * blue < 128
 
 
 def caption(panel: Panel, name: str, y: float) -> str:
@@ -160,11 +145,18 @@ def broken(panel: Panel) -> str:
     """The break line at the right end, where the sensor goes on."""
     if panel.view.end_mm >= panel.view.extent_mm:
         return ""
-    x, top, bottom = panel.frame.right, panel.frame.y(_top(panel.view)), panel.frame.bed
+    highest = max(z for _, outline in panel.view.regions for _, z in outline)
+    x, top, bottom = panel.frame.right, panel.frame.y(highest), panel.frame.bed
     middle = (top + bottom) / 2
     path = f"M{number(x)} {number(top - 2)}V{number(middle - 2)}l-1.6 .6l3.2 2.8l-1.6 .6V{number(bottom + 2)}"
     return element("path", "under", d=path) + element("path", "thin", d=path)
 
 
-def _top(view: View) -> float:
-    return max(z for _, outline in view.regions for _, z in outline)
+def outlined(panel: Panel, printed: Scene) -> Iterator[str]:
+    """Outlines of the printed bodies where a view cuts them, one path for each body."""
+    view = panel.view
+    for body in printed.bodies:
+        seen = (outline for p in body.prisms for outline in p.cut(view.normal, view.section.at_mm))
+        path = "".join(panel.frame.outline(part) for o in seen if (part := clipped(o, view.end_mm)))
+        if path:
+            yield element("path", "halo-line", "", d=path) + element("path", "printed", "", d=path, data_body=body.name)

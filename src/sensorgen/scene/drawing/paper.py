@@ -13,27 +13,6 @@ PLAIN = 2.5  # height of text; the smallest is 2.3, for less cannot be read on A
 WIDTHS = ((0.28, "ijl"), (0.34, " .,:;'|!I"), (0.43, "frt()[]-/"), (0.53, "csz"), (0.6, "aekovxy"), (0.83, "w"))
 GLYPHS = {c: em for em, letters in (*WIDTHS, (1.0, "mMW@%\N{EM DASH}")) for c in letters}
 
-STYLE = """
-text{font-family:sans-serif;font-size:2.5px;fill:#1f2328}
-.small{font-size:2.3px}.bold{font-weight:bold}.faint{fill:#59636e}.heading{font-size:3px;font-weight:bold}
-.title{font-size:4.4px;font-weight:bold}.middle{text-anchor:middle}.end{text-anchor:end}
-.halo{paint-order:stroke;stroke:#fff;stroke-width:.9;stroke-linejoin:round}
-.body{stroke:#1f2328;stroke-width:.13;stroke-linejoin:round}.far{stroke-width:.05}
-.under{stroke:#fff;stroke-width:.4;stroke-opacity:.4;fill:none}
-.grid{stroke:#2878d0;stroke-width:.14;fill:none}.dense{stroke-width:.08}
-.mid{stroke:#2878d0;stroke-width:.12;stroke-dasharray:1.2 1;fill:none}
-.halo-line{stroke:#fff;stroke-width:.75;fill:none}.printed{stroke:#00806c;stroke-width:.4;fill:none}
-.thin{stroke:#1f2328;stroke-width:.13;fill:none}.frame{stroke:#1f2328;stroke-width:.35;fill:none}
-.dim,.tick{stroke:#1f2328;stroke-width:.16;fill:none}
-.dim{marker-start:url(#sg-start);marker-end:url(#sg-end)}.tick{marker-start:url(#sg-tick);marker-end:url(#sg-tick)}
-.gap{stroke:#d4207e;stroke-width:.35;fill:none}.gaptext{fill:#b3135f;font-weight:bold}
-.window{stroke:#d4207e;stroke-width:.3;stroke-dasharray:1.6 .8;fill:none}
-.bed{fill:#8c959f}.fine{fill:#d0d7de}
-.spot{stroke:#fff;stroke-width:.25}.leader{stroke-width:.25}.balloon{stroke:#fff;stroke-width:.4}
-.error{fill:#d1242f}.warning{fill:#f59e0b}.info{fill:#1f6feb}.waived{fill:#848d97}
-.leader.error{stroke:#d1242f}.leader.warning{stroke:#f59e0b}.leader.info{stroke:#1f6feb}.leader.waived{stroke:#848d97}
-.count{fill:#fff;font-weight:bold;text-anchor:middle;font-size:2.4px}.count.dark{fill:#1f2328}
-"""
 ARROWS = "".join(
     f'<marker id="sg-{name}" viewBox="-6 -3 12 6" markerWidth="{width}" markerHeight="{height}" '
     f'markerUnits="userSpaceOnUse" orient="auto"><path d="{shape}"/></marker>'

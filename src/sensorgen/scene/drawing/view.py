@@ -41,7 +41,14 @@ class View:
     @cached_property
     def regions(self) -> list[Region]:
         """What is cut, as far as it is looked at."""
-        return list(_clipped(self.section, self.end_mm))
+        found = []
+        for body, outline in self.section.regions:
+            along = [u for u, _ in outline]
+            if max(along) <= self.end_mm:
+                found.append((body, outline))
+            elif min(along) < self.end_mm and (part := clipped(outline, self.end_mm)):
+                found.append((body, part))
+        return found
 
     @cached_property
     def columns(self) -> list[Column]:
@@ -90,15 +97,6 @@ def _shown_mm2(section: Section) -> tuple[float, float]:
     return round(sum(area for area, terminal in areas if terminal), 6), round(sum(area for area, _ in areas), 6)
 
 
-def _clipped(section: Section, end_mm: float) -> Iterator[Region]:
-    for body, outline in section.regions:
-        along = [u for u, _ in outline]
-        if max(along) <= end_mm:
-            yield body, outline
-        elif min(along) < end_mm and (part := clipped(outline, end_mm)):
-            yield body, part
-
-
 def period(row: Sequence[Column]) -> tuple[float, ...]:
     """Edges of the columns of the first full period [mm]; empty where nothing repeats.
 
@@ -112,10 +110,12 @@ def period(row: Sequence[Column]) -> tuple[float, ...]:
 
 
 def _alike(a: Column, b: Column) -> bool:
-    bodies = [[layer.body.name for layer in column.layers] for column in (a, b)]
-    return bodies[0] == bodies[1] and all(abs(p - q) < SAME_MM for p, q in zip(_sizes(a), _sizes(b), strict=True))
-
-
-def _sizes(column: Column) -> list[float]:
-    heights = [z for layer in column.layers for z in layer.bottom_mm + layer.top_mm]
-    return [column.right_mm - column.left_mm, *heights]
+    """Whether two columns have the same bodies, width and heights."""
+    (bodies, sizes), (others, beside) = (
+        (
+            [layer.body.name for layer in column.layers],
+            [column.right_mm - column.left_mm, *(z for layer in column.layers for z in layer.bottom_mm + layer.top_mm)],
+        )
+        for column in (a, b)
+    )
+    return bodies == others and all(abs(p - q) < SAME_MM for p, q in zip(sizes, beside, strict=True))

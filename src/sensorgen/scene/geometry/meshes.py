@@ -89,7 +89,7 @@ def _faces(filled: NDArray[np.bool_], around: NDArray[np.uint8], axis: int, side
     """Outer faces on one side of the filled cells: (n, 4) keys of corners, counter-clockwise from outside.
 
     A key is four times the number of the grid point, plus the number of the solid at that point: two
-    solids that meet there in an edge or corner only are told apart by it.
+    solids that meet there in an edge or corner only differ by it.
     """
     outside = np.zeros_like(filled)
     inner = tuple(slice(1 - side, filled.shape[k] - side) if k == axis else slice(None) for k in range(3))

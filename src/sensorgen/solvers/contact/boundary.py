@@ -1,4 +1,4 @@
-"""How a cell is boundary and loaded: which displacements are fixed or equal, and the pressure on its top."""
+"""Boundary conditions of a cell: fixed and equal displacements, and the pressure on its top."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -17,18 +17,18 @@ _SAME = 1e-9  # of the cell's width: places nearer than this are one
 
 @dataclass(frozen=True)
 class BoundaryConditions:
-    """Choices of the boundary.
+    """Boundary and contact conditions of a cell.
 
     Attributes
     ----------
     base : str
         "bonded", or "sliding" without friction.
     period : str
-        "fixed", or "free" to widen until nothing pulls sideways.
+        "fixed", or "free" to widen until there is no lateral force.
     top : str
         "even" pressure, or a "rigid" plate without friction.
     contact : str
-        "frictionless", or "stick" once touched.
+        "frictionless", or "stick" from first contact on.
     """
 
     base: str = "bonded"
@@ -55,7 +55,7 @@ def free_of(
     points_m : (n, d) array
         Places of the nodes, the height last; all sides of the cell are mirrors [m].
     boundary : BoundaryConditions
-        Choices of the boundary.
+        Boundary conditions.
     spans_m : (d, 2) array, optional
         Where the cell begins and ends; as far as its nodes reach where not given [m].
     used : (n,) array, optional

@@ -1,4 +1,4 @@
-"""One cell of a cross-section as edges with a region on each side: what a mesher needs, for any prismatic scene."""
+"""Unit cell of a cross-section as edges with a region on each side, for a mesher; of any prismatic scene."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ Edge = tuple[Point, Point]
 
 @dataclass(frozen=True)
 class Region:
-    """What fills one part of a cell: its material, and the electrode that it belongs to, or ""."""
+    """A part of a cell: its material, and the electrode that it belongs to, or ""."""
 
     material: str
     terminal: str
@@ -26,7 +26,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Cell:
-    """One cell, or half of one that is its own mirror image.
+    """A unit cell, or half of one that is its own mirror image.
 
     Attributes
     ----------
@@ -61,7 +61,20 @@ class Cell:
 
 
 def cell_of(scene: Scene, period_mm: float | None) -> Cell:
-    """As :func:`sensorgen.models.press2d.cell`, which documents it."""
+    """The cell of a prismatic scene: half a period between two mirrors where there are such, else a whole one.
+
+    Parameters
+    ----------
+    scene : Scene
+        As drawn or as printed, without its support.
+    period_mm : float or None
+        Period of the pattern; None for a scene without one, as a plate [mm].
+
+    Raises
+    ------
+    BadInput
+        The scene is no prism, or shorter than its period.
+    """
     try:
         found = sections(scene)
     except ValueError as error:
@@ -100,7 +113,7 @@ def _look(strip: Strip) -> tuple[object, ...]:
 
 
 def _strips(whole: list[Column], left: float, right: float) -> list[Strip]:
-    """The columns between two places, cut there: left, right, and each region with its bottom and top line.
+    """Columns between two places: left, right, and each region with its bottom and top line.
 
     Columns that only go on with what the one before them began are one.
     """
@@ -114,7 +127,7 @@ def _strips(whole: list[Column], left: float, right: float) -> list[Strip]:
 
 
 def _joined(one: Strip, other: Strip) -> list[Strip]:
-    """Two neighbours, as one strip where every line of them runs on straight."""
+    """Merge two neighbours where all of their lines continue straight."""
     (a, b, before), (_, c, after) = one, other
     if [r for r, *_ in before] != [r for r, *_ in after]:
         return [one, other]
@@ -133,7 +146,7 @@ def _layer(column: Column, layer: Layer, left: float, right: float) -> tuple[Reg
 
 
 def _filled(layers: list[tuple[Region, Point, Point]]) -> list[tuple[Region, Point, Point]]:
-    """Layers, with air where one does not reach up to the next."""
+    """Layers with air between them."""
     found = layers[:1]
     for region, low, high in layers[1:]:
         below = found[-1][2]
@@ -166,7 +179,7 @@ def _cell(whole: list[Column], left: float, right: float, *, mirrored: bool) -> 
 
 
 def _add(edges: dict[Edge, tuple[int, int]], a: Point, b: Point, sides: tuple[int, int]) -> None:
-    """Add an edge from left to right, or from below upwards; what is known of it from its other side stays."""
+    """Add an edge from left to right, or upwards; the region on its other side, if any, is kept."""
     key = (_rounded(a), _rounded(b))
     known = edges.get(key, (OUTSIDE, OUTSIDE))
     edges[key] = (sides[0] or known[0], sides[1] or known[1])

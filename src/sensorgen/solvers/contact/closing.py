@@ -1,6 +1,7 @@
-"""Faces that touch, laid along each other: each runs over the points of the other that touch it, so both are one line.
+"""Merge contacting boundaries so that the deformed cell can be meshed without slivers of air.
 
-Mirrors at the cell's ends are faces as well; points that touch one are put onto it.
+Each of two faces in contact runs over the points of the other, so that both become one line. Mirrors at the cell's ends
+are faces as well; points that touch one are put onto it.
 """
 
 from dataclasses import dataclass

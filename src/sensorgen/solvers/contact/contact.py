@@ -207,7 +207,7 @@ class Faces:
         return Pairs(gap, slips, stiffness, length, first + point, np.zeros(len(point), bool), still)
 
     def crossed(self, places_m: Real, outline: Whole, share: float) -> bool:
-        """Whether a face is in two bodies at once, or beyond a mirror, deeper than a share of its side; in a plane.
+        """Whether a face is inside two bodies, or beyond a mirror, deeper than a share of its side; in a plane.
 
         ``outline`` (k, 2) are the straight pieces of all bodies' outlines, anticlockwise.
         """

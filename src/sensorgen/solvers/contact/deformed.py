@@ -1,4 +1,4 @@
-"""The outlines of a pressed cell: sides bent as they are, faces that touch closed, what is left between them is air."""
+"""Outlines of a deformed cell: solid regions, with contacting faces merged, and the air that remains."""
 
 from dataclasses import replace
 

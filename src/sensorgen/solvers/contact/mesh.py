@@ -1,4 +1,4 @@
-"""Triangles of six nodes in a cell's solid parts, fine at notches and where two of them meet in one point."""
+"""Mesh of quadratic triangles of a cell's solid parts, refined at notches and where two of them meet in a point."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -58,7 +58,7 @@ class Mesh(ElementMesh):
 
 @dataclass(frozen=True)
 class Net:
-    """What the mesher gives: places [m], corners and regions of triangles, and sides along negative regions."""
+    """Output of the mesher: places [m], corners and regions of triangles, and sides along negative regions."""
 
     points_m: Real
     corners: Whole
@@ -87,7 +87,7 @@ def at_border(mesh: Mesh) -> NDArray[np.bool_]:
 
 
 def pinches(cell: Cell) -> set[Point]:
-    """Points in which solids touch and nothing more: four edges of solids meet there, mirrors among them."""
+    """Points in which solids touch: four edges of solids meet there, mirrors among them."""
     seen: dict[Point, int] = {}
     for edge, sides in cell.edges.items():
         if cell.solid(sides[0]) != cell.solid(sides[1]):
@@ -119,7 +119,7 @@ class Fineness:
     growth: float = 0.5
 
     def scaled(self, factor: float) -> "Fineness":
-        """Every length and the growth times a factor; but triangles of less than 1 um at an apex fold sooner."""
+        """Every length and the growth times a factor; but triangles of less than 1 um at an apex fold easily."""
         apex = max(factor * self.apex_mm, min(self.apex_mm, _LEAST_APEX_MM))
         return Fineness(apex, *(factor * value for value in (self.corner_mm, self.coarse_mm, self.growth)))
 
@@ -155,7 +155,7 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
 def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth: float, *, quick: bool = False) -> Net:
     """Mesh what edges with a region to their left and right enclose; regions from 0 down are left open.
 
-    ``quick`` triangles are Delaunay's, bettered once: for potentials as good as those of a front that runs inwards.
+    ``quick`` makes Delaunay triangles with one optimisation step; for potentials they are as good as a front.
     """
     geometry = netgen()()
     numbers: dict[Point, int] = {}

@@ -55,7 +55,7 @@ class Pressed:
     capacitance_f_per_m2 : tuple of (Interval or None)
         Bounds for the deformed outlines; None where they could not be meshed [F/m2].
     outlines : tuple of Cell
-        The deformed cell at each pressure; empty in three dimensions, and when no capacitance was asked for.
+        The deformed cell at each pressure; empty in three dimensions, and without capacitance.
     volume_ratio, penetration, imbalance : (n,) array
         Least J, largest penetration over the side that it happens on, and work over energy less 1 [-].
     fall_m : float

@@ -1,4 +1,4 @@
-"""Rings of triangles that shrink towards corners, where fields and stresses are singular."""
+"""Geometric refinement by rings of triangles towards corners, where fields and stresses are singular."""
 
 from collections.abc import Mapping
 from math import atan2, pi
@@ -48,7 +48,7 @@ def notches(cell: Cell) -> list[Point]:
 
 
 def _filled(ways: list[tuple[float, bool]]) -> float:
-    """Angle between two ways that is solid [rad]; the second of each says whether it is on the way's left."""
+    """Solid angle between two directions [rad]; each with whether the solid is on its left."""
     (one, solid), (other, _) = ways
     return (other - one if solid else one - other) % (2 * pi)
 

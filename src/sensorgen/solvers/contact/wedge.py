@@ -1,6 +1,6 @@
-"""Air that runs out in a point: thinner than its sides are long, it is cut off and filled with triangles here.
+"""Wedges of air that end in a point, thinner than their sides are long: cut off and triangulated here.
 
-A mesher asks for triangles as small as the air is thin; second-order triangles across it do as well.
+A mesher would make triangles as small as the air is thin; quadratic triangles across it are as accurate.
 """
 
 from collections import defaultdict

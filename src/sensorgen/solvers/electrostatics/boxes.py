@@ -13,7 +13,7 @@ In the eigenvectors of g the unknowns inside a box do not couple, so that they a
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from sensorgen.core.bounds import Interval
 from sensorgen.solvers.electrostatics.bricks import Grid
-from sensorgen.solvers.electrostatics.dissection import Elements, least, unknowns_of
+from sensorgen.solvers.electrostatics.elimination import HELD, Block, Solution, least
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -210,33 +210,56 @@ class Boxes:
 
     Attributes
     ----------
-    elements : Elements
-        Their energies over eps0 [mm].
+    places : (n, 3) array
+        Which box of the grid each is, along x, y and z.
+    ids : (n, b) array
+        Numbers of the unknowns, equal where boxes share them; 0 and 1 on the bottom and on the top electrode.
+    scale : (n, b) array
+        By which a number's value is the box's unknown: 1, or on an electrode that of a potential of 1 V.
     eps : (n,) array
         Relative permittivity, complex where it loses [-].
     shares : (n,) array
         How often each occurs in the sensor [-].
     shape : callable
-        From a box's number to its matrix for a permittivity of 1.
+        From a box's number to its matrix for a permittivity of 1: energies over eps0 [mm].
+    load : (n, b) array, optional
+        Forces on the unknowns, in place of a top at 1 V.
     """
 
-    elements: Elements
+    places: Ints
+    ids: Ints
+    scale: Real
     eps: Matrix
     shares: Real
     shape: Callable[[int], Real]
+    load: Matrix | None = None
 
     def unknowns(self) -> int:
         """How many the boxes share."""
-        return len(np.unique(self.elements.keys[np.isnan(self.elements.held)]))
+        return len(np.unique(self.ids[self.ids >= HELD]))
+
+    def least(self, keep: bool = False) -> Solution:
+        """The least energy; ``keep`` what finds the unknowns."""
+        ids = self.ids if self.load is None else np.pad(self.ids, ((0, 0), (0, 1)), constant_values=1)
+        blocks = [Block(own, partial(self._matrix, box), self.places[box]) for box, own in enumerate(ids)]
+        return least(blocks, int(self.ids.max()) + HELD, leaf=1, keep=keep)
+
+    def _matrix(self, box: int) -> Matrix:
+        scale = self.scale[box]
+        energy: Matrix = self.eps[box] * (scale[:, None] * self.shape(box) * scale)
+        if self.load is None:
+            return energy
+        push = -(scale * self.load[box])[:, None]
+        return np.block([[energy, push], [push.T, np.zeros((1, 1))]])
 
     def solved(self) -> Matrix:
         """The unknowns of each box (n, b) that have the least energy."""
-        return unknowns_of(self.elements, least(self.elements, keep=True).values())
+        found: Matrix = self.least(keep=True).values()[self.ids] * self.scale
+        return found
 
     def pushed(self, load: Matrix) -> "Boxes":
         """The same with both electrodes at 0 V and forces (n, b) on the unknowns."""
-        held = np.where(np.isnan(self.elements.held), np.nan, 0.0)
-        return replace(self, elements=replace(self.elements, held=held, load=load))
+        return replace(self, ids=np.where(self.ids < HELD, 0, self.ids), load=load)
 
     def answers(self, unknowns: Matrix) -> Matrix:
         """What the unknowns (n, b) are met with (n, b): from a flux's, its moments on the six faces."""
@@ -245,21 +268,17 @@ class Boxes:
 
 def boxes_of(fine: Grid, values: Sequence[complex], kind: Element) -> Boxes:
     """The boxes of a grid whose materials have some relative permittivities."""
-    boxes = np.argwhere(fine.fill > 1)
-    count = np.array(fine.fill.shape)
-    keys = kind.keys(boxes, count)
-    held = np.full(keys.shape, np.nan)
-    for code, value in ((0, 0.0), (1, 1.0)):
-        held[np.isin(keys, kind.keys(np.argwhere(fine.fill == code), count))] = value
-    eps = np.array(values)[fine.fill[tuple(boxes.T)]]
-    edges = np.column_stack([np.diff(p)[boxes[:, axis]] for axis, p in enumerate(fine.planes_mm)])
+    places, count = np.argwhere(fine.fill > 1), np.array(fine.fill.shape)
+    keys = kind.keys(places, count)
+    ids = np.unique(keys, return_inverse=True)[1].reshape(keys.shape) + HELD
+    for code in (0, 1):
+        ids[np.isin(keys, kind.keys(np.argwhere(fine.fill == code), count))] = code
+    edges = np.column_stack([np.diff(p)[places[:, axis]] for axis, p in enumerate(fine.planes_mm)])
     scales = edges.prod(1)[:, None] / (2 * edges**2)
-
-    def shape(box: int) -> Real:
-        return kind.condensed(scales[box])
-
-    elements = Elements(boxes, keys, held, kind.one, lambda box: eps[box] * shape(box))
-    return Boxes(elements, eps, fine.shares[boxes[:, 0], boxes[:, 1]], shape)
+    return Boxes(
+        places, ids, np.where(ids == 1, kind.one, 1.0), np.array(values)[fine.fill[tuple(places.T)]],
+        fine.shares[places[:, 0], places[:, 1]], lambda box: kind.condensed(scales[box]),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

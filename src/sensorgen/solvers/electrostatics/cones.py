@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.solvers.electrostatics.fronts import Numbers, Whole, added, eliminated
+from sensorgen.solvers.electrostatics.elimination import Numbers, Whole, added, eliminated
 from sensorgen.solvers.electrostatics.polynomials import Real, numbered
 
 RATIO = 0.25  # of one ring's radius to the last; more lowers the error no further

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sensorgen.solvers.electrostatics.fronts import HELD, Numbers, Whole
+from sensorgen.solvers.electrostatics.elimination import HELD, Numbers, Whole
 from sensorgen.solvers.electrostatics.triangles import Edge, Fan, Triangles, fans
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sensorgen.solvers.electrostatics.cones import Cone, Layout, ring_corners
-from sensorgen.solvers.electrostatics.fronts import HELD, Block, Numbers, Whole, least
+from sensorgen.solvers.electrostatics.elimination import HELD, Block, Numbers, Whole, least
 from sensorgen.solvers.electrostatics.mesh import Cones, Flow
 from sensorgen.solvers.electrostatics.polynomials import Real, condensed, crossed, numbered
 from sensorgen.solvers.electrostatics.triangles import Edge
@@ -118,7 +118,7 @@ class Problem:
         blocks = [share.block(*parts) for share, *parts in zip(plain, energies, places, strict=True)]
         corners = points[list(self.mesh.fans)]
         blocks += [rim.block(cone.matrix, at) for rim, cone, at in zip(rims, cones, corners, strict=True)]
-        unknowns = least([*blocks, self._rise(flow)] if flow else blocks, self._unknowns[0])
+        unknowns = least([*blocks, self._rise(flow)] if flow else blocks, self._unknowns[0]).values()
         inside = [cone.inside(rim.values(unknowns)) for cone, rim in zip(cones, rims, strict=True)]
         on_plain = np.array([share.values(unknowns) for share in plain])
         return Field(on_plain, inside)

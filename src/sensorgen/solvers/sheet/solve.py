@@ -211,8 +211,8 @@ class Bounds:
             Which frequencies, counted from 0; all unless given.
         outline : bool
             Whether it is known that the press is on the sheet, as a prior of its spread (van Trees): errors of
-            position then never exceed that of a uniform distribution, and an undetermined position does not affect the
-            other errors.
+            position then never exceed that of a uniform distribution, and an undetermined position does not affect
+            the other errors.
         """
         chosen = self.information if tones is None else self.information[:, :, list(tones)]
         known = np.diag([0.0, *(1 / spread**2 for spread in self.guess_m)]) if outline else 0.0

@@ -1,4 +1,4 @@
-"""Speed against accuracy: every model on every standard scene, timed and held against the truth.
+"""Speed against accuracy: every model on every standard scene, timed and compared with a reference.
 
 Times are the processor's, imports left out, so that a busy machine shows nearly what an idle one does.
 """
@@ -61,5 +61,5 @@ def _silent(scene: str, found: Sequence[Point]) -> Iterator[Silent]:
 
 
 def _about(name: str) -> str:
-    """What a model speaks of."""
+    """Scenes that a model applies to."""
     return (registry.load(models, name).__doc__ or "").strip().partition("\n")[0]

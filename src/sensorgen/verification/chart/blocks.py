@@ -1,4 +1,4 @@
-"""Models of compression on bodies whose way under pressure is known: how far their top comes down.
+"""Models of compression on bodies of known displacement under pressure.
 
 A block follows closed forms; a strip that is bonded to stiff plates, and rect pressed lightly, were solved by another
 program to the digits that are given. The error is the largest one over the loads.
@@ -24,7 +24,7 @@ from sensorgen.verification.chart.presses import has_mesher
 
 Real = NDArray[np.float64]
 
-ASKED = "how far the top of a body comes down"
+ASKED = "displacement of the top of a body"
 _RUBBER = Elastic(6e6, 0.5)
 _STRETCHES = np.array([0.97, 0.9, 0.8])  # along the load, of blocks
 _BLOCK_MM, _STRIP_MM, _HALF_MM = 1.2, 10.0, 0.3  # heights of block and half strip, width of the strip
@@ -48,11 +48,11 @@ class Standard:
     boundary : BoundaryConditions
         Boundary and contact conditions.
     stress_pa, down_m : array
-        Loads [Pa] and how far its top comes down [m].
+        Loads [Pa] and displacement of its top [m].
     known_to : float
         Its relative error [-].
     laws : tuple of Plate
-        That can speak of it.
+        Models that apply to it.
     height_m : float
         Of the film that they take it for [m].
     plane, columns : bool
@@ -133,19 +133,19 @@ def points(name: str, budget_s: float) -> list[Point]:
     name : str
         Of ``STANDARD``.
     budget_s : float
-        A finer mesh is not tried where that would take longer, ten times the last one taken as a guess [s].
+        A finer mesh is not tried where that would take longer, estimated as ten times the last one [s].
     """
     standard = STANDARD[name]()
     return [_point(name, standard, *found) for found in (*_cheap(standard), *_solved(standard, budget_s))]
 
 
 def why_not_applicable(name: str) -> dict[str, str]:
-    """Why models of compression cannot speak of a scene."""
+    """Why models of compression do not apply to a scene."""
     standard = STANDARD[name]()
     flat = (
         "it holds the body along its depth" if not standard.plane else press2d.why_not_applicable(standard.scene) or ""
     )
-    deep = press3d.why_not_applicable(standard.scene) or "free sides give way in both directions, not along x alone"
+    deep = press3d.why_not_applicable(standard.scene) or "free sides move in both directions, not along x alone"
     return {"press2d": flat or "the mesher is not installed (extra fem)", "press3d": deep,
             "springs": "beside the strip nothing reaches the top"}  # fmt: skip
 

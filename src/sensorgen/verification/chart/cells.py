@@ -33,7 +33,7 @@ class Standard:
     capacitance_f_per_m2 : float
         Per area of the sensor [F/m2].
     known_to : float
-        Relative half-width of what is known of it [-].
+        Relative half-width of its reference [-].
     shape, params : str, Params or None
         What it was made from, for formulas of one shape.
     """
@@ -73,21 +73,21 @@ STANDARD: dict[str, Callable[[], Standard]] = {
 
 
 def points(name: str, budget_s: float) -> list[Point]:
-    """Measure every model that can speak of a scene.
+    """Measure every model that applies to a scene.
 
     Parameters
     ----------
     name : str
         Of ``STANDARD``.
     budget_s : float
-        A model is not asked for more where that would take longer, ten times the last one taken as a guess [s].
+        A model is not asked for more where that would take longer, estimated as ten times the last one [s].
     """
     standard = STANDARD[name]()
     return [*_formulas(name, standard), *_bounds(name, standard, budget_s)]
 
 
 def why_not_applicable(name: str) -> dict[str, str]:
-    """Why models of capacitance cannot speak of a scene."""
+    """Why models of capacitance do not apply to a scene."""
     scene = STANDARD[name]().scene
     said = {model: module.why_not_applicable(scene) for model, module in capacitance_models().items()}
     only = "it has formulas of tri and rect alone"
@@ -145,7 +145,7 @@ def point(
     scene: str, model: str, found: Interval, standard: Standard, seconds: float, *,
     wanted: float | None = None, bounded: bool = True,
 ) -> Point:  # fmt: skip
-    """What a model gave per area, held against what is known."""
+    """What a model gave per area, compared with the reference."""
     off = [abs(bound / standard.capacitance_f_per_m2 - 1) for bound in (found.lower, found.upper)]
     error = max(*off, standard.known_to)
     said = f"{found.lower:.9g} to {found.upper:.9g} F/m²" if bounded else f"{found.lower:.9g} F/m²"

@@ -75,7 +75,7 @@ def interdigital() -> Exact:
 
     .. math:: C = \tfrac{1}{2} \varepsilon_0 \frac{K(k)}{K(k')}, \quad k = \sin\frac{\pi s}{2}
 
-    Igreja and Dias, Sens. Actuators A 112, 291 (2004). The next finger hangs on a lid 4 pitches up, under a wall.
+    Igreja and Dias, Sens. Actuators A 112, 291 (2004). The next finger is on a lid 4 pitches up, under a wall.
     """
     roof = _FLOOR_MM + 8.0
     low = Body("low", "etpu", (box(0, 0.5, 0, 1, _PLATE_MM, _FLOOR_MM), _floor(2.0)), "bottom")

@@ -1,7 +1,7 @@
 """Models of the pressed line on a plate whose impedance is known to 17 digits.
 
 One press is that of a round tip (Hertz's ellipse of pressure); what models of a flat tip are off is what it counts.
-The error is the larger one of abs(Z) and of Re Z by itself, at the worst tone: Re Z, which tells where the press is, is
+The error is the larger one of abs(Z) and of Re Z by itself, at the worst frequency: Re Z, which holds the position, is
 a thousandth of abs(Z) at low tones, and is lost first.
 """
 
@@ -102,7 +102,7 @@ def points(name: str, budget_s: float) -> list[Point]:
     name : str
         Of ``STANDARD``.
     budget_s : float
-        A ladder gets no more cells where that would take longer, ten times the last one taken as a guess [s].
+        A ladder gets no more cells where that would take longer, estimated as ten times the last one [s].
     """
     return [*_closed(name), *_grown(name, budget_s)]
 
@@ -145,7 +145,7 @@ def _grown(name: str, budget_s: float) -> Iterator[Point]:
 
 
 def why_not_applicable(name: str) -> dict[str, str]:
-    """Why models of lines cannot speak of a scene."""
+    """Why models of lines do not apply to a scene."""
     if STANDARD[name].profile == "uniform":
         return {"pressure": "a flat tip presses evenly"}
     return {"pressure": "it cuts the tip into the pieces of line_tip"}

@@ -22,7 +22,7 @@ class Point:
     scene, model : str
         Names; a model's begins with its own, and goes on after a colon where it has several ways.
     error : float
-        Relative distance from what is known, of the bound that is further off; no less than the reference's own [-].
+        Relative distance from the reference, of the worse bound; no less than the reference's own [-].
     seconds : float
         Time of the processor [s].
     said : str

@@ -1,7 +1,7 @@
 """The elements of press2d on Cook's membrane: does nearly incompressible rubber lock?
 
 A panel 48 mm long, 44 mm high where it is clamped and 16 mm where it is sheared, E 240.565, nu 0.4999, plane strain,
-small strain. Held against the mean way of the sheared edge, by mixed elements of order 6 in another program.
+small strain. Compared with the mean displacement of the sheared edge, by mixed elements of order 6 in another program.
 """
 
 from collections.abc import Callable
@@ -28,7 +28,7 @@ def points(name: str, budget_s: float) -> list[Point]:
     name : str
         Of ``STANDARD``.
     budget_s : float
-        A finer mesh is not tried where that would take longer, ten times the last one taken as a guess [s].
+        A finer mesh is not tried where that would take longer, estimated as ten times the last one [s].
     """
     found: list[Point] = []
     for cells in _CELLS:
@@ -43,7 +43,7 @@ def points(name: str, budget_s: float) -> list[Point]:
 
 
 def why_not_applicable(_: str) -> dict[str, str]:
-    """Why models of compression cannot speak of it."""
+    """Why models of compression do not apply to it."""
     return {"press3d": "its bricks have upright walls", "springs": "nothing presses it", "compression": "it is no film"}
 
 

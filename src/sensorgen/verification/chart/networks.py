@@ -104,13 +104,13 @@ def points(name: str, budget_s: float) -> list[Point]:
     name : str
         Of ``STANDARD``.
     budget_s : float
-        A finer grid is not tried where that would take longer, ten times the last one taken as a guess [s].
+        A finer grid is not tried where that would take longer, estimated as ten times the last one [s].
     """
     return list(_points(name, STANDARD[name](), budget_s))
 
 
 def why_not_applicable(_: str) -> dict[str, str]:
-    """Why models of networks cannot speak of a scene."""
+    """Why models of networks do not apply to a scene."""
     other = "this network is of another kind"
     return {"stack": other, "sheet": other, "traxels": other, "line": other}
 

@@ -48,8 +48,8 @@ def figures(points: Sequence[Point]) -> Iterator[Figure]:
         panel = Panel(
             tuple(curves), Axis("processor time [s]", log=True), Axis(asked, log=True, low=low, high=high), title=scene
         )
-        yield Figure(f"scene-{number}", scene, f"Each point names its model and result. {asked}".replace("\n", " "),
-                     {"": (panel,)})  # fmt: skip
+        words = f"Relative error of {kind_of(scene).ASKED}; each point names its model and result."
+        yield Figure(f"scene-{number}", scene, words, {"": (panel,)})
 
 
 def _curves(points: Sequence[Point], k: int) -> Iterator[Curve]:

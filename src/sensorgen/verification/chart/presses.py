@@ -1,6 +1,6 @@
 """Models of compression on triangular cells whose way under stress other programs have solved.
 
-The error is the largest one over the loads, of how far the top comes down, or of how far the capacitance rises.
+The error is the largest one over the loads, of the displacement of the top, or of the rise of the capacitance.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -24,7 +24,7 @@ Real = NDArray[np.float64]
 
 _EPS = {"x60": 4.68, "air": 1.00059}
 _SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
-ASKED = "how a cell gives way"
+ASKED = "compression of a cell"
 _WIDTH_M = 10e-3  # of the sensor, for a film that is bonded
 
 _MISSING = "the mesher is not installed (extra fem), or the load was not reached"
@@ -42,7 +42,7 @@ class Known:
     film_mm : float
         Of the cell [mm].
     stress_kpa, down_um, rise_pf_per_m : tuple of float
-        Loads [kPa]; how far the top comes down [um] and the capacitance per depth of a period rises [pF/m].
+        Loads [kPa]; displacement of the top [um] and rise of the capacitance per depth of a period [pF/m].
     known_to : (float, float)
         Of both, their largest relative error [-].
     rest_pf_per_m : float
@@ -90,7 +90,7 @@ def points(name: str, budget_s: float) -> list[Point]:
     name : str
         Of ``STANDARD``.
     budget_s : float
-        A finer mesh is not tried where that would take longer, ten times the last one taken as a guess [s].
+        A finer mesh is not tried where that would take longer, estimated as ten times the last one [s].
     """
     film, what = STANDARD[name]
     known = CELLS[film]
@@ -101,7 +101,7 @@ def points(name: str, budget_s: float) -> list[Point]:
 
 
 def why_not_applicable(name: str) -> dict[str, str]:
-    """Why models of compression cannot speak of a scene."""
+    """Why models of compression do not apply to a scene."""
     film, what = STANDARD[name]
     said = {"press3d": press3d.why_not_applicable(_scene(CELLS[film])) or "", "press2d": _MISSING}
     if what == _DOWN:
@@ -142,7 +142,7 @@ def _rise(known: Known, budget_s: float) -> Found:
 
 
 def _laws(known: Known) -> dict[str, compression.Plate]:
-    """The film as a plate; the solved curves of :mod:`sensorgen.models.compression` are what is known here."""
+    """The film as a plate; the solved curves of :mod:`sensorgen.models.compression` are the reference here."""
     modulus = _SOLIDS["x60"].youngs_modulus_pa
     laws = compression.unconfined(modulus), compression.bonded(modulus, _WIDTH_M, known.film_mm * M_PER_MM)
     return {law.name: law for law in laws}

@@ -25,13 +25,13 @@ _READING = np.array(list(_LINE.known.values()))
 _FIT_HZ, _FIT = 10.1e3, 3  # tone of the thesis's fit, and its place among all
 _LENGTH_M, _TIP_M = lines.PLATE["length_m"], lines.PLATE["tip_m"]
 
-STANDARD = {"press read back": (_LINE.force_n, lines.PLATE["left_m"] + _TIP_M / 2)}  # [N], centre [m]
+STANDARD = {"inversion of a load": (_LINE.force_n, lines.PLATE["left_m"] + _TIP_M / 2)}  # [N], centre [m]
 
 Press = tuple[float, float]
 
 
 def points(name: str, _: float) -> list[Point]:
-    """Measure every way back; what is prepared once for a sensor is not in its time.
+    """Measure every inversion; what is prepared once for a sensor is not in its time.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ def points(name: str, budget_s: float) -> list[Point]:
     name : str
         Of ``STANDARD``.
     budget_s : float
-        A finer mesh is not tried where that would take longer, ten times the last one taken as a guess [s].
+        A finer mesh is not tried where that would take longer, estimated as ten times the last one [s].
     """
     length, seconds = timed(_formula)
     found = [_point(name, "pressure: hertz", "", length, seconds)]
@@ -45,8 +45,8 @@ def points(name: str, budget_s: float) -> list[Point]:
 
 
 def why_not_applicable(_: str) -> dict[str, str]:
-    """Why models of compression cannot speak of it."""
-    no_film = "it tells how far the top comes down, and not where bodies touch"
+    """Why models of compression do not apply to it."""
+    no_film = "it gives the displacement of the top, and not where bodies touch"
     return {"press2d": "the mesher is not installed (extra fem)", "press3d": "a prism is no box",
             "springs": no_film, "compression": no_film}  # fmt: skip
 

@@ -29,13 +29,13 @@ class Item(Strict):
     check : str
         Module and function in ``checks/`` that computes it, or "".
     given : dict
-        What that function is told: mostly the thesis's own values.
+        Arguments of that function: mostly the thesis's own values.
     tolerance, off, within, erratum, because
         As of :class:`sensorgen.verification.thesis.verdicts.Expected`.
     why_tolerance : str
         Why a larger tolerance than rounding is right.
     lost, uncovered : str
-        Why it cannot be reproduced; why nothing here speaks of it. What a check then gives is shown, not judged.
+        Why it cannot be reproduced; why nothing here covers it. What a check then gives is shown, not judged.
     """
 
     number: Text
@@ -52,7 +52,7 @@ class Item(Strict):
     uncovered: Text = ""
 
     def expected(self) -> Expected:
-        """What is known of it beforehand."""
+        """Its announced verdict."""
         return Expected(self.tolerance, self.erratum, self.because, self.off, self.within)
 
 

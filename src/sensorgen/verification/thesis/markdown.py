@@ -9,7 +9,7 @@ from sensorgen.verification.thesis.reproduced import Row
 from sensorgen.verification.thesis.verdicts import UNEXPLAINED, WORDS
 
 ABOUT = (
-    "Every numbered equation, table and figure of chapters 2 to 7 and appendices B to D of the thesis, held against "
+    "Every numbered equation, table and figure of chapters 2 to 7 and appendices B to D of the thesis, compared with "
     "this package. Its values are computed as `sensorgen thesis` runs; what stands under “thesis” is a printed value, "
     "or a printed equation put into numbers. Lines are those of Table 3.1 with the mean resistivity of Table C.1, "
     "0.135 ohm m, at 99.7 kHz where nothing else is said; cells are the default ones with a film of 0.1 mm."
@@ -18,9 +18,9 @@ VERDICTS = {
     "agrees": "the thesis's value and ours have these leading digits in common",
     "misprint confirmed": "as printed it differs from ours, corrected it agrees",
     "differs": "it differs by as much as is known, for the reason that is given",
-    "not covered": "nothing here speaks of it, or nothing in it can be compared",
+    "not covered": "nothing here covers it, or nothing in it can be compared",
     "cannot be reproduced": "numbers did not survive or were never published; ours are shown where we have some",
-    "unexplained": "it differs, and nobody knows why: report it",
+    "unexplained": "it differs for an unknown reason: report it",
 }
 
 

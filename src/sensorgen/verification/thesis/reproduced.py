@@ -32,7 +32,7 @@ def rows(started: Callable[[str], None] = lambda _: None) -> list[Row]:
     Parameters
     ----------
     started : callable
-        Told each chapter's name before it is computed.
+        Called with each chapter's name before it is computed.
     """
     found = []
     for name in CHAPTERS:

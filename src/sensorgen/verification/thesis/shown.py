@@ -1,4 +1,4 @@
-"""What was computed, in words: one line for the thesis, one for us."""
+"""Computed values as text: one line for the thesis, one for this package."""
 
 from collections.abc import Sequence
 

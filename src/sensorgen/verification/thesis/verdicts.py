@@ -73,7 +73,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Expected:
-    """What is known of an item beforehand.
+    """Announced verdict of an item.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Expected:
     off : mapping of str to float
         By part, how far the thesis then is from ours [-].
     within : float
-        How near that has to be [-].
+        Tolerance [-].
     """
 
     tolerance: float = EXACT

@@ -147,11 +147,11 @@ def make(
     time_limit_s : float
         How long each slicer may take [s].
     force : bool
-        Write the files in spite of findings of severity error.
+        Write the files even if checks report errors.
     strict : bool
         Take warnings for errors.
     step : callable
-        Told what comes next, for a progress display.
+        Called with the next step, for a progress display.
 
     Raises
     ------

@@ -77,7 +77,7 @@ class Bake(Strict):
 
 
 class Labels(Strict):
-    """How specimens are told apart in the hand."""
+    """How specimens are labelled."""
 
     tab: bool = Field(default=False, description="Print the name on a tab at the far end of each specimen.")
     sheet: bool = Field(default=True, description="A page of labels with QR codes to print.")

@@ -1,4 +1,4 @@
-"""What is printed of the designs of a plate: one copy of each is read back from the slicer's G-code."""
+"""The prints of the designs of a plate: one copy of each is read from the slicer's G-code."""
 
 import json
 from collections.abc import Sequence

@@ -54,12 +54,12 @@ def gcode(
     time_limit_s : float
         How long the slicer may take [s].
     step : callable
-        Told again and again while the slicer works.
+        Called repeatedly while the slicer works.
 
     Returns
     -------
     dict
-        Version of the slicer, the names of its files, what is printed of each design, what the check of the printer's
+        Version of the slicer, the names of its files, the print of each design, what the check of the printer's
         file found, and what it takes.
     """
     inside, own, ready = folder / f".{slicer}", folder / slicer, folder / f"{name}.{slicer}.gcode"

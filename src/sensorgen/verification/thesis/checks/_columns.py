@@ -23,7 +23,7 @@ _ELECTRODE_MM = 0.1
 def piles_f(piles: Sequence[tuple[float, Sequence[Layer]]], depth_mm: float = 1.0) -> float:
     """Capacitance of columns side by side, each of a width [mm] and of layers from below [F].
 
-    The top electrode comes down to each of them, so that what stands in a column is what is named.
+    The top electrode reaches down to each of them, so that a column holds what is named.
     """
     top = 2 * _ELECTRODE_MM + max(sum(thickness for _, thickness in layers) for _, layers in piles)
     end = sum(width for width, _ in piles)
@@ -55,12 +55,12 @@ def exact_f_per_m2(shape: str) -> float:
     Raises
     ------
     MissingValue
-        No solver that is installed comes near enough.
+        No solver that is installed meets the tolerance.
     """
     made = designs.make({"shape": shape, "parameters": {"dielectric_mm": FILM_MM}})
     eps = {taken.material: taken.value for taken in permittivities(made)}
     found = planner.capacitance(made.in_use, eps, _ACCURACY)
     if not found.reached():
-        raise MissingValue(f"no model here comes as near as {_ACCURACY:g}: {'; '.join(found.refused)}")
+        raise MissingValue(f"no model here meets a tolerance of {_ACCURACY:g}: {'; '.join(found.refused)}")
     area = made.params.length_mm * made.params.width_mm * M_PER_MM**2
     return (found.capacitance_f.lower + found.capacitance_f.upper) / 2 / area

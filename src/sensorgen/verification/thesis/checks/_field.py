@@ -1,7 +1,7 @@
 """Potentials and currents along an unpressed line, from nothing but impedances that our model gives.
 
 A piece of line with its far end open and shorted gives the piece as a two-port, by reciprocity and symmetry; the whole
-line then says what flows into it. So the thesis's differential equations are held against a model that never saw them.
+line then says what flows into it. So the thesis's differential equations are tested against an independent model.
 """
 
 from collections.abc import Callable

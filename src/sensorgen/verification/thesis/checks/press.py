@@ -57,7 +57,7 @@ def rectangles(displacement_mm: float, film_mm: float) -> list[Part]:
 
 
 def plates(two_mm: float, three_mm: float) -> list[Part]:
-    """6.11: the plain plate, held at its sides so that only its bulk gives way."""
+    """6.11: the plain plate, fixed at its sides so that only its bulk deforms."""
     ours = _moved_m(_pressed("reference", parameters={}))
     return [
         Part("2D", "m", ours, two_mm * M_PER_MM, shown=_SHOWN),
@@ -75,7 +75,7 @@ def gain(rise_f: float, film_mm: float) -> list[Part]:
 
 
 def _plate() -> Sensor:
-    """The sensor of Table 3.1, free to give way sideways as in B.49."""
+    """The sensor of Table 3.1, free to widen as in B.49."""
     return build_sensor(drawn(designs.make({"shape": "reference"})), "unconfined").sensor
 
 

@@ -102,7 +102,7 @@ def thinner() -> list[Part]:
 
 
 def piezoresistive() -> list[Part]:
-    """B.50: a line that is pressed all along, of a film that does not give way, is one of more resistivity."""
+    """B.50: a line that is pressed all along, of a rigid film, is one of more resistivity."""
     stiff = {"modulus_pa": 1e30, "tip_m": LENGTH_M, "force_n": _FORCE_N}
     ours = line.impedance(
         line.PressedLine(

@@ -63,7 +63,7 @@ def sixteen_columns() -> list[Part]:
 
 
 def whole() -> list[Part]:
-    """3.49: the formula, and the cell that it speaks of."""
+    """3.49: the formula, and its cell."""
     exact = exact_f_per_m2("rect") * _AREA_M2
     return [*sixteen_columns(), Part("of the exact cell", "F", exact, _printed_f(), shown=SHOWN)]
 

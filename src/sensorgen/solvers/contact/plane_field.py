@@ -1,6 +1,6 @@
-"""Capacitance of a cell's outlines, by triangles of second order, from both sides.
+"""Bounds of the capacitance of a cell's outlines by quadratic triangles.
 
-Any potential that is right on the electrodes bounds it from above (Dirichlet); any flux without sources from below
+Any admissible potential bounds it from above (Dirichlet); any divergence-free flux from below
 (Thomson). In the plane such a flux is the curl of a stream function, which turns the lower bound into the same problem
 with 1/eps, its values given on the sides of the cell in place of the electrodes.
 """

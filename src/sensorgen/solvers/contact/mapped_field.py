@@ -1,9 +1,9 @@
-r"""Capacitance of a cell of bent boxes, from both sides, solved on the boxes as drawn.
+r"""Bounds of the capacitance of a cell of deformed boxes, solved on the undeformed boxes.
 
-The displacement F maps straight boxes onto bent ones. Drawn back, the permittivity is the tensor
+The deformation gradient F maps undeformed boxes onto deformed ones. Pulled back, the permittivity is the tensor
 :math:`\varepsilon J F^{-1} F^{-T}`, and no new mesh is needed. Dirichlet: any potential that is right on the electrodes
 has too much energy. Thomson: any flux without sources has too little; its normal component is kept continuous by
-potentials on the faces (hybrid H(div)), and stays so when it is mapped.
+potentials on the faces (hybrid H(div)), and so is the mapped one.
 """
 
 from collections.abc import Callable, Mapping
@@ -118,8 +118,8 @@ class _System:
     """Energy of the unknowns that boxes share; the factors of one load serve for the next.
 
     An approximate potential is still one, so that its energy still lies above; that of an approximate flux lies below
-    once what its residual could take away is subtracted. With factors K0 of an earlier K, whose tensors T0 are such
-    that T <= c T0 everywhere, this is c r' K0^-1 r at most; c <= the largest trace of T0^-1 T.
+    once the largest error that its residual allows is subtracted. With factors K0 of an earlier K, whose tensors T0 are
+    such that T <= c T0 everywhere, this is c r' K0^-1 r at most; c <= the largest trace of T0^-1 T.
 
     Attributes
     ----------

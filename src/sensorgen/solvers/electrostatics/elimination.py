@@ -1,0 +1,176 @@
+"""Least energy of dense blocks that share unknowns, eliminated inside out (nested dissection: George 1973).
+
+Blocks are halved by their places until few are left. Going back, two halves are added, and unknowns that no other block
+shares are eliminated by dense algebra. Matrices are positive definite, or complex symmetric with a real part that is
+after a turn: no pivoting between blocks.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Whole = NDArray[np.int64]
+Real = NDArray[np.float64]
+Numbers = NDArray[Any]  # real or complex
+
+HELD = 2  # unknowns 0 and 1 have the values 0 and 1
+_LEAF = 12  # blocks that are joined together
+
+
+@dataclass(frozen=True)
+class Block:
+    """An energy of some unknowns.
+
+    Attributes
+    ----------
+    ids : (k,) array
+        Numbers of the unknowns; one may occur twice.
+    matrix : (k, k) array, or a function that makes it
+        Symmetric. A function where not all blocks fit into memory together.
+    place : (d,) array
+        Where it is, roughly.
+    """
+
+    ids: Whole
+    matrix: Numbers | Callable[[], Numbers]
+    place: NDArray[Any]
+
+
+@dataclass
+class Solution:
+    """The least energy, or the stationary one.
+
+    Attributes
+    ----------
+    count : int
+        Number of unknowns.
+    energy : float or complex
+        Of all blocks.
+    steps : list of (eliminated unknowns, the others, matrix from the others)
+        In turn; empty where values were not wanted.
+    """
+
+    count: int
+    energy: Any = 0.0
+    steps: list[tuple[Whole, Whole, Numbers]] = field(default_factory=list)
+
+    def values(self) -> Numbers:
+        """Of all unknowns (count,)."""
+        values = np.zeros(self.count, np.result_type(self.energy, *(m.dtype for _, _, m in self.steps[:1])))
+        values[1] = 1.0
+        for gone, kept, others in reversed(self.steps):
+            values[gone] = others @ values[kept]
+        return values
+
+
+@dataclass(frozen=True)
+class _Joined:
+    """Blocks in one: each unknown once, and how many entries of it are in."""
+
+    ids: Whole
+    matrix: Numbers
+    seen: Whole
+
+
+def eliminated(matrix: Numbers, kept: int) -> tuple[Numbers, Numbers]:
+    """Energy of the first ``kept`` unknowns at the best of the others, and the matrix that gives those."""
+    mixed = matrix[kept:, :kept]
+    others = -np.linalg.solve(matrix[kept:, kept:], mixed)
+    return matrix[:kept, :kept] + mixed.T @ others, others
+
+
+def _condensed(matrix: Numbers, kept: int) -> Numbers:
+    """The first result of :func:`eliminated` alone, in half the time where it is real."""
+    from scipy.linalg import solve_triangular
+
+    if np.iscomplexobj(matrix):
+        return eliminated(matrix, kept)[0]
+    factor = np.linalg.cholesky(matrix[kept:, kept:])
+    half = solve_triangular(factor, matrix[kept:, :kept], lower=True, check_finite=False)
+    return np.asarray(matrix[:kept, :kept] - half.T @ half)
+
+
+def added(size: int, parts: Iterable[tuple[Whole, Numbers]]) -> Numbers:
+    """Sum (size, size) of matrices (..., k, k), each with the numbers (..., k) of its rows and columns."""
+    places, values = zip(
+        *(((at[..., :, None] * size + at[..., None, :]).ravel(), m.ravel()) for at, m in parts), strict=True
+    )
+    entries = np.concatenate(values)
+    found = np.zeros(size * size, entries.dtype)
+    np.add.at(found, np.concatenate(places), entries)
+    return found.reshape(size, size)
+
+
+def least(blocks: Sequence[Block], count: int, *, leaf: int = _LEAF, keep: bool = True) -> Solution:
+    """Least energy of the sum of the blocks over ``count`` unknowns.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        Energies.
+    count : int
+        Number of unknowns, the two of known value among them.
+    leaf : int
+        Blocks that are joined without halving; 1 where blocks are large.
+    keep : bool
+        Keep what is needed for the values of the unknowns.
+    """
+    total = np.bincount(np.concatenate([b.ids for b in blocks]), minlength=count)
+    total[:HELD] = np.iinfo(total.dtype).max
+    places, found = np.array([b.place for b in blocks]), Solution(count)
+
+    def joined(which: Whole) -> _Joined:
+        """Some blocks without the unknowns that no other block shares."""
+        if len(which) > leaf:
+            both = _sum([joined(half) for half in _halves(which, places[which])])
+        else:
+            both = _sum([_leaf(blocks[k]) for k in which.tolist()])
+        done = both.seen == total[both.ids]
+        if not done.any():
+            return both
+        turn = np.argsort(done, kind="stable")
+        kept, ids = len(done) - int(done.sum()), both.ids[turn]
+        matrix = both.matrix[turn[:, None], turn]
+        if keep:
+            matrix, others = eliminated(matrix, kept)
+            found.steps.append((ids[kept:], ids[:kept], others))
+        else:
+            matrix = _condensed(matrix, kept)
+        return _Joined(ids[:kept], matrix, both.seen[turn[:kept]])
+
+    left = joined(np.arange(len(blocks)))
+    if (left.ids >= HELD).any():
+        raise ArithmeticError(f"{(left.ids >= HELD).sum()} unknowns are left: this is a fault of the solver")
+    at = np.flatnonzero(left.ids == 1)
+    found.energy = left.matrix[at, at].sum()
+    return found
+
+
+def _leaf(block: Block) -> _Joined:
+    matrix = block.matrix() if callable(block.matrix) else block.matrix
+    return _Joined(block.ids, matrix, np.ones_like(block.ids))
+
+
+def _halves(which: Whole, places: NDArray[Any]) -> tuple[Whole, Whole]:
+    """Two halves of some blocks, cut across their longest side, between two places where they differ."""
+    along = places[:, np.ptp(places, axis=0).argmax()]
+    order = np.argsort(along, kind="stable")
+    edges = np.flatnonzero(np.diff(along[order])) + 1
+    middle = len(which) // 2
+    cut = int(edges[np.abs(edges - len(which) / 2).argmin()]) if len(edges) else middle
+    return which[order[:cut]], which[order[cut:]]
+
+
+def _sum(parts: list[_Joined]) -> _Joined:
+    ids, at = np.unique(np.concatenate([p.ids for p in parts]), return_inverse=True)
+    places = np.split(at, np.cumsum([len(p.ids) for p in parts])[:-1])
+    seen = np.bincount(at, np.concatenate([p.seen for p in parts])).astype(np.int64)
+    if len(parts) > 2 or len(np.unique(places[0])) < len(places[0]):
+        return _Joined(ids, added(len(ids), zip(places, (p.matrix for p in parts), strict=True)), seen)
+    matrix = np.zeros((len(ids),) * 2, np.result_type(*(p.matrix.dtype for p in parts)))
+    for place, part in zip(places, parts, strict=True):  # large, and each unknown once
+        matrix[place[:, None], place] += part.matrix
+    return _Joined(ids, matrix, seen)
