@@ -15,8 +15,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-import lumped_line
-import numpy as np
 import pytest
 
 import sensorgen
@@ -44,18 +42,16 @@ DESIGNS = {
 
 @dataclass(frozen=True)
 class Answer:
-    """What an entry point says of a design; what it does not say is missing.
+    """What an entry point says of a design, each quantity by its name; what it does not say is missing.
 
-    Each is by the body that it is said of, ``drawn`` or ``printed``: capacitance between bounds [F], resistance of
-    ``top`` and ``bottom`` electrode, of the ``worse`` one, or of ``both`` together [ohm], electrode gap [mm].
-    ``verdict`` is how exactly a press is known, in force [N] and position [mm]; ``errors`` is the number of findings of
-    that severity, with the exit code.
+    ``printed`` and ``drawn`` hold what is said of that body: ``capacitance`` [F] and ``gap`` [m] by ``value``, ends of
+    the whole range (``lower``, ``upper``) and of the model's own (``model``), ``resistance`` by ``top``, ``bottom``
+    and ``both`` [ohm], ``resolution`` of force [N] and position [m]. ``errors`` is the number of findings of that
+    severity, with the exit code.
     """
 
-    capacitance: dict = field(default_factory=dict)
-    resistance: dict = field(default_factory=dict)
-    gap: dict = field(default_factory=dict)
-    verdict: tuple | None = None
+    printed: dict = field(default_factory=dict)
+    drawn: dict = field(default_factory=dict)
     errors: tuple | None = None
 
 
@@ -63,8 +59,14 @@ class Asked:
     """A design, and what is asked of it: every command once, in a folder of its own."""
 
     def __init__(self, name, folder):
-        self.name, self.folder, self._said = name, folder, {}
+        self.name, self.folder, self._said, self._answers = name, folder, {}, {}
         (folder / "own.yaml").write_text(OWN, "utf-8")
+
+    def answer(self, entry):
+        """What an entry point says, asked once."""
+        if entry not in self._answers:
+            self._answers[entry] = entry(self)
+        return self._answers[entry]
 
     def say(self, *words):
         """Exit code and standard output of a command, run in this process."""
@@ -103,17 +105,11 @@ class Asked:
 
     @cached_property
     def logged(self):
-        """Name of a specimen of the batch, with bed, prediction, reading and a recording at rest in the log."""
+        """Name of a specimen of the batch, with its bed, prediction and a reading in the log."""
         name = next(iter(json.loads(self.record.read_text("utf-8"))["specimens"]))
-        line = lumped_line.tri(0.2, 0.07, 0.2)
-        tones, rows = np.array([1.1e3]), 40
-        z = np.tile(line.impedance(tones), (rows, 1)) * (1 + 1e-4 * np.sin(np.arange(rows))[:, None])
-        rest = np.column_stack([np.arange(rows) / 10, z.real, z.imag])
-        lumped_line.write(self.folder / "rest.csv", ["time_s", *lumped_line.columns(tones)], rest)
         self.say("log", "predict", self.file, "--json")
         self.say("log", "import", self.record)
         self.say("log", "multimeter", name, "--y", "3k", "--z", "OL")
-        self.say("log", "bench", name, "rest.csv")
         return name
 
 
@@ -136,29 +132,13 @@ def _run(words, folder):
 
 
 def predict(asked):
-    """What all others are held to: the drawing by ``predict``, the print by ``predict --as-printed``."""
-    drawn, both = asked.json("predict", asked.file), asked.json("predict", asked.file, "--as-printed")
-    code, _ = asked.say("predict", asked.file, "--as-printed", "--json")
-    printed = both["electrode_resistance_ohm"]["printed"]
-    return Answer(
-        {"drawn": _bounds(drawn["capacitance_f"]), "printed": _bounds(both["capacitance_f"]["printed"])},
-        {
-            "drawn": _ohm(drawn.get("electrode_resistance_ohm")),
-            "printed": _ohm({end: at[0] for end, at in printed.items() if at} if printed else None),
-        },
-        {"drawn": both["electrode_gap_mm"]["drawn"], "printed": tuple(both["electrode_gap_mm"]["printed"])},
-        _verdict(drawn.get("identifiability")),
-        (_errors(both["findings"]), code),
-    )
+    """What all others are held to."""
+    return _of_prediction(asked.json("predict", asked.file))
 
 
-def predict_as_printed(asked):
-    """The drawing beside the print."""
-    both = asked.json("predict", asked.file, "--as-printed")
-    return Answer(
-        {"drawn": _bounds(both["capacitance_f"]["drawn"])},
-        {"drawn": _ohm(both["electrode_resistance_ohm"]["drawn"])},
-    )
+def predict_drawn(asked):
+    """The drawing asked for by itself."""
+    return Answer(drawn=_of_prediction(asked.json("predict", asked.file, "--drawn")).printed)
 
 
 def build(asked):
@@ -167,58 +147,58 @@ def build(asked):
         json.loads((asked.built / name).read_text("utf-8")) for name in ("prediction.json", "check.json")
     )
     code, _ = asked.say("build", *DESIGNS[asked.name], "--no-cad", "--json")
-    return _of_prediction(prediction, errors=(_errors(check["findings"]), code))
+    return replace(_of_prediction(prediction), errors=(_errors(check["findings"]), code))
 
 
 def cell(asked):
     """``cell``, times the sensor's area."""
-    said = asked.json("cell", asked.file)
-    return Answer({"drawn": _per_area(said, said["area_m2"], "lower_f_per_m2", "upper_f_per_m2") if said else None})
+    return Answer(*(_of_cell(asked.json("cell", asked.file, *how)) for how in ((), ("--drawn",))))
 
 
 def compress(asked):
     """``compress`` at stress 0, which it puts before the stresses that are asked for."""
-    said, area = asked.json("compress", asked.file, "--stress", "1"), asked.json("cell", asked.file)
-    if not said:
-        return Answer({"drawn": None})
-    at_rest = {end: said[end][said["stress_kpa"].index(0.0)] for end in ("lower_f_per_m2", "upper_f_per_m2")}
-    return Answer({"drawn": _per_area(at_rest, area["area_m2"], "lower_f_per_m2", "upper_f_per_m2")})
+    return Answer(*(_at_rest(asked, *how) for how in ((), ("--drawn",))))
 
 
 def batch(asked):
     """``batch.json``."""
-    specimen = next(iter(json.loads(asked.record.read_text("utf-8"))["specimens"].values()))
+    (prediction,) = json.loads(asked.record.read_text("utf-8"))["predictions"].values()
     code, _ = asked.say("batch", "plan.yaml", "--no-gcode", "--json")
-    return _of_prediction(specimen["expected"], errors=(None, code))
+    return replace(_of_prediction(prediction), errors=(None, code))
 
 
 def log_predict(asked):
-    """``log predict``."""
-    _ = asked.logged
-    (_, out) = asked.say("log", "predict", asked.file, "--json")
+    """``log predict``, where the log has no prediction yet."""
+    code, out = asked.say("log", "predict", asked.file, "--log", "empty.db", "--json")
+    assert code == 0, f"log predict ends with {code}"
     return _of_prediction(next(_data(row) for row in json.loads(out) if "data" in row))
 
 
 def log_show(asked):
-    """``log show`` of a specimen: its predictions, which must agree."""
-    found = [_of_prediction(_data(row)) for row in asked.json("log", "show", asked.logged) if "data" in row]
-    if len({answer.capacitance["drawn"] for answer in found}) == 1:
-        return found[0]
-    return replace(found[0], capacitance={"drawn": f"{len(found)} predictions that differ"})
+    """``log show`` of a specimen, whose design was predicted by itself and on its bed: there must be one prediction."""
+    found = [_data(row) for row in asked.json("log", "show", asked.logged) if "data" in row]
+    assert len(found) == 1, f"{len(found)} predictions of one design"
+    return _of_prediction(found[0])
 
 
 def report(asked):
-    """``report``: the table of specimens, that of tones, and that of the variants."""
+    """``report``: the table of readings, that of the variants, and the words beside their drawings."""
     _ = asked.logged
     code, out = asked.say("report", "--iteration", 60, "--format", "json", "-o", "-")
     assert code == 0, f"report ends with {code}"
-    tables = {t["key"]: _rows(t) for section in json.loads(out)["sections"] for t in section["tables"]}
-    assert tables.get("tones"), "report compares no impedance"
-    tone, card = tables["tones"][0], tables["identifiability"][0]
+    sections = json.loads(out)["sections"]
+    tables = {table["key"]: _rows(table) for section in sections for table in section["tables"]}
+    reading, card = tables["readings"][0], tables["identifiability"][0]
+    words = next(variant["words"] for section in sections for variant in section["variants"])
+    said = re.search(r"capacitance ([\d.]+) to ([\d.]+) pF", words)
+    position_mm = card["standard error of position"]
+    position_m = None if position_mm is None else position_mm * 1e-3
     return Answer(
-        {"drawn": _scaled(1e-12, tone["C from"], tone["C to"])},
-        {"drawn": {"worse": tables["specimens"][0]["R_Y to"]}},
-        verdict=_scaled(1.0, card["standard error of force"], card["standard error of position"]),
+        {
+            "capacitance": {"four digits": (float(said[1]), float(said[2]))} if said else None,
+            "resistance": _scaled(1.0, {"from": reading["predicted from"], "to": reading["predicted to"]}),
+            "resolution": _scaled(1.0, {"force": card["standard error of force"], "position": position_m}),
+        }
     )
 
 
@@ -226,14 +206,20 @@ def fit(asked):
     """The sensor from which ``fit`` starts."""
     from sensorgen.analysis.comparison.moved import Movable
 
-    return _of_sensor(asked, lambda design: Movable(design).sensed)
+    return Answer(_of_sensor(asked, lambda design: Movable(design).model))
 
 
 def invert(asked):
     """The sensor that ``invert`` searches."""
-    from sensorgen.prediction.ladder import usual
+    from sensorgen.cli.body_options import body_of
+    from sensorgen.prediction.evaluate import sensor_model
 
-    return _of_sensor(asked, usual)
+    return Answer(
+        *(
+            _of_sensor(asked, lambda design, drawn=drawn: sensor_model(body_of(drawn, None, None)(design))[0])
+            for drawn in (False, True)
+        )
+    )
 
 
 def check(asked):
@@ -241,9 +227,11 @@ def check(asked):
     code, out = asked.say("check", asked.file, "--json")
     findings = json.loads(out)["findings"]
     gap = next((f for f in findings if f["rule"] == "2-printed-gap"), None)
-    printed = float(re.search(r"Arachne: ([\d.]+) mm", gap["message"])[1]) if gap else None
+    printed = float(re.search(r"([\d.]+) mm \(Arachne\)", gap["message"])[1]) if gap else None
     return Answer(
-        gap={"drawn": gap["limit_mm"], "printed": (printed, printed)} if gap else {}, errors=(_errors(findings), code)
+        {"gap": {"value": printed * 1e-3}} if gap else {},
+        {"gap": {"value": gap["limit_mm"] * 1e-3}} if gap else {},
+        (_errors(findings), code),
     )
 
 
@@ -257,7 +245,7 @@ def draw(asked):
 
 def slice_(asked):
     """``slice``: errors of the drawing, of what is printed, and of the G-code, if it writes any."""
-    code, out = asked.say("slice", asked.file, "--json")
+    code, out = asked.say("slice", asked.file, "--out", "sliced", "--json")
     said = json.loads(out)
     found = [*said.get("design_findings", []), *said.get("printed", {}).get("findings", []), *said["findings"]]
     return Answer(errors=(_errors(found), code))
@@ -265,57 +253,75 @@ def slice_(asked):
 
 def python(asked):
     """``sensorgen.predict``."""
-    assert hasattr(sensorgen, "predict"), "there is no sensorgen.predict"
-    said = sensorgen.predict(sensorgen.load(asked.file))
-    return Answer({"printed": _ends(said.capacitance), "drawn": _ends(said.drawn.capacitance)})
+    from sensorgen.prediction.results import to_json
+
+    with contextlib.chdir(asked.folder):
+        return _of_prediction(json.loads(to_json(sensorgen.predict(sensorgen.load(asked.file)))))
 
 
-def _of_prediction(data, errors=None):
-    """A prediction as build, batch and log keep it."""
-    card = data.get("identifiability")
-    return Answer(
-        {"drawn": _bounds(data["capacitance_f"])},
-        {"drawn": _ohm(data.get("electrode_resistance_ohm"))},
-        verdict=_verdict(card),
-        errors=errors,
-    )
+def _of_prediction(data):
+    """A prediction as all keep it, the drawing's beside that of the print."""
+    return Answer(*(_quantities(body) if body else {} for body in (data, data.get("drawn"))))
 
 
-def _of_sensor(asked, sensed_of):
-    from sensorgen.core.errors import SensorgenError
-    from sensorgen.design.design import make
-
-    try:
-        sensed = sensed_of(make(json.loads(asked.file.read_text("utf-8"))))
-    except SensorgenError:
-        return Answer({"drawn": None}, {"drawn": {}})
-    bounds = sensed.unloaded.answer.capacitance_f
-    return Answer({"drawn": (bounds.lower, bounds.upper)}, {"drawn": {"both": sensed.sensor.resistance_ohm()}})
-
-
-def _bounds(data):
-    return (data["lower"], data["upper"]) if isinstance(data, dict) else None
+def _quantities(data):
+    resolution = {"force": data["force_resolution_n"], "position": data["position_resolution_m"]}
+    return {
+        "body": data["body"],
+        "capacitance": data["capacitance"]
+        and {**data["capacitance"], "four digits": _four_digits(data["capacitance"])},
+        "resistance": _ohm(data["resistance"]) if data["resistance"] else None,
+        "gap": data["gap"],
+        "resolution": None if None in resolution.values() else resolution,
+    }
 
 
-def _scaled(factor, *values):
-    return None if None in values else tuple(value * factor for value in values)
-
-
-def _ends(bounds):
-    return (bounds.lower, bounds.upper)
-
-
-def _per_area(data, area_m2, lower, upper):
-    return tuple(data[end] * area_m2 for end in (lower, upper))
+def _four_digits(bounds):
+    return tuple(float(f"{bounds[end] * 1e12:.4g}") for end in ("lower", "upper"))
 
 
 def _ohm(ends):
-    return {**ends, "worse": max(ends.values()), "both": sum(ends.values())} if ends else {}
+    """Of each electrode, of both, and of any of them without the spread of material values."""
+    value = {end: bounds["value"] for end, bounds in ends.items()}
+    known = [bounds[of][end] for bounds in ends.values() for of in ("model", "print") for end in ("lower", "upper")]
+    return {**value, "both": sum(value.values()), "from": min(known), "to": max(known)}
 
 
-def _verdict(card):
-    """Standard errors of force [N] and position [mm]."""
-    return (card["sigma_force_n"], card["sigma_position_m"] * 1e3) if card and "sigma_force_n" in card else None
+def _of_cell(said):
+    """The model's own bounds; None where the cell cannot be asked."""
+    model = _scaled(said["area_m2"], _model(said)) if said else None
+    return {"capacitance": {"model": model} if model else None, "body": said and said.get("body")}
+
+
+def _model(said):
+    return {"lower": said["lower_f_per_m2"], "upper": said["upper_f_per_m2"]}
+
+
+def _at_rest(asked, *how):
+    said, area = asked.json("compress", asked.file, "--stress", "1", *how), asked.json("cell", asked.file)
+    if not said:
+        return {"capacitance": None}
+    first = said["stress_kpa"].index(0.0)
+    return _of_cell(
+        {end: said[end][first] for end in ("lower_f_per_m2", "upper_f_per_m2")} | {"area_m2": area["area_m2"]}
+    )
+
+
+def _of_sensor(asked, model_of):
+    """What a line sensor is made of; None of what it is not made of."""
+    from sensorgen.core.errors import SensorgenError
+    from sensorgen.design.design import make
+
+    with contextlib.chdir(asked.folder):
+        try:
+            sensor = model_of(make(json.loads(asked.file.read_text("utf-8")))).sensor
+        except SensorgenError:
+            return {"capacitance": None, "resistance": None}
+    return {"capacitance": {"value": sensor.capacitance_f()}, "resistance": {"both": sensor.resistance_ohm()}}
+
+
+def _scaled(factor, values):
+    return None if None in values.values() else {name: value * factor for name, value in values.items()}
 
 
 def _errors(findings):
@@ -333,91 +339,36 @@ def _rows(table):
 
 # ---- who is asked for what, and what differs today -------------------------------------------------------------------
 
+KEPT = (build, batch, log_predict, log_show, python)
 ASKED = {
-    "capacitance drawn": (predict_as_printed, build, cell, compress, batch, log_predict, log_show, report, fit, invert,
-                          python),
-    "capacitance printed": (build, batch, log_predict, log_show, report, fit, invert, python),
-    "resistance drawn": (predict_as_printed, build, batch, log_predict, log_show, report, fit, invert),
-    "resistance printed": (build, batch, log_predict, log_show, report, fit, invert),
-    "gap drawn": (build, check, batch, log_predict, log_show, report),
-    "gap printed": (build, check, batch, log_predict, log_show, report),
-    "verdict": (build, log_predict, log_show, report),
-    "errors": (build, check, batch, draw, slice_),
-}  # fmt: skip
+    "capacitance printed": (*KEPT, cell, compress, report, fit, invert),
+    "capacitance drawn": (predict_drawn, *KEPT, cell, compress, invert),
+    "resistance printed": (*KEPT, report, fit, invert),
+    "resistance drawn": (predict_drawn, *KEPT, invert),
+    "gap printed": (*KEPT, check),
+    "gap drawn": (predict_drawn, *KEPT, check),
+    "resolution printed": (*KEPT, report),
+    "resolution drawn": (predict_drawn, *KEPT),
+    "errors": (build, check, batch, draw),
+}
 ALL = tuple(DESIGNS)
 SOLVED = ("trix", "triy", "rect", "own", "compensated", "upside-down")  # a cell that no closed form has
 PRISMS = ("trix", "triy", "own", "compensated", "upside-down")  # of which the slicer drops layers
 UNNAMED = ("rect", "reference", "double")  # whose gap is printed as drawn
 
-CHEAP = "goes by the bounds of columns"
-OWN_ACCURACY = "asks the cell for another accuracy"
-SILENT = "says nothing of the print"
-SILENT_GAP = "says nothing of the gap"
+OWN_CELL = "bounds the cell of the computed outlines anew; of the own design it takes whole periods only"
+BY_NAME = "compares with the design that the specimen's name stands for"
+ONLY_OTHERWISE = "names the gap only where it is printed otherwise"
 UNAWARE = "does not count what is not printed"
 RED = {  # who differs today, why, and for which designs: what is mended has to go from here, as xfail is strict
-    "capacitance drawn": {
-        "predict_as_printed": ("asks the cell another time, and has other digits from the ninth on", PRISMS),
-        "build": (CHEAP, SOLVED),
-        "cell": (OWN_ACCURACY, SOLVED),
-        "compress": (f"{OWN_ACCURACY}; of the own design it takes whole periods only", SOLVED),
-        "batch": (OWN_ACCURACY, SOLVED),
-        "log_predict": (CHEAP, SOLVED),
-        "log_show": ("the log has a prediction of the bed and another one of the design", SOLVED),
-        "report": (f"{CHEAP}, and by the design that the specimen's name stands for", SOLVED),
-        "fit": (CHEAP, SOLVED),
-        "python": ("there is no Python API", ALL),
-    },
-    "capacitance printed": {
-        "build": (SILENT, ALL),
-        "batch": (f"{SILENT} unless it slices", ALL),
-        "log_predict": (SILENT, ALL),
-        "log_show": (SILENT, ALL),
-        "report": (SILENT, ALL),
-        "fit": (SILENT, ALL),
-        "invert": (SILENT, ALL),
-        "python": ("there is no Python API", ALL),
-    },
-    "resistance drawn": {
-        "predict_as_printed": ("predict has no resistance where it has no capacitance", ("double",)),
-        "report": ("has a resistance of its own, by the design that the specimen's name stands for", ("double", "own")),
-    },
-    "resistance printed": {
-        "build": (SILENT, ALL),
-        "batch": (f"{SILENT} unless it slices", ALL),
-        "log_predict": (SILENT, ALL),
-        "log_show": (SILENT, ALL),
-        "report": (SILENT, ALL),
-        "fit": (SILENT, ALL),
-        "invert": (SILENT, ALL),
-    },
-    "gap drawn": {
-        "build": (SILENT_GAP, ALL),
-        "check": ("names the gap only where it is printed otherwise", UNNAMED),
-        "batch": (SILENT_GAP, ALL),
-        "log_predict": (SILENT_GAP, ALL),
-        "log_show": (SILENT_GAP, ALL),
-        "report": (SILENT_GAP, ALL),
-    },
-    "gap printed": {
-        "build": (SILENT_GAP, ALL),
-        "check": ("names the gap only where it is printed otherwise", UNNAMED),
-        "batch": (f"{SILENT_GAP} unless it slices", ALL),
-        "log_predict": (SILENT_GAP, ALL),
-        "log_show": (SILENT_GAP, ALL),
-        "report": (SILENT_GAP, ALL),
-    },
-    "verdict": {
-        "build": (CHEAP, SOLVED),
-        "log_predict": (CHEAP, SOLVED),
-        "log_show": (CHEAP, SOLVED),
-        "report": (CHEAP, SOLVED),
-    },
-    "errors": {
-        "build": (UNAWARE, PRISMS),
-        "check": (UNAWARE, PRISMS),
-        "batch": (f"{UNAWARE} unless it slices", PRISMS),
-        "draw": (f"{UNAWARE} unless --as-printed", PRISMS),
-    },
+    ("capacitance printed", "compress"): (OWN_CELL, SOLVED),
+    ("capacitance drawn", "compress"): (OWN_CELL, SOLVED),
+    ("capacitance printed", "report"): (BY_NAME, ("own", "compensated")),
+    ("resistance printed", "report"): (BY_NAME, ("double", "own", "compensated")),
+    ("resolution printed", "report"): (BY_NAME, ("own", "compensated")),
+    ("gap printed", "check"): (ONLY_OTHERWISE, UNNAMED),
+    ("gap drawn", "check"): (ONLY_OTHERWISE, UNNAMED),
+    ("errors", "batch"): (f"{UNAWARE} unless it slices", PRISMS),
 }
 
 
@@ -426,7 +377,7 @@ def cases():
     for quantity, entries in ASKED.items():
         for entry in entries:
             name = f"{quantity}-{entry.__name__.strip('_')}"  # slice_
-            why, red = RED[quantity].get(entry.__name__, ("", ()))
+            why, red = RED.get((quantity, entry.__name__), ("", ()))
             if green := [design for design in DESIGNS if design not in red]:
                 yield pytest.param(quantity, entry, green, id=name)
             if red:
@@ -439,8 +390,12 @@ def asked(tmp_path_factory):
     """The designs, each asked everything at most once."""
     made = {}
 
-    def of(name):
-        return made.setdefault(name, Asked(name, tmp_path_factory.mktemp(name)))
+    def of(name, sliced=False):
+        if (name, sliced) not in made:
+            design = made[name, sliced] = Asked(name, tmp_path_factory.mktemp(name))
+            if sliced:
+                design.say("slice", design.file, "--json")
+        return made[name, sliced]
 
     return of
 
@@ -453,26 +408,45 @@ def _solved_once(_cache, monkeypatch, tmp_path_factory):
 
 @pytest.mark.parametrize(("quantity", "entry", "designs"), list(cases()))
 def test_whoever_is_asked_says_the_same(quantity, entry, designs, asked, monkeypatch, program):
-    if entry is slice_:
+    if quantity == "errors":
         program("prusa-slicer", "prusa-slicer")
-    differing = {}
+    differing, known = {}, slice_ if quantity == "errors" else predict
     for name in designs:
         design = asked(name)
         monkeypatch.setenv("SENSORGEN_LOG", str(design.folder / "log.db"))
-        wanted = _of(predict(design), quantity)
+        wanted = _of(design.answer(known), quantity)
         try:
-            found = _of(entry(design), quantity)
+            found = _of(design.answer(entry), quantity)
         except AssertionError as error:
             found = str(error).partition("\n")[0]
         if not _same(wanted, found):
             differing[name] = (found, wanted)
-    assert not differing, "\n".join(f"{k}: {v[0]}, but predict says {v[1]}" for k, v in differing.items())
+    assert not differing, "\n".join(f"{k}: {v[0]}, but {known.__name__} says {v[1]}" for k, v in differing.items())
+
+
+def build_again(asked):
+    """``build`` of a design that has been built and sliced before."""
+    asked.say("build", asked.file, "--no-cad", "--force", "--json")
+    return _of_prediction(json.loads((asked.built / "prediction.json").read_text("utf-8")))
+
+
+SLICED = [build_again, log_predict, cell, invert, python, fit]
+NOT_SLICED = pytest.mark.xfail(strict=True, raises=AssertionError, reason="goes by the estimate where G-code is there")
+
+
+@pytest.mark.parametrize("entry", [pytest.param(e, marks=NOT_SLICED) if e is fit else e for e in SLICED])
+def test_once_there_is_gcode_everybody_speaks_of_it(entry, asked, program):
+    program("prusa-slicer", "prusa-slicer")
+    design = asked("trix", sliced=True)
+    wanted, found = design.answer(predict).printed, design.answer(entry).printed
+    assert "gcode" in wanted["body"]
+    for quantity in wanted.keys() & found.keys():
+        assert _same(wanted[quantity], found[quantity]), (quantity, found[quantity], wanted[quantity])
 
 
 def _of(answer, quantity):
     name, _, body = quantity.partition(" ")
-    value = getattr(answer, name)
-    return value.get(body, "does not say") if body else value
+    return getattr(answer, body).get(name, "does not say") if body else answer.errors
 
 
 def _same(wanted, found):
@@ -489,7 +463,7 @@ def _same(wanted, found):
 
 
 def test_a_digit_is_a_difference():
-    assert _same({"top": 1.0, "both": 3.0}, {"both": 3.0})
+    assert _same({"top": 1.0, "both": 3.0, "model": {"lower": 1.0}}, {"both": 3.0, "model": {"lower": 1.0}})
     assert _same((2, 1), (2, None))
     assert not _same((6.419105947e-11, 6.4e-11), (6.419105974e-11, 6.4e-11))
     assert not _same({"both": 3.0}, {"both": 3.000001})
@@ -510,16 +484,17 @@ TRUE_F = {
 
 
 @pytest.mark.parametrize("name", TRUE_F)
-def test_the_answer_holds_the_independent_solution(name, asked, monkeypatch):
-    """Bounds of the drawing, no wider than 1 %, hold what other programs have solved."""
-    low, high = predict(asked(name)).capacitance["drawn"]
-    assert low * (1 - 3e-5) <= TRUE_F[name] <= high * (1 + 3e-5)
-    assert high / low < 1.01
+def test_the_answer_holds_the_independent_solution(name, asked):
+    """The model's own bounds of the drawing, no wider than 0.5 %, hold what other programs have solved."""
+    model = asked(name).answer(predict).drawn["capacitance"]["model"]
+    assert model["lower"] * (1 - 3e-5) <= TRUE_F[name] <= model["upper"] * (1 + 3e-5)
+    assert model["upper"] / model["lower"] < 1.005
 
 
 def test_a_design_of_which_nobody_says_anything_is_no_agreement(asked):
     """None beside None is the same answer, so all but the double sensor must have one."""
     for name in DESIGNS:
-        answer = predict(asked(name))
-        assert (answer.capacitance["drawn"] is None) == (name == "double")
-        assert (answer.verdict is None) == (name == "double")
+        answer = asked(name).answer(predict)
+        for body in (answer.printed, answer.drawn):
+            missing = {quantity for quantity in ("capacitance", "resistance", "gap") if not body[quantity]}
+            assert missing == ({"capacitance", "resistance"} if name == "double" else set()), name
