@@ -177,7 +177,7 @@ def test_the_card_is_of_the_greatest_press_and_the_noise_asked_for(run):
 def test_the_verdict_on_a_cell_that_nobody_solved_says_so(run):
     found = json.loads(run("predict", "tri", "--drawn", "--compression", "unconfined", "--json").out)["identifiability"]
     assert found["verdict"].startswith(
-        "not known, as the cell was not solved, and is taken to give way as a solid plate;"
+        "not known, as the cell was not solved, and is taken to deform as a solid plate;"
     )
     assert (found["senses_force"], found["locates"]) == (None, None)
     assert not any("cell of triangles" in change["change"] for change in found["changes"])
@@ -274,7 +274,7 @@ def test_a_picture_where_a_file_is(run, tmp_path):
     (tmp_path / "p").write_text("mine")
     said = run("predict", "reference", *PRESSES, "--plot", "p")
     assert said.code == 2
-    assert "cannot write 'p/resistance.png': File exists" in said.line
+    assert "cannot write 'p/identifiability.png': File exists" in said.line
     assert (tmp_path / "p").read_text() == "mine"
 
 

@@ -1,5 +1,6 @@
 """``sensorgen batch``: a plan of several sensors to the files of one plate; and whether they are still the same."""
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,7 +93,8 @@ def _say(made: "Batch") -> None:
     click.echo(f"{record['batch']}: {len(record['specimens'])} specimens on {record['printer']}, {record['quality']}")
     for name, s in record["specimens"].items():
         x, y = s["centre_mm"]
-        click.echo(f"{s['order']:4}  {name:28} {s['design']:24} at {x:7.1f} {y:7.1f} mm  {_expected(s['expected'])}")
+        expected = _predicted(record["predictions"][s["design_id"]])
+        click.echo(f"{s['order']:4}  {name:28} {s['design']:24} at {x:7.1f} {y:7.1f} mm  {expected}")
     click.echo("\nchecklist")
     for line in record["checklist"]:
         click.echo(f"  [ ] {line}")
@@ -118,27 +120,28 @@ def _taken(used: dict[str, Any]) -> str:
     return f"at least {used['time_s'] / 3600:.1f} h; {'; '.join(spools)}; {used['tool_changes']} tool changes"
 
 
-def _expected(expected: dict[str, Any]) -> str:
-    if expected["capacitance_f"] is None:
+def _predicted(data: dict[str, Any]) -> str:
+    """A prediction in one line."""
+    from sensorgen.prediction.results import from_json
+
+    found = from_json(json.dumps(data))
+    if found.capacitance is None:
         return "no prediction"
-    resistance = sum(expected["electrode_resistance_ohm"].values())
-    return f"R {show.si(resistance, 'ohm')}, C {show.si(expected['capacitance_f']['middle'], 'F')}"
+    resistance = sum(r.value for r in found.resistance.values())
+    return f"R {show.si(resistance, 'ohm')}, C {show.si(found.capacitance.value, 'F')}"
 
 
 def _printed(printed: dict[str, Any]) -> str:
     """The print of a design, in one line."""
     if "reason" in printed:
         return str(printed["reason"])
-    gaps, drawn = printed["electrode_gap_mm"]["printed"], printed["electrode_gap_mm"]["drawn"]
-    capacitance = printed["capacitance_f"]["printed"]
-    resistances = printed["electrode_resistance_ohm"]["printed"]
+    from sensorgen.prediction.results import from_json
+
+    found = from_json(json.dumps(printed["prediction"]))
+    gaps = [f"{p.gap.value * 1e3:g} mm" for p in (found, found.drawn) if p and p.gap]
     lost = sum(f["severity"] == "error" and not f["waiver"] for f in printed["findings"])
-    parts = [f"electrode gap {' to '.join(f'{gap:g}' for gap in sorted(set(gaps)))} mm (drawn {drawn:g})"]
-    if capacitance:
-        parts.append(f"C {show.si(capacitance['lower'], 'F')} to {show.si(capacitance['upper'], 'F')}")
-    if resistances:
-        parts.append(f"R {show.si(sum(values[0] for values in resistances.values()), 'ohm')}")
-    return ", ".join(parts) + (f"; {lost} layers of bodies are not printed at all" if lost else "")
+    parts = [f"electrode gap {' (drawn '.join(gaps)})" if len(gaps) > 1 else "", _predicted(printed["prediction"])]
+    return ", ".join(filter(None, parts)) + (f"; {lost} layers of bodies are not printed at all" if lost else "")
 
 
 @click.command("verify", short_help="Hash every file again and say what differs.")

@@ -141,6 +141,7 @@ def _loaded(body: "Body", query: "Query", axes: Axes, how: dict[str, Any]) -> "P
         lines = (
             *_explained(found.plan, how),
             *show.loaded(found, model, z, query.noise),
+            "",
             *prediction_text.judgement(found),
         )
         _deliver((f"{line}\n" for line in lines), how["output"])
