@@ -101,8 +101,8 @@ def test_a_film_of_nothing_is_refused_unless_forced(name, tmp_path):
     assert {f.rule for f in caught.value.findings if f.severity == "error"} == {"1-short", "7-printed"}
     assert not (tmp_path / "out").exists()
     forced = build(variant, tmp_path / "out", cad=False, force=True)
-    assert forced.prediction["capacitance_f"] is None
-    assert "touch" in forced.prediction["reason"]
+    assert (forced.prediction.drawn.status, forced.prediction.drawn.capacitance) == ("short", None)
+    assert "touch" in forced.prediction.drawn.reason
 
 
 def test_the_drawing_is_well_formed_and_named(whole):

@@ -43,10 +43,9 @@ def test_every_specimen_is_traced_to_its_design_and_has_what_it_should_measure(s
     tri = found["26 triX .2mm 2 fine"]
     assert (tri["design_id"], tri["copy"], tri["iteration"]) == (TRI.id(), 2, 26)
     predicted = json.loads(to_json(evaluate(estimated(TRI))))
-    for name in ("capacitance_f", "electrode_resistance_ohm", "impedance_ohm"):
-        assert tri["expected"][name] == json.loads(json.dumps(predicted[name]))
-    # The plate's C by hand: eps0 4.68 A/d = 8.854e-12 x 4.68 x 2e-4 / 6e-4, in the middle of the bounds.
-    plate = found["26 SX60 1 fine"]["expected"]["capacitance_f"]["middle"]
+    assert record["predictions"][TRI.id()] == predicted
+    # The plate's C by hand: eps0 4.68 A/d = 8.854e-12 x 4.68 x 2e-4 / 6e-4.
+    plate = record["predictions"][found["26 SX60 1 fine"]["design_id"]]["capacitance"]["value"]
     assert plate == pytest.approx(8.8541878128e-12 * 4.68 * 20e-3 * 10e-3 / 0.6e-3, rel=1e-8)
     assert record["designs"][TRI.id()]["resolved"] == json.loads(json.dumps(TRI.resolved()))
     assert all(parse(name).name == name for name in found)
@@ -143,9 +142,9 @@ def test_a_design_that_cannot_be_printed_stops_the_batch(plan, tmp_path):
     assert error.value.findings
     assert not (tmp_path / "out").exists()
     found = make(path, tmp_path / "out", gcode=False, force=True)
-    expected = found.record["specimens"]["26 triX 1 fine"]["expected"]
-    assert expected["capacitance_f"] is None
-    assert expected["reason"]
+    expected = found.record["predictions"][found.record["specimens"]["26 triX 1 fine"]["design_id"]]
+    assert expected["drawn"]["status"] == "short"
+    assert expected["drawn"]["reason"]
 
 
 def test_a_plan_too_large_says_how_many_plates(plan, tmp_path):

@@ -25,7 +25,7 @@ from sensorgen.prediction.identifiability import FORCE_N, NOISE, identify
 from sensorgen.prediction.losses import Lost, lost
 from sensorgen.prediction.plan import Plan
 from sensorgen.prediction.rest_state import RestState, rest_state
-from sensorgen.prediction.results import SCHEMA, Impedance, Prediction, from_json, to_json
+from sensorgen.prediction.results import SCHEMA, Impedance, Prediction, adapter, from_json
 from sensorgen.prediction.sensor_model import SensorModel, Tip
 from sensorgen.prediction.spread import spread
 
@@ -102,7 +102,7 @@ def evaluate(body: Body, query: Query = DEFAULT, *, keep: bool = True) -> Predic
 
 def _stored(body: Body, query: Query) -> Prediction:
     question = {"what": "prediction", "body": body.identity, "query": asdict(query), "schema": SCHEMA}
-    found = from_json(cache.answer(question, lambda: to_json(_prediction(body, query))))
+    found = from_json(cache.answer(question, lambda: adapter().dump_json(_prediction(body, query)).decode()))
     return replace(found, design=body.design.name, body=body.provenance)
 
 

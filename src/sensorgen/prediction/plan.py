@@ -86,6 +86,14 @@ class Plan:
     width: float | None = None
 
 
+def without_times(plan: Plan) -> Plan:
+    """The plan without run times, which differ from run to run."""
+    levels = (
+        replace(level, candidates=tuple(replace(c, seconds=None) for c in level.candidates)) for level in plan.levels
+    )
+    return replace(plan, levels=tuple(levels))
+
+
 def plain(plan: Plan) -> dict[str, Any]:
     """A plan as plain data; unknown errors are None."""
     data = asdict(plan)

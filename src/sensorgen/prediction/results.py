@@ -1,7 +1,7 @@
 """A prediction, as commands, log, report and fit read it: typed, frozen, with a published schema."""
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from math import nan
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -12,7 +12,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.values import MaterialValue
 from sensorgen.prediction.error_budget import ErrorBudget
 from sensorgen.prediction.identifiability.results import Identifiability, of_schema_1
-from sensorgen.prediction.plan import Plan
+from sensorgen.prediction.plan import Plan, without_times
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
@@ -118,8 +118,13 @@ def adapter() -> "TypeAdapter[Prediction]":
 
 
 def to_json(prediction: Prediction) -> str:
-    """A prediction as JSON; infinities are the strings "Infinity"."""
-    return adapter().dump_json(prediction).decode()
+    """A prediction as JSON, the same for the same prediction: without run times; infinities are "Infinity"."""
+    return adapter().dump_json(_timeless(prediction)).decode()
+
+
+def _timeless(prediction: Prediction) -> Prediction:
+    plan, drawn = prediction.plan, prediction.drawn
+    return replace(prediction, plan=plan and without_times(plan), drawn=drawn and _timeless(drawn))
 
 
 def from_json(text: str) -> Prediction:
