@@ -121,7 +121,7 @@ def _prediction(body: Body, query: Query) -> Prediction:
         model, plan, reason = _model(body, query)
         rest = model.rest if model else rest_state(body)
         found = _at_rest(replace(found, status="predicted", reason=reason), body, rest, query.frequency_hz)
-    except (Unpredictable, MissingValue) as error:
+    except SensorgenError as error:  # no model applies, a value is missing, an electrode or a tool path is interrupted
         touches = found.gap is not None and found.gap.value == 0
         with suppress(SensorgenError):  # as a resistivity that is missing
             found = replace(found, resistance=electrode_resistance(body))
