@@ -129,7 +129,7 @@ def test_the_version_covers_the_models_and_what_they_stand_on(monkeypatch, tmp_p
 
 WRITER = """
 import sys
-from sensorgen import cached
+from sensorgen.core import cache as cached
 for k in range(200):
     question = {"k": k % 7}
     assert cached.answer(question, lambda: [k % 7] * 1000) == [k % 7] * 1000

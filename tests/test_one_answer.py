@@ -412,6 +412,8 @@ def test_whoever_is_asked_says_the_same(quantity, entry, designs, asked, monkeyp
         program("prusa-slicer", "prusa-slicer")
     differing, known = {}, slice_ if quantity == "errors" else predict
     for name in designs:
+        if name == "double" and entry in (fit, invert):
+            continue  # a line needs a capacitance, which three electrodes do not have
         design = asked(name)
         monkeypatch.setenv("SENSORGEN_LOG", str(design.folder / "log.db"))
         wanted = _of(design.answer(known), quantity)
@@ -497,4 +499,4 @@ def test_a_design_of_which_nobody_says_anything_is_no_agreement(asked):
         answer = asked(name).answer(predict)
         for body in (answer.printed, answer.drawn):
             missing = {quantity for quantity in ("capacitance", "resistance", "gap") if not body[quantity]}
-            assert missing == ({"capacitance", "resistance"} if name == "double" else set()), name
+            assert missing == ({"capacitance"} if name == "double" else set()), name

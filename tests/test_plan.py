@@ -5,7 +5,7 @@ import math
 import pytest
 
 from sensorgen.core.errors import BadInput, SensorgenError
-from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, plain, walked
+from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, plain, run_until_within
 
 RUNGS = (Candidate("none", passed_over="it knows no gaps"), Candidate("coarse", 0.1, 1.0), Candidate("fine", 0.01, 5.0))
 
@@ -40,7 +40,7 @@ def test_one_that_was_never_measured_is_tried_and_one_that_cannot_speak_is_not()
 
 def test_it_ends_with_the_first_that_is_near_enough():
     models = Models(coarse=0.08, fine=0.004)
-    found, came = walked(level(0.2), models.find, float)
+    found, came = run_until_within(level(0.2), models.find, float)
     assert (found, models.asked, came.chosen) == (0.08, ["coarse"], "coarse")
     assert [c.width for c in came.candidates] == [None, 0.08, None]
     assert came.candidates[1].seconds >= 0
@@ -48,47 +48,49 @@ def test_it_ends_with_the_first_that_is_near_enough():
 
 def test_an_expectation_that_does_not_hold_costs_one_more():
     models = Models(coarse=0.3, fine=0.004)
-    found, came = walked(level(0.2), models.find, float)
+    found, came = run_until_within(level(0.2), models.find, float)
     assert (found, models.asked, came.chosen) == (0.004, ["coarse", "fine"], "fine")
 
 
 def test_the_nearest_is_taken_where_none_is_near_enough():
     """Here the finer mesh does worse, as meshes may."""
     models = Models(coarse=0.02, fine=0.03)
-    found, came = walked(level(0.015, candidates=(*RUNGS[:2], Candidate("fine", 0.2, 5.0))), models.find, float)
+    found, came = run_until_within(
+        level(0.015, candidates=(*RUNGS[:2], Candidate("fine", 0.2, 5.0))), models.find, float
+    )
     assert (found, models.asked, came.chosen) == (0.02, ["coarse", "fine"], "coarse")
 
 
 def test_coarser_ones_are_asked_where_finer_ones_fail():
     models = Models(coarse=0.08, fine=BadInput("does not converge"))
-    found, came = walked(level(0.05), models.find, float)
+    found, came = run_until_within(level(0.05), models.find, float)
     assert (found, models.asked) == (0.08, ["fine", "coarse"])
     assert came.candidates[2].passed_over == "does not converge"
 
 
 def test_coarser_ones_are_not_asked_where_a_finer_one_answers_though_not_near_enough():
     models = Models(coarse=0.08, fine=0.06)
-    assert walked(level(0.05), models.find, float)[0] == 0.06
+    assert run_until_within(level(0.05), models.find, float)[0] == 0.06
     assert models.asked == ["fine"]
 
 
 def test_what_is_just_near_enough_will_do():
     models = Models(coarse=0.2, fine=0.004)
-    assert walked(level(0.2), models.find, float)[0] == 0.2
+    assert run_until_within(level(0.2), models.find, float)[0] == 0.2
     assert models.asked == ["coarse"]
 
 
 def test_of_coarser_ones_the_finest_is_asked_first():
     models = Models(coarse=0.08, fine=0.06, finest=BadInput("does not converge"))
     candidates = (*RUNGS, Candidate("finest", 0.001, 9.0))
-    assert walked(level(0.002, candidates=candidates), models.find, float)[0] == 0.06
+    assert run_until_within(level(0.002, candidates=candidates), models.find, float)[0] == 0.06
     assert models.asked == ["finest", "fine"]
 
 
 def test_what_the_last_one_said_is_raised_where_none_can_answer():
     models = Models(coarse=BadInput("no mesh"), fine=BadInput("no memory"))
     with pytest.raises(BadInput, match="no mesh"):
-        walked(level(0.05), models.find, float)
+        run_until_within(level(0.05), models.find, float)
 
 
 def test_what_nobody_knows_is_no_number_in_plain_data():

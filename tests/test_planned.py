@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sensorgen.prediction.ladder import Press
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.prediction import compression_law as celllaw
-from sensorgen.prediction import ladder as planned
+from sensorgen.prediction import planning, rest_state
+from sensorgen.prediction.bodies import drawn
+from sensorgen.prediction.error_budget import Load as Press
+from sensorgen.prediction.sensor_model import Tip
 
 TONES = (1.1e3, 99.7e3)
 PRESS = Press(TONES, 6.0, 0.05)
@@ -27,7 +29,7 @@ def tri(dielectric_mm):
 
 
 def worked_out(design, accuracy, press=PRESS, law="", **tip):
-    return planned.sensed(design, planned.drawn(design, **tip), press, accuracy, law)
+    return planning.execute(planning.plan(drawn(design), press, accuracy, law, Tip(**tip)))
 
 
 def chosen(plan):
@@ -40,16 +42,24 @@ def off(one, other, press=PRESS):
     return float(max(abs(z / of - 1)))
 
 
-def test_nothing_is_planned_where_nothing_is_asked_for():
-    sensed, plan = worked_out(tri(0.1), math.inf)
-    assert plan is None
-    assert sensed.unloaded.answer.model == "columns"
+def test_without_an_accuracy_the_capacitance_is_known_to_the_default():
+    sensed, plan = worked_out(tri(0.1), None)
+    assert plan.accuracy == planning.ACCURACY
+    assert sensed.rest.answer.model == "fem2d"
+    assert sensed.rest.capacitance.model.width() <= rest_state.PLANE
+
+
+def test_without_an_accuracy_no_cell_is_solved_in_3d():
+    sensed, plan = worked_out(make({"shape": "rect", "parameters": {"dielectric_mm": 0.15}}), None)
+    assert chosen(plan)["compression"] == "nearest prototype"
+    assert not sensed.law.bounded
+    assert "--compression solved" in sensed.law.doubts[0]
 
 
 def test_the_cheapest_of_each_level_is_taken_and_the_whole_holds_the_truth():
     """Of a prototype, whose law is stored: against the capacitance to 1e-7."""
     exact, _ = worked_out(tri(0.1), 1e-7)
-    for accuracy, model in ((2.0, "columns"), (1e-2, "fem2d"), (2e-4, "fem2d")):
+    for accuracy, model in ((2.0, "fem2d"), (1e-2, "fem2d"), (2e-4, "fem2d")):
         sensed, plan = worked_out(tri(0.1), accuracy)
         assert chosen(plan) == {"cell": model, "compression": "solved", "line": "line, 1 section"}
         assert off(sensed.sensor, exact.sensor) <= plan.width <= accuracy
@@ -104,10 +114,12 @@ def test_without_force_nothing_has_to_give_way():
     assert plan.width <= 1e-3
 
 
-def test_bounds_far_apart_are_felt_most_at_the_lower_one():
+def test_bounds_far_apart_are_felt_most_at_the_lower_one(monkeypatch):
     """At a low tone abs(Z) goes with 1/C: half of a large width would say too little."""
+    for module in (planning, rest_state):
+        monkeypatch.setattr(module, "default_width", lambda scene: 2.0)
     sensed, plan = worked_out(tri(0.1), 2.0, Press((1.0,), 0.0, 0.05))
-    bounds = sensed.unloaded.answer.capacitance_f
+    bounds = sensed.rest.answer.capacitance_f
     assert bounds.width() > 0.3
     assert plan.width == pytest.approx(bounds.middle() / bounds.lower - 1, rel=1e-6)
 
@@ -122,7 +134,7 @@ def test_the_outline_says_what_is_expected_and_asks_nothing_dear(monkeypatch):
 
     for model in (fem2d, press2d):
         monkeypatch.setattr(model, "press" if model is press2d else "capacitance", None)
-    outline = planned.outlined(tri(0.15), planned.drawn(tri(0.15)), PRESS, 1e-2)
+    outline = planning.plan(drawn(tri(0.15)), PRESS, 1e-2)
     cell, compression, line = outline.plan.levels
     assert (cell.chosen, compression.chosen, line.chosen) == ("fem2d", "press2d, mesh x 1.5", "line, 1 section")
     assert compression.candidates[0].expected_width == math.inf
@@ -134,7 +146,7 @@ def test_the_outline_says_what_is_expected_and_asks_nothing_dear(monkeypatch):
 @pytest.mark.parametrize("accuracy", [0.0, -1.0, math.nan])
 def test_an_accuracy_is_above_0(accuracy):
     with pytest.raises(OutOfRange, match="above 0"):
-        planned.outlined(tri(0.1), planned.drawn(tri(0.1)), PRESS, accuracy)
+        planning.plan(drawn(tri(0.1)), PRESS, accuracy)
 
 
 @needs_mesher
@@ -143,13 +155,14 @@ def test_a_light_press_below_the_first_stress_of_a_curve_is_within_what_is_claim
     """A contact grows from nothing: the stored curve begins at 10 kPa, the same cell is solved at 1, 2 and 5."""
     from sensorgen.models.compression import curve_of
     from sensorgen.models.press2d import BoundaryConditions
-    from sensorgen.prediction.mesh_ladder import Case, drawn, pressed
+    from sensorgen.prediction.mesh_ladder import Case, pressed
+    from sensorgen.prediction.sensor_model import piece as piece_of
 
     design = tri(0.1)
     press = Press((1.0,), force_n, 0.05)
     sensed, plan = worked_out(design, 1e-3, press)
-    piece = drawn(design)
-    eps = {t.material: t.value for t in sensed.taken if t.quantity == "relative_permittivity"}
+    piece = piece_of(drawn(design))
+    eps = {t.material: t.value for t in sensed.values if t.quantity == "relative_permittivity"}
     case = Case(piece, "press2d", celllaw.elastic(design, piece.scene), eps, BoundaryConditions())
     fine = curve_of(pressed(case, (0.0, 1e3, 2e3, 5e3)))
     claimed = next(c.width for c in plan.levels[1].candidates if c.model == "solved")

@@ -157,10 +157,11 @@ def test_json_of_check_holds_the_findings(run):
 
 def test_json_of_predict(run):
     data = json.loads(run("predict", "tri", "--json").out)
-    c = data["capacitance_f"]
-    assert 0 < c["lower"] <= c["middle"] <= c["upper"] < 1e-9
-    assert len(data["impedance_ohm"]) == 7
-    assert json.loads(run("predict", "tri", "--dielectric", "0", "--json").out)["capacitance_f"] is None
+    for c in (data["capacitance"], data["drawn"]["capacitance"]):
+        assert 0 < c["lower"] <= c["value"] <= c["upper"] < 1e-9
+    assert len(data["impedance"]) == 7
+    shorted = json.loads(run("predict", "tri", "--dielectric", "0", "--drawn", "--json").out)
+    assert (shorted["status"], shorted["capacitance"]) == ("short", None)
 
 
 def test_json_of_build(run, tmp_path):
@@ -168,7 +169,7 @@ def test_json_of_build(run, tmp_path):
     folder = tmp_path / data["folder"]
     assert sorted(data["files"]) == sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
     assert data["findings"] == json.loads((folder / "check.json").read_text())["findings"]
-    assert data["prediction"]["capacitance_f"]["lower"] > 0
+    assert data["prediction"]["capacitance"]["lower"] > 0
 
 
 def test_json_of_a_refused_build(run):
@@ -179,9 +180,10 @@ def test_json_of_a_refused_build(run):
 
 
 def test_predict_without_an_answer_says_why(run):
-    said = run("predict", "tri", "--dielectric", "0")
+    said = run("predict", "tri", "--dielectric", "0", "--drawn")
     assert (said.code, said.err) == (0, "")
-    assert said.out.startswith("no capacitance is predicted: ")
+    assert said.out.startswith("trix-d0: ")
+    assert "the electrodes touch: the capacitance grows without bound" in said.out
 
 
 def test_draw(run, tmp_path):
@@ -210,7 +212,7 @@ def test_waived_findings_do_not_stop_a_build(run, tmp_path):
         "shape: tri\nparameters: {dielectric_mm: 0}\nwaivers: [{rule: 1-short, reason: a short on purpose}, "
         "{rule: 7-printed, reason: the gap is known}]\n"
     )
-    said = run("build", "short.yaml", "--no-cad")
+    said = run("build", "short.yaml", "--no-cad", "--details")
     assert (said.code, said.err) == (0, "")
     assert "accepted: a short on purpose" in " ".join(said.out.split())
 

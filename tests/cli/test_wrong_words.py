@@ -130,7 +130,7 @@ def test_too_large_for_the_bed(run, tmp_path):
     assert said.code == 1
     assert "330 x 330 mm do not fit on the bed of diabase-h5, 390 x 170 mm" in said.line
     assert "nothing was written" in said.line
-    assert said.out.startswith("error   8-bed  sensor")
+    assert said.out.startswith("CHANGE  trix-d0.2-length330-width330\n\nerror   8-bed  sensor")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -154,9 +154,10 @@ def test_a_film_under_half_a_layer_is_an_error(run):
 
 
 def test_strict_makes_a_warning_fatal(run, tmp_path):
-    assert run("check", "tri").code == 0
-    assert run("check", "tri", "--strict").code == 1
-    said = run("build", "tri", "--no-cad", "--strict")
+    wide = ("tri", "--period", "3")  # its tips are as wide as a line
+    assert run("check", *wide).code == 0
+    assert run("check", *wide, "--strict").code == 1
+    said = run("build", *wide, "--no-cad", "--strict")
     assert said.code == 1
     assert "nothing was written" in said.line
     assert list(tmp_path.iterdir()) == []

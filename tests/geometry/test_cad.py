@@ -40,7 +40,8 @@ def pretend(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], 
         folder = tmp_path / "pretend"
         folder.mkdir()
         (folder / "build123d.py").write_text(text, "utf-8")
-        monkeypatch.setenv("PYTHONPATH", str(folder))
+        before = os.environ.get("PYTHONPATH")
+        monkeypatch.setenv("PYTHONPATH", f"{folder}{os.pathsep}{before}" if before else str(folder))
 
     return put
 
@@ -218,8 +219,8 @@ def test_a_module_in_the_users_folder_takes_no_part(
 PARENT = """
 import sys, time
 from pathlib import Path
-from sensorgen.geometry.cad import CadProcess
-from sensorgen.scene import Body, Scene, box
+from sensorgen.scene.geometry.cad import CadProcess
+from sensorgen.scene.scene import Body, Scene, box
 
 scene = Scene((Body("film", "x60", (box(0, 2, 0, 1, 0, 0.1),)),), (2, 1, 0.1))
 with CadProcess() as process:

@@ -70,6 +70,7 @@ def test_it_imports_the_scene_and_the_standard_library_only(name):
         "sensorgen",
         "sensorgen.core",
         "sensorgen.core.errors",
+        "sensorgen.core.version",
         "sensorgen.scene",
         "sensorgen.scene.scene",
         "sensorgen.design",
