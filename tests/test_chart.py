@@ -380,6 +380,8 @@ def test_networks():
         patch.setattr(networks, "_GRIDS", (20, 40, 80))
         grids = [p.error for p in networks.points("sheet, contacts on one edge", 1e9)]
     assert all(a > 2.5 * b for a, b in pairwise(grids))
+    steps = networks.points("electrode, steps across the current", 1e9)
+    assert all(p.error < most for p, most in zip(steps, (1e-6, 1e-8, 1e-12, 1e-12), strict=True))
     across, _ = by_model("printed lines across the current")
     assert across["traxels"].error < 1e-9
     assert across["traxels: as a solid"].error == pytest.approx(
@@ -405,7 +407,8 @@ def test_every_model_is_on_the_chart():
         "block, free all round",
         "inversion of a load",
     ]
-    names += ["cylinder on a flat", "line, seven tones", ROUND, "printed lines across the current"]
+    names += ["cylinder on a flat", "line, seven tones", ROUND, "electrode, steps across the current"]
+    names += ["printed lines across the current"]
     found = chart.points(names, 0.0, lambda _: None)
     spoke = {p.model.partition(":")[0] for p in found}
     missing = set() if presses.has_mesher() else {"press2d"}

@@ -19,7 +19,7 @@ def test_the_plate_of_table_3_1():
     assert sensor.resistivity_ohm_m == (0.07, 0.2)
     assert sensor.capacitance_f() == pytest.approx(69.06266493984e-12, rel=1e-10, abs=0)
     assert sensor.compression.modulus_pa == 6e6
-    assert ("x60", "youngs_modulus_pa", 6e6) in {(t.material, t.quantity, t.value) for t in found.taken}
+    assert ("x60", "youngs_modulus_pa", 6e6) in {(t.material, t.quantity, t.value) for t in found.values}
     assert "bonded" in found.doubts[0]
 
 

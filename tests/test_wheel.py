@@ -21,7 +21,8 @@ def test_the_wheel_works_without_the_repository(tmp_path):
     code = (
         f"import sys; site = {str(site)!r}; sys.path.insert(0, site); import sensorgen;"
         "assert sensorgen.__file__.startswith(site);"
-        "from sensorgen.cli import main; sys.argv = ['sensorgen', 'build', 'tri', '--length', '6', '--no-cad']; main()"
+        "from sensorgen.cli import main; "
+        "sys.argv = ['sensorgen', 'build', 'tri', '--length', '6', '--no-cad', '--force']; main()"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

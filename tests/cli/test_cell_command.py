@@ -27,7 +27,7 @@ def answer(said):
 @pytest.mark.parametrize("film", [0.1, 0.2])
 @pytest.mark.parametrize("accuracy", ["1e-2", "1e-6"])
 def test_bounds_hold_the_reference_and_are_as_near_as_asked(run, film, accuracy):
-    found = answer(run("cell", "tri", "--dielectric", film, "--accuracy", accuracy, "--json"))
+    found = answer(run("cell", "tri", "--drawn", "--dielectric", film, "--accuracy", accuracy, "--json"))
     lower, upper = found["lower_f_per_m2"], found["upper_f_per_m2"]
     assert lower * (1 - 1e-9) <= TRI[film] <= upper * (1 + 1e-9)
     assert (upper - lower) / TRI[film] <= float(accuracy) * (1 + 1e-9)
@@ -35,8 +35,20 @@ def test_bounds_hold_the_reference_and_are_as_near_as_asked(run, film, accuracy)
     assert 0 < found["seconds"] == pytest.approx(sum(c["seconds"] or 0 for c in found["plan"]))
 
 
+def test_it_answers_for_the_print_unless_the_drawing_is_asked_for(run):
+    """Each is another body, with a capacitance of its own."""
+    bodies = {word: answer(run("cell", "tri", *word, "--json")) for word in ((), ("--walls", "cura"), ("--drawn",))}
+    assert [found["body"] for found in bodies.values()] == [
+        "printed, estimated (PrusaSlicer, Arachne walls)",
+        "printed, estimated (cura walls)",
+        "drawn",
+    ]
+    assert len({found["lower_f_per_m2"] for found in bodies.values()}) == 3
+    assert "trix-d0.2, drawn: " in run("cell", "tri", "--drawn").out
+
+
 def test_strips_in_three_dimensions(run):
-    found = answer(run("cell", "rect", "--dielectric", 0.2, "--accuracy", "5e-3", "--json"))
+    found = answer(run("cell", "rect", "--drawn", "--dielectric", 0.2, "--accuracy", "5e-3", "--json"))
     assert found["model"] == "fem3d"
     assert found["lower_f_per_m2"] <= RECT[0.2] * (1 + 3e-5)
     assert found["upper_f_per_m2"] >= RECT[0.2] * (1 - 3e-5)
@@ -53,12 +65,12 @@ def test_set_values_reach_the_model(run):
 
 
 def test_a_known_answer_loads_no_numbers(run, real):
-    first = answer(run("cell", "tri", "--json"))
-    said = real("cell", "tri", "--json", before=LOADED)
+    first = answer(run("cell", "tri", "--drawn", "--json"))
+    said = real("cell", "tri", "--drawn", "--json", before=LOADED)
     text, _, loaded = said.out.rpartition("loaded: ")
     assert not {"numpy", "ngsolve", "scipy", "build123d", "multiprocessing", "matplotlib"} & set(loaded.split())
     assert json.loads(text) == first | {"known": True}
-    assert "known from before" in run("cell", "tri").out
+    assert ", stored\n" in run("cell", "tri", "--drawn").out
 
 
 def test_no_cache_solves_anew_and_keeps_nothing(run):
@@ -69,10 +81,10 @@ def test_no_cache_solves_anew_and_keeps_nothing(run):
 
 
 def test_explain_tells_the_plan_and_what_came_of_it(run):
-    said = run("cell", "tri", "--explain", "--no-cache")
+    said = run("cell", "tri", "--drawn", "--explain", "--no-cache")
     plan, _, measured = said.out.partition("measured")
     assert said.code == 0
-    assert plan.startswith("plan for an accuracy of 0.001\n")
+    assert plan.startswith("plan for a relative width of 0.001\n")
     for name in ("columns", "fem2d"):
         assert f"\n  {name}" in plan
         assert f"\n  {name}" in measured
@@ -82,10 +94,9 @@ def test_explain_tells_the_plan_and_what_came_of_it(run):
 
 
 def test_an_accuracy_below_what_is_possible(run):
-    said = run("cell", "tri", "--accuracy", "1e-3", "--model", "columns")
+    said = run("cell", "tri", "--drawn", "--accuracy", "1e-3", "--model", "columns")
     assert said.code == 1
-    assert "by columns" in said.line
-    assert "an accuracy of 0.001 was not reached; the best is 0.5" in said.line
+    assert "accuracy 0.001 not reached: 0.5, by columns" in said.line
     assert "F/m2" in said.out
 
 
@@ -169,28 +180,31 @@ def no_solver(monkeypatch):
 
 
 def test_it_needs_no_optional_solver(run, no_solver):
-    found = answer(run("cell", "tri", "--dielectric", 0.1, "--accuracy", "1e-6", "--json"))
+    found = answer(run("cell", "tri", "--drawn", "--dielectric", 0.1, "--accuracy", "1e-6", "--json"))
     assert (found["model"], found["reached"]) == ("fem2d", True)
     assert found["lower_f_per_m2"] <= TRI[0.1] <= found["upper_f_per_m2"]
 
 
 def test_predict_takes_an_accuracy(run):
-    found = answer(run("predict", "tri", "--dielectric", 0.1, "--accuracy", "1e-3", "--json"))
-    per_area = found["capacitance_per_area_f_per_m2"]
-    assert found["model"]["capacitance"] == "fem2d"
-    assert per_area["lower"] <= TRI[0.1] <= per_area["upper"]
-    assert per_area["upper"] / per_area["lower"] - 1 <= 1.001e-3
+    found = answer(run("predict", "tri", "--drawn", "--dielectric", 0.1, "--accuracy", "1e-3", "--json"))
+    bounds, area_m2 = found["capacitance"]["model"], 100e-3 * 10e-3
+    assert [level["chosen"] for level in found["plan"]["levels"] if level["name"] == "cell"] == ["fem2d"]
+    assert bounds["lower"] <= TRI[0.1] * area_m2 <= bounds["upper"]
+    assert bounds["upper"] / bounds["lower"] - 1 <= 1.001e-3
+    assert found["capacitance"]["certified"]
 
 
 def test_predict_says_when_an_accuracy_is_not_reached(run, monkeypatch):
     monkeypatch.setattr(fem2d, "why_not_applicable", lambda scene: "not today")
-    said = run("predict", "tri", "--accuracy", "1e-4")
+    said = run("predict", "tri", "--drawn", "--accuracy", "1e-4", "--json")
     assert said.code == 1
-    assert "was not reached; the best is 0.29; cell 0.5 (columns); compression" in said.line
-    assert "; fem2d: not today" in said.line
+    assert "accuracy 0.0001 not reached: " in said.line
+    assert "0.29; cell 0.5 (columns); compression" in said.line
+    cell = next(level for level in json.loads(said.out)["plan"]["levels"] if level["name"] == "cell")
+    assert {c["model"]: c["passed_over"] for c in cell["candidates"]}["fem2d"] == "not today"
 
 
-SWEEP = ["cell", "tri", "--dielectric", "0.3", "--sweep", "dielectric_mm=0.1:0.2:0.1", "--jobs", "2"]
+SWEEP = ["cell", "tri", "--drawn", "--dielectric", "0.3", "--sweep", "dielectric_mm=0.1:0.2:0.1", "--jobs", "2"]
 
 
 def test_a_sweep_as_csv_and_json(run):
@@ -203,7 +217,7 @@ def test_a_sweep_as_csv_and_json(run):
     found = answer(run(*SWEEP, "--json"))
     assert [entry["known"] for entry in found] == [True, True]
     assert [repr(entry["lower_f_per_m2"]) for entry in found] == [row["lower_f_per_m2"] for row in rows]
-    longer = answer(run("cell", "tri", "--sweep", "dielectric_mm=0.1,0.15,0.2", "--json"))
+    longer = answer(run("cell", "tri", "--drawn", "--sweep", "dielectric_mm=0.1,0.15,0.2", "--json"))
     assert [entry["known"] for entry in longer] == [True, False, True]
     lowers = [entry["lower_f_per_m2"] for entry in longer]
     assert lowers == sorted(lowers, reverse=True)
@@ -234,7 +248,7 @@ def test_a_sweep_over_a_material_and_over_words(run):
 
 
 def test_a_point_without_an_answer_leaves_the_others(run):
-    said = run("cell", "tri", "--sweep", "dielectric_mm=0,0.2", "--csv", "--jobs", "1")
+    said = run("cell", "tri", "--drawn", "--sweep", "dielectric_mm=0,0.2", "--csv", "--jobs", "1")
     bad, good = csv.DictReader(io.StringIO(said.out))
     assert (said.code, bad["model"], bad["lower_f_per_m2"]) == (1, "", "")
     assert "the electrodes touch" in bad["reason"]
@@ -313,9 +327,9 @@ def stat(pid):
         (["--accuracy", "nan"], "--accuracy: nan; expected a number above 0"),
         (["--accuracy", "high"], "--accuracy: 'high' is not a number"),
         (["--model", "fem4d"], "unknown model of capacitance 'fem4d'; did you mean 'fem"),
-        (["--model", "fem3d"], "fem3d: not all of it is boxes"),
+        (["--drawn", "--model", "fem3d"], "fem3d: not all of it is boxes"),
         (["--model", "line"], "unknown model of capacitance 'line'"),
-        (["--dielectric", "0"], "the electrodes touch: the capacitance grows without bound"),
+        (["--drawn", "--dielectric", "0"], "the electrodes touch: the capacitance grows without bound"),
         (["--set", "eps_x61=3"], "unknown material 'x61'; did you mean 'x60'"),
         (["--set", "epz_x60=3"], "unknown quantity of x60 'epz'; did you mean 'eps'"),
         (["--set", "eps_x60=soft"], "material_values.x60.relative_permittivity is 'soft'; expected a number"),
@@ -334,6 +348,8 @@ def stat(pid):
         (["--sweep", "nosuch=1,2"], "unknown key of --set 'nosuch'"),
         (["--sweep", "along=x,z"], "along=z: unknown value of along 'z'"),
         (["--jobs", "0"], "--jobs"),
+        (["--drawn", "--walls", "cura"], "--drawn and --walls at once; expected one of them"),
+        (["--as-printed"], "unknown option '--as-printed'"),
     ],
 )
 def test_wrong_words(run, words, said):

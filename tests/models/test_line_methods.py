@@ -10,57 +10,62 @@ from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.models import line, line_abcd, line_closed, line_ladder
 
 MODELS = {"abcd": line_abcd.impedance, "exponentials": line_closed.impedance}
-LONG = PLATE | {"L_m": 1e3, "f_Hz": 1e6}
-GRID = PLATE | {"f_Hz": np.logspace(3, 6, 7)[:, None], "x_p_left_edge_m": np.linspace(0, 0.09, 5)}
+LONG = PLATE | {"length_m": 1e3, "frequency_hz": 1e6}
+GRID = PLATE | {"frequency_hz": np.logspace(3, 6, 7)[:, None], "left_m": np.linspace(0, 0.09, 5)}
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_they_agree_with_the_references(model):
     for inputs, (re, im) in cases():
-        z, true = MODELS[model](**inputs), complex(float(re), float(im))
+        z, true = MODELS[model](line.PressedLine(**inputs)), complex(float(re), float(im))
         assert abs(z - true) < 1e-12 * abs(true)
         assert abs(z.real - true.real) < 1e-9 * true.real
 
 
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize(
-    "change", [{"rho_top_ohm_m": 0.0, "rho_bottom_ohm_m": 0.0}, {"f_Hz": 0.0}, {"L_m": 1e3, "f_Hz": 1e6}]
+    "change",
+    [
+        {"top_resistivity_ohm_m": 0.0, "bottom_resistivity_ohm_m": 0.0},
+        {"frequency_hz": 0.0},
+        {"length_m": 1e3, "frequency_hz": 1e6},
+    ],
 )
 def test_where_they_have_no_number_they_say_so(model, change):
     with pytest.raises(OutOfRange, match="take model 'line'"):
-        MODELS[model](**(PLATE | change))
-    assert not np.isnan(line.impedance(**(PLATE | change)))
+        MODELS[model](line.PressedLine(**PLATE | change))
+    assert not np.isnan(line.impedance(line.PressedLine(**PLATE | change)))
 
 
 @pytest.mark.parametrize(("model", "least"), [("abcd", 1e-10), ("exponentials", 1e-6)])
 def test_at_a_millihertz_they_lose_the_resistance(model, least):
-    low = PLATE | {"f_Hz": 1e-3}
+    low = PLATE | {"frequency_hz": 1e-3}
     true = exact(120, **low)
-    assert off(MODELS[model](**low), true)[1] > least
-    assert off(line.impedance(**low), true)[1] < 1e-13
+    assert off(MODELS[model](line.PressedLine(**low)), true)[1] > least
+    assert off(line.impedance(line.PressedLine(**low)), true)[1] < 1e-13
 
 
 @pytest.mark.parametrize("far_end", ["short", 100.0, [10.0, 1e6]])
 def test_matrices_speak_of_other_far_ends(far_end):
-    a, b = (model(**PLATE, far_end=far_end) for model in (line_abcd.impedance, line.impedance))
+    a, b = (model(line.PressedLine(**PLATE, far_end=far_end)) for model in (line_abcd.impedance, line.impedance))
     assert a == pytest.approx(b, rel=1e-12)
     for other in (line_closed.impedance, line_ladder.impedance):
         with pytest.raises(OutOfRange, match="open"):
-            other(**PLATE, far_end=far_end)
+            other(line.PressedLine(**PLATE, far_end=far_end))
 
 
 def test_the_misprints_and_their_effect():
-    free = GRID | {"F_N": 0.0}
-    z = line.impedance(**free)
-    assert line_closed.impedance(**free) == pytest.approx(z, rel=1e-12)
-    assert line_closed.uniform(**free) == pytest.approx(z, rel=1e-12)
-    one = PLATE | {"F_N": 0.0, "L_p_m": 0.0, "x_p_left_edge_m": 0.0}
-    z = line.impedance(**one)
-    assert line_closed.impedance("B.48", **one) == pytest.approx(z / np.sqrt(0.135), rel=1e-12)
-    assert line_closed.impedance("B.39", **one) == pytest.approx(-z, rel=1e-12)
-    assert line_closed.impedance("B.42", **one) == pytest.approx(z, rel=1e-12)
+    free = GRID | {"force_n": 0.0}
+    z = line.impedance(line.PressedLine(**free))
+    assert line_closed.impedance(line.PressedLine(**free)) == pytest.approx(z, rel=1e-12)
+    assert line_closed.uniform(line.PressedLine(**free)) == pytest.approx(z, rel=1e-12)
+    one = PLATE | {"force_n": 0.0, "tip_m": 0.0, "left_m": 0.0}
+    z = line.impedance(line.PressedLine(**one))
+    assert line_closed.impedance(line.PressedLine(**one), "B.48") == pytest.approx(z / np.sqrt(0.135), rel=1e-12)
+    assert line_closed.impedance(line.PressedLine(**one), "B.39") == pytest.approx(-z, rel=1e-12)
+    assert line_closed.impedance(line.PressedLine(**one), "B.42") == pytest.approx(z, rel=1e-12)
     with pytest.raises(UnknownName, match=r"B\.48"):
-        line_closed.impedance("B.47", **one)
+        line_closed.impedance(line.PressedLine(**one), "B.47")
 
 
 def test_the_table_of_misprints_in_the_docs():
@@ -70,10 +75,13 @@ def test_the_table_of_misprints_in_the_docs():
     assert [(row[0], float(row[1])) for row in rows] == [
         (p, f / 1e3) for p in line_closed.PRINTED for f in (TONES[0], TONES[-1])
     ]
-    places = {"F_N": np.linspace(0, 6, 5)[:, None], "x_p_left_edge_m": np.linspace(0, 0.09, 5)}
+    places = {"force_n": np.linspace(0, 6, 5)[:, None], "left_m": np.linspace(0, 0.09, 5)}
     for printed, kilohertz, *spans in rows:
-        inputs = PLATE | places | {"f_Hz": float(kilohertz) * 1e3}
-        z, wrong = line.impedance(**inputs), line_closed.impedance(printed, **inputs)
+        inputs = PLATE | places | {"frequency_hz": float(kilohertz) * 1e3}
+        z, wrong = (
+            line.impedance(line.PressedLine(**inputs)),
+            line_closed.impedance(line.PressedLine(**inputs), printed),
+        )
         ratios = (np.abs(wrong / z - 1), wrong.real / z.real, wrong.imag / z.imag)
         for ratio, span in zip(ratios, spans, strict=True):
             assert [float(v) for v in span.split("..")] == pytest.approx([ratio.min(), ratio.max()], rel=6e-3)
@@ -81,31 +89,36 @@ def test_the_table_of_misprints_in_the_docs():
 
 @pytest.mark.parametrize(("printed", "least"), [("B.39", 0.5), ("B.42", 0.05), ("B.48", 0.5)])
 def test_pressed_every_misprint_shows(printed, least):
-    z = line.impedance(**PLATE)
-    assert abs(line_closed.impedance(printed, **PLATE) - z) > least * abs(z)
+    z = line.impedance(line.PressedLine(**PLATE))
+    assert abs(line_closed.impedance(line.PressedLine(**PLATE), printed) - z) > least * abs(z)
 
 
 def test_a_resistor_before_a_capacitor_is_no_line():
-    low = line_closed.series(**PLATE | {"f_Hz": 1e3})
-    assert low.real == pytest.approx(3 * line.impedance(**(PLATE | {"f_Hz": 1e3, "F_N": 0.0})).real, rel=1e-4)
-    assert low.imag == pytest.approx(line.impedance(**(PLATE | {"f_Hz": 1e3, "F_N": 0.0})).imag, rel=1e-4)
+    low = line_closed.series(line.PressedLine(**PLATE | {"frequency_hz": 1e3}))
+    assert low.real == pytest.approx(
+        3 * line.impedance(line.PressedLine(**PLATE | {"frequency_hz": 1e3, "force_n": 0.0})).real, rel=1e-4
+    )
+    assert low.imag == pytest.approx(
+        line.impedance(line.PressedLine(**PLATE | {"frequency_hz": 1e3, "force_n": 0.0})).imag, rel=1e-4
+    )
 
 
 @pytest.mark.parametrize(("one_sided", "order"), [(False, 2), (True, 1)])
 def test_ladders_converge_at_their_order(one_sided, order):
-    true = line.impedance(**GRID)
+    true = line.impedance(line.PressedLine(**GRID))
     for part in (np.abs, np.real):
         errors = [
-            np.abs(part(line_ladder.impedance(n, one_sided=one_sided, **GRID) - true)).max() for n in (40, 80, 160)
+            np.abs(part(line_ladder.impedance(line.PressedLine(**GRID), n, one_sided=one_sided) - true)).max()
+            for n in (40, 80, 160)
         ]
         rates = np.log2(np.array(errors[:-1]) / errors[1:])
         assert rates == pytest.approx(order, abs=0.05)
 
 
 def test_a_ladder_dies_where_its_cells_are_longer_than_the_current_reaches():
-    high = PLATE | {"f_Hz": 1e9}
-    assert abs(line_ladder.impedance(10, **high) / line.impedance(**high) - 1) > 0.1
+    high = PLATE | {"frequency_hz": 1e9}
+    assert abs(line_ladder.impedance(line.PressedLine(**high), 10) / line.impedance(line.PressedLine(**high)) - 1) > 0.1
     with pytest.raises(OutOfRange, match="no current"):
-        line_ladder.impedance(**(PLATE | {"f_Hz": 0.0}))
+        line_ladder.impedance(line.PressedLine(**PLATE | {"frequency_hz": 0.0}))
     with pytest.raises(OutOfRange, match="one cell"):
-        line_ladder.impedance(0, **PLATE)
+        line_ladder.impedance(line.PressedLine(**PLATE), 0)

@@ -10,7 +10,6 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models.compression import unconfined
 from sensorgen.models.stack import Body, Film, Press, Stack, Track
-from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.double_layer import study
 from sensorgen.prediction.double_layer.designs import halves, press_at, stack_of, stacked
 from sensorgen.prediction.double_layer.differencing import bounds
@@ -154,7 +153,7 @@ def test_the_table_of_what_a_touch_does():
     assert len(rows) == 2 * len(WIRINGS)
     for row, wiring in zip(rows, 2 * WIRINGS, strict=True):
         if row[0]:
-            found = stacked(make(next(designs)), body=drawn)
+            found = stacked(make(next(designs)))
             of = Touching(found.own, found.isolation_eps_r, TONES, press_at(found, 6.0, 0.045), 1e-3, Body())
         assert row[1] == wiring.words
         for cell, thickness in zip(row[2:6], (0.0, 0.1, 0.5, 1.0), strict=True):

@@ -110,7 +110,7 @@ def test_readings_below_nought_and_blanks_are_left_out_and_told(tmp_path):
     told = dict(found.left_out)
     assert "below 0" in " ".join(told.values())
     assert any("no R_Z" in why for why in told.values())
-    assert "does not tell which design" in told["design of 40 tri .1mm"]
+    assert "stands for no design" in told["design of 40 tri .1mm"]
     assert found.rows[2].predicted is None
     assert np.isnan(found.rows[0].residual)
 

@@ -1,18 +1,20 @@
-"""Conductors beyond the line: two coupled films, a sheet between two contacts, printed lines across the current.
+"""Conductors beyond the line: two coupled films, a sheet between two contacts, a stepped electrode, printed lines.
 
-Their truths are transfer matrices of 60 digits, a conformal map, resistors in a row, and another program's network.
+Their truths are transfer matrices of 60 digits, conformal maps, resistors in a row, and another program's network.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from math import log, pi
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.models import line, sheet, stack, traxels
+from sensorgen.models import conduction, line, sheet, stack, traxels
 from sensorgen.models.sheet import Sheet
+from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.network.nodes import Lines
 from sensorgen.verification.chart.measured import DIGITS, Point, timed
 from sensorgen.verification.chart.rectilinear import plate
@@ -58,6 +60,9 @@ _STRETCHES_M = (0.02, 0.03, 0.035, 0.09)  # along the front edge
 _SQUARES = 0.9443847944062356  # between them
 _GRIDS = (20, 40, 80, 160)
 
+_STEPS, _STEP_MM, _THICK_MM, _THIN_MM = 8, 5.0, 0.6, 0.3  # along an electrode 1 mm wide, of 1e-3 ohm m
+_WIDTHS = (1e-2, 1e-4, 1e-6, 1e-8)
+
 _RHO_OHM_M, _CONTACTS_OHM_M2 = 0.2, (1e-6, 1e-4, 1e-2)
 _LINE_MM, _LAYER_MM, _ACROSS = 0.42, 0.1, 12
 
@@ -72,6 +77,15 @@ def front_edge() -> Standard:
     port = [tuple(_SHEET.edge("top", "front", *_STRETCHES_M[k : k + 2]) for k in (0, 2))]
     works: Works = [(f"{n} cells, ", partial(_between, port, n)) for n in _GRIDS]
     return Standard(np.array([_SQUARES]), 1e-15, {"sheet": works})
+
+
+def stepped() -> Standard:
+    """An electrode of 0.6 and 0.3 mm in turn: squares, and for each step what its corner adds, by a conformal map."""
+    k = _THIN_MM / _THICK_MM
+    step = ((k * k + 1) / k * log((1 + k) / (1 - k)) - 2 * log(4 * k / (1 - k * k))) / pi
+    known = _STEPS * (_STEP_MM * (1 / _THIN_MM + 1 / _THICK_MM) / 2 + step)
+    works: Works = [(f"width {width:g} asked, ", partial(_comb, width)) for width in _WIDTHS]
+    return Standard(np.array([known]), DIGITS, {"conduction": works})
 
 
 def lines_across() -> Standard:
@@ -91,6 +105,7 @@ def electrode() -> Standard:
 STANDARD: dict[str, Callable[[], Standard]] = {
     "two films, one track shared": two_films,
     "sheet, contacts on one edge": front_edge,
+    "electrode, steps across the current": stepped,
     "printed lines across the current": lines_across,
     "printed electrode, 1e-4 ohm m²": electrode,
 }
@@ -112,7 +127,7 @@ def points(name: str, budget_s: float) -> list[Point]:
 def why_not_applicable(_: str) -> dict[str, str]:
     """Why models of networks do not apply to a scene."""
     other = "this network is of another kind"
-    return {"stack": other, "sheet": other, "traxels": other, "line": other}
+    return {"stack": other, "sheet": other, "conduction": other, "traxels": other, "line": other}
 
 
 def _points(name: str, standard: Standard, budget_s: float) -> Iterator[Point]:
@@ -154,6 +169,16 @@ def _alone() -> Values:
 def _between(port: list[Any], cells: int) -> Values:
     z = sheet.impedance(_SHEET, port, 0.0, cells=cells)[0, 0, 0]
     return np.array([z.real / _SHEET.sheet_resistance_ohm[0]])
+
+
+def _comb(width: float) -> Values:
+    """In the middle of its bounds; what is kept of the last run would be no time."""
+    length = _STEPS * _STEP_MM
+    plate = box(0, length, 0, 1, _THIN_MM, _THICK_MM)
+    teeth = [box(x, x + _STEP_MM, 0, 1, 0, _THIN_MM) for x in np.arange(_STEP_MM, length, 2 * _STEP_MM).tolist()]
+    scene = Scene((Body("electrode", "etpu", (plate, *teeth), "top"),), (length, 1.0, _THICK_MM))
+    conduction._per_resistivity.cache_clear()
+    return np.array([conduction.electrode_resistance(scene, "top", 1e-3, width=width).middle()])
 
 
 def _across() -> Values:

@@ -13,7 +13,7 @@ from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import to_json
 
 
-def of_designs(found: Sequence[Placed], made: Sliced) -> dict[str, Any]:
+def of_designs(found: Sequence[Placed], made: Sliced, content: bytes) -> dict[str, Any]:
     """Prediction, printed volumes and findings of each design's print, by its identity; or why there are none.
 
     Parameters
@@ -22,18 +22,20 @@ def of_designs(found: Sequence[Placed], made: Sliced) -> dict[str, Any]:
         The specimens; the first of each design stands for its copies, which the same slicer cuts alike.
     made : Sliced
         Their plate.
+    content : bytes
+        Of its printer-ready G-code.
     """
     firsts: dict[str, Placed] = {}
     for piece in found:
         firsts.setdefault(piece.design.id(), piece)
-    return {key: _of(piece, made) for key, piece in firsts.items()}
+    return {key: _of(piece, made, content) for key, piece in firsts.items()}
 
 
-def _of(piece: Placed, made: Sliced) -> dict[str, Any]:
+def _of(piece: Placed, made: Sliced, content: bytes) -> dict[str, Any]:
     design, source = piece.design, f"{made.slicer} {made.version}"
     try:
         printed = asprinted.body(design, made.lines, slicer=source, centre_mm=piece.sensor_mm())
-        body = bodies.sliced(design, partial(lambda: printed), source, made.ready.read_bytes() + piece.name.encode())
+        body = bodies.sliced(design, partial(lambda: printed), source, content + piece.name.encode())
         return {
             "specimen": piece.name,
             "design": design.name,

@@ -78,7 +78,7 @@ def gcode(
     loaded = tools(piece.design for piece in found)
     checked = check(ready, found[0].design.machine, loaded, others_empty=True)
     step("as printed")
-    printed_designs = printed.of_designs(found, made)
+    printed_designs = printed.of_designs(found, made, ready.read_bytes())
     return {
         "version": made.version,
         "gcode": ready.name,
