@@ -11,6 +11,7 @@ from sensorgen.design.design import make
 from sensorgen.prediction import compression_law as celllaw
 from sensorgen.prediction import planning, rest_state
 from sensorgen.prediction.bodies import drawn
+from sensorgen.prediction.capacitance import PLANE
 from sensorgen.prediction.error_budget import Load as Press
 from sensorgen.prediction.sensor_model import Tip
 
@@ -46,7 +47,7 @@ def test_without_an_accuracy_the_capacitance_is_known_to_the_default():
     sensed, plan = worked_out(tri(0.1), None)
     assert plan.accuracy == planning.ACCURACY
     assert sensed.rest.answer.model == "fem2d"
-    assert sensed.rest.capacitance.model.width() <= rest_state.PLANE
+    assert sensed.rest.capacitance.model.width() <= PLANE
 
 
 def test_without_an_accuracy_no_cell_is_solved_in_3d():

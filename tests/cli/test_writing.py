@@ -188,7 +188,7 @@ def test_a_reader_that_leaves_early(start):
     assert process.returncode == 0
 
 
-# Interruptions. A build of this size takes a second or two, of which writing, after the prediction, is a tenth.
+# Interruptions. Most of the time of a build goes into its prediction; writing follows, and is short.
 
 SIGNALS = {"SIGINT": 130, "SIGTERM": 143, "SIGKILL": -9}
 

@@ -155,10 +155,9 @@ def _shortfall(data: Data) -> str:
 def _print_plan(body: "Body", asked: "Asked") -> None:
     from sensorgen.prediction import capacitance as planner
     from sensorgen.prediction import losses
-    from sensorgen.prediction.rest_state import default_width
 
     scene = body.cells.first()
-    width = default_width(scene) if asked.width is None else asked.width
+    width = planner.default_width(scene) if asked.width is None else asked.width
     click.echo(f"plan for a relative width of {width:g}")
     for c in planner.weighed(scene, width, asked.model, bool(losses.set_losses(body.design))):
         click.echo(f"  {c.model:10}{plan_text.expectation(c):32}{c.passed_over}".rstrip())

@@ -155,7 +155,7 @@ def _verdict(found: "Prediction", accuracy: float | None) -> int:
     reached = found.plan.width if found.plan else found.capacitance.model.width()
     if reached is not None and reached <= accuracy:
         return 0
-    best = "error unknown" if reached in (None, float("inf")) else f"reached {reached:.2g}"
+    best = "error unknown" if reached in (None, float("inf")) else f"{reached:.2g}"
     parts = plan_text.shares(found.plan) if found.plan else ()
     click.echo("; ".join([f"sensorgen: accuracy {accuracy:g} not reached: {best}", *parts]), err=True)
     return FOUND_ERRORS

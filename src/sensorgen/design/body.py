@@ -24,8 +24,8 @@ class Cells:
         Cells in the sensor, as its capacitance counts them [-].
     period_mm : float or None
         Period of the pattern along the sensor, of which the scene holds one or more [mm]; None without a pattern.
-    gap_mm : mapping of str to float
-        Smallest distance of two electrodes, by the same rules; infinite where there are no two [mm].
+    gaps : callable
+        Finds ``gap_mm``, when it is first needed.
     tracks : object or None
         Extruded lines, where a tool path is known.
     """
@@ -33,8 +33,13 @@ class Cells:
     scenes: Mapping[str, Scene]
     count: float
     period_mm: float | None
-    gap_mm: Mapping[str, float]
+    gaps: Callable[[], Mapping[str, float]]
     tracks: Any = None
+
+    @cached_property
+    def gap_mm(self) -> Mapping[str, float]:
+        """Smallest distance of two electrodes, by the same rules; infinite where there are no two [mm]."""
+        return self.gaps()
 
     def first(self) -> Scene:
         """The cell by the most likely rule."""

@@ -12,6 +12,7 @@ from sensorgen.design.design import Design
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
+    from sensorgen.scene.scene import Scene
 
 WALLS = ("arachne", "classic", "cura", "cura-gaps")  # rules of slicers, the default of ours first
 
@@ -22,9 +23,14 @@ def drawn(design: Design) -> Body:
 
 
 def _drawn_cells(design: Design) -> Cells:
+    period = getattr(design.params, "period_mm", None)
+    return Cells({DRAWN: design.in_use}, 1.0, period, partial(_drawn_gap, design))
+
+
+def _drawn_gap(design: Design) -> dict[str, float]:
     from sensorgen.asprinted.printed import drawn_gap_mm
 
-    return Cells({DRAWN: design.in_use}, 1.0, getattr(design.params, "period_mm", None), {DRAWN: drawn_gap_mm(design)})
+    return {DRAWN: drawn_gap_mm(design)}
 
 
 def estimated(design: Design, walls: str = "") -> Body:
@@ -111,7 +117,6 @@ def _read(design: Design, path: Path, source: str) -> "Printed":
 
 def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
     """Cells by every rule: of walls for estimates, of bead widths for a tool path."""
-    from sensorgen.asprinted.printed import gap_mm
     from sensorgen.scene.sections import sections
 
     cells = {
@@ -123,8 +128,14 @@ def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
     period = None
     if getattr(printed.design.params, "period_mm", None) is not None:
         period = first.scene.size_mm["xy".index(sections(first.scene)[0].across)]
-    gaps = {name: gap_mm(cell.scene) for name, cell in cells.items()}
-    return Cells({name: cell.scene for name, cell in cells.items()}, first.count, period, gaps, printed.lines)
+    scenes = {name: cell.scene for name, cell in cells.items()}
+    return Cells(scenes, first.count, period, partial(_printed_gaps, scenes), printed.lines)
+
+
+def _printed_gaps(scenes: "Mapping[str, Scene]") -> dict[str, float]:
+    from sensorgen.asprinted.printed import gap_mm
+
+    return {name: gap_mm(scene) for name, scene in scenes.items()}
 
 
 def _identity(design: Design, *parts: str) -> str:

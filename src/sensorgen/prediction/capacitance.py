@@ -19,8 +19,9 @@ from sensorgen.models import capacitance_models
 from sensorgen.prediction.cost_model import expected
 from sensorgen.prediction.plan import Candidate
 from sensorgen.scene.scene import Scene
-from sensorgen.scene.sections import overlap
+from sensorgen.scene.sections import overlap, sections
 
+PLANE, SPATIAL = 1e-3, 1e-2  # relative width of a capacitance's bounds where none is asked for: a cross-section, 3D
 _EXACT = 1e-9  # relative width of a capacitance's bounds below which the scene is a plate
 _LOSSLESS, _LOSSY = "capacitance", "lossy"  # functions of a model
 _CHEAP = 1  # up to this cost, a model is asked before it is weighed
@@ -32,6 +33,14 @@ class Unpredictable(SensorgenError):
 
 class Contradiction(SensorgenError):
     """Two models whose bounds exclude each other: a fault, and no result."""
+
+
+def default_width(scene: Scene) -> float:
+    """Relative width of a capacitance's bounds where none is asked for [-]."""
+    try:
+        return PLANE if len(sections(scene)) == 1 else SPATIAL
+    except ValueError:  # no constant cross-section
+        return SPATIAL
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.prediction import capacitance as planner
 from sensorgen.prediction import losses
-from sensorgen.prediction.capacitance import Answer, Unpredictable
-from sensorgen.prediction.rest_state import default_width
+from sensorgen.prediction.capacitance import Answer, Unpredictable, default_width
 from sensorgen.scene.scene import Scene
 
 

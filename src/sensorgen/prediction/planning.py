@@ -12,11 +12,11 @@ from math import inf
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body
 from sensorgen.models.sensor import UNIFORM, Sensor
-from sensorgen.prediction.capacitance import Answer, weighed
+from sensorgen.prediction.capacitance import Answer, default_width, weighed
 from sensorgen.prediction.compression_law import Law, Option, options
 from sensorgen.prediction.error_budget import Load, ReferenceLoad
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
-from sensorgen.prediction.rest_state import default_width, rest_state
+from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import FLAT, SensorModel, Tip, build_sensor, piece
 
 ACCURACY = 1e-2  # of abs(Z), where none is asked for: material data are not that accurate

@@ -7,13 +7,10 @@ from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.values import MaterialValue, permittivities, resistivities
-from sensorgen.prediction.capacitance import Answer, Unpredictable, capacitance
+from sensorgen.prediction.capacitance import Answer, Unpredictable, capacitance, default_width
 from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.prediction.spread import spread
 from sensorgen.scene.scene import Scene
-from sensorgen.scene.sections import sections
-
-PLANE, SPATIAL = 1e-3, 1e-2  # relative width of a capacitance's bounds where none is asked for: a cross-section, 3D
 
 
 @dataclass(frozen=True)
@@ -42,14 +39,6 @@ class RestState:
     resistivity_ohm_m: tuple[float, float]
     values: tuple[MaterialValue, ...]
     doubts: tuple[str, ...] = ()
-
-
-def default_width(scene: Scene) -> float:
-    """Relative width of a capacitance's bounds where none is asked for [-]."""
-    try:
-        return PLANE if len(sections(scene)) == 1 else SPATIAL
-    except ValueError:  # no constant cross-section
-        return SPATIAL
 
 
 def rest_state(body: Body, width: float | None = None) -> RestState:

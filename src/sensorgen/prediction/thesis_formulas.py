@@ -17,9 +17,8 @@ from sensorgen.design.values import MaterialValue, permittivities
 from sensorgen.models import thesis_cells, thesis_swept
 from sensorgen.prediction import capacitance as planner
 from sensorgen.prediction import losses
-from sensorgen.prediction.capacitance import Unpredictable
+from sensorgen.prediction.capacitance import PLANE, Unpredictable
 from sensorgen.prediction.capacitance_answer import Asked
-from sensorgen.prediction.rest_state import PLANE
 
 NAMES = (*thesis_cells.NAMED, thesis_swept.NAME)
 SHAPES = {name: law.shapes for name, law in thesis_cells.NAMED.items()} | {thesis_swept.NAME: thesis_swept.SHAPES}
