@@ -17,7 +17,7 @@ def test_predict_shows_the_print_beside_the_drawing(run):
     said = run("predict", *SMALL, "--dielectric", "0.1", "--walls", "classic")
     assert (said.code, said.err) == (0, "")
     head, gap = said.out.splitlines()[1:3]
-    assert head.split()[:2] == ["drawn", "printed,"]
+    assert head.split()[:2] == ["drawn", "printed"]
     assert gap.split() == ["electrode", "gap", "0.1", "mm", "0.3", "mm"]
 
 

@@ -12,21 +12,23 @@ if TYPE_CHECKING:
     from sensorgen.prediction.error_budget import Changes, ErrorBudget
     from sensorgen.prediction.results import Prediction
 
-_LABEL, _CELL = 21, 33
+_LABEL, _CELL = 21, 30
 
 
 def table(found: "Prediction") -> Iterator[str]:
     """Quantities of the print beside the drawing's: the best value and the range with all errors."""
     columns = [found.drawn, found] if found.drawn else [found]
-    yield _row("", [p.body for p in columns])
+    yield _row("", [p.body.partition(",")[0] for p in columns])
     yield _row("electrode gap", [_bounds(p.gap) for p in columns])
     yield _row("capacitance", [_bounds(p.capacitance) if p.capacitance else p.status for p in columns])
     for end in found.resistance:
         yield _row(f"{end} electrode", [_bounds(p.resistance.get(end)) for p in columns])
-    yield _row("sensitivity", [_bounds(p.sensitivity) for p in columns])
-    at = f"at {found.force_n:g} N, {found.position_m * 1e3:g} mm"
-    yield _row("force resolution", [_value(p.force_resolution_n, "N") for p in columns]) + f"  {at}"
+    unit = " 1/kPa"
+    yield _row("sensitivity [1/kPa]", [_bounds(p.sensitivity).replace(unit, "") for p in columns])
+    yield _row("force resolution", [_value(p.force_resolution_n, "N") for p in columns])
     yield _row("position resolution", [_value(p.position_resolution_m, "m") for p in columns])
+    load = f"resolution at {found.force_n:g} N and {found.position_m * 1e3:g} mm"
+    yield from textwrap.wrap(f"({load}; {found.body})", WIDTH)
 
 
 def _row(label: str, cells: list[str]) -> str:
@@ -67,34 +69,36 @@ def _value(value: float | None, unit: str) -> str:
 
 
 def impedance(found: "Prediction") -> Iterator[str]:
-    """Impedance at rest: the range with all errors, then the best value."""
-    yield f"{'impedance at rest':>17}  {'Re [ohm]':>11} {'range':^22} {'Im [ohm]':>12} {'range':^24}".rstrip()
+    """Impedance at rest: the best value, and the range with all errors."""
+    yield f"{'at rest':>9} {'Re [ohm]':>9} {'range':^21} {'Im [ohm]':>11} {'range':^23}".rstrip()
     for row in found.impedance:
         re, im = (f"{part.lower:.3g} to {part.upper:.3g}" for part in (row.re, row.im))
-        yield f"{si(row.frequency_hz, 'Hz'):>17}  {row.re.value:11.5g} {re:^22} {row.im.value:12.5g} {im:^24}".rstrip()
+        values = f"{row.re.value:9.5g} {re:^21} {row.im.value:11.5g} {im:^23}"
+        yield f"{si(row.frequency_hz, 'Hz'):>9} {values}".rstrip()
 
 
 def ranges(found: "Prediction") -> Iterator[str]:
     """What the ranges hold, each error alone."""
-    rows = {"capacitance": found.capacitance, **{f"{e} electrode": r for e, r in found.resistance.items()}}
-    yield f"{'range of':{_LABEL}}{'model':>18}{'print':>18}{'material':>18}"
+    c = found.capacitance
+    certified = " (certified)" if c and c.certified else ""
+    rows = {"capacitance": c, **{f"{end} electrode": r for end, r in found.resistance.items()}}
+    yield f"{'range of':18}{'model' + certified:>20}{'print':>20}{'material':>20}"
     for name, bounds in rows.items():
         if bounds and bounds.value:
-            cells = (f"{_percent(i.lower, bounds.value)} to {_percent(i.upper, bounds.value)}" for i in
-                     (bounds.model, bounds.print, bounds.material))  # fmt: skip
-            kind = "" if name != "capacitance" or not bounds.certified else "  model: certified"
-            yield f"{name:{_LABEL}}" + "".join(f"{cell:>18}" for cell in cells) + kind
+            parts = (bounds.model, bounds.print, bounds.material)
+            cells = (f"{_percent(i.lower, bounds.value)} to {_percent(i.upper, bounds.value)} %" for i in parts)
+            yield f"{name:18}" + "".join(f"{cell:>20}" for cell in cells)
 
 
 def _percent(end: float, value: float) -> str:
     change = 100 * (end / value - 1)
-    return f"{change:+.2g} %" if abs(change) >= 0.005 else "0 %"
+    return f"{change:+.2g}" if abs(change) >= 0.005 else "0"
 
 
 def whole(found: "Prediction") -> Iterator[str]:
     """The prediction, what its ranges hold, impedance, identifiability and error budget."""
     if found.capacitance is None:
-        yield f"{found.design}: {found.reason}"
+        yield from textwrap.wrap(f"{found.design}: {found.reason}", WIDTH)
         if found.drawn and found.drawn.capacitance:
             yield from ("", *table(found))
         return
