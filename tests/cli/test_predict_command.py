@@ -280,7 +280,7 @@ def test_a_picture_where_a_file_is(run, tmp_path):
 
 def test_a_short_has_no_answer_to_a_press(run):
     for how in (["--json"], ["--csv"], ["--plot", "p"], []):
-        said = run("predict", "tri", "--dielectric", "0", "--force", "1", *how)
+        said = run("predict", "tri", "--drawn", "--dielectric", "0", "--force", "1", *how)
         assert (said.code, said.out) == (2, "")
         assert "the electrodes touch" in said.line
 
