@@ -169,6 +169,19 @@ def test_ways_to_print_it_are_a_term_of_a_print():
     assert term.changes.magnitude == pytest.approx(c.value / c.print.lower - 1, rel=0.02)  # |Z| of a capacitor
 
 
+@pytest.mark.parametrize(
+    ("accuracy", "said"),
+    [
+        (10.0, "accuracy 10 of |Z| reached"),
+        (1e-2, "reached by the models, not by print and material data; larger alone: resistivity, permittivity of x60"),
+        (1e-5, "not reached by the models"),
+    ],
+)
+def test_the_text_says_whether_an_accuracy_is_reached(accuracy, said):
+    assert said in " ".join(" ".join(lines(found("reference", accuracy))).split())
+    assert "accuracy" not in " ".join(lines(found("reference")))
+
+
 def test_the_text_names_the_largest_term():
     text = " ".join(" ".join(lines(found("reference"))).split())
     assert "largest: resistivity (of the electrodes, 0.07 to 0.833 ohm m)" in text

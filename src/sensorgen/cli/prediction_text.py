@@ -137,6 +137,18 @@ def budget(found: "ErrorBudget") -> Iterator[str]:
     largest = found.largest()
     yield from textwrap.wrap(f"largest: {largest.name} ({largest.what})", WIDTH, initial_indent="  ",
                              subsequent_indent="    ")  # fmt: skip
+    if found.accuracy:
+        yield from textwrap.wrap(_accuracy(found), WIDTH, initial_indent="  ", subsequent_indent="    ")
+
+
+def _accuracy(found: "ErrorBudget") -> str:
+    """Whether the accuracy of abs(Z) that was asked for is reached, by the models and by everything."""
+    beyond = f"; larger alone: {', '.join(found.beyond())}" if found.beyond() else ""
+    if found.met_by("model", "print", "material"):
+        return f"accuracy {found.accuracy:g} of |Z| reached"
+    if found.met_by("model"):
+        return f"accuracy {found.accuracy:g} of |Z| reached by the models, not by print and material data{beyond}"
+    return f"accuracy {found.accuracy:g} of |Z| not reached by the models{beyond}"
 
 
 def _shares(changes: "Changes | None", *, at_least: bool) -> str:
