@@ -19,7 +19,7 @@ from sensorgen.analysis.comparison import of_iteration
 from sensorgen.analysis.plots.static import files
 from sensorgen.analysis.report import FORMATS, formats, report, written, yields
 from sensorgen.analysis.report.electrodes import MOST_ROWS
-from sensorgen.analysis.report.tables import shown as shown_as
+from sensorgen.core.document import shown as shown_as
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Log, notes
 

@@ -11,8 +11,8 @@ from sensorgen.analysis.comparison.specimens import known_iterations
 from sensorgen.analysis.plots.figure import Figure
 from sensorgen.analysis.report import electrodes, explained, recordings, variants, yields
 from sensorgen.analysis.report.provenance import origins
-from sensorgen.analysis.report.tables import Column, Table
 from sensorgen.analysis.report.variants import Variant
+from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Log
 
@@ -183,4 +183,4 @@ def _recordings(recorded: Sequence[Run]) -> Section:
 
 def _left_out(rows: Sequence[tuple[str, str]]) -> tuple[Table, ...]:
     caption = "What was left out, or taken with care, and why"
-    return (Table("left_out", caption, tuple(LeftOut(*row) for row in rows)),) if rows else ()
+    return (Table.of("left_out", caption, tuple(LeftOut(*row) for row in rows)),) if rows else ()

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.plots.figure import GREEN, GREY, ORANGE, PINK, SKY, YELLOW, Axis, Curve, Figure, Panel
-from sensorgen.analysis.report.tables import Column, Table
+from sensorgen.core.document import Column, Table
 from sensorgen.measure.signal.verdicts import WORDS
 
 VERDICT_COLOURS = dict(zip(WORDS, (PINK, ORANGE, YELLOW, SKY, GREEN, GREY), strict=True))
@@ -64,7 +64,9 @@ class VerdictRow:
 def readings(found: Comparison) -> Table:
     """A row for each reading, the largest deviation first."""
     ordered = sorted(found.rows, key=lambda row: -abs(row.residual) if isfinite(row.residual) else 1.0)
-    return Table("readings", "Every reading and its prediction; the largest deviation first", tuple(map(_row, ordered)))
+    return Table.of(
+        "readings", "Every reading and its prediction; the largest deviation first", tuple(map(_row, ordered))
+    )
 
 
 def _row(row: Compared) -> ReadingRow:
@@ -85,7 +87,7 @@ def reasons(found: Comparison) -> Table:
     for row in found.rows:
         r, (electrode, film) = row.reading, row.verdict.reasons
         rows.append(VerdictRow(r.number, r.specimen, row.verdict.word, electrode, film, r.remark, "; ".join(r.doubts)))
-    return Table("verdicts", "Verdicts and their reasons", tuple(rows))
+    return Table.of("verdicts", "Verdicts and their reasons", tuple(rows))
 
 
 def usable(found: Comparison) -> list[Compared]:

@@ -17,7 +17,7 @@ from sensorgen.analysis.comparison.leaky import across_ohm, along_ohm
 from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
 from sensorgen.analysis.comparison.runs import Run
 from sensorgen.analysis.report.electrodes import usable
-from sensorgen.analysis.report.tables import Column, Table
+from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.measure.recording.samples import Complex, Real
@@ -71,7 +71,7 @@ def explanations(found: Comparison, recorded: Sequence[Run]) -> list[Explanation
 
 def table(found: Sequence[Explanation]) -> Table:
     """A row for each."""
-    return Table("explained", "Share of the residuals that one parameter explains", tuple(found))
+    return Table.of("explained", "Share of the residuals that one parameter explains", tuple(found))
 
 
 def sentences(found: Sequence[Explanation]) -> Iterator[str]:

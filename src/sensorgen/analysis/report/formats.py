@@ -4,16 +4,14 @@ import base64
 import csv
 import io
 import json
-import re
 from collections.abc import Iterator
 
 from sensorgen.analysis.plots.pages import render
 from sensorgen.analysis.report.contents import Report
-from sensorgen.analysis.report.tables import Cell, Table, exact, plain, shown
+from sensorgen.core.document import exact, plain, safe, shown, spreadsheet
+from sensorgen.core.document import markdown as document
 
 MOST_ROWS = 2000  # of a table on the page: a browser has to lay out all of them
-_SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|!~$&])")
-_FORMULA = ("=", "+", "-", "@", "\t", "\r", "'")
 
 
 def html(report: Report) -> str:
@@ -31,36 +29,18 @@ def markdown(report: Report) -> str:
 
 
 def _lines(report: Report) -> Iterator[str]:
-    yield from (f"# {_safe(report.title)}", "")
-    yield from (f"**{_safe(text)}**  " for text in report.headline)
+    yield from (f"# {safe(report.title)}", "")
+    yield from (f"**{safe(text)}**  " for text in report.headline)
     yield ""
-    yield from (f"- {_safe(text)}" for text in report.findings)
+    yield from (f"- {safe(text)}" for text in report.findings)
     for section in report.sections:
-        yield from ("", f"## {_safe(section.title)}", "")
-        yield from (f"- {_safe(v.design)} (design {v.design_id}): {_safe(v.words)}" for v in section.variants)
+        yield from ("", f"## {safe(section.title)}", "")
+        yield from (f"- {safe(v.design)} (design {v.design_id}): {safe(v.words)}" for v in section.variants)
         for table in section.tables:
-            yield from _table(table)
+            yield from document([table])
         for note in section.notes:
-            yield from ("", _safe(note))
+            yield from ("", safe(note))
     yield from ("", f"Made {report.made_at}.")
-
-
-def _table(table: Table) -> Iterator[str]:
-    """A table; one of a single row as a list."""
-    yield from ("", f"**{_safe(table.caption)}**", "")
-    if len(table.rows) == 1:
-        for column, cell in zip(table.columns, table.cells[0], strict=True):
-            yield f"- {_safe(column.head)}: {_safe(shown(cell))}"
-        return
-    worded = [any(isinstance(row[k], str) for row in table.cells) for k in range(len(table.columns))]
-    yield f"| {' | '.join(_safe(c.head) for c in table.columns)} |"
-    yield f"|{'|'.join('---' if words else '---:' for words in worded)}|"
-    yield from (f"| {' | '.join(_safe(shown(v)) for v in row)} |" for row in table.cells)
-
-
-def _safe(text: str) -> str:
-    """Text whose signs mean nothing to Markdown, on one line."""
-    return _SPECIAL.sub(r"\\\1", " ".join(text.split()))
 
 
 def comma_separated(report: Report) -> str:
@@ -71,14 +51,8 @@ def comma_separated(report: Report) -> str:
     for table in report.tables:
         for number, row in enumerate(table.cells, 1):
             for column, cell in zip(table.columns, row, strict=True):
-                writer.writerow([table.key, number, column.name, column.unit, _cell(cell)])
+                writer.writerow([table.key, number, column.name, column.unit, spreadsheet(cell)])
     return target.getvalue()
-
-
-def _cell(cell: Cell) -> str:
-    """Text that a spreadsheet would take for a formula gets an apostrophe, as in the log's own tables."""
-    text = exact(cell)
-    return f"'{text}" if isinstance(cell, str) and text.startswith(_FORMULA) else text
 
 
 def as_json(report: Report) -> str:

@@ -8,7 +8,7 @@ from importlib.metadata import version
 from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison
-from sensorgen.analysis.report.tables import Column, Table
+from sensorgen.core.document import Column, Table
 from sensorgen.core.version import __version__
 from sensorgen.design.materials import SET, citations
 from sensorgen.measure.log import Log, RawFile
@@ -39,7 +39,7 @@ def origins(log: Log, found: Comparison) -> Table:
         *(Origin("prediction", f"{p.design} ({p.design_id})", p.provenance) for p in found.predictions.values()),
         *_sources(found),
     ]  # fmt: skip
-    return Table("provenance", "Programs, files, designs and sources", tuple(rows))
+    return Table.of("provenance", "Programs, files, designs and sources", tuple(rows))
 
 
 def _sources(found: Comparison) -> list[Origin]:

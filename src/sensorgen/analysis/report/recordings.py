@@ -11,8 +11,8 @@ from sensorgen.analysis.comparison import Comparison, Predicted
 from sensorgen.analysis.comparison.runs import Run
 from sensorgen.analysis.plots import recordings as plots
 from sensorgen.analysis.plots.figure import BLUE, ORANGE, Axis, Curve, Figure, Panel
-from sensorgen.analysis.report.tables import Cell, Column, Table
 from sensorgen.core.bounds import Bounds
+from sensorgen.core.document import Cell, Column, Table
 from sensorgen.core.errors import SensorgenError
 
 _SAME = 1e-6  # relative: frequencies nearer than this are the same
@@ -65,7 +65,7 @@ def impedances(recorded: Sequence[Run], found: Comparison) -> Table:
     rows = tuple(
         row for run in recorded for row in _rows(run, found.predictions.get(found.names.get(run.entry.specimen, "")))
     )
-    return Table("impedance", "Impedance at rest and its prediction, by frequency", rows)
+    return Table.of("impedance", "Impedance at rest and its prediction, by frequency", rows)
 
 
 def _rows(run: Run, of: Predicted | None) -> Iterator[ImpedanceRow]:
@@ -101,7 +101,7 @@ def facts(recorded: Sequence[Run]) -> Table:
         )
         for run in recorded
     )  # fmt: skip
-    return Table("recordings", "Recordings of the rig", tuple(rows))
+    return Table.of("recordings", "Recordings of the rig", tuple(rows))
 
 
 def headline(table: Table | None) -> Iterator[str]:

@@ -7,8 +7,8 @@ from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison, Predicted
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, Body, Curve, Figure, Panel
-from sensorgen.analysis.report.tables import Column, Table
 from sensorgen.checks.review import draw, review
+from sensorgen.core.document import Column, Table
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import materials
 from sensorgen.design.design import Design
@@ -74,7 +74,7 @@ def identifiability(found: Comparison) -> tuple[Table, ...]:
     """A row for each variant with a prediction."""
     rows = tuple(_row(name, of.prediction.identifiability, of.reason) for name, of in found.predictions.items())
     caption = f"Predicted identifiability of {FORCE_N:g} N in the middle, by seven frequencies (Cramér-Rao)"
-    return (Table("identifiability", caption, rows),) if rows else ()
+    return (Table.of("identifiability", caption, rows),) if rows else ()
 
 
 def _row(name: str, found: Identifiability | None, reason: str) -> IdentifiabilityRow:

@@ -8,7 +8,7 @@ from typing import Annotated
 from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, Axis, Curve, Figure, Panel
 from sensorgen.analysis.report.electrodes import VERDICT_COLOURS
-from sensorgen.analysis.report.tables import Cell, Column, Table
+from sensorgen.core.document import Cell, Column, Table
 from sensorgen.measure.signal.verdicts import ORDER, WORDS, Evidence
 from sensorgen.measure.signal.yields import Group, Share, dependence, groups
 
@@ -150,7 +150,7 @@ def table(found: Comparison) -> Table:
         known = judged(found, by)
         alone = by == "shape and film" and any(len(judged(found, part)) < 2 for part in TESTED)
         rows += [_row(by, _name(g), g) for g in known if len(known) > 1 and not alone]
-    return Table("yield", "Verdicts and yield", tuple(rows))
+    return Table.of("yield", "Verdicts and yield", tuple(rows))
 
 
 def _row(by: str, name: str, g: Group) -> YieldRow:

@@ -1,0 +1,101 @@
+"""Results as text, JSON, CSV or Markdown, to the terminal or a file: the one way out of every command."""
+
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sensorgen.core.errors import BadInput
+
+if TYPE_CHECKING:
+    from sensorgen.core.document import Documented
+
+_ABOUT = {"json": "Print as JSON.", "csv": "Print the table as CSV, all digits.", "markdown": "Print as Markdown."}
+_FORM, _FILE = "sensorgen.form", "sensorgen.output"  # in the context's meta
+
+
+def options(*forms: str) -> list[click.Parameter]:
+    """``--json``, ``--csv``, ``--markdown``, or those named, and ``--output``; :func:`deliver` obeys them."""
+    return [
+        *(
+            click.Option([f"--{form}", f"as_{form}"], is_flag=True, expose_value=False, callback=_choose, help=about)
+            for form, about in _ABOUT.items() if form in (forms or _ABOUT)
+        ),
+        click.Option(
+            ["--output", "-o"], metavar="FILE", expose_value=False, callback=_to, help="Write this file."
+        ),
+    ]  # fmt: skip
+
+
+def _choose(ctx: click.Context, param: click.Parameter, given: bool) -> None:
+    if given:
+        option = param.opts[0]
+        if other := ctx.meta.get(_FORM):
+            raise BadInput(f"--{other} and {option} at once; expected one of them")
+        ctx.meta[_FORM] = option.removeprefix("--")
+
+
+def _to(ctx: click.Context, param: click.Parameter, given: str | None) -> None:  # noqa: ARG001
+    ctx.meta[_FILE] = given
+
+
+def form() -> str:
+    """What was asked for: "json", "csv", "markdown", or "" for text."""
+    return str(click.get_current_context().meta.get(_FORM, ""))
+
+
+def deliver(result: "Documented") -> None:
+    """Print a result in the form that was asked for, or write it to the file; an existing one is replaced whole."""
+    write(pieces(result, form()))
+
+
+def pieces(result: "Documented", wanted: str) -> Iterable[str]:
+    """A result as pieces of text.
+
+    Raises
+    ------
+    BadInput
+        CSV of a result without a table.
+    """
+    if wanted == "json":
+        return [to_json(result)]
+    from sensorgen.core import document
+
+    if wanted == "csv":
+        tables = [part for part in result.document() if isinstance(part, document.Table)]
+        if not tables:
+            raise BadInput("--csv: this result has no table; expected --json")
+        return [document.comma_separated(tables[0])]
+    lines = document.markdown if wanted else document.text
+    return (f"{line}\n" for line in lines(result.document()))
+
+
+def to_json(result: Any) -> str:
+    """A result, or a sequence of results of one type, as indented JSON; null for what is not finite.
+
+    A result with a schema of its own writes itself: ``to_json()``.
+    """
+    if hasattr(result, "to_json"):
+        return str(result.to_json())
+    from pydantic import TypeAdapter
+
+    many = isinstance(result, Sequence)
+    kind: Any = tuple[type(result[0]), ...] if many and result else type(result)  # type: ignore[misc]
+    return TypeAdapter(kind).dump_json(tuple(result) if many else result, indent=2).decode() + "\n"
+
+
+def write(text: Iterable[str]) -> None:
+    """Print pieces of text as they come, or write them to the file, which is there when all of them are."""
+    output = click.get_current_context().meta.get(_FILE)
+    if output in (None, "-"):
+        for piece in text:
+            sys.stdout.write(piece)
+        return
+    from sensorgen.core import files
+
+    with files.replacing(Path(output)) as file:
+        for piece in text:
+            file.write(piece.encode())
+    click.echo(output)

@@ -1,0 +1,230 @@
+"""What a result shows: paragraphs, facts and tables; as text, Markdown, HTML or CSV.
+
+A result that a command prints or a notebook displays has a method ``document()`` that yields these parts.
+"""
+
+import csv
+import io
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from html import escape
+from math import isfinite, isinf, isnan
+from typing import Any, Protocol, Self, get_type_hints
+
+Cell = str | float | int | None
+DIGITS = 4  # for people; files for programs hold all
+WIDTH = 80  # columns of a terminal
+_MARKDOWN = str.maketrans({c: f"\\{c}" for c in "\\`*_{}[]<>#|!~$&"})
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "'")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: name, unit, its meaning if the name does not say it, digits for people, and its name in CSV."""
+
+    name: str
+    unit: str = ""
+    about: str = ""
+    digits: int = DIGITS
+    key: str = ""
+
+    @property
+    def head(self) -> str:
+        """Name with unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Attributes
+    ----------
+    key : str
+        Its name for programs, and its anchor on a page.
+    caption : str
+        What it shows; may be empty.
+    columns : tuple of Column
+        From left to right.
+    cells : tuple of tuple
+        Values row by row; None where nothing is known, infinite where a meter showed overload.
+    rows : tuple
+        The dataclasses that they were taken from, if any.
+    """
+
+    key: str
+    caption: str
+    columns: tuple[Column, ...]
+    cells: tuple[tuple[Cell, ...], ...]
+    rows: tuple[Any, ...] = ()
+
+    @classmethod
+    def of(cls, key: str, caption: str, rows: Sequence[Any]) -> Self:
+        """A table of dataclasses of one type, at least one; fields annotated with a ``Column`` are its columns."""
+        hints = get_type_hints(type(rows[0]), include_extras=True)
+        found = {f.name: c for f in fields(rows[0]) for c in getattr(hints[f.name], "__metadata__", ())[:1]}
+        values = ((getattr(row, name) for name in found) for row in rows)
+        cells = tuple(tuple(None if isinstance(v, float) and isnan(v) else v for v in row) for row in values)
+        return cls(key, caption, tuple(replace(c, key=name) for name, c in found.items()), cells, tuple(rows))
+
+    def beside(self, column: Column, values: Sequence[Cell]) -> "Table":
+        """The table with one more column before the first."""
+        cells = tuple((value, *row) for value, row in zip(values, self.cells, strict=True))
+        return replace(self, columns=(column, *self.columns), cells=cells)
+
+    def filled(self) -> "Table":
+        """The table without columns that are empty in every row."""
+        kept = [k for k in range(len(self.columns)) if any(row[k] not in (None, "") for row in self.cells)]
+        cells = tuple(tuple(row[k] for k in kept) for row in self.cells)
+        return replace(self, columns=tuple(self.columns[k] for k in kept), cells=cells)
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Names with what is to be said of each; one of an empty name goes on with the one before."""
+
+    rows: tuple[tuple[str, str], ...]
+
+
+Part = str | Facts | Table
+
+
+class Documented(Protocol):
+    """A result that says what it shows."""
+
+    def document(self) -> Iterable[Part]:
+        """Parts in the order of reading; "" is an empty line."""
+        ...
+
+
+def shown(cell: Cell, digits: int = DIGITS) -> str:
+    """A cell for people.
+
+    >>> [shown(v) for v in (None, float("inf"), 1234.5678, 7, True, "a")]
+    ['–', '∞', '1235', '7', 'yes', 'a']
+    """
+    if cell is None:
+        return "–"
+    if isinstance(cell, str):
+        return cell
+    if isinstance(cell, bool):
+        return "yes" if cell else "no"
+    if isinf(cell):
+        return "∞"
+    if isinstance(cell, int) or (cell == int(cell) and abs(cell) < 1e6):
+        return f"{cell:.0f}"
+    return f"{cell:.{digits}g}"
+
+
+def exact(cell: Cell) -> str:
+    """A cell for programs, all digits; "" for nothing.
+
+    >>> [exact(v) for v in (None, float("inf"), 0.1, True, "a")]
+    ['', 'inf', '0.1', 'true', 'a']
+    """
+    if cell is None:
+        return ""
+    if isinstance(cell, bool):
+        return str(cell).lower()
+    return cell if isinstance(cell, str) else repr(cell if isinstance(cell, int) else float(cell))
+
+
+def plain(cell: Cell) -> Cell:
+    """A cell for JSON, which has no infinity."""
+    return cell if isinstance(cell, str) or cell is None or isfinite(cell) else "inf"
+
+
+def text(parts: Iterable[Part]) -> Iterator[str]:
+    """Lines for a terminal: paragraphs and facts wrapped, tables with columns below each other."""
+    for part in parts:
+        if isinstance(part, str):
+            yield from textwrap.wrap(part, WIDTH, subsequent_indent="  ") or [""]
+        elif isinstance(part, Facts):
+            yield from _facts(part)
+        else:
+            yield from textwrap.wrap(part.caption, WIDTH)
+            yield from _aligned(part.filled())
+
+
+def _facts(part: Facts) -> Iterator[str]:
+    wide = max(len(name) for name, _ in part.rows) + 2
+    for name, said in part.rows:
+        yield from textwrap.wrap(said, WIDTH, initial_indent=f"{name:{wide}}", subsequent_indent=" " * wide)
+
+
+def _aligned(table: Table) -> Iterator[str]:
+    """Numbers to the right, words to the left."""
+    rows = [[shown(v, c.digits) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
+    worded = [any(isinstance(row[k], str) for row in table.cells) for k in range(len(table.columns))]
+    lines = [[c.head for c in table.columns], *rows]
+    wide = [max(len(line[k]) for line in lines) for k in range(len(table.columns))]
+    for line in lines:
+        cells = (f"{v:<{w}}" if words else f"{v:>{w}}" for v, w, words in zip(line, wide, worded, strict=True))
+        yield "  ".join(cells).rstrip()
+
+
+def markdown(parts: Iterable[Part]) -> Iterator[str]:
+    """Lines of Markdown, in which no sign of a value has a meaning."""
+    for part in parts:
+        if isinstance(part, str):
+            yield from ("", safe(part)) if part else ()
+        elif isinstance(part, Facts):
+            yield from ("", *(f"- {safe(f'{name}: {said}' if name else said)}" for name, said in part.rows))
+        else:
+            yield from _markdown_table(part.filled())
+
+
+def _markdown_table(table: Table) -> Iterator[str]:
+    """A table; one of a single row as a list."""
+    yield from ("", f"**{safe(table.caption)}**", "") if table.caption else ("",)
+    if len(table.cells) == 1:
+        for column, cell in zip(table.columns, table.cells[0], strict=True):
+            yield f"- {safe(column.head)}: {safe(shown(cell, column.digits))}"
+        return
+    worded = [any(isinstance(row[k], str) for row in table.cells) for k in range(len(table.columns))]
+    yield f"| {' | '.join(safe(c.head) for c in table.columns)} |"
+    yield f"|{'|'.join('---' if words else '---:' for words in worded)}|"
+    for row in table.cells:
+        yield f"| {' | '.join(safe(shown(v, c.digits)) for v, c in zip(row, table.columns, strict=True))} |"
+
+
+def safe(words: str) -> str:
+    """Words whose signs mean nothing to Markdown, on one line."""
+    return " ".join(words.split()).translate(_MARKDOWN)
+
+
+def html(parts: Iterable[Part]) -> str:
+    """A fragment of a page."""
+    return "".join(_html(part) for part in parts if part)
+
+
+def _html(part: Part) -> str:
+    if isinstance(part, str):
+        return f"<p>{escape(part)}</p>"
+    if isinstance(part, Facts):
+        return f"<table>{''.join(_html_row(row, 'td') for row in part.rows)}</table>"
+    table = part.filled()
+    rows = [[shown(v, c.digits) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
+    head = _html_row([c.head for c in table.columns], "th")
+    caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
+    return f"<table>{caption}{head}{''.join(_html_row(row, 'td') for row in rows)}</table>"
+
+
+def _html_row(cells: Iterable[str], tag: str) -> str:
+    return f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells)}</tr>"
+
+
+def comma_separated(table: Table) -> str:
+    """A table as CSV with all digits and all columns."""
+    target = io.StringIO(newline="")
+    writer = csv.writer(target, lineterminator="\n")
+    writer.writerow([c.key or c.head for c in table.columns])
+    writer.writerows([spreadsheet(cell) for cell in row] for row in table.cells)
+    return target.getvalue()
+
+
+def spreadsheet(cell: Cell) -> str:
+    """A cell for programs; text that a spreadsheet would take for a formula gets an apostrophe."""
+    words = exact(cell)
+    return f"'{words}" if isinstance(cell, str) and words.startswith(_FORMULA) else words
