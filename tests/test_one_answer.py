@@ -212,7 +212,7 @@ def fit(asked):
 def invert(asked):
     """The sensor that ``invert`` searches."""
     from sensorgen.cli.body_options import body_of
-    from sensorgen.prediction.evaluate import sensor_model
+    from sensorgen.prediction.planning import sensor_model
 
     return Answer(
         *(

@@ -10,7 +10,7 @@ from sensorgen.design.design import Design, make
 from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import bodies
-from sensorgen.prediction.evaluate import sensor_model
+from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import SensorModel
 
@@ -32,7 +32,7 @@ class Movable:
 
     @cached_property
     def model(self) -> SensorModel:
-        """Of the print, as predicted; raises as :func:`sensorgen.prediction.evaluate.sensor_model`."""
+        """Of the print, as predicted; raises as :func:`sensorgen.prediction.planning.sensor_model`."""
         return sensor_model(bodies.default_body(self.design))[0]
 
     @property

@@ -12,7 +12,8 @@ from sensorgen.core.document import Column, Table
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import materials
 from sensorgen.design.design import Design
-from sensorgen.prediction.identifiability import FORCE_N, Identifiability
+from sensorgen.prediction.identifiability.results import Identifiability
+from sensorgen.prediction.query import FORCE_N
 from sensorgen.scene.geometry.meshes import mesh
 
 _STRETCH = (1.0, 1.0, 10.0)
