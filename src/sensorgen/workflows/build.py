@@ -23,7 +23,6 @@ from sensorgen.export.threemf.part import parts_of
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, to_json
-from sensorgen.scene.geometry.cad import CadProcess
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
 LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")
@@ -90,7 +89,11 @@ def build(
     """
     folder = out / design.name
     with ExitStack() as stack:
-        kernel = stack.enter_context(CadProcess()) if cad else None  # its import runs beside everything below
+        kernel = None
+        if cad:
+            from sensorgen.scene.geometry.cad import CadProcess
+
+            kernel = stack.enter_context(CadProcess())  # its import runs beside everything below
         held = review(design, step)
         if held.errors(strict) and not force:
             raise Unprintable(held.findings)

@@ -17,6 +17,7 @@ from sensorgen.prediction.identifiability.fisher import (
     bounds,
     shares,
     slopes,
+    standard_errors,
     undefined,
 )
 from sensorgen.prediction.identifiability.results import (
@@ -28,7 +29,6 @@ from sensorgen.prediction.identifiability.results import (
     Stiffest,
     cartesian,
     finite,
-    standard_errors,
 )
 from sensorgen.prediction.identifiability.verdict import Required, bracket, required, verdict
 from sensorgen.prediction.query import FORCE_N, NOISE
