@@ -36,7 +36,7 @@ def main() -> None:
             continue
         curve = law.compression
         found[content(cell)] = (
-            f"  {content(cell)}:  # tri along {along}, film {film:g} mm, {quality}\n"
+            f"  {content(cell)}:  # tri repeating along {along}, film {film:g} mm, {quality}\n"
             f"    displacement_um: {curve.displacement_m * 1e6:.5g}\n"
             f"    stress_kpa: {[round(p / 1e3, 6) for p in curve.stress_pa]}\n"
             f"    rise_percent: {[round(100 * (r - 1), 6) for r in curve.ratio]}\n"
