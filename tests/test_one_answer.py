@@ -205,8 +205,9 @@ def report(asked):
 def fit(asked):
     """The sensor from which ``fit`` starts."""
     from sensorgen.analysis.comparison.moved import Movable
+    from sensorgen.prediction.bodies import default_body
 
-    return Answer(_of_sensor(asked, lambda design: Movable(design).model))
+    return Answer(_of_sensor(asked, lambda design: Movable(default_body(design)).model))
 
 
 def invert(asked):

@@ -320,4 +320,4 @@ def _body(what: Design | Body) -> Body:
     if isinstance(what, Body):
         return what
     design = _named(what)
-    return bodies.default_body(design, Path("out") / design.name)
+    return bodies.default_body(design)

@@ -6,10 +6,12 @@ from math import isfinite, log, nan
 
 from sensorgen.analysis.comparison.expected import Predicted, predicted
 from sensorgen.core.errors import SensorgenError
+from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
 from sensorgen.design.specimen_name import Specimen, design_of, parse
 from sensorgen.measure.log import Log, Prediction, Reading
 from sensorgen.measure.signal.verdicts import Evidence, Verdict, expected_from, verdict
+from sensorgen.prediction import bodies
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,8 @@ class Comparison:
     ----------
     rows : tuple of Compared
         One for each reading, in the order of the log.
-    designs : mapping of str to Design
-        Every design that is known, by name.
+    bodies : mapping of str to Body
+        What was measured, by the design's name.
     names : mapping of str to str
         The design's name by the specimen's.
     predictions : mapping of str to Predicted
@@ -65,7 +67,7 @@ class Comparison:
     """
 
     rows: tuple[Compared, ...]
-    designs: Mapping[str, Design]
+    bodies: Mapping[str, Body]
     names: Mapping[str, str]
     predictions: Mapping[str, Predicted]
     left_out: tuple[tuple[str, str], ...]
@@ -76,7 +78,9 @@ class Comparison:
         return tuple({row.reading.specimen: row for row in self.rows}.values())
 
 
-def of_iteration(log: Log, iteration: int, step: Callable[[str], None] = lambda _: None) -> Comparison:
+def of_iteration(
+    log: Log, iteration: int, step: Callable[[str], None] = lambda _: None, body_of: BodyOf = bodies.default_body
+) -> Comparison:
     """Everything in the log about an iteration, compared.
 
     Parameters
@@ -87,6 +91,8 @@ def of_iteration(log: Log, iteration: int, step: Callable[[str], None] = lambda 
         Of the design.
     step : callable
         Called with the name of each design before it is predicted.
+    body_of : callable
+        Makes the body of a design.
     """
     readings = log.readings(iteration=iteration)
     left_out: list[tuple[str, str]] = [
@@ -96,17 +102,18 @@ def of_iteration(log: Log, iteration: int, step: Callable[[str], None] = lambda 
     names = {specimen: design.name for specimen, design in by_specimen.items()}
     designs = dict(sorted((design.name, design) for design in by_specimen.values()))
     left_out += _other_designs(readings, designs.values())
-    found = {}
+    measured, found = {}, {}
     for name, design in designs.items():
         step(name)
-        found[name] = predicted(design, _stored(log, design))
+        measured[name] = body_of(design)
+        found[name] = predicted(measured[name], _stored(log, design))
     evidence = [_evidence(reading, found.get(names.get(reading.specimen, ""))) for reading in readings]
     usual = {shape: expected_from([e for e in evidence if e.shape == shape]) for shape in {e.shape for e in evidence}}
     rows = []
     for reading, of in zip(readings, evidence, strict=True):
         known = replace(of, expected_ohm=usual[of.shape])
         rows.append(Compared(reading, found.get(names.get(reading.specimen, "")), known, verdict(known)))
-    return Comparison(tuple(rows), designs, names, found, tuple(left_out + list(_unused(rows))))
+    return Comparison(tuple(rows), measured, names, found, tuple(left_out + list(_unused(rows))))
 
 
 def _corrected(log: Log, iteration: int) -> Iterator[Reading]:
