@@ -358,15 +358,11 @@ PRISMS = ("trix", "triy", "own", "compensated", "upside-down")  # of which the s
 UNNAMED = ("rect", "reference", "double")  # whose gap is printed as drawn
 
 OWN_CELL = "bounds the cell of the computed outlines anew; of the own design it takes whole periods only"
-BY_NAME = "compares with the design that the specimen's name stands for"
 ONLY_OTHERWISE = "names the gap only where it is printed otherwise"
 UNAWARE = "does not count what is not printed"
 RED = {  # who differs today, why, and for which designs: what is mended has to go from here, as xfail is strict
     ("capacitance printed", "compress"): (OWN_CELL, SOLVED),
     ("capacitance drawn", "compress"): (OWN_CELL, SOLVED),
-    ("capacitance printed", "report"): (BY_NAME, ("own", "compensated")),
-    ("resistance printed", "report"): (BY_NAME, ("double", "own", "compensated")),
-    ("resolution printed", "report"): (BY_NAME, ("own", "compensated")),
     ("gap printed", "check"): (ONLY_OTHERWISE, UNNAMED),
     ("gap drawn", "check"): (ONLY_OTHERWISE, UNNAMED),
     ("errors", "batch"): (f"{UNAWARE} unless it slices", PRISMS),
@@ -434,10 +430,9 @@ def build_again(asked):
 
 
 SLICED = [build_again, log_predict, cell, invert, python, fit]
-NOT_SLICED = pytest.mark.xfail(strict=True, raises=AssertionError, reason="goes by the estimate where G-code is there")
 
 
-@pytest.mark.parametrize("entry", [pytest.param(e, marks=NOT_SLICED) if e is fit else e for e in SLICED])
+@pytest.mark.parametrize("entry", SLICED)
 def test_once_there_is_gcode_everybody_speaks_of_it(entry, asked, program):
     program("prusa-slicer", "prusa-slicer")
     design = asked("trix", sliced=True)
