@@ -224,7 +224,7 @@ def invert(asked):
 
 
 def check(asked):
-    """``check``: errors, and the gaps, which it names where they differ: in its silence the print's is the drawing's."""
+    """``check``: errors, and the gaps, named where they differ: in its silence they are the same."""
     code, out = asked.say("check", asked.file, "--json")
     findings = json.loads(out)["findings"]
     gap = next((f for f in findings if f["rule"] == "2-printed-gap"), None)
