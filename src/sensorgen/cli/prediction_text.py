@@ -2,6 +2,7 @@
 
 import textwrap
 from collections.abc import Iterator
+from math import inf
 from typing import TYPE_CHECKING
 
 from sensorgen.cli import card_text
@@ -24,8 +25,8 @@ def table(found: "Prediction") -> Iterator[str]:
         yield _row(f"{end} electrode", [_bounds(p.resistance.get(end)) for p in columns])
     unit = " 1/kPa"
     yield _row("sensitivity [1/kPa]", [_bounds(p.sensitivity).replace(unit, "") for p in columns])
-    yield _row("force resolution", [_value(p.force_resolution_n, "N") for p in columns])
-    yield _row("position resolution", [_value(p.position_resolution_m, "m") for p in columns])
+    yield _row("force resolution", [_bounds(p.force_resolution) for p in columns])
+    yield _row("position resolution", [_bounds(p.position_resolution) for p in columns])
     load = f"resolution at {found.force_n:g} N and {found.position_m * 1e3:g} mm"
     yield from textwrap.wrap(f"({load}; {found.body})", WIDTH)
 
@@ -41,6 +42,8 @@ def _bounds(bounds: "Bounds | None") -> str:
     prefix, scale = _prefix(bounds.value, bounds.unit)
     low, value, high = (end / scale for end in (bounds.lower, bounds.value, bounds.upper))
     unit = f"{prefix}{bounds.unit}"
+    if high == inf:
+        return f"{value:.2g} {unit} (error unknown)"
     if f"{low:.2g}" == f"{high:.2g}":
         return f"{value:.4g} {unit}"
     return f"{value:.3g} {unit} ({_short(low)} to {_short(high)})"

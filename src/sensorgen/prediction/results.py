@@ -16,7 +16,7 @@ from sensorgen.prediction.plan import Plan, without_times
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
-SCHEMA = 2  # 1 was a JSON of the drawing alone, of versions up to 0.1.0
+SCHEMA = 3  # 1 was a JSON of the drawing alone, of version 0.1.0; 2 had resolutions without their range
 
 
 @dataclass(frozen=True)
@@ -156,8 +156,9 @@ class Prediction(Displayed):
         Relative change of capacitance per pressure, from rest to the reference load [1/kPa].
     force_n, position_m : float
         The reference load [N], [m].
-    force_resolution_n, position_resolution_m : float or None
-        Standard errors of force and position there, from one reading [N], [m]; None where undefined.
+    force_resolution, position_resolution : Bounds or None
+        Standard errors of force and position there, from one reading [N], [m]; None where undefined. The range holds
+        what ways to print it differ by, and is infinite where that is not known.
     identifiability : Identifiability or None
         How precisely impedance determines force and position.
     budget : ErrorBudget or None
@@ -188,8 +189,8 @@ class Prediction(Displayed):
     corner_frequency: Bounds | None = None
     impedance: tuple[Impedance, ...] = ()
     sensitivity: Bounds | None = None
-    force_resolution_n: float | None = None
-    position_resolution_m: float | None = None
+    force_resolution: Bounds | None = None
+    position_resolution: Bounds | None = None
     identifiability: Identifiability | None = None
     budget: ErrorBudget | None = None
     plan: Plan | None = None
@@ -228,11 +229,22 @@ def from_json(text: str) -> Prediction:
         data = json.loads(text)
         if isinstance(data, dict) and "schema" not in data:
             return _of_schema_1(data)
+        if isinstance(data, dict) and data["schema"] == 2:
+            return adapter().validate_python(_of_schema_2(data), strict=False)
         if isinstance(data, dict) and data["schema"] != SCHEMA:
             raise BadInput(f"a prediction of schema {data['schema']}; this version reads {SCHEMA} and older: update")
         return adapter().validate_json(text)
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise BadInput(f"not a prediction: {str(error).splitlines()[0]}") from None
+
+
+def _of_schema_2(data: dict[str, Any]) -> dict[str, Any]:
+    """Resolutions were numbers, without what ways to print differ by."""
+    found = {"schema": SCHEMA, **{k: v for k, v in data.items() if k not in ("schema", "drawn")}}
+    for name, unit in (("force_resolution", "N"), ("position_resolution", "m")):
+        value = found.pop(f"{name}_{unit.lower()}", None)
+        found[name] = value and Bounds.of(float(value), unit)
+    return {**found, "drawn": data.get("drawn") and _of_schema_2(data["drawn"])}
 
 
 def _of_schema_1(data: dict[str, Any]) -> Prediction:
