@@ -2,13 +2,10 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import click
-
-Data = dict[str, Any]
 
 
 def options() -> list[click.Parameter]:
@@ -36,22 +33,3 @@ def bar(length: int) -> Iterator[Callable[[], None]]:
     with click.progressbar(length=length, file=sys.stderr, hidden=not sys.stderr.isatty(), label="solving") as shown:
         shown.render_progress()
         yield lambda: shown.update(1)
-
-
-def rows_csv(key: str, rows: Iterable[Data], columns: Sequence[str]) -> str:
-    """Rows with the value of the sweep before them, as CSV."""
-    import csv
-    import io
-
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow([key, *columns])
-    table.writerows([cell(row[key]), *(cell(row.get(name)) for name in columns)] for row in rows)
-    return text.getvalue()
-
-
-def cell(value: Any) -> str:
-    """One value of a table."""
-    if isinstance(value, float):
-        return repr(value)
-    return "" if value is None else str(value).lower() if isinstance(value, bool) else str(value)

@@ -17,6 +17,7 @@ from sensorgen.core.units import si
 Cell = str | float | int | None
 DIGITS = 4  # for people; files for programs hold all
 WIDTH = 80  # columns of a terminal
+_LEAST = 20  # columns into which words are wrapped
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "\\`*_{}[]<>#|!~$&"})
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "'")
 
@@ -181,14 +182,20 @@ def _facts(part: Facts) -> Iterator[str]:
 
 
 def _aligned(table: Table) -> Iterator[str]:
-    """Numbers to the right, words to the left."""
+    """Numbers to the right, words to the left; words of the last column are wrapped."""
     rows = [[c.words(v) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
     worded = [any(isinstance(row[k], str) for row in table.cells) for k in range(len(table.columns))]
     lines = [[c.head for c in table.columns], *rows]
     wide = [max(len(line[k]) for line in lines) for k in range(len(table.columns))]
+    before = sum(wide[:-1]) + 2 * len(wide[:-1])
     for line in lines:
-        cells = (f"{v:<{w}}" if words else f"{v:>{w}}" for v, w, words in zip(line, wide, worded, strict=True))
-        yield "  ".join(cells).rstrip()
+        cells = [f"{v:<{w}}" if words else f"{v:>{w}}" for v, w, words in zip(line, wide, worded, strict=True)]
+        if not worded[-1]:
+            yield "  ".join(cells).rstrip()
+            continue
+        last = textwrap.wrap(line[-1], max(WIDTH - before, _LEAST)) or [""]
+        yield "  ".join([*cells[:-1], last[0]]).rstrip()
+        yield from (" " * before + more for more in last[1:])
 
 
 def markdown(parts: Iterable[Part]) -> Iterator[str]:
