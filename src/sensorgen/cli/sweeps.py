@@ -1,8 +1,8 @@
-"""The words of a sweep, the same for every command that has one, and its progress bar."""
+"""``--sweep`` and ``--jobs``, and progress bars of solvers."""
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import click
@@ -33,3 +33,13 @@ def bar(length: int) -> Iterator[Callable[[], None]]:
     with click.progressbar(length=length, file=sys.stderr, hidden=not sys.stderr.isatty(), label="solving") as shown:
         shown.render_progress()
         yield lambda: shown.update(1)
+
+
+@contextmanager
+def pressing(stress_kpa: Sequence[float]) -> Iterator[Callable[[float], None]]:
+    """A progress bar that stands at the highest stress reached so far, only for a person."""
+    with click.progressbar(
+        length=len(stress_kpa), file=sys.stderr, hidden=not sys.stderr.isatty(), label="pressing"
+    ) as shown:
+        shown.render_progress()
+        yield lambda reached_pa: shown.update(max(sum(1e3 * kpa <= reached_pa for kpa in stress_kpa) - shown.pos, 0))

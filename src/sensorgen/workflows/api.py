@@ -50,32 +50,6 @@ class Loaded(Displayed):
     impedance: grid.ImpedanceGrid
 
 
-@dataclass(frozen=True, eq=False)
-class Compressed(Displayed):
-    """A unit cell under pressure.
-
-    Attributes
-    ----------
-    pressure_kpa : (n,) array
-        Pressure on the top [kPa].
-    displacement_um : (n,) array
-        Of the top [um].
-    lower_f_per_m2, upper_f_per_m2 : (n,) array
-        Bounds of the capacitance per area [F/m2]; nan where unknown.
-    model : str
-        That was used.
-    doubts : tuple of str
-        Why the numbers are to be taken with care.
-    """
-
-    pressure_kpa: np.ndarray
-    displacement_um: np.ndarray
-    lower_f_per_m2: np.ndarray
-    upper_f_per_m2: np.ndarray
-    model: str
-    doubts: tuple[str, ...]
-
-
 def load(path: str | Path) -> Design:
     r"""Read a design file.
 
@@ -172,7 +146,9 @@ def predict(
     return Loaded(evaluate.evaluate(body, query), grid.impedance_grid(model.sensor, *axes))
 
 
-def compress(what: Design | Body, pressure_kpa: Sequence[float], *, accuracy: float | None = None) -> Compressed:
+def compress(
+    what: Design | Body, pressure_kpa: Sequence[float], *, accuracy: float | None = None
+) -> compression.CompressionResult:
     """Displacement and capacitance of a unit cell under pressure.
 
     Parameters
@@ -192,16 +168,12 @@ def compress(what: Design | Body, pressure_kpa: Sequence[float], *, accuracy: fl
     Examples
     --------
     >>> found = compress(as_printed(Design(shape="reference"), walls="arachne"), [10.0])
-    >>> float(found.pressure_kpa[-1])
-    10.0
+    >>> found.stress_kpa
+    (0.0, 10.0)
     """
     wanted = inf if accuracy is None else accuracy
     asked = compression.Asked(compression.stresses_kpa(tuple(pressure_kpa)), BoundaryConditions(), accuracy=wanted)
-    data = compression.answer(_body(what), asked)
-    pressure, displacement, lower, upper = (
-        np.array(data[name], float) for name in ("stress_kpa", "displacement_um", "lower_f_per_m2", "upper_f_per_m2")
-    )
-    return Compressed(pressure, displacement, lower, upper, data["model"], tuple(data["doubts"]))
+    return compression.answer(_body(what), asked)
 
 
 def as_printed(design: Design, gcode: str | Path | None = None, *, walls: str = "") -> Body:
