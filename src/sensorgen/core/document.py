@@ -127,10 +127,10 @@ class Documented(Protocol):
 
 
 def shown(cell: Cell, digits: int = DIGITS) -> str:
-    """A cell for people.
+    """A cell for people; no exponent from 0.0001 to a million.
 
-    >>> [shown(v) for v in (None, float("inf"), 1234.5678, 7, True, "a")]
-    ['–', '∞', '1235', '7', 'yes', 'a']
+    >>> [shown(v) for v in (None, float("inf"), 1234.5678, 12345.678, 7, True, "a")]
+    ['–', '∞', '1235', '12350', '7', 'yes', 'a']
     """
     if cell is None:
         return "–"
@@ -142,7 +142,7 @@ def shown(cell: Cell, digits: int = DIGITS) -> str:
         return "∞"
     if isinstance(cell, int) or (cell == int(cell) and abs(cell) < 1e6):
         return f"{cell:.0f}"
-    return f"{cell:.{digits}g}"
+    return f"{float(f'{cell:.{digits}g}'):.{max(digits, 6)}g}"
 
 
 def exact(cell: Cell) -> str:

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design
 from sensorgen.design.materials import PIEZORESISTANCE
@@ -127,6 +128,30 @@ class ErrorBudget:
     def beyond(self) -> tuple[str, ...]:
         """Names of the terms that alone exceed the accuracy."""
         return tuple(t.name for t in self.terms if t.magnitude() > (self.accuracy or 0.0))
+
+    def document(self) -> Iterator[Part]:
+        """Each term, their sum, the largest, and whether the accuracy is reached."""
+        rows = [(t.name, t.changes, t.at_least) for t in self.terms]
+        rows += [("all at their worst", self.total, self.at_least)] if self.total else []
+        cells = (
+            (name, *((100 * v for v in astuple(changes)) if changes else (None,) * 4),
+             "unknown" if changes is None else "at least" if at_least else "")
+            for name, changes, at_least in rows
+        )  # fmt: skip
+        columns = (Column("error"), *(Column(f, "%", digits=2) for f in ("|Z|", "R", "X", "dZ/dF")), Column(""))
+        caption = f"error budget at {self.force_n:g} N and {self.position_m * 1e3:g} mm, at the worst frequency"
+        yield Table("budget", caption, columns, tuple(cells))
+        largest = self.largest()
+        yield f"largest: {largest.name} ({largest.what})"
+        if not self.accuracy:
+            return
+        beyond = f"; larger alone: {', '.join(self.beyond())}" if self.beyond() else ""
+        if self.met_by("model", "print", "material"):
+            yield f"accuracy {self.accuracy:g} of |Z| reached"
+        elif self.met_by("model"):
+            yield f"accuracy {self.accuracy:g} of |Z| reached by the models, not by print and material data{beyond}"
+        else:
+            yield f"accuracy {self.accuracy:g} of |Z| not reached by the models{beyond}"
 
 
 def error_budget(model: SensorModel, load: Load, accuracy: float | None = None) -> ErrorBudget:

@@ -1,7 +1,6 @@
 """The public functions, for notebooks and programs: ``import sensorgen as sg``."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -14,17 +13,16 @@ from sensorgen.analysis.fit import Fit
 from sensorgen.analysis.fit import fit as fit_values
 from sensorgen.asprinted import printed
 from sensorgen.checks.review import Review, review
-from sensorgen.core.display import Displayed
 from sensorgen.core.errors import BadInput
 from sensorgen.design import design as designs
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.export.gcode import paths
 from sensorgen.measure.log import Log
-from sensorgen.prediction import bodies, compression, evaluate, grid
+from sensorgen.prediction import bodies, compression, evaluate
 from sensorgen.prediction.identifiability import NOISE
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
-from sensorgen.prediction.results import Prediction
+from sensorgen.prediction.loaded import loaded
 from sensorgen.prediction.sensor_model import FLAT, Tip
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.workflows import build as builds
@@ -32,22 +30,6 @@ from sensorgen.workflows import display as display
 from sensorgen.workflows import slice as slicing
 from sensorgen.workflows.build import Built
 from sensorgen.workflows.slice import Printed
-
-
-@dataclass(frozen=True, eq=False)
-class Loaded(Displayed):
-    """A prediction, and the impedance over force and position.
-
-    Attributes
-    ----------
-    prediction : Prediction
-        At rest, and at the largest force in the middle position.
-    impedance : ImpedanceGrid
-        Over frequency, force and position [ohm].
-    """
-
-    prediction: Prediction
-    impedance: grid.ImpedanceGrid
 
 
 def load(path: str | Path) -> Design:
@@ -135,15 +117,7 @@ def predict(
     query = evaluate.Query(tuple(frequency_hz), law=law, tip=tip, accuracy=accuracy, noise=noise)
     if not len(force_n) and not len(position_mm):
         return evaluate.evaluate(body, query)
-    axes = (
-        tuple(frequency_hz), tuple(force_n) or grid.FORCES_N, tuple(position_mm) or grid.positions_mm(body.design)
-    )  # fmt: skip
-    reference = grid.hardest(*axes)
-    query = evaluate.Query(
-        tuple(frequency_hz), reference.force_n, reference.position_m, tip, law, accuracy, noise
-    )  # fmt: skip
-    model, _ = evaluate.sensor_model(body, query)
-    return Loaded(evaluate.evaluate(body, query), grid.impedance_grid(model.sensor, *axes))
+    return loaded(body, query, force_n, position_mm)
 
 
 def compress(
