@@ -20,6 +20,22 @@ def compression(
     return click.Option(["--compression"], type=OneOf(("unconfined", "bonded", *laws)), help=about)
 
 
+def force() -> click.Option:
+    """``--force``, one [N]."""
+    return click.Option(
+        ["--force", "force_n"], type=Values(units.FORCE_N, zero=False), default="6N", show_default=True,
+        help="Force of the press.",
+    )  # fmt: skip
+
+
+def tip(flag: str, name: str, about: str) -> click.Option:
+    """Length of a tip, one [mm]."""
+    return click.Option(
+        [flag, name], type=Values(units.LENGTH_MM, zero=False), metavar="MM", default="10mm", show_default=True,
+        help=about,
+    )  # fmt: skip
+
+
 def frequencies() -> click.Option:
     """``--frequencies`` [Hz]."""
     return click.Option(
