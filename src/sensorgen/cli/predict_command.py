@@ -65,9 +65,8 @@ def _work(
     options.refuse_explain(explain, many=bool(plot))
     proper("--noise", noise)
     body = body_options.body_of(drawn, slicer, walls)(design)
-    from sensorgen.prediction.evaluate import DEFAULT, Query, evaluate
-    from sensorgen.prediction.loaded import loaded
-    from sensorgen.prediction.sensor_model import TIP_M, Tip
+    from sensorgen.prediction.evaluate import evaluate
+    from sensorgen.prediction.query import DEFAULT, TIP_M, Query, Tip
 
     tip = Tip(
         TIP_M if tip_mm is None else tip_mm * units.M_PER_MM, profile,
@@ -79,6 +78,8 @@ def _work(
     with show.progress(_WORK) as step:
         step(_WORK[0])
         if force_n or position_mm or plot or render.form() == "csv":
+            from sensorgen.prediction.loaded import loaded
+
             found = loaded(body, query, force_n or (), position_mm or ())
             prediction = found.prediction
         else:

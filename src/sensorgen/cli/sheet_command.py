@@ -40,7 +40,8 @@ def _work(
     force_n: tuple[float, ...], tip_mm: tuple[float, ...], noise: float, compression: str | None, plot: Path | None,
     drawn: bool, slicer: str | None, walls: str | None,
 ) -> int:  # fmt: skip
-    from sensorgen.prediction.evaluate import TONES_HZ, Query, sensor_model
+    from sensorgen.prediction.planning import sensor_model
+    from sensorgen.prediction.query import TONES_HZ, Query
     from sensorgen.prediction.sheet_study import PLACES, study
 
     force, tip_m = one("--force", force_n), one("--tip", tip_mm) * units.M_PER_MM

@@ -10,8 +10,9 @@ from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.units import M_PER_MM, si
 from sensorgen.design.body import Body
 from sensorgen.prediction import grid
-from sensorgen.prediction.evaluate import Query, evaluate, sensor_model
-from sensorgen.prediction.planning import rough_sensor
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.planning import rough_sensor, sensor_model
+from sensorgen.prediction.query import Query
 from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.sensor_model import SensorModel
 

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.units import si
-from sensorgen.prediction.identifiability.fisher import Bounds
 
 Rows = tuple[tuple[float | None, ...], ...]
 Real = float | NDArray[np.float64]
@@ -326,15 +325,6 @@ def _text(value: Real | None, units: dict[str, float], beyond: str) -> str:
         if shown < 999.5:
             return f"{shown:.0f} {unit}"
     return f"more than 1 {beyond}"
-
-
-def standard_errors(limits: Bounds) -> StandardErrors:
-    """Bounds of one press, None where they are undefined."""
-    return StandardErrors(
-        sigma_force_n=finite(limits.force_n),
-        sigma_position_m=finite(limits.position_m),
-        correlation=finite(limits.correlation),
-    )
 
 
 def finite(value: float | NDArray[np.float64]) -> float | None:
