@@ -1,9 +1,9 @@
 """Results as text, JSON, CSV or Markdown, to the terminal or a file: the one way out of every command."""
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -17,17 +17,16 @@ _ABOUT = {"json": "Print as JSON.", "csv": "Print the table as CSV, all digits."
 _FORM, _FILE = "sensorgen.form", "sensorgen.output"  # in the context's meta
 
 
-def options(*forms: str) -> list[click.Parameter]:
+def options(*forms: str, file: bool = True) -> list[click.Parameter]:
     """``--json``, ``--csv``, ``--markdown``, or those named, and ``--output``; :func:`deliver` obeys them."""
-    return [
-        *(
-            click.Option([f"--{form}", f"as_{form}"], is_flag=True, expose_value=False, callback=_choose, help=about)
-            for form, about in _ABOUT.items() if form in (forms or _ABOUT)
-        ),
-        click.Option(
-            ["--output", "-o"], metavar="FILE", expose_value=False, callback=_to, help="Write this file."
-        ),
+    flags = [
+        click.Option([f"--{form}", f"as_{form}"], is_flag=True, expose_value=False, callback=_choose, help=about)
+        for form, about in _ABOUT.items() if form in (forms or _ABOUT)
     ]  # fmt: skip
+    output = click.Option(
+        ["--output", "-o"], metavar="FILE", expose_value=False, callback=_to, help="Write this file."
+    )  # fmt: skip
+    return [*flags, output] if file else [*flags]
 
 
 def _choose(ctx: click.Context, param: click.Parameter, given: bool) -> None:
@@ -79,20 +78,20 @@ def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> 
     -----
     CSV is the result's first table, unless it writes its own, as ``csv()``, piece by piece.
     """
-    if wanted == "json":
-        return [to_json(result)]
-    if wanted == "csv" and hasattr(result, "csv"):
-        pieces: Iterable[str] = result.csv()
-        return pieces
     from sensorgen.core import document
 
+    if wanted == "json":
+        return [document.to_json(result)]
+    if wanted == "csv" and hasattr(result, "csv"):
+        lines: Iterable[str] = result.csv()
+        return lines
     if wanted == "csv":
         tables = [part for part in result.document() if isinstance(part, document.Table)]
         if not tables:
             raise BadInput("--csv: this result has no table; expected --json")
         return [document.comma_separated(tables[0])]
-    lines = document.markdown if wanted else document.text
-    return (f"{line}\n" for line in lines([*before, *result.document()]))
+    shown = document.markdown if wanted else document.text
+    return (f"{line}\n" for line in shown([*before, *result.document()]))
 
 
 def verdict(*problems: str) -> int:
@@ -100,20 +99,6 @@ def verdict(*problems: str) -> int:
     for problem in problems:
         click.echo(f"sensorgen: {problem}", err=True)
     return FOUND_ERRORS if problems else 0
-
-
-def to_json(result: Any) -> str:
-    """A result, or a sequence of results of one type, as indented JSON; null for what is not finite.
-
-    A result with a schema of its own writes itself: ``to_json()``.
-    """
-    if hasattr(result, "to_json"):
-        return str(result.to_json())
-    from pydantic import TypeAdapter
-
-    many = isinstance(result, Sequence)
-    kind: Any = tuple[type(result[0]), ...] if many and result else type(result)  # type: ignore[misc]
-    return TypeAdapter(kind).dump_json(tuple(result) if many else result, indent=2).decode() + "\n"
 
 
 def write(text: Iterable[str]) -> None:
