@@ -1,9 +1,8 @@
 """What a file takes: time, filament and mass of each tool, changes of tool, and what goes into purging."""
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,10 +52,6 @@ class Report:
     tools: tuple[OfTool, ...]
     tool_changes: int
     box_mm: tuple[tuple[float, ...], tuple[float, ...]] | None
-
-    def as_dict(self) -> dict[str, Any]:
-        """The report, for JSON."""
-        return asdict(self)
 
 
 def report(motion: Motion, machine: Printer, loaded: dict[int, str] | None = None) -> Report:
