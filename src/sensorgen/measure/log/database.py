@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from sensorgen.core.errors import BadInput, SensorgenError, Unwritable
-from sensorgen.measure.log.durable import part_of, remove_stale_parts, sync_folder
+from sensorgen.core.files import part_of, remove_stale_parts, sync_folder
 from sensorgen.measure.log.schema import APPLICATION_ID, STEPS, VERSION
 
 WAIT_S = 20.0  # for another writer to finish

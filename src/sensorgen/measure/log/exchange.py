@@ -18,7 +18,6 @@ from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
 from sensorgen.measure.csv_table import Table
 from sensorgen.measure.log import entries, files
-from sensorgen.measure.log.durable import part_of
 from sensorgen.measure.log.entries import Entry, RawFile, Reading
 from sensorgen.measure.log.fields import Value, from_cell, from_sql, to_cell, to_sql
 from sensorgen.measure.log.logbook import TABLES, Log
@@ -68,7 +67,7 @@ def export(log: Log, place: Path) -> int:
         raise BadInput(
             f"cannot export to {str(place)!r}; expected a .csv or .parquet file, or a folder that is not there"
         )
-    part = part_of(place)
+    part = store.part_of(place)
     try:
         (part / "files").mkdir(parents=True)
         rows = sum(_write_table(log, kind, part / f"{name}.csv", "csv") for kind, name in FILES.items())

@@ -7,6 +7,7 @@ Python read as one. A cell of CSV is text as it is, nothing for None, and JSON f
 
 import json
 import math
+from functools import cache
 from types import NoneType
 from typing import Any, get_args
 
@@ -33,29 +34,37 @@ def _json(value: Value) -> str:
 
 def from_cell(annotation: Any, cell: str) -> Value:
     """Value of a cell, by the field's type; ValueError, TypeError or RecursionError for any other cell."""
-    if cell == "" and NoneType in get_args(annotation):
+    optional, kind, _ = _kinds(annotation)
+    if cell == "" and optional:
         return None
-    return from_sql(annotation, cell if annotation in (str, *_ITEMS) else json.loads(cell))
+    return from_sql(annotation, cell if kind is str else json.loads(cell))
 
 
 def from_sql(annotation: Any, value: Any) -> Value:
     """Value of SQLite, by the field's type; errors as :func:`from_cell`."""
-    if value is None and NoneType in get_args(annotation):
+    optional, kind, items = _kinds(annotation)
+    if value is None and optional:
         return None
-    kind = next((a for a in get_args(annotation) if a is not NoneType), annotation) if annotation not in _ITEMS else str
     if kind is float and type(value) in (float, int) and math.isfinite(value):
         return float(value)
     if kind is bool and value in (0, 1):
         return bool(value)
-    if type(value) is not kind or kind is bool:
+    if type(value) is not kind or kind in (bool, float):
         raise TypeError(f"{value!r:.60} is no {kind.__name__}")
-    if annotation not in _ITEMS:
+    if not items:
         return value  # type: ignore[no-any-return]
-    items, kinds = json.loads(value), _ITEMS[annotation]
-    if type(items) is not list or not all(type(item) in kinds and item == item for item in items):  # nan is not itself
-        raise ValueError(f"{value!r:.60} is no list of {kinds[-1].__name__}")
-    return tuple(kinds[-1](item) for item in items)
+    found = json.loads(value)
+    if type(found) is not list or not all(type(item) in items and item == item for item in found):  # nan is not itself
+        raise ValueError(f"{value!r:.60} is no list of {items[-1].__name__}")
+    return tuple(items[-1](item) for item in found)
 
 
-_ITEMS: dict[Any, tuple[type, ...]] = {tuple[float, ...]: (int, float), tuple[str, ...]: (str,)}
-"""Fields that are held as JSON, and the types of their items."""
+@cache
+def _kinds(annotation: Any) -> tuple[bool, type, tuple[type, ...]]:
+    """Whether a field may be None, its type in SQLite, and the types of its items if it is a tuple, held as JSON."""
+    if annotation == tuple[float, ...]:
+        return False, str, (int, float)
+    if annotation == tuple[str, ...]:
+        return False, str, (str,)
+    kinds = get_args(annotation) or (annotation,)
+    return NoneType in kinds, next(kind for kind in kinds if kind is not NoneType), ()

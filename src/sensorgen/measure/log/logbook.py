@@ -22,7 +22,7 @@ from sensorgen.measure.log.entries import (
     Specimen,
     columns,
 )
-from sensorgen.measure.log.fields import FROM_SQL, Value, to_sql
+from sensorgen.measure.log.fields import Value, from_sql, to_sql
 
 PLACE = "SENSORGEN_LOG"  # environment variable with another file
 TABLES: dict[type[Any], str] = {
@@ -257,7 +257,7 @@ class Log:
         values = {}
         for (name, annotation), value in zip(_SQL[kind].columns.items(), row, strict=True):
             try:
-                values[name] = "" if value is None and name in _NULL_IF_EMPTY else FROM_SQL[annotation](value)
+                values[name] = "" if value is None and name in _NULL_IF_EMPTY else from_sql(annotation, value)
             except (TypeError, ValueError, KeyError, OverflowError, RecursionError):
                 held = f"column {name} of a {kind.__name__} holds {value!r:.60}"
                 raise BadInput(f"the log {str(self.path)!r} is damaged: {held}") from None
