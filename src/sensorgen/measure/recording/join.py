@@ -106,15 +106,13 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
 def _joined(recording: Recording, rig: RigLog, time: Real, offset: Offset) -> Joined:
     """Columns of the rig at the samples' times."""
     at = time - offset.offset_s - offset.skew * (time - offset.middle_s)
-    good = ~rig.error
-    rows = rig.time_s[good]
+    rows, force, set_force, position = rig.sound()
     before = np.searchsorted(rows, at, side="right") - 1
     inside = (before >= 0) & (at <= rows[-1])
     held = np.clip(before, 0, len(rows) - 1)
     step = float(np.median(np.diff(rows)))
     after = np.minimum(held + 1, len(rows) - 1)
     silent = ~inside | ((rows[after] - rows[held] > _SILENT * step) & (at - rows[held] > step))
-    force = np.where(np.isfinite(rig.force_n), rig.force_n, rig.set_force_n)[good]
     mask = np.where(silent, np.nan, 1.0)
     marks = dict(recording.marks)
     marks["rig error"] = marks["rig error"] | silent | _beside_error(rig, at)
@@ -122,8 +120,8 @@ def _joined(recording: Recording, rig: RigLog, time: Real, offset: Offset) -> Jo
     if silent.any():
         notes.append(f"{np.count_nonzero(silent)} samples while the rig was silent")
     return Joined(
-        replace(recording, marks=marks), np.interp(at, rows, force) * mask, rig.set_force_n[good][held] * mask,
-        rig.set_position_mm[good][held] * mask, offset.offset_s, offset.error_s, offset.skew, offset.skew_error,
+        replace(recording, marks=marks), np.interp(at, rows, force) * mask, set_force[held] * mask,
+        position[held] * mask, offset.offset_s, offset.error_s, offset.skew, offset.skew_error,
         offset.explained, tuple(notes),
     )  # fmt: skip
 

@@ -182,18 +182,10 @@ def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> Verdict:
     film, why_film = _film(ry, rz, of.expected_ohm, intact_ohm)
     leak = nan if isnan(rz) or isnan(ry) or ry == inf else leak_s(rz, ry)
     ratio = nan if isnan(ry) or isnan(rz) or ry in (0, inf) else rz / ry
-    return Verdict(
-        _word(electrode, film), electrode, film, ry, rz, ratio, leak, ry / of.expected_ohm, (why_electrode, why_film)
-    )
-
-
-def _word(electrode: str, film: str) -> str:
-    """The gravest of the two; a sound half beside an unknown one proves nothing."""
-    if electrode == "open electrode" or film in ("short", "leak"):
-        return electrode if electrode == "open electrode" else film
-    if electrode == "dry joint":
-        return electrode
-    return "unknown" if "unknown" in (electrode, film) else "intact"
+    grave = [word for word in WORDS[:4] if word in (electrode, film)]
+    word = grave[0] if grave else "unknown" if "unknown" in (electrode, film) else "intact"
+    over, reasons = ry / of.expected_ohm, (why_electrode, why_film)
+    return Verdict(word, electrode, film, ry, rz, ratio, leak, over, reasons)
 
 
 def _electrode(of: Evidence, ry: float) -> tuple[str, str]:
