@@ -13,7 +13,6 @@ from typing import Annotated
 import numpy as np
 
 from sensorgen.analysis.comparison import Comparison
-from sensorgen.analysis.comparison.leaky import across_ohm, along_ohm
 from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
 from sensorgen.analysis.comparison.runs import Run
 from sensorgen.analysis.report.electrodes import usable
@@ -21,6 +20,7 @@ from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.measure.recording.samples import Complex, Real
+from sensorgen.measure.signal.leakage import across_ohm, along_ohm
 from sensorgen.measure.signal.verdicts import INTACT_OHM
 
 RESISTIVITY, PERMITTIVITY, MODULUS, FILM, LEAK = PARAMETERS = (
