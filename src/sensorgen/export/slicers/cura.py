@@ -86,7 +86,7 @@ def context(printer: Printer, quality: Quality, used: Mapping[int, Recipe]) -> d
 
 def fill(template: str, shared: Mapping[str, Any], **own: Any) -> str:
     """Text of a template in ``slicer_profiles/cura``, with what all templates show and with its own."""
-    return _templates().get_template(template).render(shared | own)
+    return _templates().get_template(template).render(dict(shared), **own)
 
 
 @cache

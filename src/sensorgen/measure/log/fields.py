@@ -52,7 +52,7 @@ def from_sql(annotation: Any, value: Any) -> Value:
     if type(value) is not kind or kind in (bool, float):
         raise TypeError(f"{value!r:.60} is no {kind.__name__}")
     if not items:
-        return value  # type: ignore[no-any-return]
+        return value
     found = json.loads(value)
     if type(found) is not list or not all(type(item) in items and item == item for item in found):  # nan is not itself
         raise ValueError(f"{value!r:.60} is no list of {items[-1].__name__}")
@@ -60,7 +60,7 @@ def from_sql(annotation: Any, value: Any) -> Value:
 
 
 @cache
-def _kinds(annotation: Any) -> tuple[bool, type, tuple[type, ...]]:
+def _kinds(annotation: Any) -> tuple[bool, Any, tuple[type, ...]]:
     """Whether a field may be None, its type in SQLite, and the types of its items if it is a tuple, held as JSON."""
     if annotation == tuple[float, ...]:
         return False, str, (int, float)
