@@ -1,6 +1,7 @@
 """``sensorgen thesis``: every numbered item of the thesis, its value, ours, and a verdict."""
 
 from collections import Counter
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import click
@@ -31,7 +32,7 @@ def command(output: str, formats: tuple[str, ...]) -> int:
 
     with show.progress(CHAPTERS) as step:
         rows = thesis.rows(step)
-    made = {
+    made: dict[str, Callable[[Sequence[thesis.Row]], str]] = {
         "html": thesis.html, "md": thesis.markdown, "json": lambda rows: show.json_text(thesis.plain(rows)),
     }  # fmt: skip
     for name in dict.fromkeys(formats):

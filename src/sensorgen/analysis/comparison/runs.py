@@ -90,6 +90,6 @@ def _of_entry(log: Log, entry: BenchRun) -> Iterator[Run]:
         scatter = np.full(z.shape[1], complex("nan"))
         if len(z) > 1:
             scatter = z.real.std(axis=0, ddof=1) + 1j * z.imag.std(axis=0, ddof=1)
-        error = np.asarray(scatter / np.sqrt(max(len(z), 1)))
+        spread = np.asarray(scatter / np.sqrt(max(len(z), 1)))
         pairs = done.pairs if done.by_force else None
-        yield Run(entry, one, done.filtered_s, done.filtered_ohm, z.mean(axis=0), error, pairs, notes)
+        yield Run(entry, one, done.filtered_s, done.filtered_ohm, z.mean(axis=0), spread, pairs, notes)

@@ -62,7 +62,7 @@ class _Steps:
         back = self.moves & (self.code < 2) & ~np.isnan(self.words["R"])
         faults += [Fault(n >> SHIFT, "R of G0 or G1 goes by a stored place") for n in self.place[back].tolist()]
         arcs, wrong = self._arcs(rows)
-        before = iter(self._rows([place for place, *_ in (*said.events, *said.changes)]))
+        before = iter(self._rows([*(place for place, _ in said.events), *(place for place, _, _ in said.changes)]))
         events = [Event(next(before), place >> SHIFT, command) for place, command in said.events]
         changes = [Change(next(before), place >> SHIFT, tool, macro) for place, tool, macro in said.changes]
         return Motion(

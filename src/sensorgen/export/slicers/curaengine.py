@@ -54,7 +54,8 @@ def engine_settings(printer: Printer, quality: Quality, loads: Mapping[int, Load
     used = recipes(printer, quality, loads)
     files = cura.profiles(printer, quality, loads)
     own = f"quality/{printer.name}/{printer.name}_{quality.name}"
-    shared, tools, of_all = cura.context(printer, quality, used), {}, {}
+    shared, tools = cura.context(printer, quality, used), {}
+    of_all: dict[str, str] = {}
     for index, r in used.items():
         profile = _sections(files[f"{own}_{cura.material_id(r)}.inst.cfg"])["values"]
         engine = _sections(cura.fill("engine.ini", shared, r=r))

@@ -9,7 +9,7 @@ import json
 import math
 from functools import cache
 from types import NoneType
-from typing import Any, get_args
+from typing import Any, cast, get_args
 
 Value = str | int | float | bool | tuple[float, ...] | tuple[str, ...] | None
 
@@ -52,7 +52,7 @@ def from_sql(annotation: Any, value: Any) -> Value:
     if type(value) is not kind or kind in (bool, float):
         raise TypeError(f"{value!r:.60} is no {kind.__name__}")
     if not items:
-        return value
+        return cast(Value, value)
     found = json.loads(value)
     if type(found) is not list or not all(type(item) in items and item == item for item in found):  # nan is not itself
         raise ValueError(f"{value!r:.60} is no list of {items[-1].__name__}")

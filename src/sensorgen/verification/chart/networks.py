@@ -75,7 +75,7 @@ def two_films() -> Standard:
 
 def front_edge() -> Standard:
     """A sheet of 100 x 70 mm between two stretches of one edge: its rectangle as a half plane."""
-    port = [tuple(_SHEET.edge("top", "front", *_STRETCHES_M[k : k + 2]) for k in (0, 2))]
+    port: list[Any] = [tuple(_SHEET.edge("top", "front", *_STRETCHES_M[k : k + 2]) for k in (0, 2))]
 
     def between(cells: int) -> Values:
         z = sheet.impedance(_SHEET, port, 0.0, cells=cells)[0, 0, 0]

@@ -32,4 +32,6 @@ def _values(values: ArrayLike | None) -> Any:
     found = np.asarray(values)
     if np.iscomplexobj(found):
         found = np.stack([found.real, found.imag], -1)
-    return np.where(np.isfinite(found), found.astype(object), None).tolist()
+    plain = found.astype(object)
+    plain[~np.isfinite(found)] = None
+    return plain.tolist()

@@ -27,7 +27,7 @@ def _parts(name: str, unit: str, ours: ArrayLike, printed: ArrayLike) -> list[Pa
 
 def _b4() -> complex:
     """By B.37."""
-    return (-2 * LINE.input_a * RHO_OHM_M + HW * INPUT_V * K) / (4 * HW * K)
+    return complex((-2 * LINE.input_a * RHO_OHM_M + HW * INPUT_V * K) / (4 * HW * K))
 
 
 def _waves(x_m: ArrayLike) -> tuple[Any, Any]:
