@@ -359,11 +359,8 @@ ALL = tuple(DESIGNS)
 SOLVED = ("trix", "triy", "rect", "own", "compensated", "upside-down")  # a cell that no closed form has
 PRISMS = ("trix", "triy", "own", "compensated", "upside-down")  # of which the slicer drops layers
 
-OWN_CELL = "bounds the cell of the computed outlines anew; of the own design it takes whole periods only"
 UNAWARE = "does not count what is not printed"
 RED = {  # who differs today, why, and for which designs: what is mended has to go from here, as xfail is strict
-    ("capacitance printed", "compress"): (OWN_CELL, SOLVED),
-    ("capacitance drawn", "compress"): (OWN_CELL, SOLVED),
     ("errors", "batch"): (f"{UNAWARE} unless it slices", PRISMS),
 }
 

@@ -221,7 +221,7 @@ def answer(body: Body, asked: Asked, *, step: Step | None = None) -> Compression
         found = _pressed(case, asked, USUAL, step)
         if asked.check_mesh:
             found = press2d.compared(found, _pressed(case, asked, USUAL + 1, step))
-        return _result(body, case, found, _OF_OUTLINES)
+        return _result(body, case, found, _OF_OUTLINES, asked)
     except NotInstalled as error:
         if asked.model:
             raise
@@ -286,7 +286,7 @@ def _within(body: Body, asked: Asked, step: Step | None) -> CompressionResult:
     (found, off), level = run_until_within(plan.levels[0], find, lambda answer: _width(*answer))
     width = _width(found, off)
     return replace(
-        _result(body, case, _widened(found, off), _OF_ALL), accuracy=asked.accuracy,
+        _result(body, case, _widened(found, off), _OF_ALL, asked), accuracy=asked.accuracy,
         relative_width=width if width < inf else None, reached=width <= asked.accuracy,
         plan=replace(plan, levels=(level,)),
     )  # fmt: skip
@@ -342,8 +342,8 @@ def _pressed(case: Case, asked: Asked, level: int, step: Step | None) -> Pressed
     return pressed(case, stress_pa, level, keep=asked.keep, step=step)
 
 
-def _result(body: Body, case: Case, found: Pressed, bounds: str) -> CompressionResult:
-    c = found.capacitance_f_per_m2
+def _result(body: Body, case: Case, found: Pressed, bounds: str, asked: Asked) -> CompressionResult:
+    c = _from_rest(body, found.capacitance_f_per_m2, asked)
     return CompressionResult(
         design=body.design.name, body=body.provenance, model=case.model, held=dict(vars(case.boundary)),
         stress_kpa=tuple(p / _PA_PER_KPA for p in found.stress_pa.tolist()),
@@ -352,6 +352,24 @@ def _result(body: Body, case: Case, found: Pressed, bounds: str) -> CompressionR
         upper_f_per_m2=tuple(i.upper if i else None for i in c),
         converged_kpa=found.converged_pa / _PA_PER_KPA, faults=found.faults, doubts=found.doubts, bounds=bounds,
     )  # fmt: skip
+
+
+def _from_rest(body: Body, found: Sequence[Interval | None], asked: Asked) -> Sequence[Interval | None]:
+    """Capacitances that begin with that of the sensor at rest, as all predictions have it [F/m2].
+
+    Those of a sensor of whole and broken periods, of which one was pressed, are scaled by what both differ at rest.
+    """
+    try:
+        rest = at_rest.answer(body, at_rest.Asked(keep=asked.keep))
+    except Unpredictable:
+        return found
+    first = found[0] if found else None
+    if first is None or rest.lower_f_per_m2 is None or rest.upper_f_per_m2 is None:
+        return found
+    known = Interval(rest.lower_f_per_m2, rest.upper_f_per_m2)
+    apart = known.upper < first.lower or first.upper < known.lower
+    factor = known.middle() / first.middle() if apart else 1.0
+    return [known, *(c and c.times(factor) for c in found[1:])]
 
 
 def _closed_form(body: Body, asked: Asked, model: str) -> CompressionResult:
