@@ -84,7 +84,7 @@ def _work(
         from sensorgen.core import files
 
         files.replace(Path(plot), figure.png(found))
-    render.deliver(found, before=[*found.plan.document(), ""] if explain else ())
+    render.deliver(found, before=found.explained() if explain else ())
     return render.verdict(*found.problems())
 
 

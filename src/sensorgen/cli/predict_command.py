@@ -91,7 +91,7 @@ def _work(
     if plot and not isinstance(found, Prediction):
         _plot(found, Path(plot))
     else:
-        render.deliver(found, before=[*prediction.plan.document(), ""] if explain and prediction.plan else ())
+        render.deliver(found, before=prediction.explained() if explain else ())
     return render.verdict(*prediction.problems(accuracy))
 
 

@@ -152,6 +152,10 @@ class CompressionResult(Displayed):
         yield f"converged up to {self.converged_kpa:.4g} kPa{width}{target}"
         yield from self.remarks()
 
+    def explained(self) -> Iterator[Part]:
+        """Which meshes were used, their cost and error."""
+        yield from (*self.plan.document(), "") if self.plan else ()
+
     def remarks(self) -> Sequence[str]:
         """How the cell was held, what is wrong with the answer, and what is uncertain."""
         if self.model is None:
