@@ -11,7 +11,7 @@ from sensorgen.prediction.sensor_model import piece
 FILE = Path(__file__).parents[1] / "src" / "sensorgen" / "models" / "solved_prints.yaml"
 HEAD = """\
 # Rise of the capacitance of printed triangular cells with stress, as bench/solved_prints.py solved it: by press2d, its
-# usual mesh, held against the next coarser one ("within"); layers of 0.1 and 0.06 mm, by the rules of walls. Keys are the
+# usual mesh, held against the next coarser one ("within"); layers of 0.1 and 0.06 mm, walls as named. Keys are the
 # content of the cross-section. "held" are the changes under other boundary and contact conditions of the drawn cell.
 source: plane-strain finite elements with frictionless contact, neo-Hookean, nu 0.4999, of the printed cell
 youngs_modulus_pa: {etpu: 22.0e6, x60: 6.0e6}
