@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import takewhile
 from math import inf
-from typing import Annotated
 
 import numpy as np
 
@@ -43,6 +42,13 @@ Step = Callable[[float], None]
 Bounded = tuple[Pressed, tuple[float, ...]]  # and the share by which each capacitance may be off [-]
 ALL = (*MODELS, *closed_form.MODELS)
 
+COLUMNS = (
+    Column("stress", "kPa", key="stress_kpa"), Column("displacement", "um", key="displacement_um"),
+    Column("C, lower", "F/m2", key="lower_f_per_m2", digits=7, si=True),
+    Column("C, upper", "F/m2", key="upper_f_per_m2", digits=7, si=True),
+    *(Column(k, key=k, hidden=True) for k in ("converged_kpa", "relative_width", "model", "reached", "reason")),
+)  # fmt: skip
+
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _OF_OUTLINES = "of the capacitance of the deformed outlines as computed; the outlines' own error is not in them"
 _OF_ALL = "of the capacitance of the deformed outlines, plus the difference from the next coarser mesh: an estimate"
@@ -78,21 +84,6 @@ class Asked:
     accuracy: float = inf
     check_mesh: bool = False
     keep: bool = True
-
-
-@dataclass(frozen=True, kw_only=True)
-class Row:
-    """One stress of a result, or the reason why there is none."""
-
-    stress_kpa: Annotated[float | None, Column("stress", "kPa")] = None
-    displacement_um: Annotated[float | None, Column("displacement", "um")] = None
-    lower_f_per_m2: Annotated[float | None, Column("C, lower", "F/m2", digits=7, si=True)] = None
-    upper_f_per_m2: Annotated[float | None, Column("C, upper", "F/m2", digits=7, si=True)] = None
-    converged_kpa: Annotated[float | None, Column("converged", "kPa", hidden=True)] = None
-    relative_width: Annotated[float | None, Column("width", hidden=True)] = None
-    model: Annotated[str | None, Column("model", hidden=True)] = None
-    reached: Annotated[bool | None, Column("reached", hidden=True)] = None
-    reason: Annotated[str, Column("reason", hidden=True)] = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,28 +136,25 @@ class CompressionResult(Displayed):
     plan: Plan | None = None
     reason: str = ""
 
-    def rows(self) -> Sequence[Row]:
+    def table(self) -> Table:
         """A row for each stress; one with the reason where there is no answer."""
-        if self.model is None:
-            return (Row(reason=self.reason),)
         curve = zip(self.stress_kpa, self.displacement_um, self.lower_f_per_m2, self.upper_f_per_m2, strict=True)
-        return [
-            Row(
-                stress_kpa=stress, displacement_um=displacement, lower_f_per_m2=lower, upper_f_per_m2=upper,
-                converged_kpa=self.converged_kpa, relative_width=self.relative_width, model=self.model,
-                reached=self.reached, reason="; ".join(self.faults),
-            )
-            for stress, displacement, lower, upper in curve
-        ]  # fmt: skip
+        more = self.converged_kpa, self.relative_width, self.model, self.reached, self.reason or "; ".join(self.faults)
+        rows = curve if self.model else [(None,) * 4]
+        return Table("compression", "", COLUMNS, tuple((*row, *more) for row in rows))
 
     def document(self) -> Iterator[Part]:
         """The curve, how the cell was held, and what is uncertain."""
         yield self.design
-        yield Table.of("compression", "", self.rows())
+        yield self.table()
         width = "" if self.relative_width is None else f"; largest relative width {self.relative_width:.2g}"
         target = "" if self.accuracy is None else f" (target {self.accuracy:g})"
         yield f"converged up to {self.converged_kpa:.4g} kPa{width}{target}"
         yield from self.remarks()
+
+    def explained(self) -> Iterator[Part]:
+        """Which meshes were used, their cost and error."""
+        yield from (*self.plan.document(), "") if self.plan else ()
 
     def remarks(self) -> Sequence[str]:
         """How the cell was held, what is wrong with the answer, and what is uncertain."""
