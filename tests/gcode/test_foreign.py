@@ -123,7 +123,7 @@ def test_ends_of_lines_change_nothing(text, end, tmp_path):
     path = tmp_path / "a.gcode"
     path.write_bytes(end.join(text.splitlines()).encode())
     one, other = check(path, DIABASE), check(text.splitlines(), DIABASE)
-    assert one.report.tools == other.report.tools
+    assert one.tools == other.tools
     assert [(f.rule, f.message) for f in one.findings] == [(f.rule, f.message) for f in other.findings]
 
 
@@ -142,7 +142,7 @@ def test_small_letters_line_numbers_and_checksums_change_nothing(text):
     ):
         again = check(other, DIABASE)
         assert [(f.rule, f.message) for f in again.findings] == [(f.rule, f.message) for f in plain.findings]
-        assert again.report.tools == plain.report.tools
+        assert again.tools == plain.tools
 
 
 COMMANDS = """

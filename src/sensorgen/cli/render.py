@@ -1,9 +1,10 @@
 """Results as text, JSON, CSV or Markdown, to the terminal or a file: the one way out of every command."""
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -51,6 +52,20 @@ def deliver(result: "Documented") -> None:
     write(pieces(result, form()))
 
 
+@contextmanager
+def refused(name: str) -> Iterator[None]:
+    """Deliver the findings for which a design, or a plan, is not made."""
+    from sensorgen.core.errors import Unprintable
+
+    try:
+        yield
+    except Unprintable as error:
+        from sensorgen.core.findings import Refused
+
+        deliver(Refused(name, tuple(error.findings)))
+        raise
+
+
 def pieces(result: "Documented", wanted: str) -> Iterable[str]:
     """A result as pieces of text.
 
@@ -59,10 +74,10 @@ def pieces(result: "Documented", wanted: str) -> Iterable[str]:
     BadInput
         CSV of a result without a table.
     """
-    if wanted == "json":
-        return [to_json(result)]
     from sensorgen.core import document
 
+    if wanted == "json":
+        return [document.to_json(result)]
     if wanted == "csv":
         tables = [part for part in result.document() if isinstance(part, document.Table)]
         if not tables:
@@ -70,20 +85,6 @@ def pieces(result: "Documented", wanted: str) -> Iterable[str]:
         return [document.comma_separated(tables[0])]
     lines = document.markdown if wanted else document.text
     return (f"{line}\n" for line in lines(result.document()))
-
-
-def to_json(result: Any) -> str:
-    """A result, or a sequence of results of one type, as indented JSON; null for what is not finite.
-
-    A result with a schema of its own writes itself: ``to_json()``.
-    """
-    if hasattr(result, "to_json"):
-        return str(result.to_json())
-    from pydantic import TypeAdapter
-
-    many = isinstance(result, Sequence)
-    kind: Any = tuple[type(result[0]), ...] if many and result else type(result)  # type: ignore[misc]
-    return TypeAdapter(kind).dump_json(tuple(result) if many else result, indent=2).decode() + "\n"
 
 
 def write(text: Iterable[str]) -> None:

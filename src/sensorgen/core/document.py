@@ -1,4 +1,4 @@
-"""What a result shows: paragraphs, facts and tables; as text, Markdown, HTML or CSV.
+"""What a result shows: paragraphs, facts and tables; as text, Markdown, HTML, CSV or JSON.
 
 A result that a command prints or a notebook displays has a method ``document()`` that yields these parts.
 """
@@ -82,9 +82,18 @@ class Table:
 
 @dataclass(frozen=True)
 class Facts:
-    """Names with what is to be said of each; one of an empty name goes on with the one before."""
+    """Names with what is to be said of each; one of an empty name goes on with the one before.
+
+    Attributes
+    ----------
+    rows : tuple of (str, str)
+        Name and text.
+    hang : int
+        By how many columns the lines of a long text after the first stand further right [-].
+    """
 
     rows: tuple[tuple[str, str], ...]
+    hang: int = 0
 
 
 Part = str | Facts | Table
@@ -117,6 +126,15 @@ def shown(cell: Cell, digits: int = DIGITS) -> str:
     return f"{cell:.{digits}g}"
 
 
+def visible(words: str) -> str:
+    """Words of strangers, their control characters shown instead of obeyed by the terminal.
+
+    >>> visible("a\\x1b[2J")
+    'a\\\\x1b[2J'
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
+
+
 def exact(cell: Cell) -> str:
     """A cell for programs, all digits; "" for nothing.
 
@@ -139,23 +157,24 @@ def text(parts: Iterable[Part]) -> Iterator[str]:
     """Lines for a terminal: paragraphs and facts wrapped, tables with columns below each other."""
     for part in parts:
         if isinstance(part, str):
-            yield from textwrap.wrap(part, WIDTH, subsequent_indent="  ") or [""]
+            yield from textwrap.wrap(visible(part), WIDTH, subsequent_indent="  ") or [""]
         elif isinstance(part, Facts):
             yield from _facts(part)
         else:
-            yield from textwrap.wrap(part.caption, WIDTH)
+            yield from textwrap.wrap(visible(part.caption), WIDTH)
             yield from _aligned(part.filled())
 
 
 def _facts(part: Facts) -> Iterator[str]:
     wide = max(len(name) for name, _ in part.rows) + 2
+    hanging = " " * (wide + part.hang)
     for name, said in part.rows:
-        yield from textwrap.wrap(said, WIDTH, initial_indent=f"{name:{wide}}", subsequent_indent=" " * wide)
+        yield from textwrap.wrap(visible(said), WIDTH, initial_indent=f"{name:{wide}}", subsequent_indent=hanging)
 
 
 def _aligned(table: Table) -> Iterator[str]:
     """Numbers to the right, words to the left."""
-    rows = [[shown(v, c.digits) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
+    rows = [[visible(shown(v, c.digits)) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
     worded = [any(isinstance(row[k], str) for row in table.cells) for k in range(len(table.columns))]
     lines = [[c.head for c in table.columns], *rows]
     wide = [max(len(line[k]) for line in lines) for k in range(len(table.columns))]
@@ -191,7 +210,7 @@ def _markdown_table(table: Table) -> Iterator[str]:
 
 def safe(words: str) -> str:
     """Words whose signs mean nothing to Markdown, on one line."""
-    return " ".join(words.split()).translate(_MARKDOWN)
+    return visible(" ".join(words.split())).translate(_MARKDOWN)
 
 
 def html(parts: Iterable[Part]) -> str:
@@ -213,6 +232,20 @@ def _html(part: Part) -> str:
 
 def _html_row(cells: Iterable[str], tag: str) -> str:
     return f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells)}</tr>"
+
+
+def to_json(result: Any) -> str:
+    """A result, or a sequence of results of one type, as indented JSON; null for what is not finite.
+
+    A result with a schema of its own writes itself: ``to_json()``.
+    """
+    if hasattr(result, "to_json"):
+        return str(result.to_json())
+    from pydantic import TypeAdapter
+
+    many = isinstance(result, Sequence)
+    kind: Any = tuple[type(result[0]), ...] if many and result else type(result)  # type: ignore[misc]
+    return TypeAdapter(kind).dump_json(tuple(result) if many else result, indent=2).decode() + "\n"
 
 
 def comma_separated(table: Table) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from sensorgen.checks.review import Review, Step, draw, report, review
+from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.errors import Unprintable
 from sensorgen.core.version import __version__
@@ -121,7 +122,7 @@ def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> I
         yield path, text.encode()
     step("drawing")
     yield f"{name}.svg", draw(design, held).encode()
-    yield "check.json", json_bytes(report(design, held))
+    yield "check.json", document.to_json(report(design, held)).encode()
     yield "prediction.json", json_bytes(json.loads(to_json(predicted)))
     yield "design.json", json_bytes(design.model_dump(mode="json"))
 

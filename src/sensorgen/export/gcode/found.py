@@ -1,8 +1,7 @@
 """What a check of G-code has found, as plain data: the form of :class:`sensorgen.core.findings.Finding`, with lines."""
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 from sensorgen.core.findings import SEVERITIES
 
@@ -34,21 +33,17 @@ class Found:
     advice: str
     count: int = 1
 
-    def as_dict(self) -> dict[str, Any]:
-        """The finding, for JSON."""
-        return asdict(self)
-
 
 def error(rule: str, line: int, message: str, advice: str) -> Found:
     """A finding that refuses the file."""
     return Found(rule, "error", line, message, advice)
 
 
-def merged(found: Iterable[Found]) -> list[Found]:
+def merged(found: Iterable[Found]) -> tuple[Found, ...]:
     """Findings of the same words as one, which has the first line; the severe first, and then by line."""
     kept: dict[tuple[str, str, str], Found] = {}
     for f in found:
         key = (f.rule, f.severity, f.message)
         old = kept.get(key)
         kept[key] = f if old is None else replace(old, count=old.count + f.count)
-    return sorted(kept.values(), key=lambda f: (SEVERITIES.index(f.severity), f.line, f.rule))
+    return tuple(sorted(kept.values(), key=lambda f: (SEVERITIES.index(f.severity), f.line, f.rule)))
