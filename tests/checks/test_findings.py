@@ -5,6 +5,7 @@ import json
 import pytest
 
 from sensorgen.checks.review import report, review
+from sensorgen.core.document import to_json
 from sensorgen.core.findings import SEVERITIES, Finding
 from sensorgen.design.design import make
 from sensorgen.scene.scene import Body, box

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from sensorgen.cli import card_text
-from sensorgen.cli.show import PREFIXES, WIDTH, si
+from sensorgen.cli.show import WIDTH, si
+from sensorgen.core.units import PREFIXES
 
 if TYPE_CHECKING:
     from sensorgen.core.bounds import Bounds

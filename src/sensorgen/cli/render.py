@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sensorgen.cli import FOUND_ERRORS
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.core.document import Documented
+    from sensorgen.core.document import Documented, Part
 
 _ABOUT = {"json": "Print as JSON.", "csv": "Print the table as CSV, all digits.", "markdown": "Print as Markdown."}
 _FORM, _FILE = "sensorgen.form", "sensorgen.output"  # in the context's meta
@@ -47,9 +48,17 @@ def form() -> str:
     return str(click.get_current_context().meta.get(_FORM, ""))
 
 
-def deliver(result: "Documented") -> None:
-    """Print a result in the form that was asked for, or write it to the file; an existing one is replaced whole."""
-    write(pieces(result, form()))
+def deliver(result: "Documented", *, before: "Iterable[Part]" = ()) -> None:
+    """Print a result in the form that was asked for, or write it to the file; an existing one is replaced whole.
+
+    Parameters
+    ----------
+    result : Documented
+        What is shown.
+    before : iterable of Part
+        What people read before it; CSV and JSON leave it out.
+    """
+    write(pieces(result, form(), before))
 
 
 @contextmanager
@@ -66,7 +75,7 @@ def refused(name: str) -> Iterator[None]:
         raise
 
 
-def pieces(result: "Documented", wanted: str) -> Iterable[str]:
+def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> Iterable[str]:
     """A result as pieces of text.
 
     Raises
@@ -84,7 +93,14 @@ def pieces(result: "Documented", wanted: str) -> Iterable[str]:
             raise BadInput("--csv: this result has no table; expected --json")
         return [document.comma_separated(tables[0])]
     lines = document.markdown if wanted else document.text
-    return (f"{line}\n" for line in lines(result.document()))
+    return (f"{line}\n" for line in lines([*before, *result.document()]))
+
+
+def verdict(*problems: str) -> int:
+    """Say what is wrong with a result, a line each; the exit code."""
+    for problem in problems:
+        click.echo(f"sensorgen: {problem}", err=True)
+    return FOUND_ERRORS if problems else 0
 
 
 def write(text: Iterable[str]) -> None:

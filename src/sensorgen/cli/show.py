@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sensorgen.core.units import si as si
+
 if TYPE_CHECKING:
     from sensorgen.checks.review import Review
     from sensorgen.core.findings import Finding
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
 
 WIDTH = 80
 _COLOURS = {"error": "red", "warning": "yellow", "info": "blue"}
-PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
 def findings(found: Sequence["Finding"]) -> None:
@@ -154,17 +155,6 @@ def _axis(values: Sequence[float], name: str, unit: str) -> str:
 
 def _ends_and_middle(values: Sequence[float]) -> list[int]:
     return sorted({0, len(values) // 2, len(values) - 1})
-
-
-def si(value: float, unit: str) -> str:
-    """A value with an SI prefix, to four digits.
-
-    >>> si(6.29e-11, "F"), si(2333.3, "ohm"), si(0.0, "F")
-    ('62.9 pF', '2.333 kohm', '0 F')
-    """
-    powers = [p for p in PREFIXES if value and abs(value) >= 10.0**p]
-    power = max(powers, default=0 if not value else min(PREFIXES))
-    return f"{value / 10.0**power:.4g} {PREFIXES[power]}{unit}"
 
 
 def as_json(data: Any) -> None:

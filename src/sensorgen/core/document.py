@@ -8,31 +8,57 @@ import io
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from html import escape
 from math import isfinite, isinf, isnan
 from typing import Any, Protocol, Self, get_type_hints
+
+from sensorgen.core.units import si
 
 Cell = str | float | int | None
 DIGITS = 4  # for people; files for programs hold all
 WIDTH = 80  # columns of a terminal
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "\\`*_{}[]<>#|!~$&"})
+_wrapped = partial(textwrap.wrap, width=WIDTH, break_on_hyphens=False, break_long_words=False)  # names stay whole
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "'")
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column: name, unit, its meaning if the name does not say it, digits for people, and its name in CSV."""
+    """A column of a table.
+
+    Attributes
+    ----------
+    name, unit, about : str
+        Head, unit, and its meaning if the name does not say it.
+    digits : int
+        For people [-].
+    key : str
+        Its name in CSV.
+    si : bool
+        People see each number with its unit and an SI prefix, in place of the unit in the head.
+    hidden : bool
+        For programs alone: CSV has it, text, Markdown and HTML do not.
+    """
 
     name: str
     unit: str = ""
     about: str = ""
     digits: int = DIGITS
     key: str = ""
+    si: bool = False
+    hidden: bool = False
 
     @property
     def head(self) -> str:
         """Name with unit."""
-        return f"{self.name} [{self.unit}]" if self.unit else self.name
+        return f"{self.name} [{self.unit}]" if self.unit and not self.si else self.name
+
+    def words(self, cell: Cell) -> str:
+        """A cell for people."""
+        if self.si and isinstance(cell, (float, int)) and isfinite(cell):
+            return si(cell, self.unit, self.digits)
+        return shown(cell, self.digits)
 
 
 @dataclass(frozen=True)
@@ -74,8 +100,11 @@ class Table:
         return replace(self, columns=(column, *self.columns), cells=cells)
 
     def filled(self) -> "Table":
-        """The table without columns that are empty in every row."""
-        kept = [k for k in range(len(self.columns)) if any(row[k] not in (None, "") for row in self.cells)]
+        """The table for people: without hidden columns, and those that are empty in every row."""
+        kept = [
+            k for k, column in enumerate(self.columns)
+            if not column.hidden and any(row[k] not in (None, "") for row in self.cells)
+        ]  # fmt: skip
         cells = tuple(tuple(row[k] for k in kept) for row in self.cells)
         return replace(self, columns=tuple(self.columns[k] for k in kept), cells=cells)
 
@@ -127,10 +156,10 @@ def shown(cell: Cell, digits: int = DIGITS) -> str:
 
 
 def visible(words: str) -> str:
-    """Words of strangers, their control characters shown instead of obeyed by the terminal.
+    r"""Words of strangers, their control characters shown instead of obeyed by the terminal.
 
-    >>> visible("a\\x1b[2J")
-    'a\\\\x1b[2J'
+    >>> visible("a\x1b[2J")
+    'a\\x1b[2J'
     """
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
 
@@ -157,11 +186,11 @@ def text(parts: Iterable[Part]) -> Iterator[str]:
     """Lines for a terminal: paragraphs and facts wrapped, tables with columns below each other."""
     for part in parts:
         if isinstance(part, str):
-            yield from textwrap.wrap(visible(part), WIDTH, subsequent_indent="  ") or [""]
+            yield from _wrapped(visible(part), subsequent_indent="  ") or [""]
         elif isinstance(part, Facts):
             yield from _facts(part)
         else:
-            yield from textwrap.wrap(visible(part.caption), WIDTH)
+            yield from _wrapped(visible(part.caption))
             yield from _aligned(part.filled())
 
 
@@ -169,12 +198,12 @@ def _facts(part: Facts) -> Iterator[str]:
     wide = max(len(name) for name, _ in part.rows) + 2
     hanging = " " * (wide + part.hang)
     for name, said in part.rows:
-        yield from textwrap.wrap(visible(said), WIDTH, initial_indent=f"{name:{wide}}", subsequent_indent=hanging)
+        yield from _wrapped(visible(said), initial_indent=f"{name:{wide}}", subsequent_indent=hanging)
 
 
 def _aligned(table: Table) -> Iterator[str]:
     """Numbers to the right, words to the left."""
-    rows = [[visible(shown(v, c.digits)) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
+    rows = [[visible(c.words(v)) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
     worded = [any(isinstance(row[k], str) for row in table.cells) for k in range(len(table.columns))]
     lines = [[c.head for c in table.columns], *rows]
     wide = [max(len(line[k]) for line in lines) for k in range(len(table.columns))]
@@ -199,13 +228,13 @@ def _markdown_table(table: Table) -> Iterator[str]:
     yield from ("", f"**{safe(table.caption)}**", "") if table.caption else ("",)
     if len(table.cells) == 1:
         for column, cell in zip(table.columns, table.cells[0], strict=True):
-            yield f"- {safe(column.head)}: {safe(shown(cell, column.digits))}"
+            yield f"- {safe(column.head)}: {safe(column.words(cell))}"
         return
     worded = [any(isinstance(row[k], str) for row in table.cells) for k in range(len(table.columns))]
     yield f"| {' | '.join(safe(c.head) for c in table.columns)} |"
     yield f"|{'|'.join('---' if words else '---:' for words in worded)}|"
     for row in table.cells:
-        yield f"| {' | '.join(safe(shown(v, c.digits)) for v, c in zip(row, table.columns, strict=True))} |"
+        yield f"| {' | '.join(safe(c.words(v)) for v, c in zip(row, table.columns, strict=True))} |"
 
 
 def safe(words: str) -> str:
@@ -224,7 +253,7 @@ def _html(part: Part) -> str:
     if isinstance(part, Facts):
         return f"<table>{''.join(_html_row(row, 'td') for row in part.rows)}</table>"
     table = part.filled()
-    rows = [[shown(v, c.digits) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
+    rows = [[c.words(v) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
     head = _html_row([c.head for c in table.columns], "th")
     caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
     return f"<table>{caption}{head}{''.join(_html_row(row, 'td') for row in rows)}</table>"
