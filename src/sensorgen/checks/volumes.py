@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from math import inf
 
 import numpy as np
 import shapely
@@ -36,8 +35,8 @@ class Row:
         Separate parts as drawn, those that are lost, and those that merge with a neighbour [-].
     place_mm : (float, float)
         Middle of the first lost part, or else of the first, at its front or left edge [mm].
-    ratio : float
-        Printed over drawn volume; infinite where nothing is drawn. From these two [-].
+    ratio : float or None
+        Printed over drawn volume; None where nothing is drawn. From these two [-].
     """
 
     body: str
@@ -50,7 +49,7 @@ class Row:
     vanished: int
     fused: int
     place_mm: Point
-    ratio: float = inf
+    ratio: float | None = None
 
     def __post_init__(self) -> None:
         """Derive the ratio."""
@@ -74,7 +73,7 @@ def table(rows: Sequence[Row]) -> Table:
 def _cell(row: Row) -> str:
     lost = f" -{row.vanished}" if row.vanished else ""
     fused = f" +{row.fused}" if row.fused else ""
-    return f"{format(row.ratio, '.2f') if row.exact_mm3 > 0 else 'extra'}{lost}{fused}"
+    return f"{'extra' if row.ratio is None else format(row.ratio, '.2f')}{lost}{fused}"
 
 
 def rows(
@@ -145,14 +144,14 @@ def findings(found: Iterable[Row], scene: Scene) -> list[Finding]:
     scene : Scene
         The sensor on its bed.
     """
-    outside = [row for row in found if row.exact_mm3 > 0 and not LOW <= row.ratio <= HIGH]
+    outside = [row for row in found if row.ratio is not None and not LOW <= row.ratio <= HIGH]
     return [finding for body in scene.bodies for finding in _of_body(body, [r for r in outside if r.body == body.name])]
 
 
 def _of_body(body: Body, outside: Sequence[Row]) -> Iterator[Finding]:
     """One finding for neighbouring layers with the same fault."""
     numbered = list(enumerate(outside))
-    for (_, fault, _), group in groupby(numbered, key=lambda p: (p[1].layer - p[0], _fault(p[1]), p[1].ratio > 1)):
+    for (_, fault, _), group in groupby(numbered, key=lambda p: (p[1].layer - p[0], _fault(p[1]), (p[1].ratio or 0) > 1)):
         here = [row for _, row in group]
         first, last = here[0], here[-1]
         severe = fault == "is not printed at all" and not body.is_support()

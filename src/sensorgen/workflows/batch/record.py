@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from sensorgen.checks.volumes import Row
 from sensorgen.core import files as store
@@ -202,6 +202,8 @@ class Record:
     sha256 : str
         Of all the rest of the record, so that a change by hand shows.
     """
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
     batch: str
     iteration: int
