@@ -56,6 +56,11 @@ class Row:
         if self.exact_mm3 > 0:
             object.__setattr__(self, "ratio", self.printed_mm3 / self.exact_mm3)
 
+    @property
+    def grown(self) -> bool:
+        """Whether more is printed than drawn."""
+        return self.printed_mm3 > self.exact_mm3
+
 
 def table(rows: Sequence[Row]) -> Table:
     """Printed over drawn volume of every body, layer by layer from the top."""
@@ -151,7 +156,7 @@ def findings(found: Iterable[Row], scene: Scene) -> list[Finding]:
 def _of_body(body: Body, outside: Sequence[Row]) -> Iterator[Finding]:
     """One finding for neighbouring layers with the same fault."""
     numbered = list(enumerate(outside))
-    for (_, fault, _), group in groupby(numbered, key=lambda p: (p[1].layer - p[0], _fault(p[1]), (p[1].ratio or 0) > 1)):
+    for (_, fault, _), group in groupby(numbered, key=lambda p: (p[1].layer - p[0], _fault(p[1]), p[1].grown)):
         here = [row for _, row in group]
         first, last = here[0], here[-1]
         severe = fault == "is not printed at all" and not body.is_support()

@@ -18,17 +18,16 @@ _ABOUT = {"json": "Print as JSON.", "csv": "Print the table as CSV, all digits."
 _FORM, _FILE = "sensorgen.form", "sensorgen.output"  # in the context's meta
 
 
-def options(*forms: str) -> list[click.Parameter]:
+def options(*forms: str, file: bool = True) -> list[click.Parameter]:
     """``--json``, ``--csv``, ``--markdown``, or those named, and ``--output``; :func:`deliver` obeys them."""
-    return [
-        *(
-            click.Option([f"--{form}", f"as_{form}"], is_flag=True, expose_value=False, callback=_choose, help=about)
-            for form, about in _ABOUT.items() if form in (forms or _ABOUT)
-        ),
-        click.Option(
-            ["--output", "-o"], metavar="FILE", expose_value=False, callback=_to, help="Write this file."
-        ),
+    flags = [
+        click.Option([f"--{form}", f"as_{form}"], is_flag=True, expose_value=False, callback=_choose, help=about)
+        for form, about in _ABOUT.items() if form in (forms or _ABOUT)
     ]  # fmt: skip
+    output = click.Option(
+        ["--output", "-o"], metavar="FILE", expose_value=False, callback=_to, help="Write this file."
+    )  # fmt: skip
+    return [*flags, output] if file else [*flags]
 
 
 def _choose(ctx: click.Context, param: click.Parameter, given: bool) -> None:

@@ -39,6 +39,8 @@ class Column:
         People see each number with its unit and an SI prefix, in place of the unit in the head.
     hidden : bool
         For programs alone: CSV has it, text, Markdown and HTML do not.
+    right : bool
+        Its words stand to the right, as numbers do.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Column:
     key: str = ""
     si: bool = False
     hidden: bool = False
+    right: bool = False
 
     @property
     def head(self) -> str:
@@ -204,12 +207,20 @@ def _facts(part: Facts) -> Iterator[str]:
 def _aligned(table: Table) -> Iterator[str]:
     """Numbers to the right, words to the left."""
     rows = [[visible(c.words(v)) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
-    worded = [any(isinstance(row[k], str) for row in table.cells) for k in range(len(table.columns))]
+    worded = _worded(table)
     lines = [[c.head for c in table.columns], *rows]
     wide = [max(len(line[k]) for line in lines) for k in range(len(table.columns))]
     for line in lines:
         cells = (f"{v:<{w}}" if words else f"{v:>{w}}" for v, w, words in zip(line, wide, worded, strict=True))
         yield "  ".join(cells).rstrip()
+
+
+def _worded(table: Table) -> list[bool]:
+    """Which columns hold words that stand to the left."""
+    return [
+        not column.right and any(isinstance(row[k], str) for row in table.cells)
+        for k, column in enumerate(table.columns)
+    ]
 
 
 def markdown(parts: Iterable[Part]) -> Iterator[str]:
@@ -230,7 +241,7 @@ def _markdown_table(table: Table) -> Iterator[str]:
         for column, cell in zip(table.columns, table.cells[0], strict=True):
             yield f"- {safe(column.head)}: {safe(column.words(cell))}"
         return
-    worded = [any(isinstance(row[k], str) for row in table.cells) for k in range(len(table.columns))]
+    worded = _worded(table)
     yield f"| {' | '.join(safe(c.head) for c in table.columns)} |"
     yield f"|{'|'.join('---' if words else '---:' for words in worded)}|"
     for row in table.cells:

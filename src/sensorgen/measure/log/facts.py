@@ -1,11 +1,13 @@
 """Summary of a recording as it was logged: samples, marks, frequencies and clocks; JSON in the field ``facts``."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput
+from sensorgen.core.units import si
 
 if TYPE_CHECKING:
     from sensorgen.measure.recording import Joined, Recording, RigLog
@@ -40,6 +42,14 @@ class LockIn:
     epoch_s: float | None = None
     notes: tuple[str, ...] = ()
 
+    def words(self) -> Iterator[tuple[str, str]]:
+        """Samples and marks, then frequencies and time, for people."""
+        marks = ", ".join(f"{n} {mark}" for mark, n in self.counts.items() if n and mark not in ("samples", "valid"))
+        counts = f"{self.counts['samples']} samples, {self.counts['valid']} of them sound; {marks or 'no marks'}"
+        yield f"lock-in {self.lockin}", counts
+        frequencies = ", ".join(si(tone, "Hz") for tone in self.tones_hz)
+        yield "", f"{frequencies}; {self.seconds:.5g} s by {self.program or self.format}"
+
 
 @dataclass(frozen=True)
 class Rig:
@@ -70,6 +80,12 @@ class Rig:
     explained: float | None = None
     notes: tuple[str, ...] = ()
 
+    def words(self) -> Iterator[tuple[str, str]]:
+        """Rows and errors, then clocks and remarks, for people."""
+        marked = f"; {self.samples} samples beside them, or while it was silent" if self.samples else ""
+        yield "rig", f"{self.rows} rows, {self.errors} with errors{marked}"
+        yield from (("", line) for line in (self.clocks, *self.notes) if line)
+
 
 @dataclass(frozen=True)
 class Facts:
@@ -89,6 +105,11 @@ class Facts:
     columns: dict[str, str] = field(default_factory=dict)
     rig_columns: dict[str, str] = field(default_factory=dict)
     rig: Rig | None = None
+
+    def words(self) -> Iterator[tuple[str, str]]:
+        """Lock-ins and rig, for people."""
+        for part in (*self.lockins, *([self.rig] if self.rig else [])):
+            yield from part.words()
 
 
 def to_json(facts: Facts) -> str:
@@ -130,11 +151,12 @@ def summarised(
 
     joined = joined_all(recordings, rig) if rig else ()
     marked = [one.recording for one in joined] or recordings  # joining marks the rig's errors
-    lockins = tuple(_lockin(one) for one in marked)
+    lockins = tuple(lockin(one) for one in marked)
     return Facts(lockins, dict(columns), dict(rig_columns), _rig(rig, joined[0]) if rig else None)
 
 
-def _lockin(recording: "Recording") -> LockIn:
+def lockin(recording: "Recording") -> LockIn:
+    """Summary of the recording of one lock-in."""
     source = recording.source
     return LockIn(
         tuple(recording.tones_hz.tolist()), recording.counts(), float(recording.time_s[-1]), source.format,
