@@ -1,5 +1,6 @@
 """Compression of the thesis's triangular cells as PrusaSlicer should print them: writes models/solved_prints.yaml."""
 
+from itertools import product
 from pathlib import Path
 
 from sensorgen.design.design import make
@@ -22,25 +23,27 @@ cells:
 def main() -> None:
     """Solve and write."""
     found = {}
-    for quality in ("fine", "extrafine"):
-        for film in (0.0, 0.1, 0.2, 0.3, 0.4, 0.5):
-            design = make({"shape": "tri", "quality": quality, "parameters": {"dielectric_mm": film}})
-            cell = piece(estimated(design, "arachne"))
-            try:
-                law = solved(design, cell)
-            except Exception as error:  # a cell that cannot be solved stays unsolved
-                print(quality, film, error)
-                continue
-            curve = law.compression
-            found[content(cell)] = (
-                f"  {content(cell)}:  # tri, film {film:g} mm, {quality}\n"
-                f"    displacement_um: {curve.displacement_m * 1e6:.5g}\n"
-                f"    stress_kpa: {[round(p / 1e3, 6) for p in curve.stress_pa]}\n"
-                f"    rise_percent: {[round(100 * (r - 1), 6) for r in curve.ratio]}\n"
-                f"    within: {curve.within:.4g}\n"
-            )
-            print(quality, film, content(cell), law.doubts)
-            FILE.write_text(HEAD + "".join(found.values()), "utf-8")
+    for quality, along, film in product(("fine", "extrafine"), "xy", (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)):
+        sizes = {"dielectric_mm": film, "along": along}
+        design = make({"shape": "tri", "quality": quality, "parameters": sizes})
+        cell = piece(estimated(design, "arachne"))
+        if content(cell) in found:
+            continue
+        try:
+            law = solved(design, cell)
+        except Exception as error:  # a cell that cannot be solved stays unsolved
+            print(quality, along, film, error)
+            continue
+        curve = law.compression
+        found[content(cell)] = (
+            f"  {content(cell)}:  # tri repeating along {along}, film {film:g} mm, {quality}\n"
+            f"    displacement_um: {curve.displacement_m * 1e6:.5g}\n"
+            f"    stress_kpa: {[round(p / 1e3, 6) for p in curve.stress_pa]}\n"
+            f"    rise_percent: {[round(100 * (r - 1), 6) for r in curve.ratio]}\n"
+            f"    within: {curve.within:.4g}\n"
+        )
+        print(quality, along, film, content(cell), law.doubts)
+        FILE.write_text(HEAD + "".join(found.values()), "utf-8")
 
 
 if __name__ == "__main__":

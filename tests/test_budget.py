@@ -9,7 +9,8 @@ from drawn_sensor import sensor_of
 from sensorgen.cli.prediction_text import budget as lines
 from sensorgen.design.design import make
 from sensorgen.models import line
-from sensorgen.prediction.error_budget import Load, error_budget
+from sensorgen.prediction.error_budget import error_budget
+from sensorgen.prediction.query import Load
 
 TONES = (1.1e3, 99.7e3)
 PLATE = {

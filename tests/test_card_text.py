@@ -7,8 +7,8 @@ import pytest
 from sensorgen.cli import card_text
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.evaluate import TONES_HZ
-from sensorgen.prediction.identifiability import identify
+from sensorgen.prediction.identifiability.identify import identify
+from sensorgen.prediction.query import TONES_HZ
 
 PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), 8.8541878128e-12 * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))
 BONDED = replace(PLATE, compression=compression.bonded(6e6, 0.01, 6e-4))

@@ -23,8 +23,9 @@ from sensorgen.design.specimen_name import design_of, parse
 from sensorgen.measure.log import Log, bench, notes
 from sensorgen.prediction.bodies import default_body, drawn
 from sensorgen.prediction.electrodes import electrode_resistance
-from sensorgen.prediction.evaluate import Query, evaluate
+from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.losses import lost
+from sensorgen.prediction.query import Query
 from sensorgen.prediction.rest_state import rest_state
 
 

@@ -22,7 +22,7 @@ from sensorgen.models import line
 from sensorgen.prediction import capacitance as planner
 from sensorgen.prediction.bodies import drawn, estimated
 from sensorgen.prediction.capacitance import Unpredictable, capacitance
-from sensorgen.prediction.evaluate import NOISE, TONES_HZ, Query, evaluate
+from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.grid import (
     FORCES_N,
     LARGEST,
@@ -34,6 +34,7 @@ from sensorgen.prediction.grid import (
     positions_mm,
 )
 from sensorgen.prediction.losses import Lost
+from sensorgen.prediction.query import NOISE, TONES_HZ, Query
 
 pytestmark = pytest.mark.usefixtures("shared_cache")
 EPS = {"x60": 4.68, "air": 1.00059}

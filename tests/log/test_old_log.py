@@ -103,9 +103,6 @@ def test_a_report_is_made_of_the_old_log(old, command):
     assert "60 triX .2mm 1 fine" in command("report", "--iteration", 60, "--format", "json", "-o", "-")
 
 
-@pytest.mark.xfail(
-    strict=True, raises=AssertionError, reason="report compares with the design that the specimen's name stands for"
-)
 def test_reports_find_the_predictions_that_were_stored_before_measuring(old, command):
     found = command("report", "--iteration", 60, "--format", "json", "-o", "-")
     assert found.count("stored 2026-11-22T10:34:01") >= 2, "of both designs of the bed"

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from sensorgen.design.body import Body
     from sensorgen.design.design import Design
 
-OUT = Path("out")  # folder of the designs' folders, where build and slice write
-
 
 def body_options() -> list[click.Parameter]:
     """``--drawn``, ``--slicer`` and ``--walls``."""
@@ -50,7 +48,7 @@ def body_of(drawn: bool, slicer: str | None, walls: str | None) -> "Callable[[De
         return partial(_sliced, slicer)
     if walls:
         return partial(bodies.estimated, walls=walls)
-    return lambda design: bodies.default_body(design, OUT / design.name)
+    return bodies.default_body
 
 
 def compensate_option() -> click.Option:

@@ -16,8 +16,8 @@ from sensorgen.core.errors import BadInput
 if TYPE_CHECKING:
     from sensorgen.design.body import Body
     from sensorgen.design.design import Design
-    from sensorgen.prediction.evaluate import Query
     from sensorgen.prediction.plan import Plan
+    from sensorgen.prediction.query import Query
     from sensorgen.prediction.results import Prediction
 
 _WORK = ("cell, compression and line",)
@@ -78,8 +78,8 @@ def _work(
     proper("--noise", noise)
     body = body_options.body_of(drawn, slicer, walls)(design)
     from sensorgen.prediction import grid
-    from sensorgen.prediction.evaluate import DEFAULT, Query, evaluate
-    from sensorgen.prediction.sensor_model import TIP_M, Tip
+    from sensorgen.prediction.evaluate import evaluate
+    from sensorgen.prediction.query import DEFAULT, TIP_M, Query, Tip
 
     tip = Tip(
         TIP_M if tip_mm is None else tip_mm * units.M_PER_MM, profile,
@@ -119,8 +119,8 @@ def _loaded(body: "Body", query: "Query", axes: Axes, how: dict[str, Any]) -> "P
     from dataclasses import replace
 
     from sensorgen.prediction import grid
-    from sensorgen.prediction.evaluate import evaluate, sensor_model
-    from sensorgen.prediction.planning import rough_sensor
+    from sensorgen.prediction.evaluate import evaluate
+    from sensorgen.prediction.planning import rough_sensor, sensor_model
 
     reference = grid.hardest(*axes)
     query = replace(query, force_n=reference.force_n, position_m=reference.position_m)

@@ -10,8 +10,7 @@ from sensorgen.core.units import PREFIXES
 
 if TYPE_CHECKING:
     from sensorgen.core.bounds import Bounds
-    from sensorgen.prediction.error_budget import Changes, ErrorBudget
-    from sensorgen.prediction.results import Prediction
+    from sensorgen.prediction.results import Changes, ErrorBudget, Prediction
 
 _LABEL, _CELL = 21, 30
 

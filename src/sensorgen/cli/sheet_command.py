@@ -81,7 +81,8 @@ def _work(
     plot: Path | None, drawn: bool, slicer: str | None, walls: str | None,
 ) -> int:  # fmt: skip
     from sensorgen.models.sheet import impedance
-    from sensorgen.prediction.evaluate import TONES_HZ, Query, sensor_model
+    from sensorgen.prediction.planning import sensor_model
+    from sensorgen.prediction.query import TONES_HZ, Query
 
     force_n, tip_mm, tones = one("--force", force), one("--tip", tip), frequencies or TONES_HZ
     proper("--noise", noise)

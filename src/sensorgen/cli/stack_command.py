@@ -61,7 +61,7 @@ def _work(
     within_n: Sequence[float], compression: str | None, as_json: bool,
 ) -> int:  # fmt: skip
     from sensorgen.prediction.double_layer import StackStudy, study
-    from sensorgen.prediction.evaluate import TONES_HZ
+    from sensorgen.prediction.query import TONES_HZ
 
     at_mm = None if position_mm is None else one("--position", position_mm)
     found = study(

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
     from sensorgen.scene.scene import Scene
 
+OUT = Path("out")  # folder of the designs' folders, where build and slice write, unless told otherwise
 WALLS = ("arachne", "classic", "cura", "cura-gaps")  # rules of slicers, the default of ours first
 
 
@@ -86,9 +87,10 @@ def default_body(design: Design, folder: Path | None = None) -> Body:
     design : Design
         What is printed.
     folder : Path, optional
-        With the design's files, as ``out/NAME``.
+        With the design's files; ``out/NAME`` in the working folder if not given.
     """
-    for note in sorted(folder.glob("*.gcode.json")) if folder and folder.is_dir() else ():
+    folder = folder or OUT / design.name
+    for note in sorted(folder.glob("*.gcode.json")) if folder.is_dir() else ():
         found = _toolpath(design, note)
         if found:
             return found

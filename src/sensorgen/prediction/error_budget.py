@@ -6,9 +6,9 @@ is what slicers and walls differ by; the others are material values on which sou
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import replace
 from math import inf
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,9 @@ from sensorgen.design.materials import PIEZORESISTANCE
 from sensorgen.design.values import ENDS, MaterialValue, material_value, piezoresistance, resistivities
 from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
+from sensorgen.prediction.query import Load
 from sensorgen.prediction.rest_state import permittivity_ratios
+from sensorgen.prediction.results import Changes, ErrorBudget, Term
 from sensorgen.prediction.sensor_model import SensorModel
 from sensorgen.prediction.spread import spread
 
@@ -28,105 +30,6 @@ _RICHARDSON = 4 / 3  # of what halving changes, where errors fall by four
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-
-@dataclass(frozen=True)
-class Load:
-    """A load at which numbers are stated: frequencies [Hz], force [N], centre of the tip [m]."""
-
-    frequency_hz: tuple[float, ...]
-    force_n: float
-    position_m: float
-
-
-@dataclass(frozen=True)
-class Changes:
-    """Largest relative changes over the frequencies [-].
-
-    Attributes
-    ----------
-    magnitude, re, im : float
-        Of abs(Z), Re Z and Im Z.
-    by_force : float
-        Of dZ/dF.
-    """
-
-    magnitude: float = 0.0
-    re: float = 0.0
-    im: float = 0.0
-    by_force: float = 0.0
-
-    def __add__(self, other: "Changes") -> "Changes":
-        return Changes(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
-
-    def max(self, other: "Changes") -> "Changes":
-        """The larger of both, each."""
-        return Changes(*(max(a, b) for a, b in zip(astuple(self), astuple(other), strict=True)))
-
-
-@dataclass(frozen=True)
-class Term:
-    """One source of error.
-
-    Attributes
-    ----------
-    name, what : str
-        Which, and what was moved between which ends.
-    kind : str
-        "model", "print" or "material".
-    changes : Changes or None
-        Its effect; None where it is unknown.
-    at_least : bool
-        Whether it may be larger: the load at one end is beyond the models' range.
-    """
-
-    name: str
-    what: str
-    kind: Literal["model", "print", "material"]
-    changes: Changes | None
-    at_least: bool = False
-
-    def magnitude(self) -> float:
-        """Relative change of abs(Z), infinite where it is unknown [-]."""
-        return inf if self.changes is None or self.at_least else self.changes.magnitude
-
-
-@dataclass(frozen=True)
-class ErrorBudget:
-    """All sources of error of the impedance at a load.
-
-    Attributes
-    ----------
-    force_n, position_m : float
-        The load [N], [m].
-    terms : tuple of Term
-        All of them.
-    total : Changes or None
-        Their sum, as if each were at its worst: bounds do not average out. None where a term is unknown.
-    at_least : bool
-        Whether the sum may be larger.
-    accuracy : float or None
-        Wanted of abs(Z) [-].
-    """
-
-    force_n: float
-    position_m: float
-    terms: tuple[Term, ...]
-    total: Changes | None
-    at_least: bool
-    accuracy: float | None = None
-
-    def largest(self) -> Term:
-        """The term with the largest effect on abs(Z)."""
-        return max(self.terms, key=Term.magnitude)
-
-    def met_by(self, *kinds: str) -> bool:
-        """Whether the terms of some kinds together are within the accuracy."""
-        return sum(t.magnitude() for t in self.terms if t.kind in kinds) <= (self.accuracy or 0.0)
-
-    def beyond(self) -> tuple[str, ...]:
-        """Names of the terms that alone exceed the accuracy."""
-        return tuple(t.name for t in self.terms if t.magnitude() > (self.accuracy or 0.0))
 
 
 def error_budget(model: SensorModel, load: Load, accuracy: float | None = None) -> ErrorBudget:

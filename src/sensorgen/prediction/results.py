@@ -1,16 +1,15 @@
 """A prediction, as commands, log, report and fit read it: typed, frozen, with a published schema."""
 
 import json
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from functools import cache
-from math import nan
+from math import inf, nan
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.display import Displayed
 from sensorgen.core.errors import BadInput
 from sensorgen.design.values import MaterialValue
-from sensorgen.prediction.error_budget import ErrorBudget
 from sensorgen.prediction.identifiability.results import Identifiability, of_schema_1
 from sensorgen.prediction.plan import Plan, without_times
 
@@ -18,6 +17,96 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
 SCHEMA = 2  # 1 was a JSON of the drawing alone, of versions up to 0.1.0
+
+
+@dataclass(frozen=True)
+class Changes:
+    """Largest relative changes over the frequencies [-].
+
+    Attributes
+    ----------
+    magnitude, re, im : float
+        Of abs(Z), Re Z and Im Z.
+    by_force : float
+        Of dZ/dF.
+    """
+
+    magnitude: float = 0.0
+    re: float = 0.0
+    im: float = 0.0
+    by_force: float = 0.0
+
+    def __add__(self, other: "Changes") -> "Changes":
+        return Changes(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    def max(self, other: "Changes") -> "Changes":
+        """The larger of both, each."""
+        return Changes(*(max(a, b) for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+
+@dataclass(frozen=True)
+class Term:
+    """One source of error.
+
+    Attributes
+    ----------
+    name, what : str
+        Which, and what was moved between which ends.
+    kind : str
+        "model", "print" or "material".
+    changes : Changes or None
+        Its effect; None where it is unknown.
+    at_least : bool
+        Whether it may be larger: the load at one end is beyond the models' range.
+    """
+
+    name: str
+    what: str
+    kind: Literal["model", "print", "material"]
+    changes: Changes | None
+    at_least: bool = False
+
+    def magnitude(self) -> float:
+        """Relative change of abs(Z), infinite where it is unknown [-]."""
+        return inf if self.changes is None or self.at_least else self.changes.magnitude
+
+
+@dataclass(frozen=True)
+class ErrorBudget:
+    """All sources of error of the impedance at a load.
+
+    Attributes
+    ----------
+    force_n, position_m : float
+        The load [N], [m].
+    terms : tuple of Term
+        All of them.
+    total : Changes or None
+        Their sum, as if each were at its worst: bounds do not average out. None where a term is unknown.
+    at_least : bool
+        Whether the sum may be larger.
+    accuracy : float or None
+        Wanted of abs(Z) [-].
+    """
+
+    force_n: float
+    position_m: float
+    terms: tuple[Term, ...]
+    total: Changes | None
+    at_least: bool
+    accuracy: float | None = None
+
+    def largest(self) -> Term:
+        """The term with the largest effect on abs(Z)."""
+        return max(self.terms, key=Term.magnitude)
+
+    def met_by(self, *kinds: str) -> bool:
+        """Whether the terms of some kinds together are within the accuracy."""
+        return sum(t.magnitude() for t in self.terms if t.kind in kinds) <= (self.accuracy or 0.0)
+
+    def beyond(self) -> tuple[str, ...]:
+        """Names of the terms that alone exceed the accuracy."""
+        return tuple(t.name for t in self.terms if t.magnitude() > (self.accuracy or 0.0))
 
 
 @dataclass(frozen=True)

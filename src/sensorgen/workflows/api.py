@@ -22,10 +22,10 @@ from sensorgen.design.design import Design
 from sensorgen.export.gcode import paths
 from sensorgen.measure.log import Log
 from sensorgen.prediction import bodies, compression, evaluate, grid
-from sensorgen.prediction.identifiability import NOISE
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
+from sensorgen.prediction.planning import sensor_model
+from sensorgen.prediction.query import FLAT, NOISE, TONES_HZ, Query, Tip
 from sensorgen.prediction.results import Prediction
-from sensorgen.prediction.sensor_model import FLAT, Tip
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.workflows import build as builds
 from sensorgen.workflows import display as display
@@ -124,7 +124,7 @@ def check(design: Design) -> Review:
 
 def predict(
     what: Design | Body, *, force_n: Sequence[float] = (), position_mm: Sequence[float] = (),
-    frequency_hz: Sequence[float] = evaluate.TONES_HZ, accuracy: float | None = None, law: str = "", tip: Tip = FLAT,
+    frequency_hz: Sequence[float] = TONES_HZ, accuracy: float | None = None, law: str = "", tip: Tip = FLAT,
     noise: float = NOISE,
 ) -> Any:  # fmt: skip
     """What a sensor should measure: of the print, with the drawing beside it.
@@ -158,17 +158,17 @@ def predict(
     ('predicted', 2333)
     """
     body = _body(what)
-    query = evaluate.Query(tuple(frequency_hz), law=law, tip=tip, accuracy=accuracy, noise=noise)
+    query = Query(tuple(frequency_hz), law=law, tip=tip, accuracy=accuracy, noise=noise)
     if not len(force_n) and not len(position_mm):
         return evaluate.evaluate(body, query)
     axes = (
         tuple(frequency_hz), tuple(force_n) or grid.FORCES_N, tuple(position_mm) or grid.positions_mm(body.design)
     )  # fmt: skip
     reference = grid.hardest(*axes)
-    query = evaluate.Query(
+    query = Query(
         tuple(frequency_hz), reference.force_n, reference.position_m, tip, law, accuracy, noise
     )  # fmt: skip
-    model, _ = evaluate.sensor_model(body, query)
+    model, _ = sensor_model(body, query)
     return Loaded(evaluate.evaluate(body, query), grid.impedance_grid(model.sensor, *axes))
 
 
@@ -293,11 +293,11 @@ def invert(what: Design | Body, frequency_hz: Sequence[float], impedance_ohm: Ar
     --------
     >>> plate = Design(shape="reference")
     >>> measured = predict(plate, force_n=[2.0], position_mm=[30.0]).impedance.impedance_ohm.reshape(1, -1)
-    >>> found = invert(plate, evaluate.TONES_HZ, measured, noise=1e-6)
+    >>> found = invert(plate, TONES_HZ, measured, noise=1e-6)
     >>> round(float(found.force_n[0]), 2), round(float(found.position_m[0]), 3)
     (2.0, 0.03)
     """
-    model, _ = evaluate.sensor_model(_body(what))
+    model, _ = sensor_model(_body(what))
     return Estimator(model.sensor, tuple(frequency_hz), noise).batch(np.asarray(impedance_ohm))
 
 
@@ -320,4 +320,4 @@ def _body(what: Design | Body) -> Body:
     if isinstance(what, Body):
         return what
     design = _named(what)
-    return bodies.default_body(design, Path("out") / design.name)
+    return bodies.default_body(design)

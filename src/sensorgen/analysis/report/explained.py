@@ -120,7 +120,7 @@ def _impedances(found: Comparison, recorded: Sequence[Run]) -> Iterator[Kind]:
     """Z at rest, and its change under load, where a line can be made of the design."""
     known: list[tuple[Run, Movable]] = []
     for run in recorded:
-        of = Movable(found.designs[found.names[run.entry.specimen]]) if run.entry.specimen in found.names else None
+        of = Movable(found.bodies[found.names[run.entry.specimen]]) if run.entry.specimen in found.names else None
         try:
             if of is not None and np.isfinite(run.rest_ohm).all():
                 _ = of.model.sensor

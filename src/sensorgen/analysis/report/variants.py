@@ -12,7 +12,8 @@ from sensorgen.core.document import Column, Table
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import materials
 from sensorgen.design.design import Design
-from sensorgen.prediction.identifiability import FORCE_N, Identifiability
+from sensorgen.prediction.identifiability.results import Identifiability
+from sensorgen.prediction.query import FORCE_N
 from sensorgen.scene.geometry.meshes import mesh
 
 _STRETCH = (1.0, 1.0, 10.0)
@@ -53,8 +54,8 @@ class IdentifiabilityRow:
 def variants(found: Comparison) -> tuple[Variant, ...]:
     """Every variant that a specimen was printed of."""
     return tuple(
-        Variant(name, design.id(), draw(design, review(design)), _words(found.predictions[name]))
-        for name, design in found.designs.items()
+        Variant(name, body.design.id(), draw(body.design, review(body.design)), _words(found.predictions[name]))
+        for name, body in found.bodies.items()
     )
 
 
@@ -96,13 +97,13 @@ def figures(found: Comparison) -> Iterator[Figure]:
             "Least standard error (Cramér-Rao) of force above, of position below, over the position of the load, for "
             "the frequencies and noise of the prediction. Dashed: required. Gaps: undefined.", known, "variant",
         )  # fmt: skip
-    if found.designs:
+    if found.bodies:
         axes = Axis("x [mm]"), Axis("y [mm]"), Axis("z [mm]")
         yield Figure(
             "bodies", f"Bodies, height x {_STRETCH[2]:g}",
             "The bodies of the chosen variant, to be turned with the mouse, their height enlarged. The drawings show "
             "them in section.",
-            {name: (Panel(tuple(_bodies(design)), *axes),) for name, design in found.designs.items()}, "variant",
+            {name: (Panel(tuple(_bodies(body.design)), *axes),) for name, body in found.bodies.items()}, "variant",
             stretch=_STRETCH,
         )  # fmt: skip
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
+from sensorgen.design.design import Design, Infill
 from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer, Quality
 
@@ -20,6 +21,17 @@ class Load:
     source: str = ""
     infill_percent: float | None = None
     infill_pattern: str | None = None
+
+
+def load(design: Design, name: str) -> Load:
+    """What the tool of a material prints for a design."""
+    infill = design.infill.get(name, Infill())
+    return Load(design.material(name), design.used()[name], infill.percent, infill.pattern)
+
+
+def loads(design: Design) -> dict[int, Load]:
+    """What each tool prints for a design, by the printer's own tool number."""
+    return {design.tool(name): load(design, name) for name in design.used()}
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.design import materials
+from sensorgen.design.design import Design
+from sensorgen.export.slicers.loads import load
+from sensorgen.export.slicers.prusa import volume_settings
 from sensorgen.scene.geometry.mesh import Mesh
 
 # What XML 1.0 cannot carry, not even escaped; and line breaks and tabs, whose escapes lib3mf refuses.
@@ -110,3 +114,29 @@ def _check_mesh(part: Part) -> None:
 def escaped(text: str) -> str:
     """Text for XML, also within double quotes; without references by number, which lib3mf refuses."""
     return html.escape(text, quote=False).replace('"', "&quot;")
+
+
+def parts_of(design: Design, made: Mapping[str, Mesh]) -> list[Part]:
+    """Bodies of a design, in the sensor's coordinates.
+
+    Parameters
+    ----------
+    design : Design
+        The design.
+    made : mapping of str to Mesh
+        Mesh of each body, by its name [mm].
+    """
+    return [part_of(design, body.name, body.material, made[body.name]) for body in design.printed.bodies]
+
+
+def part_of(design: Design, name: str, material: str, mesh: Mesh) -> Part:
+    """One body, with the tool that the design gives its material."""
+    tool, found = design.tool(material), materials.load(material)
+    return Part(
+        name=name,
+        material=found.title,
+        colour=found.colour,
+        extruder=design.machine.slicer_index(tool),
+        mesh=mesh,
+        settings=volume_settings(design.machine, design.layers, tool, load(design, material)),
+    )

@@ -11,7 +11,7 @@ from sensorgen.models.stack import Body
 from sensorgen.prediction.double_layer.designs import press_at, stacked
 from sensorgen.prediction.double_layer.differencing import ReadingErrors, bounds
 from sensorgen.prediction.double_layer.touching import WIRINGS, Touching, TouchResult
-from sensorgen.prediction.sensor_model import TIP_M
+from sensorgen.prediction.query import TIP_M
 
 __all__ = ["FilmReadings", "ReadingErrors", "StackStudy", "TouchResult", "study"]
 

@@ -6,8 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.prediction.identifiability.fisher import Bounds
-
 Rows = tuple[tuple[float | None, ...], ...]
 
 
@@ -224,15 +222,6 @@ class Identifiability(StandardErrors):
     changes: tuple[ChangeResult, ...]
     changes_together: StandardErrors | None
     doubts: tuple[str, ...] = ()
-
-
-def standard_errors(limits: Bounds) -> StandardErrors:
-    """Bounds of one press, None where they are undefined."""
-    return StandardErrors(
-        sigma_force_n=finite(limits.force_n),
-        sigma_position_m=finite(limits.position_m),
-        correlation=finite(limits.correlation),
-    )
 
 
 def finite(value: float | NDArray[np.float64]) -> float | None:

@@ -8,7 +8,7 @@ from sensorgen.design import design as designs
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction.bodies import drawn
-from sensorgen.prediction.evaluate import TONES_HZ
+from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
 from sensorgen.verification.thesis.verdicts import Part
 
