@@ -1,6 +1,6 @@
 """Design rule check: exact gap, valid bodies, and the findings of every rule about a design on its printer."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from sensorgen import checks
@@ -19,6 +19,11 @@ Step = Callable[[str], None]
 STEPS = ("meshes", "checks", "validity")
 LOST = "7-printed"
 _WIDENED = ("2-printed-gap", "5-width", LOST)  # rules that larger widths or a longer period satisfy
+
+
+def lost(found: Iterable[Finding]) -> list[Finding]:
+    """Errors of rule 7 that the design does not waive: bodies that are missing from a printed layer."""
+    return [f for f in found if f.rule == LOST and f.severity == "error" and not f.waiver]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +49,7 @@ class Review(Displayed):
 
     def lost(self) -> list[Finding]:
         """Errors of rule 7 that the design does not waive: bodies that are missing from a printed layer."""
-        return [f for f in self.findings if f.rule == LOST and f.severity == "error" and not f.waiver]
+        return lost(self.findings)
 
     def sliced(self) -> "Review":
         """The review without the estimate of rule 7, which G-code replaces."""
