@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS
+from sensorgen.cli import FOUND_ERRORS, show
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -47,6 +47,13 @@ def form() -> str:
     return str(click.get_current_context().meta.get(_FORM, ""))
 
 
+def refuse_beside(option: str) -> None:
+    """Raise BadInput where a form or a file was asked for too."""
+    asked = (*([form()] if form() else ()), *(["output"] if click.get_current_context().meta.get(_FILE) else ()))
+    if asked:
+        raise BadInput(f"--{asked[0]} and {option} at once; expected one of them")
+
+
 def deliver(result: "Documented", *, before: "Iterable[Part]" = ()) -> None:
     """Print a result in the form that was asked for, or write it to the file; an existing one is replaced whole.
 
@@ -81,7 +88,14 @@ def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> 
     ------
     BadInput
         CSV of a result without a table.
+
+    Notes
+    -----
+    CSV is the result's first table, unless it writes its own, as ``csv()``, piece by piece.
     """
+    if wanted == "csv" and hasattr(result, "csv"):
+        pieces: Iterable[str] = result.csv()
+        return pieces
     from sensorgen.core import document
 
     if wanted == "json":
@@ -111,7 +125,8 @@ def write(text: Iterable[str]) -> None:
         return
     from sensorgen.core import files
 
-    with files.replacing(Path(output)) as file:
-        for piece in text:
+    with show.progress(()) as step, files.replacing(Path(output)) as file:
+        for k, piece in enumerate(text):
+            step(f"{k} pieces")
             file.write(piece.encode())
     click.echo(output)

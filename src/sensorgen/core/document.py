@@ -18,6 +18,7 @@ from sensorgen.core.units import si
 Cell = str | float | int | None
 DIGITS = 4  # for people; files for programs hold all
 WIDTH = 80  # columns of a terminal
+_LEAST = 20  # columns into which words are wrapped
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "\\`*_{}[]<>#|!~$&"})
 _wrapped = partial(textwrap.wrap, width=WIDTH, break_on_hyphens=False, break_long_words=False)  # names stay whole
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "'")
@@ -140,10 +141,10 @@ class Documented(Protocol):
 
 
 def shown(cell: Cell, digits: int = DIGITS) -> str:
-    """A cell for people.
+    """A cell for people; no exponent from 0.0001 to a million.
 
-    >>> [shown(v) for v in (None, float("inf"), 1234.5678, 7, True, "a")]
-    ['–', '∞', '1235', '7', 'yes', 'a']
+    >>> [shown(v) for v in (None, float("inf"), 1234.5678, 12345.678, 7, True, "a")]
+    ['–', '∞', '1235', '12350', '7', 'yes', 'a']
     """
     if cell is None:
         return "–"
@@ -155,7 +156,7 @@ def shown(cell: Cell, digits: int = DIGITS) -> str:
         return "∞"
     if isinstance(cell, int) or (cell == int(cell) and abs(cell) < 1e6):
         return f"{cell:.0f}"
-    return f"{cell:.{digits}g}"
+    return f"{float(f'{cell:.{digits}g}'):.{max(digits, 6)}g}"
 
 
 def visible(words: str) -> str:
@@ -205,14 +206,20 @@ def _facts(part: Facts) -> Iterator[str]:
 
 
 def _aligned(table: Table) -> Iterator[str]:
-    """Numbers to the right, words to the left."""
+    """Numbers to the right, words to the left; words of the last column are wrapped."""
     rows = [[visible(c.words(v)) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
     worded = _worded(table)
     lines = [[c.head for c in table.columns], *rows]
     wide = [max(len(line[k]) for line in lines) for k in range(len(table.columns))]
+    before = sum(wide[:-1]) + 2 * len(wide[:-1])
     for line in lines:
-        cells = (f"{v:<{w}}" if words else f"{v:>{w}}" for v, w, words in zip(line, wide, worded, strict=True))
-        yield "  ".join(cells).rstrip()
+        cells = [f"{v:<{w}}" if words else f"{v:>{w}}" for v, w, words in zip(line, wide, worded, strict=True)]
+        if not worded[-1]:
+            yield "  ".join(cells).rstrip()
+            continue
+        last = textwrap.wrap(line[-1], max(WIDTH - before, _LEAST)) or [""]
+        yield "  ".join([*cells[:-1], last[0]]).rstrip()
+        yield from (" " * before + more for more in last[1:])
 
 
 def _worded(table: Table) -> list[bool]:

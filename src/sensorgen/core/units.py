@@ -128,12 +128,12 @@ def prefix(value: float) -> tuple[str, float]:
 def si(value: float, unit: str, digits: int = 4) -> str:
     """A value with an SI prefix.
 
-    >>> si(6.29e-11, "F"), si(2333.3, "ohm"), si(0.0, "F"), si(0.99996, "m"), si(float("inf"), "m")
-    ('62.9 pF', '2.333 kohm', '0 F', '1 m', 'inf m')
+    >>> si(6.29e-11, "F"), si(2333.3, "ohm"), si(0.0, "F"), si(0.99996, "m"), si(0.5513, "s", 2)
+    ('62.9 pF', '2.333 kohm', '0 F', '1 m', '550 ms')
     """
     rounded = float(f"{value:.{digits}g}")
     name, size = prefix(rounded) if math.isfinite(rounded) else ("", 1.0)
-    return f"{rounded / size:.{digits}g} {name}{unit}"
+    return f"{rounded / size:.{max(digits, 4)}g} {name}{unit}"
 
 
 def frequency_text(frequency_hz: float) -> str:

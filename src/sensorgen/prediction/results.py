@@ -1,6 +1,7 @@
 """A prediction, as commands, log, report and fit read it: typed, frozen, with a published schema."""
 
 import json
+from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from functools import cache
 from math import inf, nan
@@ -8,9 +9,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.display import Displayed
+from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.design.values import MaterialValue
-from sensorgen.prediction.identifiability.results import Identifiability, of_schema_1
+from sensorgen.prediction.identifiability.results import Identifiability, metres, newtons, of_schema_1
 from sensorgen.prediction.plan import Plan, without_times
 
 if TYPE_CHECKING:
@@ -108,6 +110,30 @@ class ErrorBudget:
         """Names of the terms that alone exceed the accuracy."""
         return tuple(t.name for t in self.terms if t.magnitude() > (self.accuracy or 0.0))
 
+    def document(self) -> Iterator[Part]:
+        """Each term, their sum, the largest, and whether the accuracy is reached."""
+        rows = [(t.name, t.changes, t.at_least) for t in self.terms]
+        rows += [("all at their worst", self.total, self.at_least)] if self.total else []
+        cells = (
+            (name, *((100 * v for v in astuple(changes)) if changes else (None,) * 4),
+             "unknown" if changes is None else "at least" if at_least else "")
+            for name, changes, at_least in rows
+        )  # fmt: skip
+        columns = (Column("error"), *(Column(f, "%", digits=2) for f in ("|Z|", "R", "X", "dZ/dF")), Column(""))
+        caption = f"error budget at {self.force_n:g} N and {self.position_m * 1e3:g} mm, at the worst frequency"
+        yield Table("budget", caption, columns, tuple(cells))
+        largest = self.largest()
+        yield f"largest: {largest.name} ({largest.what})"
+        if not self.accuracy:
+            return
+        beyond = f"; larger alone: {', '.join(self.beyond())}" if self.beyond() else ""
+        if self.met_by("model", "print", "material"):
+            yield f"accuracy {self.accuracy:g} of |Z| reached"
+        elif self.met_by("model"):
+            yield f"accuracy {self.accuracy:g} of |Z| reached by the models, not by print and material data{beyond}"
+        else:
+            yield f"accuracy {self.accuracy:g} of |Z| not reached by the models{beyond}"
+
 
 @dataclass(frozen=True)
 class Impedance:
@@ -196,6 +222,93 @@ class Prediction(Displayed):
     values: tuple[MaterialValue, ...] = ()
     assumptions: tuple[str, ...] = ()
     drawn: "Prediction | None" = None
+
+    def summary(self) -> Iterator[Part]:
+        """Quantities of the print beside the drawing's: the best value and the range with all errors."""
+        shown = [self.drawn, self] if self.drawn else [self]
+        rows = [
+            ("electrode gap", *(p.gap and p.gap.words() for p in shown)),
+            ("capacitance", *(p.capacitance.words() if p.capacitance else p.status for p in shown)),
+            *((f"{end} electrode", *(_words(p.resistance.get(end)) for p in shown)) for end in self.resistance),
+            ("sensitivity [1/kPa]", *((_words(p.sensitivity) or "–").replace(" 1/kPa", "") for p in shown)),
+            ("force resolution", *(p.force_resolution_n and newtons(p.force_resolution_n) for p in shown)),
+            ("position resolution", *(p.position_resolution_m and metres(p.position_resolution_m) for p in shown)),
+        ]
+        columns = (Column(""), *(Column(p.body.partition(",")[0]) for p in shown))
+        yield Table("quantities", "", columns, tuple(rows))
+        yield f"(resolution at {self.force_n:g} N and {self.position_m * 1e3:g} mm; {self.body})"
+
+    def document(self) -> Iterator[Part]:
+        """The prediction, what its ranges hold, impedance, identifiability and error budget."""
+        if self.capacitance is None:
+            yield f"{self.design}: {self.reason}"
+            if self.drawn and self.drawn.capacitance:
+                yield from ("", *self.summary())
+            return
+        yield self.design
+        yield from self.summary()
+        yield ""
+        certified = " (certified)" if self.capacitance.certified else ""
+        heads = ("range of", f"model{certified}", "print", "material")
+        quantities = {"capacitance": self.capacitance, **{f"{e} electrode": r for e, r in self.resistance.items()}}
+        ranges = (
+            (name, *(_change(part, b.value) for part in (b.model, b.print, b.material)))
+            for name, b in quantities.items() if b.value
+        )  # fmt: skip
+        yield Table("ranges", "", tuple(map(Column, heads)), tuple(ranges))
+        yield f"corner frequency {_words(self.corner_frequency) or 'undefined'}"
+        yield ""
+        columns = (
+            Column("at rest", "Hz", si=True), Column("Re", "ohm", digits=5), Column("range"),
+            Column("Im", "ohm", digits=5), Column("range"),
+        )  # fmt: skip
+        z = (
+            (row.frequency_hz, *(cell for part in (row.re, row.im) for cell in (part.value, _range(part))))
+            for row in self.impedance
+        )
+        yield Table("impedance", "", columns, tuple(z))
+        yield ""
+        yield from self.judgement()
+        yield ""
+        yield from (f"assumed: {assumption}" for assumption in self.assumptions)
+
+    def judgement(self) -> Iterator[Part]:
+        """Identifiability and error budget; or why there are none."""
+        if self.identifiability:
+            yield from self.identifiability.document()
+        elif self.reason:
+            yield f"no load: {self.reason}"
+        if self.budget:
+            yield ""
+            yield from self.budget.document()
+
+    def to_json(self) -> str:
+        """Indented JSON of the published schema."""
+        return json.dumps(json.loads(to_json(self)), indent=2, ensure_ascii=False) + "\n"
+
+    def problems(self, accuracy: float | None) -> Sequence[str]:
+        """That abs(Z) is not within an accuracy that was asked for [-]."""
+        if accuracy is None or self.capacitance is None:
+            return ()
+        reached = self.plan.width if self.plan else self.capacitance.model.width()
+        if reached is not None and reached <= accuracy:
+            return ()
+        best = "error unknown" if reached in (None, inf) else f"{reached:.2g}"
+        return ("; ".join((f"accuracy {accuracy:g} not reached: {best}", *(self.plan.shares() if self.plan else ()))),)
+
+
+def _words(bounds: Bounds | None) -> str | None:
+    return bounds and bounds.words()
+
+
+def _range(bounds: Bounds) -> str:
+    return " to ".join(f"{float(f'{end:.3g}'):g}" for end in (bounds.lower, bounds.upper))
+
+
+def _change(part: Interval, value: float) -> str:
+    """Changes from the best value to the ends [%]."""
+    changes = (100 * (end / value - 1) for end in (part.lower, part.upper))
+    return " to ".join(f"{float(f'{c:.2g}'):+g}" if abs(c) >= 0.005 else "0" for c in changes) + " %"
 
 
 @cache

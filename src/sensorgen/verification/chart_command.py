@@ -1,5 +1,6 @@
 """``sensorgen chart``: every model on every standard scene, time against error."""
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -43,7 +44,7 @@ def command(scene: tuple[str, ...], budget: float, output: str, as_json: bool) -
     rows = [vars(one) for one in (*points, *chart.silent(names, points))]
     _write(Path(output), points, rows)
     if as_json:
-        show.as_json(rows)
+        click.echo(json.dumps(rows, indent=2, ensure_ascii=False))
     else:
         for name in FILES:
             click.echo(str(Path(output) / name))

@@ -1,5 +1,6 @@
 """``sensorgen thesis``: every numbered item of the thesis, its value, ours, and a verdict."""
 
+import json
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -46,7 +47,7 @@ def _write(folder: Path, rows: Sequence["Row"], formats: Sequence[str]) -> None:
     made = {
         "html": lambda: thesis.html(rows),
         "md": lambda: thesis.markdown(rows),
-        "json": lambda: show.json_text(thesis.plain(rows)),
+        "json": lambda: json.dumps(thesis.plain(rows), indent=2, ensure_ascii=False) + "\n",
     }
     try:
         folder.mkdir(parents=True, exist_ok=True)
