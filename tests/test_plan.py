@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from sensorgen.cli.render import to_json
+from sensorgen.core.document import to_json
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
 

@@ -7,6 +7,7 @@ import pytest
 
 from sensorgen.asprinted.printed import body
 from sensorgen.core.errors import SensorgenError
+from sensorgen.design.walls import WALLS
 from sensorgen.models import press2d, press3d
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.prediction import compression as compressed
@@ -78,7 +79,7 @@ def test_a_printed_cell_gives_way_like_one_built_by_hand(walls, fall_um):
     assert (f"falls {fall_um:g} um" in "".join(found.doubts)) == (fall_um > 0)
     middle = (np.array(found.lower_f_per_m2) + np.array(found.upper_f_per_m2)) / 2
     assert middle == pytest.approx([c.middle() for c in hand.capacitance_f_per_m2], rel=0.01)
-    assert found.body == f"printed, estimated ({walls} walls)"
+    assert found.body == f"printed, estimated ({WALLS[walls]})"
 
 
 @needs_mesher

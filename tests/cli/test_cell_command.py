@@ -40,7 +40,7 @@ def test_it_answers_for_the_print_unless_the_drawing_is_asked_for(run):
     bodies = {word: answer(run("cell", "tri", *word, "--json")) for word in ((), ("--walls", "cura"), ("--drawn",))}
     assert [found["body"] for found in bodies.values()] == [
         "printed, estimated (PrusaSlicer, Arachne walls)",
-        "printed, estimated (cura walls)",
+        "printed, estimated (plain Cura)",
         "drawn",
     ]
     assert len({found["lower_f_per_m2"] for found in bodies.values()}) == 3

@@ -15,7 +15,6 @@ from sensorgen.core.errors import BadInput
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
     from sensorgen.prediction.loaded import Loaded
-    from sensorgen.prediction.results import Prediction
 
 _WORK = ("cell, compression and line",)
 
@@ -67,6 +66,7 @@ def _work(
     body = body_options.body_of(drawn, slicer, walls)(design)
     from sensorgen.prediction.evaluate import evaluate
     from sensorgen.prediction.query import DEFAULT, TIP_M, Query, Tip
+    from sensorgen.prediction.results import Prediction
 
     tip = Tip(
         TIP_M if tip_mm is None else tip_mm * units.M_PER_MM, profile,
@@ -87,18 +87,22 @@ def _work(
             asked = compression or tip_mm is not None or radius_mm is not None
             if found.capacitance and not found.budget and asked:
                 raise BadInput(found.reason)
-    if plot:
-        from sensorgen.analysis import plots
-        from sensorgen.core import files
-
-        with show.progress(plots.STEPS) as step:
-            for file, content in plots.files(found.model.sensor, *found.axes, design.name):
-                step(file)
-                files.replace(Path(plot) / file, content)
-        click.echo("\n".join(str(Path(plot) / file) for file in plots.STEPS))
+    if plot and not isinstance(found, Prediction):
+        _plot(found, Path(plot))
     else:
         render.deliver(found, before=[*prediction.plan.document(), ""] if explain and prediction.plan else ())
     return render.verdict(*prediction.problems(accuracy))
+
+
+def _plot(found: "Loaded", folder: Path) -> None:
+    from sensorgen.analysis import plots
+    from sensorgen.core import files
+
+    with show.progress(plots.STEPS) as step:
+        for file, content in plots.files(found.model.sensor, *found.axes, found.prediction.design):
+            step(file)
+            files.replace(folder / file, content)
+    click.echo("\n".join(str(folder / file) for file in plots.STEPS))
 
 
 command = DesignGroup(

@@ -93,20 +93,20 @@ def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> 
     -----
     CSV is the result's first table, unless it writes its own, as ``csv()``, piece by piece.
     """
-    if wanted == "csv" and hasattr(result, "csv"):
-        pieces: Iterable[str] = result.csv()
-        return pieces
     from sensorgen.core import document
 
     if wanted == "json":
         return [document.to_json(result)]
+    if wanted == "csv" and hasattr(result, "csv"):
+        blocks: Iterable[str] = result.csv()
+        return blocks
     if wanted == "csv":
         tables = [part for part in result.document() if isinstance(part, document.Table)]
         if not tables:
             raise BadInput("--csv: this result has no table; expected --json")
         return [document.comma_separated(tables[0])]
-    lines = document.markdown if wanted else document.text
-    return (f"{line}\n" for line in lines([*before, *result.document()]))
+    shown = document.markdown if wanted else document.text
+    return (f"{line}\n" for line in shown([*before, *result.document()]))
 
 
 def verdict(*problems: str) -> int:

@@ -217,7 +217,7 @@ def _aligned(table: Table) -> Iterator[str]:
         if not worded[-1]:
             yield "  ".join(cells).rstrip()
             continue
-        last = textwrap.wrap(line[-1], max(WIDTH - before, _LEAST)) or [""]
+        last = _wrapped(line[-1], width=max(WIDTH - before, _LEAST)) or [""]
         yield "  ".join([*cells[:-1], last[0]]).rstrip()
         yield from (" " * before + more for more in last[1:])
 

@@ -178,7 +178,8 @@ def answer(body: Body, asked: Asked) -> CellCapacitance:
     return CellCapacitance(
         design=design.name, body=body.provenance, model=found.model,
         lower_f_per_m2=per_area.lower, upper_f_per_m2=per_area.upper,
-        loss_lower_f_per_m2=loss and loss.lower / area_m2, loss_upper_f_per_m2=loss and loss.upper / area_m2,
+        loss_lower_f_per_m2=loss.lower / area_m2 if loss else None,
+        loss_upper_f_per_m2=loss.upper / area_m2 if loss else None,
         relative_width=found.width(), seconds=found.seconds(), reached=found.reached(),
         accuracy=found.wanted if found.wanted < inf else None, known=found.known, area_m2=area_m2, tan_delta=tan_delta,
         frequency_hz=asked.frequency_hz if loss else None, refused=found.refused, plan=found.plan, values=tuple(values),

@@ -227,7 +227,7 @@ class Prediction(Displayed):
         """Quantities of the print beside the drawing's: the best value and the range with all errors."""
         shown = [self.drawn, self] if self.drawn else [self]
         rows = [
-            ("electrode gap", *(p.gap and p.gap.words() for p in shown)),
+            ("electrode gap", *(_words(p.gap) for p in shown)),
             ("capacitance", *(p.capacitance.words() if p.capacitance else p.status for p in shown)),
             *((f"{end} electrode", *(_words(p.resistance.get(end)) for p in shown)) for end in self.resistance),
             ("sensitivity [1/kPa]", *((_words(p.sensitivity) or "–").replace(" 1/kPa", "") for p in shown)),
@@ -298,7 +298,7 @@ class Prediction(Displayed):
 
 
 def _words(bounds: Bounds | None) -> str | None:
-    return bounds and bounds.words()
+    return None if bounds is None else bounds.words()
 
 
 def _range(bounds: Bounds) -> str:

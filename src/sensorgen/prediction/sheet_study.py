@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.document import Cell, Column, Facts, Part, Table, to_json
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM, si
 from sensorgen.models.sensor import Sensor
@@ -151,7 +152,7 @@ class SheetStudy:
             Column("sigma y", "m", key="sigma_y_m", si=True, digits=3), Column("located", "%", key="located_percent"),
             Column("best frequencies", key="best_frequencies"),
         )  # fmt: skip
-        rows = []
+        rows: list[tuple[Cell, ...]] = []
         for name, found in self.bounds.items():
             errors = (float(np.median(found.sigma()[..., k])) for k in range(3))
             best = ", ".join(si(float(found.frequency_hz[k]), "Hz") for k in found.best_tones()[:2])
@@ -186,9 +187,7 @@ class SheetStudy:
 
     def to_json(self) -> str:
         """The record as indented JSON."""
-        from pydantic import TypeAdapter
-
-        return TypeAdapter(SheetRecord).dump_json(self.record(), indent=2).decode() + "\n"
+        return to_json(self.record())
 
 
 def study(
@@ -232,9 +231,7 @@ def study(
         ports["pads"] = tuple((Contact("top", x, y), Contact("bottom", x, y)) for x, y in x_y)
     ports |= {name: pairs for name, pairs in contact_sets(sheet).items() if contacts in (name, "all")}
     bounds = {
-        name: localise(
-            sheet, pairs, frequency_hz, press, per_newton, noise, PLACES, lambda count, name=name: step(name, count)
-        )
+        name: localise(sheet, pairs, frequency_hz, press, per_newton, noise, PLACES, partial(step, name))
         for name, pairs in ports.items()
     }
     return SheetStudy(sheet, press, ports, bounds, force_n, noise, model.doubts)

@@ -8,7 +8,7 @@ from itertools import chain
 from typing import Any, Generic, Protocol, TypeVar
 
 from sensorgen.core import cache as cached
-from sensorgen.core.document import Column, Part, Table, shown
+from sensorgen.core.document import Column, Part, Table, shown, to_json
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.parallel import in_parallel, said
 from sensorgen.design.body import Body
@@ -76,9 +76,7 @@ class Sweep(Generic[Result]):
 
     def to_json(self) -> str:
         """A list of the results, each with the value of the setting before it."""
-        from pydantic import TypeAdapter
-
-        results = json.loads(TypeAdapter(list[type(self.results[0])]).dump_json(list(self.results)))  # type: ignore[misc]
+        results = json.loads(to_json(self.results))
         rows = [{self.key: value} | result for value, result in zip(self.values, results, strict=True)]
         return json.dumps(rows, indent=2, ensure_ascii=False) + "\n"
 
@@ -130,9 +128,10 @@ def sweep(
             cached.keep(*entry)
         found[missing[n]] = result
         done()
-    results = [
-        found[k] if not isinstance(found[k], str) else failed(body, found[k]) for k, (_, body) in enumerate(points)
-    ]
+    results = []
+    for k, (_, body) in enumerate(points):
+        known = found[k]
+        results.append(failed(body, known) if isinstance(known, str) else known)
     return Sweep(key, tuple(value for value, _ in points), tuple(results))
 
 

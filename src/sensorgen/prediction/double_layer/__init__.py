@@ -112,8 +112,8 @@ class StackStudy:
         caption = (
             "A body that touches the top beside the press: shift of the reading, and the force that it is mistaken for"
         )
-        heads = ("isolation", *(row.wiring for row in self.touch))
-        yield Table("touch", caption, tuple(map(Column, heads)), (*effects, needed))
+        columns = (Column("isolation"), *(Column(row.wiring) for row in self.touch))
+        yield Table("touch", caption, columns, (*effects, needed))
         yield f"needed: isolation from which on it stays within {self.within_n:g} N"
         yield ""
         yield from (f"doubt: {doubt}" for doubt in self.doubts)

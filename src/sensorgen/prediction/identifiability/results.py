@@ -243,7 +243,7 @@ class Identifiability(StandardErrors):
     doubts: tuple[str, ...] = ()
 
     def document(self) -> Iterator[Part]:
-        """Verdict, errors over all presses, what would help, and what each frequency contributes."""
+        """Verdict, errors over all presses, changes that reduce them, and what each frequency contributes."""
         yield Facts(tuple(self._facts()))
         known = sorted(self.frequencies, key=lambda row: -(row.share_of_position_information or 0.0))[:SHOWN]
         columns = (

@@ -30,7 +30,7 @@ def _pressed(
         drawn(made), compressed.Asked((0.0, _KPA), compressed.BoundaryConditions(base=base, period=period))
     )
     if found.faults:
-        raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {found['faults'][0]}")
+        raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {found.faults[0]}")
     return found
 
 
