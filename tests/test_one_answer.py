@@ -269,7 +269,7 @@ def _of_prediction(data):
 
 
 def _quantities(data):
-    resolution = {"force": data["force_resolution_n"], "position": data["position_resolution_m"]}
+    resolution = {of: (data[f"{of}_resolution"] or {}).get("value") for of in ("force", "position")}
     return {
         "body": data["body"],
         "capacitance": data["capacitance"]

@@ -1,7 +1,7 @@
 """A number known to lie between two others, or near one."""
 
 from dataclasses import dataclass
-from math import prod
+from math import inf, prod
 
 from sensorgen.core.units import prefix
 
@@ -107,6 +107,8 @@ class Bounds:
         """
         name, size = {"m": ("m", 1e-3), "1/kPa": ("", 1.0)}.get(self.unit) or prefix(self.value)
         low, value, high = (end / size for end in (self.lower, self.value, self.upper))
+        if high == inf:
+            return f"{value:.2g} {name}{self.unit} (error unknown)"
         if f"{low:.2g}" == f"{high:.2g}":
             return f"{value:.4g} {name}{self.unit}"
         ends = (f"{float(f'{end:.2g}'):g}" for end in (low, high))

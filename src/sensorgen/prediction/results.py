@@ -12,13 +12,13 @@ from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.design.values import MaterialValue
-from sensorgen.prediction.identifiability.results import Identifiability, metres, newtons, of_schema_1
+from sensorgen.prediction.identifiability.results import Identifiability, of_schema_1
 from sensorgen.prediction.plan import Plan, without_times
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
-SCHEMA = 2  # 1 was a JSON of the drawing alone, of versions up to 0.1.0
+SCHEMA = 3  # 1 was a JSON of the drawing alone, of version 0.1.0; 2 had resolutions without their range
 
 
 @dataclass(frozen=True)
@@ -182,8 +182,9 @@ class Prediction(Displayed):
         Relative change of capacitance per pressure, from rest to the reference load [1/kPa].
     force_n, position_m : float
         The reference load [N], [m].
-    force_resolution_n, position_resolution_m : float or None
-        Standard errors of force and position there, from one reading [N], [m]; None where undefined.
+    force_resolution, position_resolution : Bounds or None
+        Standard errors of force and position there, from one reading [N], [m]; None where undefined. The range holds
+        what ways to print it differ by, and is infinite where that is not known.
     identifiability : Identifiability or None
         How precisely impedance determines force and position.
     budget : ErrorBudget or None
@@ -214,8 +215,8 @@ class Prediction(Displayed):
     corner_frequency: Bounds | None = None
     impedance: tuple[Impedance, ...] = ()
     sensitivity: Bounds | None = None
-    force_resolution_n: float | None = None
-    position_resolution_m: float | None = None
+    force_resolution: Bounds | None = None
+    position_resolution: Bounds | None = None
     identifiability: Identifiability | None = None
     budget: ErrorBudget | None = None
     plan: Plan | None = None
@@ -231,8 +232,8 @@ class Prediction(Displayed):
             ("capacitance", *(p.capacitance.words() if p.capacitance else p.status for p in shown)),
             *((f"{end} electrode", *(_words(p.resistance.get(end)) for p in shown)) for end in self.resistance),
             ("sensitivity [1/kPa]", *((_words(p.sensitivity) or "–").replace(" 1/kPa", "") for p in shown)),
-            ("force resolution", *(p.force_resolution_n and newtons(p.force_resolution_n) for p in shown)),
-            ("position resolution", *(p.position_resolution_m and metres(p.position_resolution_m) for p in shown)),
+            ("force resolution", *(_words(p.force_resolution) for p in shown)),
+            ("position resolution", *(_words(p.position_resolution) for p in shown)),
         ]
         columns = (Column(""), *(Column(p.body.partition(",")[0]) for p in shown))
         yield Table("quantities", "", columns, tuple(rows))
@@ -342,11 +343,22 @@ def from_json(text: str) -> Prediction:
         data = json.loads(text)
         if isinstance(data, dict) and "schema" not in data:
             return _of_schema_1(data)
+        if isinstance(data, dict) and data["schema"] == 2:
+            return adapter().validate_python(_of_schema_2(data), strict=False)
         if isinstance(data, dict) and data["schema"] != SCHEMA:
             raise BadInput(f"a prediction of schema {data['schema']}; this version reads {SCHEMA} and older: update")
         return adapter().validate_json(text)
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise BadInput(f"not a prediction: {str(error).splitlines()[0]}") from None
+
+
+def _of_schema_2(data: dict[str, Any]) -> dict[str, Any]:
+    """Resolutions were numbers, without what ways to print differ by."""
+    found = {"schema": SCHEMA, **{k: v for k, v in data.items() if k not in ("schema", "drawn")}}
+    for name, unit in (("force_resolution", "N"), ("position_resolution", "m")):
+        value = found.pop(f"{name}_{unit.lower()}", None)
+        found[name] = value and Bounds.of(float(value), unit)
+    return {**found, "drawn": data.get("drawn") and _of_schema_2(data["drawn"])}
 
 
 def _of_schema_1(data: dict[str, Any]) -> Prediction:
