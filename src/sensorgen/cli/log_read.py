@@ -39,10 +39,11 @@ def _found(log: "Log", what: str) -> "list[Entry]":
         found += log.entries(Reading, superseded=True, number=int(what))
     else:
         name = notes.specimen(what).specimen
-        rows = [row for kind in (Reading, BenchRun) for row in log.entries(kind, superseded=True, specimen=name)]
-        printed = [*log.entries(Print, specimen=name), *rows]
-        designs = dict.fromkeys(row.design_id for row in printed if row.design_id)
-        found += [*printed, *(row for design in designs for row in log.entries(Prediction, design_id=design))]
+        rows: list[Print | Reading | BenchRun] = [*log.entries(Print, specimen=name)]
+        rows += log.entries(Reading, superseded=True, specimen=name)
+        rows += log.entries(BenchRun, superseded=True, specimen=name)
+        designs = dict.fromkeys(row.design_id for row in rows if row.design_id)
+        found += [*rows, *(row for design in designs for row in log.entries(Prediction, design_id=design))]
     if not found:
         raise BadInput(f"nothing in {str(log.path)!r} of {what!r}; sensorgen log list shows what is")
     return found

@@ -108,8 +108,10 @@ class Facts:
 
     def words(self) -> Iterator[tuple[str, str]]:
         """Lock-ins and rig, for people."""
-        for part in (*self.lockins, *([self.rig] if self.rig else [])):
-            yield from part.words()
+        for one in self.lockins:
+            yield from one.words()
+        if self.rig:
+            yield from self.rig.words()
 
 
 def to_json(facts: Facts) -> str:

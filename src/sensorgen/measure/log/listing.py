@@ -5,6 +5,7 @@ import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from math import isinf
+from typing import Any
 
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.units import si
@@ -57,7 +58,7 @@ def listing(log: Log, iteration: int | None = None, last: int | None = None) -> 
     last : int, optional
         At most so many of each [-].
     """
-    wanted = {} if iteration is None else {"iteration": iteration}
+    wanted: dict[str, Any] = {} if iteration is None else {"iteration": iteration}
     readings, recordings = log.readings(last=last, **wanted), log.recordings(last=last, **wanted)
     names = {Reading: "readings", BenchRun: "recordings", Prediction: "predictions"}
     total = ", ".join(f"{log.count(kind)} {name}" for kind, name in names.items())

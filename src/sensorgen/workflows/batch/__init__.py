@@ -189,7 +189,9 @@ def make(
         families = [family for family in threemf.FAMILIES if family not in sliced_from]
         for name, content in (*printing.threemfs(found.plan.name, on_plate, families), *_files(found)):
             store.write(stage, {name: content})
-        sliced = {s: printing.gcode(found.plan.name, on_plate, s, stage, time_limit_s, step) for s in slicers}
+        sliced: dict[str, SlicedPlate] = {
+            s: printing.gcode(found.plan.name, on_plate, s, stage, time_limit_s, step) for s in slicers
+        }
         step("record")
         made = _record(found, predicted, sliced, stage).sealed()
         store.write(stage, {record.RECORD: made.to_json().encode()})

@@ -38,7 +38,7 @@ class Specimen:
         Its number on the plate, from 1.
     design, design_id : str
         Name and identity of its design.
-    iteration, copy : int
+    iteration, copy : int or None
         Of its name.
     centre_mm, size_mm : (float, float)
         Middle on the bed, and length and width [mm].
@@ -47,8 +47,8 @@ class Specimen:
     order: int
     design: str
     design_id: str
-    iteration: int
-    copy: int
+    iteration: int | None
+    copy: int | None
     centre_mm: tuple[float, float]
     size_mm: tuple[float, float]
 
