@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -94,7 +95,7 @@ M623
 @pytest.mark.parametrize("text", [MARLIN, BAMBU, THUMBNAIL, "G1", "\n\n", "%\nO1000\nG20 G90 G17\nX1 Y2\nM30\n%"])
 def test_other_printers_files_are_followed_and_judged(text):
     result = check(text.splitlines(), DIABASE)
-    json.dumps(result.as_dict(), allow_nan=False)
+    json.dumps(asdict(result), allow_nan=False)
     assert result.findings
 
 
@@ -172,7 +173,7 @@ LINES = st.lists(st.lists(WORDS, max_size=6).map(" ".join), max_size=25)
 @example(["G28", "M83", "T2", "G10 P2 Snan", "M104 Tnan S0", "M104 Snan", "M116 Pnan", "G4 Snan", "G1 X1 E1"])
 def test_anything_is_followed_without_a_traceback(lines):
     result = check(lines, DIABASE)
-    json.dumps(result.as_dict(), allow_nan=False)
+    json.dumps(asdict(result), allow_nan=False)
     motion = follow(lines)
     assert np.isfinite(motion.rows).all()
     found = paths.paths_of(motion, DIABASE, "slicer")
@@ -194,4 +195,4 @@ def test_any_bytes_are_read_or_refused(tmp_path_factory, content, head):
         result = check(path, DIABASE)
     except BadInput:  # and nothing else
         return
-    json.dumps(result.as_dict(), allow_nan=False)
+    json.dumps(asdict(result), allow_nan=False)

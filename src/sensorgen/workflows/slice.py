@@ -57,7 +57,7 @@ class Printed(Checked):
     design_findings : tuple of Finding
         What the checks of the design found.
     printed : Volumes
-        What is printed of every body.
+        Volumes as printed.
     compensated : tuple of Change
         How the design differs from the one that was asked for.
     """
