@@ -1,7 +1,8 @@
 """Results as text, JSON, CSV or Markdown, to the terminal or a file: the one way out of every command."""
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,6 +67,20 @@ def deliver(result: "Documented", *, before: "Iterable[Part]" = ()) -> None:
     write(pieces(result, form(), before))
 
 
+@contextmanager
+def refused(name: str) -> Iterator[None]:
+    """Deliver the findings for which a design, or a plan, is not made."""
+    from sensorgen.core.errors import Unprintable
+
+    try:
+        yield
+    except Unprintable as error:
+        from sensorgen.core.findings import Refused
+
+        deliver(Refused(name, tuple(error.findings)))
+        raise
+
+
 def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> Iterable[str]:
     """A result as pieces of text.
 
@@ -83,8 +98,8 @@ def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> 
     if wanted == "json":
         return [document.to_json(result)]
     if wanted == "csv" and hasattr(result, "csv"):
-        lines: Iterable[str] = result.csv()
-        return lines
+        blocks: Iterable[str] = result.csv()
+        return blocks
     if wanted == "csv":
         tables = [part for part in result.document() if isinstance(part, document.Table)]
         if not tables:
