@@ -1,6 +1,6 @@
 """Rule 9: bridges, overhangs and islands over air. Any body below supports, whatever its material."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import ceil
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from sensorgen.checks.widths import VANISHES
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.scene.layers import Region, cleaned, is_rectilinear
-from sensorgen.scene.scene import Body
+from sensorgen.scene.scene import SLIVER_MM, Body
 
 Mask = NDArray[np.bool_]
 Lengths = NDArray[np.float64]
@@ -30,15 +30,16 @@ class _Span(NamedTuple):
 def check(slices: Slices, printer: Printer, quality: Quality) -> Iterator[Finding]:
     """Findings about bridges (supported at both ends), overhangs (at one) and islands (at none)."""
     line, least = printer.line_mm(), VANISHES * printer.nozzle_mm
-    known: dict[tuple[Region, Region], dict[str, _Span]] = {}
+    known: dict[tuple[int, ...], dict[str, _Span]] = {}
     for layer in range(1, len(slices.layers)):
         # What vanishes in the slicer neither needs support nor gives any.
-        ground = shapely.union_all([slices.printed(b, layer - 1, least) for b in slices.scene.bodies])
+        ground = [r for b in slices.scene.bodies if not (r := slices.printed(b, layer - 1, least)).is_empty]
         for body in slices.scene.bodies:
             shape = slices.printed(body, layer, least)
-            if (shape, ground) not in known:
-                known[shape, ground] = _spans(shape, ground, least)
-            yield from _judged(body, layer + 1, slices.layers.mids_mm[layer], known[shape, ground], quality, line)
+            key = (id(shape), *map(id, ground))
+            if key not in known:
+                known[key] = _spans(shape, ground, least)
+            yield from _judged(body, layer + 1, slices.layers.mids_mm[layer], known[key], quality, line)
 
 
 def _judged(
@@ -64,28 +65,38 @@ def _judged(
         )  # fmt: skip
 
 
-def _grid(shape: Region, ground: Region, step_mm: float) -> tuple[tuple[Lengths, Lengths], Mask, Mask]:
+def _grid(
+    shape: Region, ground: Sequence[Region], step_mm: float, rectilinear: bool
+) -> tuple[tuple[Lengths, Lengths], Mask, Mask]:
     """Lines along x and y, and which cells between them the shape fills, and the ground.
 
     The lines are those of all edges; where some are slanted, lines a step apart.
     """
-    x, y = (np.unique(at.round(9)) for at in shapely.get_coordinates([shape, ground]).T)
-    if not (is_rectilinear(shape) and is_rectilinear(ground)):
+    x, y = (np.unique(at.round(9)) for at in shapely.get_coordinates([shape, *ground]).T)
+    if rectilinear:
+        x, y = (at[np.diff(at, prepend=-np.inf) > SLIVER_MM] for at in (x, y))
+    else:
         x, y = (np.linspace(at[0], at[-1], ceil((at[-1] - at[0]) / step_mm) + 1) for at in (x, y))
     middles = np.meshgrid((x[:-1] + x[1:]) / 2, (y[:-1] + y[1:]) / 2, indexing="ij")
-    return (x, y), shapely.contains_xy(shape, *middles), shapely.contains_xy(ground, *middles)
+    below = np.any([shapely.contains_xy(region, *middles) for region in ground], axis=0)
+    return (x, y), shapely.contains_xy(shape, *middles), below
 
 
-def _spans(shape: Region, ground: Region, least_mm: float) -> dict[str, _Span]:
+def _spans(shape: Region, ground: Sequence[Region], least_mm: float) -> dict[str, _Span]:
     """Longest bridge, overhang and island of a shape above a ground, along x or y.
 
     Every unsupported place is held along x or along y; the better way counts. Places that are held neither way,
     as the corners of a roof that juts out on two sides, hold on to those that are.
     """
     found = dict.fromkeys(("bridge", "overhang", "island"), _Span())
-    if cleaned(shapely.difference(shape, ground)).is_empty:
+    if shape.is_empty or any(shape is region for region in ground):
         return found
-    lines, filled, below = _grid(shape, ground, least_mm / 2)
+    if shapely.covers(ground, shapely.box(*shape.bounds)).any():
+        return found
+    rectilinear = is_rectilinear(shapely.multipolygons(shapely.get_parts([shape, *ground])))
+    if not rectilinear and cleaned(shapely.difference(shape, shapely.union_all(ground))).is_empty:
+        return found
+    lines, filled, below = _grid(shape, ground, least_mm / 2, rectilinear)
     air = filled & ~below
 
     def note(kind: str, lengths: Lengths, where: Mask) -> None:
