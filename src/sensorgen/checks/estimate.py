@@ -5,7 +5,6 @@ they scale with the nozzle. Capacitance of the estimate: within 2 % of PrusaSlic
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from math import pi
 
 import numpy as np
@@ -43,7 +42,8 @@ def cura_gaps(width_mm: float, layer_mm: float, printer: Printer) -> float:  # n
     return width_mm
 
 
-RULES: dict[str, Callable[[float, float, Printer], float]] = {
+Rule = Callable[[float, float, Printer], float]
+RULES: dict[str, Rule] = {
     "arachne": arachne,
     "classic": classic,
     "cura": cura,
@@ -84,18 +84,20 @@ def layers(scene: Scene, printer: Printer, quality: Quality, walls: str = "arach
     for layer in drawn(scene, quality.boundaries_mm(scene.size_mm[2])):
         key = round(layer.height_mm, 12), *((name, id(region)) for name, region in layer.regions.items())
         if key not in known:
-            known[key] = _printed(layer, scene, partial(RULES[walls], layer_mm=layer.height_mm, printer=printer))
+            known[key] = _printed(layer, scene, printer, RULES[walls])
         found.append(layer.mapped(known[key]))
     return found
 
 
-def _printed(layer: LayerRegions, scene: Scene, wide: Callable[[float], float]) -> dict[str, Region]:
+def _printed(layer: LayerRegions, scene: Scene, printer: Printer, wide: Rule) -> dict[str, Region]:
     length, width, _ = scene.size_mm
     regions: dict[str, Region] = {}
     # Electrodes first and support last, as their tools are.
     for body in sorted(scene.bodies, key=lambda b: (b.is_support(), not b.terminal)):
         if body.name in layer.regions:
-            widened = shapely.clip_by_rect(_widened(layer, body.name, length * width, wide), 0.0, 0.0, length, width)
+            widened = shapely.clip_by_rect(
+                _widened(layer, body.name, length * width, printer, wide), 0.0, 0.0, length, width
+            )
             others = shapely.get_parts(list(regions.values()))
             met = np.unique(shapely.STRtree(others).query(widened, predicate="intersects")[1])
             found = united(widened)
@@ -105,7 +107,7 @@ def _printed(layer: LayerRegions, scene: Scene, wide: Callable[[float], float]) 
     return regions
 
 
-def _widened(layer: LayerRegions, body: str, plan_mm2: float, wide: Callable[[float], float]) -> Sequence[Region]:
+def _widened(layer: LayerRegions, body: str, plan_mm2: float, printer: Printer, wide: Rule) -> Sequence[Region]:
     """The parts of a body in a layer as their walls print them."""
     found = parts(layer.region(body))
     if not found or found[0].area > plan_mm2 * (1 - SLIVER_MM):
@@ -113,7 +115,7 @@ def _widened(layer: LayerRegions, body: str, plan_mm2: float, wide: Callable[[fl
     bounds = shapely.bounds(found)
     across = {"y": bounds[:, 2] - bounds[:, 0], "x": bounds[:, 3] - bounds[:, 1]}
     width = across[layer.along] if layer.along else narrow_mm(found)
-    printed = np.array([wide(w) for w in width.tolist()])
+    printed = np.array([wide(w, layer.height_mm, printer) for w in width.tolist()])
     more = (printed - width)[:, None] / 2
     if layer.along:
         sides = np.array([-1, 0, 1, 0] if layer.along == "y" else [0, -1, 0, 1])

@@ -17,18 +17,7 @@ from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.solvers.contact.cell import Cell
 from sensorgen.solvers.contact.cell import cell_of as cell
 from sensorgen.solvers.contact.mesh import Fineness, Mesh, Unmeshed, mesh_of
-from sensorgen.solvers.contact.pressed import (
-    DEEPEST,
-    Elastic,
-    Pressed,
-    Run,
-    check,
-    compared,
-    law_of,
-    penalty_pa,
-    reached,
-    with_capacitances,
-)
+from sensorgen.solvers.contact.pressed import Elastic, Pressed, Run, check, compared, solve, with_capacitances
 
 SOURCE = (
     "neo-Hookean plane strain, displacement with bubble and pressure (Crouzeix and Raviart 1973), penalty contact with "
@@ -112,29 +101,14 @@ def _solved(
     fineness: Fineness,
     step: Callable[[float], None],
 ) -> tuple[Pressed, Run[Mesh]]:
-    from sensorgen.solvers.contact.boundary import free_of, top_load
-    from sensorgen.solvers.contact.contact import faces_of
-    from sensorgen.solvers.contact.element import Elements
-    from sensorgen.solvers.contact.load import Problem
-
     mesh = mesh_of(cell, fineness)
-    law, softest_pa = law_of(["", *(r.material for r in cell.regions)], mesh.region, solids)
-    faces = faces_of(mesh)
-    problem = Problem(
-        Elements(mesh, law),
-        faces,
-        free_of(mesh.points_m, boundary),
-        top_load(mesh.points_m, *mesh.top()),
-        penalty_pa(softest_pa),
-        boundary.contact == "stick",
-        sound=lambda places_m: not faces.crossed(places_m, mesh.outline, DEEPEST),
-    )
-    longest_pa = softest_pa * (_STICKING_STEP if problem.stick else _STEP)
-    found, states = reached(problem, stress_pa, longest_pa, step, SOURCE)
+    materials = [cell.regions[k - 1].material for k in mesh.region.tolist()]
+    longest = _STICKING_STEP if boundary.contact == "stick" else _STEP
+    found, run = solve(mesh, [solids[m] for m in materials], stress_pa, boundary, longest, SOURCE, step)
     if not cell.mirrored:
         said = "mirrors stand at both ends of the period, though it is not its own mirror image"
         found = replace(found, doubts=(said, *found.doubts))
-    return found, Run(problem, mesh, states)
+    return found, run
 
 
 def _with_fields(found: Pressed, cell: Cell, run: Run[Mesh], permittivity: Mapping[str, float]) -> Pressed:

@@ -81,7 +81,7 @@ def cleaned(region: Region) -> Region:
     return shapely.multipolygons(found[wide])
 
 
-def are_boxes(polygons: Sequence[Polygon]) -> NDArray[np.bool_]:
+def are_boxes(polygons: Sequence[Polygon] | NDArray[np.object_]) -> NDArray[np.bool_]:
     """Which polygons are rectangles along the axes (n,)."""
     x0, y0, x1, y1 = shapely.bounds(polygons).T
     return np.asarray(abs((x1 - x0) * (y1 - y0) - shapely.area(polygons)) < SLIVER_MM**2)
@@ -95,11 +95,11 @@ def is_rectilinear(region: Region) -> bool:
     return bool((steps[ring[1:] == ring[:-1]] < SLIVER_MM).all())
 
 
-def narrow_mm(polygons: Sequence[Polygon]) -> NDArray[np.float64]:
+def narrow_mm(polygons: Sequence[Polygon] | NDArray[np.object_]) -> NDArray[np.float64]:
     """Smaller side of the smallest rectangle around each polygon (n,) [mm]."""
     found = np.array(polygons, dtype=object)
     x0, y0, x1, y1 = shapely.bounds(found).T
-    narrow = np.minimum(x1 - x0, y1 - y0)
+    narrow: NDArray[np.float64] = np.minimum(x1 - x0, y1 - y0)
     turned = ~are_boxes(found)
     if turned.any():
         corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(found[turned])).reshape(-1, 5, 2)
