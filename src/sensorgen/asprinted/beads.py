@@ -95,27 +95,20 @@ def beads(design: Design, paths: Paths, centre_mm: Point | None = None) -> Beads
     height = np.diff(heights)[layer]
     volume = found.volume_mm3(machine.filament_mm)
     width = volume / (found.length_mm() * height)
-    body = _owners(design, scene, found.tool, layer, middle)
-    columns = (*ends, width, height, volume, layer, body, found.tool, found.number)
-    return Beads(*(c[here] for c in columns))
-
-
-def _owners(
-    design: Design, scene: Scene, tool: NDArray[np.int64], layer: NDArray[np.int64], middle: Floats
-) -> NDArray[np.int64]:
-    """The body that each line belongs to: of its tool's, the one that is drawn nearest in its layer, or near it."""
+    # The body that each line belongs to: of its tool's, the one that is drawn nearest in its layer, or near it
     layers = drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))
-    owner = np.zeros(len(tool), np.int64)
+    body = np.zeros(len(found.tool), np.int64)
     for one in {design.tool(body.material) for body in scene.bodies}:
         mine = {body.name: k for k, body in enumerate(scene.bodies) if design.tool(body.material) == one}
-        for number in np.unique(layer[tool == one]):
-            rows = np.flatnonzero((tool == one) & (layer == number))
+        for number in np.unique(layer[found.tool == one]):
+            rows = np.flatnonzero((found.tool == one) & (layer == number))
             near = sorted(layers, key=lambda each: abs(each.bottom_mm - layers[number].bottom_mm))
             each = next(each for each in near if mine.keys() & each.regions.keys())
             shown = {name: region for name, region in each.regions.items() if name in mine}
             numbers = np.array([mine[name] for name in shown])
-            owner[rows] = numbers[0] if len(shown) == 1 else numbers[_nearest(list(shown.values()), middle[rows])]
-    return owner
+            body[rows] = numbers[0] if len(shown) == 1 else numbers[_nearest(list(shown.values()), middle[rows])]
+    columns = (*ends, width, height, volume, layer, body, found.tool, found.number)
+    return Beads(*(c[here] for c in columns))
 
 
 def _nearest(regions: Sequence[Region], places_mm: Floats) -> NDArray[np.intp]:

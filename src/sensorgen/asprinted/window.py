@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from shapely.affinity import translate
 
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, outlines, parts
-from sensorgen.scene.scene import SLIVER_MM, Body, Outline, Point, Scene, rectangle
+from sensorgen.scene.scene import SLIVER_MM, Body, Point, Scene, rectangle
 from sensorgen.scene.sections import Section
 from sensorgen.scene.unit_cell import Band, Slice, cell, mirrored
 
@@ -61,7 +61,18 @@ def _period(layers: Sequence[LayerRegions], conducting: set[str], size_mm: Seque
     end, wide = size_mm[axis], size_mm[1 - axis]
     patterned = [layer for layer in layers if layer.along != "xy"[axis]]
     if all(layer.along for layer in patterned):
-        piece = mirrored(_level(patterned, axis, end, wide)).slices
+        # The pattern of strips as slices of one level band each, named by all that stands there
+        regions = list({region for layer in patterned for region in layer.regions.values()})
+        places = np.unique(np.append(shapely.get_coordinates(regions)[:, axis], [0.0, end]))
+        places = places[np.append(True, np.diff(places) > SLIVER_MM)]
+        middles = (places[:-1] + places[1:]) / 2
+        x, y = (middles, wide / 2) if axis == 0 else (wide / 2, middles)
+        looks = np.array([shapely.contains_xy(region, x, y) for region in regions], dtype=bool)
+        bands = [
+            (Band(look.tobytes().hex(), "", (0.0, 0.0), (1.0, 1.0)),) for look in looks.T.reshape(len(middles), -1)
+        ]
+        strips = [Slice(a, b, band) for (a, b), band in zip(pairwise(places.tolist()), bands, strict=True)]
+        piece = mirrored(strips).slices
     else:
         piece = cell(_stacked(patterned, axis, end, wide), (len(patterned) + 1) * (wide + 1.0)).slices
     low, width = piece[0].left_mm, piece[-1].right_mm - piece[0].left_mm
@@ -80,18 +91,6 @@ def _period(layers: Sequence[LayerRegions], conducting: set[str], size_mm: Seque
     return start, start + 2 * width
 
 
-def _level(layers: Sequence[LayerRegions], axis: int, end: float, wide: float) -> list[Slice]:
-    """The pattern of strips as slices of one level band each, named by all that stands there."""
-    regions = list({region for layer in layers for region in layer.regions.values()})
-    places = np.unique(np.append(shapely.get_coordinates(regions)[:, axis], [0.0, end]))
-    places = places[np.append(True, np.diff(places) > SLIVER_MM)]
-    middles = (places[:-1] + places[1:]) / 2
-    x, y = (middles, wide / 2) if axis == 0 else (wide / 2, middles)
-    looks = np.array([shapely.contains_xy(region, x, y) for region in regions], dtype=bool).T.reshape(len(middles), -1)
-    bands = [(Band(look.tobytes().hex(), "", (0.0, 0.0), (1.0, 1.0)),) for look in looks]
-    return [Slice(a, b, band) for (a, b), band in zip(pairwise(places.tolist()), bands, strict=True)]
-
-
 def _stacked(layers: Sequence[LayerRegions], axis: int, end: float, wide: float) -> Section:
     """Patterned layers beside each other as one section, whose mirrors are those of all of them."""
     looks = {tuple(layer.regions.items()): layer for layer in layers}
@@ -99,12 +98,9 @@ def _stacked(layers: Sequence[LayerRegions], axis: int, end: float, wide: float)
     for number, layer in enumerate(looks.values()):
         for name, region in layer.regions.items():
             body = Body(name, name, ())
-            regions += [(body, _shifted(outline, axis, 1.0 + number * (wide + 1.0))) for outline in outlines(region)]
+            up = 1.0 + number * (wide + 1.0)
+            regions += [(body, tuple((p[axis], p[1 - axis] + up) for p in o)) for o in outlines(region)]
     return Section("xy"[axis], wide, 0.0, tuple(regions))
-
-
-def _shifted(outline: Outline, axis: int, by_mm: float) -> Outline:
-    return tuple((p[axis], p[1 - axis] + by_mm) for p in outline)
 
 
 def cut(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:

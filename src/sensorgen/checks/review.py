@@ -80,10 +80,6 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "arachne") 
     if any(not f.waiver for f in misfit):  # a sensor that no bed holds may be too large to mesh, too
         step("checks")
         return Review({}, misfit)
-    return _full(design, step, walls)
-
-
-def _full(design: Design, step: Step, walls: str) -> Review:
     scene = design.printed
     step("meshes")
     made = _meshes(design)

@@ -81,16 +81,13 @@ def rows(
             area = made.region(body.name).area * made.height_mm
             volume = area if volumes_mm3 is None else volumes_mm3.get((number, body.name), 0.0)
             if max(exact, volume) > least:
-                found.append(_row(body.name, number + 1, meant, made, (exact, volume)))
+                plan = parts(meant.region(body.name))
+                lost, merged = _lost(plan, parts(made.region(body.name)))
+                x0, y0, x1, y1 = plan[lost[0] if lost else 0].bounds if plan else (0.0, 0.0, 0.0, 0.0)
+                place = (x0, (y0 + y1) / 2) if meant.along == "x" else ((x0 + x1) / 2, y0)
+                counts = len(plan), len(lost), merged
+                found.append(Row(body.name, number + 1, meant.bottom_mm, meant.top_mm, exact, volume, *counts, place))
     return found
-
-
-def _row(body: str, number: int, meant: LayerRegions, made: LayerRegions, volumes_mm3: tuple[float, float]) -> Row:
-    plan = parts(meant.region(body))
-    lost, merged = _lost(plan, parts(made.region(body)))
-    x0, y0, x1, y1 = plan[lost[0] if lost else 0].bounds if plan else (0.0, 0.0, 0.0, 0.0)
-    place = (x0, (y0 + y1) / 2) if meant.along == "x" else ((x0 + x1) / 2, y0)
-    return Row(body, number, meant.bottom_mm, meant.top_mm, *volumes_mm3, len(plan), len(lost), merged, place)
 
 
 def _drawn_mm3(body: Body, boundaries_mm: Sequence[float]) -> list[float]:

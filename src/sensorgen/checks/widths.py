@@ -108,31 +108,23 @@ def _by_band(
         here = [s for s in here if below is None or s.width_mm > below.upto_mm + TOUCH_MM]
         if band.severity == "error" and here:
             half = slices.layers.mids_mm[layer] - slices.layers.boundaries_mm[layer]
-            tapers = _tapers(here, [slices.near(body, layer, sign * _NEAR * half) for sign in (-1, 1)])
+            # Tips lose half of their width up to the layer's boundary, and so all of it up to the next sample.
+            width, middle, way = (np.array([getattr(s, k) for s in here]) for k in ("width_mm", "middle_mm", "way"))
+            reach = 0.75 * width[:, None] * way
+            lines = shapely.linestrings(np.stack([middle - reach, middle + reach], axis=1))
+            lengths = []
+            for sign in (-1, 1):
+                polygons = shapely.get_parts(slices.near(body, layer, sign * _NEAR * half))
+                line, part = shapely.STRtree(polygons).query(lines)
+                inside = shapely.length(shapely.intersection(lines[line], polygons[part]))
+                lengths.append(np.bincount(line, inside, len(lines)))
+            tapers: list[bool] = (abs(lengths[1] - lengths[0]) / 2 / _NEAR > 0.49 * width).tolist()
             tips = [s for s, ends in zip(here, tapers, strict=True) if ends]
             here = [s for s, ends in zip(here, tapers, strict=True) if not ends]
             if tips:
                 yield replace(band, severity="warning", noun="tip"), tips
         if here:
             yield replace(band, severity="warning") if band.severity == "error" and body.is_support() else band, here
-
-
-def _tapers(found: Sequence[Stretch], near: Sequence[Region]) -> list[bool]:
-    """Whether stretches lose half of their width up to the layer's boundary, and so all of it up to the next sample.
-
-    ``near`` are the regions a little below and above mid-height.
-    """
-    width, middle, way = (np.array([getattr(s, k) for s in found]) for k in ("width_mm", "middle_mm", "way"))
-    reach = 0.75 * width[:, None] * way
-    lines = shapely.linestrings(np.stack([middle - reach, middle + reach], axis=1))
-    lengths = []
-    for region in near:
-        polygons = shapely.get_parts(region)
-        line, part = shapely.STRtree(polygons).query(lines)
-        inside = shapely.length(shapely.intersection(lines[line], polygons[part]))
-        lengths.append(np.bincount(line, inside, len(lines)))
-    loss: list[bool] = (abs(lengths[1] - lengths[0]) / 2 / _NEAR > 0.49 * width).tolist()
-    return loss
 
 
 def _findings(rule: str, body: Body, found: Sequence[_Narrow]) -> Iterator[Finding]:
@@ -166,7 +158,12 @@ def stretches(region: Region, limit_mm: float, *, gaps: bool = False) -> list[St
         here = ~boxes | ((high - low).min(axis=1, initial=np.inf) <= far)
     if not here.any():
         return []
-    starts, ends = _edges(shapely.multipolygons(polygons[here]))
+    # Start and end of every edge, the region on its right
+    simple = shapely.normalize(shapely.simplify(shapely.multipolygons(polygons[here]), 0.0))
+    rings = shapely.get_rings(shapely.get_parts(simple))
+    corners, ring = shapely.get_coordinates(rings, return_index=True)
+    same = ring[1:] == ring[:-1]
+    starts, ends = corners[:-1][same], corners[1:][same]
     way = (ends - starts)[:, ::-1] * [1.0, -1.0]
     way /= np.hypot(*way.T)[:, None] * (-1.0 if gaps else 1.0)
     tree = shapely.STRtree(shapely.linestrings(np.stack([starts, ends], axis=1)))
@@ -183,14 +180,6 @@ def stretches(region: Region, limit_mm: float, *, gaps: bool = False) -> list[St
             if share == 0.5 or width not in known:
                 found.setdefault((width, *at), Stretch(width, (x, y), tuple(out)))
     return sorted(found.values(), key=lambda s: (s.width_mm, abs(s.way[1]), s.middle_mm))
-
-
-def _edges(region: Region) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Start and end of every edge, the region on its right."""
-    rings = shapely.get_rings(shapely.get_parts(shapely.normalize(shapely.simplify(region, 0.0))))
-    corners, ring = shapely.get_coordinates(rings, return_index=True)
-    same = ring[1:] == ring[:-1]
-    return corners[:-1][same], corners[1:][same]
 
 
 def _across(

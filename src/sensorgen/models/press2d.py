@@ -81,16 +81,13 @@ def press(
         coarser = replace(fineness, apex_mm=factor * fineness.apex_mm)
         again, other = _solved(cell, solids, stress_pa, boundary, coarser, told)
         if (again.converged_pa, -len(again.faults)) > (best.converged_pa, -len(best.faults)):
-            best, run = replace(again, doubts=(*again.doubts, _coarsened(first, again, coarser))), other
+            both = len(first.stress_pa)
+            apart = float(np.abs(again.displacement_m[1:both] / first.displacement_m[1:] - 1).max(initial=0.0))
+            known = f"displacement {apart:.1%} off up to {first.converged_pa / 1e3:.4g} kPa"
+            apex = f"triangles of {coarser.apex_mm * 1e3:.3g} um at the apex, because finer ones do not converge"
+            doubt = f"{apex}: {known if both > 1 else 'error not known'}"
+            best, run = replace(again, doubts=(*again.doubts, doubt)), other
     return _with_fields(best, cell, run, permittivity) if permittivity else best
-
-
-def _coarsened(first: Pressed, again: Pressed, coarser: Fineness) -> str:
-    """Error of coarser triangles at the apex, as far as the finer ones converged."""
-    both = len(first.stress_pa)
-    apart = float(np.abs(again.displacement_m[1:both] / first.displacement_m[1:] - 1).max(initial=0.0))
-    known = f"displacement {apart:.1%} off up to {first.converged_pa / 1e3:.4g} kPa" if both > 1 else "error not known"
-    return f"triangles of {coarser.apex_mm * 1e3:.3g} um at the apex, because finer ones do not converge: {known}"
 
 
 def _solved(

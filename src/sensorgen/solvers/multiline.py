@@ -66,20 +66,16 @@ def piece(line: Line, length_m: NDArray[np.float64]) -> Moving:
     length_m : array
         Length, with two axes of 1 at its end [m].
     """
-    halvings = _halvings(line, length_m)
-    made = _short(line, length_m * 0.5**halvings)
-    for _ in range(halvings):
-        made = _doubled(made)
-    return made
-
-
-def _halvings(line: Line, length_m: NDArray[np.float64]) -> int:
-    """How often to halve: the sum of R_kk |Y_kk| bounds every eigenvalue of R Y, whatever the units of each film."""
+    # How often to halve: the sum of R_kk |Y_kk| bounds every eigenvalue of R Y, whatever the units of each film
     rates = np.einsum("...kk,...kk->...", line.series, np.abs(line.shunt))
     size = float(np.max(rates.real * length_m[..., 0, 0] ** 2, initial=0.0))
     if not np.isfinite(size):
         raise OutOfRange("the stack's numbers are too extreme for double precision")
-    return max(0, int(np.ceil(np.log2(size / _SMALL) / 2))) if size > _SMALL else 0
+    halvings = max(0, int(np.ceil(np.log2(size / _SMALL) / 2))) if size > _SMALL else 0
+    made = _short(line, length_m * 0.5**halvings)
+    for _ in range(halvings):
+        made = _doubled(made)
+    return made
 
 
 def _short(line: Line, length_m: NDArray[np.float64]) -> Moving:

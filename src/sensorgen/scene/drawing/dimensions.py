@@ -63,22 +63,18 @@ def rows(frame: Frame, found: Sequence[Sequence[Measure]], start: float, step: f
         for u, z in sorted(_ends(row).items()):
             yield seen("thin", frame.x(u), frame.y(z), frame.x(u), y + beyond)
     for y, row in rows_at:
-        yield from _row(frame, row, y)
+        sizes = [width(number(m.value_mm)) for m in row]
+        middles = [frame.x((m.low_mm + m.high_mm) / 2) for m in row]
+        pitch = [0.0, *((a + b) / 2 + 0.8 for a, b in pairwise(sizes))]
+        for m, place in zip(row, spread(middles, pitch, frame.left, frame.right + 20), strict=True):
+            yield _distance((frame.x(m.low_mm), y), (frame.x(m.high_mm), y))
+            yield text("middle halo", place, y - 0.8, number(m.value_mm))
 
 
 def _fits(frame: Frame, row: Sequence[Measure]) -> bool:
     """Whether a row can be read: its values are no longer than itself."""
     length = sum(m.value_mm for m in row) * frame.per_mm
     return length >= NARROW if len(row) == 1 else sum(width(number(m.value_mm)) for m in row) < length
-
-
-def _row(frame: Frame, row: Sequence[Measure], y: float) -> Iterator[str]:
-    sizes = [width(number(m.value_mm)) for m in row]
-    middles = [frame.x((m.low_mm + m.high_mm) / 2) for m in row]
-    pitch = [0.0, *((a + b) / 2 + 0.8 for a, b in pairwise(sizes))]
-    for m, place in zip(row, spread(middles, pitch, frame.left, frame.right + 20), strict=True):
-        yield _distance((frame.x(m.low_mm), y), (frame.x(m.high_mm), y))
-        yield text("middle halo", place, y - 0.8, number(m.value_mm))
 
 
 def _distance(a: Point, b: Point) -> str:

@@ -63,7 +63,12 @@ def _grid(prisms: tuple[Prism, ...]) -> Mesh:
     for p in prisms:
         ends = (np.searchsorted(line, p.span(axis)) for line, axis in zip(lines, "xyz", strict=True))
         filled[tuple(slice(low, high) for low, high in ends)] = True
-    around = _surroundings(filled)
+    # Which of the eight cells around each grid point are filled, as bits x + 2 y + 4 z
+    padded = np.pad(filled, 1).astype(np.uint8)
+    around = np.zeros([n + 1 for n in filled.shape], np.uint8)
+    for bit, shift in enumerate(_CORNERS):
+        window = tuple(slice(s, s + n) for s, n in zip(shift, around.shape, strict=True))
+        around |= padded[window] << bit
     keys = np.concatenate([_faces(filled, around, axis, side) for axis in range(3) for side in (0, 1)])
     used = np.zeros(around.size * 4, bool)
     used[keys.ravel()] = True
@@ -73,16 +78,6 @@ def _grid(prisms: tuple[Prism, ...]) -> Mesh:
     vertices = np.stack([line[place] for line, place in zip(lines, places, strict=True)], 1)
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     return Mesh(vertices, triangles.astype(np.int32))
-
-
-def _surroundings(filled: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Which of the eight cells around each grid point are filled, as bits x + 2 y + 4 z."""
-    padded = np.pad(filled, 1).astype(np.uint8)
-    around = np.zeros([n + 1 for n in filled.shape], np.uint8)
-    for bit, shift in enumerate(_CORNERS):
-        window = tuple(slice(s, s + n) for s, n in zip(shift, around.shape, strict=True))
-        around |= padded[window] << bit
-    return around
 
 
 def _faces(filled: NDArray[np.bool_], around: NDArray[np.uint8], axis: int, side: int) -> Ints:

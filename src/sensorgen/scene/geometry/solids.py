@@ -132,7 +132,14 @@ def write_step(scene: Scene, colours: Mapping[str, str], title: str, path: Path)
         path.write_bytes(b"")  # says why it cannot, which the kernel does not
         # All faces are planes: curves in their parameters would say nothing new, in twice the time and the bytes.
         export_step(assembly, path, write_pcurves=False, timestamp=TIME_STAMP)
-        path.write_bytes(_settled(path.read_bytes(), [title, *(body.name for body in scene.bodies)]))
+        # What differs from run to run is made equal, and bodies get their real names.
+        step = path.read_bytes()
+        step = _PLACING.sub(rb"\1('\2','@\2@','',\3,\4,$)", step)
+        begin = step.find(_COLOURS)
+        begin, end = step.rfind(b"\n", 0, begin) + 1, step.rfind(b"ENDSEC;")
+        step = step[:begin] + _in_order(step[begin:end]) + step[end:]
+        names = [title, *(body.name for body in scene.bodies)]
+        path.write_bytes(_LABEL.sub(lambda match: _step_string(names[int(match[1])]), step))
     except OSError as error:
         raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
     except Exception as error:  # what the kernel throws while it translates
@@ -153,19 +160,6 @@ def _described(prism: Prism) -> str:
 def _label(number: int) -> str:
     """A name that the kernel's writer neither wraps nor garbles; ``_settled`` puts the real one in."""
     return f"@{number}@"
-
-
-def _settled(step: bytes, names: list[str]) -> bytes:
-    """The file with what differs from run to run made equal, and with the real names.
-
-    The kernel numbers placements on from the last file of the process, and writes colours in the order of addresses
-    in memory. Names it takes for Latin-1, and does not encode.
-    """
-    step = _PLACING.sub(rb"\1('\2','@\2@','',\3,\4,$)", step)
-    begin = step.find(_COLOURS)
-    begin, end = step.rfind(b"\n", 0, begin) + 1, step.rfind(b"ENDSEC;")
-    step = step[:begin] + _in_order(step[begin:end]) + step[end:]
-    return _LABEL.sub(lambda match: _step_string(names[int(match[1])]), step)
 
 
 def _in_order(colours: bytes) -> bytes:

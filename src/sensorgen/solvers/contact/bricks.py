@@ -74,8 +74,18 @@ def bricks_of(scene: Scene) -> Bricks:
             raise BadInput(f"{body.name} overlaps its neighbour")
         fill[here] = regions.index(Region(body.material, body.terminal))
     for axis in (0, 1):
-        planes[axis], owner = _cell(planes[axis], np.moveaxis(fill, axis, 0))
-        fill = fill.take(owner, axis)
+        # The smallest piece that mirrors at its ends continue to the whole
+        lines = planes[axis]
+        looks: dict[bytes, str] = {}
+        names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in np.moveaxis(fill, axis, 0)]
+        slices = [
+            Slice(a, b, (Band(n, "", (0.0, 0.0), (1.0, 1.0)),))
+            for (a, b), n in zip(pairwise(lines.tolist()), names, strict=True)
+        ]
+        found = mirrored(slices).slices
+        middles = [(s.left_mm + s.right_mm) / 2 for s in found]
+        planes[axis] = np.array([found[0].left_mm, *(s.right_mm for s in found)])
+        fill = fill.take(np.searchsorted(lines, middles) - 1, axis)
     x, y, z = (p * M_PER_MM for p in planes)
     return Bricks((x, y, z), fill, tuple(regions))
 
@@ -83,19 +93,6 @@ def bricks_of(scene: Scene) -> Bricks:
 def _planes(spans: list[tuple[float, float]]) -> Real:
     values = np.unique(np.array(spans))
     return np.asarray(values[np.concatenate([[True], np.diff(values) > _SAME_MM])])
-
-
-def _cell(planes: Real, fill: Whole) -> tuple[Real, Whole]:
-    """Planes of the smallest piece that mirrors at its ends continue to the whole, and from which slice each is."""
-    looks: dict[bytes, str] = {}
-    names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in fill]
-    slices = [
-        Slice(a, b, (Band(n, "", (0.0, 0.0), (1.0, 1.0)),))
-        for (a, b), n in zip(pairwise(planes.tolist()), names, strict=True)
-    ]
-    found = mirrored(slices).slices
-    middles = [(s.left_mm + s.right_mm) / 2 for s in found]
-    return np.array([found[0].left_mm, *(s.right_mm for s in found)]), np.searchsorted(planes, middles) - 1
 
 
 def _cut(planes: Real, pieces: int, shrink: float) -> tuple[Real, Whole]:

@@ -156,13 +156,7 @@ class Faces:
     def project(self, places_m: Real, penalty_pa: float, kept: Pairs | None = None) -> Pairs:
         """Find the partner of every point at given places of the nodes (n, d); those of ``kept`` stay as they are."""
         rays = self.rays(places_m)
-        made = [self._met(places_m, rays, penalty_pa), *self._mirrored(places_m, rays, penalty_pa)]
-        if kept is None:
-            return _joined(made)
-        return _joined([*(p.some(~np.isin(p.point, kept.point)) for p in made), kept])
-
-    def _met(self, places_m: Real, rays: Rays, penalty_pa: float) -> Pairs:
-        """Points whose partner is on another face."""
+        # Points whose partner is on another face
         faces = places_m[self.nodes]
         point, face, s, _ = hit(rays, faces, self._depth_m)
         own, at = np.divmod(point, len(self._at))
@@ -170,7 +164,11 @@ class Faces:
         nodes = np.concatenate([self.nodes[face], self.nodes[own]], axis=1)
         _, looks = on_faces(s, faces[face])
         slips = tuple(self._rows(weights, nodes, rays.tangents[point, k]) for k in range(self._ways))
-        return self._pairs(self._rows(weights, nodes, -looks), slips, point, 0, _PASS * penalty_pa)
+        met = self._pairs(self._rows(weights, nodes, -looks), slips, point, 0, _PASS * penalty_pa)
+        made = [met, *self._mirrored(places_m, rays, penalty_pa)]
+        if kept is None:
+            return _joined(made)
+        return _joined([*(p.some(~np.isin(p.point, kept.point)) for p in made), kept])
 
     def _mirrored(self, places_m: Real, rays: Rays, penalty_pa: float) -> Iterator[Pairs]:
         """Points that look at a mirror; its image slips as they do."""

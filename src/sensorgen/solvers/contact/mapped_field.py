@@ -76,10 +76,23 @@ class Field:
 
     def __post_init__(self) -> None:
         """Select the boxes that carry field, and number their unknowns."""
+        from scipy.ndimage import binary_dilation, label
+
         bricks = self.mesh.bricks
         of = [[k for k, r in enumerate(bricks.regions) if r.terminal == end] for end in ("bottom", "top")]
         ends = [np.isin(bricks.fill, regions) for regions in of]
-        self.carrying = _between(self.mesh, ends)
+        # Dielectric carries field in a piece that touches both electrodes
+        free = ~(ends[0] | ends[1])
+        numbers, _ = label(free)
+        touched = [np.unique(numbers[binary_dilation(end) & free]) for end in ends]
+        inside = np.isin(numbers, np.intersect1d(touched[0], touched[1])) & free
+        if not inside.any():
+            raise BadInput("no dielectric lies between a top and a bottom electrode")
+        if inside[:, :, [0, -1]].any():
+            raise BadInput("an electrode does not cover the whole cell")
+        if np.intersect1d(*(self.mesh.nodes[end[tuple(self.mesh.boxes.T)]] for end in ends)).size:
+            raise OutOfRange("the electrodes touch: the capacitance grows without bound")
+        self.carrying = np.asarray(inside[tuple(self.mesh.boxes.T)])
         # Legendre polynomials, of which the first on each face is a potential of 1/2
         kind, one = flux(self.orders.flux), np.zeros((6, (self.orders.flux + 1) ** 2))
         one[:, 0] = 2.0
@@ -180,23 +193,6 @@ class _System:
                 self._unknowns = x
                 return energy, apart * power
         return None
-
-
-def _between(mesh: BrickMesh, ends: list[Mask]) -> Mask:
-    """Which bricks carry field: dielectric in a piece that touches both electrodes."""
-    from scipy.ndimage import binary_dilation, label
-
-    free = ~(ends[0] | ends[1])
-    numbers, _ = label(free)
-    touched = [np.unique(numbers[binary_dilation(end) & free]) for end in ends]
-    inside = np.isin(numbers, np.intersect1d(touched[0], touched[1])) & free
-    if not inside.any():
-        raise BadInput("no dielectric lies between a top and a bottom electrode")
-    if inside[:, :, [0, -1]].any():
-        raise BadInput("an electrode does not cover the whole cell")
-    if np.intersect1d(*(mesh.nodes[end[tuple(mesh.boxes.T)]] for end in ends)).size:
-        raise OutOfRange("the electrodes touch: the capacitance grows without bound")
-    return np.asarray(inside[tuple(mesh.boxes.T)])
 
 
 def _system(boxes: Whole, ends: list[Mask], kind: Element, local: Local, order: int) -> _System:

@@ -58,7 +58,13 @@ def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float,
     ends = [np.isin(np.arange(len(mesh.points_m)), mesh.outer[terminal == end]) for end in ("bottom", "top")]
     if (ends[0] & ends[1]).any():
         raise OutOfRange("the electrodes touch: the capacitance grows without bound")
-    inside = _between(mesh.outer, terminal == "", ends)
+    # Dielectric carries field in a piece that touches both electrodes
+    dielectric = terminal == ""
+    middles = mesh.outer[dielectric, 3:]
+    beside = coo_matrix((np.ones(middles.size), (middles.ravel(), middles[:, [1, 2, 0]].ravel())), (len(ends[0]),) * 2)
+    _, piece = connected_components(beside)
+    touched = [np.unique(piece[middles[end[middles].any(axis=1), 0]]) for end in ends]
+    inside = np.flatnonzero(dielectric)[np.isin(piece[middles[:, 0]], np.intersect1d(touched[0], touched[1]))]
     eps = np.array([permittivity.get(r.material, np.nan) for r in cell.regions])[mesh.region[inside] - 1]
     x = mesh.points_m[:, 0]
     width = float(np.ptp(x))
@@ -135,15 +141,6 @@ def _filling(net: Net, number: int, wedge: Wedge) -> list[tuple[int, int, int]]:
     while ring[-1] != tip:
         ring.append(next(k for k in beside[ring[-1]] if k != ring[-2]))
     return filled(ring[:-1], points.tolist())
-
-
-def _between(triangles: Whole, dielectric: Mask, ends: list[Mask]) -> Whole:
-    """Numbers of the dielectric triangles in pieces that touch both electrodes; others carry no field."""
-    middles = triangles[dielectric, 3:]
-    beside = coo_matrix((np.ones(middles.size), (middles.ravel(), middles[:, [1, 2, 0]].ravel())), (len(ends[0]),) * 2)
-    _, piece = connected_components(beside)
-    touched = [np.unique(piece[middles[end[middles].any(axis=1), 0]]) for end in ends]
-    return np.flatnonzero(dielectric)[np.isin(piece[middles[:, 0]], np.intersect1d(touched[0], touched[1]))]
 
 
 def _energy(triangles: Whole, local: Real, zero: Mask, one: Mask) -> float:

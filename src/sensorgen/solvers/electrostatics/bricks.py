@@ -49,8 +49,26 @@ def grid(scene: Scene) -> Grid:
         A prism is no box, bodies overlap, the electrodes touch, or one does not cover the sensor.
     """
     cut = _cell(*_raster(scene))
-    _refuse_contact(cut.fill)
-    return _between(cut)
+    # Refuse electrodes that share a face, an edge or a corner
+    corners = []
+    for terminal in (0, 1):
+        full = np.pad(cut.fill == terminal, 1)
+        for axis in range(3):
+            full = full | np.roll(full, 1, axis)
+        corners.append(full)
+    if (corners[0] & corners[1]).any():
+        raise ValueError("the electrodes touch: the capacitance grows without bound")
+    # The grid with every dielectric outside the field turned to conductor; refuses an open field
+    inside = _reached(cut.fill, 0) & _reached(cut.fill, 1)
+    if not inside.any():
+        raise ValueError("no dielectric lies between a top and a bottom electrode")
+    if inside[:, :, [0, -1]].any():
+        raise ValueError("an electrode does not cover the whole sensor")
+    used = np.unique(cut.fill[inside])
+    number = np.full(len(cut.names), -1)
+    number[[0, 1, *used]] = np.arange(len(used) + 2)
+    fill = np.where(inside, number[cut.fill], np.where(cut.fill > 1, -1, cut.fill))
+    return Grid(cut.planes_mm, fill, ["@bottom", "@top", *(cut.names[k] for k in used)], cut.shares)
 
 
 def insulated(scene: Scene, axis: int) -> Grid:
@@ -121,32 +139,6 @@ def _slices(planes: NDArray[np.float64], fill: Ints) -> list[Slice]:
 
 def _edges(cell: Cell) -> NDArray[np.float64]:
     return np.array([cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)])
-
-
-def _refuse_contact(fill: Ints) -> None:
-    """Refuse electrodes that share a face, an edge or a corner."""
-    corners = []
-    for terminal in (0, 1):
-        full = np.pad(fill == terminal, 1)
-        for axis in range(3):
-            full = full | np.roll(full, 1, axis)
-        corners.append(full)
-    if (corners[0] & corners[1]).any():
-        raise ValueError("the electrodes touch: the capacitance grows without bound")
-
-
-def _between(cut: Grid) -> Grid:
-    """The grid with every dielectric outside the field turned to conductor; refuses an open field."""
-    inside = _reached(cut.fill, 0) & _reached(cut.fill, 1)
-    if not inside.any():
-        raise ValueError("no dielectric lies between a top and a bottom electrode")
-    if inside[:, :, [0, -1]].any():
-        raise ValueError("an electrode does not cover the whole sensor")
-    used = np.unique(cut.fill[inside])
-    number = np.full(len(cut.names), -1)
-    number[[0, 1, *used]] = np.arange(len(used) + 2)
-    fill = np.where(inside, number[cut.fill], np.where(cut.fill > 1, -1, cut.fill))
-    return Grid(cut.planes_mm, fill, ["@bottom", "@top", *(cut.names[k] for k in used)], cut.shares)
 
 
 def _reached(fill: Ints, terminal: int) -> NDArray[np.bool_]:

@@ -128,8 +128,14 @@ class Cone:
         for _ in range(doublings):
             ring, amid = _doubled(ring, m)
             between.append(amid)
-        matrix, innermost = _closed(ring, tip, m)
-        return cls(layout, matrix, in_ring, between, innermost, at_tip)
+        # A ring around the innermost triangles, without the unknowns amid them, and the matrix that gives those
+        inner, kept = slice(m, 2 * m), np.r_[:m, 2 * m : len(ring)]
+        mixed = ring[inner][:, kept]
+        mixed[:, m:] += tip[:m, m:]
+        innermost = -np.linalg.solve(ring[inner, inner] + tip[:m, :m], mixed)
+        both = ring[kept[:, None], kept]
+        both[m:, m:] += tip[m:, m:]
+        return cls(layout, both + mixed.T @ innermost, in_ring, between, innermost, at_tip)
 
     def inside(self, values: Numbers) -> tuple[Numbers, Numbers]:
         """Values in all rings' triangles (rings, s, 2, k) and in the innermost (s, k), from those ``matrix`` takes."""
@@ -167,14 +173,3 @@ def _doubled(ring: Numbers, m: int) -> tuple[Numbers, Numbers]:
     apart[outer, inner] = apart[inner, outer] = 0.0
     apart[held, held] *= 2
     return apart + mixed.T @ amid, amid
-
-
-def _closed(ring: Numbers, tip: Numbers, m: int) -> tuple[Numbers, Numbers]:
-    """A ring around the innermost triangles, without the unknowns amid them, and the matrix that gives those."""
-    inner, kept = slice(m, 2 * m), np.r_[:m, 2 * m : len(ring)]
-    mixed = ring[inner][:, kept]
-    mixed[:, m:] += tip[:m, m:]
-    amid = -np.linalg.solve(ring[inner, inner] + tip[:m, :m], mixed)
-    both = ring[kept[:, None], kept]
-    both[m:, m:] += tip[m:, m:]
-    return both + mixed.T @ amid, amid

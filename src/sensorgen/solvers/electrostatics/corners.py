@@ -9,7 +9,7 @@ from math import ceil, log
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.solvers.electrostatics.triangles import Edge, Fan, Triangle, Triangles, edges_of, fan, fans
+from sensorgen.solvers.electrostatics.triangles import Edge, Triangle, Triangles, edges_of, fan, fans
 
 _DEGREE = 8  # of the polynomials in a sector
 _WIDEST = np.pi / 3  # of a sector
@@ -40,22 +40,23 @@ def exponents(mesh: Triangles, permittivity: Mapping[str, float]) -> dict[int, f
     for corner, (around,) in fans(mesh.triangles).items():
         edges = [tuple(sorted((corner, around.spokes[k]))) for k in (0, -1)]
         ends = None if around.closed else tuple(edge in mesh.terminals for edge in edges)
-        value = exponent(_sectors(mesh, corner, around, permittivity), ends)
+        # Angle and permittivity of the triangles around a corner, in turn
+        away = mesh.points[[*around.spokes, *around.spokes[:1]]] - mesh.points[corner]
+        angles = np.arctan2(
+            away[:-1, 0] * away[1:, 1] - away[:-1, 1] * away[1:, 0], (away[:-1] * away[1:]).sum(axis=1)
+        ).tolist()
+        value = exponent(
+            _merged(
+                (angle, permittivity[mesh.regions[n][0]]) for angle, n in zip(angles, around.members, strict=False)
+            ),
+            ends,
+        )
         if value < _HIGHEST:
             found[corner] = value
     return found
 
 
 _Sectors = tuple[tuple[float, float], ...]
-
-
-def _sectors(mesh: Triangles, corner: int, fan: Fan, permittivity: Mapping[str, float]) -> _Sectors:
-    """Angle and permittivity of the triangles around a corner, in turn."""
-    away = mesh.points[[*fan.spokes, *fan.spokes[:1]]] - mesh.points[corner]
-    angles = np.arctan2(
-        away[:-1, 0] * away[1:, 1] - away[:-1, 1] * away[1:, 0], (away[:-1] * away[1:]).sum(axis=1)
-    ).tolist()
-    return _merged((angle, permittivity[mesh.regions[n][0]]) for angle, n in zip(angles, fan.members, strict=False))
 
 
 def _merged(sectors: Iterable[tuple[float, float]]) -> _Sectors:
@@ -156,7 +157,8 @@ class _Splitter:
             regions += [region] * len(new)
         terminals: dict[Edge, str] = {}
         for (a, b), name in self.mesh.terminals.items():
-            chain = [a, *self._chain(a, b), b]
+            # All points on an edge from one corner to the other, ends left out
+            chain = [a, *[*self._around(a, b)[::-1], *self._around(b, a)], b]
             terminals |= {(min(e), max(e)): name for e in pairwise(chain)}
         return Triangles(np.array(self.points), triangles, regions, terminals)
 
@@ -186,10 +188,6 @@ class _Splitter:
         """Points around a corner on its edge to another one, the outermost first."""
         edge = (min(corner, other), max(corner, other))
         return self.on_edge[edge][edge.index(corner)]
-
-    def _chain(self, a: int, b: int) -> list[int]:
-        """All points on an edge from one corner to the other, ends left out."""
-        return [*self._around(a, b)[::-1], *self._around(b, a)]
 
     def _parts(self, corners: Triangle) -> Iterator[Triangle]:
         hub: list[int] = []

@@ -49,7 +49,15 @@ def triangles(cell: Cell) -> Triangles:
         The electrodes touch, none lies opposite the other, or the field between them would leave the sensor.
     """
     points, found = _all(cell)
-    _refuse_contact(points, found)
+    top, bottom = (
+        {p for corners, (what, _) in found if what == f"@{end}" for p in corners} for end in ("top", "bottom")
+    )
+    places = sorted((*points[p], p in top) for p in top | bottom)
+    for (x, z, end), (at, above, other) in pairwise(places):
+        if x == at and above - z < _CONTACT_MM and end != other:
+            raise ValueError("the electrodes touch: the capacitance grows without bound")
+    if top & bottom:
+        raise ValueError("the electrodes touch: the capacitance grows without bound")
     mesh, owners, inside = _triangulated(points, found)
     _refuse_open(points, owners, inside, cell)
     return mesh
@@ -72,7 +80,19 @@ def _triangulated(points: NDArray[np.float64], found: "_Found") -> tuple[Triangl
     for number, (corners, _) in enumerate(found):
         for edge in edges_of(corners):
             owners[edge].append(number)
-    inside = _between(found, owners)
+    # The dielectric triangles whose field runs from one electrode to the other
+    beside: dict[int, list[int]] = defaultdict(list)
+    for pair in (sides for sides in owners.values() if len(sides) == 2):
+        beside[pair[0]].append(pair[1])
+        beside[pair[1]].append(pair[0])
+    left = {n for n, (_, (what, _)) in enumerate(found) if what and not what.startswith("@")}
+    inside: set[int] = set()
+    while left:
+        piece, ends = _piece(found, beside, left)
+        left -= piece
+        inside |= piece if len(ends) == 2 else set()
+    if not inside:
+        raise ValueError("no dielectric lies between a top and a bottom electrode")
     terminals = {}
     for edge, sides in owners.items():
         names = {found[n][1][0] for n in sides}
@@ -88,21 +108,17 @@ def apart(mesh: Triangles) -> Triangles:
     """The same, with a point for each of the pieces that only touch there: no field runs through a point."""
     for corner, found in fans(mesh.triangles).items():
         if len(found) > 1:
-            return apart(_parted(mesh, corner, found[1]))
+            # One of a corner's fans with a new point at the same place
+            new = len(mesh.points)
+            corners, terminals = list(mesh.triangles), dict(mesh.terminals)
+            for n in found[1].members:
+                a, b, c = (new if k == corner else k for k in corners[n])
+                corners[n] = (a, b, c)
+            for spoke in found[1].spokes:
+                if name := terminals.pop((min(corner, spoke), max(corner, spoke)), ""):
+                    terminals[spoke, new] = name
+            return apart(Triangles(np.vstack([mesh.points, mesh.points[corner]]), corners, mesh.regions, terminals))
     return mesh
-
-
-def _parted(mesh: Triangles, corner: int, fan: "Fan") -> Triangles:
-    """One of a corner's fans with a new point at the same place."""
-    new = len(mesh.points)
-    corners, terminals = list(mesh.triangles), dict(mesh.terminals)
-    for n in fan.members:
-        a, b, c = (new if k == corner else k for k in corners[n])
-        corners[n] = (a, b, c)
-    for spoke in fan.spokes:
-        if name := terminals.pop((min(corner, spoke), max(corner, spoke)), ""):
-            terminals[spoke, new] = name
-    return Triangles(np.vstack([mesh.points, mesh.points[corner]]), corners, mesh.regions, terminals)
 
 
 def edges_of(corners: Triangle) -> list[Edge]:
@@ -156,55 +172,23 @@ def fan(places: NDArray[np.float64], polygon: list[int]) -> Iterable[Triangle]:
         ring = todo.pop()
         if len(ring) < 3:
             continue
-        k = _apex(places[ring])
+        # The corner from which the edge from the last to the first looks widest, flat triangles apart
+        corners = places[ring]
+        to_first, to_last = corners[0] - corners[1:-1], corners[-1] - corners[1:-1]
+        cross = to_last[:, 0] * to_first[:, 1] - to_last[:, 1] * to_first[:, 0]
+        dot = (to_first * to_last).sum(1)
+        angle = np.arctan2(cross, dot)
+        size = np.hypot(*to_first.T) * np.hypot(*to_last.T)
+        angle[np.abs(cross) < _FLAT * size] = -1.0
+        k = int(angle.argmax()) + 1
         yield polygon[ring[0]], polygon[ring[k]], polygon[ring[-1]]
         todo += [ring[: k + 1], ring[k:]]
-
-
-def _apex(corners: NDArray[np.float64]) -> int:
-    """The corner from which the edge from the last to the first looks widest, flat triangles apart."""
-    to_first, to_last = corners[0] - corners[1:-1], corners[-1] - corners[1:-1]
-    cross = to_last[:, 0] * to_first[:, 1] - to_last[:, 1] * to_first[:, 0]
-    dot = (to_first * to_last).sum(1)
-    angle = np.arctan2(cross, dot)
-    size = np.hypot(*to_first.T) * np.hypot(*to_last.T)
-    angle[np.abs(cross) < _FLAT * size] = -1.0
-    return int(angle.argmax()) + 1
 
 
 _FLAT = 1e-12  # sine of the angle of three corners on a line
 
 
-def _refuse_contact(points: NDArray[np.float64], found: _Found) -> None:
-    top, bottom = (
-        {p for corners, (what, _) in found if what == f"@{end}" for p in corners} for end in ("top", "bottom")
-    )
-    places = sorted((*points[p], p in top) for p in top | bottom)
-    for (x, z, end), (at, above, other) in pairwise(places):
-        if x == at and above - z < _CONTACT_MM and end != other:
-            raise ValueError("the electrodes touch: the capacitance grows without bound")
-    if top & bottom:
-        raise ValueError("the electrodes touch: the capacitance grows without bound")
-
-
 _CONTACT_MM = 1e-7  # a gap below a tenth of a nanometre is contact
-
-
-def _between(found: _Found, owners: dict[Edge, list[int]]) -> set[int]:
-    """The dielectric triangles whose field runs from one electrode to the other."""
-    beside: dict[int, list[int]] = defaultdict(list)
-    for pair in (sides for sides in owners.values() if len(sides) == 2):
-        beside[pair[0]].append(pair[1])
-        beside[pair[1]].append(pair[0])
-    left = {n for n, (_, (what, _)) in enumerate(found) if what and not what.startswith("@")}
-    inside: set[int] = set()
-    while left:
-        piece, ends = _piece(found, beside, left)
-        left -= piece
-        inside |= piece if len(ends) == 2 else set()
-    if not inside:
-        raise ValueError("no dielectric lies between a top and a bottom electrode")
-    return inside
 
 
 def _piece(found: _Found, beside: dict[int, list[int]], left: set[int]) -> tuple[set[int], set[str]]:

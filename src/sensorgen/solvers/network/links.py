@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.solvers.network.nodes import Floats, Ints, Lines, Nodes, interleaved
 
@@ -254,7 +253,28 @@ class _Ends:
 
     def __init__(self, lines: Lines, pairs: tuple[Ints, Ints]) -> None:
         self.lines = lines
-        self.piece, self.side, self.wall, self.share, self.away, self.sine = _walls(lines, pairs)
+        # For each end of a piece the nearest line across it: piece, end (0 or 1), wall, share, distance [m] and sine
+        a, b = pairs
+        way, length = lines.direction(), lines.length_m()
+        jointed = (np.abs(a - b) == 1) & lines.joined[np.maximum(a, b)]
+        fits = (lines.layer[a] == lines.layer[b]) & ~jointed
+        a, b = a[fits], b[fits]
+        steep = np.abs(_dot(way[a], way[b])) < _PARALLEL
+        a, b = a[steep], b[steep]
+        mean, sine = (lines.width_m[a] + lines.width_m[b]) / 2, np.abs(_cross(way[a], way[b]))
+        found = []
+        for i, j in ((a, b), (b, a)):
+            for side, at in ((0, lines.start_m), (1, lines.end_m)):
+                gap = at[i] - lines.start_m[j]
+                foot, away = _dot(gap, way[j]), np.abs(_cross(way[j], gap))
+                touch = (foot >= 0) & (foot <= length[j]) & (away < 1.1 * mean) & (away > _STACKED * mean)
+                columns = i, np.full(len(i), side), j, foot / length[j], away, sine
+                found.append(np.stack([column[touch] for column in columns]))
+        every = np.concatenate(found, axis=1)
+        every = every[:, np.lexsort((every[4], every[1], every[0]))]
+        first = np.append(True, (np.diff(every[0]) != 0) | (np.diff(every[1]) != 0))[: every.shape[1]]
+        self.piece, self.side, self.wall = every[:3, first].astype(np.int64)
+        self.share, self.away, self.sine = every[3:, first]
         self.room = np.zeros((2, len(lines)))  # from a piece's start and end to the wall, along the piece [m]
         room = (self.away - lines.width_m[self.wall] / 2) / self.sine
         self.room[self.side, self.piece] = room
@@ -281,13 +301,9 @@ class _Ends:
         low = _reach((0.0, self.room[0, i]), (-np.minimum(start, end), self.room[np.where(back, 1, 0), j]), apart)
         high = _reach((length[i], self.room[1, i]), (np.maximum(start, end), self.room[np.where(back, 0, 1), j]), apart)
         bridge = lines.width_m[np.minimum(i + 1, len(lines) - 1)] / self.sines[1, i]
-        return -low, high - np.where(self._bridged(i, j), bridge, 0.0)
-
-    def _bridged(self, i: Ints, j: Ints) -> NDArray[np.bool_]:
-        """Whether one short piece joins the end of i with the start of j."""
-        joined = self.lines.joined
-        last = len(joined) - 1
-        return np.asarray((j == i + 2) & joined[np.minimum(i + 1, last)] & joined[np.minimum(i + 2, last)])
+        joined, last = self.lines.joined, len(lines) - 1
+        is_bridged = (j == i + 2) & joined[np.minimum(i + 1, last)] & joined[np.minimum(i + 2, last)]
+        return -low, high - np.where(is_bridged, bridge, 0.0)
 
 
 def _reach(one: tuple[float | Floats, Floats], other: tuple[float | Floats, Floats], apart: Floats) -> Floats:
@@ -300,36 +316,6 @@ def _reach(one: tuple[float | Floats, Floats], other: tuple[float | Floats, Floa
     shorter = np.where(np.less(a, b), a + room_a, b + room_b)
     one_wall = (room_a > 0) & (room_b > 0) & (np.abs(a - b) < apart)
     return np.where(one_wall, (a + room_a + b + room_b) / 2, shorter)
-
-
-def _walls(lines: Lines, pairs: tuple[Ints, Ints]) -> tuple[Ints, Ints, Ints, Floats, Floats, Floats]:
-    """For each end of a piece the nearest line across it: piece, end (0 or 1), wall, share, distance [m] and sine."""
-    a, b = pairs
-    way, length = lines.direction(), lines.length_m()
-    fits = (lines.layer[a] == lines.layer[b]) & ~_chained(lines, a, b)
-    a, b = a[fits], b[fits]
-    steep = np.abs(_dot(way[a], way[b])) < _PARALLEL
-    a, b = a[steep], b[steep]
-    mean, sine = (lines.width_m[a] + lines.width_m[b]) / 2, np.abs(_cross(way[a], way[b]))
-    found = []
-    for i, j in ((a, b), (b, a)):
-        for side, at in ((0, lines.start_m), (1, lines.end_m)):
-            gap = at[i] - lines.start_m[j]
-            foot, away = _dot(gap, way[j]), np.abs(_cross(way[j], gap))
-            touch = (foot >= 0) & (foot <= length[j]) & (away < 1.1 * mean) & (away > _STACKED * mean)
-            ends = i[touch], np.full(touch.sum(), side), j[touch], (foot / length[j])[touch], away[touch], sine[touch]
-            found.append(np.stack(ends))
-    every = np.concatenate(found, axis=1)
-    every = every[:, np.lexsort((every[4], every[1], every[0]))]
-    first = np.append(True, (np.diff(every[0]) != 0) | (np.diff(every[1]) != 0))[: every.shape[1]]
-    piece, side, wall, share, away, sine = every[:, first]
-    return piece.astype(np.int64), side.astype(np.int64), wall.astype(np.int64), share, away, sine
-
-
-def _chained(lines: Lines, i: Ints, j: Ints) -> NDArray[np.bool_]:
-    """Whether two pieces meet at a joint."""
-    high = np.maximum(i, j)
-    return np.asarray((np.abs(i - j) == 1) & lines.joined[high])
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

@@ -200,7 +200,11 @@ class Network:
         through the film is a case like any other: alpha is then infinite, or nothing for ports within one sheet.
         """
         y = admittance_s[self.film]
-        border = self._gather(y, self.film)
+        a, b = self.ends[:, self.film]
+        border = np.zeros(len(self.drive) + 1, complex)  # the last takes what belongs to a reference
+        np.add.at(border, a, y)
+        np.add.at(border, b, -y)
+        border = border[:-1]
         solved = self._inverse(admittance_s, np.column_stack([self.drive, border]))
         w, h = solved[:, :-1], solved[:, -1]
         through = self.crossing - border @ w
@@ -211,22 +215,11 @@ class Network:
         else:
             alpha = through / total
             z = np.outer(alpha, through) + self.drive.T @ w
-        along = self._differences(w - np.outer(h, alpha))
+        potentials = w - np.outer(h, alpha)
+        padded = np.vstack([potentials, np.zeros((1, potentials.shape[1]))])
+        along = np.asarray(padded[self.ends[0]] - padded[self.ends[1]])
         along[self.film] += alpha
         return z, along
-
-    def _gather(self, y: Complex, part: slice) -> Complex:
-        """Sum over the film's links at their top, minus that at their bottom, per unknown."""
-        a, b = self.ends[:, part]
-        size = len(self.drive)
-        found = np.zeros(size + 1, complex)  # the last takes what belongs to a reference
-        np.add.at(found, a, y)
-        np.add.at(found, b, -y)
-        return found[:size]
-
-    def _differences(self, potentials: Complex) -> Complex:
-        padded = np.vstack([potentials, np.zeros((1, potentials.shape[1]))])
-        return np.asarray(padded[self.ends[0]] - padded[self.ends[1]])
 
     def _inverse(self, admittance_s: Complex, right: Complex) -> Complex:
         if not len(right):
