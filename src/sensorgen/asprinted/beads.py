@@ -12,7 +12,7 @@ from sensorgen.core.errors import UnknownName
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.paths import Paths
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, parts
-from sensorgen.scene.scene import SLIVER_MM, Point, Scene
+from sensorgen.scene.scene import SLIVER_MM, Point
 
 CONVENTIONS = ("vol", "deposit", "stadium")
 FULL = 0.95  # a plate of which this share is filled has no holes but between rounded lines
@@ -148,24 +148,20 @@ def layers(
     """
     if convention not in CONVENTIONS:
         raise UnknownName("convention for a line's width", convention, CONVENTIONS)
-    scene = design.printed
-    plan = drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))
-    return [
-        _printed(layer, scene, lines.of(lines.layer == k), convention, electrode_wins=electrode_wins)
-        for k, layer in enumerate(plan)
-    ]
-
-
-def _printed(layer: LayerRegions, scene: Scene, lines: Beads, convention: str, *, electrode_wins: bool) -> LayerRegions:
-    cover = _strips if layer.along else _union
-    regions: dict[str, Region] = {}
-    for k in _order(scene, lines, electrode_wins=electrode_wins):
-        name = scene.bodies[k].name
-        filled = cover(lines.of(lines.body == k), layer, scene.size_mm, convention)
-        if layer.along and len(plan := parts(layer.region(name))) == 1:
-            filled = plan[0] if filled.area > FULL * scene.size_mm[0] * scene.size_mm[1] else filled
-        regions[name] = cleaned(shapely.difference(filled, shapely.union_all(list(regions.values()))))
-    return layer.mapped(regions)
+    scene, found = design.printed, []
+    for number, layer in enumerate(drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))):
+        here, cover = lines.of(lines.layer == number), _strips if layer.along else _union
+        bodies, regions = np.unique(here.body).tolist(), dict[str, Region]()
+        # As they are printed, tool by tool.
+        first = {k: here.number[here.tool == here.tool[here.body == k][0]].min() for k in bodies}
+        for k in sorted(bodies, key=lambda k: (electrode_wins and not scene.bodies[k].terminal, first[k], k)):
+            name = scene.bodies[k].name
+            filled = cover(here.of(here.body == k), layer, scene.size_mm, convention)
+            if layer.along and len(plan := parts(layer.region(name))) == 1:
+                filled = plan[0] if filled.area > FULL * scene.size_mm[0] * scene.size_mm[1] else filled
+            regions[name] = cleaned(shapely.difference(filled, shapely.union_all(list(regions.values()))))
+        found.append(layer.mapped(regions))
+    return found
 
 
 def _strips(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convention: str) -> Region:
@@ -209,21 +205,12 @@ def _union(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], conventi
     ways = shapely.linestrings(np.stack([lines.start_mm, lines.end_mm], axis=1))
     region = shapely.union_all(shapely.buffer(ways, lines.widths_mm(convention) / 2, quad_segs=4))
     if convention == "deposit":
-        region = shapely.union_all([_pushed(part, lines) for part in parts(region)])
+        wider = []
+        for part in parts(region):  # by what its lines overlap
+            inside = shapely.contains_xy(part, (lines.start_mm + lines.end_mm) / 2)
+            deposited = float((lines.volume_mm3[inside] / lines.height_mm[inside]).sum())
+            wider.append(part.buffer(max(deposited - part.area, 0.0) / part.length, join_style="mitre"))
+        region = shapely.union_all(wider)
     slit = ROUND * layer.height_mm
     closed = region.buffer(slit, join_style="mitre").buffer(-slit, join_style="mitre")
     return shapely.clip_by_rect(closed, 0.0, 0.0, size_mm[0], size_mm[1])
-
-
-def _pushed(part: Region, lines: Beads) -> Region:
-    """A connected part, wider by what its lines overlap."""
-    inside = shapely.contains_xy(part, (lines.start_mm + lines.end_mm) / 2)
-    deposited = float((lines.volume_mm3[inside] / lines.height_mm[inside]).sum())
-    return part.buffer(max(deposited - part.area, 0.0) / part.length, join_style="mitre")
-
-
-def _order(scene: Scene, lines: Beads, *, electrode_wins: bool) -> list[int]:
-    """The bodies of a layer as they are printed, tool by tool."""
-    here = np.unique(lines.body).tolist()
-    first = {k: lines.number[lines.tool == lines.tool[lines.body == k][0]].min() for k in here}
-    return sorted(here, key=lambda k: (electrode_wins and not scene.bodies[k].terminal, first[k], k))

@@ -106,24 +106,18 @@ def _stacked(layers: Sequence[LayerRegions], axis: int, end: float, wide: float)
 def cut(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:
     """The part of some layers within a window, moved to the origin, with edges that rounding parted made one [mm]."""
     (x0, x1), (y0, y1) = to.x_mm, to.y_mm
-    found = [
-        layer.mapped(
-            {n: translate(shapely.clip_by_rect(r, x0, y0, x1, y1), -x0, -y0) for n, r in layer.regions.items()}
-        )
-        for layer in layers
-    ]
-    strips = [region for layer in found if layer.along for region in layer.regions.values()]
-    edges = shapely.get_coordinates(strips)
-    places = [_snapped(edges[:, axis], side) for axis, side in enumerate(to.sides_mm())]
+    found = []
+    for layer in layers:
+        inside = {n: translate(shapely.clip_by_rect(r, x0, y0, x1, y1), -x0, -y0) for n, r in layer.regions.items()}
+        found.append(layer.mapped(inside))
+    drawn = shapely.get_coordinates([region for layer in found if layer.along for region in layer.regions.values()])
+    places = []  # edges, rising, and where each goes: to the middle of those that rounding parted, or to the side
+    for axis, side in enumerate(to.sides_mm()):
+        edges = np.unique(np.append(drawn[:, axis], [0.0, side]))
+        groups = np.split(edges, np.flatnonzero(np.diff(edges) >= ROUNDED_MM) + 1)
+        middles = [np.full(len(g), round(float(g.mean()), 6)) for g in groups[1:-1]]
+        places.append((edges, np.concatenate([0.0 * groups[0], *middles, 0.0 * groups[-1] + side])))
     return [layer.mapped({n: _moved(r, places, layer.along) for n, r in layer.regions.items()}) for layer in found]
-
-
-def _snapped(edges: Floats, side: float) -> tuple[Floats, Floats]:
-    """Edges, rising, and where each goes: to the middle of those that rounding parted, or to the window's side."""
-    edges = np.unique(np.append(edges, [0.0, side]))
-    groups = np.split(edges, np.flatnonzero(np.diff(edges) >= ROUNDED_MM) + 1)
-    middles = [np.full(len(g), round(float(g.mean()), 6)) for g in groups[1:-1]]
-    return edges, np.concatenate([0.0 * groups[0], *middles, 0.0 * groups[-1] + side])
 
 
 def _moved(region: Region, places: list[tuple[Floats, Floats]], along: str) -> Region:
@@ -147,14 +141,12 @@ def evened(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:
     For crossed strips, whose lopsided cell would take sixteen times the bricks. Widths stay; a strip that is printed a
     little aside moves to its place, which changes the field in second order.
     """
-    sides = np.array([*to.sides_mm(), *to.sides_mm()])
-    return [
-        layer.mapped({n: _evened(r, sides) for n, r in layer.regions.items()}) if layer.along else layer
-        for layer in layers
-    ]
-
-
-def _evened(region: Region, sides: Floats) -> Region:
-    bounds = shapely.bounds(parts(region))
-    mirrored = (sides - bounds)[::-1][:, [2, 3, 0, 1]]
-    return shapely.union_all(shapely.box(*((bounds + mirrored) / 2).round(6).T))
+    sides, found = np.array([*to.sides_mm(), *to.sides_mm()]), []
+    for layer in layers:
+        regions = dict(layer.regions)
+        for name, region in regions.items() if layer.along else ():
+            bounds = shapely.bounds(parts(region))
+            mirrored = (sides - bounds)[::-1][:, [2, 3, 0, 1]]
+            regions[name] = shapely.union_all(shapely.box(*((bounds + mirrored) / 2).round(6).T))
+        found.append(layer.mapped(regions))
+    return found

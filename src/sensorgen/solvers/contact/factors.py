@@ -157,8 +157,16 @@ def factored(matrix: csr_matrix, order: Order) -> Factors | None:
     rests: dict[int, Real] = {}
     parts: list[tuple[Real, Real]] = []
     for number, front in enumerate(order.fronts):
-        whole = _gathered(turned, front, [(order.fronts[c].outer, rests.pop(c)) for c in front.children])
         n = front.stop - front.start
+        whole = np.zeros((n + len(front.outer),) * 2)  # its own entries, and what its children leave
+        low, high = turned.indptr[front.start], turned.indptr[front.stop]
+        rows = np.repeat(np.arange(n), np.diff(turned.indptr[front.start : front.stop + 1]))
+        columns = turned.indices[low:high]
+        later = columns >= front.start
+        whole[rows[later], front.local(columns[later])] = turned.data[low:high][later]
+        for child in front.children:
+            at = front.local(order.fronts[child].outer)
+            whole[np.ix_(at, at)] += rests.pop(child)
         lower, failed = lapack.dpotrf(whole[:n, :n], lower=True, clean=True)
         if failed:
             return None
@@ -167,22 +175,6 @@ def factored(matrix: csr_matrix, order: Order) -> Factors | None:
         parts.append((inverse, coupling))
         rests[number] = whole[n:, n:] - coupling.T @ coupling
     return Factors(order, parts)
-
-
-def _gathered(turned: csr_matrix, front: Front, rests: list[tuple[Whole, Real]]) -> Real:
-    """A front with its own entries and what its children leave."""
-    n = front.stop - front.start
-    found = np.zeros((n + len(front.outer),) * 2)
-    low, high = turned.indptr[front.start], turned.indptr[front.stop]
-    rows = np.repeat(np.arange(n), np.diff(turned.indptr[front.start : front.stop + 1]))
-    columns = turned.indices[low:high]
-    later = columns >= front.start
-    here = front.local(columns[later])
-    found[rows[later], here] = turned.data[low:high][later]
-    for numbers, rest in rests:
-        at = front.local(numbers)
-        found[np.ix_(at, at)] += rest
-    return found
 
 
 @dataclass

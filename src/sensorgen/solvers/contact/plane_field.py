@@ -95,7 +95,15 @@ def _meshed(cell: Cell, coarse_mm: float, growth: float) -> Mesh:
     net = triangulated(cut, coarse_mm, growth, quick=True)
     new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
     corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])
-    _refuse_holes(edges, net.points_m[corners])
+    # Compare the area within the edges with that of the triangles (m, 3, 2), none of which may be turned over
+    placed = net.points_m[corners]
+    drawn = sum(
+        0.5 * (a[0] * b[1] - a[1] * b[0]) * ((left > 0) - (right > 0)) for (a, b), (left, right) in edges.items()
+    )
+    u, v = placed[:, 1] - placed[:, 0], placed[:, 2] - placed[:, 0]
+    parts = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / M_PER_MM**2
+    if parts.min() <= 0 or abs(parts.sum() / drawn - 1) > _HOLE:
+        raise Unmeshed("the mesh has holes or folds")
     region = np.concatenate([net.region, np.full(len(new), cell.air)])
     tips = [nearest(net.points_m, place) for place in rings.corners(edges, cell.left_mm, cell.right_mm)]
     return of_triangles(*rings.ringed(net.points_m, corners, region, tips, _RINGS))
@@ -116,17 +124,6 @@ def _side(a: Real, b: Real, p: Real) -> Real:
     turn = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
     size = np.abs(u[..., 0] * v[..., 1]) + np.abs(u[..., 1] * v[..., 0])
     return np.asarray(np.where(np.abs(turn) > _ROUNDING * size, np.sign(turn), 0.0))
-
-
-def _refuse_holes(edges: Edges, corners: Real) -> None:
-    """Compare the area within the edges with that of the triangles (m, 3, 2), none of which may be turned over."""
-    area = sum(
-        0.5 * (a[0] * b[1] - a[1] * b[0]) * ((left > 0) - (right > 0)) for (a, b), (left, right) in edges.items()
-    )
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    parts = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / M_PER_MM**2
-    if parts.min() <= 0 or abs(parts.sum() / area - 1) > _HOLE:
-        raise Unmeshed("the mesh has holes or folds")
 
 
 def _filling(net: Net, number: int, wedge: Wedge) -> list[tuple[int, int, int]]:
