@@ -89,7 +89,7 @@ def potential(order: int) -> Element:
     shared, inside = ends.any(1), ~ends.any(1)
     lattice = np.array([0, order, *range(1, order)])  # both ends, then the modes between them
     numbers = np.column_stack([lattice[places[shared]], np.zeros(shared.sum(), dtype=np.int64)])
-    whole = np.stack([_product([pair[int(a != axis)] for a in range(3)]) for axis in range(3)])
+    whole = np.stack([kron([pair[int(a != axis)] for a in range(3)]) for axis in range(3)])
     return Element(
         _three(whole[:, shared][:, :, shared]),
         _three(whole[:, inside][:, :, shared]),
@@ -100,7 +100,8 @@ def potential(order: int) -> Element:
     )
 
 
-def _product(factors: list[Array]) -> Array:
+def kron(factors: list[Array]) -> Array:
+    """Kronecker product of three matrices."""
     first, second, third = factors
     return np.kron(np.kron(first, second), third)
 
@@ -108,23 +109,34 @@ def _product(factors: list[Array]) -> Array:
 def _modes(order: int) -> tuple[Array, Array, Array]:
     """Stiffness and mass of two straight hats and of modes that vanish at both ends and diagonalise both; the modes."""
     at, weight = np.polynomial.legendre.leggauss(order + 1)
-    value = _values(order, at)
-    degree = np.arange(2, order + 1)
-    legendre = np.polynomial.legendre.legvander(at, order)
-    rising = legendre[:, degree - 1] * (2 * degree - 1) / np.sqrt(4 * degree - 2)
-    slope = np.column_stack([-0.5 + 0 * at, 0.5 + 0 * at, rising])
+    value, slope = hats(order, at)
     stiffness, mass = (v.T @ (weight[:, None] * v) for v in (slope, value))
     turn = np.eye(order + 1)
     turn[2:, 2:] = np.linalg.eigh(mass[2:, 2:]).eigenvectors  # the bubbles' stiffness is 1
     return turn.T @ stiffness @ turn, turn.T @ mass @ turn, turn
 
 
-def _values(order: int, at: Array) -> Array:
-    """Two straight hats, and bubbles of degree 2 and more, at some places."""
+def hats(order: int, at: Array) -> tuple[Array, Array]:
+    """Two straight hats, and bubbles of degree 2 and more (integrated Legendre), at some places; their slopes."""
     legendre = np.polynomial.legendre.legvander(at, order)
     degree = np.arange(2, order + 1)
-    bubbles = (legendre[:, degree] - legendre[:, degree - 2]) / np.sqrt(4 * degree - 2)
-    return np.column_stack([(1 - at) / 2, (1 + at) / 2, bubbles])
+    norm = np.sqrt(4 * degree - 2)
+    bubbles = (legendre[:, degree] - legendre[:, degree - 2]) / norm
+    rising = legendre[:, degree - 1] * (2 * degree - 1) / norm
+    half = np.full_like(at, 0.5)
+    return np.column_stack([(1 - at) / 2, (1 + at) / 2, bubbles]), np.column_stack([-half, half, rising])
+
+
+def legendres(order: int, at: Array, weight: Array) -> tuple[Array, Array, Array]:
+    """Orthonormal Legendre polynomials up to ``order`` + 1 at points of a quadrature, and at -1 and 1.
+
+    Third, the moments of their slopes with those up to ``order``: the divergence of a flux of Raviart and Thomas.
+    """
+    norm = np.sqrt(np.arange(order + 2) + 0.5)
+    value = np.polynomial.legendre.legvander(at, order + 1) * norm
+    ends = np.polynomial.legendre.legvander(np.array([-1.0, 1.0]), order + 1) * norm
+    slope = np.polynomial.legendre.legval(at, np.polynomial.legendre.legder(np.diag(norm))).T
+    return value, ends, value[:, :-1].T @ (weight[:, None] * slope)
 
 
 @cache
@@ -164,7 +176,7 @@ def traces(order: int, flux_order: int) -> Array:
         unknowns, their product is the integral of the potential's gradient along the flux.
     """
     at, weight = np.polynomial.legendre.leggauss(order + flux_order + 2)
-    modes = _values(order, at) @ _modes(order)[2]
+    modes = hats(order, at)[0] @ _modes(order)[2]
     _, _, _, turn = _worked_out(flux_order)
     n = flux_order + 1
     legendre = np.polynomial.legendre.legvander(at, flux_order) * np.sqrt(np.arange(n) + 0.5)
@@ -185,12 +197,7 @@ def _worked_out(order: int) -> tuple[Array, Array, Array, Array]:
 
     Returns the ends' matrix, that between modes and ends, the modes' energies, and the modes (orthonormal Legendre).
     """
-    at, weight = np.polynomial.legendre.leggauss(order + 2)
-    norm = np.sqrt(np.arange(order + 2) + 0.5)
-    value = np.polynomial.legendre.legvander(at, order + 1) * norm
-    ends = np.polynomial.legendre.legvander(np.array([-1.0, 1.0]), order + 1) * norm
-    slope = np.polynomial.legendre.legval(at, np.polynomial.legendre.legder(np.diag(norm))).T
-    divergence = value[:, :-1].T @ (weight[:, None] * slope)
+    _, ends, divergence = legendres(order, *np.polynomial.legendre.leggauss(order + 2))
     squares, turn = np.linalg.eigh(divergence @ divergence.T)
     drive = np.array([[-1.0], [1.0]]) * ends
     return drive @ drive.T, -turn.T @ divergence @ drive.T, squares, turn
