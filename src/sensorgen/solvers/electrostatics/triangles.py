@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.scene.sections import ROUNDING_MM
-from sensorgen.scene.unit_cell import Cell, Slice
+from sensorgen.scene.unit_cell import Cell
 
 Edge = tuple[int, int]
 Triangle = tuple[int, int, int]
@@ -133,32 +133,26 @@ _Found = list[tuple[Triangle, tuple[str, float]]]
 def _all(cell: Cell) -> tuple[NDArray[np.float64], _Found]:
     """All triangles of a cell, those of electrodes with "@top" or "@bottom" for a material."""
     ends = [cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)]
-    levels = [_levels(cell.slices, k) for k in range(len(ends))]
+    levels = []  # heights at which anything meets the line between slice k - 1 and slice k
+    for k in range(len(ends)):
+        sides = zip(cell.slices[max(k - 1, 0) : k + 1], (1, 0) if k else (0,), strict=False)
+        heights = sorted(z for s, side in sides for b in s.bands for z in (b.bottom_mm[side], b.top_mm[side]))
+        levels.append([z for n, z in enumerate(heights) if n == 0 or z - heights[n - 1] > ROUNDING_MM])
     first = np.concatenate([[0], np.cumsum([len(z) for z in levels])])
     points = np.array([(x, z) for x, heights in zip(ends, levels, strict=True) for z in heights])
     found: _Found = []
     for k, (here, share) in enumerate(zip(cell.slices, cell.shares, strict=True)):
         for band in here.bands:
-            left, right = (
-                [int(first[k + side]) + n for n in _between_levels(levels[k + side], *ends)]
-                for side, ends in enumerate(zip(band.bottom_mm, band.top_mm, strict=True))
-            )
+            taken = []  # levels from the band's lower to its upper line, at its left and right side
+            for side, lines in enumerate(zip(band.bottom_mm, band.top_mm, strict=True)):
+                low, high = lines[0] - 2 * ROUNDING_MM, lines[1] + 2 * ROUNDING_MM
+                within = range(bisect_left(levels[k + side], low), bisect_left(levels[k + side], high))
+                taken.append([int(first[k + side]) + n for n in within])
+            left, right = taken
             region = (f"@{band.terminal}" if band.terminal else band.material, share)
             polygon = [*left[::-1], *right]
             found += [(corners, region) for corners in fan(points[polygon], polygon)]
     return points, found
-
-
-def _levels(slices: tuple[Slice, ...], k: int) -> list[float]:
-    """Heights at which anything meets the line between slice k - 1 and slice k [mm]."""
-    sides = [(s, side) for s, side in zip(slices[max(k - 1, 0) : k + 1], (1, 0) if k else (0,), strict=False)]
-    heights = sorted(z for s, side in sides for b in s.bands for z in (b.bottom_mm[side], b.top_mm[side]))
-    return [z for n, z in enumerate(heights) if n == 0 or z - heights[n - 1] > ROUNDING_MM]
-
-
-def _between_levels(levels: list[float], low: float, high: float) -> range:
-    """Which of the levels a band takes in, from its lower to its upper line."""
-    return range(bisect_left(levels, low - 2 * ROUNDING_MM), bisect_left(levels, high + 2 * ROUNDING_MM))
 
 
 def fan(places: NDArray[np.float64], polygon: list[int]) -> Iterable[Triangle]:
@@ -309,20 +303,16 @@ def fans(triangles: Sequence[Triangle]) -> dict[int, list[Fan]]:
     around: dict[int, dict[int, tuple[int, int]]] = defaultdict(dict)
     for number, (a, b, c) in enumerate(triangles):
         around[a][b], around[b][c], around[c][a] = (number, c), (number, a), (number, b)
-    return {corner: _fans(by_first) for corner, by_first in around.items()}
-
-
-def _fans(by_first: dict[int, tuple[int, int]]) -> list[Fan]:
-    """From each triangle's first spoke, with its number and last spoke."""
-    lasts = {last for _, last in by_first.values()}
-    found = []
-    for start in [first for first in by_first if first not in lasts] or [next(iter(by_first))]:
-        fan, spoke = Fan([], []), start
-        while spoke in by_first and not (fan.spokes and spoke == start):
-            fan.spokes.append(spoke)
-            number, spoke = by_first[spoke]
-            fan.members.append(number)
-        if spoke != start:
-            fan.spokes.append(spoke)
-        found.append(fan)
+    found: dict[int, list[Fan]] = defaultdict(list)
+    for corner, by_first in around.items():  # from each triangle's first spoke to its number and last spoke
+        lasts = {last for _, last in by_first.values()}
+        for start in [first for first in by_first if first not in lasts] or [next(iter(by_first))]:
+            fan, spoke = Fan([], []), start
+            while spoke in by_first and not (fan.spokes and spoke == start):
+                fan.spokes.append(spoke)
+                number, spoke = by_first[spoke]
+                fan.members.append(number)
+            if spoke != start:
+                fan.spokes.append(spoke)
+            found[corner].append(fan)
     return found
