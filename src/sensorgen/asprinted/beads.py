@@ -8,6 +8,7 @@ import shapely
 from numpy.typing import NDArray
 
 from sensorgen.checks.estimate import ROUND
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import UnknownName
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.paths import Paths
@@ -18,8 +19,6 @@ CONVENTIONS = ("vol", "deposit", "stadium")
 FULL = 0.95  # a plate of which this share is filled has no holes but between rounded lines
 _CUTS = (-0.37, -0.2, 0.0, 0.17, 0.41)  # places of the cuts, in shares of a tenth of the sensor, from its middle
 _LEVEL_MM = 0.01  # a line belongs to a layer whose top it is this near
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,17 +39,17 @@ class Beads:
         Line of the file, from 1 [-].
     """
 
-    start_mm: Floats
-    end_mm: Floats
-    width_mm: Floats
-    height_mm: Floats
-    volume_mm3: Floats
-    layer: NDArray[np.int64]
-    body: NDArray[np.int64]
-    tool: NDArray[np.int64]
-    number: NDArray[np.int64]
+    start_mm: Real
+    end_mm: Real
+    width_mm: Real
+    height_mm: Real
+    volume_mm3: Real
+    layer: Whole
+    body: Whole
+    tool: Whole
+    number: Whole
 
-    def corners_mm(self, convention: str) -> Floats:
+    def corners_mm(self, convention: str) -> Real:
         """Each line as a rectangle in plan, (n, 4, 2): half a width longer at both ends, wide by a convention [mm]."""
         middle, way = (self.start_mm + self.end_mm) / 2, self.end_mm - self.start_mm
         length = np.hypot(*way.T)
@@ -59,11 +58,11 @@ class Beads:
         corners = (middle + along + aside, middle + along - aside, middle - along - aside, middle - along + aside)
         return np.stack(corners, axis=1)
 
-    def widths_mm(self, convention: str) -> Floats:
+    def widths_mm(self, convention: str) -> Real:
         """Width of each line by a convention [mm]."""
         return self.width_mm + ROUND * self.height_mm if convention == "stadium" else self.width_mm
 
-    def of(self, rows: NDArray[np.bool_]) -> "Beads":
+    def of(self, rows: Mask) -> "Beads":
         """The lines of a mask."""
         return Beads(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
@@ -111,7 +110,7 @@ def beads(design: Design, paths: Paths, centre_mm: Point | None = None) -> Beads
     return Beads(*(c[here] for c in columns))
 
 
-def _nearest(regions: Sequence[Region], places_mm: Floats) -> NDArray[np.intp]:
+def _nearest(regions: Sequence[Region], places_mm: Real) -> NDArray[np.intp]:
     """Which region is nearest to each place."""
     places = shapely.points(places_mm)
     found = [parts(region) for region in regions]
@@ -173,7 +172,7 @@ def _strips(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convent
     return shapely.multipolygons(shapely.box(low, 0.0, high, long) if axis == 0 else shapely.box(0.0, low, long, high))
 
 
-def _cut(lines: Beads, axis: int, at_mm: float, convention: str) -> Floats:
+def _cut(lines: Beads, axis: int, at_mm: float, convention: str) -> Real:
     """Runs along an axis, (n, 2), in which a line square to it meets the beads [mm]."""
     here = lines.corners_mm(convention)
     u, v = here[:, :, axis], here[:, :, 1 - axis] - at_mm
@@ -189,7 +188,7 @@ def _cut(lines: Beads, axis: int, at_mm: float, convention: str) -> Floats:
     return runs
 
 
-def _merged(runs: Floats) -> tuple[Floats, Floats]:
+def _merged(runs: Real) -> tuple[Real, Real]:
     """Union of runs, (n, 2), and the sum of the lengths of those in each [mm]."""
     runs = runs[runs[:, 0].argsort()]
     if not len(runs):

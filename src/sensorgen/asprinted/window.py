@@ -10,15 +10,14 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.affinity import translate
 
+from sensorgen.core.arrays import Real
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, outlines, parts
 from sensorgen.scene.scene import SLIVER_MM, Body, Point, Scene, rectangle
 from sensorgen.scene.sections import Section
 from sensorgen.scene.unit_cell import Band, Slice, cell, mirrored
 
-Floats = NDArray[np.float64]
 ROUNDED_MM = 2e-3  # edges nearer than this are one: G-code has three decimals
 
 
@@ -120,7 +119,7 @@ def cut(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:
     return [layer.mapped({n: _moved(r, places, layer.along) for n, r in layer.regions.items()}) for layer in found]
 
 
-def _moved(region: Region, places: list[tuple[Floats, Floats]], along: str) -> Region:
+def _moved(region: Region, places: list[tuple[Real, Real]], along: str) -> Region:
     """A region with its edges where they belong; slanted ones on a grid of the file's decimals."""
     if along:
         sides = zip(places * 2, shapely.bounds(parts(region)).T, strict=True)
@@ -129,7 +128,7 @@ def _moved(region: Region, places: list[tuple[Floats, Floats]], along: str) -> R
         return shapely.union_all(shapely.box(x0, y0, x1, y1)[wide])
     high = np.array([to[-1] for _, to in places])
 
-    def to_sides(at: Floats) -> Floats:
+    def to_sides(at: Real) -> Real:
         return np.where(at < ROUNDED_MM, 0.0, np.where(at > high - ROUNDED_MM, high, at))
 
     return cleaned(shapely.transform(shapely.set_precision(region, ROUNDED_MM / 2), to_sides))

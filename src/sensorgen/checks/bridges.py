@@ -6,17 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from sensorgen.checks.slices import TOUCH_MM, Slices
 from sensorgen.checks.widths import VANISHES
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.scene.layers import Region, cleaned, is_rectilinear
 from sensorgen.scene.scene import SLIVER_MM, Body
-
-Mask = NDArray[np.bool_]
-Lengths = NDArray[np.float64]
 
 
 class _Span(NamedTuple):
@@ -67,7 +64,7 @@ def _judged(
 
 def _grid(
     shape: Region, ground: Sequence[Region], step_mm: float, rectilinear: bool
-) -> tuple[tuple[Lengths, Lengths], Mask, Mask]:
+) -> tuple[tuple[Real, Real], Mask, Mask]:
     """Lines along x and y, and which cells between them the shape fills, and the ground.
 
     The lines are those of all edges; where some are slanted, lines a step apart.
@@ -99,7 +96,7 @@ def _spans(shape: Region, ground: Sequence[Region], least_mm: float) -> dict[str
     lines, filled, below = _grid(shape, ground, least_mm / 2, rectilinear)
     air = filled & ~below
 
-    def note(kind: str, lengths: Lengths, where: Mask) -> None:
+    def note(kind: str, lengths: Real, where: Mask) -> None:
         i, j = np.unravel_index(np.argmax(np.where(where, lengths, 0.0)), where.shape)
         if where[i, j] and lengths[i, j] > found[kind].mm:
             x, y = (float(line[k] + line[k + 1]) / 2 for line, k in zip(lines, (i, j), strict=True))
@@ -116,7 +113,7 @@ def _spans(shape: Region, ground: Sequence[Region], least_mm: float) -> dict[str
     return found
 
 
-def _best(filled: Mask, lines: tuple[Lengths, Lengths], air: Mask) -> tuple[NDArray[np.int64], Lengths, Lengths]:
+def _best(filled: Mask, lines: tuple[Real, Real], air: Mask) -> tuple[Whole, Real, Real]:
     """Best support of every unsupported place: number of ends, length, and its narrower stretch [mm]."""
     ways = [_held(filled, air, lines[0]), tuple(m.T for m in _held(filled.T, air.T, lines[1]))]
     ends, lengths = (np.stack([way[k] for way in ways]) for k in (0, 1))
@@ -125,7 +122,7 @@ def _best(filled: Mask, lines: tuple[Lengths, Lengths], air: Mask) -> tuple[NDAr
     return *(np.take_along_axis(m, best, 0)[0] for m in (ends, lengths)), lengths.min(axis=0)
 
 
-def _held(filled: Mask, air: Mask, line: Lengths) -> tuple[NDArray[np.int64], Lengths]:
+def _held(filled: Mask, air: Mask, line: Real) -> tuple[Whole, Real]:
     """Along the first axis: number of supported ends of each unsupported stretch, and its length [mm]."""
     ends = np.zeros(filled.shape, np.int64)
     lengths = np.zeros(filled.shape)

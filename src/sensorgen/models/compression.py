@@ -10,9 +10,9 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.core import yamlfile
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import MissingValue, OutOfRange
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ REACH = 3.0  # factor on its last stress up to which a curve is extrapolated by 
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _SAME = 1e-6  # relative difference up to which two parameters are one
 _EARLY = np.array([1 / 16, 1 / 4])  # of the first stress: knots of a curve that begins with a power of the stress
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

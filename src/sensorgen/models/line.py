@@ -10,17 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.solvers.line.inputs import (
-    HIGHEST_OHM,
-    Complex,
-    PressedLine,
-    check_fit,
-    far_load,
-    in_blocks,
-    passive,
-    read,
-)
+from sensorgen.solvers.line.inputs import HIGHEST_OHM, PressedLine, check_fit, far_load, in_blocks, passive, read
 from sensorgen.solvers.line.slopes import slopes
 from sensorgen.solvers.line.tanhc import tanhc
 

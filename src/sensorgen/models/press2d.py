@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Scene
@@ -32,8 +32,6 @@ _STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid
 _FIELD_GROWTH = 0.2  # of the triangles of the capacitance's mesh, per distance [-]
 _MISFIT = 1e-3  # of a solid's area: gaps that were closed in the wrong place change more [-]
 _COARSER = (3, 9)  # times the size of the triangles at an apex, where the finer ones do not converge [-]
-
-Real = NDArray[np.float64]
 
 
 def press(

@@ -6,8 +6,8 @@ Each column is free to bulge, independent of its neighbours, and carries load on
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.overlay import parts
@@ -18,8 +18,6 @@ COST = 0
 
 _PLACES = (np.arange(256) + 0.5) / 256  # in each column; evenly, because gaps close from one side
 _HALVINGS = 60  # of the interval that holds the displacement
-
-Real = NDArray[np.float64]
 
 
 def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Sequence[float]) -> Real:

@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.scene.scene import Body, Scene
 from sensorgen.scene.sections import ROUNDING_MM
 from sensorgen.scene.unit_cell import Band, Slice, mirrored
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -29,7 +27,7 @@ class Raster:
     """
 
     planes_mm: tuple[Real, Real, Real]
-    fill: NDArray[np.int64]
+    fill: Whole
     shares: Real
 
 
@@ -59,9 +57,9 @@ def raster(
     prisms = [(body, p) for body in scene.bodies for p in body.prisms]
     if not all(p.is_box() for _, p in prisms):
         raise ValueError("not all of it is boxes")
-    planes = []
-    for axis, ends in zip("xyz", outer_mm, strict=True):
-        edges = np.unique([*ends, *(x for _, p in prisms for x in p.span(axis))])
+    planes: list[Real] = []
+    for axis, outer in zip("xyz", outer_mm, strict=True):
+        edges = np.unique(np.array([*outer, *(x for _, p in prisms for x in p.span(axis))]))
         planes.append(edges[np.diff(edges, prepend=-np.inf) > ROUNDING_MM])
     fill = np.full([len(p) - 1 for p in planes], -1)
     for body, prism in prisms:
@@ -72,16 +70,16 @@ def raster(
         fill[here] = number(body)
     fill[fill < 0] = air
     shares = []
-    for axis in (0, 1):
+    for k in (0, 1):
         # What a walk along the axis meets: one level band, named by all that stands on this place.
         looks: dict[bytes, str] = {}
-        names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in np.moveaxis(fill, axis, 0)]
+        names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in np.moveaxis(fill, k, 0)]
         bands = [(Band(name, "", (0.0, 0.0), (1.0, 1.0)),) for name in names]
-        walk = [Slice(a, b, band) for (a, b), band in zip(pairwise(planes[axis].tolist()), bands, strict=True)]
+        walk = [Slice(a, b, band) for (a, b), band in zip(pairwise(planes[k].tolist()), bands, strict=True)]
         cell = mirrored(walk, evenly)
         middles = [(s.left_mm + s.right_mm) / 2 for s in cell.slices]
-        fill = fill.take(np.searchsorted(planes[axis], middles) - 1, axis)
-        planes[axis] = np.array([cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)])
-        shares.append(cell.shares)
+        fill = fill.take(np.searchsorted(planes[k], middles) - 1, k)
+        planes[k] = np.array([cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)])
+        shares.append(np.array(cell.shares))
     x, y, z = planes
-    return Raster((x, y, z), fill, np.outer(*shares))
+    return Raster((x, y, z), fill, np.outer(shares[0], shares[1]))

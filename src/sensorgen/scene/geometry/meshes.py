@@ -5,10 +5,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Mask, Whole
 from sensorgen.scene.geometry.mesh import Mesh
 from sensorgen.scene.scene import PLANE, Body, Outline, Prism
-
-Ints = NDArray[np.int64]
 
 
 def mesh(body: Body) -> Mesh:
@@ -47,7 +46,7 @@ def _prism(prism: Prism) -> Mesh:
     return Mesh(vertices, triangles.astype(np.int32))
 
 
-def _cap(outline: Outline) -> Ints:
+def _cap(outline: Outline) -> Whole:
     """Triangles of a flat outline, as indices of its corners."""
     if len(outline) == 3:
         return np.array([[0, 1, 2]])
@@ -80,7 +79,7 @@ def _grid(prisms: tuple[Prism, ...]) -> Mesh:
     return Mesh(vertices, triangles.astype(np.int32))
 
 
-def _faces(filled: NDArray[np.bool_], around: NDArray[np.uint8], axis: int, side: int) -> Ints:
+def _faces(filled: Mask, around: NDArray[np.uint8], axis: int, side: int) -> Whole:
     """Outer faces on one side of the filled cells: (n, 4) keys of corners, counter-clockwise from outside.
 
     A key is four times the number of the grid point, plus the number of the solid at that point: two
@@ -107,7 +106,7 @@ def _faces(filled: NDArray[np.bool_], around: NDArray[np.uint8], axis: int, side
 _CORNERS = [(x, y, z) for z, y, x in product((0, 1), repeat=3)]
 
 
-def _number_solids() -> NDArray[np.int64]:
+def _number_solids() -> Whole:
     """For each pattern of eight cells around a point: which of the solids there each cell belongs to.
 
     Cells that share a face are one solid; (256, 8), cells in the order of the bits.

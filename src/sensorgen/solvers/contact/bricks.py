@@ -5,17 +5,14 @@ from functools import cached_property
 from itertools import pairwise, product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.raster import raster
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.contact.cell import AIR, Region
 from sensorgen.solvers.contact.element import BRICK, BRICK_CORNERS, BRICK_INNER, BRICK_OUTER, ElementMesh
-
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -119,7 +116,7 @@ class BrickMesh(ElementMesh):
         return np.asarray(found)
 
 
-def mesh_of(bricks: Bricks, which: NDArray[np.bool_]) -> BrickMesh:
+def mesh_of(bricks: Bricks, which: Mask) -> BrickMesh:
     """Mesh some of the boxes of a cell."""
     boxes = np.argwhere(which)
     size = 2 * np.array(which.shape) + 1

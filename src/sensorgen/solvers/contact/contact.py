@@ -12,16 +12,12 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, vstack
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.solvers.contact.bricks import BrickMesh
 from sensorgen.solvers.contact.element import line_slopes, line_values
 from sensorgen.solvers.contact.mesh import Mesh, at_border
-
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 _STEEP = 0.3  # cosine of a face's slope, below which nothing rests on it [-]
 _PASS = 0.5  # share of the penalty that each of two faces brings [-]

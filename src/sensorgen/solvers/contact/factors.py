@@ -9,12 +9,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
 
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
+from sensorgen.core.arrays import Mask, Real, Whole
 
 _PIVOT = 1e-3  # share of its column below which a pivot of an indefinite matrix is exchanged [-]
 _LEAST = 60  # unknowns that are not halved any more
@@ -116,7 +114,7 @@ def _dissected(matrix: csr_matrix, places: Whole, block: Whole, pieces: list[tup
     return len(pieces) - 1
 
 
-def _cut(places: Whole) -> NDArray[np.bool_] | None:
+def _cut(places: Whole) -> Mask | None:
     """The lower part of a block cut across its longest side at the even place nearest to the middle; or None."""
     for axis in np.argsort(-np.ptp(places, axis=0), kind="stable"):
         here = places[:, axis]

@@ -13,9 +13,9 @@ from functools import cache
 from itertools import combinations_with_replacement, product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M
@@ -25,9 +25,6 @@ from sensorgen.solvers.contact.factors import Factors, factored, iterations, ord
 from sensorgen.solvers.electrostatics.boxes import Element, flux, hats, kron, legendres, potential
 from sensorgen.solvers.electrostatics.bricks import reached
 
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 Local = Callable[[Real, Real, int], tuple[Real, Real]]
 
 _ROUNDING = 1e-9

@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
@@ -21,11 +21,9 @@ from sensorgen.solvers.contact import rings
 from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Edge
 from sensorgen.solvers.contact.element import triangle_gradients
 from sensorgen.solvers.contact.factors import solved_by_lu
-from sensorgen.solvers.contact.mesh import Mesh, Net, Unmeshed, Whole, nearest, of_triangles, triangulated
+from sensorgen.solvers.contact.mesh import Mesh, Net, Unmeshed, nearest, of_triangles, triangulated
 from sensorgen.solvers.contact.wedge import Wedge, filled, wedges
 
-Real = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Edges = Mapping[Edge, tuple[int, int]]
 
 _ROUNDING = 1e-9

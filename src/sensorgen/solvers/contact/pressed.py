@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.solvers.contact.boundary import CHOICES, BoundaryConditions
@@ -24,7 +24,6 @@ DEEPEST = 0.3  # penetration over the side it happens on [-]
 _BALANCE = 0.01  # by which work and energy may differ [-]
 _LEVELS = 0.01  # by which two meshes may differ [-]
 
-Real = NDArray[np.float64]
 AnyMesh = TypeVar("AnyMesh", Mesh, "BrickMesh")
 
 

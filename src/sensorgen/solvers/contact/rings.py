@@ -4,13 +4,10 @@ from collections.abc import Mapping
 from math import atan2, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.scene.scene import Point
 from sensorgen.solvers.contact.cell import Cell, Edge
-
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 _SHARP = 0.3  # an outline that turns by less is no corner [rad]
 _RATIO = 0.5  # of a ring to the one around it [-]

@@ -19,12 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.core.bounds import Interval
 from sensorgen.solvers.electrostatics.bricks import Grid
 from sensorgen.solvers.electrostatics.elimination import HELD, Block, Solution, least
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -47,14 +45,14 @@ class Element:
         Places of the lattice from one element to the next.
     """
 
-    outer: tuple[Array, Array, Array]
-    coupling: tuple[Array, Array, Array]
-    inner: tuple[Array, Array, Array]
-    one: Array
-    numbers: Ints
+    outer: tuple[Real, Real, Real]
+    coupling: tuple[Real, Real, Real]
+    inner: tuple[Real, Real, Real]
+    one: Real
+    numbers: Whole
     pitch: int
 
-    def keys(self, boxes: Ints, count: Ints) -> Ints:
+    def keys(self, boxes: Whole, count: Whole) -> Whole:
         """Numbers of the shared unknowns of boxes, equal where boxes share them.
 
         Parameters
@@ -67,15 +65,15 @@ class Element:
         sizes = count * self.pitch + 1
         place = boxes[:, None, :] * self.pitch + self.numbers[None, :, :3]
         flat = (place[..., 0] * sizes[1] + place[..., 1]) * sizes[2] + place[..., 2]
-        found: Ints = flat * 3 + self.numbers[:, 3]
+        found: Whole = flat * 3 + self.numbers[:, 3]
         return found
 
-    def condensed(self, scale: Array) -> Array:
+    def condensed(self, scale: Real) -> Real:
         """Energy of the shared unknowns when those inside have found their best values, of a box of three scales."""
         shared, coupling, inner = (
             sum(s * g for s, g in zip(scale, of, strict=True)) for of in (self.outer, self.coupling, self.inner)
         )
-        found: Array = shared - coupling.T @ (coupling / inner[:, None])
+        found: Real = shared - coupling.T @ (coupling / inner[:, None])
         return found
 
 
@@ -100,13 +98,13 @@ def potential(order: int) -> Element:
     )
 
 
-def kron(factors: list[Array]) -> Array:
+def kron(factors: list[Real]) -> Real:
     """Kronecker product of three matrices."""
     first, second, third = factors
     return np.kron(np.kron(first, second), third)
 
 
-def _modes(order: int) -> tuple[Array, Array, Array]:
+def _modes(order: int) -> tuple[Real, Real, Real]:
     """Stiffness and mass of two straight hats and of modes that vanish at both ends and diagonalise both; the modes."""
     at, weight = np.polynomial.legendre.leggauss(order + 1)
     value, slope = hats(order, at)
@@ -116,7 +114,7 @@ def _modes(order: int) -> tuple[Array, Array, Array]:
     return turn.T @ stiffness @ turn, turn.T @ mass @ turn, turn
 
 
-def hats(order: int, at: Array) -> tuple[Array, Array]:
+def hats(order: int, at: Real) -> tuple[Real, Real]:
     """Two straight hats, and bubbles of degree 2 and more (integrated Legendre), at some places; their slopes."""
     legendre = np.polynomial.legendre.legvander(at, order)
     degree = np.arange(2, order + 1)
@@ -127,7 +125,7 @@ def hats(order: int, at: Array) -> tuple[Array, Array]:
     return np.column_stack([(1 - at) / 2, (1 + at) / 2, bubbles]), np.column_stack([-half, half, rising])
 
 
-def legendres(order: int, at: Array, weight: Array) -> tuple[Array, Array, Array]:
+def legendres(order: int, at: Real, weight: Real) -> tuple[Real, Real, Real]:
     """Orthonormal Legendre polynomials up to ``order`` + 1 at points of a quadrature, and at -1 and 1.
 
     Third, the moments of their slopes with those up to ``order``: the divergence of a flux of Raviart and Thomas.
@@ -161,7 +159,7 @@ def flux(order: int) -> Element:
 
 
 @cache
-def traces(order: int, flux_order: int) -> Array:
+def traces(order: int, flux_order: int) -> Real:
     """What fluxes feel of potentials: moments of :func:`potential` with the functions on the faces of :func:`flux`.
 
     Parameters
@@ -192,7 +190,7 @@ def traces(order: int, flux_order: int) -> Array:
     return found
 
 
-def _worked_out(order: int) -> tuple[Array, Array, Array, Array]:
+def _worked_out(order: int) -> tuple[Real, Real, Real, Real]:
     """In one dimension: energy of a flux driven by potentials at two ends and between them, in the latter's modes.
 
     Returns the ends' matrix, that between modes and ends, the modes' energies, and the modes (orthonormal Legendre).
@@ -203,12 +201,11 @@ def _worked_out(order: int) -> tuple[Array, Array, Array, Array]:
     return drive @ drive.T, -turn.T @ divergence @ drive.T, squares, turn
 
 
-def _three(found: NDArray[np.float64]) -> tuple[Array, Array, Array]:
+def _three(found: Real) -> tuple[Real, Real, Real]:
     return found[0], found[1], found[2]
 
 
 Matrix = NDArray[Any]
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -233,8 +230,8 @@ class Boxes:
         Forces on the unknowns, in place of a top at 1 V.
     """
 
-    places: Ints
-    ids: Ints
+    places: Whole
+    ids: Whole
     scale: Real
     eps: Matrix
     shares: Real

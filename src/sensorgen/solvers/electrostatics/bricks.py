@@ -5,16 +5,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.scene.raster import raster
 from sensorgen.scene.scene import Body, Scene
 from sensorgen.solvers.electrostatics.corners import exponent
 
 RATIO = 0.15  # of a layer's distance from an edge to the next layer's
 _INFINITE = 1 - 1e-6  # exponents of the potential below this: the field is infinite
-
-Ints = NDArray[np.int_]
 
 
 @dataclass(frozen=True)
@@ -33,10 +31,10 @@ class Grid:
         How often each place of the cell, or a mirror image, occurs in the sensor [-].
     """
 
-    planes_mm: tuple[NDArray[np.float64], ...]
-    fill: Ints
+    planes_mm: tuple[Real, ...]
+    fill: Whole
     names: list[str]
-    shares: NDArray[np.float64]
+    shares: Real
 
 
 def grid(scene: Scene) -> Grid:
@@ -101,7 +99,7 @@ def _cell(scene: Scene, evenly: bool = True) -> Grid:
     return Grid(found.planes_mm, found.fill, names, found.shares)
 
 
-def reached(fill: Ints, terminal: int) -> NDArray[np.bool_]:
+def reached(fill: Whole, terminal: int) -> Mask:
     """Dielectric boxes, 2 or more, that a walk through dielectric reaches from one electrode, 0 or 1."""
     found = fill == terminal
     allowed = found | (fill > 1)
@@ -161,7 +159,7 @@ def _wanted(around: list[int], values: Sequence[float], layers: int) -> int:
     return 0
 
 
-def _graded(planes: NDArray[np.float64], layers: list[int]) -> tuple[NDArray[np.float64], Ints]:
+def _graded(planes: Real, layers: list[int]) -> tuple[Real, Whole]:
     """Planes with layers between them, and from which interval each layer comes."""
     found, owners = [planes[0]], []
     for k, (a, b) in enumerate(pairwise(planes.tolist())):

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sensorgen.solvers.electrostatics.elimination import Numbers, Whole, added, eliminated
-from sensorgen.solvers.electrostatics.polynomials import Real, numbered
+from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.solvers.electrostatics.elimination import Numbers, added, eliminated
+from sensorgen.solvers.electrostatics.polynomials import numbered
 
 RATIO = 0.25  # of one ring's radius to the last; more lowers the error no further
 
@@ -72,7 +72,7 @@ class Layout:
         return cls(free, rim, outer, held, ring.reshape(shape), ring_signs.reshape(shape), tip, tip_signs)
 
 
-def _arranged(corners: Whole, spokes: int, levels: int, fixed: NDArray[np.bool_], order: int) -> tuple[Whole, Real]:
+def _arranged(corners: Whole, spokes: int, levels: int, fixed: Mask, order: int) -> tuple[Whole, Real]:
     """Unknowns of triangles, numbered from 1: by levels of so many points, then the held value, then all others."""
     points, after = np.arange(len(fixed)), np.roll(corners, -1, axis=1)
     ends = np.sort(np.stack([corners, after], axis=-1), axis=-1).reshape(-1, 2)

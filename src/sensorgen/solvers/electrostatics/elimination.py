@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Whole = NDArray[np.int64]
-Real = NDArray[np.float64]
+from sensorgen.core.arrays import Whole
+
 Numbers = NDArray[Any]  # real or complex
 
 HELD = 2  # unknowns 0 and 1 have the values 0 and 1

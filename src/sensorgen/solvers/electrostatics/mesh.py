@@ -11,7 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from sensorgen.solvers.electrostatics.elimination import HELD, Numbers, Whole
+from sensorgen.core.arrays import Whole
+from sensorgen.solvers.electrostatics.elimination import HELD, Numbers
 from sensorgen.solvers.electrostatics.triangles import Edge, Fan, Triangles, fans
 
 

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.solvers.electrostatics.cones import Cone, Layout, ring_corners
-from sensorgen.solvers.electrostatics.elimination import HELD, Block, Numbers, Whole, least
+from sensorgen.solvers.electrostatics.elimination import HELD, Block, Numbers, least
 from sensorgen.solvers.electrostatics.mesh import Cones, Flow
-from sensorgen.solvers.electrostatics.polynomials import Real, condensed, crossed, numbered
+from sensorgen.solvers.electrostatics.polynomials import condensed, crossed, numbered
 from sensorgen.solvers.electrostatics.triangles import Edge
 
 

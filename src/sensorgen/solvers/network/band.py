@@ -7,15 +7,13 @@ a current is wanted, no potential: forward elimination of two right-hand sides t
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 _WIDEST = 1500  # beyond, a sparse factor is quicker
 _STRETCH = 4096  # unknowns that are eliminated at once, or four times the band
 
@@ -23,11 +21,11 @@ _STRETCH = 4096  # unknowns that are eliminated at once, or four times the band
 class _Rest(NamedTuple):
     """What elimination leaves to the unknowns after a stretch: of their matrix, as a band, and of both right sides."""
 
-    band: Floats
-    sides: Floats
+    band: Real
+    sides: Real
 
 
-def product(matrix: "csr_array[np.float64]", one: Floats, other: Floats) -> float:
+def product(matrix: "csr_array[np.float64]", one: Real, other: Real) -> float:
     """``one . matrix^-1 . other``.
 
     Parameters
@@ -85,7 +83,7 @@ def product(matrix: "csr_array[np.float64]", one: Floats, other: Floats) -> floa
     return total
 
 
-def _eliminated(band: Floats, sides: Floats, rest: _Rest) -> tuple[float, _Rest]:
+def _eliminated(band: Real, sides: Real, rest: _Rest) -> tuple[float, _Rest]:
     """One stretch: its part of the product, and what it leaves."""
     from scipy.linalg import solve_triangular
     from scipy.linalg.lapack import dpbtrf, dtbtrs

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.solvers.sheet.parts import ROUNDING, Contact, Patch, Port, Sheet
 
-Real = NDArray[np.float64]
 GRADING = 3.0  # cells at a corner of a contact shrink with this power: above 2, potentials as sqrt(r) cost no order
 _TABLE = 4000  # points between which the grading is inverted; any monotone choice of lines will do
 

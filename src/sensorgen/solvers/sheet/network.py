@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.solvers.sheet.grid import Axis
 from sensorgen.solvers.sheet.parts import SIDES, Contact, Patch, Port, Sheet
 
-Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 BY = ("x_m", "y_m", "capacitance_factor", "top_resistance_factor", "bottom_resistance_factor")
@@ -47,7 +47,14 @@ def links(sheet: Sheet, axes: tuple[Axis, Axis], patch: Patch | None) -> Links:
     joined = np.array([np.concatenate([*ends[0], film]), np.concatenate([*ends[1], film + 1])])
 
     leak, capacitance, by_film = _film(sheet, axes, patch)
-    conductance, by_sheet = _sheets(sheet, axes, patch)
+    sides = enumerate(sheet.sheet_resistance_ohm)
+    ways = [(ohm, *_one_way(axes, along, patch, side)) for side, ohm in sides for along in range(2)]
+    # A perfect conductor's links do not matter.
+    conductance = np.concatenate([value / ohm if ohm else 0 * value for ohm, value, _ in ways])
+    by_sheet = {
+        name: np.concatenate([by.get(name, 0 * value) / ohm if ohm else 0 * value for ohm, value, by in ways])
+        for name in BY
+    }
     none, dead = np.zeros(len(film)), np.zeros(len(conductance))
     slopes = {
         name: np.array([np.append(by_sheet.get(name, dead), none), np.append(dead, by_film.get(name, none))])
@@ -118,20 +125,6 @@ def _folded(values: Real) -> Real:
     return found
 
 
-def _sheets(sheet: Sheet, axes: tuple[Axis, Axis], patch: Patch | None) -> tuple[Real, dict[str, Real]]:
-    """Conductance of the links in both sheets [S], and its derivatives; a perfect conductor's do not matter."""
-    found: list[Real] = []
-    slopes: dict[str, list[Real]] = {name: [] for name in BY}
-    for side, ohm in enumerate(sheet.sheet_resistance_ohm):
-        for along in range(2):
-            value, by = _one_way(axes, along, patch, side)
-            per_ohm = 1 / ohm if ohm else 0.0
-            found.append(value * per_ohm)
-            for name, parts in slopes.items():
-                parts.append(by[name] * per_ohm if name in by else np.zeros(len(value)))
-    return np.concatenate(found), {name: np.concatenate(parts) for name, parts in slopes.items()}
-
-
 def _one_way(axes: tuple[Axis, Axis], along: int, patch: Patch | None, side: int) -> tuple[Real, dict[str, Real]]:
     """Squares in parallel over squares in series, of the links along one axis, and its derivatives.
 
@@ -162,9 +155,6 @@ def _one_way(axes: tuple[Axis, Axis], along: int, patch: Patch | None, side: int
         f"{SIDES[side]}_resistance_factor": -width * length * series**2 * squares,
     }
     return turn((1 - width + width * series) * squares), {name: turn(value) for name, value in by.items()}
-
-
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.solvers.sheet.grid import axes, fold, folds
-from sensorgen.solvers.sheet.network import BY, Complex, links, network
+from sensorgen.solvers.sheet.network import BY, links, network
 from sensorgen.solvers.sheet.parts import SIDES, Contact, Patch, Port, Sheet, check, check_patch, contacts_of
 
 COARSEST, FINEST = 10, 320  # cells between which a resolution is looked for
@@ -73,7 +74,7 @@ def depth_m(sheet: Sheet, frequency_hz: float, patch: Patch | None = None) -> fl
     return float(1 / np.sqrt(abs(y) * ohm)) if abs(y) * ohm else float("inf")
 
 
-def frequencies(given: ArrayLike) -> NDArray[np.float64]:
+def frequencies(given: ArrayLike) -> Real:
     """Frequencies as an array [Hz], checked."""
     found = np.atleast_1d(np.asarray(given))
     if found.dtype.kind not in "iuf" or found.ndim != 1 or not found.size:
@@ -158,8 +159,6 @@ def _fine_enough(
     )
 
 
-Real = NDArray[np.float64]
-
 ACCURACY = 3e-2  # of the impedances behind a bound [-]
 SHALLOWEST = 1 / 20  # depth of the current over the longer side, under which places would take hours [-]
 _ROUNDING = 1e-11  # relative change of an impedance across the sheet [-] below which a derivative is only rounding
@@ -205,7 +204,16 @@ class Bounds:
         """
         chosen = self.information if tones is None else self.information[:, :, list(tones)]
         known = np.diag([0.0, *(1 / spread**2 for spread in self.guess_m)]) if outline else 0.0
-        return _standard_errors(chosen.sum(2) + known)
+        # Square roots of the diagonal of the inverse, inf for what a singular information leaves open.
+        information = chosen.sum(2) + known
+        own = np.sqrt(np.einsum("...aa->...a", information))
+        unit = np.where(own > 0, own, 1.0)
+        values, vectors = np.linalg.eigh(information / (unit[..., :, None] * unit[..., None, :]))
+        distinct = values > _SINGULAR
+        weight = np.where(distinct, 1 / np.where(distinct, values, 1.0), 0.0)
+        errors = np.sqrt(np.einsum("...ak,...k->...a", vectors**2, weight)) / unit
+        open_ = np.einsum("...ak,...k->...a", vectors**2, ~distinct) > _SINGULAR**0.5
+        return np.where(open_, np.inf, errors)
 
     def located(self) -> float:
         """Share of the places where both x and y are known twice as well as from a uniform distribution [-]."""
@@ -296,15 +304,3 @@ def bounds(
 
 def _moved(press: Patch, x_m: float, y_m: float) -> Patch:
     return replace(press, x_m=max(x_m, 0.0), y_m=max(y_m, 0.0))
-
-
-def _standard_errors(information: Real) -> Real:
-    """Square roots of the diagonal of the inverse; inf for what a singular information leaves open."""
-    own = np.sqrt(np.einsum("...aa->...a", information))
-    unit = np.where(own > 0, own, 1.0)
-    values, vectors = np.linalg.eigh(information / (unit[..., :, None] * unit[..., None, :]))
-    known = values > _SINGULAR
-    weight = np.where(known, 1 / np.where(known, values, 1.0), 0.0)
-    errors = np.sqrt(np.einsum("...ak,...k->...a", vectors**2, weight)) / unit
-    open_ = np.einsum("...ak,...k->...a", vectors**2, ~known) > _SINGULAR**0.5
-    return np.where(open_, np.inf, errors)
