@@ -1,6 +1,6 @@
 """Rule 7: printed against drawn volume of every body in every layer, and the parts that are lost or merged."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby, pairwise
 
@@ -129,28 +129,30 @@ def findings(found: Iterable[Row], scene: Scene) -> list[Finding]:
         The sensor on its bed.
     """
     outside = [row for row in found if row.exact_mm3 > 0 and not LOW <= row.ratio <= HIGH]
-    return [finding for body in scene.bodies for finding in _of_body(body, [r for r in outside if r.body == body.name])]
+    told = []
+    for body in scene.bodies:
+        numbered = list(enumerate(row for row in outside if row.body == body.name))
+        # One finding for neighbouring layers with the same fault.
+        alike = groupby(numbered, key=lambda pair: (pair[1].layer - pair[0], _fault(pair[1]), pair[1].ratio > 1))
+        told += [_finding(body, fault, [row for _, row in group]) for (_, fault, _), group in alike]
+    return told
 
 
-def _of_body(body: Body, outside: Sequence[Row]) -> Iterator[Finding]:
-    """One finding for neighbouring layers with the same fault."""
-    numbered = list(enumerate(outside))
-    for (_, fault, _), group in groupby(numbered, key=lambda p: (p[1].layer - p[0], _fault(p[1]), p[1].ratio > 1)):
-        here = [row for _, row in group]
-        first, last = here[0], here[-1]
-        severe = fault == "is not printed at all" and not body.is_support()
-        ratios = sorted({f"{row.ratio:.2f}" for row in here})
-        what = fault or f"prints {' to '.join(ratios[:: max(len(ratios) - 1, 1)])} times its volume"
-        vanished = max(here, key=lambda row: row.vanished)
-        more = [f"{vanished.vanished} of {vanished.strips} strips vanish"] if vanished.vanished and not fault else []
-        more += [f"{max(row.fused for row in here)} fuse"] if any(row.fused for row in here) else []
-        yield Finding(
-            "7-printed", "error" if severe else "warning", body.name,
-            f"from {first.bottom_mm:g} to {last.top_mm:g} mm it {', '.join([what, *more])}",
-            "make narrow parts at least a line wide, or use other walls or thinner layers",
-            layer=first.layer, place_mm=(*first.place_mm, round((first.bottom_mm + first.top_mm) / 2, 9)),
-            count=max(vanished.vanished, 1), last_layer=last.layer if len(here) > 1 else None,
-        )  # fmt: skip
+def _finding(body: Body, fault: str, here: Sequence[Row]) -> Finding:
+    first, last = here[0], here[-1]
+    severe = fault == "is not printed at all" and not body.is_support()
+    ratios = sorted({f"{row.ratio:.2f}" for row in here})
+    what = fault or f"prints {' to '.join(ratios[:: max(len(ratios) - 1, 1)])} times its volume"
+    vanished = max(here, key=lambda row: row.vanished)
+    more = [f"{vanished.vanished} of {vanished.strips} strips vanish"] if vanished.vanished and not fault else []
+    more += [f"{max(row.fused for row in here)} fuse"] if any(row.fused for row in here) else []
+    return Finding(
+        "7-printed", "error" if severe else "warning", body.name,
+        f"from {first.bottom_mm:g} to {last.top_mm:g} mm it {', '.join([what, *more])}",
+        "make narrow parts at least a line wide, or use other walls or thinner layers",
+        layer=first.layer, place_mm=(*first.place_mm, round((first.bottom_mm + first.top_mm) / 2, 9)),
+        count=max(vanished.vanished, 1), last_layer=last.layer if len(here) > 1 else None,
+    )  # fmt: skip
 
 
 def _fault(row: Row) -> str:

@@ -4,7 +4,7 @@ Plain data without a CAD kernel. Drawing, checks, meshes, solids and models all 
 disagree about the sensor. x runs along the sensor, y across it, z up; the corner is at 0, 0, 0.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from math import isfinite
 
@@ -240,21 +240,17 @@ def clipped(outline: Iterable[Point], end_mm: float) -> Outline:
     """
     points = [(rounded(u), rounded(v)) for u, v in outline]
     for sign, limit in ((-1.0, 0.0), (1.0, end_mm)):
-        points = list(_half_plane(points, sign, limit))
+        kept: list[Point] = []  # on the near side of a vertical line (Sutherland and Hodgman, 1974)
+        for a, b in zip(points[-1:] + points[:-1], points, strict=True):
+            a_in, b_in = sign * (a[0] - limit) <= 0, sign * (b[0] - limit) <= 0
+            if a_in != b_in:
+                share = (limit - a[0]) / (b[0] - a[0])
+                kept.append((limit, round(a[1] + share * (b[1] - a[1]), 12)))
+            kept += [b] if b_in else []
+        points = kept
     distinct = tuple(p for k, p in enumerate(points) if p != points[k - 1])
     width = max((p[0] for p in distinct), default=0.0) - min((p[0] for p in distinct), default=0.0)
     return distinct if len(distinct) > 2 and width > SLIVER_MM else ()
-
-
-def _half_plane(points: list[Point], sign: float, limit: float) -> Iterator[Point]:
-    """Corners of the part of an outline on the near side of a vertical line (Sutherland and Hodgman, 1974)."""
-    for a, b in zip(points[-1:] + points[:-1], points, strict=True):
-        a_in, b_in = sign * (a[0] - limit) <= 0, sign * (b[0] - limit) <= 0
-        if a_in != b_in:
-            share = (limit - a[0]) / (b[0] - a[0])
-            yield (limit, round(a[1] + share * (b[1] - a[1]), 12))
-        if b_in:
-            yield b
 
 
 def _turned(prism: Prism, size_mm: tuple[float, float, float]) -> Prism:

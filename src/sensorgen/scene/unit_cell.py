@@ -249,33 +249,22 @@ def _folded(slices: list[Slice], low: float, high: float) -> Iterator[Slice]:
         for k in range(first, last + 1):
             start = low + k * width
             for piece in _cut([s], start, start + width):
-                yield _mirrored(piece, start, width, low) if k % 2 else _moved(piece, low - start)
-
-
-def _moved(piece: Slice, by_mm: float) -> Slice:
-    return Slice(piece.left_mm + by_mm, piece.right_mm + by_mm, piece.bands)
-
-
-def _mirrored(piece: Slice, start: float, width: float, low: float) -> Slice:
-    bands = tuple(Band(b.material, b.terminal, b.bottom_mm[::-1], b.top_mm[::-1]) for b in piece.bands)
-    end = 2 * start + width
-    return Slice(end - piece.right_mm + low - start, end - piece.left_mm + low - start, bands)
+                left, right, bands = piece.left_mm - start, piece.right_mm - start, piece.bands
+                if k % 2:
+                    left, right = width - right, width - left
+                    bands = tuple(Band(b.material, b.terminal, b.bottom_mm[::-1], b.top_mm[::-1]) for b in bands)
+                yield Slice(low + left, low + right, bands)
 
 
 def _cell(slices: list[Slice], low: float, high: float) -> Cell:
     """The piece between two places, cut where a sensor's end falls into it, and how often each part occurs."""
     pieces = [(p.left_mm, p.right_mm) for p in _folded(slices, low, high)]
     inside = _cut(slices, low, high)
-    ends = _distinct(
-        sorted({x for piece in pieces for x in piece} | {x for s in inside for x in (s.left_mm, s.right_mm)})
-    )
-    parts = [p for a, b in pairwise(ends) for p in _cut(inside, a, b)]
+    ends = sorted({x for piece in pieces for x in piece} | {x for s in inside for x in (s.left_mm, s.right_mm)})
+    distinct = [x for k, x in enumerate(ends) if k == 0 or x - ends[k - 1] > 10 * ROUNDING_MM]
+    parts = [p for a, b in pairwise(distinct) for p in _cut(inside, a, b)]
     middles = [(p.left_mm + p.right_mm) / 2 for p in parts]
     shares = [float(sum(a < m < b for a, b in pieces)) for m in middles]
     if max(shares) == min(shares):
         return Cell(tuple(inside), (shares[0],) * len(inside))
     return Cell(tuple(parts), tuple(shares))
-
-
-def _distinct(values: list[float]) -> list[float]:
-    return [v for k, v in enumerate(values) if k == 0 or v - values[k - 1] > 10 * ROUNDING_MM]

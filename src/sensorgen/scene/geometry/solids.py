@@ -158,7 +158,7 @@ def _described(prism: Prism) -> str:
 
 
 def _label(number: int) -> str:
-    """A name that the kernel's writer neither wraps nor garbles; ``_settled`` puts the real one in."""
+    """A name that the kernel's writer neither wraps nor garbles; the real one is put in afterwards."""
     return f"@{number}@"
 
 
@@ -213,7 +213,11 @@ def main() -> None:
     """Write one STEP file for each job on standard input, until it ends; answer None, or what went wrong."""
     with os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)  # what the kernel prints is no answer
-        _load()
+        gc.disable()  # what the import makes lives for good: not to look through it for garbage saves a tenth of it
+        import build123d  # noqa: F401
+
+        gc.freeze()
+        gc.enable()
         for scene, colours, title, path in _jobs(sys.stdin.buffer):
             answer: SensorgenError | None = None
             try:
@@ -224,15 +228,6 @@ def main() -> None:
                 answer = CadFailed(f"the CAD process failed on {title!r}: {type(error).__name__}: {error}")
             pickle.dump(answer, answers)
             answers.flush()
-
-
-def _load() -> None:
-    """Import build123d. What it makes lives for good: not looking through it for garbage saves a tenth of the time."""
-    gc.disable()
-    import build123d  # noqa: F401
-
-    gc.freeze()
-    gc.enable()
 
 
 def _jobs(stream: BinaryIO) -> Iterator[tuple[Scene, Mapping[str, str], str, Path]]:

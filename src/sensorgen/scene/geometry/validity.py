@@ -55,7 +55,7 @@ def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
             found.append((body.name, "is not where it is drawn"))
     if found or _are_apart(scene):
         return found
-    return [(f"{a} / {b}", f"overlap by {volume:.3g} mm3") for a, b, volume in _overlaps(solids)]
+    return _overlaps(solids)
 
 
 def _box_mm(body: Body) -> list[float]:
@@ -89,17 +89,16 @@ def _self_overlap_mm3(solid: "manifold3d.Manifold") -> float:
     return float(solid.volume() - united.volume())
 
 
-def _overlaps(solids: Mapping[str, "manifold3d.Manifold"]) -> list[tuple[str, str, float]]:
-    shared = (
-        (a, b, (solids[a] ^ solids[b]).volume()) for a, b in combinations(solids, 2) if _near(solids[a], solids[b])
-    )
-    return [(a, b, v) for a, b, v in shared if v > OVERLAP_MM * min(solids[a].surface_area(), solids[b].surface_area())]
-
-
-def _near(a: "manifold3d.Manifold", b: "manifold3d.Manifold") -> bool:
-    """Whether their enclosing boxes share more than a face."""
-    box_a, box_b = np.array(a.bounding_box()), np.array(b.bounding_box())
-    return bool(np.all(np.minimum(box_a[3:], box_b[3:]) - np.maximum(box_a[:3], box_b[:3]) > OVERLAP_MM))
+def _overlaps(solids: Mapping[str, "manifold3d.Manifold"]) -> list[tuple[str, str]]:
+    found = []
+    for a, b in combinations(solids, 2):
+        one, other = solids[a], solids[b]
+        boxes = np.array([one.bounding_box(), other.bounding_box()])
+        if (boxes[:, 3:].min(axis=0) - boxes[:, :3].max(axis=0) > OVERLAP_MM).all():  # they share more than a face
+            volume = (one ^ other).volume()
+            if volume > OVERLAP_MM * min(one.surface_area(), other.surface_area()):
+                found.append((f"{a} / {b}", f"overlap by {volume:.3g} mm3"))
+    return found
 
 
 def electrode_gap_mm(scene: Scene, meshes: Mapping[str, Mesh]) -> float:
