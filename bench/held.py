@@ -12,7 +12,8 @@ from sensorgen.design.design import Design, make
 from sensorgen.models import press2d
 from sensorgen.models.press2d import BoundaryConditions, Elastic
 from sensorgen.prediction.bodies import drawn
-from sensorgen.prediction.sensor_model import Tip, build_sensor
+from sensorgen.prediction.query import Tip
+from sensorgen.prediction.sensor_model import build_sensor
 from sensorgen.scene.scene import Body, Prism, Scene, rectangle
 
 STRESS_PA = [0.0, 1e5]

@@ -20,8 +20,8 @@ from scipy.optimize import least_squares
 from sensorgen.design.design import make
 from sensorgen.models import line_fit
 from sensorgen.prediction.bodies import drawn
-from sensorgen.prediction.evaluate import TONES_HZ
 from sensorgen.prediction.inverse import Estimator, Prior, Status
+from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
 
 RESULTS = Path(__file__).parent / "results"

@@ -11,8 +11,8 @@ import numpy as np
 
 from sensorgen.design.design import make
 from sensorgen.prediction.bodies import drawn
-from sensorgen.prediction.evaluate import TONES_HZ
 from sensorgen.prediction.inverse import Estimator, Prior, Status
+from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
 
 mpl.use("Agg")

@@ -14,7 +14,7 @@ from sensorgen.design.design import Design, make
 from sensorgen.models import compression
 from sensorgen.models.compression import Compression
 from sensorgen.prediction.compression_law import solved
-from sensorgen.prediction.evaluate import TONES_HZ
+from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensitivity import BOUNDARIES, Sensitivity, sensitivity
 
 FORCE_N, RHO_OHM_M = 6.0, 0.135

@@ -16,7 +16,7 @@ from sensorgen.models.stack import Body
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.double_layer.designs import press_at, stacked
 from sensorgen.prediction.double_layer.touching import WIRINGS, Touching
-from sensorgen.prediction.evaluate import TONES_HZ
+from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
 
 PICTURES = DOCS / "pictures"

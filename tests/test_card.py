@@ -16,12 +16,12 @@ from scipy.optimize import least_squares
 from sensorgen.core.errors import SensorgenError
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.evaluate import TONES_HZ
-from sensorgen.prediction.identifiability import Identifiability, identify, surface
 from sensorgen.prediction.identifiability.fisher import Setup, Slopes, bearable, bounds, shares, slopes
 from sensorgen.prediction.identifiability.frequencies import spread
-from sensorgen.prediction.identifiability.results import of_schema_1
+from sensorgen.prediction.identifiability.identify import identify, surface
+from sensorgen.prediction.identifiability.results import Identifiability, of_schema_1
 from sensorgen.prediction.identifiability.verdict import Required, bracket, metres, newtons, required, verdict
+from sensorgen.prediction.query import TONES_HZ
 
 EPS0 = 8.8541878128e-12
 TEN_TIMES = tuple(10 * f for f in TONES_HZ)
@@ -434,10 +434,7 @@ def test_it_goes_to_json_and_back():
 
 
 def test_it_needs_neither_scipy_nor_matplotlib():
-    program = (
-        "import sys, sensorgen.prediction.identifiability, sensorgen.cli.card_text; "
-        "print({'scipy', 'matplotlib'} & set(sys.modules))"
-    )
+    program = "import sys, sensorgen.prediction.identifiability; print({'scipy', 'matplotlib'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
 

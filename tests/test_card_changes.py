@@ -10,11 +10,12 @@ from sensorgen.design import materials
 from sensorgen.design.design import make
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.evaluate import TONES_HZ
-from sensorgen.prediction.identifiability import changes, identify
+from sensorgen.prediction.identifiability import changes
 from sensorgen.prediction.identifiability.changes import CHANGES, most_helpful, together
 from sensorgen.prediction.identifiability.fisher import Setup
+from sensorgen.prediction.identifiability.identify import identify
 from sensorgen.prediction.identifiability.verdict import required
+from sensorgen.prediction.query import TONES_HZ
 
 EPS0 = 8.8541878128e-12
 PLATE = Sensor(

@@ -9,8 +9,8 @@ from sensorgen.analysis.plots import identifiability as plots
 from sensorgen.analysis.plots.static import drawn as drawn_by
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.evaluate import TONES_HZ
 from sensorgen.prediction.identifiability.fisher import Setup
+from sensorgen.prediction.query import TONES_HZ
 
 PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), 8.8541878128e-12 * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))
 

@@ -11,7 +11,8 @@ from sensorgen.design.design import make
 from sensorgen.models.conduction import electrode_resistance as of_scene
 from sensorgen.prediction.bodies import drawn, estimated
 from sensorgen.prediction.electrodes import electrode_resistance
-from sensorgen.prediction.evaluate import evaluate, sensor_model
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.planning import sensor_model
 from sensorgen.scene.scene import Scene, box
 
 PLATE_OHM = {"top": 0.07 / 3e-5, "bottom": 0.2 / 3e-5}  # rho L / (H W)

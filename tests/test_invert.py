@@ -13,10 +13,10 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.evaluate import TONES_HZ
 from sensorgen.prediction.inverse import Estimator, Prior, Status, answers, estimate
 from sensorgen.prediction.inverse.forward import Forward
 from sensorgen.prediction.inverse.verdict import chi2_limit
+from sensorgen.prediction.query import TONES_HZ
 
 TONES = np.array(TONES_HZ)
 NOISE = 1e-3

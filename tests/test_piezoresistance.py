@@ -20,10 +20,11 @@ from sensorgen.models.pressure import bed, hertz
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.bodies import drawn as drawn_body
 from sensorgen.prediction.double_layer.designs import stack_of
-from sensorgen.prediction.error_budget import Load, error_budget
-from sensorgen.prediction.evaluate import Query, evaluate
+from sensorgen.prediction.error_budget import error_budget
+from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.grid import check_presses
 from sensorgen.prediction.inverse.forward import Forward, Scalar
+from sensorgen.prediction.query import Load, Query
 
 K = 2e-6  # 1/Pa: 12 % at 60 kPa
 PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), EPS0_F_PER_M * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))

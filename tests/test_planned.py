@@ -12,8 +12,8 @@ from sensorgen.prediction import compression_law as celllaw
 from sensorgen.prediction import planning, rest_state
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.capacitance import PLANE
-from sensorgen.prediction.error_budget import Load as Press
-from sensorgen.prediction.sensor_model import Tip
+from sensorgen.prediction.query import Load as Press
+from sensorgen.prediction.query import Tip
 
 TONES = (1.1e3, 99.7e3)
 PRESS = Press(TONES, 6.0, 0.05)

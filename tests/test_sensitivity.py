@@ -4,7 +4,7 @@ import pytest
 
 from sensorgen.design.design import make
 from sensorgen.models import compression
-from sensorgen.prediction.evaluate import TONES_HZ
+from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensitivity import BOUNDARIES, sensitivity
 
 PLATE = make({"shape": "reference"})

@@ -4,8 +4,9 @@ from math import inf
 
 from sensorgen.models.sensor import UNIFORM
 from sensorgen.prediction.bodies import drawn
+from sensorgen.prediction.query import TIP_M, Tip
 from sensorgen.prediction.rest_state import rest_state
-from sensorgen.prediction.sensor_model import TIP_M, Tip, build_sensor
+from sensorgen.prediction.sensor_model import build_sensor
 
 
 def sensor_of(design, law="", tip_m=TIP_M, *, profile=UNIFORM, radius_m=None):

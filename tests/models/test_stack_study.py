@@ -14,7 +14,7 @@ from sensorgen.prediction.double_layer import study
 from sensorgen.prediction.double_layer.designs import halves, press_at, stack_of, stacked
 from sensorgen.prediction.double_layer.differencing import bounds
 from sensorgen.prediction.double_layer.touching import WIRINGS, Touching
-from sensorgen.prediction.evaluate import TONES_HZ
+from sensorgen.prediction.query import TONES_HZ
 
 TONES = np.array(TONES_HZ)
 PRESS = Press(6.0, 0.04, 0.01)

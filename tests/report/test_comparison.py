@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from sensorgen.analysis.comparison import of_iteration, predicted
-from sensorgen.analysis.comparison.leaky import across_ohm, along_ohm, electrode_and_leak
 from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.design.specimen_name import design_of, parse
 from sensorgen.measure.log import Log, notes
 from sensorgen.measure.log.batches import prediction
+from sensorgen.measure.signal.leakage import across_ohm, along_ohm, electrode_and_leak
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.bodies import drawn
+from sensorgen.prediction.bodies import default_body, drawn
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.plan import without_times
 from sensorgen.prediction.results import to_json
@@ -73,7 +73,7 @@ def test_a_plain_electrode_has_its_own_resistance_for_both_bounds():
     design = make({"shape": "reference"})
     p = design.params
     squares = p.length_mm / (p.electrode_mm * p.width_mm) * 1e3
-    found = predicted(design).ry_ohm
+    found = predicted(default_body(design)).ry_ohm
     assert (found.lower, found.upper) == (pytest.approx(0.07 * squares), pytest.approx(0.2 * squares))
 
 
@@ -90,7 +90,7 @@ def test_the_earliest_stored_prediction_is_taken_as_it_was(tmp_path):
     assert row.predicted.stored_at
     assert row.predicted.provenance.startswith("stored ")
     assert row.residual == pytest.approx(log(650 / row.predicted.ry_ohm.middle()))
-    afterwards = predicted(make({"shape": "reference"}))
+    afterwards = predicted(default_body(make({"shape": "reference"})))
     assert not afterwards.stored_at
     assert "made afterwards" in afterwards.provenance
 
@@ -154,14 +154,14 @@ def test_a_stiffer_film_is_one_with_another_modulus():
 
 def test_permittivity_and_film_move_a_plate_in_proportion():
     """C of a solid plate is eps A / d."""
-    of = Movable(make({"shape": "reference"}))
+    of = Movable(default_body(make({"shape": "reference"})))
     factors, curve = of.by_permittivity
     assert curve == pytest.approx(factors, abs=1e-9)
     assert of.by_film[1] == pytest.approx(-factors, abs=1e-9)
 
 
 def test_the_film_of_a_cell_moves_less_than_in_proportion_and_thicker_is_less():
-    factors, curve = Movable(make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})).by_film
+    factors, curve = Movable(default_body(make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}}))).by_film
     assert (np.diff(curve) < 0).all()
     assert (np.abs(curve) <= np.abs(factors) + 1e-9).all()
 
@@ -170,6 +170,6 @@ def test_stored_predictions_are_plain_data(tmp_path):
     design = make({"shape": "reference"})
     found = evaluate(drawn(design))
     row = prediction(design.id(), design.name, json.loads(to_json(found)))
-    assert json.loads(row.data)["capacitance"]["lower"] == predicted(design, [row]).capacitance_f.lower
+    assert json.loads(row.data)["capacitance"]["lower"] == predicted(default_body(design), [row]).capacitance_f.lower
     untimed = dataclasses.replace(found, plan=without_times(found.plan))  # stored without run times
-    assert predicted(design, [row]).prediction == untimed
+    assert predicted(default_body(design), [row]).prediction == untimed

@@ -12,14 +12,40 @@ import click
 from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.version import __version__
 
-SECTIONS = {
-    "Design": ("build", "batch", "check", "slice", "gcode", "draw"),
-    "Predict": ("predict", "cell", "compress", "invert", "sheet", "stack"),
-    "Measure": ("log", "bench", "report", "fit"),
-    "Reference": ("list", "schema", "completion"),
-    "For developers": ("chart", "thesis"),
+SECTIONS = {  # what each command is for, here so that --help imports none of them
+    "Design": {
+        "build": "Write all that a print needs: 3MF, STEP, profiles, drawing.",
+        "batch": "Put several sensors on one plate, with a record.",
+        "check": "Check a design against nozzle, layers and bed.",
+        "slice": "Write printer-ready G-code, by a real slicer.",
+        "gcode": "Check G-code before the printer does.",
+        "draw": "Draw the cross-section, its layers and findings, as SVG.",
+    },
+    "Predict": {
+        "predict": "Predict capacitance, resistance and impedance, loaded or not.",
+        "cell": "Capacitance between certified bounds.",
+        "compress": "Displacement and capacitance under stress.",
+        "invert": "Force and position from measured impedances.",
+        "sheet": "Which contacts and frequencies locate a load in two dimensions.",
+        "stack": "Double sensor, and isolation against touch.",
+    },
+    "Measure": {
+        "log": "Log of readings, recordings, prints and predictions.",
+        "bench": "Plan a run of loads, and evaluate its recording.",
+        "report": "Compare predictions and measurements, as one page.",
+        "fit": "Fit material values to what was measured.",
+    },
+    "Reference": {
+        "list": "List shapes, materials, printers, qualities, models or sources.",
+        "schema": "Print the JSON schema of a design file or of prediction.json.",
+        "completion": "Print the completion script for a shell.",
+    },
+    "For developers": {
+        "chart": "Draw time against error of every model.",
+        "thesis": "Hold every number of the thesis against ours.",
+    },
 }
-COMMANDS = tuple(name for names in SECTIONS.values() for name in names)
+COMMANDS = tuple(name for commands in SECTIONS.values() for name in commands)
 _PACKAGE = {"chart": "verification", "thesis": "verification"}  # of a command's module, where it is not ``cli``
 WRONG_INPUT = 2
 FOUND_ERRORS = 1
@@ -31,12 +57,11 @@ class _Lazy(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         return list(COMMANDS)
 
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """The commands in sections."""
-        for title, names in SECTIONS.items():
-            found = [(name, self.get_command(ctx, name)) for name in names]
+        for title, commands in SECTIONS.items():
             with formatter.section(title):
-                formatter.write_dl([(name, made.get_short_help_str(limit=100)) for name, made in found if made])
+                formatter.write_dl(list(commands.items()))
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
         if name not in COMMANDS:

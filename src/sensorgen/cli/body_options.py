@@ -11,14 +11,13 @@ import click
 from sensorgen.cli import show
 from sensorgen.cli.words import OneOf
 from sensorgen.core.errors import BadInput
+from sensorgen.design.walls import WALLS
 from sensorgen.export.slicers import SLICERS
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
     from sensorgen.design.body import Body
     from sensorgen.design.design import Design
-
-OUT = Path("out")  # folder of the designs' folders, where build and slice write
 
 
 def body_options() -> list[click.Parameter]:
@@ -30,7 +29,7 @@ def body_options() -> list[click.Parameter]:
             help="Slice now for the print; if not given, the G-code in out/NAME, else an estimate from the layers.",
         ),
         click.Option(
-            ["--walls"], type=OneOf(("arachne", "classic", "cura", "cura-gaps")),
+            ["--walls"], type=OneOf(WALLS),
             help="Estimate the print for these walls alone; for all of them if not given, Arachne's as the best value.",
         ),
     ]  # fmt: skip
@@ -49,7 +48,7 @@ def body_of(drawn: bool, slicer: str | None, walls: str | None) -> "Callable[[De
         return partial(_sliced, slicer)
     if walls:
         return partial(bodies.estimated, walls=walls)
-    return lambda design: bodies.default_body(design, OUT / design.name)
+    return bodies.default_body
 
 
 def printed_of(design: "Design", slicer: str | None, walls: str | None) -> "Printed":

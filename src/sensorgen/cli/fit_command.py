@@ -7,13 +7,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import log_words, show
+from sensorgen.cli import body_options, log_words, show
 
 if TYPE_CHECKING:
     from sensorgen.analysis.fit import Fit
 
 
-def _work(iteration: int, file: str | None, output: str | None, seed: int, *, dry_run: bool, as_json: bool) -> int:
+def _work(
+    iteration: int, file: str | None, output: str | None, seed: int, drawn: bool, slicer: str | None, walls: str | None,
+    *, dry_run: bool, as_json: bool,
+) -> int:  # fmt: skip
     """Fit material values to what was measured, and keep them as a source.
 
     A design takes them where it names the source, as in etpu@fit-23. A quarter of the specimens is held back, to
@@ -26,7 +29,7 @@ def _work(iteration: int, file: str | None, output: str | None, seed: int, *, dr
     from sensorgen.design.materials import own
 
     with log_words.opened(file) as log:
-        made = fit(log, iteration, seed)
+        made = fit(log, iteration, seed, body_options.body_of(drawn, slicer, walls))
     path = Path(output) if output else own.path(made.source)
     keep = bool(made.values) and not dry_run
     if keep:
@@ -71,6 +74,7 @@ command = click.Command(
         log_words.where(),
         click.Option(["--output", "-o"], metavar="FILE", help="File to write instead of the source's own."),
         click.Option(["--seed"], type=int, default=23, show_default=True, help="Of the split."),
+        *body_options.body_options(),
         click.Option(["--dry-run"], is_flag=True, help="Write no file."),
         log_words.as_json(),
     ],

@@ -117,9 +117,9 @@ def _estimator(
     **body: Any,
 ) -> "tuple[Estimator, tuple[str, ...]]":
     """The estimator for this design, and what to doubt about its sensor."""
-    from sensorgen.prediction.evaluate import Query, sensor_model
     from sensorgen.prediction.inverse import FORCE_LIMIT_N, Estimator
-    from sensorgen.prediction.sensor_model import Tip
+    from sensorgen.prediction.planning import sensor_model
+    from sensorgen.prediction.query import Query, Tip
 
     query = Query(tip=Tip(tip_mm * units.M_PER_MM), law=compression or "")
     model = sensor_model(body_options.body_of(**body)(design), query)[0]

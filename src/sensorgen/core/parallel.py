@@ -92,9 +92,10 @@ def _pool(jobs: int) -> Iterator["ProcessPoolExecutor"]:
     try:
         yield pool
     except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
         for process in multiprocessing.active_children():
             process.terminate()
+        # wait: else the interpreter, as it ends, may write to a pipe that the pool's thread closes
+        pool.shutdown(cancel_futures=True)
         raise
     pool.shutdown()
 

@@ -1,11 +1,12 @@
 """A body: what there is of a sensor, as drawn or as printed, in one type."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from hashlib import sha256
 from typing import Any, Literal
 
-from sensorgen.design.design import Design
+from sensorgen.design.design import Design, make
 from sensorgen.scene.scene import Scene
 
 DRAWN: Literal["drawn"] = "drawn"
@@ -75,7 +76,25 @@ class Body:
         """Unit cells; raises what making them raises."""
         return self.make()
 
+    def with_values(self, material_values: Mapping[str, Mapping[str, float]]) -> "Body":
+        """The same geometry of materials with other values, by material and quantity."""
+        data = self.design.model_dump(exclude_defaults=True, mode="json")
+        known = data.get("material_values", {})
+        changed = {name: known.get(name, {}) | dict(values) for name, values in material_values.items()}
+        design = make(data | {"material_values": known | changed})
+        identity = sha256(f"{self.identity} {design.id()}".encode()).hexdigest()
+        return replace(self, design=design, identity=identity, make=lambda: self.cells)
+
+    def printed_otherwise(self, rule: str) -> "Body":
+        """The body by one of the rules of its cells alone."""
+        cells = self.cells
+        one = replace(cells, scenes={rule: cells.scenes[rule]}, gaps=lambda: {rule: cells.gap_mm[rule]})
+        return replace(self, identity=sha256(f"{self.identity} {rule}".encode()).hexdigest(), make=lambda: one)
+
     @property
     def is_drawn(self) -> bool:
         """Whether it is the drawing."""
         return self.kind == DRAWN
+
+
+BodyOf = Callable[[Design], Body]  # how a command makes the body of a design

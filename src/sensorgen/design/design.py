@@ -309,6 +309,25 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
     return design if design.name else design.model_copy(update={"name": name_of(design)})
 
 
+def of_resolved(name: str, data: Mapping[str, Any]) -> Design:
+    """The design of that name whose :meth:`Design.resolved` a record holds.
+
+    Raises
+    ------
+    SensorgenError
+        Not a resolved design, or one of a material, printer or quality that has other values here and now.
+    """
+    try:
+        names = {key: data[f"{key}_values"]["name"] for key in ("printer", "quality")}
+    except (KeyError, TypeError):
+        raise BadInput(f"{name}: not a resolved design; expected one as batch.json has it") from None
+    found = make({"name": name, **{key: data[key] for key in Design.model_fields if key in data}, **names})
+    then, now = ({k: v for k, v in d.items() if k != "sensorgen"} for d in (data, found.resolved()))
+    if then != json.loads(json.dumps(now)):
+        raise BadInput(f"{name}: its materials, printer or quality have other values here than where it was recorded")
+    return found
+
+
 def _check_names(design: Design) -> None:
     """Look up every name that a design uses, so that a wrong one is reported before any work."""
     _ = design.params, design.machine, design.layers

@@ -2,7 +2,7 @@
 
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import SEEK_END
 from pathlib import Path
@@ -11,8 +11,7 @@ import numpy as np
 
 from sensorgen.core import files as store
 from sensorgen.core.errors import BadInput, SlicerFailed, UnknownName
-from sensorgen.design import materials
-from sensorgen.design.design import Design, Infill
+from sensorgen.design.design import Design
 from sensorgen.design.printer import Printer
 from sensorgen.export import threemf
 from sensorgen.export.gcode.files import text_of
@@ -21,10 +20,10 @@ from sensorgen.export.gcode.moves import Motion
 from sensorgen.export.gcode.paths import Paths, paths_of
 from sensorgen.export.gcode.ready import ready
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S, curaengine, prusa, stl
-from sensorgen.export.slicers.loads import Load
+from sensorgen.export.slicers.loads import Load, loads
 from sensorgen.export.slicers.run import Runner
+from sensorgen.export.threemf.part import part_of, parts_of
 from sensorgen.scene.geometry import meshes
-from sensorgen.scene.geometry.mesh import Mesh
 from sensorgen.scene.scene import Body
 
 STEPS = ("meshes", "files", "slicing", "G-code", "done")
@@ -223,42 +222,6 @@ def plate_loads(pieces: Sequence[Placed]) -> dict[int, Load]:
     return found
 
 
-def loads(design: Design) -> dict[int, Load]:
-    """What each tool prints for a design, by the printer's own tool number."""
-    return {design.tool(name): load(design, name) for name in design.used()}
-
-
-def load(design: Design, name: str) -> Load:
-    """What the tool of a material prints."""
-    infill = design.infill.get(name, Infill())
-    return Load(design.material(name), design.used()[name], infill.percent, infill.pattern)
-
-
-def parts(design: Design, made: Mapping[str, Mesh]) -> list[threemf.Part]:
-    """Bodies of a design for a 3MF, in the sensor's coordinates.
-
-    Parameters
-    ----------
-    design : Design
-        The design.
-    made : mapping of str to Mesh
-        Mesh of each body, by its name [mm].
-    """
-    return [_part(design, body.name, body.material, made[body.name]) for body in design.printed.bodies]
-
-
-def _part(design: Design, name: str, material: str, mesh: Mesh) -> threemf.Part:
-    tool = design.tool(material)
-    return threemf.Part(
-        name=name,
-        material=materials.load(material).title,
-        colour=materials.load(material).colour,
-        extruder=design.machine.slicer_index(tool),
-        mesh=mesh,
-        settings=prusa.volume_settings(design.machine, design.layers, tool, load(design, material)),
-    )
-
-
 def plate_parts(pieces: Sequence[Placed]) -> list[threemf.Part]:
     """All bodies of a plate, where they stand on the bed; equal designs are meshed once."""
     made: dict[str, list[threemf.Part]] = {}
@@ -266,8 +229,8 @@ def plate_parts(pieces: Sequence[Placed]) -> list[threemf.Part]:
     for piece in pieces:
         key = piece.design.id()
         if key not in made:
-            made[key] = parts(piece.design, {body.name: meshes.mesh(body) for body in piece.design.printed.bodies})
-        extra = [_part(piece.design, body.name, body.material, meshes.mesh(body)) for body in piece.extra]
+            made[key] = parts_of(piece.design, {body.name: meshes.mesh(body) for body in piece.design.printed.bodies})
+        extra = [part_of(piece.design, body.name, body.material, meshes.mesh(body)) for body in piece.extra]
         found += threemf.placed([*made[key], *extra], piece.centre_mm, piece.name)
     return found
 

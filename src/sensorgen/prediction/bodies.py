@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 
 from sensorgen.design.body import DRAWN, Body, Cells
 from sensorgen.design.design import Design
+from sensorgen.design.walls import WALLS
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
     from sensorgen.scene.scene import Scene
 
-WALLS = ("arachne", "classic", "cura", "cura-gaps")  # rules of slicers, the default of ours first
+OUT = Path("out")  # folder of the designs' folders, where build and slice write, unless told otherwise
 
 
 def drawn(design: Design) -> Body:
@@ -43,8 +44,8 @@ def estimated(design: Design, walls: str = "") -> Body:
     walls : str
         One of ``WALLS`` alone; all of them, the first as the most likely, if not given.
     """
-    rules = (walls,) if walls else WALLS
-    said = f"printed, estimated ({walls or 'PrusaSlicer, Arachne'} walls)"
+    rules = (walls,) if walls else tuple(WALLS)
+    said = f"printed, estimated ({WALLS.get(rules[0], rules[0])})"
     return Body(
         design, "estimated", said, _identity(design, "estimated", *rules), partial(_estimated_cells, design, rules)
     )
@@ -86,9 +87,10 @@ def default_body(design: Design, folder: Path | None = None) -> Body:
     design : Design
         What is printed.
     folder : Path, optional
-        With the design's files, as ``out/NAME``.
+        With the design's files; ``out/NAME`` in the working folder if not given.
     """
-    for note in sorted(folder.glob("*.gcode.json")) if folder and folder.is_dir() else ():
+    folder = folder or OUT / design.name
+    for note in sorted(folder.glob("*.gcode.json")) if folder.is_dir() else ():
         found = _toolpath(design, note)
         if found:
             return found

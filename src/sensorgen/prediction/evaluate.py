@@ -1,75 +1,12 @@
 """The one way from a body to numbers: what a sensor should measure, each quantity with its range."""
 
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
-from itertools import product
-from math import inf, pi
-
-import numpy as np
+from dataclasses import asdict, replace
 
 from sensorgen.core import cache
-from sensorgen.core.bounds import Bounds, Interval
-from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
-from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
-from sensorgen.design.design import Design
-from sensorgen.design.values import material_value
-from sensorgen.models import line
-from sensorgen.models.compression import Compression
-from sensorgen.prediction import bodies, planning
-from sensorgen.prediction.capacitance import Unpredictable
-from sensorgen.prediction.electrodes import electrode_resistance
-from sensorgen.prediction.error_budget import Load, error_budget
-from sensorgen.prediction.identifiability import FORCE_N, NOISE, identify
-from sensorgen.prediction.losses import Lost, lost
-from sensorgen.prediction.plan import Plan
-from sensorgen.prediction.rest_state import RestState, rest_state
-from sensorgen.prediction.results import SCHEMA, Impedance, Prediction, adapter, from_json
-from sensorgen.prediction.sensor_model import SensorModel, Tip
-from sensorgen.prediction.spread import spread
-
-TONES_HZ = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)  # thesis, Table 5.1, its 4990 corrected
-_ASSUMED = "the cell was not solved, and is taken to deform as a solid plate"
-_PA_PER_KPA = 1e3
-
-
-@dataclass(frozen=True)
-class Query:
-    """What is asked of a body; the default is the same for every command.
-
-    Attributes
-    ----------
-    frequency_hz : tuple of float
-        Of the impedance [Hz].
-    force_n, position_m : float or None
-        The reference load, at which resolution and error budget are stated [N], [m]; in the sensor's middle if no
-        position is given.
-    tip : Tip
-        What presses.
-    law : str
-        Law of compression, as of :func:`sensorgen.prediction.planning.plan`.
-    accuracy : float or None
-        Of abs(Z), relative [-]; if None, the default of :mod:`sensorgen.prediction.planning`.
-    noise : float
-        Standard deviation of Re Z and of Im Z, each, relative to abs(Z) [-].
-    """
-
-    frequency_hz: tuple[float, ...] = TONES_HZ
-    force_n: float = FORCE_N
-    position_m: float | None = None
-    tip: Tip = field(default_factory=Tip)
-    law: str = ""
-    accuracy: float | None = None
-    noise: float = NOISE
-
-    def load(self, design: Design) -> Load:
-        """The reference load."""
-        middle = design.params.length_mm * M_PER_MM / 2
-        return Load(self.frequency_hz, self.force_n, middle if self.position_m is None else self.position_m)
-
-
-DEFAULT = Query()
+from sensorgen.prediction import bodies
+from sensorgen.prediction.query import DEFAULT, Query
+from sensorgen.prediction.results import SCHEMA, Prediction, adapter, from_json
 
 
 def evaluate(body: Body, query: Query = DEFAULT, *, keep: bool = True) -> Prediction:
@@ -94,7 +31,7 @@ def evaluate(body: Body, query: Query = DEFAULT, *, keep: bool = True) -> Predic
     OutOfRange, BadInput, UnknownName
         A query that no sensor can answer: an accuracy or a noise that is not above 0, a tip that does not fit.
     """
-    found = _stored(body, query) if keep else _prediction(body, query)
+    found = _stored(body, query) if keep else _computed(body, query)
     if body.is_drawn:
         return found
     return replace(found, drawn=evaluate(bodies.drawn(body.design), query, keep=keep))
@@ -102,175 +39,11 @@ def evaluate(body: Body, query: Query = DEFAULT, *, keep: bool = True) -> Predic
 
 def _stored(body: Body, query: Query) -> Prediction:
     question = {"what": "prediction", "body": body.identity, "query": asdict(query), "schema": SCHEMA}
-    found = from_json(cache.answer(question, lambda: adapter().dump_json(_prediction(body, query)).decode()))
+    found = from_json(cache.answer(question, lambda: adapter().dump_json(_computed(body, query)).decode()))
     return replace(found, design=body.design.name, body=body.provenance)
 
 
-def sensor_model(body: Body, query: Query = DEFAULT) -> tuple[SensorModel, Plan]:
-    """The line-sensor model behind :func:`evaluate` and its plan; raises SensorgenError where there is none."""
-    return planning.execute(planning.plan(body, query.load(body.design), query.accuracy, query.law, query.tip))
+def _computed(body: Body, query: Query) -> Prediction:
+    from sensorgen.prediction import quantities  # the models: a stored prediction does without
 
-
-def _prediction(body: Body, query: Query) -> Prediction:
-    design, load = body.design, query.load(body.design)
-    found = Prediction(
-        SCHEMA, design.name, design.id(), body.provenance, "not predicted", load.force_n, load.position_m
-    )  # fmt: skip
-    try:
-        found = replace(found, gap=_gap(body))
-        model, plan, reason = _model(body, query)
-        rest = model.rest if model else rest_state(body)
-        found = _at_rest(replace(found, status="predicted", reason=reason), body, rest, query.frequency_hz)
-    except SensorgenError as error:  # no model applies, a value is missing, an electrode or a tool path is interrupted
-        touches = found.gap is not None and found.gap.value == 0
-        with suppress(SensorgenError):  # as a resistivity that is missing
-            found = replace(found, resistance=electrode_resistance(body))
-        return replace(found, status="short" if touches else "not predicted", reason=str(error))
-    values, doubts = (model.values, model.doubts) if model else (rest.values, rest.doubts)
-    found = replace(found, plan=plan, values=values, assumptions=(*_assumptions(body, model), *doubts))
-    return _at_load(found, model, load, query) if model else found
-
-
-def _model(body: Body, query: Query) -> tuple[SensorModel | None, Plan | None, str]:
-    """The sensor and its plan; or why there is none, where the body can be predicted at rest alone."""
-    try:
-        return *sensor_model(body, query), ""
-    except (Unpredictable, MissingValue):
-        raise
-    except SensorgenError as error:
-        return None, None, str(error)
-
-
-def _gap(body: Body) -> Bounds | None:
-    gaps = [gap * M_PER_MM for gap in body.cells.gap_mm.values()]
-    if inf in gaps:
-        return None
-    by_print = Interval(min(gaps), max(gaps))
-    if gaps[0] == 0:
-        exact = Interval(0.0, 0.0)
-        return Bounds(0.0, by_print.lower, by_print.upper, "m", exact, by_print, exact, certified=True)
-    return Bounds.of(gaps[0], "m", print=by_print, certified=True)
-
-
-def _at_rest(found: Prediction, body: Body, rest: RestState, frequency_hz: tuple[float, ...]) -> Prediction:
-    """Capacitance, resistance, corner frequency and impedance without a load."""
-    resistance, c, gone = rest.resistance, rest.capacitance, lost(body.design)
-    r = _in_series(resistance["top"], resistance["bottom"])
-    corner = _of_line(r, c, lambda ohm, farad: line.corner_frequency_hz(ohm, farad), "Hz")
-    return replace(
-        found, capacitance=c, resistance=resistance, corner_frequency=corner,
-        impedance=tuple(_impedance(f, r, c, gone) for f in frequency_hz),
-    )  # fmt: skip
-
-
-def _in_series(one: Bounds, other: Bounds) -> Bounds:
-    def added(a: Interval, b: Interval) -> Interval:
-        return Interval(a.lower + b.lower, a.upper + b.upper)
-
-    return Bounds(
-        one.value + other.value, one.lower + other.lower, one.upper + other.upper, "ohm",
-        added(one.model, other.model), added(one.print, other.print), added(one.material, other.material),
-        one.certified and other.certified,
-    )  # fmt: skip
-
-
-def _of_line(r: Bounds, c: Bounds, of: Callable[[float, float], float], unit: str) -> Bounds:
-    """A quantity of the unloaded line: at the ends of what resistance and capacitance may be."""
-
-    def ends(ohm: Interval, farad: Interval) -> Interval:
-        values = [of(*pair) for pair in product((ohm.lower, ohm.upper), (farad.lower, farad.upper))]
-        return Interval(min(values), max(values))
-
-    whole = ends(Interval(r.lower, r.upper), Interval(c.lower, c.upper))
-    return Bounds(
-        of(r.value, c.value), whole.lower, whole.upper, unit,
-        ends(r.model, c.model), ends(r.print, c.print), ends(r.material, c.material), r.certified and c.certified,
-    )  # fmt: skip
-
-
-def _impedance(frequency_hz: float, r: Bounds, c: Bounds, gone: Lost) -> Impedance:
-    """Of the unloaded line at one frequency; r and c of the whole sensor."""
-
-    def z(ohm: float, farad: float) -> complex:
-        admittance = 2 * pi * frequency_hz * farad * (1j + gone.tan_delta) + gone.leak_s
-        return complex(line.cascade([ohm], [np.array([admittance])], [1.0])[0])
-
-    re = _of_line(r, c, lambda ohm, farad: z(ohm, farad).real, "ohm")
-    im = _of_line(r, c, lambda ohm, farad: z(ohm, farad).imag, "ohm")
-    return Impedance(frequency_hz, re, im)
-
-
-def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) -> Prediction:
-    """Sensitivity, resolution and error budget at the reference load; or why there are none."""
-    law = model.law
-    stiffest = (
-        replace(model.sensor, compression=law.others[0])
-        if law.compression.name == "unconfined" and law.bounded
-        else None
-    )
-    try:
-        made = identify(
-            model.sensor, load.frequency_hz, query.noise, force_n=load.force_n or FORCE_N, position_m=load.position_m,
-            stiffest=stiffest, assumed="" if law.bounded else _ASSUMED,
-        )  # fmt: skip
-        return replace(
-            found, identifiability=made, budget=error_budget(model, load, query.accuracy),
-            sensitivity=_sensitivity(model, load),
-            force_resolution_n=made.sigma_force_n, position_resolution_m=made.sigma_position_m,
-        )  # fmt: skip
-    except SensorgenError as error:
-        return replace(found, reason=str(error))
-
-
-def _sensitivity(model: SensorModel, load: Load) -> Bounds:
-    """(C(p) / C(0) - 1) / p, with p the pressure of the reference load [1/kPa]."""
-    pressure_pa = float(model.sensor.stress_pa(load.force_n or FORCE_N, load.position_m))
-
-    def of(law: Compression) -> float:
-        strain = float(law.capacitive_strain(np.asarray(pressure_pa))[0])
-        return strain / (1 - strain) / pressure_pa * _PA_PER_KPA
-
-    value = of(model.law.compression)
-    return Bounds.of(
-        value, "1/kPa", model=_span(value, of, model.law.others), material=_span(value, of, _moduli(model))
-    )
-
-
-def _span(value: float, of: Callable[[Compression], float], laws: Iterable[Compression]) -> Interval:
-    """Lowest and highest over other laws of compression, those left out that the pressure is beyond."""
-    found = [value]
-    for law in laws:
-        with suppress(OutOfRange):
-            found.append(of(law))
-    return Interval(min(found), max(found))
-
-
-def _moduli(model: SensorModel) -> list[Compression]:
-    """The law of compression with all moduli at the ends of what the sources say."""
-    design, used = model.body.design, model.body.design.used()
-    factors = {
-        end / value.value
-        for value in model.law.taken
-        if value.quantity == "youngs_modulus_pa"
-        for end in spread(design, material_value(design.material(value.material), used[value.material], value.quantity))
-    }
-    return [model.law.compression.scaled_modulus(factor) for factor in sorted(factors) if factor != 1]
-
-
-def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
-    """What is taken for granted."""
-    yield "electrodes are equipotential for the capacitance, and the field has no fringe at the sensor's edge"
-    yield "electrode resistance from end face to end face, cogs included"
-    if not body.is_drawn:
-        yield "contacts between extruded lines cost no resistance: no source gives their resistivity"
-    gone = lost(body.design).taken
-    said = " and ".join(f"{t.quantity} of {t.material}" for t in gone)
-    yield f"dielectric losses: {said} as given" if gone else "no dielectric loss and no leak: the sources give none"
-    rises = model.piezoresistance if model else {}
-    if not rises:
-        yield "resistivity under the tip as elsewhere: no source says how it changes with pressure"
-    for end, value in rises.items():
-        yield (
-            f"resistivity of the {end} electrode rises with pressure by {value.value:g} 1/Pa "
-            f"({value.material}, {value.source})"
-        )
+    return quantities.prediction(body, query)

@@ -13,7 +13,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM, frequency_text
 from sensorgen.design.design import Design
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.error_budget import Load
+from sensorgen.prediction.query import Load
 
 LARGEST = 2_000_000  # impedances that are kept in memory at once
 ROWS = 4096  # of CSV at a time

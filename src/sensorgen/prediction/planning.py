@@ -14,10 +14,11 @@ from sensorgen.design.body import Body
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.capacitance import Answer, default_width, weighed
 from sensorgen.prediction.compression_law import Law, Option, options
-from sensorgen.prediction.error_budget import Load, ReferenceLoad
+from sensorgen.prediction.error_budget import ReferenceLoad
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
+from sensorgen.prediction.query import DEFAULT, FLAT, Load, Query, Tip
 from sensorgen.prediction.rest_state import rest_state
-from sensorgen.prediction.sensor_model import FLAT, SensorModel, Tip, build_sensor, piece
+from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
 
 ACCURACY = 1e-2  # of abs(Z), where none is asked for: material data are not that accurate
 PATIENCE_S = (
@@ -55,6 +56,11 @@ class PredictionPlan:
     rough: SensorModel
     by_capacitance: float
     plan: Plan
+
+
+def sensor_model(body: Body, query: Query = DEFAULT) -> tuple[SensorModel, Plan]:
+    """The line-sensor model behind a prediction, and its plan; raises SensorgenError where there is none."""
+    return execute(plan(body, query.load(body.design), query.accuracy, query.law, query.tip))
 
 
 def rough_sensor(body: Body, law: str = "", tip: Tip = FLAT) -> SensorModel:

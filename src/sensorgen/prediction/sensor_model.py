@@ -9,35 +9,12 @@ from sensorgen.design.body import Body
 from sensorgen.design.values import ENDS, MaterialValue, of_all_materials, piezoresistance
 from sensorgen.design.values import film as film_of
 from sensorgen.models import pressure
-from sensorgen.models.sensor import UNIFORM, Sensor
+from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.compression_law import Law, gap_m, law_of
 from sensorgen.prediction.losses import Lost, lost
 from sensorgen.prediction.mesh_ladder import Piece
+from sensorgen.prediction.query import FLAT, Tip
 from sensorgen.prediction.rest_state import RestState, rest_state
-
-TIP_M = 0.01  # thesis, Table C.1: L_press
-
-
-@dataclass(frozen=True)
-class Tip:
-    """What presses.
-
-    Attributes
-    ----------
-    length_m : float
-        Along the sensor [m].
-    profile : str
-        How its pressure is spread: one of :data:`sensorgen.models.pressure.PROFILES`.
-    radius_m : float or None
-        Of a hard round tip, whose contact grows with the force up to ``length_m`` [m]; None where all of it touches.
-    """
-
-    length_m: float = TIP_M
-    profile: str = UNIFORM
-    radius_m: float | None = None
-
-
-FLAT = Tip()  # the default
 
 
 @dataclass(frozen=True)

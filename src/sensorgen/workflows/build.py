@@ -16,12 +16,13 @@ from sensorgen.core.errors import Unprintable
 from sensorgen.core.version import __version__
 from sensorgen.design import materials, printer
 from sensorgen.design.design import Design
-from sensorgen.export import slicing, threemf
+from sensorgen.export import threemf
 from sensorgen.export.slicers import cura, prusa
+from sensorgen.export.slicers.loads import loads
+from sensorgen.export.threemf.part import parts_of
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, to_json
-from sensorgen.scene.geometry.cad import CadProcess
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
 LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")
@@ -88,7 +89,11 @@ def build(
     """
     folder = out / design.name
     with ExitStack() as stack:
-        kernel = stack.enter_context(CadProcess()) if cad else None  # its import runs beside everything below
+        kernel = None
+        if cad:
+            from sensorgen.scene.geometry.cad import CadProcess
+
+            kernel = stack.enter_context(CadProcess())  # its import runs beside everything below
         held = review(design, step)
         if held.errors(strict) and not force:
             raise Unprintable(held.findings)
@@ -114,7 +119,7 @@ def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> I
     for family in threemf.FAMILIES:
         yield (
             f"{name}.{family}.3mf",
-            threemf.content(family, name, slicing.parts(design, held.meshes), _centre_mm(design, family)),
+            threemf.content(family, name, parts_of(design, held.meshes), _centre_mm(design, family)),
         )
     step("profiles")
     for path, text in profiles(design).items():
@@ -150,15 +155,15 @@ def _await(job: "Future[None]", step: Step) -> None:
 
 def profiles(design: Design) -> dict[str, str]:
     """Slicer profiles, by file name: PrusaSlicer and Cura, for every quality that ships and the design's own."""
-    loads = slicing.loads(design)
+    found = loads(design)
     texts: dict[str, str] = {}
     # The design's own quality comes last: Cura's machine definition, one for all, then starts with it.
     others = (printer.load_quality(name) for name in QUALITIES if name != design.layers.name)
     for quality in (*others, design.layers):
         texts[f"profiles/prusa/{design.machine.name}-{quality.name}.ini"] = prusa.profile(
-            design.machine, quality, loads
+            design.machine, quality, found
         )
-        texts |= {f"profiles/cura/{path}": text for path, text in cura.profiles(design.machine, quality, loads).items()}
+        texts |= {f"profiles/cura/{path}": text for path, text in cura.profiles(design.machine, quality, found).items()}
     return texts
 
 

@@ -1,7 +1,6 @@
 """Predict a specimen's design and log the prediction before the specimen is measured."""
 
 import json
-from pathlib import Path
 
 from sensorgen.core.errors import MissingValue
 from sensorgen.design.design import Design
@@ -9,8 +8,6 @@ from sensorgen.measure.log import notes
 from sensorgen.measure.log.batches import prediction
 from sensorgen.measure.log.entries import Entry
 from sensorgen.measure.log.logbook import Log
-
-OUT = Path("out")  # folder of the designs' folders, where build and slice write
 
 
 def predict(log: Log, specimen: str) -> list[Entry]:
@@ -51,5 +48,5 @@ def predicted_row(design: Design) -> Entry:
     from sensorgen.prediction.evaluate import evaluate
     from sensorgen.prediction.results import to_json
 
-    predicted = evaluate(bodies.default_body(design, OUT / design.name))
+    predicted = evaluate(bodies.default_body(design))
     return prediction(design.id(), design.name, json.loads(to_json(predicted)))

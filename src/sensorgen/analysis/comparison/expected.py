@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.version import __version__
-from sensorgen.design.design import Design
+from sensorgen.design.body import Body
 from sensorgen.measure import log
-from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, from_json
 
@@ -71,17 +70,18 @@ class Predicted:
         return f"made afterwards by sensorgen {self.version}: none was stored before"
 
 
-def predicted(design: Design, stored: Sequence[log.Prediction] = ()) -> Predicted:
-    """The earliest prediction that the log has of a design, else one that is made now.
+def predicted(body: Body, stored: Sequence[log.Prediction] = ()) -> Predicted:
+    """The earliest prediction that the log has of a body's design, else one that is made now.
 
     Parameters
     ----------
-    design : Design
-        That was printed.
+    body : Body
+        That was measured.
     stored : sequence of log.Prediction
         The log's predictions of this very design.
     """
+    design = body.design
     first = min(stored, key=lambda p: p.number, default=None)
     if first:
         return Predicted(design.name, design.id(), from_json(first.data), first.logged_at, first.version)
-    return Predicted(design.name, design.id(), evaluate(bodies.default_body(design)), "", __version__)
+    return Predicted(design.name, design.id(), evaluate(body), "", __version__)

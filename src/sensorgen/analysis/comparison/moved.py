@@ -6,11 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
-from sensorgen.design.design import Design, make
+from sensorgen.design.body import Body
+from sensorgen.design.design import make
 from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import bodies
-from sensorgen.prediction.evaluate import sensor_model
+from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import SensorModel
 
@@ -20,25 +21,25 @@ FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)  # of permittivity or film at which the cap
 
 @dataclass(frozen=True, eq=False)
 class Movable:
-    """A design's sensor that parameters can be moved of.
+    """A body's sensor that parameters can be moved of.
 
     Attributes
     ----------
-    design : Design
-        As drawn.
+    body : Body
+        That was measured.
     """
 
-    design: Design
+    body: Body
 
     @cached_property
     def model(self) -> SensorModel:
-        """Of the print, as predicted; raises as :func:`sensorgen.prediction.evaluate.sensor_model`."""
-        return sensor_model(bodies.default_body(self.design))[0]
+        """As predicted; raises as :func:`sensorgen.prediction.planning.sensor_model`."""
+        return sensor_model(self.body)[0]
 
     @property
     def film(self) -> str:
         """Name of the film's material."""
-        return self.design.slot("film")[0].name
+        return self.body.design.slot("film")[0].name
 
     @cached_property
     def permittivity(self) -> float:
@@ -47,10 +48,7 @@ class Movable:
 
     def capacitance_f(self, permittivity: float) -> float:
         """With another permittivity of the film's material [F]."""
-        data = self.design.model_dump(exclude_defaults=True, mode="json")
-        values = data.get("material_values", {})
-        own = values.get(self.film, {}) | {PERMITTIVITY: permittivity}
-        return _capacitance_f(make(data | {"material_values": values | {self.film: own}}))
+        return rest_state(self.body.with_values({self.film: {PERMITTIVITY: permittivity}})).capacitance.value
 
     @cached_property
     def by_permittivity(self) -> tuple[Real, Real]:
@@ -63,8 +61,8 @@ class Movable:
 
         A print has whole layers, so that its capacitance jumps with the film that is asked for.
         """
-        data = self.design.model_dump(exclude={"name"}, exclude_defaults=True, mode="json")
-        d = getattr(self.design.params, "dielectric_mm", 0.0)
+        data = self.body.design.model_dump(exclude={"name"}, exclude_defaults=True, mode="json")
+        d = getattr(self.body.design.params, "dielectric_mm", 0.0)
         if not d:
             return np.log(FACTORS), np.zeros(len(FACTORS))
 
@@ -77,10 +75,6 @@ class Movable:
 
 def _curve(at: Callable[[float], float], known: float) -> tuple[Real, Real]:
     return np.log(FACTORS), np.log([at(k) / known if k != 1 else 1.0 for k in FACTORS])
-
-
-def _capacitance_f(design: Design) -> float:
-    return rest_state(bodies.default_body(design)).capacitance.value
 
 
 def moved(sensor: Sensor, resistivity: float = 1.0, capacitance: float = 1.0, leak_s: float = 0.0) -> Sensor:

@@ -1,15 +1,18 @@
 """Specimens of an iteration: readings, designs, predictions and verdicts, row by row; and what cannot be compared."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, log, nan
 
 from sensorgen.analysis.comparison.expected import Predicted, predicted
 from sensorgen.core.errors import SensorgenError
+from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
 from sensorgen.design.specimen_name import Specimen, design_of, parse
-from sensorgen.measure.log import Log, Prediction, Reading
+from sensorgen.measure.log import Log, Reading
+from sensorgen.measure.log.batches import designs as on_beds
 from sensorgen.measure.signal.verdicts import Evidence, Verdict, expected_from, verdict
+from sensorgen.prediction import bodies
 
 
 @dataclass(frozen=True)
@@ -54,8 +57,8 @@ class Comparison:
     ----------
     rows : tuple of Compared
         One for each reading, in the order of the log.
-    designs : mapping of str to Design
-        Every design that is known, by name.
+    bodies : mapping of str to Body
+        What was measured, by the design's name.
     names : mapping of str to str
         The design's name by the specimen's.
     predictions : mapping of str to Predicted
@@ -65,7 +68,7 @@ class Comparison:
     """
 
     rows: tuple[Compared, ...]
-    designs: Mapping[str, Design]
+    bodies: Mapping[str, Body]
     names: Mapping[str, str]
     predictions: Mapping[str, Predicted]
     left_out: tuple[tuple[str, str], ...]
@@ -76,7 +79,9 @@ class Comparison:
         return tuple({row.reading.specimen: row for row in self.rows}.values())
 
 
-def of_iteration(log: Log, iteration: int, step: Callable[[str], None] = lambda _: None) -> Comparison:
+def of_iteration(
+    log: Log, iteration: int, step: Callable[[str], None] = lambda _: None, body_of: BodyOf = bodies.default_body
+) -> Comparison:
     """Everything in the log about an iteration, compared.
 
     Parameters
@@ -87,26 +92,33 @@ def of_iteration(log: Log, iteration: int, step: Callable[[str], None] = lambda 
         Of the design.
     step : callable
         Called with the name of each design before it is predicted.
+    body_of : callable
+        Makes the body of a design.
     """
     readings = log.readings(iteration=iteration)
     left_out: list[tuple[str, str]] = [
         (f"reading {old.number}, {old.specimen}", "a later reading corrects it") for old in _corrected(log, iteration)
     ]
-    by_specimen = _by_specimen(log, iteration, left_out)
+    printed = {row.specimen: row.design_id for row in log.prints()}
+    by_specimen = _by_specimen(log, iteration, printed, left_out)
     names = {specimen: design.name for specimen, design in by_specimen.items()}
     designs = dict(sorted((design.name, design) for design in by_specimen.values()))
-    left_out += _other_designs(readings, designs.values())
-    found = {}
+    ids = {name: {design.id()} for name, design in designs.items()}
+    for specimen in by_specimen.keys() & printed.keys():
+        ids[names[specimen]].add(printed[specimen])  # another version of sensorgen may have named it
+    left_out += _other_designs(readings, set().union(*ids.values()))
+    measured, found = {}, {}
     for name, design in designs.items():
         step(name)
-        found[name] = predicted(design, _stored(log, design))
+        measured[name] = body_of(design)
+        found[name] = predicted(measured[name], [p for each in ids[name] for p in log.predictions(design_id=each)])
     evidence = [_evidence(reading, found.get(names.get(reading.specimen, ""))) for reading in readings]
     usual = {shape: expected_from([e for e in evidence if e.shape == shape]) for shape in {e.shape for e in evidence}}
     rows = []
     for reading, of in zip(readings, evidence, strict=True):
         known = replace(of, expected_ohm=usual[of.shape])
         rows.append(Compared(reading, found.get(names.get(reading.specimen, "")), known, verdict(known)))
-    return Comparison(tuple(rows), designs, names, found, tuple(left_out + list(_unused(rows))))
+    return Comparison(tuple(rows), measured, names, found, tuple(left_out + list(_unused(rows))))
 
 
 def _corrected(log: Log, iteration: int) -> Iterator[Reading]:
@@ -115,11 +127,17 @@ def _corrected(log: Log, iteration: int) -> Iterator[Reading]:
     yield from (r for r in every if r.number not in current)
 
 
-def _by_specimen(log: Log, iteration: int, left_out: list[tuple[str, str]]) -> dict[str, Design]:
-    """The designs that the specimens' names stand for, each made once."""
+def _by_specimen(
+    log: Log, iteration: int, printed: Mapping[str, str], left_out: list[tuple[str, str]]
+) -> dict[str, Design]:
+    """The designs that the specimens were printed of: from their print bed, else what their names stand for."""
     found: dict[str, Design] = {}
+    recorded = on_beds(log)
     made: dict[Specimen, Design | None] = {}
     for specimen in log.specimens(iteration=iteration):
+        if printed.get(specimen.specimen) in recorded:
+            found[specimen.specimen] = recorded[printed[specimen.specimen]]
+            continue
         try:
             kind = replace(parse(specimen.specimen), iteration=None, replicate=None, place="")
             design = made[kind] if kind in made else made.setdefault(kind, design_of(kind))
@@ -133,9 +151,8 @@ def _by_specimen(log: Log, iteration: int, left_out: list[tuple[str, str]]) -> d
     return found
 
 
-def _other_designs(readings: Sequence[Reading], designs: Iterable[Design]) -> list[tuple[str, str]]:
+def _other_designs(readings: Sequence[Reading], known: Container[str]) -> list[tuple[str, str]]:
     """What the log says of designs that the names do not stand for."""
-    known = {design.id() for design in designs}
     others = {(r.design, r.design_id) for r in readings if r.design_id and r.design_id not in known}
     return [
         (f"design {name} ({uid})", "the log names it for a specimen whose name stands for another design, or for this "
@@ -144,16 +161,12 @@ def _other_designs(readings: Sequence[Reading], designs: Iterable[Design]) -> li
     ]  # fmt: skip
 
 
-def _stored(log: Log, design: Design) -> Sequence[Prediction]:
-    return log.predictions(design_id=design.id())
-
-
 def _evidence(reading: Reading, of: Predicted | None) -> Evidence:
     """Readings that a resistance can have; a slip below 0 is kept in the log, with a doubt."""
     ry, rz = (tuple(v for v in values if v >= 0) for values in (reading.y_ohm, reading.z_ohm))
     return Evidence(
         reading.specimen, ry, rz, nan, reading.shape, reading.film_mm, reading.remark,
-        str(reading.iteration or ""), of is not None and of.touches,
+        of is not None and of.touches,
     )  # fmt: skip
 
 

@@ -12,15 +12,17 @@ from sensorgen.analysis.comparison.runs import Run, runs
 from sensorgen.analysis.fit import resistance, tones
 from sensorgen.analysis.fit.results import Error, Fit, Fitted, Untold
 from sensorgen.core.errors import BadInput, SensorgenError
-from sensorgen.design.design import Design, make
+from sensorgen.design.body import Body, BodyOf
+from sensorgen.design.design import Design
 from sensorgen.measure.log import Log
+from sensorgen.prediction import bodies
 
 HELD_BACK = 0.25  # of the specimens
 SEED = 23
 _ACROSS = Untold("resistivity_ohm_m across", "nothing was measured across the electrodes: R_Y and Re Z run along them")
 
 
-def fit(log: Log, iteration: int, seed: int = SEED) -> Fit:
+def fit(log: Log, iteration: int, seed: int = SEED, body_of: BodyOf = bodies.default_body) -> Fit:
     """Fit material values to the readings and recordings of an iteration.
 
     Parameters
@@ -31,13 +33,15 @@ def fit(log: Log, iteration: int, seed: int = SEED) -> Fit:
         Of the design.
     seed : int
         Of the split between specimens that are fitted to and specimens that are held back.
+    body_of : callable
+        Makes the body of a design that the readings are of.
 
     Raises
     ------
     BadInput
         Nothing of that iteration in the log that a fit could use.
     """
-    found = of_iteration(log, iteration)
+    found = of_iteration(log, iteration, body_of=body_of)
     left_out = list(found.left_out)
     recorded = list(runs(log, iteration, left_out))
     usable = _usable(found)
@@ -51,7 +55,7 @@ def fit(log: Log, iteration: int, seed: int = SEED) -> Fit:
     values, untold = _fitted(
         [allowed for row, allowed in usable if row.reading.specimen not in kept_back],
         _of_runs([run for run in recorded if run.entry.specimen not in kept_back], found, left_out),
-        next(iter(found.designs.values())), seed,
+        next(iter(found.bodies.values())).design, seed,
     )  # fmt: skip
     errors = [
         *_reading_errors([row for row, _ in usable if row.reading.specimen in kept_back], found, values),
@@ -65,7 +69,7 @@ def fit(log: Log, iteration: int, seed: int = SEED) -> Fit:
 
 def _usable(found: Comparison) -> list[tuple[Compared, resistance.Allowed]]:
     rows = [row for row in found.rows if row.predicted]
-    pairs = [(row, resistance.allowed(row, found.designs[row.predicted.design])) for row in rows if row.predicted]
+    pairs = [(row, resistance.allowed(row, found.bodies[row.predicted.design])) for row in rows if row.predicted]
     return [(row, allowed) for row, allowed in pairs if allowed]
 
 
@@ -84,17 +88,17 @@ def _of_runs(recorded: Sequence[Run], found: Comparison, left_out: list[tuple[st
     fits = []
     for run in recorded:
         try:
-            fits.append(tones.of_run(run, Movable(_design(found, run.entry.specimen))))
+            fits.append(tones.of_run(run, Movable(_body(found, run.entry.specimen))))
         except SensorgenError as error:
             left_out.append((run.name, str(error)))
     return fits
 
 
-def _design(found: Comparison, specimen: str) -> Design:
+def _body(found: Comparison, specimen: str) -> Body:
     name = found.names.get(specimen)
     if name is None:
         raise BadInput(f"no design is known of {specimen}")
-    return found.designs[name]
+    return found.bodies[name]
 
 
 def _fitted(
@@ -119,20 +123,19 @@ def _fitted(
     return list(best.values()), [_ACROSS, *untold]
 
 
-def with_values(design: Design, values: Sequence[Fitted]) -> Design:
-    """A design with fitted values in place of those of its sources."""
+def with_values(body: Body, values: Sequence[Fitted]) -> Body:
+    """A body with fitted values in place of those of its sources."""
     own: dict[str, dict[str, float]] = {}
     for value in values:
         own.setdefault(value.material, {})[value.quantity] = value.value
-    data = design.model_dump(exclude_defaults=True, mode="json")
-    return make(data | {"material_values": data.get("material_values", {}) | own})
+    return body.with_values(own)
 
 
 def _reading_errors(rows: Sequence[Compared], found: Comparison, values: Sequence[Fitted]) -> list[Error]:
     if not rows:
         return []
     names = {row.predicted.design for row in rows if row.predicted}
-    after = {name: predicted(with_values(found.designs[name], values)).ry_ohm for name in names}
+    after = {name: predicted(with_values(found.bodies[name], values)).ry_ohm for name in names}
     residuals = []
     for row in rows:
         expected = after[row.predicted.design] if row.predicted else None
@@ -150,8 +153,8 @@ def _run_errors(recorded: Sequence[Run], found: Comparison, values: Sequence[Fit
     after: list[float] = []
     for run in recorded:
         try:
-            design = _design(found, run.entry.specimen)
-            pair = [Movable(d).model.sensor for d in (design, with_values(design, values))]
+            body = _body(found, run.entry.specimen)
+            pair = [Movable(b).model.sensor for b in (body, with_values(body, values))]
         except SensorgenError:
             continue
         f, measured = run.recording.tones_hz, np.log(run.rest_ohm)

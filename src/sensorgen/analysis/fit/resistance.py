@@ -12,14 +12,13 @@ from math import exp, isfinite, log
 import numpy as np
 
 from sensorgen.analysis.comparison import Compared
-from sensorgen.analysis.comparison.leaky import electrode_and_leak
 from sensorgen.analysis.fit.results import LEVEL, Fitted, Untold
 from sensorgen.core.units import M_PER_MM
-from sensorgen.design.design import Design
+from sensorgen.design.body import Body
 from sensorgen.design.materials import FILM_LEAK
 from sensorgen.design.values import resistivities
 from sensorgen.measure.recording.samples import Real
-from sensorgen.prediction import bodies
+from sensorgen.measure.signal.leakage import electrode_and_leak
 from sensorgen.prediction.electrodes import electrode_resistance
 
 RESISTIVITY = "resistivity_ohm_m"
@@ -37,20 +36,20 @@ class Allowed:
     leak: float
 
 
-def allowed(row: Compared, design: Design) -> Allowed | None:
+def allowed(row: Compared, body: Body) -> Allowed | None:
     """What a reading allows; None where it is none of a sound electrode."""
     ry, rz = row.verdict.ry_ohm, row.verdict.rz_ohm
     if row.verdict.electrode != "sound" or not (isfinite(ry) and ry > 0):
         return None
-    per = _per_resistivity(design)
+    per, design = _per_resistivity(body), body.design
     highest, leak = electrode_and_leak(ry, rz) if rz > 0 else (ry, float("nan"))
     area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
     return Allowed(log(ry / per[1]), log(highest / per[0]), log(leak / area) if leak > 0 else float("nan"))
 
 
-def _per_resistivity(design: Design) -> tuple[float, float]:
+def _per_resistivity(body: Body) -> tuple[float, float]:
     """Bounds of an electrode's resistance over its resistivity [1/m]."""
-    body, rho = bodies.default_body(design), resistivities(design)
+    rho = resistivities(body.design)
     found = [
         end / rho[name].value
         for name, r in electrode_resistance(body).items()

@@ -121,7 +121,7 @@ def _resistivity(fits: Sequence[OfRun]) -> list[Fitted | Untold]:
     factors = [(fit.resistivity[0] + log(fit.of.model.sensor.common_resistivity_ohm_m()), fit.resistivity[1])
                for fit in fits]  # fmt: skip
     at, error = _together(factors)
-    material = fits[0].of.design.slot("top_electrode")[0].name
+    material = fits[0].of.body.design.slot("top_electrode")[0].name
     if error > _UNSURE:
         return [Untold("resistivity_ohm_m", f"Re Z of {len(fits)} recordings leaves a factor of {exp(error):.3g} open")]
     return [Fitted(material, "resistivity_ohm_m", *_interval(at, error),

@@ -5,14 +5,15 @@ from dataclasses import dataclass
 from math import nan
 from typing import Annotated
 
-from sensorgen.analysis.comparison import Comparison, Predicted
+from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, Body, Curve, Figure, Panel
 from sensorgen.checks.review import draw, review
 from sensorgen.core.document import Column, Table
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import materials
 from sensorgen.design.design import Design
-from sensorgen.prediction.identifiability import FORCE_N, Identifiability
+from sensorgen.prediction.identifiability.results import Identifiability
+from sensorgen.prediction.query import FORCE_N
 from sensorgen.scene.geometry.meshes import mesh
 
 _STRETCH = (1.0, 1.0, 10.0)
@@ -52,38 +53,30 @@ class IdentifiabilityRow:
 
 def variants(found: Comparison) -> tuple[Variant, ...]:
     """Every variant that a specimen was printed of."""
-    return tuple(
-        Variant(name, design.id(), draw(design, review(design)), _words(found.predictions[name]))
-        for name, design in found.designs.items()
-    )
-
-
-def _words(of: Predicted) -> str:
-    r, c = of.ry_ohm, of.capacitance_f
-    parts = [
-        f"electrode resistance {r.lower:.4g} to {r.upper:.4g} ohm" if r else "electrode resistance unknown",
-        f"capacitance {c.lower / _F_PER_PF:.4g} to {c.upper / _F_PER_PF:.4g} pF"
-        if c
-        else f"no capacitance: {of.reason}",
-        of.provenance,
-    ]
-    return "; ".join(parts)
+    made = []
+    for name, body in found.bodies.items():
+        of, design = found.predictions[name], body.design
+        r, c = of.ry_ohm, of.capacitance_f
+        words = (
+            f"electrode resistance {r.lower:.4g} to {r.upper:.4g} ohm" if r else "electrode resistance unknown",
+            f"capacitance {c.lower / _F_PER_PF:.4g} to {c.upper / _F_PER_PF:.4g} pF" if c
+            else f"no capacitance: {of.reason}", of.provenance,
+        )  # fmt: skip
+        made.append(Variant(name, design.id(), draw(design, review(design)), "; ".join(words)))
+    return tuple(made)
 
 
 def identifiability(found: Comparison) -> tuple[Table, ...]:
     """A row for each variant with a prediction."""
-    rows = tuple(_row(name, of.prediction.identifiability, of.reason) for name, of in found.predictions.items())
+    rows = []
+    for name, of in found.predictions.items():
+        card = of.prediction.identifiability
+        known = (card.sigma_force_n, card.sigma_position_m, card.correlation) if card else (None, None, None)
+        force, place, together = (nan if value is None else value for value in known)
+        verdict = card.verdict if card else of.reason or "no prediction"
+        rows.append(IdentifiabilityRow(name, force, place / M_PER_MM, together, verdict))
     caption = f"Predicted identifiability of {FORCE_N:g} N in the middle, by seven frequencies (Cramér-Rao)"
     return (Table.of("identifiability", caption, rows),) if rows else ()
-
-
-def _row(name: str, found: Identifiability | None, reason: str) -> IdentifiabilityRow:
-    if found is None:
-        return IdentifiabilityRow(name, nan, nan, nan, reason or "no prediction")
-    force, place, together = (
-        nan if value is None else value for value in (found.sigma_force_n, found.sigma_position_m, found.correlation)
-    )
-    return IdentifiabilityRow(name, force, place / M_PER_MM, together, found.verdict)
 
 
 def figures(found: Comparison) -> Iterator[Figure]:
@@ -96,13 +89,13 @@ def figures(found: Comparison) -> Iterator[Figure]:
             "Least standard error (Cramér-Rao) of force above, of position below, over the position of the load, for "
             "the frequencies and noise of the prediction. Dashed: required. Gaps: undefined.", known, "variant",
         )  # fmt: skip
-    if found.designs:
+    if found.bodies:
         axes = Axis("x [mm]"), Axis("y [mm]"), Axis("z [mm]")
         yield Figure(
             "bodies", f"Bodies, height x {_STRETCH[2]:g}",
             "The bodies of the chosen variant, to be turned with the mouse, their height enlarged. The drawings show "
             "them in section.",
-            {name: (Panel(tuple(_bodies(design)), *axes),) for name, design in found.designs.items()}, "variant",
+            {name: (Panel(tuple(_bodies(body.design)), *axes),) for name, body in found.bodies.items()}, "variant",
             stretch=_STRETCH,
         )  # fmt: skip
 

@@ -1,7 +1,7 @@
 """Check of a G-code file on a simulated printer: faults, time, filament."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from sensorgen.core.findings import SEVERITIES
@@ -31,7 +31,7 @@ class Checked:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, for JSON."""
-        return {"findings": [f.as_dict() for f in self.findings], **self.report.as_dict()}
+        return {"findings": [asdict(f) for f in self.findings], **asdict(self.report)}
 
 
 def check(

@@ -1,8 +1,7 @@
 """What a check of G-code has found, as plain data: the form of :class:`sensorgen.core.findings.Finding`, with lines."""
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 from sensorgen.core.findings import SEVERITIES
 
@@ -34,14 +33,17 @@ class Found:
     advice: str
     count: int = 1
 
-    def as_dict(self) -> dict[str, Any]:
-        """The finding, for JSON."""
-        return asdict(self)
 
+class Findings(list[Found]):
+    """Findings of a check as it goes on."""
 
-def error(rule: str, line: int, message: str, advice: str) -> Found:
-    """A finding that refuses the file."""
-    return Found(rule, "error", line, message, advice)
+    def error(self, rule: str, line: int, message: str, advice: str) -> None:
+        """Add a finding that refuses the file."""
+        self.append(Found(rule, "error", line, message, advice))
+
+    def warning(self, rule: str, line: int, message: str, advice: str) -> None:
+        """Add a finding that does not."""
+        self.append(Found(rule, "warning", line, message, advice))
 
 
 def merged(found: Iterable[Found]) -> list[Found]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.design.printer import Printer
-from sensorgen.export.gcode.found import Found, error
+from sensorgen.export.gcode.found import Found
 from sensorgen.export.gcode.moves import NO_TOOL, Motion
 from sensorgen.export.gcode.words import Command
 
@@ -48,7 +48,9 @@ def check_loaded(motion: Motion, loaded: Mapping[int, str]) -> Iterator[Found]:
     for tool in np.setdiff1d(tools[motion.extruded_mm > 0], [NO_TOOL, *loaded]).astype(int).tolist():
         number = int(motion.number[np.flatnonzero((tools == tool) & (motion.extruded_mm > 0))[0]])
         known = ", ".join(f"{name} on {one}" for one, name in loaded.items())
-        yield error("tool", number, f"tool {tool} prints, and nothing is on it; loaded are {known}", "use another tool")
+        yield Found(
+            "tool", "error", number, f"tool {tool} prints, and nothing is on it; loaded are {known}", "use another tool"
+        )
 
 
 def _found(motion: Motion, wrong: Mask, rule: str, severity: str, message: str, advice: str) -> Iterator[Found]:

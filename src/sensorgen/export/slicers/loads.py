@@ -1,12 +1,17 @@
 """What each tool prints, as numbers that the printer can do: the one source of every profile."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
+from sensorgen.design.design import Design, Infill
 from sensorgen.design.materials import Material
-from sensorgen.design.printer import Printer, Quality
+from sensorgen.design.printer import Printer, Quality, folder
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 PATTERNS = ("rectilinear", "grid", "concentric", "honeycomb", "triangles")
 RETRACTION_SPEED_MM_S = 40.0  # PrusaSlicer's default; slower where the printer's extruder is
@@ -20,6 +25,17 @@ class Load:
     source: str = ""
     infill_percent: float | None = None
     infill_pattern: str | None = None
+
+
+def load(design: Design, name: str) -> Load:
+    """What the tool of a material prints for a design."""
+    infill = design.infill.get(name, Infill())
+    return Load(design.material(name), design.used()[name], infill.percent, infill.pattern)
+
+
+def loads(design: Design) -> dict[int, Load]:
+    """What each tool prints for a design, by the printer's own tool number."""
+    return {design.tool(name): load(design, name) for name in design.used()}
 
 
 @dataclass(frozen=True)
@@ -38,6 +54,16 @@ class Recipe:
     flow_percent: float
     retraction_mm: float
     retraction_speed_mm_s: float
+
+    @property
+    def label(self) -> str:
+        """Material and source."""
+        return f"{self.material.name}@{self.source}" if self.source else self.material.name
+
+    @property
+    def slow_speed_mm_s(self) -> float:
+        """Slowest speed of layers that must cool [mm/s]."""
+        return min(10.0, self.speed_mm_s)
 
 
 def recipe(printer: Printer, quality: Quality, tool: int, load: Load) -> Recipe:
@@ -121,6 +147,18 @@ def by_hand(material: Material) -> list[str]:
     if "cam_dial" in material.print:
         found.insert(0, f"Cam dial of the extruder: {number(material.value('cam_dial').value)}")
     return found
+
+
+def templates(slicer: str, **filters: Callable[..., str]) -> "Environment":
+    """The profile templates of a slicer; ``n`` writes numbers."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    made = Environment(  # noqa: S701 - plain text; XML and JSON are escaped by filters
+        loader=FileSystemLoader(folder() / slicer), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )  # fmt: skip
+    made.filters |= {"n": number, **filters}
+    return made
 
 
 def number(value: float) -> str:

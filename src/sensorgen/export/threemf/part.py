@@ -9,6 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.design import materials
+from sensorgen.design.design import Design
+from sensorgen.export.slicers.loads import load
+from sensorgen.export.slicers.prusa import volume_settings
 from sensorgen.scene.geometry.mesh import Mesh
 
 # What XML 1.0 cannot carry, not even escaped; and line breaks and tabs, whose escapes lib3mf refuses.
@@ -68,30 +72,26 @@ def check(title: str, parts: Sequence[Part], centre_mm: tuple[float, float]) -> 
         raise BadInput("no bodies to write: a 3MF needs at least one")
     if not all(math.isfinite(c) for c in centre_mm):
         raise OutOfRange(f"centre {centre_mm} mm on the bed is not finite")
-    _check_text("title", title)
-    for part in parts:
-        _check_words(part)
-        _check_mesh(part)
     names = [part.name for part in parts]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise BadInput(f"two bodies are called {twice[0]!r}: name each body once")
-
-
-def _check_text(what: str, text: str) -> None:
-    if wrong := _NOT_XML.search(text):
-        raise BadInput(f"{what} {text!r} has the character {wrong[0]!r}, which a 3MF cannot hold: remove it")
-
-
-def _check_words(part: Part) -> None:
-    for what in ("name", "material"):
-        _check_text(what, getattr(part, what))
-    for text in (*part.settings.keys(), *part.settings.values()):
-        _check_text(f"setting of body {part.name!r}", text)
-    if not re.fullmatch("#[0-9a-fA-F]{6}", part.colour):
-        raise BadInput(f"colour {part.colour!r} of body {part.name!r} is not of the form #rrggbb")
-    if part.extruder < 0:
-        raise OutOfRange(f"extruder {part.extruder} of body {part.name!r} is below 0: slicers count from 0")
+    texts = [("title", title)]
+    for part in parts:
+        settings = (*part.settings.keys(), *part.settings.values())
+        texts += [
+            ("name", part.name),
+            ("material", part.material),
+            *((f"setting of body {part.name!r}", s) for s in settings),
+        ]
+        if not re.fullmatch("#[0-9a-fA-F]{6}", part.colour):
+            raise BadInput(f"colour {part.colour!r} of body {part.name!r} is not of the form #rrggbb")
+        if part.extruder < 0:
+            raise OutOfRange(f"extruder {part.extruder} of body {part.name!r} is below 0: slicers count from 0")
+        _check_mesh(part)
+    for what, text in texts:
+        if wrong := _NOT_XML.search(text):
+            raise BadInput(f"{what} {text!r} has the character {wrong[0]!r}, which a 3MF cannot hold: remove it")
 
 
 def _check_mesh(part: Part) -> None:
@@ -110,3 +110,29 @@ def _check_mesh(part: Part) -> None:
 def escaped(text: str) -> str:
     """Text for XML, also within double quotes; without references by number, which lib3mf refuses."""
     return html.escape(text, quote=False).replace('"', "&quot;")
+
+
+def parts_of(design: Design, made: Mapping[str, Mesh]) -> list[Part]:
+    """Bodies of a design, in the sensor's coordinates.
+
+    Parameters
+    ----------
+    design : Design
+        The design.
+    made : mapping of str to Mesh
+        Mesh of each body, by its name [mm].
+    """
+    return [part_of(design, body.name, body.material, made[body.name]) for body in design.printed.bodies]
+
+
+def part_of(design: Design, name: str, material: str, mesh: Mesh) -> Part:
+    """One body, with the tool that the design gives its material."""
+    tool, found = design.tool(material), materials.load(material)
+    return Part(
+        name=name,
+        material=found.title,
+        colour=found.colour,
+        extruder=design.machine.slicer_index(tool),
+        mesh=mesh,
+        settings=volume_settings(design.machine, design.layers, tool, load(design, material)),
+    )

@@ -2,18 +2,23 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.core.records import Strict, checked
 from sensorgen.core.version import __version__
+from sensorgen.design.design import Design, of_resolved
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log import notes
 from sensorgen.measure.log.entries import Batch, Entry, Prediction, Print, RawFile
 from sensorgen.measure.log.verify import prediction_uid
+
+if TYPE_CHECKING:
+    from sensorgen.measure.log.logbook import Log
 
 MOST_BYTES = 64_000_000
 
@@ -79,6 +84,17 @@ def _piece(batch: str, name: str, piece: _Piece, record: _Record) -> Iterator[En
         printed = {slicer: used.printed[piece.design_id] for slicer, used in slicers
                    if used.printed and piece.design_id in used.printed}  # fmt: skip
         yield prediction(piece.design_id, piece.design, piece.expected | ({"printed": printed} if printed else {}))
+
+
+def designs(log: "Log") -> dict[str, Design]:
+    """Designs on the log's print beds, by their identity when they were printed; without those that cannot be read."""
+    found = {}
+    for batch in log.batches():
+        with suppress(SensorgenError):
+            for key, entry in _json(log.raw(batch.file)).get("designs", {}).items():
+                with suppress(SensorgenError, KeyError, TypeError):
+                    found[key] = of_resolved(entry["name"], entry["resolved"])
+    return found
 
 
 def prediction(design_id: str, design: str, data: Mapping[str, Any]) -> Prediction:

@@ -12,8 +12,8 @@ from sensorgen.design.values import MaterialValue
 from sensorgen.models.sensor import Sensor
 from sensorgen.models.stack import Film, Press, Stack, Track
 from sensorgen.prediction import bodies
-from sensorgen.prediction.evaluate import Query, sensor_model
-from sensorgen.prediction.sensor_model import TIP_M, Tip
+from sensorgen.prediction.planning import sensor_model
+from sensorgen.prediction.query import TIP_M, Query, Tip
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def stacked(
     Raises
     ------
     SensorgenError
-        As :func:`sensorgen.prediction.evaluate.sensor_model`.
+        As :func:`sensorgen.prediction.planning.sensor_model`.
     """
     found = [sensor_model(body(half), Query(tip=Tip(tip_m), law=law))[0] for half in halves(design)]
     lower, upper = found[0], found[-1]

@@ -12,9 +12,9 @@ import numpy as np
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import compression
 from sensorgen.models.compression import Plate
-from sensorgen.prediction.identifiability.fisher import Bounds, Setup
+from sensorgen.prediction.identifiability.fisher import Bounds, Setup, standard_errors
 from sensorgen.prediction.identifiability.frequencies import spread
-from sensorgen.prediction.identifiability.results import ChangeResult, standard_errors
+from sensorgen.prediction.identifiability.results import ChangeResult
 from sensorgen.prediction.identifiability.verdict import Required
 
 SHOWN = 3

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.identifiability.results import StandardErrors, finite
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -187,3 +188,12 @@ def _beside(a: Complex, b: Complex) -> Complex:
     """Component of a orthogonal to b; a itself where b is 0."""
     length = _dot(b, b)
     return np.asarray(a - (_dot(a, b) / np.where(length == 0, 1.0, length))[..., None] * b)
+
+
+def standard_errors(limits: Bounds) -> StandardErrors:
+    """Bounds of one press, None where they are undefined."""
+    return StandardErrors(
+        sigma_force_n=finite(limits.force_n),
+        sigma_position_m=finite(limits.position_m),
+        correlation=finite(limits.correlation),
+    )

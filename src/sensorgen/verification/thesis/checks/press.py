@@ -8,7 +8,7 @@ from sensorgen.design import design as designs
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction.bodies import drawn
-from sensorgen.prediction.evaluate import TONES_HZ
+from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
 from sensorgen.verification.thesis.verdicts import Part
 
@@ -23,54 +23,50 @@ _LOW_AND_HIGH_HZ = np.array([TONES_HZ[0], TONES_HZ[-1]])
 
 def _pressed(
     shape: str, *, parameters: dict[str, float], base: str = "bonded", period: str = "fixed"
-) -> compressed.Data:
+) -> compressed.CompressionResult:
     """A cell under 100 kPa, of the cache where it was solved before."""
     made = designs.make({"shape": shape, "parameters": parameters})
     found = compressed.answer(
         drawn(made), compressed.Asked((0.0, _KPA), compressed.BoundaryConditions(base=base, period=period))
     )
-    if found["faults"]:
-        raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {found['faults'][0]}")
+    if found.faults:
+        raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {found.faults[0]}")
     return found
 
 
-def _moved_m(found: compressed.Data) -> float:
-    return float(found["displacement_um"][-1]) * _M_PER_UM
+def _top(name: str, moved: compressed.CompressionResult, thesis_mm: float) -> Part:
+    """How far the top of a cell moves, against what the thesis has."""
+    ours = float(moved.displacement_um[-1]) * _M_PER_UM
+    return Part(name, "m", ours, thesis_mm * M_PER_MM, shown=_SHOWN)
 
 
-def triangles(displacement_mm: float, film_mm: float) -> list[Part]:
-    """6.5: the triangular cell, base and period held."""
-    found = _pressed("tri", parameters={"dielectric_mm": film_mm})
-    return [Part("displacement of the top at 100 kPa", "m", _moved_m(found), displacement_mm * M_PER_MM, shown=_SHOWN)]
-
-
-def triangles_free(displacement_mm: float, film_mm: float) -> list[Part]:
-    """6.8: the same on a base that slides, its period free to widen."""
-    found = _pressed("tri", parameters={"dielectric_mm": film_mm}, base="sliding", period="free")
-    return [Part("displacement of the top at 100 kPa", "m", _moved_m(found), displacement_mm * M_PER_MM, shown=_SHOWN)]
+def triangles(displacement_mm: float, film_mm: float, base: str = "bonded", period: str = "fixed") -> list[Part]:
+    """6.5: the triangular cell, base and period held; 6.8: on a base that slides, its period free to widen."""
+    found = _pressed("tri", parameters={"dielectric_mm": film_mm}, base=base, period=period)
+    return [_top("displacement of the top at 100 kPa", found, displacement_mm)]
 
 
 def rectangles(displacement_mm: float, film_mm: float) -> list[Part]:
     """6.9: the rectangular cell, in three dimensions, base and period held."""
     found = _pressed("rect", parameters={"dielectric_mm": film_mm})
-    return [Part("displacement of the top at 100 kPa", "m", _moved_m(found), displacement_mm * M_PER_MM, shown=_SHOWN)]
+    return [_top("displacement of the top at 100 kPa", found, displacement_mm)]
 
 
 def plates(two_mm: float, three_mm: float) -> list[Part]:
     """6.11: the plain plate, fixed at its sides so that only its bulk deforms."""
-    ours = _moved_m(_pressed("reference", parameters={}))
-    return [
-        Part("2D", "m", ours, two_mm * M_PER_MM, shown=_SHOWN),
-        Part("3D", "m", ours, three_mm * M_PER_MM, shown=_SHOWN),
-    ]
+    found = _pressed("reference", parameters={})
+    return [_top("2D", found, two_mm), _top("3D", found, three_mm)]
 
 
 def gain(rise_f: float, film_mm: float) -> list[Part]:
     """6.12: by how much the capacitance of the triangular cell rises."""
     found = _pressed("tri", parameters={"dielectric_mm": film_mm})
-    rest, last = ((found["lower_f_per_m2"][k] + found["upper_f_per_m2"][k]) / 2 for k in (0, -1))
+    lower, upper = np.array(found.lower_f_per_m2, float), np.array(found.upper_f_per_m2, float)
+    rest, *_, last = (lower + upper) / 2
     return [
-        Part("rise of C at 100 kPa, 2 mm by 20 mm", "F", (last - rest) * _DEPTH_M * _PERIOD_M, rise_f, shown=_SHOWN)
+        Part(
+            "rise of C at 100 kPa, 2 mm by 20 mm", "F", float(last - rest) * _DEPTH_M * _PERIOD_M, rise_f, shown=_SHOWN
+        )
     ]
 
 

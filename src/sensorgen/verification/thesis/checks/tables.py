@@ -6,8 +6,7 @@ from sensorgen.core.errors import MissingValue
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import materials, printer
 from sensorgen.design.shapes import reference
-from sensorgen.prediction.evaluate import TONES_HZ
-from sensorgen.prediction.sensor_model import TIP_M
+from sensorgen.prediction.query import TIP_M, TONES_HZ
 from sensorgen.verification.thesis.verdicts import Part
 
 _UNITS = {"_pa": "Pa", "_kg_m3": "kg/m3", "_c": "°C", "_percent": "%"}  # by the ending of a quantity

@@ -1,0 +1,270 @@
+"""Quantities of a prediction, each with its range: gap, capacitance, resistance, impedance, sensitivity, resolution."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from itertools import product
+from math import inf, isnan, nan, pi, prod
+
+import numpy as np
+
+from sensorgen.core.bounds import Bounds, Interval
+from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design.body import Body
+from sensorgen.design.values import material_value
+from sensorgen.models import line
+from sensorgen.models.compression import Compression
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.capacitance import Unpredictable
+from sensorgen.prediction.compression_law import at_a_few_pressures
+from sensorgen.prediction.electrodes import electrode_resistance
+from sensorgen.prediction.error_budget import ReferenceLoad, error_budget, material_ends
+from sensorgen.prediction.identifiability.fisher import Setup
+from sensorgen.prediction.identifiability.identify import identify
+from sensorgen.prediction.losses import Lost, lost
+from sensorgen.prediction.plan import Plan
+from sensorgen.prediction.planning import sensor_model
+from sensorgen.prediction.query import FORCE_N, Load, Query
+from sensorgen.prediction.rest_state import RestState, rest_state
+from sensorgen.prediction.results import SCHEMA, Impedance, Prediction
+from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
+from sensorgen.prediction.spread import spread
+
+_ASSUMED = "the cell was not solved, and is taken to deform as a solid plate"
+_PA_PER_KPA = 1e3
+_SAME = 0.05  # capacitances that differ by less are not told apart: solving takes seconds
+
+
+def prediction(body: Body, query: Query) -> Prediction:
+    """What a body should measure, computed now; parameters and errors as of :mod:`sensorgen.prediction.evaluate`."""
+    design, load = body.design, query.load(body.design)
+    found = Prediction(
+        SCHEMA, design.name, design.id(), body.provenance, "not predicted", load.force_n, load.position_m
+    )  # fmt: skip
+    try:
+        found = replace(found, gap=_gap(body))
+        model, plan, reason = _model(body, query)
+        rest = model.rest if model else rest_state(body)
+        found = _at_rest(replace(found, status="predicted", reason=reason), body, rest, query.frequency_hz)
+    except SensorgenError as error:  # no model applies, a value is missing, an electrode or a tool path is interrupted
+        touches = found.gap is not None and found.gap.value == 0
+        with suppress(SensorgenError):  # as a resistivity that is missing
+            found = replace(found, resistance=electrode_resistance(body))
+        return replace(found, status="short" if touches else "not predicted", reason=str(error))
+    values, doubts = (model.values, model.doubts) if model else (rest.values, rest.doubts)
+    found = replace(found, plan=plan, values=values, assumptions=(*_assumptions(body, model), *doubts))
+    return _at_load(found, model, load, query) if model else found
+
+
+def _model(body: Body, query: Query) -> tuple[SensorModel | None, Plan | None, str]:
+    """The sensor and its plan; or why there is none, where the body can be predicted at rest alone."""
+    try:
+        return *sensor_model(body, query), ""
+    except (Unpredictable, MissingValue):
+        raise
+    except SensorgenError as error:
+        return None, None, str(error)
+
+
+def _gap(body: Body) -> Bounds | None:
+    gaps = [gap * M_PER_MM for gap in body.cells.gap_mm.values()]
+    if inf in gaps:
+        return None
+    by_print = Interval(min(gaps), max(gaps))
+    if gaps[0] == 0:
+        exact = Interval(0.0, 0.0)
+        return Bounds(0.0, by_print.lower, by_print.upper, "m", exact, by_print, exact, certified=True)
+    return Bounds.of(gaps[0], "m", print=by_print, certified=True)
+
+
+def _at_rest(found: Prediction, body: Body, rest: RestState, frequency_hz: tuple[float, ...]) -> Prediction:
+    """Capacitance, resistance, corner frequency and impedance without a load."""
+    resistance, c, gone = rest.resistance, rest.capacitance, lost(body.design)
+    r = _in_series(resistance["top"], resistance["bottom"])
+    corner = _of_line(r, c, lambda ohm, farad: line.corner_frequency_hz(ohm, farad), "Hz")
+    return replace(
+        found, capacitance=c, resistance=resistance, corner_frequency=corner,
+        impedance=tuple(_impedance(f, r, c, gone) for f in frequency_hz),
+    )  # fmt: skip
+
+
+def _in_series(one: Bounds, other: Bounds) -> Bounds:
+    def added(a: Interval, b: Interval) -> Interval:
+        return Interval(a.lower + b.lower, a.upper + b.upper)
+
+    return Bounds(
+        one.value + other.value, one.lower + other.lower, one.upper + other.upper, "ohm",
+        added(one.model, other.model), added(one.print, other.print), added(one.material, other.material),
+        one.certified and other.certified,
+    )  # fmt: skip
+
+
+def _of_line(r: Bounds, c: Bounds, of: Callable[[float, float], float], unit: str) -> Bounds:
+    """A quantity of the unloaded line: at the ends of what resistance and capacitance may be."""
+
+    def ends(ohm: Interval, farad: Interval) -> Interval:
+        values = [of(*pair) for pair in product((ohm.lower, ohm.upper), (farad.lower, farad.upper))]
+        return Interval(min(values), max(values))
+
+    whole = ends(Interval(r.lower, r.upper), Interval(c.lower, c.upper))
+    return Bounds(
+        of(r.value, c.value), whole.lower, whole.upper, unit,
+        ends(r.model, c.model), ends(r.print, c.print), ends(r.material, c.material), r.certified and c.certified,
+    )  # fmt: skip
+
+
+def _impedance(frequency_hz: float, r: Bounds, c: Bounds, gone: Lost) -> Impedance:
+    """Of the unloaded line at one frequency; r and c of the whole sensor."""
+
+    def z(ohm: float, farad: float) -> complex:
+        admittance = 2 * pi * frequency_hz * farad * (1j + gone.tan_delta) + gone.leak_s
+        return complex(line.cascade([ohm], [np.array([admittance])], [1.0])[0])
+
+    re = _of_line(r, c, lambda ohm, farad: z(ohm, farad).real, "ohm")
+    im = _of_line(r, c, lambda ohm, farad: z(ohm, farad).imag, "ohm")
+    return Impedance(frequency_hz, re, im)
+
+
+def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) -> Prediction:
+    """Sensitivity, resolution and error budget at the reference load; or why there are none."""
+    law = model.law
+    stiffest = (
+        replace(model.sensor, compression=law.others[0])
+        if law.compression.name == "unconfined" and law.bounded
+        else None
+    )
+    load = replace(load, force_n=load.force_n or FORCE_N)
+    try:
+        made = identify(
+            model.sensor, load.frequency_hz, query.noise, force_n=load.force_n, position_m=load.position_m,
+            stiffest=stiffest, assumed="" if law.bounded else _ASSUMED,
+        )  # fmt: skip
+        others = list(_printed_otherwise(model, load, query)) if law.bounded else [None]
+        found = replace(
+            found, identifiability=made, sensitivity=_sensitivity(model, load, others),
+            budget=error_budget(model, query.load(model.body.design), query.accuracy, others),
+        )  # fmt: skip
+        return _resolution(found, model, load, query, others)
+    except SensorgenError as error:
+        return replace(found, reason=str(error))
+
+
+def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator[Sensor | None]:
+    """Sensors by the ways to print it that have the least and the largest capacitance; None where one is not known."""
+    body = model.body
+    own = model.sensor.capacitance_f()
+    at_rest: list[tuple[float, Body, RestState]] = [(own, body, model.rest)]
+    for rule in list(body.cells.scenes)[1:]:
+        with suppress(SensorgenError):  # as of a short, which the prediction tells by itself
+            other = body.printed_otherwise(rule)
+            rest = rest_state(other)
+            at_rest.append((rest.capacitance.value, other, rest))
+    ends = {id(pick[1]): pick for pick in (_end(at_rest, least=True), _end(at_rest, least=False))}
+    pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
+    for _, other, rest in ends.values():
+        if other is not body:
+            law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa)
+            yield build_sensor(other, law, query.tip, rest=rest).sensor if law else None
+
+
+def _end(found: list[tuple[float, Body, RestState]], *, least: bool) -> tuple[float, Body, RestState]:
+    """The first with the least or the largest capacitance, to 5 %."""
+    value = (min if least else max)(c for c, _, _ in found)
+    return next(pick for pick in found if abs(pick[0] / value - 1) < _SAME)
+
+
+def _sensitivity(model: SensorModel, load: Load, others: Sequence[Sensor | None]) -> Bounds:
+    """(C(p) / C(0) - 1) / p, with p the pressure of the reference load [1/kPa]."""
+    pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
+
+    def of(law: Compression) -> float:
+        strain = float(law.capacitive_strain(np.asarray(pressure_pa))[0])
+        return strain / (1 - strain) / pressure_pa * _PA_PER_KPA
+
+    value = of(model.law.compression)
+    return Bounds.of(
+        value, "1/kPa", model=_span(value, of, model.law.others), material=_span(value, of, _moduli(model)),
+        print=_range([value, *(of(sensor.compression) if sensor else nan for sensor in others)]),
+    )  # fmt: skip
+
+
+def _resolution(
+    found: Prediction, model: SensorModel, load: Load, query: Query, others: Sequence[Sensor | None]
+) -> Prediction:
+    """Standard errors of force and position from one reading, with what they are of sensors within the errors."""
+
+    def errors(sensor: Sensor | None) -> tuple[float, float]:
+        if sensor is None:
+            return nan, nan
+        press = Setup(sensor, load.frequency_hz, query.noise, load.force_n, load.position_m, inf)
+        force, position, _ = press.bounds()
+        return float(force), float(position)
+
+    own, law = errors(model.sensor), model.law
+    by_law = [errors(replace(model.sensor, compression=other)) for other in law.others] if law.bounded else [(nan, nan)]
+    by_print = [errors(sensor) for sensor in others]
+    by_material = [
+        [errors(sensor) for sensor in ends.sensors] for ends in material_ends(model, ReferenceLoad(model.sensor, load))
+    ]
+
+    def bounds(which: int, unit: str) -> Bounds | None:
+        value = own[which]
+        if isnan(value):
+            return None
+
+        def spread_of(each: Sequence[tuple[float, float]]) -> Interval:
+            return _range([value, *(e[which] for e in each)])
+
+        material = [spread_of(ends) for ends in by_material]
+        lower, upper = (value * prod(getattr(m, end) / value for m in material) for end in ("lower", "upper"))
+        return Bounds.of(
+            value, unit, model=spread_of(by_law), print=spread_of(by_print), material=Interval(lower, upper)
+        )
+
+    return replace(found, force_resolution=bounds(0, "N"), position_resolution=bounds(1, "m"))
+
+
+def _range(values: Sequence[float]) -> Interval:
+    """Lowest and highest; all that is possible where one is not known."""
+    return Interval(0.0, inf) if any(map(isnan, values)) else Interval(min(values), max(values))
+
+
+def _span(value: float, of: Callable[[Compression], float], laws: Iterable[Compression]) -> Interval:
+    """Lowest and highest over other laws of compression, those left out that the pressure is beyond."""
+    found = [value]
+    for law in laws:
+        with suppress(OutOfRange):
+            found.append(of(law))
+    return Interval(min(found), max(found))
+
+
+def _moduli(model: SensorModel) -> list[Compression]:
+    """The law of compression with all moduli at the ends of what the sources say."""
+    design, used = model.body.design, model.body.design.used()
+    factors = {
+        end / value.value
+        for value in model.law.taken
+        if value.quantity == "youngs_modulus_pa"
+        for end in spread(design, material_value(design.material(value.material), used[value.material], value.quantity))
+    }
+    return [model.law.compression.scaled_modulus(factor) for factor in sorted(factors) if factor != 1]
+
+
+def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
+    """What is taken for granted."""
+    yield "electrodes are equipotential for the capacitance, and the field has no fringe at the sensor's edge"
+    yield "electrode resistance from end face to end face, cogs included"
+    if not body.is_drawn:
+        yield "contacts between extruded lines cost no resistance: no source gives their resistivity"
+    gone = lost(body.design).taken
+    said = " and ".join(f"{t.quantity} of {t.material}" for t in gone)
+    yield f"dielectric losses: {said} as given" if gone else "no dielectric loss and no leak: the sources give none"
+    rises = model.piezoresistance if model else {}
+    if not rises:
+        yield "resistivity under the tip as elsewhere: no source says how it changes with pressure"
+    for end, value in rises.items():
+        yield (
+            f"resistivity of the {end} electrode rises with pressure by {value.value:g} 1/Pa "
+            f"({value.material}, {value.source})"
+        )

@@ -1,0 +1,80 @@
+"""What is asked of a body; the default is the same for every command."""
+
+from dataclasses import dataclass, field
+
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design.design import Design
+
+TONES_HZ = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)  # thesis, Table 5.1, its 4990 corrected
+FORCE_N = 6.0  # thesis 5.2: presses of 0 to 6 N
+NOISE = 1e-3  # of Re Z and of Im Z, each, relative to abs(Z)
+TIP_M = 0.01  # thesis, Table C.1: L_press
+
+
+@dataclass(frozen=True)
+class Tip:
+    """What presses.
+
+    Attributes
+    ----------
+    length_m : float
+        Along the sensor [m].
+    profile : str
+        How its pressure is spread: one of :data:`sensorgen.models.pressure.PROFILES`.
+    radius_m : float or None
+        Of a hard round tip, whose contact grows with the force up to ``length_m`` [m]; None where all of it touches.
+    """
+
+    length_m: float = TIP_M
+    profile: str = "uniform"
+    radius_m: float | None = None
+
+
+FLAT = Tip()  # the default
+
+
+@dataclass(frozen=True)
+class Load:
+    """A load at which numbers are stated: frequencies [Hz], force [N], centre of the tip [m]."""
+
+    frequency_hz: tuple[float, ...]
+    force_n: float
+    position_m: float
+
+
+@dataclass(frozen=True)
+class Query:
+    """What is asked of a body; the default is the same for every command.
+
+    Attributes
+    ----------
+    frequency_hz : tuple of float
+        Of the impedance [Hz].
+    force_n, position_m : float or None
+        The reference load, at which resolution and error budget are stated [N], [m]; in the sensor's middle if no
+        position is given.
+    tip : Tip
+        What presses.
+    law : str
+        Law of compression, as of :func:`sensorgen.prediction.planning.plan`.
+    accuracy : float or None
+        Of abs(Z), relative [-]; if None, the default of :mod:`sensorgen.prediction.planning`.
+    noise : float
+        Standard deviation of Re Z and of Im Z, each, relative to abs(Z) [-].
+    """
+
+    frequency_hz: tuple[float, ...] = TONES_HZ
+    force_n: float = FORCE_N
+    position_m: float | None = None
+    tip: Tip = field(default_factory=Tip)
+    law: str = ""
+    accuracy: float | None = None
+    noise: float = NOISE
+
+    def load(self, design: Design) -> Load:
+        """The reference load."""
+        middle = design.params.length_mm * M_PER_MM / 2
+        return Load(self.frequency_hz, self.force_n, middle if self.position_m is None else self.position_m)
+
+
+DEFAULT = Query()
