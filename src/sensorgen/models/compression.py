@@ -10,9 +10,9 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.core import yamlfile
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import MissingValue, OutOfRange
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ REACH = 3.0  # factor on its last stress up to which a curve is extrapolated by 
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _SAME = 1e-6  # relative difference up to which two parameters are one
 _EARLY = np.array([1 / 16, 1 / 4])  # of the first stress: knots of a curve that begins with a power of the stress
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -118,7 +116,15 @@ class Curve:
                 f"a stress of {np.max(stress_pa):.4g} Pa; the curve {self.name!r} ends at {last:.4g} Pa and is "
                 f"extended up to {REACH:g} times that: press less, or with a larger tip"
             )
-        rise, slope = self._rise(stress_pa)
+        # C'/C'(0) - 1, accurate for small stresses too [-], and its derivative [1/Pa]
+        starts, *pieces = self._cubics
+        k = np.clip(np.searchsorted(starts, stress_pa, side="right") - 1, 0, None)
+        h, before, linear, quadratic, cubic = (piece[k] for piece in pieces)
+        inside = np.minimum(stress_pa, self.stress_pa[-1])
+        t = (inside - starts[k]) / h
+        value = before + t * (linear + t * (quadratic + t * cubic))
+        slope = (linear + t * (2 * quadratic + 3 * t * cubic)) / h
+        rise = value + (stress_pa - inside) * self.slope_per_pa[-1]
         return rise / (1 + rise), slope / (1 + rise) ** 2
 
     def foundation_stiffness_pa_per_m(self, gap_m: float) -> float:  # noqa: ARG002 - the cell's own height is in it
@@ -168,17 +174,6 @@ class Curve:
         slope = power * begun / early
         first = (2 - power) * begun[0] / early[0]  # a parabola to the first of them
         return np.insert(p, 1, early), np.insert(r, 1, begun), np.concatenate([[first], slope, m[1:]])
-
-    def _rise(self, at: Real) -> tuple[Real, Real]:
-        """C'/C'(0) - 1, accurate for small stresses too [-], and its derivative [1/Pa]."""
-        starts, *pieces = self._cubics
-        k = np.clip(np.searchsorted(starts, at, side="right") - 1, 0, None)
-        h, before, linear, quadratic, cubic = (piece[k] for piece in pieces)
-        inside = np.minimum(at, self.stress_pa[-1])
-        t = (inside - starts[k]) / h
-        value = before + t * (linear + t * (quadratic + t * cubic))
-        slope = (linear + t * (2 * quadratic + 3 * t * cubic)) / h
-        return value + (at - inside) * self.slope_per_pa[-1], slope
 
 
 Compression = Plate | Curve
