@@ -105,8 +105,8 @@ def slice_bodies(
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_text(text, "utf-8")
         command = [program, "slice", *_arguments(stls, settings, Path(here)), "-o", str(gcode)]
-        search = os.pathsep.join(map(str, _search(Path(here))))
-        run(command, gcode, {"CURA_ENGINE_SEARCH_PATH": search}, runner)
+        search = [str(base / kind) for base in (Path(here), resources()) for kind in ("definitions", "extruders")]
+        run(command, gcode, {"CURA_ENGINE_SEARCH_PATH": os.pathsep.join(search)}, runner)
 
 
 def resources() -> Path:
@@ -121,10 +121,6 @@ def resources() -> Path:
         if (path / "definitions" / "fdmprinter.def.json").is_file():
             return path
     raise SlicerFailed(f"Cura's definitions are not in {RESOURCES[0]}; on Debian: apt install cura")
-
-
-def _search(here: Path) -> list[Path]:
-    return [base / kind for base in (here, resources()) for kind in ("definitions", "extruders")]
 
 
 def _arguments(stls: Sequence[tuple[Path, int]], settings: EngineSettings, here: Path) -> list[str]:

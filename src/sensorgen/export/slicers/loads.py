@@ -137,7 +137,9 @@ def recipes(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> di
     _between(printer.name, "first layer height [mm]", quality.first_layer_mm, printer.min_layer_mm, printer.nozzle_mm)
     _between(quality.name, "travel speed [mm/s]", quality.travel_speed_mm_s, 1, printer.max_speed_mm_s.xy)
     made = {tool: recipe(printer, quality, tool, loads[tool]) for tool in sorted(loads)}
-    _one_bed(made)
+    if len({r.bed_c for r in made.values()}) > 1:
+        each = ", ".join(f"{r.material.name} on tool {tool} {r.bed_c:g} C" for tool, r in made.items())
+        raise BadInput(f"one bed, two temperatures: {each}; name sources that agree, or print without one of them")
     return {printer.slicer_index(tool): made[tool] for tool in sorted(made, key=printer.slicer_index)}
 
 
@@ -187,9 +189,3 @@ def _whole(where: str, what: str, value: float) -> int:
     if value != round(_between(where, what, value, 1, 100)):
         raise OutOfRange(f"{where}: {what} is {value:g}; expected a whole number")
     return int(value)
-
-
-def _one_bed(made: Mapping[int, Recipe]) -> None:
-    if len({r.bed_c for r in made.values()}) > 1:
-        each = ", ".join(f"{r.material.name} on tool {tool} {r.bed_c:g} C" for tool, r in made.items())
-        raise BadInput(f"one bed, two temperatures: {each}; name sources that agree, or print without one of them")

@@ -141,7 +141,7 @@ def summarised(
         ))  # fmt: skip
     if rig:
         first = joined[0]
-        numbers = {name: _known(getattr(first, name)) for name in _CLOCK}
+        numbers: dict[str, Any] = {name: _known(getattr(first, name)) for name in _CLOCK}
         samples = first.recording.counts()["rig error"]
         beside = Rig(**rig.counts(), samples=samples, clocks=first.clock_text(), notes=first.notes, **numbers)
     return Facts(tuple(lockins), dict(columns), dict(rig_columns), beside)
