@@ -1,17 +1,17 @@
-"""Compression of the thesis's triangular cells as PrusaSlicer should print them: writes models/solved_prints.yaml."""
+"""Compression of the thesis's triangular cells as slicers should print them: writes models/solved_prints.yaml."""
 
 from itertools import product
 from pathlib import Path
 
 from sensorgen.design.design import make
-from sensorgen.prediction.bodies import estimated
+from sensorgen.prediction.bodies import WALLS, estimated
 from sensorgen.prediction.compression_law import content, solved
 from sensorgen.prediction.sensor_model import piece
 
 FILE = Path(__file__).parents[1] / "src" / "sensorgen" / "models" / "solved_prints.yaml"
 HEAD = """\
 # Rise of the capacitance of printed triangular cells with stress, as bench/solved_prints.py solved it: by press2d, its
-# usual mesh, held against the next coarser one ("within"); layers of 0.1 and 0.06 mm, Arachne walls. Keys are the
+# usual mesh, held against the next coarser one ("within"); layers of 0.1 and 0.06 mm, walls as named. Keys are the
 # content of the cross-section. "held" are the changes under other boundary and contact conditions of the drawn cell.
 source: plane-strain finite elements with frictionless contact, neo-Hookean, nu 0.4999, of the printed cell
 youngs_modulus_pa: {etpu: 22.0e6, x60: 6.0e6}
@@ -23,26 +23,27 @@ cells:
 def main() -> None:
     """Solve and write."""
     found = {}
-    for quality, along, film in product(("fine", "extrafine"), "xy", (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)):
+    films = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
+    for walls, quality, along, film in product(WALLS, ("fine", "extrafine"), "xy", films):
         sizes = {"dielectric_mm": film, "along": along}
         design = make({"shape": "tri", "quality": quality, "parameters": sizes})
-        cell = piece(estimated(design, "arachne"))
+        cell = piece(estimated(design, walls))
         if content(cell) in found:
             continue
         try:
             law = solved(design, cell)
         except Exception as error:  # a cell that cannot be solved stays unsolved
-            print(quality, along, film, error)
+            print(walls, quality, along, film, error)
             continue
         curve = law.compression
         found[content(cell)] = (
-            f"  {content(cell)}:  # tri repeating along {along}, film {film:g} mm, {quality}\n"
+            f"  {content(cell)}:  # tri repeating along {along}, film {film:g} mm, {quality}, {walls}\n"
             f"    displacement_um: {curve.displacement_m * 1e6:.5g}\n"
             f"    stress_kpa: {[round(p / 1e3, 6) for p in curve.stress_pa]}\n"
             f"    rise_percent: {[round(100 * (r - 1), 6) for r in curve.ratio]}\n"
             f"    within: {curve.within:.4g}\n"
         )
-        print(quality, along, film, content(cell), law.doubts)
+        print(walls, quality, along, film, content(cell), law.doubts)
         FILE.write_text(HEAD + "".join(found.values()), "utf-8")
 
 

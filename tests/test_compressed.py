@@ -33,21 +33,21 @@ def pressed(film, accuracy):
 def test_the_bounds_hold_the_reference_at_every_load(film, accuracy):
     found = pressed(film, accuracy)
     known = KNOWN[f"tri_d{film}"]
-    assert found["reached"]
-    for k, low, high in zip(LOADS, found["lower_f_per_m2"], found["upper_f_per_m2"], strict=True):
+    assert found.reached
+    for k, low, high in zip(LOADS, found.lower_f_per_m2, found.upper_f_per_m2, strict=True):
         truth = known["C0_exact_pF_per_m"] + known["dC_pF_per_m"][k]
         assert 2e9 * low < truth < 2e9 * high  # pF per metre of depth and period of 2 mm
-        assert 2 * (high - low) / (high + low) <= found["relative_width"] <= accuracy
-    level = found["plan"]["levels"][0]
-    assert (level["chosen"] == "press2d") is (accuracy < 2e-2)
+        assert 2 * (high - low) / (high + low) <= found.relative_width <= accuracy
+    level = found.plan.levels[0]
+    assert (level.chosen == "press2d") is (accuracy < 2e-2)
 
 
 @needs_mesher
 def test_what_is_below_the_reach_of_all_meshes_is_told_with_the_best():
     found = pressed(0.2, 1e-5)
-    assert not found["reached"]
-    assert 1e-4 < found["relative_width"] < 1e-2
-    asked = [c["model"] for c in found["plan"]["levels"][0]["candidates"] if c["seconds"] is not None]
+    assert not found.reached
+    assert 1e-4 < found.relative_width < 1e-2
+    asked = [c.model for c in found.plan.levels[0].candidates if c.seconds is not None]
     assert asked == ["press2d, mesh x 0.5"]
 
 
@@ -62,5 +62,5 @@ def test_one_that_ends_early_is_not_reached(monkeypatch):
 
     monkeypatch.setattr(compressed, "pressed", ends_early)
     found = pressed(0.1, 5e-2)
-    assert (found["reached"], found["relative_width"], found["converged_kpa"]) == (False, None, 20.0)
-    assert found["lower_f_per_m2"][1] < 1.1 < found["upper_f_per_m2"][1]
+    assert (found.reached, found.relative_width, found.converged_kpa) == (False, None, 20.0)
+    assert found.lower_f_per_m2[1] < 1.1 < found.upper_f_per_m2[1]

@@ -224,7 +224,7 @@ def invert(asked):
 
 
 def check(asked):
-    """``check``: errors, and the gaps, which it names where they differ: in its silence the print's is the drawing's."""
+    """``check``: errors, and the gaps, named where they differ: in its silence they are the same."""
     code, out = asked.say("check", asked.file, "--json")
     findings = json.loads(out)["findings"]
     gap = next((f for f in findings if f["rule"] == "2-printed-gap"), None)
@@ -269,7 +269,7 @@ def _of_prediction(data):
 
 
 def _quantities(data):
-    resolution = {"force": data["force_resolution_n"], "position": data["position_resolution_m"]}
+    resolution = {of: (data[f"{of}_resolution"] or {}).get("value") for of in ("force", "position")}
     return {
         "body": data["body"],
         "capacitance": data["capacitance"]

@@ -1,11 +1,13 @@
 """Who is asked, in which order, and what is told of it."""
 
+import json
 import math
 
 import pytest
 
+from sensorgen.core.document import to_json
 from sensorgen.core.errors import BadInput, SensorgenError
-from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, plain, run_until_within
+from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
 
 RUNGS = (Candidate("none", passed_over="it knows no gaps"), Candidate("coarse", 0.1, 1.0), Candidate("fine", 0.01, 5.0))
 
@@ -93,9 +95,9 @@ def test_what_the_last_one_said_is_raised_where_none_can_answer():
         run_until_within(level(0.05), models.find, float)
 
 
-def test_what_nobody_knows_is_no_number_in_plain_data():
+def test_an_unknown_error_is_null_in_json():
     candidates = (Candidate("a", math.inf, 0.0, width=math.inf), Candidate("b", 0.1, 1.0, width=0.2))
-    data = plain(Plan(0.1, "C", (level(0.1, candidates=candidates),), math.inf))
+    data = json.loads(to_json(Plan(0.1, "C", (level(0.1, candidates=candidates),), math.inf)))
     assert data["width"] is None
     first, second = data["levels"][0]["candidates"]
     assert (first["expected_width"], first["width"]) == (None, None)

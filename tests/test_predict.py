@@ -3,6 +3,7 @@
 import cmath
 import csv
 import io
+import json
 import math
 import tracemalloc
 from dataclasses import replace
@@ -35,6 +36,7 @@ from sensorgen.prediction.grid import (
 )
 from sensorgen.prediction.losses import Lost
 from sensorgen.prediction.query import NOISE, TONES_HZ, Query
+from sensorgen.prediction.results import from_json, to_json
 
 pytestmark = pytest.mark.usefixtures("shared_cache")
 EPS = {"x60": 4.68, "air": 1.00059}
@@ -166,6 +168,41 @@ def test_the_ranges_of_the_impedance_hold_its_middle():
             assert part.lower < part.value < part.upper
             for alone in (part.model, part.print, part.material):
                 assert part.lower <= alone.lower <= part.value <= alone.upper <= part.upper
+
+
+def test_ranges_hold_what_each_way_to_print_gives_by_itself():
+    """Walls alone decide whether the tips of the triangles are printed, and with them most of the sensitivity."""
+    design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}})
+    found = prediction(design, body=estimated)
+    alone = [prediction(design, body=lambda d, walls=walls: estimated(d, walls)) for walls in ("classic", "cura-gaps")]
+    for name in ("capacitance", "sensitivity", "force_resolution", "position_resolution"):
+        bounds, values = getattr(found, name), [getattr(one, name).value for one in alone]
+        assert all(bounds.lower <= value <= bounds.upper for value in values), name
+        assert bounds.print.lower <= 1.1 * min(values), name
+        assert bounds.print.upper >= max(values) / 1.1, name
+    assert max(one.sensitivity.value for one in alone) > 20 * found.sensitivity.value
+    budget = {term.name: term for term in found.budget.terms}
+    assert budget["print"].changes.magnitude > 0.6  # 0.57 by the capacitance alone
+
+
+def test_a_cell_that_was_not_solved_has_no_known_error():
+    found = prediction(make({"shape": "rect", "parameters": {"dielectric_mm": 0.1}}), body=estimated)
+    assert (found.sensitivity.lower, found.sensitivity.upper) == (0, math.inf)
+    assert found.force_resolution.upper == math.inf
+
+
+def test_predictions_of_schema_2_are_read():
+    """Their resolutions were numbers without a range."""
+    new = prediction(make({"shape": "reference"}), body=estimated)
+    data = json.loads(to_json(new))
+    for one in (data, data["drawn"]):
+        one["schema"] = 2
+        for name, unit in (("force_resolution", "n"), ("position_resolution", "m")):
+            one[f"{name}_{unit}"] = one.pop(name)["value"]
+    old = from_json(json.dumps(data))
+    assert (old.schema, old.drawn.schema, old.capacitance) == (new.schema, new.schema, new.capacitance)
+    assert old.force_resolution.value == new.force_resolution.value
+    assert old.drawn.position_resolution.unit == "m"
 
 
 def test_the_tones_are_those_of_table_5_1_with_its_slip_corrected():

@@ -13,7 +13,7 @@ for film in films:
     print(
         f"{film:.1f} mm: gap {p.drawn.gap.value * 1e3:.1f} -> {p.gap.value * 1e3:.1f} mm, "
         f"C {p.drawn.capacitance.value * 1e12:.1f} -> {p.capacitance.value * 1e12:.1f} pF, "
-        f"force known to {p.drawn.force_resolution_n:.2g} -> {p.force_resolution_n:.2g} N"
+        f"force known to {p.drawn.force_resolution.value:.2g} -> {p.force_resolution.value:.2g} N"
     )
 
 # %% [markdown]

@@ -1,6 +1,5 @@
 """Prints under pressure: their cell against one built by hand, feet that hang free, and the sensor that they make."""
 
-import json
 from functools import partial
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 
 from sensorgen.asprinted.printed import body
 from sensorgen.core.errors import SensorgenError
+from sensorgen.design.walls import WALLS
 from sensorgen.models import press2d, press3d
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.prediction import compression as compressed
@@ -72,14 +72,14 @@ def test_a_printed_cell_gives_way_like_one_built_by_hand(walls, fall_um):
     found = answered(estimated(design, walls), 20.0)
     both, low = BY_HAND[walls]
     hand = press2d.press(built({"cog": both, "feet": both, "low": low}), SOLIDS, [0.0, 2e4], EPS, fineness=QUICK)
-    assert (found["model"], found["faults"], hand.faults) == ("press2d", [], ())
-    moved = np.array(found["displacement_um"][1:]) - fall_um
+    assert (found.model, found.faults, hand.faults) == ("press2d", (), ())
+    moved = np.array(found.displacement_um[1:]) - fall_um
     assert moved == pytest.approx((hand.displacement_m[1:] - hand.fall_m) * 1e6, rel=0.01)
     assert hand.fall_m * 1e6 == pytest.approx(fall_um, rel=1e-6, abs=1e-6)
-    assert (f"falls {fall_um:g} um" in "".join(found["doubts"])) == (fall_um > 0)
-    middle = (np.array(found["lower_f_per_m2"]) + np.array(found["upper_f_per_m2"])) / 2
+    assert (f"falls {fall_um:g} um" in "".join(found.doubts)) == (fall_um > 0)
+    middle = (np.array(found.lower_f_per_m2) + np.array(found.upper_f_per_m2)) / 2
     assert middle == pytest.approx([c.middle() for c in hand.capacitance_f_per_m2], rel=0.01)
-    assert found["body"] == f"printed, estimated ({walls} walls)"
+    assert found.body == f"printed, estimated ({WALLS[walls]})"
 
 
 @needs_mesher
@@ -87,9 +87,9 @@ def test_a_foot_of_a_lines_width_is_stiffer_than_a_sharp_one():
     """At 10 kPa as drawn 6.13 um, by other programs; on feet of 0.34 mm less than a third of it."""
     design = small()
     sharp, found = answered(drawn(design), 10.0), answered(estimated(design, "arachne"), 10.0)
-    assert sharp["displacement_um"][1] == pytest.approx(6.13, rel=0.02)
-    assert found["displacement_um"][1] < sharp["displacement_um"][1] / 3
-    assert sharp["body"] == "drawn"
+    assert sharp.displacement_um[1] == pytest.approx(6.13, rel=0.02)
+    assert found.displacement_um[1] < sharp.displacement_um[1] / 3
+    assert sharp.body == "drawn"
 
 
 @needs_mesher
@@ -98,7 +98,7 @@ def test_the_printed_sensor_has_the_law_of_its_own_cell():
     printed = estimated(small(), "arachne")
     sensed = build_sensor(printed, "solved")
     found = answered(printed, 10.0, 20.0)
-    middle = (np.array(found["lower_f_per_m2"]) + np.array(found["upper_f_per_m2"])) / 2
+    middle = (np.array(found.lower_f_per_m2) + np.array(found.upper_f_per_m2)) / 2
     thinning, _ = sensed.sensor.compression.capacitive_strain(np.array([1e4, 2e4]))
     assert 1 / (1 - thinning) == pytest.approx(middle[1:] / middle[0], rel=1e-4)
     assert sensed.law.bounded
@@ -121,9 +121,9 @@ def test_crossed_strips_are_pressed_in_three_dimensions(monkeypatch):
     monkeypatch.setattr(press3d, "Pieces", partial(press3d.Pieces, 1))
     design = small("rect")
     found, sharp = answered(estimated(design, "arachne"), 100.0), answered(drawn(design), 100.0)
-    assert (found["model"], found["faults"]) == ("press3d", [])
-    assert 1.0 < found["displacement_um"][1] / sharp["displacement_um"][1] < 1.15
-    assert found["lower_f_per_m2"][0] * 4e-6 < 0.79334e-12 < found["upper_f_per_m2"][0] * 4e-6  # found by hand
+    assert (found.model, found.faults) == ("press3d", ())
+    assert 1.0 < found.displacement_um[1] / sharp.displacement_um[1] < 1.15
+    assert found.lower_f_per_m2[0] * 4e-6 < 0.79334e-12 < found.upper_f_per_m2[0] * 4e-6  # found by hand
 
 
 def test_a_print_is_the_same_scene_in_every_process():
@@ -173,8 +173,7 @@ def test_what_prusaslicer_prints_is_pressed(real):
     design, lines, version = real("arachne")
     made = sliced(design, lambda: body(design, lines, slicer=version), version, b"file")
     found, guess = (answered(b, 20.0) for b in (made, estimated(design, "arachne")))
-    assert found["faults"] == []
-    assert version in found["body"]
-    assert found["displacement_um"][1] == pytest.approx(guess["displacement_um"][1], rel=0.05)
-    assert found["upper_f_per_m2"][0] == pytest.approx(guess["upper_f_per_m2"][0], rel=0.01)
-    json.dumps(found, allow_nan=False)
+    assert found.faults == ()
+    assert version in found.body
+    assert found.displacement_um[1] == pytest.approx(guess.displacement_um[1], rel=0.05)
+    assert found.upper_f_per_m2[0] == pytest.approx(guess.upper_f_per_m2[0], rel=0.01)

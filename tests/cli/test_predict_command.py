@@ -136,9 +136,10 @@ def test_the_table(run):
     assert lines[0] == "reference, drawn: 3 forces 0 to 6 N, 2 positions 20 to 50 mm;"
     assert lines[1] == "tip 10 mm, compression unconfined"
     assert lines[2].startswith("doubtful: plate free to expand sideways")
-    numbers = {row.split()[0]: row.split()[2:] for row in lines if "kHz" in row and len(row.split()) == 10}
+    rows = [row.split() for row in lines]
+    ends, changes = ([float(cell) for cell in row[2:]] for row in rows if row[:2] == ["99.7", "kHz"] and len(row) == 6)
     values = {(f, x): at_point(99.7e3, f, x) for f in (0, 3, 6) for x in (20, 50)}
-    low, high, least, most, re_f, re_x, im_f, im_x = map(float, numbers["99.7"])
+    (low, high, least, most), (re_f, re_x, im_f, im_x) = ends, changes
     assert low == pytest.approx(min(z.real for z in values.values()), rel=1e-5)
     assert high == pytest.approx(max(z.real for z in values.values()), rel=1e-5)
     assert least == pytest.approx(min(z.imag for z in values.values()), rel=1e-5)
@@ -146,8 +147,8 @@ def test_the_table(run):
     deviation = 1e-3 * max(map(abs, values.values()))
     at_50, at_6 = [values[f, 50] for f in (0, 3, 6)], [values[6, x] for x in (20, 50)]
     for points, of_r, of_x in ((at_50, re_f, im_f), (at_6, re_x, im_x)):
-        assert of_r == pytest.approx(span(z.real for z in points) / deviation, abs=0.006)
-        assert of_x == pytest.approx(span(z.imag for z in points) / deviation, abs=0.006)
+        assert of_r == pytest.approx(span(z.real for z in points) / deviation, rel=5e-3)
+        assert of_x == pytest.approx(span(z.imag for z in points) / deviation, rel=5e-3)
     corner = [float(word) for word in last_of_table(lines)]
     expected = [v for x in (20, 50) for v in (values[6, x].real, values[6, x].imag)]
     assert corner == pytest.approx(expected, rel=1e-6)
@@ -159,7 +160,7 @@ def test_a_single_press(run):
     assert lines[0] == "reference, drawn: force 2 N, position 30 mm;"
     z = at_point(99.7e3, 2.0, 30.0)
     assert list(map(float, last_of_table(lines))) == pytest.approx([z.real, z.imag], rel=1e-6)
-    assert next(line for line in lines if "99.7 kHz" in line).split()[-4:] == ["-"] * 4  # one press moves nothing
+    assert not any("change of R and X" in line for line in lines)  # one press moves nothing
 
 
 def test_the_card_is_of_the_greatest_press_and_the_noise_asked_for(run):
@@ -252,7 +253,7 @@ WRONG = [
     (["--force", "1", "--compression", "bond"], "unknown --compression 'bond'; did you mean 'bonded'?"),
     (["--force", "1", "--json", "--csv"], "--json and --csv at once; expected one of them"),
     (["--plot", "p", "--csv"], "--csv and --plot at once"),
-    (["--plot", "p", "-o", "f"], "--plot and --output at once"),
+    (["--plot", "p", "-o", "f"], "--output and --plot at once"),
     (["--plot", "p", "--force", "1"], "1 force(s) and 101 position(s) make no map"),
     (["--force", "0:6:0.001", "--position", "0:100:0.1"], "7 x 6001 x 1001 frequencies, forces and positions;"),
     (["--force", "1", "-o", "."], "cannot write '.': it is a folder or a device; expected a file"),
@@ -336,9 +337,9 @@ def test_a_round_tip_presses_harder_in_its_middle_and_moves_less(run):
 
 def test_the_budget_stands_below_and_names_its_largest_term(run):
     lines = run("predict", "reference", *PRESSES).out.splitlines()
-    assert "error budget at 6 N and 50 mm, at the worst frequency:" in lines
-    assert any(line.startswith("  largest: ") for line in lines)
-    assert max(map(len, lines[lines.index("error budget at 6 N and 50 mm, at the worst frequency:") :])) <= 80
+    assert "error budget at 6 N and 50 mm, at the worst frequency" in lines
+    assert any(line.startswith("largest: ") for line in lines)
+    assert max(map(len, lines[lines.index("error budget at 6 N and 50 mm, at the worst frequency") :])) <= 80
 
 
 @pytest.mark.parametrize("value", ["0", "-1", "nan", "much"])

@@ -8,7 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sensorgen.cli import sheet_text, show
+from sensorgen.cli import show
+from sensorgen.core.document import text
+from sensorgen.models.sheet import Patch, Sheet
+from sensorgen.prediction.sheet_study import SheetStudy
 
 WORDS = ("sheet", "reference", "--size", "60x60", "--frequencies", "100kHz,1MHz")
 
@@ -137,13 +140,15 @@ def test_wrong_words_are_one_line(run, words, say):
     ("length_m", "words"),
     [
         (0.0123456, "12.3 mm"), (0.99949, "999 mm"), (0.99951, "1 m"), (6.96, "6.96 m"), (8949.0, "8.95 km"),
-        (999_999.0, "1 Mm"), (3e9, "> 1 Mm"), (float("inf"), "none"),
+        (999_999.0, "1 Mm"), (3e9, "∞"), (float("inf"), "∞"),
     ],
 )  # fmt: skip
 def test_columns_stay_apart_whatever_the_errors(length_m, words):
     found = SimpleNamespace(
         sigma=lambda: np.array([[[2e12, length_m, length_m]]]), frequency_hz=np.array([1e5]),
-        best_tones=lambda: np.array([0]), located=lambda: 1.0,
+        best_tones=lambda: np.array([0]), located=lambda: 1.0, verdict=lambda: "",
     )  # fmt: skip
-    row = re.split("  +", sheet_text._row("two-edges", found))
-    assert row == ["two-edges", "> 1 MN", words, words, "100%", "100 kHz"]
+    sheet = Sheet(0.1, 0.1, (450.0, 450.0), 7e-8)
+    found = SheetStudy(sheet, Patch(0.0, 0.0, 0.01, 0.01, 1.1), {}, {"two-edges": found, "b": found}, 6.0, 1e-3, ())
+    row = next(line for line in text(found.document()) if line.startswith("two-edges  "))
+    assert re.split("  +", row) == ["two-edges", "∞", words, words, "100", "100 kHz"]

@@ -57,10 +57,10 @@ def further(sound):
     """Top and capacitance move by twice as much."""
 
     def wrong(*given, **more):
-        found = dict(sound(*given, **more))
-        rest, last = found["lower_f_per_m2"][0], found["lower_f_per_m2"][-1]
-        moved = [2 * d for d in found["displacement_um"]]
-        return found | {"displacement_um": moved, "lower_f_per_m2": [rest, 2 * last - rest]}
+        found = sound(*given, **more)
+        rest, *_, last = found.lower_f_per_m2
+        moved = tuple(2 * d for d in found.displacement_um)
+        return replace(found, displacement_um=moved, lower_f_per_m2=(rest, 2 * last - rest))
 
     return wrong
 

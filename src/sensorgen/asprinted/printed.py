@@ -17,6 +17,7 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.findings import Finding
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
+from sensorgen.design.walls import WALLS
 from sensorgen.export.gcode.paths import Paths
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.layers import LayerRegions, drawn, scene_of
@@ -51,7 +52,7 @@ class Printed:
     design : Design
         As drawn.
     provenance : str
-        "printed, estimated (Arachne)", or "printed, " with slicer and version.
+        "printed, estimated (PrusaSlicer, Arachne walls)", or "printed, " with slicer and version.
     layers : mapping of str to sequence of LayerRegions
         By the convention for a line's width; that of the first is the print's scene.
     lines : Beads or None
@@ -133,7 +134,7 @@ def body(
     """
     if paths is None:
         layers = estimate.layers(design.printed, design.machine, design.layers, walls)
-        return Printed(design, f"printed, estimated ({estimate.TITLES[walls]})", {"mid-plane": layers})
+        return Printed(design, f"printed, estimated ({WALLS[walls]})", {"mid-plane": layers})
     lines = beads(design, paths, centre_mm)
     if not len(lines.number):
         tools = sorted({design.tool(body.material) for body in design.printed.bodies})

@@ -45,9 +45,6 @@ def cura_gaps(width_mm: float, layer_mm: float, printer: Printer) -> float:  # n
 
 Rule = Callable[[float, float, Printer], float]
 RULES: dict[str, Rule] = {"arachne": arachne, "classic": classic, "cura": cura, "cura-gaps": cura_gaps}
-TITLES = {
-    "arachne": "Arachne", "classic": "classic walls", "cura": "plain Cura", "cura-gaps": "Cura filling outline gaps",
-}  # fmt: skip
 
 
 def layers(scene: Scene, printer: Printer, quality: Quality, walls: str = "arachne") -> list[LayerRegions]:

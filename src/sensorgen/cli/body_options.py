@@ -11,6 +11,7 @@ import click
 from sensorgen.cli import show
 from sensorgen.cli.words import OneOf
 from sensorgen.core.errors import BadInput
+from sensorgen.design.walls import WALLS
 from sensorgen.export.slicers import SLICERS
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def body_options() -> list[click.Parameter]:
             help="Slice now for the print; if not given, the G-code in out/NAME, else an estimate from the layers.",
         ),
         click.Option(
-            ["--walls"], type=OneOf(("arachne", "classic", "cura", "cura-gaps")),
+            ["--walls"], type=OneOf(WALLS),
             help="Estimate the print for these walls alone; for all of them if not given, Arachne's as the best value.",
         ),
     ]  # fmt: skip

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import asprinted_text, prediction_text, show
+from sensorgen.cli import asprinted_text, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ def _work(
     design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool, compensate: str | None, details: bool,
     as_json: bool,
 ) -> int:  # fmt: skip
+    from sensorgen.core import document
     from sensorgen.core import files as store
     from sensorgen.core.errors import Unprintable
     from sensorgen.workflows.build import STEPS, as_dict, build
@@ -49,9 +50,9 @@ def _work(
     click.echo(f"{built.verdict}  {design.name}: {show.summary(built.review)}\n")
     if details:
         show.findings(built.review.findings)
-        click.echo("\n".join(("", *prediction_text.whole(built.prediction))))
+        click.echo("\n".join(("", *document.text(built.prediction.document()))))
     else:
-        click.echo("\n".join(prediction_text.table(built.prediction)) + "\n")
+        click.echo("\n".join(document.text([*built.prediction.summary(), ""])))
         show.findings(show.most_severe(built.review.findings, 3))
     click.echo(f"\n{built.folder}: {len(files)} files; {'' if details else '--details prints all'}".rstrip("; "))
     return code

@@ -82,7 +82,7 @@ class DesignGroup(click.Group):
 
     def _command(self, name: str, module: ModuleType | None, base: Data) -> click.Command:
         def run(**given: Any) -> int:
-            own = {p.name: given.pop(p.name) for p in self.own if p.name}
+            own = {p.name: given.pop(p.name) for p in self.own if p.name in given}
             return self.work(_design(base, given, name), **own)
 
         params = _parameter_options(module.Params) if module else []

@@ -1,32 +1,32 @@
 """Results as text, JSON, CSV or Markdown, to the terminal or a file: the one way out of every command."""
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from sensorgen.cli import FOUND_ERRORS, show
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.core.document import Documented
+    from sensorgen.core.document import Documented, Part
 
 _ABOUT = {"json": "Print as JSON.", "csv": "Print the table as CSV, all digits.", "markdown": "Print as Markdown."}
 _FORM, _FILE = "sensorgen.form", "sensorgen.output"  # in the context's meta
 
 
-def options(*forms: str) -> list[click.Parameter]:
+def options(*forms: str, file: bool = True) -> list[click.Parameter]:
     """``--json``, ``--csv``, ``--markdown``, or those named, and ``--output``; :func:`deliver` obeys them."""
-    return [
-        *(
-            click.Option([f"--{form}", f"as_{form}"], is_flag=True, expose_value=False, callback=_choose, help=about)
-            for form, about in _ABOUT.items() if form in (forms or _ABOUT)
-        ),
-        click.Option(
-            ["--output", "-o"], metavar="FILE", expose_value=False, callback=_to, help="Write this file."
-        ),
+    flags = [
+        click.Option([f"--{form}", f"as_{form}"], is_flag=True, expose_value=False, callback=_choose, help=about)
+        for form, about in _ABOUT.items() if form in (forms or _ABOUT)
     ]  # fmt: skip
+    output = click.Option(
+        ["--output", "-o"], metavar="FILE", expose_value=False, callback=_to, help="Write this file."
+    )  # fmt: skip
+    return [*flags, output] if file else [*flags]
 
 
 def _choose(ctx: click.Context, param: click.Parameter, given: bool) -> None:
@@ -46,44 +46,59 @@ def form() -> str:
     return str(click.get_current_context().meta.get(_FORM, ""))
 
 
-def deliver(result: "Documented") -> None:
-    """Print a result in the form that was asked for, or write it to the file; an existing one is replaced whole."""
-    write(pieces(result, form()))
+def refuse_beside(option: str) -> None:
+    """Raise BadInput where a form or a file was asked for too."""
+    asked = (*([form()] if form() else ()), *(["output"] if click.get_current_context().meta.get(_FILE) else ()))
+    if asked:
+        raise BadInput(f"--{asked[0]} and {option} at once; expected one of them")
 
 
-def pieces(result: "Documented", wanted: str) -> Iterable[str]:
+def deliver(result: "Documented", *, before: "Iterable[Part]" = ()) -> None:
+    """Print a result in the form that was asked for, or write it to the file; an existing one is replaced whole.
+
+    Parameters
+    ----------
+    result : Documented
+        What is shown.
+    before : iterable of Part
+        What people read before it; CSV and JSON leave it out.
+    """
+    write(pieces(result, form(), before))
+
+
+def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> Iterable[str]:
     """A result as pieces of text.
 
     Raises
     ------
     BadInput
         CSV of a result without a table.
+
+    Notes
+    -----
+    CSV is the result's first table, unless it writes its own, as ``csv()``, piece by piece.
     """
-    if wanted == "json":
-        return [to_json(result)]
     from sensorgen.core import document
 
+    if wanted == "json":
+        return [document.to_json(result)]
+    if wanted == "csv" and hasattr(result, "csv"):
+        lines: Iterable[str] = result.csv()
+        return lines
     if wanted == "csv":
         tables = [part for part in result.document() if isinstance(part, document.Table)]
         if not tables:
             raise BadInput("--csv: this result has no table; expected --json")
         return [document.comma_separated(tables[0])]
-    lines = document.markdown if wanted else document.text
-    return (f"{line}\n" for line in lines(result.document()))
+    shown = document.markdown if wanted else document.text
+    return (f"{line}\n" for line in shown([*before, *result.document()]))
 
 
-def to_json(result: Any) -> str:
-    """A result, or a sequence of results of one type, as indented JSON; null for what is not finite.
-
-    A result with a schema of its own writes itself: ``to_json()``.
-    """
-    if hasattr(result, "to_json"):
-        return str(result.to_json())
-    from pydantic import TypeAdapter
-
-    many = isinstance(result, Sequence)
-    kind: Any = tuple[type(result[0]), ...] if many and result else type(result)  # type: ignore[misc]
-    return TypeAdapter(kind).dump_json(tuple(result) if many else result, indent=2).decode() + "\n"
+def verdict(*problems: str) -> int:
+    """Say what is wrong with a result, a line each; the exit code."""
+    for problem in problems:
+        click.echo(f"sensorgen: {problem}", err=True)
+    return FOUND_ERRORS if problems else 0
 
 
 def write(text: Iterable[str]) -> None:
@@ -95,7 +110,8 @@ def write(text: Iterable[str]) -> None:
         return
     from sensorgen.core import files
 
-    with files.replacing(Path(output)) as file:
-        for piece in text:
+    with show.progress(()) as step, files.replacing(Path(output)) as file:
+        for k, piece in enumerate(text):
+            step(f"{k} pieces")
             file.write(piece.encode())
     click.echo(output)

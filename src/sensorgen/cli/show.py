@@ -1,4 +1,4 @@
-"""Findings, predictions and progress, as a person at a terminal wants to read them."""
+"""Findings and progress, as a person at a terminal wants to read them."""
 
 import json
 import shutil
@@ -12,16 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sensorgen.core.units import si as si
+
 if TYPE_CHECKING:
     from sensorgen.checks.review import Review
     from sensorgen.core.findings import Finding
-    from sensorgen.prediction.grid import ImpedanceGrid
-    from sensorgen.prediction.results import Prediction
-    from sensorgen.prediction.sensor_model import SensorModel
 
 WIDTH = 80
 _COLOURS = {"error": "red", "warning": "yellow", "info": "blue"}
-PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
 def findings(found: Sequence["Finding"]) -> None:
@@ -71,102 +69,6 @@ def summary(review: "Review") -> str:
     )
 
 
-def loaded(found: "Prediction", model: "SensorModel", grid: "ImpedanceGrid", noise: float) -> Iterator[str]:
-    """R and X over force and position, as lines: their ranges, how much they change, and corners at the last frequency.
-
-    Parameters
-    ----------
-    found, model, grid : Prediction, SensorModel, ImpedanceGrid
-        Of one body.
-    noise : float
-        Standard deviation of a reading, relative to abs(Z) [-].
-    """
-    force, at, sensor = grid.force_n, grid.position_mm, model.sensor
-    touches = float(sensor.contact_m(force[-1])[0])
-    grown = f", contact {touches * 1e3:.3g} mm at {force[-1]:g} N" if touches < sensor.tip_m else ""
-    spread = "" if sensor.profile == "uniform" else f" ({sensor.profile}{grown})"
-    yield f"{found.design}, {found.body}: {_axis(force, 'force', 'N')}, {_axis(at, 'position', 'mm')};"
-    yield f"tip {sensor.tip_m * 1e3:g} mm{spread}, compression {sensor.compression.name}"
-    for doubt in _doubts(model, grid):
-        yield from textwrap.wrap(f"doubtful: {doubt}", WIDTH)
-    yield ""
-    yield f"{'':9} {'R [ohm]':^17}  {'X [ohm]':^25}  change of R  change of X"
-    yield f"{'frequency':>9} {'least':>8} {'most':>8}  {'least':>12} {'most':>12} force  pos. force  pos."
-    for f, z, change in zip(grid.frequency_hz, grid.impedance_ohm, grid.changes(noise), strict=True):
-        r, x = z.real, z.imag
-        moved = " ".join(map(_deviations, change.values()))
-        yield f"{si(f, 'Hz'):>9} {r.min():8.6g} {r.max():8.6g}  {x.min():12.6g} {x.max():12.6g} {moved}"
-    if len(force) > 1 or len(at) > 1:
-        yield f"Changes in standard deviations of one reading, {noise:.2g} of |Z|: over force at"
-        yield f"{at[len(at) // 2]:g} mm, over position at {force[-1]:g} N."
-    yield ""
-    yield f"R and X [ohm] at {si(grid.frequency_hz[-1], 'Hz')}"
-    places = _ends_and_middle(at)
-    yield f"{'':>7}" + "".join(f"{f'{at[k]:g} mm':^24}" for k in places).rstrip()
-    for j in _ends_and_middle(force):
-        cells = (grid.impedance_ohm[-1][j][k] for k in places)
-        yield f"{f'{force[j]:g} N':>7}" + "".join(f"  {z.real:9.7g} {z.imag:12.7g}" for z in cells)
-
-
-def _doubts(model: "SensorModel", grid: "ImpedanceGrid") -> Iterator[str]:
-    """Of the sensor, and of pressures beyond the solved ones."""
-    yield from model.doubts
-    stress_pa = model.sensor.stress_pa(grid.force_n[-1], [x * 1e-3 for x in grid.position_mm])
-    beyond = model.sensor.compression.doubt(float(stress_pa.max()))
-    if beyond:
-        yield beyond
-
-
-def grid_json(found: "Prediction", model: "SensorModel", grid: "ImpedanceGrid") -> Iterator[str]:
-    """Prediction and impedances as JSON, a line per key: for long lists of numbers."""
-    from sensorgen.prediction.results import to_json
-
-    data = {
-        "prediction": json.loads(to_json(found)),
-        "tip_mm": model.sensor.tip_m * 1e3,
-        "profile": model.sensor.profile,
-        "contact_mm": float(model.sensor.contact_m(grid.force_n[-1])[0]) * 1e3,
-        "compression": model.law.compression.name,
-        "doubts": list(_doubts(model, grid)),
-        "axes": ["frequency_hz", "force_n", "position_mm"],
-        "frequency_hz": list(grid.frequency_hz),
-        "force_n": list(grid.force_n),
-        "position_mm": list(grid.position_mm),
-        "re_ohm": grid.impedance_ohm.real.tolist(),
-        "im_ohm": grid.impedance_ohm.imag.tolist(),
-    }
-    for lead, (key, value) in zip(["{", *[","] * (len(data) - 1)], data.items(), strict=True):
-        yield f"{lead}\n  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False, allow_nan=False)}"
-    yield "\n}\n"
-
-
-def _deviations(value: float | None) -> str:
-    if value is None:
-        return "    -"
-    return f"{value:5.2f}" if value < 100 else f"{value:5.3g}"
-
-
-def _axis(values: Sequence[float], name: str, unit: str) -> str:
-    if len(values) == 1:
-        return f"{name} {values[0]:g} {unit}"
-    return f"{len(values)} {name}s {values[0]:g} to {values[-1]:g} {unit}"
-
-
-def _ends_and_middle(values: Sequence[float]) -> list[int]:
-    return sorted({0, len(values) // 2, len(values) - 1})
-
-
-def si(value: float, unit: str) -> str:
-    """A value with an SI prefix, to four digits.
-
-    >>> si(6.29e-11, "F"), si(2333.3, "ohm"), si(0.0, "F")
-    ('62.9 pF', '2.333 kohm', '0 F')
-    """
-    powers = [p for p in PREFIXES if value and abs(value) >= 10.0**p]
-    power = max(powers, default=0 if not value else min(PREFIXES))
-    return f"{value / 10.0**power:.4g} {PREFIXES[power]}{unit}"
-
-
 def as_json(data: Any) -> None:
     """Print plain data as JSON."""
     click.echo(json_text(data), nl=False)
@@ -175,11 +77,6 @@ def as_json(data: Any) -> None:
 def json_text(data: Any) -> str:
     """Plain data as indented JSON."""
     return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
-
-
-def indented(text: str) -> str:
-    """JSON text with two spaces per level."""
-    return json_text(json.loads(text))
 
 
 @contextmanager

@@ -1,14 +1,11 @@
-"""The words of a sweep, the same for every command that has one, and its progress bar."""
+"""``--sweep`` and ``--jobs``, and progress bars of solvers."""
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
 
 import click
-
-Data = dict[str, Any]
 
 
 def options() -> list[click.Parameter]:
@@ -38,20 +35,11 @@ def bar(length: int) -> Iterator[Callable[[], None]]:
         yield lambda: shown.update(1)
 
 
-def rows_csv(key: str, rows: Iterable[Data], columns: Sequence[str]) -> str:
-    """Rows with the value of the sweep before them, as CSV."""
-    import csv
-    import io
-
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow([key, *columns])
-    table.writerows([cell(row[key]), *(cell(row.get(name)) for name in columns)] for row in rows)
-    return text.getvalue()
-
-
-def cell(value: Any) -> str:
-    """One value of a table."""
-    if isinstance(value, float):
-        return repr(value)
-    return "" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+@contextmanager
+def pressing(stress_kpa: Sequence[float]) -> Iterator[Callable[[float], None]]:
+    """A progress bar that stands at the highest stress reached so far, only for a person."""
+    with click.progressbar(
+        length=len(stress_kpa), file=sys.stderr, hidden=not sys.stderr.isatty(), label="pressing"
+    ) as shown:
+        shown.render_progress()
+        yield lambda reached_pa: shown.update(max(sum(1e3 * kpa <= reached_pa for kpa in stress_kpa) - shown.pos, 0))

@@ -80,6 +80,22 @@ class Ratio(click.ParamType):  # type: ignore[type-arg]
         return found
 
 
+class Pad(click.ParamType):  # type: ignore[type-arg]
+    """A rectangle on the sheet, or a stretch of an edge where it has no width."""
+
+    name = "X0-X1,Y0-Y1"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
+        """Read ``90-100,0-10``, or ``0,20-60`` for a stretch of an edge [mm]."""
+        spans = [span.split("-") for span in value.split(",")]
+        if len(spans) != 2 or any(len(span) > 2 for span in spans):
+            raise BadInput(f"--pad {value!r}; expected {self.name} in mm, as in 90-100,0-10, or 0,20-60 on an edge")
+        try:
+            return tuple((units.length_mm(span[0]), units.length_mm(span[-1])) for span in spans)
+        except BadInput as error:
+            raise error.within(f"--pad {value!r}") from None
+
+
 def one(option: str, values: Sequence[float]) -> float:
     """The only one of the numbers that an option was given."""
     if len(values) != 1:

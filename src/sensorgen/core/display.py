@@ -1,4 +1,4 @@
-"""How results show themselves in a notebook: implementations are registered by the packages above."""
+"""How results show themselves in a notebook: by their document, or as the packages above register."""
 
 from functools import singledispatch
 from html import escape
@@ -8,7 +8,11 @@ from typing import Any
 @singledispatch
 def html(thing: object) -> str:
     """A result as HTML."""
-    return f"<pre>{escape(repr(thing))}</pre>"
+    if not hasattr(thing, "document"):
+        return f"<pre>{escape(repr(thing))}</pre>"
+    from sensorgen.core import document
+
+    return document.html(thing.document())
 
 
 @singledispatch

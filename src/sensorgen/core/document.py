@@ -1,4 +1,4 @@
-"""What a result shows: paragraphs, facts and tables; as text, Markdown, HTML or CSV.
+"""What a result shows: paragraphs, facts and tables; as text, Markdown, HTML, CSV or JSON.
 
 A result that a command prints or a notebook displays has a method ``document()`` that yields these parts.
 """
@@ -8,31 +8,61 @@ import io
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from html import escape
 from math import isfinite, isinf, isnan
 from typing import Any, Protocol, Self, get_type_hints
 
+from sensorgen.core.units import si
+
 Cell = str | float | int | None
 DIGITS = 4  # for people; files for programs hold all
 WIDTH = 80  # columns of a terminal
+_LEAST = 20  # columns into which words are wrapped
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "\\`*_{}[]<>#|!~$&"})
+_wrapped = partial(textwrap.wrap, width=WIDTH, break_on_hyphens=False, break_long_words=False)  # names stay whole
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "'", "＝", "＋", "－", "＠")
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column: name, unit, its meaning if the name does not say it, digits for people, and its name in CSV."""
+    """A column of a table.
+
+    Attributes
+    ----------
+    name, unit, about : str
+        Head, unit, and its meaning if the name does not say it.
+    digits : int
+        For people [-].
+    key : str
+        Its name in CSV.
+    si : bool
+        People see each number with its unit and an SI prefix, in place of the unit in the head.
+    hidden : bool
+        For programs alone: CSV has it, text, Markdown and HTML do not.
+    right : bool
+        Its words stand to the right, as numbers do.
+    """
 
     name: str
     unit: str = ""
     about: str = ""
     digits: int = DIGITS
     key: str = ""
+    si: bool = False
+    hidden: bool = False
+    right: bool = False
 
     @property
     def head(self) -> str:
         """Name with unit."""
-        return f"{self.name} [{self.unit}]" if self.unit else self.name
+        return f"{self.name} [{self.unit}]" if self.unit and not self.si else self.name
+
+    def words(self, cell: Cell) -> str:
+        """A cell for people."""
+        if self.si and isinstance(cell, (float, int)) and isfinite(cell):
+            return si(cell, self.unit, self.digits)
+        return shown(cell, self.digits)
 
 
 @dataclass(frozen=True)
@@ -74,17 +104,29 @@ class Table:
         return replace(self, columns=(column, *self.columns), cells=cells)
 
     def filled(self) -> "Table":
-        """The table without columns that are empty in every row."""
-        kept = [k for k in range(len(self.columns)) if any(row[k] not in (None, "") for row in self.cells)]
+        """The table for people: without hidden columns, and those that are empty in every row."""
+        kept = [
+            k for k, column in enumerate(self.columns)
+            if not column.hidden and any(row[k] not in (None, "") for row in self.cells)
+        ]  # fmt: skip
         cells = tuple(tuple(row[k] for k in kept) for row in self.cells)
         return replace(self, columns=tuple(self.columns[k] for k in kept), cells=cells)
 
 
 @dataclass(frozen=True)
 class Facts:
-    """Names with what is to be said of each; one of an empty name goes on with the one before."""
+    """Names with what is to be said of each; one of an empty name goes on with the one before.
+
+    Attributes
+    ----------
+    rows : tuple of (str, str)
+        Name and text.
+    hang : int
+        By how many columns the lines of a long text after the first stand further right [-].
+    """
 
     rows: tuple[tuple[str, str], ...]
+    hang: int = 0
 
 
 Part = str | Facts | Table
@@ -99,10 +141,10 @@ class Documented(Protocol):
 
 
 def shown(cell: Cell, digits: int = DIGITS) -> str:
-    """A cell for people.
+    """A cell for people; no exponent from 0.0001 to a million.
 
-    >>> [shown(v) for v in (None, float("inf"), 1234.5678, 7, True, "a")]
-    ['–', '∞', '1235', '7', 'yes', 'a']
+    >>> [shown(v) for v in (None, float("inf"), 1234.5678, 12345.678, 7, True, "a")]
+    ['–', '∞', '1235', '12350', '7', 'yes', 'a']
     """
     if cell is None:
         return "–"
@@ -114,7 +156,16 @@ def shown(cell: Cell, digits: int = DIGITS) -> str:
         return "∞"
     if isinstance(cell, int) or (cell == int(cell) and abs(cell) < 1e6):
         return f"{cell:.0f}"
-    return f"{cell:.{digits}g}"
+    return f"{float(f'{cell:.{digits}g}'):.{max(digits, 6)}g}"
+
+
+def visible(words: str) -> str:
+    r"""Words of strangers, their control characters shown instead of obeyed by the terminal.
+
+    >>> visible("a\x1b[2J")
+    'a\\x1b[2J'
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
 
 
 def exact(cell: Cell) -> str:
@@ -139,29 +190,44 @@ def text(parts: Iterable[Part]) -> Iterator[str]:
     """Lines for a terminal: paragraphs and facts wrapped, tables with columns below each other."""
     for part in parts:
         if isinstance(part, str):
-            yield from textwrap.wrap(part, WIDTH, subsequent_indent="  ") or [""]
+            yield from _wrapped(visible(part), subsequent_indent="  ") or [""]
         elif isinstance(part, Facts):
             yield from _facts(part)
         else:
-            yield from textwrap.wrap(part.caption, WIDTH)
+            yield from _wrapped(visible(part.caption))
             yield from _aligned(part.filled())
 
 
 def _facts(part: Facts) -> Iterator[str]:
     wide = max(len(name) for name, _ in part.rows) + 2
+    hanging = " " * (wide + part.hang)
     for name, said in part.rows:
-        yield from textwrap.wrap(said, WIDTH, initial_indent=f"{name:{wide}}", subsequent_indent=" " * wide)
+        yield from _wrapped(visible(said), initial_indent=f"{name:{wide}}", subsequent_indent=hanging)
 
 
 def _aligned(table: Table) -> Iterator[str]:
-    """Numbers to the right, words to the left."""
-    rows = [[shown(v, c.digits) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
-    worded = [any(isinstance(row[k], str) for row in table.cells) for k in range(len(table.columns))]
+    """Numbers to the right, words to the left; words of the last column are wrapped."""
+    rows = [[visible(c.words(v)) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
+    worded = _worded(table)
     lines = [[c.head for c in table.columns], *rows]
     wide = [max(len(line[k]) for line in lines) for k in range(len(table.columns))]
+    before = sum(wide[:-1]) + 2 * len(wide[:-1])
     for line in lines:
-        cells = (f"{v:<{w}}" if words else f"{v:>{w}}" for v, w, words in zip(line, wide, worded, strict=True))
-        yield "  ".join(cells).rstrip()
+        cells = [f"{v:<{w}}" if words else f"{v:>{w}}" for v, w, words in zip(line, wide, worded, strict=True)]
+        if not worded[-1]:
+            yield "  ".join(cells).rstrip()
+            continue
+        last = _wrapped(line[-1], width=max(WIDTH - before, _LEAST)) or [""]
+        yield "  ".join([*cells[:-1], last[0]]).rstrip()
+        yield from (" " * before + more for more in last[1:])
+
+
+def _worded(table: Table) -> list[bool]:
+    """Which columns hold words that stand to the left."""
+    return [
+        not column.right and any(isinstance(row[k], str) for row in table.cells)
+        for k, column in enumerate(table.columns)
+    ]
 
 
 def markdown(parts: Iterable[Part]) -> Iterator[str]:
@@ -180,18 +246,18 @@ def _markdown_table(table: Table) -> Iterator[str]:
     yield from ("", f"**{safe(table.caption)}**", "") if table.caption else ("",)
     if len(table.cells) == 1:
         for column, cell in zip(table.columns, table.cells[0], strict=True):
-            yield f"- {safe(column.head)}: {safe(shown(cell, column.digits))}"
+            yield f"- {safe(column.head)}: {safe(column.words(cell))}"
         return
-    worded = [any(isinstance(row[k], str) for row in table.cells) for k in range(len(table.columns))]
+    worded = _worded(table)
     yield f"| {' | '.join(safe(c.head) for c in table.columns)} |"
     yield f"|{'|'.join('---' if words else '---:' for words in worded)}|"
     for row in table.cells:
-        yield f"| {' | '.join(safe(shown(v, c.digits)) for v, c in zip(row, table.columns, strict=True))} |"
+        yield f"| {' | '.join(safe(c.words(v)) for v, c in zip(row, table.columns, strict=True))} |"
 
 
 def safe(words: str) -> str:
     """Words whose signs mean nothing to Markdown, on one line."""
-    return " ".join(words.split()).translate(_MARKDOWN)
+    return visible(" ".join(words.split())).translate(_MARKDOWN)
 
 
 def html(parts: Iterable[Part]) -> str:
@@ -205,7 +271,7 @@ def _html(part: Part) -> str:
     if isinstance(part, Facts):
         return f"<table>{''.join(_html_row(row, 'td') for row in part.rows)}</table>"
     table = part.filled()
-    rows = [[shown(v, c.digits) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
+    rows = [[c.words(v) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
     head = _html_row([c.head for c in table.columns], "th")
     caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
     return f"<table>{caption}{head}{''.join(_html_row(row, 'td') for row in rows)}</table>"
@@ -213,6 +279,20 @@ def _html(part: Part) -> str:
 
 def _html_row(cells: Iterable[str], tag: str) -> str:
     return f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells)}</tr>"
+
+
+def to_json(result: Any) -> str:
+    """A result, or a sequence of results of one type, as indented JSON; null for what is not finite.
+
+    A result with a schema of its own writes itself: ``to_json()``.
+    """
+    if hasattr(result, "to_json"):
+        return str(result.to_json())
+    from pydantic import TypeAdapter
+
+    many = isinstance(result, Sequence)
+    kind: Any = tuple[type(result[0]), ...] if many and result else type(result)  # type: ignore[misc]
+    return TypeAdapter(kind).dump_json(tuple(result) if many else result, indent=2).decode() + "\n"
 
 
 def comma_separated(table: Table) -> str:

@@ -16,6 +16,7 @@ MOST_VALUES = 100_000  # that one text may stand for
 _TYPED = re.compile(r"\s*([-+]?[0-9.]+(?:e[-+]?[0-9]{1,3})?)\s*([a-zµμ]*)\s*", re.IGNORECASE)
 _ROUNDING = Decimal("1e-9")  # of a step: how near the stop counts as on the grid, for steps such as 0.3333333333
 _EXPECTED = "start:stop:step as in 0:6:0.1, or numbers with commas between them"
+PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _PREFIXES = {6: "M", 3: "k", 0: ""}
 
 
@@ -115,6 +116,24 @@ def force_n(text: str) -> float:
     (6.0, 0.25, 0.980665)
     """
     return FORCE_N.read(text)
+
+
+def prefix(value: float) -> tuple[str, float]:
+    """SI prefix in which a value has one to three digits before the point, and its size."""
+    powers = [p for p in PREFIXES if abs(value) >= 10.0**p]
+    power = max(powers) if powers else min(PREFIXES) if value else 0
+    return PREFIXES[power], 10.0**power
+
+
+def si(value: float, unit: str, digits: int = 4) -> str:
+    """A value with an SI prefix.
+
+    >>> si(6.29e-11, "F"), si(2333.3, "ohm"), si(0.0, "F"), si(0.99996, "m"), si(0.5513, "s", 2)
+    ('62.9 pF', '2.333 kohm', '0 F', '1 m', '550 ms')
+    """
+    rounded = float(f"{value:.{digits}g}")
+    name, size = prefix(rounded) if math.isfinite(rounded) else ("", 1.0)
+    return f"{rounded / size:.{max(digits, 4)}g} {name}{unit}"
 
 
 def frequency_text(frequency_hz: float) -> str:

@@ -85,6 +85,12 @@ class Body:
         identity = sha256(f"{self.identity} {design.id()}".encode()).hexdigest()
         return replace(self, design=design, identity=identity, make=lambda: self.cells)
 
+    def printed_otherwise(self, rule: str) -> "Body":
+        """The body by one of the rules of its cells alone."""
+        cells = self.cells
+        one = replace(cells, scenes={rule: cells.scenes[rule]}, gaps=lambda: {rule: cells.gap_mm[rule]})
+        return replace(self, identity=sha256(f"{self.identity} {rule}".encode()).hexdigest(), make=lambda: one)
+
     @property
     def is_drawn(self) -> bool:
         """Whether it is the drawing."""

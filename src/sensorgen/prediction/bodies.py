@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 from sensorgen.design.body import DRAWN, Body, Cells
 from sensorgen.design.design import Design
+from sensorgen.design.walls import WALLS
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
     from sensorgen.scene.scene import Scene
 
 OUT = Path("out")  # folder of the designs' folders, where build and slice write, unless told otherwise
-WALLS = ("arachne", "classic", "cura", "cura-gaps")  # rules of slicers, the default of ours first
 
 
 def drawn(design: Design) -> Body:
@@ -44,8 +44,8 @@ def estimated(design: Design, walls: str = "") -> Body:
     walls : str
         One of ``WALLS`` alone; all of them, the first as the most likely, if not given.
     """
-    rules = (walls,) if walls else WALLS
-    said = f"printed, estimated ({walls or 'PrusaSlicer, Arachne'} walls)"
+    rules = (walls,) if walls else tuple(WALLS)
+    said = f"printed, estimated ({WALLS.get(rules[0], rules[0])})"
     return Body(
         design, "estimated", said, _identity(design, "estimated", *rules), partial(_estimated_cells, design, rules)
     )

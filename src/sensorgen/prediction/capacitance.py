@@ -133,22 +133,9 @@ def capacitance(
     if not keep or (width == inf and not model):
         return _asked(scene, permittivity, width, model)
     question = _question(scene, permittivity, width, model)
-    found = cached.known(question)
-    if found is not None:
-        return replace(_of_plain(found), known=True)
-    answer = _asked(scene, permittivity, width, model)
-    remember(scene, permittivity, model, answer)
-    return answer
-
-
-def remember(scene: Scene, permittivity: Mapping[str, complex], model: str, answer: Answer) -> None:
-    """Keep an answer to :func:`capacitance` for the next time."""
-    cached.keep(_question(scene, permittivity, answer.wanted, model), _plain(answer))
-
-
-def is_known(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str = "") -> bool:
-    """Whether the answer to :func:`capacitance` is known from before."""
-    return cached.known(_question(scene, permittivity, width, model)) is not None
+    known = cached.known(question)
+    found = known or cached.answer(question, lambda: _plain(_asked(scene, permittivity, width, model)))
+    return replace(_of_plain(found), known=known is not None)
 
 
 def weighed(scene: Scene, width: float = inf, model: str = "", lossy: bool = False) -> tuple[Candidate, ...]:

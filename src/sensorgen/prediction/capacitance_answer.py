@@ -1,17 +1,26 @@
-"""The capacitance of designs between bounds, one design or many: what ``sensorgen cell`` answers, as plain data."""
+"""Capacitance per area of a body between bounds, unloaded: the result of ``sensorgen cell``."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from math import inf
-from typing import Any
+from typing import Annotated
 
-from sensorgen.core.parallel import in_parallel, said
-from sensorgen.core.units import M_PER_MM
+from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.units import M_PER_MM, si
 from sensorgen.design.body import Body
-from sensorgen.prediction import capacitance as planner
+from sensorgen.design.values import MaterialValue
 from sensorgen.prediction import losses
-from sensorgen.prediction.capacitance import Answer, Unpredictable, default_width
-from sensorgen.scene.scene import Scene
+from sensorgen.prediction.capacitance import Unpredictable, capacitance, default_width
+from sensorgen.prediction.plan import Candidate, candidates_table
+from sensorgen.prediction.sweep import Sweep
+from sensorgen.prediction.sweep import sweep as swept
+
+QUANTITIES = {
+    "relative_permittivity": "relative permittivity",
+    "loss_tangent": "loss tangent",
+    "resistivity_ohm_m": "resistivity [ohm m]",
+}
 
 
 @dataclass(frozen=True)
@@ -36,7 +45,110 @@ class Asked:
     frequency_hz: float | None = None
 
 
-def answer(body: Body, asked: Asked) -> dict[str, Any]:
+@dataclass(frozen=True, kw_only=True)
+class CellCapacitance:
+    """Capacitance per area of a body's most likely cell; values are None where there is no answer.
+
+    Attributes
+    ----------
+    design, body : str
+        Name of the design, and what of it.
+    lower_f_per_m2, upper_f_per_m2 : float or None
+        Bounds of the capacitance per area, or of its real part [F/m2].
+    loss_lower_f_per_m2, loss_upper_f_per_m2 : float or None
+        Bounds of minus the imaginary part, where dielectrics lose [F/m2].
+    relative_width : float or None
+        How far the bounds are apart, relative to their mean [-].
+    model : str or None
+        That gave them.
+    seconds : float or None
+        Time that all models took together, imports left out [s].
+    reached : bool
+        Whether the bounds are as narrow as asked.
+    reason : str
+        Why there is no answer, or "".
+    accuracy : float or None
+        Relative width that was asked for [-].
+    known : bool
+        Whether the answer was stored.
+    area_m2 : float or None
+        Of the sensor [m2].
+    tan_delta : (float, float) or None
+        Bounds of the loss tangent of the whole [-].
+    frequency_hz : float or None
+        Of the field, where dielectrics lose [Hz].
+    refused : tuple of str
+        Why other models do not apply.
+    plan : tuple of Candidate
+        All models, with what they reached.
+    values : tuple of MaterialValue
+        Material values used.
+    """
+
+    design: str
+    body: str
+    lower_f_per_m2: Annotated[float | None, Column("lower", "F/m2", digits=7)] = None
+    upper_f_per_m2: Annotated[float | None, Column("upper", "F/m2", digits=7)] = None
+    loss_lower_f_per_m2: Annotated[float | None, Column("loss, lower", digits=7)] = None
+    loss_upper_f_per_m2: Annotated[float | None, Column("loss, upper", digits=7)] = None
+    relative_width: Annotated[float | None, Column("width", digits=2)] = None
+    model: Annotated[str | None, Column("model")] = None
+    seconds: Annotated[float | None, Column("time", "s", digits=2, si=True)] = None
+    reached: Annotated[bool, Column("reached", hidden=True)] = False
+    reason: Annotated[str, Column("no answer")] = ""
+    accuracy: float | None = None
+    known: bool = False
+    area_m2: float | None = None
+    tan_delta: tuple[float, float] | None = None
+    frequency_hz: float | None = None
+    refused: tuple[str, ...] = ()
+    plan: tuple[Candidate, ...] = ()
+    values: tuple[MaterialValue, ...] = ()
+
+    def rows(self) -> Sequence["CellCapacitance"]:
+        """The only row."""
+        return (self,)
+
+    def document(self) -> Iterator[Part]:
+        """Capacitance of the sensor, bounds per area, and what they rest on."""
+        ends = [end * (self.area_m2 or 0.0) for end in (self.lower_f_per_m2, self.upper_f_per_m2) if end is not None]
+        yield f"{self.design}, {self.body}: {' to '.join(si(end, 'F') for end in ends)}{', stored' * self.known}"
+        yield Table.of("cell", "", self.rows())
+        yield Facts(tuple(self._facts()))
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "target", f"relative width {self.accuracy:g}"
+        if self.tan_delta:
+            at = f" at {si(self.frequency_hz, 'Hz')}" if self.frequency_hz else ""
+            yield "tan delta", f"{self.tan_delta[0]:.6g} to {self.tan_delta[1]:.6g}{at}"
+        if self.loss_lower_f_per_m2 is not None:
+            yield "loss", "minus the imaginary part of the capacitance per area [F/m2]"
+        yield from (("with", remark) for remark in self.remarks())
+
+    def remarks(self) -> Sequence[str]:
+        """Material values and their sources."""
+        found = [
+            (QUANTITIES[quantity], [v for v in self.values if v.quantity == quantity])
+            for quantity in dict.fromkeys(v.quantity for v in self.values)
+        ]
+        return [f"{name} of {', '.join(f'{v.material} {v.value:g} ({v.source})' for v in of)}" for name, of in found]
+
+    def explained(self) -> Iterator[Part]:
+        """The plan, with what came of it."""
+        yield candidates_table(self.plan, f"plan for a relative width of {self.accuracy:g}", self.model or "")
+        yield ""
+
+    def problems(self) -> Sequence[str]:
+        """Why there is no answer, or none as narrow as asked."""
+        if self.reached:
+            return ()
+        if self.model is None:
+            return (f"no answer: {self.reason}",)
+        best = f"accuracy {self.accuracy:g} not reached: {self.relative_width:.2g}, by {self.model}"
+        return ("; ".join((best, *self.refused)),)
+
+
+def answer(body: Body, asked: Asked) -> CellCapacitance:
     """Bounds of the capacitance per area of one body's most likely cell, unloaded.
 
     Parameters
@@ -53,111 +165,37 @@ def answer(body: Body, asked: Asked) -> dict[str, Any]:
     MissingValue
         A dielectric without a permittivity.
     """
-    return _plain(body, _solved(*_inputs(body, asked)), asked)
+    design, scene = body.design, body.cells.first()
+    permittivity, values = losses.permittivity(design, asked.frequency_hz)
+    width = default_width(scene) if asked.width is None else asked.width
+    found = capacitance(scene, permittivity, width, asked.model, asked.keep).times(body.cells.count)
+    area_m2 = design.params.length_mm * design.params.width_mm * M_PER_MM**2
+    real, loss, per_area = found.capacitance_f, found.loss_f, found.capacitance_f.times(1 / area_m2)
+    tan_delta = None
+    if loss and real.lower > 0:
+        ends = (real.lower, real.upper)
+        tan_delta = loss.lower / ends[loss.lower > 0], loss.upper / ends[loss.upper < 0]
+    return CellCapacitance(
+        design=design.name, body=body.provenance, model=found.model,
+        lower_f_per_m2=per_area.lower, upper_f_per_m2=per_area.upper,
+        loss_lower_f_per_m2=loss.lower / area_m2 if loss else None,
+        loss_upper_f_per_m2=loss.upper / area_m2 if loss else None,
+        relative_width=found.width(), seconds=found.seconds(), reached=found.reached(),
+        accuracy=found.wanted if found.wanted < inf else None, known=found.known, area_m2=area_m2, tan_delta=tan_delta,
+        frequency_hz=asked.frequency_hz if loss else None, refused=found.refused, plan=found.plan, values=tuple(values),
+    )  # fmt: skip
 
 
-def answers(bodies: Sequence[Body], asked: Asked, jobs: int, done: Callable[[], None]) -> list[dict[str, Any]]:
-    """The same for many bodies, those that are not known from before in several processes.
+def sweep(
+    key: str, points: Sequence[tuple[float | str, Body]], asked: Asked, jobs: int, done: Callable[[], None]
+) -> Sweep[CellCapacitance]:  # fmt: skip
+    """The same along a sweep; a reason stands in place of what no model applies to, or at which one fails.
 
-    A design to which no model applies, or at which one fails, has a reason in place of numbers.
-
-    Parameters
-    ----------
-    bodies : sequence of Body
-        In the order of the answers.
-    asked : Asked
-        Accuracy and model.
-    jobs : int
-        How many processes at once, 1 or more.
-    done : callable
-        Called after each design.
-
-    Raises
-    ------
-    UnknownName, OutOfRange, MissingValue
-        As :func:`answer`.
-    SensorgenError
-        A process ended before its answer, as when the memory is full.
+    Parameters and errors as of :func:`answer` and :func:`sensorgen.prediction.sweep.sweep`.
     """
-    inputs = [_inputs(body, asked) for body in bodies]
-    missing = [
-        k for k, (scene, eps, of) in enumerate(inputs)
-        if not (asked.keep and planner.is_known(scene, eps, _width(scene, of), of.model))
-    ]  # fmt: skip
-    found: dict[int, Answer | str] = {}
-    for k in sorted(set(range(len(inputs))) - set(missing)):
-        found[k] = _said(*inputs[k])
-        done()
-    # this process alone writes: the others may be ended at any moment
-    anew = [(*inputs[k][:2], replace(inputs[k][2], keep=False)) for k in missing]
-    for k, result in in_parallel(_said, anew, jobs):
-        scene, eps, _ = inputs[missing[k]]
-        if asked.keep and isinstance(result, Answer):
-            planner.remember(scene, eps, asked.model, result)
-        found[missing[k]] = result
-        done()
-    return [_plain(body, found[k], asked) for k, body in enumerate(bodies)]
+    work = partial(answer, asked=asked)
+    return swept(key, points, work, _failed, refused=(Unpredictable,), keep=asked.keep, jobs=jobs, done=done)
 
 
-def _inputs(body: Body, asked: Asked) -> tuple[Scene, dict[str, complex], Asked]:
-    scene = body.cells.first()
-    return scene, losses.permittivity(body.design, asked.frequency_hz)[0], replace(asked, width=_width(scene, asked))
-
-
-def _width(scene: Scene, asked: Asked) -> float:
-    return default_width(scene) if asked.width is None else asked.width
-
-
-def _solved(scene: Scene, permittivity: dict[str, complex], asked: Asked) -> Answer:
-    return planner.capacitance(scene, permittivity, _width(scene, asked), asked.model, asked.keep)
-
-
-def _said(scene: Scene, permittivity: dict[str, complex], asked: Asked) -> Answer | str:
-    """The answer, or why there is none."""
-    return said(_solved, scene, permittivity, asked, refused=(Unpredictable,))
-
-
-def _plain(body: Body, found: Answer | str, asked: Asked) -> dict[str, Any]:
-    """Lines of an answer."""
-    design = body.design
-    data: dict[str, Any] = {
-        "design": design.name,
-        "body": body.provenance,
-        "model": None,
-        "lower_f_per_m2": None,
-        "upper_f_per_m2": None,
-    }
-    if isinstance(found, str):
-        return data | {"reason": found}
-    found = found.times(body.cells.count)
-    area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
-    per_area = found.capacitance_f.times(1 / area)
-    return data | {
-        "model": found.model,
-        "lower_f_per_m2": per_area.lower,
-        "upper_f_per_m2": per_area.upper,
-        **_lost(found, area, asked),
-        "relative_width": found.width(),
-        "accuracy": found.wanted if found.wanted < inf else None,
-        "reached": found.reached(),
-        "seconds": found.seconds(),
-        "known": found.known,
-        "area_m2": area,
-        "refused": list(found.refused),
-        "plan": [asdict(c) for c in found.plan],
-        "values": [vars(t) for t in losses.permittivity(design, asked.frequency_hz)[1]],
-    }
-
-
-def _lost(found: Answer, area_m2: float, asked: Asked) -> dict[str, Any]:
-    """Where dielectrics lose: minus the imaginary part per area, and the tangent of the whole."""
-    if found.loss_f is None:
-        return {}
-    real, loss = found.capacitance_f, found.loss_f
-    ends = (real.lower, real.upper)
-    return {
-        "loss_lower_f_per_m2": loss.lower / area_m2,
-        "loss_upper_f_per_m2": loss.upper / area_m2,
-        "tan_delta": [loss.lower / ends[loss.lower > 0], loss.upper / ends[loss.upper < 0]] if real.lower > 0 else None,
-        "frequency_hz": asked.frequency_hz,
-    }
+def _failed(body: Body, reason: str) -> CellCapacitance:
+    return CellCapacitance(design=body.design.name, body=body.provenance, reason=reason)

@@ -1,23 +1,25 @@
 """Displacement and capacitance of a design's cell under pressure: results of ``sensorgen compress``."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import takewhile
 from math import inf
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
 from sensorgen.core.bounds import Interval
-from sensorgen.core.errors import BadInput, NotInstalled, OutOfRange
+from sensorgen.core.display import Displayed
+from sensorgen.core.document import Column, Part, Table
+from sensorgen.core.errors import BadInput, MissingValue, NotInstalled, OutOfRange
 from sensorgen.design.body import Body
-from sensorgen.design.design import Design
 from sensorgen.design.values import permittivities
 from sensorgen.models import press2d
 from sensorgen.models.press2d import BoundaryConditions, Pressed
-from sensorgen.prediction import capacitance_answer as bounds
+from sensorgen.prediction import capacitance_answer as at_rest
 from sensorgen.prediction import closed_form_compression as closed_form
+from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.compression_law import elastic, expected
 from sensorgen.prediction.mesh_ladder import (
     MODELS,
@@ -30,15 +32,15 @@ from sensorgen.prediction.mesh_ladder import (
     pressed,
     why_not_applicable,
 )
-from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, plain, run_until_within
-from sensorgen.prediction.sensor_model import piece
-from sensorgen.scene.scene import Scene
+from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
+from sensorgen.prediction.sensor_model import piece as piece_of
+from sensorgen.prediction.sweep import Sweep
+from sensorgen.prediction.sweep import sweep as swept
 
-__all__ = ["ALL", "Asked", "BoundaryConditions", "answer", "planned", "stresses_kpa"]
+__all__ = ["ALL", "Asked", "BoundaryConditions", "CompressionResult", "answer", "planned", "stresses_kpa", "sweep"]
 
-Data = dict[str, Any]
 Step = Callable[[float], None]
-Told = tuple[Pressed, tuple[float, ...]]
+Bounded = tuple[Pressed, tuple[float, ...]]  # and the share by which each capacitance may be off [-]
 ALL = (*MODELS, *closed_form.MODELS)
 
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
@@ -78,7 +80,117 @@ class Asked:
     keep: bool = True
 
 
-def answer(body: Body, asked: Asked, *, step: Step | None = None) -> Data:
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One stress of a result, or the reason why there is none."""
+
+    stress_kpa: Annotated[float | None, Column("stress", "kPa")] = None
+    displacement_um: Annotated[float | None, Column("displacement", "um")] = None
+    lower_f_per_m2: Annotated[float | None, Column("C, lower", "F/m2", digits=7, si=True)] = None
+    upper_f_per_m2: Annotated[float | None, Column("C, upper", "F/m2", digits=7, si=True)] = None
+    converged_kpa: Annotated[float | None, Column("converged", "kPa", hidden=True)] = None
+    relative_width: Annotated[float | None, Column("width", hidden=True)] = None
+    model: Annotated[str | None, Column("model", hidden=True)] = None
+    reached: Annotated[bool | None, Column("reached", hidden=True)] = None
+    reason: Annotated[str, Column("reason", hidden=True)] = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompressionResult(Displayed):
+    """Displacement and bounds of the capacitance per area over stress.
+
+    Attributes
+    ----------
+    design, body : str
+        Name of the design, and what of it.
+    model : str or None
+        That gave the values; None where none did.
+    held : dict of str to str
+        Boundary conditions.
+    stress_kpa, displacement_um : tuple of float
+        On the top [kPa], of the top [um].
+    lower_f_per_m2, upper_f_per_m2 : tuple of float or None
+        Bounds of the capacitance per area at each stress [F/m2]; None where unknown.
+    converged_kpa : float or None
+        Highest stress that was solved [kPa].
+    faults, doubts : tuple of str
+        Why the answer is not to be trusted; why its numbers are uncertain.
+    bounds : str
+        What the bounds hold.
+    accuracy, relative_width : float or None
+        Width of the bounds that was asked for, and the largest that was reached, relative [-].
+    reached : bool or None
+        Whether the accuracy is reached; None where none was asked for.
+    plan : Plan or None
+        Meshes, with what they reached.
+    reason : str
+        Why there is no answer, or "".
+    """
+
+    design: str
+    body: str
+    model: str | None = None
+    held: dict[str, str] = field(default_factory=dict)
+    stress_kpa: tuple[float, ...] = ()
+    displacement_um: tuple[float, ...] = ()
+    lower_f_per_m2: tuple[float | None, ...] = ()
+    upper_f_per_m2: tuple[float | None, ...] = ()
+    converged_kpa: float | None = None
+    faults: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+    bounds: str = ""
+    accuracy: float | None = None
+    relative_width: float | None = None
+    reached: bool | None = None
+    plan: Plan | None = None
+    reason: str = ""
+
+    def rows(self) -> Sequence[Row]:
+        """A row for each stress; one with the reason where there is no answer."""
+        if self.model is None:
+            return (Row(reason=self.reason),)
+        curve = zip(self.stress_kpa, self.displacement_um, self.lower_f_per_m2, self.upper_f_per_m2, strict=True)
+        return [
+            Row(
+                stress_kpa=stress, displacement_um=displacement, lower_f_per_m2=lower, upper_f_per_m2=upper,
+                converged_kpa=self.converged_kpa, relative_width=self.relative_width, model=self.model,
+                reached=self.reached, reason="; ".join(self.faults),
+            )
+            for stress, displacement, lower, upper in curve
+        ]  # fmt: skip
+
+    def document(self) -> Iterator[Part]:
+        """The curve, how the cell was held, and what is uncertain."""
+        yield self.design
+        yield Table.of("compression", "", self.rows())
+        width = "" if self.relative_width is None else f"; largest relative width {self.relative_width:.2g}"
+        target = "" if self.accuracy is None else f" (target {self.accuracy:g})"
+        yield f"converged up to {self.converged_kpa:.4g} kPa{width}{target}"
+        yield from self.remarks()
+
+    def remarks(self) -> Sequence[str]:
+        """How the cell was held, what is wrong with the answer, and what is uncertain."""
+        if self.model is None:
+            return (f"no answer: {self.reason}",)
+        return (
+            f"{self.model}: {', '.join(f'{key} {value}' for key, value in self.held.items())}",
+            f"body: {self.body}",
+            *(f"fault: {fault}" for fault in self.faults),
+            *(f"doubt: {doubt}" for doubt in self.doubts),
+        )
+
+    def problems(self) -> Sequence[str]:
+        """Why it is not what was asked for."""
+        if self.model is None:
+            return (f"no answer: {self.reason}",)
+        wrong = [f"not to be trusted: {fault}" for fault in self.faults]
+        if self.reached is False:
+            best = "error unknown" if self.relative_width is None else f"{self.relative_width:.2g}"
+            wrong.append(f"accuracy {self.accuracy:g} not reached: {best}")
+        return wrong
+
+
+def answer(body: Body, asked: Asked, *, step: Step | None = None) -> CompressionResult:
     """Displacement and bounds of the capacitance per area over stress.
 
     Parameters
@@ -99,46 +211,61 @@ def answer(body: Body, asked: Asked, *, step: Step | None = None) -> Data:
         As :func:`sensorgen.models.press2d.press`; other electrodes than two, sides that a bonded base holds, a
         stress above the least modulus; an accuracy of springs, or one that is not above 0.
     """
-    design, pressed = body.design, piece(body)
-    of = {"body": body.provenance}
     try:
-        return _answer(design, pressed, asked, step) | of
+        if asked.accuracy < inf:
+            return _within(body, asked, step)
+        model = _model(piece_of(body), asked)
+        if model in closed_form.MODELS:
+            return _closed_form(body, asked, model)
+        case = _case(body, asked)
+        found = _pressed(case, asked, USUAL, step)
+        if asked.check_mesh:
+            found = press2d.compared(found, _pressed(case, asked, USUAL + 1, step))
+        return _result(body, case, found, _OF_OUTLINES)
     except NotInstalled as error:
         if asked.model:
             raise
-        return _unsolved(design, pressed, asked, str(error)) | _at_rest(body, asked) | of
+        return _unsolved(body, asked, str(error))
 
 
-def _answer(design: Design, piece: Piece, asked: Asked, step: Step | None) -> Data:
-    if asked.accuracy < inf:
-        return _as_near(design, piece, asked, step)
-    if _model(piece, asked) in closed_form.MODELS:
-        return _closed_form(design, piece, asked)
-    case = _case(design, piece, asked)
-    found = _pressed(case, asked, USUAL, step)
-    if asked.check_mesh:
-        found = press2d.compared(found, _pressed(case, asked, USUAL + 1, step))
-    return _plain(found, case)
+def sweep(
+    key: str, points: Sequence[tuple[float | str, Body]], asked: Asked, jobs: int, done: Callable[[], None]
+) -> Sweep[CompressionResult]:
+    """The same along a sweep; a reason stands in place of a point that has no answer.
+
+    Parameters and errors as of :func:`answer` and :func:`sensorgen.prediction.sweep.sweep`.
+    """
+    alone = (BadInput, MissingValue, OutOfRange, Unpredictable)
+    work = partial(answer, asked=asked)
+    return swept(key, points, work, _failed, refused=alone, keep=asked.keep, jobs=jobs, done=done)
+
+
+def _failed(body: Body, reason: str) -> CompressionResult:
+    return CompressionResult(design=body.design.name, body=body.provenance, reason=reason)
 
 
 def planned(body: Body, asked: Asked) -> Plan:
     """What an accuracy takes, before anything is pressed; parameters and errors as of :func:`answer`."""
-    return _planned(body.design, piece(body), asked)
-
-
-def _planned(design: Design, piece: Piece, asked: Asked) -> Plan:
     if not asked.accuracy > 0:
         raise OutOfRange(f"an accuracy of {asked.accuracy:g}; expected a number above 0, as 1e-2")
+    piece = piece_of(body)
     model = _model(piece, asked)
     if model in closed_form.MODELS:
         why = f"--model {model}" if asked.model else why_not_applicable(piece, MODELS[0])
         raise BadInput(f"an accuracy of C, and {why}: {model} tells {_NO_C}; leave out --accuracy")
-    others = [Candidate(name, passed_over=_reason(piece, name, asked.model)) for name in ALL if name != model]
-    meshes = [_candidate(design, asked, mesh) for mesh in _mesh_levels(piece, model, asked)]
-    candidates = (*others, *meshes)
-    level = Level(
-        "compression", _MEASURE, asked.accuracy, candidates, cheapest(candidates, asked.accuracy)
-    )  # fmt: skip
+    candidates = []
+    for name in ALL:
+        if name != model:
+            without_c = _NO_C if name in closed_form.MODELS else ""
+            unfit = without_c or why_not_applicable(piece, name) or "the model before it applies to the cell"
+            candidates.append(Candidate(name, passed_over=f"--model {model}" if asked.model else unfit))
+    for mesh in _mesh_levels(piece, model, asked):
+        curve = expected(body.design, mesh)  # where the cell rises like a prototype
+        last_pa = min(asked.stress_kpa[-1] * _PA_PER_KPA, float(curve.stress_pa[-1]))
+        share = float(curve.capacitive_strain(np.asarray(last_pa))[0])
+        candidates.append(Candidate(mesh.name, _BRACKET[mesh.model] + 2 * mesh.rise_error * share, mesh.seconds))
+    chosen = cheapest(tuple(candidates), asked.accuracy)
+    level = Level("compression", _MEASURE, asked.accuracy, tuple(candidates), chosen)
     return Plan(asked.accuracy, f"C up to {asked.stress_kpa[-1]:g} kPa", (level,))
 
 
@@ -150,39 +277,22 @@ def _mesh_levels(piece: Piece, model: str, asked: Asked) -> list[MeshLevel]:
     return mesh_levels(piece, model, len(asked.stress_kpa) - 1)
 
 
-def _reason(piece: Piece, name: str, forced: str) -> str:
-    if forced:
-        return f"--model {forced}"
-    return (
-        _NO_C
-        if name in closed_form.MODELS
-        else why_not_applicable(piece, name) or "the model before it applies to the cell"
-    )
-
-
-def _candidate(design: Design, asked: Asked, mesh: MeshLevel) -> Candidate:
-    """A mesh, with the error expected where the cell rises like a prototype."""
-    curve = expected(design, mesh)
-    share = float(curve.capacitive_strain(np.minimum(asked.stress_kpa[-1] * _PA_PER_KPA, curve.stress_pa[-1]))[0])
-    return Candidate(mesh.name, _BRACKET[mesh.model] + 2 * mesh.rise_error * share, mesh.seconds)
-
-
-def _as_near(design: Design, piece: Piece, asked: Asked, step: Step | None) -> Data:
+def _within(body: Body, asked: Asked, step: Step | None) -> CompressionResult:
     """The first mesh within tolerance, from the expected one upwards; the best where none is."""
-    plan = _planned(design, piece, asked)
-    case = _case(design, piece, asked)
-    find = {mesh.name: partial(_told, case, asked, mesh, step) for mesh in _mesh_levels(piece, case.model, asked)}
-    (found, off), level = run_until_within(plan.levels[0], find, lambda answer: _width(*answer))
-    data = _plain(_widened(found, off), case) | {"bounds": _OF_ALL}
-    return data | {
-        "accuracy": asked.accuracy,
-        "relative_width": _width(found, off) if _width(found, off) < inf else None,
-        "reached": _width(found, off) <= asked.accuracy,
-        "plan": plain(replace(plan, levels=(level,))),
+    plan, case = planned(body, asked), _case(body, asked)
+    find = {
+        mesh.name: partial(_bounded, case, asked, mesh, step) for mesh in _mesh_levels(case.piece, case.model, asked)
     }
+    (found, off), level = run_until_within(plan.levels[0], find, lambda answer: _width(*answer))
+    width = _width(found, off)
+    return replace(
+        _result(body, case, _widened(found, off), _OF_ALL), accuracy=asked.accuracy,
+        relative_width=width if width < inf else None, reached=width <= asked.accuracy,
+        plan=replace(plan, levels=(level,)),
+    )  # fmt: skip
 
 
-def _told(case: Case, asked: Asked, mesh: MeshLevel, step: Step | None) -> Told:
+def _bounded(case: Case, asked: Asked, mesh: MeshLevel, step: Step | None) -> Bounded:
     """A case on one mesh, and the share by which each capacitance may be off for it [-]."""
     fine, coarse = (_pressed(case, asked, level, step) for level in (mesh.level, mesh.level - 1))
     rises, others = (_rises(found) for found in (fine, coarse))
@@ -212,10 +322,19 @@ def _width(found: Pressed, off: Sequence[float]) -> float:
     return max((c.width() if c else inf for c in widened), default=inf) if not found.faults else inf
 
 
-def _case(design: Design, piece: Piece, asked: Asked) -> Case:
-    _refuse_unpressable(piece.scene, asked.boundary)
-    permittivity = {t.material: t.value for t in permittivities(design)}
-    return Case(piece, _model(piece, asked), elastic(design, piece.scene), permittivity, asked.boundary)
+def _case(body: Body, asked: Asked) -> Case:
+    """What is pressed; refuses what would be answered, but not as it was asked."""
+    piece = piece_of(body)
+    ends = sorted({body.terminal for body in piece.scene.bodies if body.terminal})
+    if ends != ["bottom", "top"]:
+        raise BadInput(
+            f"a cell with electrodes {', '.join(ends) or 'of no kind'}: expected two, bottom and top, whose "
+            "capacitance a press changes; --model springs tells the displacement alone"
+        )
+    if asked.boundary.period == "free" and asked.boundary.base == "bonded":
+        raise BadInput("free sides over a bonded base are not possible: expected base 'sliding' with them")
+    permittivity = {t.material: t.value for t in permittivities(body.design)}
+    return Case(piece, _model(piece, asked), elastic(body.design, piece.scene), permittivity, asked.boundary)
 
 
 def _pressed(case: Case, asked: Asked, level: int, step: Step | None) -> Pressed:
@@ -223,76 +342,46 @@ def _pressed(case: Case, asked: Asked, level: int, step: Step | None) -> Pressed
     return pressed(case, stress_pa, level, keep=asked.keep, step=step)
 
 
-def _refuse_unpressable(scene: Scene, boundary: BoundaryConditions) -> None:
-    """Refuse what would be answered, but not as it was asked."""
-    ends = sorted({body.terminal for body in scene.bodies if body.terminal})
-    if ends != ["bottom", "top"]:
-        raise BadInput(
-            f"a cell with electrodes {', '.join(ends) or 'of no kind'}: expected two, bottom and top, whose "
-            "capacitance a press changes; --model springs tells the displacement alone"
-        )
-    if boundary.period == "free" and boundary.base == "bonded":
-        raise BadInput("free sides over a bonded base are not possible: expected base 'sliding' with them")
+def _result(body: Body, case: Case, found: Pressed, bounds: str) -> CompressionResult:
+    c = found.capacitance_f_per_m2
+    return CompressionResult(
+        design=body.design.name, body=body.provenance, model=case.model, held=dict(vars(case.boundary)),
+        stress_kpa=tuple(p / _PA_PER_KPA for p in found.stress_pa.tolist()),
+        displacement_um=tuple(d * _UM_PER_M for d in found.displacement_m.tolist()),
+        lower_f_per_m2=tuple(i.lower if i else None for i in c),
+        upper_f_per_m2=tuple(i.upper if i else None for i in c),
+        converged_kpa=found.converged_pa / _PA_PER_KPA, faults=found.faults, doubts=found.doubts, bounds=bounds,
+    )  # fmt: skip
 
 
-def _plain(found: Pressed, case: Case) -> Data:
-    bounds = found.capacitance_f_per_m2
-    return {
-        "model": case.model,
-        "held": dict(vars(case.boundary)),
-        "stress_kpa": [p / _PA_PER_KPA for p in found.stress_pa.tolist()],
-        "displacement_um": [d * _UM_PER_M for d in found.displacement_m.tolist()],
-        "lower_f_per_m2": [c.lower if c else None for c in bounds],
-        "upper_f_per_m2": [c.upper if c else None for c in bounds],
-        "converged_kpa": found.converged_pa / _PA_PER_KPA,
-        "faults": list(found.faults),
-        "doubts": list(found.doubts),
-        "bounds": _OF_OUTLINES,
-    }
-
-
-def _closed_form(design: Design, piece: Piece, asked: Asked) -> Data:
+def _closed_form(body: Body, asked: Asked, model: str) -> CompressionResult:
     """What a law knows that solves no field: a displacement, and no capacitance."""
-    name, unknown = _model(piece, asked), [None] * len(asked.stress_kpa)
-    found = closed_form.MODELS[name](design, piece, [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
-    return {
-        "model": name,
-        "held": found.boundary,
-        "stress_kpa": list(asked.stress_kpa),
-        "displacement_um": (found.displacement_m * _UM_PER_M).tolist(),
-        "lower_f_per_m2": unknown,
-        "upper_f_per_m2": unknown,
-        "converged_kpa": asked.stress_kpa[-1],
-        "faults": [],
-        "doubts": list(found.doubts),
-        "bounds": "none",
-    }
+    unknown = (None,) * len(asked.stress_kpa)
+    found = closed_form.MODELS[model](body.design, piece_of(body), [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
+    return CompressionResult(
+        design=body.design.name, body=body.provenance, model=model, held=found.boundary, stress_kpa=asked.stress_kpa,
+        displacement_um=tuple((found.displacement_m * _UM_PER_M).tolist()), lower_f_per_m2=unknown,
+        upper_f_per_m2=unknown, converged_kpa=asked.stress_kpa[-1], doubts=found.doubts, bounds="none",
+    )  # fmt: skip
 
 
-def _unsolved(design: Design, piece: Piece, asked: Asked, why: str) -> Data:
-    """Without the library for fields: a closed-form estimate, and no accuracy."""
-    data = _closed_form(design, piece, replace(asked, model=closed_form.FIRST))
-    data["doubts"] += [f"not solved: {why}"]
+def _unsolved(body: Body, asked: Asked, why: str) -> CompressionResult:
+    """Without the library for fields: a closed-form estimate, the capacitance at rest, and no accuracy."""
+    found = _closed_form(body, asked, closed_form.FIRST)
+    rest = at_rest.answer(body, at_rest.Asked(keep=asked.keep))
+    unknown = (None,) * (len(asked.stress_kpa) - 1)
+    found = replace(
+        found, doubts=(*found.doubts, f"not solved: {why}"), lower_f_per_m2=(rest.lower_f_per_m2, *unknown),
+        upper_f_per_m2=(rest.upper_f_per_m2, *unknown),
+        bounds=f"of the capacitance at rest, by {rest.model}; none under stress",
+    )  # fmt: skip
     if asked.accuracy == inf:
-        return data
-    plan = _planned(design, piece, asked)
-    levels = tuple(_unasked(level, why) for level in plan.levels)
-    missed = {"accuracy": asked.accuracy, "relative_width": None, "reached": False}
-    return data | missed | {"plan": plain(replace(plan, levels=levels))}
-
-
-def _unasked(level: Level, why: str) -> Level:
-    return replace(
-        level, chosen="", candidates=tuple(replace(c, passed_over=c.passed_over or why) for c in level.candidates)
-    )
-
-
-def _at_rest(body: Body, asked: Asked) -> Data:
-    """The capacitance at rest, which takes no mesher."""
-    found = bounds.answer(body, bounds.Asked(keep=asked.keep))
-    unknown = [None] * (len(asked.stress_kpa) - 1)
-    ends = {key: [found[key], *unknown] for key in ("lower_f_per_m2", "upper_f_per_m2")}
-    return ends | {"bounds": f"of the capacitance at rest, by {found['model']}; none under stress"}
+        return found
+    plan = planned(body, asked)
+    (level,) = plan.levels
+    candidates = tuple(replace(c, passed_over=c.passed_over or why) for c in level.candidates)
+    plan = replace(plan, levels=(replace(level, chosen="", candidates=candidates),))
+    return replace(found, accuracy=asked.accuracy, reached=False, plan=plan)
 
 
 def stresses_kpa(found: Sequence[float]) -> tuple[float, ...]:

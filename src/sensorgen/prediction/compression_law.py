@@ -12,7 +12,7 @@ from itertools import takewhile
 from json import dumps
 from typing import TYPE_CHECKING
 
-from sensorgen.core.errors import OutOfRange, UnknownName
+from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.values import MaterialValue, film, of_all_materials, permittivities
@@ -20,6 +20,7 @@ from sensorgen.models import compression
 from sensorgen.models.compression import Compression, Curve, curve_of
 from sensorgen.prediction.capacitance import Answer, is_plate
 from sensorgen.prediction.mesh_ladder import (
+    COARSEST,
     SAFETY,
     USUAL,
     Case,
@@ -241,8 +242,7 @@ def solved(
     moduli, ratios = of_all_materials(design, "youngs_modulus_pa"), of_all_materials(design, "poisson_ratio")
     piece = printed or drawn(design)
     model = model_of(piece)
-    eps = {t.material: t.value for t in permittivities(design)}
-    case = Case(piece, model, elastic(design, piece.scene), eps, boundary or BoundaryConditions())
+    case = _case(design, piece, model, boundary or BoundaryConditions())
     found = pressed(case, STRESS_PA, level)
     pairs = zip(found.stress_pa.tolist(), found.capacitance_f_per_m2, strict=True)
     last_pa = max((p for p, _ in takewhile(lambda pair: pair[1] is not None, pairs)), default=0.0)
@@ -262,6 +262,41 @@ def solved(
     ended = [f"the solution of the cell ended at {curve.stress_pa[-1] / 1e3:.3g} kPa"] if short else []
     doubts = (*found.doubts, *([_LANDING] if found.fall_m else []), *ended)
     return _cell(curve, {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, doubts)
+
+
+def at_a_few_pressures(design: Design, printed: Piece, answer: Answer, stress_pa: float) -> Law | None:
+    """What is known at once of a printed cell; a cross-section is solved at a few pressures on the coarsest mesh.
+
+    Its own error is not known: it tells by how much ways to print differ, which is far more.
+
+    Parameters
+    ----------
+    design, printed, answer
+        As of :func:`law_of`.
+    stress_pa : float
+        Up to which it is wanted [Pa].
+
+    Returns
+    -------
+    Law or None
+        None where the cell is not solved: in 3D, and where the solver gives up.
+    """
+    from sensorgen.models.press2d import BoundaryConditions
+
+    known = law_of(design, answer, printed=printed)
+    if known.bounded or model_of(printed) != "press2d":
+        return known if known.bounded else None
+    try:
+        case = _case(design, printed, "press2d", BoundaryConditions())
+        found = curve_of(pressed(case, [stress_pa * part for part in (0, 0.5, 1, 1.25)], COARSEST))
+    except SensorgenError:
+        return None
+    return replace(known, compression=found, doubts=())
+
+
+def _case(design: Design, piece: Piece, model: str, boundary: "BoundaryConditions") -> Case:
+    eps = {t.material: t.value for t in permittivities(design)}
+    return Case(piece, model, elastic(design, piece.scene), eps, boundary)
 
 
 def elastic(design: Design, scene: Scene) -> "dict[str, Elastic]":

@@ -8,7 +8,7 @@ is what slicers and walls differ by; the others are material values on which sou
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import inf
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,9 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-def error_budget(model: SensorModel, load: Load, accuracy: float | None = None) -> ErrorBudget:
+def error_budget(
+    model: SensorModel, load: Load, accuracy: float | None = None, otherwise: Sequence[Sensor | None] = ()
+) -> ErrorBudget:
     """The error budget of a load.
 
     Parameters
@@ -43,6 +45,8 @@ def error_budget(model: SensorModel, load: Load, accuracy: float | None = None) 
         Frequencies, force and position.
     accuracy : float, optional
         Wanted of abs(Z), relative [-].
+    otherwise : sequence of Sensor or None
+        The sensor as it may be printed otherwise; None where one is not known under pressure.
 
     Raises
     ------
@@ -50,7 +54,7 @@ def error_budget(model: SensorModel, load: Load, accuracy: float | None = None) 
         A load that the sensor cannot take.
     """
     reference = ReferenceLoad(model.sensor, load)
-    terms = (*_models(model, reference), *_print(model, reference), *_materials(model, reference))
+    terms = (*_models(model, reference), *_print(model, reference, otherwise), *_materials(model, reference))
     total = Changes()
     for term in terms:
         total = total + (term.changes or Changes())
@@ -122,33 +126,47 @@ def _models(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
     yield Term("tip", what, "model", reference.change(*profiles))
 
 
-def _print(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
+def _print(model: SensorModel, reference: ReferenceLoad, otherwise: Sequence[Sensor | None]) -> Iterator[Term]:
     span = model.rest.capacitance.print
     if span.lower < span.upper:
-        ends = _with_capacitances(model, (span.lower, span.upper))
-        names = ", ".join(model.body.cells.scenes)
-        yield Term("print", f"capacitance by line widths of {names}", "print", reference.change(*ends))
+        ends = [*_with_capacitances(model, (span.lower, span.upper)), *(s for s in otherwise if s)]
+        what = f"line widths of {', '.join(model.body.cells.scenes)}"
+        yield Term("print", what, "print", reference.change(*ends), at_least=None in otherwise)
 
 
 def _materials(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
-    """One term for each value on which sources disagree."""
+    for ends in material_ends(model, reference):
+        yield Term(ends.name, ends.what, "material", reference.change(*ends.sensors), at_least=ends.at_least)
+
+
+class Ends(NamedTuple):
+    """A material value on which sources disagree, and the sensor with it at its ends."""
+
+    name: str
+    what: str
+    sensors: Sequence[Sensor]
+    at_least: bool = False
+
+
+def material_ends(model: SensorModel, reference: ReferenceLoad) -> Iterator[Ends]:
+    """Material values on which sources disagree, of a sensor under the load of the reference."""
     design, sensor = model.body.design, model.sensor
     tracks = [spread(design, value) for value in resistivities(design).values()]
     if any(low < high for low, high in tracks):
         ends = [replace(sensor, resistivity_ohm_m=(a, b)) for a, b in zip(*tracks, strict=True)]
         what = f"of the electrodes, {_range_text(tracks)} ohm m"
-        yield Term("resistivity", what, "material", reference.change(*ends))
+        yield Ends("resistivity", what, ends)
     rises = [_piezoresistance_range(design, end) for end in ENDS]
     if any(low < high for low, high in rises):
         ends = [replace(sensor, piezoresistance_per_pa=(a, b)) for a, b in zip(*rises, strict=True)]
         what = f"of the electrodes, {_range_text(rises)} 1/Pa"
-        yield Term("piezoresistance", what, "material", reference.change(*ends))
+        yield Ends("piezoresistance", what, ends)
     yield from _stiffness(model, reference)
     for name, ratios in permittivity_ratios(design, model.body.cells.first()).items():
         value = next(v for v in model.rest.values if v.material == name and v.quantity == "relative_permittivity")
         low, high = spread(design, value)
         ends = [replace(sensor, capacitance_f_per_m=sensor.capacitance_f_per_m * ratio) for ratio in ratios]
-        yield Term(f"permittivity of {name}", f"{low:g} to {high:g}", "material", reference.change(*ends))
+        yield Ends(f"permittivity of {name}", f"{low:g} to {high:g}", ends)
 
 
 def _piezoresistance_range(design: Design, end: str) -> tuple[float, float]:
@@ -158,7 +176,7 @@ def _piezoresistance_range(design: Design, end: str) -> tuple[float, float]:
     return spread(design, value)
 
 
-def _stiffness(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
+def _stiffness(model: SensorModel, reference: ReferenceLoad) -> Iterator[Ends]:
     """All moduli at once, scaled by the largest change that any of them may have."""
     design, sensor = model.body.design, model.sensor
     used, softest, stiffest, parts = design.used(), inf, 0.0, []
@@ -173,7 +191,7 @@ def _stiffness(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
         ends = [replace(sensor, compression=sensor.compression.scaled_modulus(factor)) for factor in (least, stiffest)]
         beyond = f": below {least:.2g} of it the load exceeds the compression law" if least > softest else ""
         what = ", ".join(parts) + beyond
-        yield Term("stiffness", what, "material", reference.change(*ends), at_least=least > softest)
+        yield Ends("stiffness", what, ends, at_least=least > softest)
 
 
 def _least_modulus(sensor: Sensor, softest: float, reference: ReferenceLoad) -> float:

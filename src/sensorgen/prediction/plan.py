@@ -1,12 +1,14 @@
 """Plans as databases print them: candidate models of each level, expected cost and error, and what they reached."""
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import inf
-from typing import Any, TypeVar
+from typing import TypeVar
 
+from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import SensorgenError
+from sensorgen.core.units import si
 
 Found = TypeVar("Found")
 
@@ -37,6 +39,16 @@ class Candidate:
     def reach(self) -> float:
         """Expected error; 0 without a benchmark, so that it is tried."""
         return self.expected_width or 0.0
+
+    def expected(self) -> str:
+        """Expected error and time in words."""
+        if self.expected_seconds is None:
+            return "" if self.passed_over else "always run"
+        return _error_and_time(self.expected_width, self.expected_seconds)
+
+    def reached(self) -> str:
+        """Error that it reached and its time in words."""
+        return "not run" if self.seconds is self.width is None else _error_and_time(self.width, self.seconds)
 
 
 @dataclass(frozen=True)
@@ -85,6 +97,40 @@ class Plan:
     levels: tuple[Level, ...]
     width: float | None = None
 
+    def document(self) -> Iterator[Part]:
+        """Candidates of each level, with what they reached if they were run."""
+        yield f"plan for an accuracy of {self.accuracy:g} of {self.of}"
+        for level in self.levels:
+            caption = f"{level.name}: {level.measure}, tolerance {level.allowed:.2g}"
+            yield candidates_table(level.candidates, caption, level.chosen)
+        if self.width is not None:
+            yield f"all levels together: {_error(self.width)}"
+
+    def shares(self) -> Iterator[str]:
+        """Error that the chosen model of each level reached, in words."""
+        for level in self.levels:
+            yield from (
+                f"{level.name} {_error(c.width)} ({c.model})" for c in level.candidates if c.model == level.chosen
+            )
+
+
+def candidates_table(candidates: Sequence[Candidate], caption: str = "", chosen: str = "") -> Table:
+    """Models with their expected and reached error and time; an arrow leads the one that was chosen."""
+    columns = (Column(""), Column("model"), Column("expected"), Column("reached"), Column("reason"))
+    rows = ((">" if c.model == chosen else "", c.model, c.expected(), c.reached(), c.passed_over) for c in candidates)
+    return Table("plan", caption, columns, tuple(rows))
+
+
+def _error_and_time(width: float | None, seconds: float | None) -> str:
+    time = "" if seconds is None else " instant" if seconds == 0 else f" in {si(seconds, 's', 2)}"
+    return _error(width) + time
+
+
+def _error(width: float | None) -> str:
+    if width in (None, inf):
+        return "error unknown"
+    return "exact" if width == 0 else f"{width:.2g}"
+
 
 def without_times(plan: Plan) -> Plan:
     """The plan without run times, which differ from run to run."""
@@ -93,22 +139,6 @@ def without_times(plan: Plan) -> Plan:
         for level in plan.levels
     )
     return replace(plan, levels=tuple(levels))
-
-
-def plain(plan: Plan) -> dict[str, Any]:
-    """A plan as plain data; unknown errors are None."""
-    data = asdict(plan)
-    for part in (data, *(c for level in data["levels"] for c in level["candidates"])):
-        part |= {key: None for key in ("width", "expected_width") if part.get(key) == inf}
-    return data
-
-
-def of_plain(data: dict[str, Any]) -> Plan:
-    """A plan from :func:`plain` data."""
-    levels = (
-        Level(**level | {"candidates": tuple(Candidate(**c) for c in level["candidates"])}) for level in data["levels"]
-    )
-    return Plan(**data | {"levels": tuple(levels)})
 
 
 def cheapest(candidates: tuple[Candidate, ...], allowed: float) -> str:

@@ -1,10 +1,10 @@
 """Quantities of a prediction, each with its range: gap, capacitance, resistance, impedance, sensitivity, resolution."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
-from math import inf, pi
+from math import inf, isnan, nan, pi, prod
 
 import numpy as np
 
@@ -15,9 +15,12 @@ from sensorgen.design.body import Body
 from sensorgen.design.values import material_value
 from sensorgen.models import line
 from sensorgen.models.compression import Compression
+from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.capacitance import Unpredictable
+from sensorgen.prediction.compression_law import at_a_few_pressures
 from sensorgen.prediction.electrodes import electrode_resistance
-from sensorgen.prediction.error_budget import error_budget
+from sensorgen.prediction.error_budget import ReferenceLoad, error_budget, material_ends
+from sensorgen.prediction.identifiability.fisher import Setup
 from sensorgen.prediction.identifiability.identify import identify
 from sensorgen.prediction.losses import Lost, lost
 from sensorgen.prediction.plan import Plan
@@ -25,11 +28,12 @@ from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import FORCE_N, Load, Query
 from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.results import SCHEMA, Impedance, Prediction
-from sensorgen.prediction.sensor_model import SensorModel
+from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
 from sensorgen.prediction.spread import spread
 
 _ASSUMED = "the cell was not solved, and is taken to deform as a solid plate"
 _PA_PER_KPA = 1e3
+_SAME = 0.05  # capacitances that differ by less are not told apart: solving takes seconds
 
 
 def prediction(body: Body, query: Query) -> Prediction:
@@ -130,23 +134,49 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
         if law.compression.name == "unconfined" and law.bounded
         else None
     )
+    load = replace(load, force_n=load.force_n or FORCE_N)
     try:
         made = identify(
-            model.sensor, load.frequency_hz, query.noise, force_n=load.force_n or FORCE_N, position_m=load.position_m,
+            model.sensor, load.frequency_hz, query.noise, force_n=load.force_n, position_m=load.position_m,
             stiffest=stiffest, assumed="" if law.bounded else _ASSUMED,
         )  # fmt: skip
-        return replace(
-            found, identifiability=made, budget=error_budget(model, load, query.accuracy),
-            sensitivity=_sensitivity(model, load),
-            force_resolution_n=made.sigma_force_n, position_resolution_m=made.sigma_position_m,
+        others = list(_printed_otherwise(model, load, query)) if law.bounded else [None]
+        found = replace(
+            found, identifiability=made, sensitivity=_sensitivity(model, load, others),
+            budget=error_budget(model, query.load(model.body.design), query.accuracy, others),
         )  # fmt: skip
+        return _resolution(found, model, load, query, others)
     except SensorgenError as error:
         return replace(found, reason=str(error))
 
 
-def _sensitivity(model: SensorModel, load: Load) -> Bounds:
+def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator[Sensor | None]:
+    """Sensors by the ways to print it that have the least and the largest capacitance; None where one is not known."""
+    body = model.body
+    own = model.sensor.capacitance_f()
+    at_rest: list[tuple[float, Body, RestState]] = [(own, body, model.rest)]
+    for rule in list(body.cells.scenes)[1:]:
+        with suppress(SensorgenError):  # as of a short, which the prediction tells by itself
+            other = body.printed_otherwise(rule)
+            rest = rest_state(other)
+            at_rest.append((rest.capacitance.value, other, rest))
+    ends = {id(pick[1]): pick for pick in (_end(at_rest, least=True), _end(at_rest, least=False))}
+    pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
+    for _, other, rest in ends.values():
+        if other is not body:
+            law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa)
+            yield build_sensor(other, law, query.tip, rest=rest).sensor if law else None
+
+
+def _end(found: list[tuple[float, Body, RestState]], *, least: bool) -> tuple[float, Body, RestState]:
+    """The first with the least or the largest capacitance, to 5 %."""
+    value = (min if least else max)(c for c, _, _ in found)
+    return next(pick for pick in found if abs(pick[0] / value - 1) < _SAME)
+
+
+def _sensitivity(model: SensorModel, load: Load, others: Sequence[Sensor | None]) -> Bounds:
     """(C(p) / C(0) - 1) / p, with p the pressure of the reference load [1/kPa]."""
-    pressure_pa = float(model.sensor.stress_pa(load.force_n or FORCE_N, load.position_m))
+    pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
 
     def of(law: Compression) -> float:
         strain = float(law.capacitive_strain(np.asarray(pressure_pa))[0])
@@ -154,8 +184,50 @@ def _sensitivity(model: SensorModel, load: Load) -> Bounds:
 
     value = of(model.law.compression)
     return Bounds.of(
-        value, "1/kPa", model=_span(value, of, model.law.others), material=_span(value, of, _moduli(model))
-    )
+        value, "1/kPa", model=_span(value, of, model.law.others), material=_span(value, of, _moduli(model)),
+        print=_range([value, *(of(sensor.compression) if sensor else nan for sensor in others)]),
+    )  # fmt: skip
+
+
+def _resolution(
+    found: Prediction, model: SensorModel, load: Load, query: Query, others: Sequence[Sensor | None]
+) -> Prediction:
+    """Standard errors of force and position from one reading, with what they are of sensors within the errors."""
+
+    def errors(sensor: Sensor | None) -> tuple[float, float]:
+        if sensor is None:
+            return nan, nan
+        press = Setup(sensor, load.frequency_hz, query.noise, load.force_n, load.position_m, inf)
+        force, position, _ = press.bounds()
+        return float(force), float(position)
+
+    own, law = errors(model.sensor), model.law
+    by_law = [errors(replace(model.sensor, compression=other)) for other in law.others] if law.bounded else [(nan, nan)]
+    by_print = [errors(sensor) for sensor in others]
+    by_material = [
+        [errors(sensor) for sensor in ends.sensors] for ends in material_ends(model, ReferenceLoad(model.sensor, load))
+    ]
+
+    def bounds(which: int, unit: str) -> Bounds | None:
+        value = own[which]
+        if isnan(value):
+            return None
+
+        def spread_of(each: Sequence[tuple[float, float]]) -> Interval:
+            return _range([value, *(e[which] for e in each)])
+
+        material = [spread_of(ends) for ends in by_material]
+        lower, upper = (value * prod(getattr(m, end) / value for m in material) for end in ("lower", "upper"))
+        return Bounds.of(
+            value, unit, model=spread_of(by_law), print=spread_of(by_print), material=Interval(lower, upper)
+        )
+
+    return replace(found, force_resolution=bounds(0, "N"), position_resolution=bounds(1, "m"))
+
+
+def _range(values: Sequence[float]) -> Interval:
+    """Lowest and highest; all that is possible where one is not known."""
+    return Interval(0.0, inf) if any(map(isnan, values)) else Interval(min(values), max(values))
 
 
 def _span(value: float, of: Callable[[Compression], float], laws: Iterable[Compression]) -> Interval:

@@ -1,69 +1,150 @@
-"""Compression along a sweep: cached designs first, the others in parallel processes."""
+"""Results along values of one setting: cached points first, the others in parallel processes."""
 
-from collections.abc import Callable, Sequence
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from itertools import chain
+from typing import Any, Generic, Protocol, TypeVar
 
 from sensorgen.core import cache as cached
-from sensorgen.core.errors import BadInput, MissingValue, OutOfRange
+from sensorgen.core.document import Column, Part, Table, shown, to_json
+from sensorgen.core.errors import SensorgenError
 from sensorgen.core.parallel import in_parallel, said
 from sensorgen.design.body import Body
-from sensorgen.prediction.capacitance import Unpredictable
-from sensorgen.prediction.compression import Asked, Data, answer
 
+Value = float | str
 Kept = list[tuple[Any, Any]]
 
 
-def answers(points: Sequence[Body], asked: Asked, jobs: int, done: Callable[[], None]) -> list[Data | str]:
-    """Compression of designs, those that are not cached in several processes; a reason where one fails.
+class Point(Protocol):
+    """A result that a sweep may have at each of its values."""
+
+    @property
+    def design(self) -> str:
+        """Name of the design."""
+        ...
+
+    def rows(self) -> Sequence[Any]:
+        """Dataclasses whose fields are annotated with columns; one or more."""
+        ...
+
+    def remarks(self) -> Sequence[str]:
+        """What is to be said of it besides its rows."""
+        ...
+
+    def problems(self) -> Sequence[str]:
+        """Why it is not what was asked for."""
+        ...
+
+
+Result = TypeVar("Result", bound=Point)
+
+
+@dataclass(frozen=True)
+class Sweep(Generic[Result]):
+    """Results along values of one setting.
+
+    Attributes
+    ----------
+    key : str
+        The setting.
+    values : tuple of float or str
+        That it takes.
+    results : tuple
+        One for each value, of one type.
+    """
+
+    key: str
+    values: tuple[Value, ...]
+    results: tuple[Result, ...]
+
+    def document(self) -> Iterator[Part]:
+        """All rows in one table, and each remark once, with the values it is about unless it is about all."""
+        rows = [(value, row) for value, result in self._points() for row in result.rows()]
+        table = Table.of("sweep", "", [row for _, row in rows])
+        yield table.beside(Column(self.key, digits=6, key=self.key), [value for value, _ in rows])
+        for remark in dict.fromkeys(chain(*(result.remarks() for result in self.results))):
+            of = [shown(value, 6) for value, result in self._points() if remark in result.remarks()]
+            yield f"{remark} ({self.key} {', '.join(of)})" if len(of) < len(self.values) else remark
+
+    def problems(self) -> Sequence[str]:
+        """What is wrong with the first that has a problem, and how many have one."""
+        found = [(result.design, problem) for result in self.results for problem in result.problems()[:1]]
+        more = f" ({len(found)} of {len(self.results)} like this)" if len(found) > 1 else ""
+        return [f"{design}: {problem}{more}" for design, problem in found[:1]]
+
+    def to_json(self) -> str:
+        """A list of the results, each with the value of the setting before it."""
+        results = json.loads(to_json(self.results))
+        rows = [{self.key: value} | result for value, result in zip(self.values, results, strict=True)]
+        return json.dumps(rows, indent=2, ensure_ascii=False) + "\n"
+
+    def _points(self) -> Iterator[tuple[Value, Result]]:
+        return zip(self.values, self.results, strict=True)
+
+
+def sweep(
+    key: str, points: Sequence[tuple[Value, Body]], work: Callable[[Body], Result],
+    failed: Callable[[Body, str], Result], *, refused: tuple[type[SensorgenError], ...], keep: bool = True,
+    jobs: int = 1, done: Callable[[], None] = lambda: None,
+) -> Sweep[Result]:  # fmt: skip
+    """The same work for each body, those whose answer is not cached in several processes.
 
     Parameters
     ----------
-    points : sequence of Body
-        In the order of the answers.
-    asked : Asked
-        As of :func:`sensorgen.prediction.compression.answer`.
+    key : str
+        The setting that is varied.
+    points : sequence of (value, Body)
+        Its values, and the body of each.
+    work : callable
+        Gives the result of a body; a function of a module, or a partial of one, so that another process can find it.
+    failed : callable
+        Makes a result of a body and the reason why it has none.
+    refused : tuple of type
+        Errors that are about one point alone; any other SensorgenError, or a library that is not installed, stops all.
+    keep : bool
+        Read the cache and store new answers.
     jobs : int
         How many processes at once, 1 or more.
     done : callable
-        Called after each.
+        Called after each point.
 
     Raises
     ------
-    NotInstalled
-        A model that was asked for by name needs a library.
     SensorgenError
-        Bounds that cross; a process that ended before its answer, as when the memory is full.
+        Not in ``refused``; a process that ended before its answer, as when the memory is full.
     """
-    found = {k: known for k, point in enumerate(points) if (known := _known(point, asked)) is not None}
-    for _ in found:
-        done()
+    attempt = partial(said, work, refused=refused)
+    found: dict[int, Result | str] = {}
+    for k, (_, body) in enumerate(points if keep else ()):
+        known = _known(attempt, body)
+        if known is not None:
+            found[k] = known
+            done()
     missing = [k for k in range(len(points)) if k not in found]
-    for n, (result, entries) in in_parallel(_apart, [(points[k], asked) for k in missing], jobs):
-        for entry in entries:  # this process alone writes: the others may be ended at any moment
+    for n, (result, entries) in in_parallel(_apart, [(attempt, points[k][1]) for k in missing], jobs):
+        for entry in entries if keep else ():  # this process alone writes: the others may be ended at any moment
             cached.keep(*entry)
         found[missing[n]] = result
         done()
-    return [found[k] for k in range(len(points))]
+    results = []
+    for k, (_, body) in enumerate(points):
+        known = found[k]
+        results.append(failed(body, known) if isinstance(known, str) else known)
+    return Sweep(key, tuple(value for value, _ in points), tuple(results))
 
 
-def _known(body: Body, asked: Asked) -> Data | str | None:
-    """The answer of a point, or why there is none, if nothing has to be solved for it."""
-    if not asked.keep:
-        return None
+def _known(attempt: Callable[[Body], Result | str], body: Body) -> Result | str | None:
+    """The result of a point, or why there is none; None where something has to be solved for it."""
     try:
         with cached.only_known():
-            return _said(body, asked)
+            return attempt(body)
     except cached.Unknown:
         return None
 
 
-def _apart(body: Body, asked: Asked) -> tuple[Data | str, Kept]:
-    """The answer of a point, or why there is none; and what is to be kept of it."""
+def _apart(attempt: Callable[[Body], Result | str], body: Body) -> tuple[Result | str, Kept]:
+    """The result of a point, or why there is none; and what is to be kept of it."""
     with cached.held_back() as entries:
-        return _said(body, asked), entries
-
-
-def _said(body: Body, asked: Asked) -> Data | str:
-    work = partial(answer, body, asked)
-    return said(work, refused=(BadInput, MissingValue, OutOfRange, Unpredictable))
+        return attempt(body), entries

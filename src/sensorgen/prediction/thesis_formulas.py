@@ -1,15 +1,16 @@
-"""What the thesis's own formulas, and its geometry of a pressed cell, give for designs, as plain data.
+"""Capacitance per area by the thesis's own formulas, and by its geometry of a pressed cell.
 
 A formula gives a value without bounds: it has no error estimate. Measured errors: docs/cells.md.
 """
 
 import time
-from collections.abc import Sequence
-from dataclasses import asdict, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from math import ceil
-from typing import Any
+from typing import Annotated, Any
 
-from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.core.document import Column, Part, Table
+from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design.design import Design
@@ -19,15 +20,68 @@ from sensorgen.prediction import capacitance as planner
 from sensorgen.prediction import losses
 from sensorgen.prediction.capacitance import PLANE, Unpredictable
 from sensorgen.prediction.capacitance_answer import Asked
+from sensorgen.prediction.sweep import Sweep
 
 NAMES = (*thesis_cells.NAMED, thesis_swept.NAME)
 SHAPES = {name: law.shapes for name, law in thesis_cells.NAMED.items()} | {thesis_swept.NAME: thesis_swept.SHAPES}
 PRESSED = (*(name for name, law in thesis_cells.NAMED.items() if law.pressed), thesis_swept.NAME)
 
-Data = dict[str, Any]
+
+@dataclass(frozen=True, kw_only=True)
+class FormulaResult:
+    """Capacitance per area that a formula gives; None where it gives none.
+
+    Attributes
+    ----------
+    design : str
+        Name of the design.
+    value_f_per_m2 : float or None
+        Capacitance per area [F/m2].
+    model : str or None
+        The formula.
+    reason : str
+        Its source; or why there is no value.
+    press_mm : float or None
+        Displacement of the top [mm].
+    lower_f_per_m2, upper_f_per_m2 : None
+        A formula has no bounds.
+    seconds : float or None
+        Time it took [s].
+    values : tuple of MaterialValue
+        Material values used.
+    """
+
+    design: str
+    value_f_per_m2: Annotated[float | None, Column("capacitance", "F/m2", digits=10)] = None
+    model: Annotated[str | None, Column("formula")] = None
+    reason: Annotated[str, Column("source", hidden=True)] = ""
+    press_mm: float | None = None
+    lower_f_per_m2: None = None
+    upper_f_per_m2: None = None
+    seconds: float | None = None
+    values: tuple[MaterialValue, ...] = ()
+
+    def rows(self) -> Sequence["FormulaResult"]:
+        """The only row."""
+        return (self,)
+
+    def document(self) -> Iterator[Part]:
+        """The value and its source."""
+        pressed = f", pressed by {self.press_mm:g} mm" if self.press_mm is not None else ""
+        yield f"{self.design}{pressed}; without bounds"
+        yield Table.of("formula", "", self.rows())
+        yield self.reason
+
+    def remarks(self) -> Sequence[str]:
+        """Its source, or why there is no value."""
+        return (self.reason,)
+
+    def problems(self) -> Sequence[str]:
+        """Why there is no value."""
+        return () if self.model else (f"no answer: {self.reason}",)
 
 
-def answer(design: Design, asked: Asked, press_mm: float | None = None) -> Data:
+def answer(design: Design, asked: Asked, press_mm: float | None = None) -> FormulaResult:
     """The capacitance per area of the sensor at rest that a formula gives.
 
     Parameters
@@ -41,6 +95,8 @@ def answer(design: Design, asked: Asked, press_mm: float | None = None) -> Data:
 
     Raises
     ------
+    UnknownName
+        No such formula.
     Unpredictable
         The formula applies to other shapes, or has no losses.
     BadInput
@@ -51,33 +107,53 @@ def answer(design: Design, asked: Asked, press_mm: float | None = None) -> Data:
     _refuse(design, asked.model, press_mm)
     start = time.perf_counter()
     work = _field if asked.model == thesis_swept.NAME else _formula
-    value, said, taken = work(design, asked, press_mm or 0.0)
-    return {
-        "design": design.name, "model": asked.model, "press_mm": press_mm, "value_f_per_m2": value,
-        "lower_f_per_m2": None, "upper_f_per_m2": None, "seconds": time.perf_counter() - start,
-        "values": [vars(t) for t in taken], "reason": said,
-    }  # fmt: skip
+    value, source, values = work(design, asked, press_mm or 0.0)
+    return FormulaResult(
+        design=design.name, value_f_per_m2=value, model=asked.model, reason=source, press_mm=press_mm,
+        seconds=time.perf_counter() - start, values=tuple(values),
+    )  # fmt: skip
 
 
-def answers(designs: Sequence[Design], asked: Asked, press_mm: Sequence[float | None]) -> list[Data]:
-    """The same for many designs and presses, one of each pair; a reason stands in place of what has no number.
+def sweep(
+    key: str, points: Sequence[tuple[float | str, Design]], asked: Asked, press_mm: Sequence[float]
+) -> Sweep[FormulaResult]:
+    """The same along a sweep, or along presses of one design; a reason stands in place of what has no number.
+
+    Parameters
+    ----------
+    key : str
+        The setting that is varied, or "" for presses.
+    points : sequence of (value, Design)
+        Its values and their designs; one of them for presses.
+    asked : Asked
+        As of :func:`answer`.
+    press_mm : sequence of float
+        Displacements of the top [mm]; may be empty.
 
     Raises
     ------
-    Unpredictable, BadInput
-        As :func:`answer`.
+    UnknownName, Unpredictable, BadInput
+        As :func:`answer`; a sweep of both.
     """
-    return [_answer_or_why(design, asked, press) for design, press in zip(designs, press_mm, strict=True)]
-
-
-def _answer_or_why(design: Design, asked: Asked, press_mm: float | None) -> Data:
-    try:
-        return answer(design, asked, press_mm)
-    except OutOfRange as error:
-        return {"design": design.name, "model": None, "value_f_per_m2": None, "reason": str(error)}
+    if key and len(press_mm) > 1:
+        raise BadInput("--sweep and several values of --press at once; expected one of them")
+    if key:
+        pressed = press_mm[0] if press_mm else None
+        cases = [(value, design, pressed) for value, design in points]
+    else:
+        cases = [(press, points[0][1], press) for press in press_mm]
+    results = []
+    for _, design, press in cases:
+        try:
+            results.append(answer(design, asked, press))
+        except OutOfRange as error:
+            results.append(FormulaResult(design=design.name, reason=str(error), press_mm=press))
+    return Sweep(key or "press_mm", tuple(value for value, *_ in cases), tuple(results))
 
 
 def _refuse(design: Design, name: str, press_mm: float | None) -> None:
+    if name not in NAMES:
+        raise UnknownName("formula", name, NAMES)
     if design.shape not in SHAPES[name]:
         raise Unpredictable(f"{name} applies to {' and '.join(SHAPES[name])}, not to {design.shape}")
     if losses.set_losses(design):

@@ -1,7 +1,6 @@
 """The public functions, for notebooks and programs: ``import sensorgen as sg``."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -14,66 +13,23 @@ from sensorgen.analysis.fit import Fit
 from sensorgen.analysis.fit import fit as fit_values
 from sensorgen.asprinted import printed
 from sensorgen.checks.review import Review, review
-from sensorgen.core.display import Displayed
 from sensorgen.core.errors import BadInput
 from sensorgen.design import design as designs
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.export.gcode import paths
 from sensorgen.measure.log import Log
-from sensorgen.prediction import bodies, compression, evaluate, grid
+from sensorgen.prediction import bodies, compression, evaluate
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
+from sensorgen.prediction.loaded import loaded
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import FLAT, NOISE, TONES_HZ, Query, Tip
-from sensorgen.prediction.results import Prediction
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.workflows import build as builds
 from sensorgen.workflows import display as display
 from sensorgen.workflows import slice as slicing
 from sensorgen.workflows.build import Built
 from sensorgen.workflows.slice import Printed
-
-
-@dataclass(frozen=True, eq=False)
-class Loaded(Displayed):
-    """A prediction, and the impedance over force and position.
-
-    Attributes
-    ----------
-    prediction : Prediction
-        At rest, and at the largest force in the middle position.
-    impedance : ImpedanceGrid
-        Over frequency, force and position [ohm].
-    """
-
-    prediction: Prediction
-    impedance: grid.ImpedanceGrid
-
-
-@dataclass(frozen=True, eq=False)
-class Compressed(Displayed):
-    """A unit cell under pressure.
-
-    Attributes
-    ----------
-    pressure_kpa : (n,) array
-        Pressure on the top [kPa].
-    displacement_um : (n,) array
-        Of the top [um].
-    lower_f_per_m2, upper_f_per_m2 : (n,) array
-        Bounds of the capacitance per area [F/m2]; nan where unknown.
-    model : str
-        That was used.
-    doubts : tuple of str
-        Why the numbers are to be taken with care.
-    """
-
-    pressure_kpa: np.ndarray
-    displacement_um: np.ndarray
-    lower_f_per_m2: np.ndarray
-    upper_f_per_m2: np.ndarray
-    model: str
-    doubts: tuple[str, ...]
 
 
 def load(path: str | Path) -> Design:
@@ -161,18 +117,12 @@ def predict(
     query = Query(tuple(frequency_hz), law=law, tip=tip, accuracy=accuracy, noise=noise)
     if not len(force_n) and not len(position_mm):
         return evaluate.evaluate(body, query)
-    axes = (
-        tuple(frequency_hz), tuple(force_n) or grid.FORCES_N, tuple(position_mm) or grid.positions_mm(body.design)
-    )  # fmt: skip
-    reference = grid.hardest(*axes)
-    query = Query(
-        tuple(frequency_hz), reference.force_n, reference.position_m, tip, law, accuracy, noise
-    )  # fmt: skip
-    model, _ = sensor_model(body, query)
-    return Loaded(evaluate.evaluate(body, query), grid.impedance_grid(model.sensor, *axes))
+    return loaded(body, query, force_n, position_mm)
 
 
-def compress(what: Design | Body, pressure_kpa: Sequence[float], *, accuracy: float | None = None) -> Compressed:
+def compress(
+    what: Design | Body, pressure_kpa: Sequence[float], *, accuracy: float | None = None
+) -> compression.CompressionResult:
     """Displacement and capacitance of a unit cell under pressure.
 
     Parameters
@@ -192,16 +142,12 @@ def compress(what: Design | Body, pressure_kpa: Sequence[float], *, accuracy: fl
     Examples
     --------
     >>> found = compress(as_printed(Design(shape="reference"), walls="arachne"), [10.0])
-    >>> float(found.pressure_kpa[-1])
-    10.0
+    >>> found.stress_kpa
+    (0.0, 10.0)
     """
     wanted = inf if accuracy is None else accuracy
     asked = compression.Asked(compression.stresses_kpa(tuple(pressure_kpa)), BoundaryConditions(), accuracy=wanted)
-    data = compression.answer(_body(what), asked)
-    pressure, displacement, lower, upper = (
-        np.array(data[name], float) for name in ("stress_kpa", "displacement_um", "lower_f_per_m2", "upper_f_per_m2")
-    )
-    return Compressed(pressure, displacement, lower, upper, data["model"], tuple(data["doubts"]))
+    return compression.answer(_body(what), asked)
 
 
 def as_printed(design: Design, gcode: str | Path | None = None, *, walls: str = "") -> Body:

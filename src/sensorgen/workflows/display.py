@@ -1,12 +1,9 @@
-"""Tables and figures of results, as a notebook shows them."""
+"""Drawings, tables and figures of results, as a notebook shows them."""
 
-from collections.abc import Sequence
-from html import escape
 from typing import TYPE_CHECKING
 
 from sensorgen.checks.review import Review
-from sensorgen.core import display
-from sensorgen.core.bounds import Bounds
+from sensorgen.core import display, document
 from sensorgen.design.design import Design
 from sensorgen.prediction.results import Prediction
 
@@ -14,35 +11,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "") -> str:
-    def row(cells: Sequence[str], tag: str) -> str:
-        return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"
-
-    body = "".join(row(cells, "td") for cells in rows)
-    return f"<table><caption>{escape(caption)}</caption>{row(head, 'th')}{body}</table>"
-
-
-def _bounds(bounds: Bounds | None) -> str:
-    return "-" if bounds is None else f"{bounds.value:.4g} {bounds.unit} ({bounds.lower:.3g} to {bounds.upper:.3g})"
-
-
-@display.html.register(Prediction)
-def _(found: Prediction) -> str:
-    columns = [found.drawn, found] if found.drawn else [found]
-    quantities = {
-        "electrode gap": [p.gap for p in columns],
-        "capacitance": [p.capacitance for p in columns],
-        **{f"{end} electrode": [p.resistance.get(end) for p in columns] for end in found.resistance},
-        "sensitivity": [p.sensitivity for p in columns],
-    }
-    rows = [[name, *map(_bounds, values)] for name, values in quantities.items()]
-    return _table(["", *(p.body for p in columns)], rows, f"{found.design}: {found.reason or found.status}")
-
-
 @display.html.register(Review)
 def _(found: Review) -> str:
-    rows = [(f.severity, f.rule, f.body, str(f.count), f.message, f.advice) for f in found.findings]
-    return _table(("severity", "rule", "body", "places", "finding", "advice"), rows)
+    heads = ("severity", "rule", "body", "places", "finding", "advice")
+    rows = tuple((f.severity, f.rule, f.body, f.count, f.message, f.advice) for f in found.findings)
+    return document.html([document.Table("findings", "", tuple(map(document.Column, heads)), rows)])
 
 
 @display.html.register(Design)

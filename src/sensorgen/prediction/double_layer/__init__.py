@@ -1,16 +1,18 @@
 """Double sensors: information of a second film, and the effect of a touching body with and without isolation."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from sensorgen.core.document import Column, Part, Table
+from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.values import MaterialValue
 from sensorgen.models.stack import Body
 from sensorgen.prediction.double_layer.designs import press_at, stacked
 from sensorgen.prediction.double_layer.differencing import ReadingErrors, bounds
-from sensorgen.prediction.double_layer.touching import WIRINGS, Touching, TouchResult
+from sensorgen.prediction.double_layer.touching import THICKEST_MM, WIRINGS, Touching, TouchResult
 from sensorgen.prediction.query import TIP_M
 
 __all__ = ["FilmReadings", "ReadingErrors", "StackStudy", "TouchResult", "study"]
@@ -72,6 +74,56 @@ class StackStudy:
     values: tuple[MaterialValue, ...]
     doubts: tuple[str, ...]
     assumptions: tuple[str, ...] = _ASSUMPTIONS
+
+    def document(self) -> Iterator[Part]:
+        """Readings of both films, standard errors by way of reading, and the effect of a touch."""
+        yield (
+            f"{self.force_n:g} N at {self.position_m / M_PER_MM:g} mm, noise {self.noise * 100:g} %; "
+            f"it moves a reading by {self.press_shift * 100:.3g} %"
+        )
+        yield ""
+        heads = ("lower R", "lower X", "upper R", "upper X", "delta R", "delta X")
+        readings = (
+            (r.frequency_hz, r.lower_re, r.lower_im, r.upper_re, r.upper_im, r.upper_re - r.lower_re,
+             r.upper_im - r.lower_im)
+            for r in self.readings_ohm
+        )  # fmt: skip
+        columns = (Column("frequency", "Hz", si=True), *(Column(head) for head in heads))
+        caption = "two films that share the middle electrode; R and X, and upper - lower [ohm]"
+        yield Table("readings", caption, columns, tuple(readings))
+        yield ""
+        columns = (
+            Column("reading"), Column("sigma F", "N", si=True), Column("sigma x", "m", si=True),
+            Column("with drift, F", "N", si=True), Column("x", "m", si=True),
+        )  # fmt: skip
+        errors = (
+            (e.reading, e.force_n.known, e.position_m.known, e.force_n.drifting, e.position_m.drifting)
+            for e in self.bounds
+        )
+        caption = f"standard errors, permittivity known, and where it may drift by {self.drift * 100:g} %"
+        yield Table("errors", caption, columns, tuple(errors))
+        yield ""
+        effects = (
+            (f"{rows[0].isolation_mm:.4g} mm" if rows[0].isolation_mm else "bare",
+             *(f"{r.largest_shift * 100:.2g} % {r.mistaken_for_n:.3g} N" for r in rows))
+            for rows in zip(*(row.by_isolation for row in self.touch), strict=True)
+        )  # fmt: skip
+        needed = ("needed", *(_needed(row.needed_mm) for row in self.touch))
+        caption = (
+            "A body that touches the top beside the press: shift of the reading, and the force that it is mistaken for"
+        )
+        columns = (Column("isolation"), *(Column(row.wiring) for row in self.touch))
+        yield Table("touch", caption, columns, (*effects, needed))
+        yield f"needed: isolation from which on it stays within {self.within_n:g} N"
+        yield ""
+        yield from (f"doubt: {doubt}" for doubt in self.doubts)
+        yield f"assumptions: {'; '.join(self.assumptions)}"
+
+
+def _needed(thickness_mm: float | None) -> str:
+    if thickness_mm is None:
+        return f"not even {THICKEST_MM:g} mm"
+    return "none" if thickness_mm == 0 else f"{thickness_mm:.3g} mm"
 
 
 def study(

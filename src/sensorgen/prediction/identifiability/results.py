@@ -1,12 +1,18 @@
 """Results of an identifiability analysis. SI units; None where a number is undefined."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.units import si
+
 Rows = tuple[tuple[float | None, ...], ...]
+Real = float | NDArray[np.float64]
+SHOWN = 7  # frequencies; of more, those with most information on position
 
 
 @dataclass(frozen=True)
@@ -27,6 +33,10 @@ class StandardErrors:
     sigma_force_n: float | None
     sigma_position_m: float | None
     correlation: float | None = None
+
+    def words(self) -> str:
+        """Both errors to two digits."""
+        return f"{newtons(self.sigma_force_n)}, {metres(self.sigma_position_m)}"
 
 
 @dataclass(frozen=True)
@@ -104,6 +114,11 @@ class ErrorSummary:
     from_force_n: float
     share_known: float
 
+    def where(self) -> str:
+        """The press where it is worst, in words."""
+        at = self.worst_position_m
+        return "" if at is None else f" (at {self.worst_force_n:g} N, {at * 1e3:g} mm)"
+
 
 @dataclass(frozen=True)
 class ErrorMap:
@@ -135,6 +150,10 @@ class FrequencyChoice(StandardErrors):
     """Some frequencies and the standard errors with them alone; no frequency where all errors are undefined."""
 
     frequency_hz: tuple[float, ...] = ()
+
+    def words(self) -> str:
+        """The frequencies and both errors."""
+        return f"{' + '.join(f'{f / 1e3:.3g}' for f in self.frequency_hz)} kHz ({super().words()})"
 
 
 @dataclass(frozen=True)
@@ -222,6 +241,90 @@ class Identifiability(StandardErrors):
     changes: tuple[ChangeResult, ...]
     changes_together: StandardErrors | None
     doubts: tuple[str, ...] = ()
+
+    def document(self) -> Iterator[Part]:
+        """Verdict, errors over all presses, changes that reduce them, and what each frequency contributes."""
+        yield Facts(tuple(self._facts()))
+        known = sorted(self.frequencies, key=lambda row: -(row.share_of_position_information or 0.0))[:SHOWN]
+        columns = (
+            Column("frequency", "Hz", si=True), Column("|Z|", "ohm", si=True), Column("per N", "%", digits=2),
+            Column("per mm", "%", digits=2), Column("info on force", "%", digits=2),
+            Column("on position", "%", digits=2),
+        )  # fmt: skip
+        cells = (
+            (
+                row.frequency_hz, row.magnitude_ohm, 100 * abs(row.relative_by_force_per_n),
+                0.1 * abs(row.relative_by_position_per_m), _percent(row.share_of_force_information),
+                _percent(row.share_of_position_information),
+            )
+            for row in sorted(known, key=lambda row: row.frequency_hz)
+        )  # fmt: skip
+        caption = f"change of Z at {self.press.force_n:g} N and {self.press.position_m * 1e3:g} mm"
+        yield Table("frequencies", caption, columns, tuple(cells))
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "verdict", f"{self.verdict}."
+        yield from (("doubtful", doubt) for doubt in self.doubts)
+        if self.stiffest:
+            yield "", f"{self.stiffest.verdict}."
+        force, position = self.map.of_force, self.map.of_position
+        yield "over all", "; ".join((
+            f"median {newtons(force.median)}, {metres(position.median)}",
+            f"worst {newtons(force.worst)}{force.where()}, {metres(position.worst)}{position.where()}",
+            f"above {force.from_force_n:g} N, force is resolved to {newtons(self.required.sigma_force_n)} in "
+            f"{100 * force.share_known:.0f} % of presses, position to {metres(self.required.sigma_position_m)} in "
+            f"{100 * position.share_known:.0f} %",
+            *([self.map.doubt] if self.map.doubt else ()),
+        ))  # fmt: skip
+        better = self.advised_frequencies
+        if better.pair.frequency_hz:
+            given = [best.words() for best in self.best_frequencies if best.frequency_hz]
+            advised = f"of all up to {si(better.highest_hz, 'Hz')}: {better.single.words()}; {better.pair.words()}"
+            yield "best", "; ".join((*given, advised))
+        else:
+            yield "best", "no frequencies determine both force and position"
+        if not self.changes:
+            yield "to improve", "none of the changes that were tried"
+        for k, change in enumerate(self.changes):
+            yield "" if k else "to improve", f"{k + 1}. {change.change}: {change.words()}"
+        if self.changes_together and len(self.changes) > 1:
+            yield "", f"all together: {self.changes_together.words()}"
+
+
+def _percent(share: float | None) -> float | None:
+    """A share in whole percent."""
+    return None if share is None else float(f"{100 * share:.0f}")
+
+
+def newtons(value: Real | None) -> str:
+    """A force to two digits.
+
+    >>> newtons(2.2299), newtons(213.4), newtons(0.1508), newtons(None)
+    ('2.2 N', '213 N', '0.15 N', 'undefined')
+    """
+    return _text(value, {"N": 1.0}, "kN")
+
+
+def metres(value: Real | None) -> str:
+    """A length to two digits.
+
+    >>> metres(0.22495), metres(21.34), metres(0.00829), metres(2e5)
+    ('225 mm', '21 m', '8.3 mm', 'more than 1 km')
+    """
+    return _text(value, {"mm": 1e-3, "m": 1.0}, "km")
+
+
+def _text(value: Real | None, units: dict[str, float], beyond: str) -> str:
+    """A value in the first unit that keeps it below a thousand."""
+    if value is None or np.isnan(value):
+        return "undefined"
+    for unit, size in units.items():
+        shown = float(value) / size
+        if shown < 99.5:
+            return f"{shown:.2g} {unit}"
+        if shown < 999.5:
+            return f"{shown:.0f} {unit}"
+    return f"more than 1 {beyond}"
 
 
 def finite(value: float | NDArray[np.float64]) -> float | None:

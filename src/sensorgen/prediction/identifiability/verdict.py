@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sensorgen.prediction.identifiability.fisher import Bounds, Real, Setup
-from sensorgen.prediction.identifiability.results import StandardErrors
+from sensorgen.prediction.identifiability.results import StandardErrors, metres, newtons
 
 FORCE_SHARE = 0.1  # force is sensed where its standard error is a tenth of it
 GUESS = 12**-0.5  # standard deviation of a uniform distribution, relative to its range [-]
@@ -93,32 +93,3 @@ def _ability(bounds: Bounds, need: Required) -> str:
 
 def _grades(bounds: Bounds, need: Required) -> tuple[str, str]:
     return need.force(float(bounds.force_n)), need.position(float(bounds.position_m))
-
-
-def newtons(value: float | Real) -> str:
-    """A force to two digits.
-
-    >>> newtons(2.2299), newtons(213.4), newtons(0.1508), newtons(float("nan"))
-    ('2.2 N', '213 N', '0.15 N', 'undefined')
-    """
-    return _text(float(value), {"N": 1.0}, "kN")
-
-
-def metres(value: float | Real) -> str:
-    """A length to two digits.
-
-    >>> metres(0.22495), metres(21.34), metres(0.00829), metres(2e5)
-    ('225 mm', '21 m', '8.3 mm', 'more than 1 km')
-    """
-    return _text(float(value), {"mm": 1e-3, "m": 1.0}, "km")
-
-
-def _text(value: float, units: dict[str, float], beyond: str) -> str:
-    """A value in the first unit that keeps it below a thousand."""
-    for unit, size in units.items():
-        shown = value / size
-        if shown < 99.5:
-            return f"{shown:.2g} {unit}"
-        if shown < 999.5:
-            return f"{shown:.0f} {unit}"
-    return "undefined" if np.isnan(value) else f"more than 1 {beyond}"

@@ -23,20 +23,20 @@ _LOW_AND_HIGH_HZ = np.array([TONES_HZ[0], TONES_HZ[-1]])
 
 def _pressed(
     shape: str, *, parameters: dict[str, float], base: str = "bonded", period: str = "fixed"
-) -> compressed.Data:
+) -> compressed.CompressionResult:
     """A cell under 100 kPa, of the cache where it was solved before."""
     made = designs.make({"shape": shape, "parameters": parameters})
     found = compressed.answer(
         drawn(made), compressed.Asked((0.0, _KPA), compressed.BoundaryConditions(base=base, period=period))
     )
-    if found["faults"]:
-        raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {found['faults'][0]}")
+    if found.faults:
+        raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {found.faults[0]}")
     return found
 
 
-def _top(name: str, moved: compressed.Data, thesis_mm: float) -> Part:
+def _top(name: str, moved: compressed.CompressionResult, thesis_mm: float) -> Part:
     """How far the top of a cell moves, against what the thesis has."""
-    ours = float(moved["displacement_um"][-1]) * _M_PER_UM
+    ours = float(moved.displacement_um[-1]) * _M_PER_UM
     return Part(name, "m", ours, thesis_mm * M_PER_MM, shown=_SHOWN)
 
 
@@ -61,9 +61,12 @@ def plates(two_mm: float, three_mm: float) -> list[Part]:
 def gain(rise_f: float, film_mm: float) -> list[Part]:
     """6.12: by how much the capacitance of the triangular cell rises."""
     found = _pressed("tri", parameters={"dielectric_mm": film_mm})
-    rest, last = ((found["lower_f_per_m2"][k] + found["upper_f_per_m2"][k]) / 2 for k in (0, -1))
+    lower, upper = np.array(found.lower_f_per_m2, float), np.array(found.upper_f_per_m2, float)
+    rest, *_, last = (lower + upper) / 2
     return [
-        Part("rise of C at 100 kPa, 2 mm by 20 mm", "F", (last - rest) * _DEPTH_M * _PERIOD_M, rise_f, shown=_SHOWN)
+        Part(
+            "rise of C at 100 kPa, 2 mm by 20 mm", "F", float(last - rest) * _DEPTH_M * _PERIOD_M, rise_f, shown=_SHOWN
+        )
     ]
 
 
