@@ -265,7 +265,7 @@ def solved(
 
 
 def at_a_few_pressures(design: Design, printed: Piece, answer: Answer, stress_pa: float) -> Law | None:
-    """What is known at once of a printed cell; a cross-section is solved at a few pressures on the coarsest mesh.
+    """The stored law of a printed cell; else a cross-section is solved at a few pressures on the coarsest mesh.
 
     Its own error is not known: it tells by how much ways to print differ, which is far more.
 
