@@ -1,11 +1,12 @@
 """Compensation: parameters changed so that the print has the requested dimensions."""
 
 from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
 from sensorgen.asprinted.printed import body, drawn_gap_mm
 from sensorgen.checks.widths import GAP_CLOSES
+from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.design import Design, fields, make, name_of
 from sensorgen.scene.scene import SLIVER_MM
@@ -36,9 +37,13 @@ class Change:
     after: float
     why: str
 
-    def as_dict(self) -> dict[str, str | float]:
-        """Plain data, for JSON."""
-        return asdict(self)
+
+def document(changes: Sequence[Change]) -> Iterator[Part]:
+    """What was changed, if anything."""
+    if changes:
+        yield "compensated for the print:"
+        yield Facts(tuple((f"  {c.what}", f"{c.before:g} -> {c.after:g}: {c.why}") for c in changes))
+        yield ""
 
 
 def compensated(design: Design, walls: str = "arachne", *, bake: bool = False) -> tuple[Design, list[Change]]:

@@ -1,11 +1,12 @@
 """Design rule check: exact gap, valid bodies, and the findings of every rule about a design on its printer."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from sensorgen import checks
 from sensorgen.core.display import Displayed
-from sensorgen.core.findings import Finding
+from sensorgen.core.document import Part
+from sensorgen.core.findings import Finding, counted, counts, listed
 from sensorgen.design import materials
 from sensorgen.design.design import Design, fields
 from sensorgen.design.tower import tower
@@ -18,6 +19,11 @@ Step = Callable[[str], None]
 STEPS = ("meshes", "checks", "validity")
 LOST = "7-printed"
 _WIDENED = ("2-printed-gap", "5-width", LOST)  # rules that larger widths or a longer period satisfy
+
+
+def lost(found: Iterable[Finding]) -> list[Finding]:
+    """Errors of rule 7 that the design does not waive: bodies that are missing from a printed layer."""
+    return [f for f in found if f.rule == LOST and f.severity == "error" and not f.waiver]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +49,7 @@ class Review(Displayed):
 
     def lost(self) -> list[Finding]:
         """Errors of rule 7 that the design does not waive: bodies that are missing from a printed layer."""
-        return [f for f in self.findings if f.rule == LOST and f.severity == "error" and not f.waiver]
+        return lost(self.findings)
 
     def sliced(self) -> "Review":
         """The review without the estimate of rule 7, which G-code replaces."""
@@ -51,10 +57,7 @@ class Review(Displayed):
 
     def counts(self) -> dict[str, int]:
         """How many findings there are of each severity, and how many are waived."""
-        open_ones = [f.severity for f in self.findings if not f.waiver]
-        return {s: open_ones.count(s) for s in ("error", "warning", "info")} | {
-            "waived": len(self.findings) - len(open_ones)
-        }
+        return counts(self.findings)
 
 
 def review(design: Design, step: Step = lambda _: None, walls: str = "arachne") -> Review:
@@ -126,16 +129,40 @@ def _crowding(design: Design) -> list[Finding]:
     ]  # fmt: skip
 
 
-def report(design: Design, held: Review) -> dict[str, object]:
-    """The findings as plain data for ``check.json``."""
-    return {
-        "name": design.name,
-        "design": design.id(),
-        "printer": design.machine.name,
-        "quality": design.layers.name,
-        "counts": held.counts(),
-        "findings": [f.as_dict() for f in held.findings],
-    }
+@dataclass(frozen=True)
+class CheckReport:
+    """The findings about a design, as in ``check.json``.
+
+    Attributes
+    ----------
+    name, design : str
+        Name and identity of the design.
+    printer, quality : str
+        What it was checked for.
+    counts : dict of str to int
+        Findings of each severity, and waived ones.
+    findings : tuple of Finding
+        All of them.
+    """
+
+    name: str
+    design: str
+    printer: str
+    quality: str
+    counts: dict[str, int]
+    findings: tuple[Finding, ...]
+
+    def document(self) -> Iterator[Part]:
+        """The findings, then their number."""
+        yield from listed(self.findings)
+        yield f"{self.name}: {counted(self.counts)}"
+
+
+def report(design: Design, held: Review) -> CheckReport:
+    """The findings as data."""
+    return CheckReport(
+        design.name, design.id(), design.machine.name, design.layers.name, held.counts(), tuple(held.findings)
+    )
 
 
 def draw(design: Design, held: Review, printed: Scene | None = None, source: str = "") -> str:

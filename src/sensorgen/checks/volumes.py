@@ -1,12 +1,13 @@
 """Rule 7: printed against drawn volume of every body in every layer, and the parts that are lost or merged."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import groupby, pairwise
 
 import numpy as np
 import shapely
 
+from sensorgen.core.document import Column, Table
 from sensorgen.core.findings import Finding
 from sensorgen.scene.layers import LayerRegions, Region, drawn, parts
 from sensorgen.scene.scene import SLIVER_MM, Body, Point, Scene
@@ -34,6 +35,8 @@ class Row:
         Separate parts as drawn, those that are lost, and those that merge with a neighbour [-].
     place_mm : (float, float)
         Middle of the first lost part, or else of the first, at its front or left edge [mm].
+    ratio : float or None
+        Printed over drawn volume; None where nothing is drawn. From these two [-].
     """
 
     body: str
@@ -46,15 +49,36 @@ class Row:
     vanished: int
     fused: int
     place_mm: Point
+    ratio: float | None = None
+
+    def __post_init__(self) -> None:
+        """Derive the ratio."""
+        if self.exact_mm3 > 0:
+            object.__setattr__(self, "ratio", self.printed_mm3 / self.exact_mm3)
 
     @property
-    def ratio(self) -> float:
-        """Printed over drawn volume; infinite where nothing is drawn [-]."""
-        return self.printed_mm3 / self.exact_mm3 if self.exact_mm3 > 0 else float("inf")
+    def grown(self) -> bool:
+        """Whether more is printed than drawn."""
+        return self.printed_mm3 > self.exact_mm3
 
-    def as_dict(self) -> dict[str, object]:
-        """The row with its ratio, for JSON; None where nothing is drawn."""
-        return asdict(self) | {"ratio": self.ratio if self.exact_mm3 > 0 else None}
+
+def table(rows: Sequence[Row]) -> Table:
+    """Printed over drawn volume of every body, layer by layer from the top."""
+    bodies = list(dict.fromkeys(row.body for row in rows))
+    cells = {(row.layer, row.body): _cell(row) for row in rows}
+    spans = {row.layer: f"{row.bottom_mm:g}-{row.top_mm:g}" for row in rows}
+    layers = sorted(spans, reverse=True)
+    return Table(
+        "volumes", "printed over drawn volume (-n: missing parts, +n: merged parts)",
+        (Column("layer"), Column("height", "mm"), *map(Column, bodies)),
+        tuple((n, spans[n], *(cells.get((n, body), "") for body in bodies)) for n in layers),
+    )  # fmt: skip
+
+
+def _cell(row: Row) -> str:
+    lost = f" -{row.vanished}" if row.vanished else ""
+    fused = f" +{row.fused}" if row.fused else ""
+    return f"{'extra' if row.ratio is None else format(row.ratio, '.2f')}{lost}{fused}"
 
 
 def rows(
@@ -128,31 +152,29 @@ def findings(found: Iterable[Row], scene: Scene) -> list[Finding]:
     scene : Scene
         The sensor on its bed.
     """
-    outside = [row for row in found if row.exact_mm3 > 0 and not LOW <= row.ratio <= HIGH]
-    told = []
-    for body in scene.bodies:
-        numbered = list(enumerate(row for row in outside if row.body == body.name))
-        # One finding for neighbouring layers with the same fault.
-        alike = groupby(numbered, key=lambda pair: (pair[1].layer - pair[0], _fault(pair[1]), pair[1].ratio > 1))
-        told += [_finding(body, fault, [row for _, row in group]) for (_, fault, _), group in alike]
-    return told
+    outside = [row for row in found if row.ratio is not None and not LOW <= row.ratio <= HIGH]
+    return [finding for body in scene.bodies for finding in _of_body(body, [r for r in outside if r.body == body.name])]
 
 
-def _finding(body: Body, fault: str, here: Sequence[Row]) -> Finding:
-    first, last = here[0], here[-1]
-    severe = fault == "is not printed at all" and not body.is_support()
-    ratios = sorted({f"{row.ratio:.2f}" for row in here})
-    what = fault or f"prints {' to '.join(ratios[:: max(len(ratios) - 1, 1)])} times its volume"
-    vanished = max(here, key=lambda row: row.vanished)
-    more = [f"{vanished.vanished} of {vanished.strips} strips vanish"] if vanished.vanished and not fault else []
-    more += [f"{max(row.fused for row in here)} fuse"] if any(row.fused for row in here) else []
-    return Finding(
-        "7-printed", "error" if severe else "warning", body.name,
-        f"from {first.bottom_mm:g} to {last.top_mm:g} mm it {', '.join([what, *more])}",
-        "make narrow parts at least a line wide, or use other walls or thinner layers",
-        layer=first.layer, place_mm=(*first.place_mm, round((first.bottom_mm + first.top_mm) / 2, 9)),
-        count=max(vanished.vanished, 1), last_layer=last.layer if len(here) > 1 else None,
-    )  # fmt: skip
+def _of_body(body: Body, outside: Sequence[Row]) -> Iterator[Finding]:
+    """One finding for neighbouring layers with the same fault."""
+    numbered = list(enumerate(outside))
+    for (_, fault, _), group in groupby(numbered, key=lambda p: (p[1].layer - p[0], _fault(p[1]), p[1].grown)):
+        here = [row for _, row in group]
+        first, last = here[0], here[-1]
+        severe = fault == "is not printed at all" and not body.is_support()
+        ratios = sorted({f"{row.ratio:.2f}" for row in here})
+        what = fault or f"prints {' to '.join(ratios[:: max(len(ratios) - 1, 1)])} times its volume"
+        vanished = max(here, key=lambda row: row.vanished)
+        more = [f"{vanished.vanished} of {vanished.strips} strips vanish"] if vanished.vanished and not fault else []
+        more += [f"{max(row.fused for row in here)} fuse"] if any(row.fused for row in here) else []
+        yield Finding(
+            "7-printed", "error" if severe else "warning", body.name,
+            f"from {first.bottom_mm:g} to {last.top_mm:g} mm it {', '.join([what, *more])}",
+            "make narrow parts at least a line wide, or use other walls or thinner layers",
+            layer=first.layer, place_mm=(*first.place_mm, round((first.bottom_mm + first.top_mm) / 2, 9)),
+            count=max(vanished.vanished, 1), last_layer=last.layer if len(here) > 1 else None,
+        )  # fmt: skip
 
 
 def _fault(row: Row) -> str:

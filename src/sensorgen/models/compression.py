@@ -86,6 +86,8 @@ class Curve:
         Relative changes of the rise under other boundary and contact conditions [-].
     displacement_m : float or None
         Of the top at the last stress [m]; None if unknown.
+    doubts : tuple of str
+        What its solution is to be doubted for.
     onset : float
         Factor on the distance from 1 of the power of the stress with which the curve begins [-].
 
@@ -105,6 +107,7 @@ class Curve:
     boundary_changes: tuple[float, ...] = ()
     displacement_m: float | None = None
     onset: float = 1.0
+    doubts: tuple[str, ...] = ()
 
     def capacitive_strain(self, stress_pa: Real) -> tuple[Real, Real]:
         """Capacitive strain [-] and its derivative [1/Pa]; OutOfRange below 0 and far beyond the last point."""
@@ -296,7 +299,10 @@ def _curve(cell: Mapping[str, Any], scale: float) -> Curve:
     stress = [kpa * _PA_PER_KPA * scale for kpa in cell["stress_kpa"]]
     found = curve("solved", cell["source"], stress, [1 + percent / 100 for percent in cell["rise_percent"]])
     changes, displacement_m = tuple(cell["held"].values()), cell["displacement_um"] / _UM_PER_M
-    return replace(found, within=cell["within"], boundary_changes=changes, displacement_m=displacement_m)
+    return replace(
+        found, within=cell["within"], boundary_changes=changes, displacement_m=displacement_m,
+        doubts=tuple(cell.get("doubts", ())),
+    )  # fmt: skip
 
 
 def _cells() -> dict[str, Any]:

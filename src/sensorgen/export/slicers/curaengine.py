@@ -104,9 +104,16 @@ def slice_bodies(
             place = Path(here) / name
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_text(text, "utf-8")
-        command = [program, "slice", *_arguments(stls, settings, Path(here)), "-o", str(gcode)]
-        search = os.pathsep.join(map(str, _search(Path(here))))
-        run(command, gcode, {"CURA_ENGINE_SEARCH_PATH": search}, runner)
+        # General settings, then each tool's, then each body under its tool: the engine reads in this order.
+        command = [program, "slice", "-j", str(Path(here) / "definitions" / f"{settings.printer}.def.json")]
+        command += _given(settings.common)
+        for index, values in sorted((settings.unused | settings.tools).items()):
+            command += [f"-e{index}", *_given(values)]
+        for path, index in stls:
+            command += [f"-e{index}", "-l", str(path), "-s", f"extruder_nr={index}"]
+        command += ["-o", str(gcode)]
+        search = [str(base / kind) for base in (Path(here), resources()) for kind in ("definitions", "extruders")]
+        run(command, gcode, {"CURA_ENGINE_SEARCH_PATH": os.pathsep.join(search)}, runner)
 
 
 def resources() -> Path:
@@ -121,20 +128,6 @@ def resources() -> Path:
         if (path / "definitions" / "fdmprinter.def.json").is_file():
             return path
     raise SlicerFailed(f"Cura's definitions are not in {RESOURCES[0]}; on Debian: apt install cura")
-
-
-def _search(here: Path) -> list[Path]:
-    return [base / kind for base in (here, resources()) for kind in ("definitions", "extruders")]
-
-
-def _arguments(stls: Sequence[tuple[Path, int]], settings: EngineSettings, here: Path) -> list[str]:
-    """General settings, then each tool's, then each body under its tool: the engine reads in this order."""
-    words = ["-j", str(here / "definitions" / f"{settings.printer}.def.json"), *_given(settings.common)]
-    for index, values in sorted((settings.unused | settings.tools).items()):
-        words += [f"-e{index}", *_given(values)]
-    for path, index in stls:
-        words += [f"-e{index}", "-l", str(path), "-s", f"extruder_nr={index}"]
-    return words
 
 
 def _given(values: Mapping[str, str]) -> list[str]:

@@ -45,10 +45,22 @@ def points(name: str, budget_s: float) -> list[Point]:
         off = abs(found[0] / force - 1), abs(found[1] - position) / _LENGTH_M
         return max(*off, DIGITS), f"{found[0]:.6g} N at {1e3 * found[1]:.6g} mm"
 
+    def by_fit(form: str) -> Press:
+        found = _fitted(form).presses(*line_fit.series(_FIT_HZ, _READING[[_FIT]]))
+        return float(found.force_n[0]), float(found.choice(_LENGTH_M)[0])
+
+    def as_printed() -> Press:
+        c, fit = line_fit.series(_FIT_HZ, _READING[[_FIT]])[0], _fitted("printed")
+        return float(fit.force_n(c)[0]), float(fit.printed_position_m(c)[0])
+
+    def sought() -> Press:
+        found = _estimator().one(_READING)
+        return found.force_n, found.position_m
+
     ladders: list[Ladder] = [
-        *((f"line_fit: {form}", [("", partial(_by_fit, form))]) for form in line_fit.FORMS),
-        ("line_fit: C.5 as printed", [("", _as_printed)]),
-        ("invert: seven tones", [("", _sought)]),
+        *((f"line_fit: {form}", [("", partial(by_fit, form))]) for form in line_fit.FORMS),
+        ("line_fit: C.5 as printed", [("", as_printed)]),
+        ("invert: seven tones", [("", sought)]),
     ]
     return list(climbed(name, ladders, judge, budget_s))
 
@@ -66,17 +78,6 @@ def _fitted(form: str) -> line_fit.LineFit:
     return line_fit.fit(force, x + _TIP_M / 2, *line_fit.series(_FIT_HZ, z), form)
 
 
-def _by_fit(form: str) -> Press:
-    found = _fitted(form).presses(*line_fit.series(_FIT_HZ, _READING[[_FIT]]))
-    return float(found.force_n[0]), float(found.choice(_LENGTH_M)[0])
-
-
-def _as_printed() -> Press:
-    capacitance, _ = line_fit.series(_FIT_HZ, _READING[[_FIT]])
-    fit = _fitted("printed")
-    return float(fit.force_n(capacitance)[0]), float(fit.printed_position_m(capacitance)[0])
-
-
 @cache
 def _estimator() -> Estimator:
     p = lines.PLATE
@@ -84,8 +85,3 @@ def _estimator() -> Estimator:
     high, rho = ((p[f"top_{of}"], p[f"bottom_{of}"]) for of in ("thickness_m", "resistivity_ohm_m"))
     law = compression.unconfined(p["modulus_pa"])
     return Estimator(Sensor(_LENGTH_M, p["width_m"], high, rho, film, law, _TIP_M), _TONES)
-
-
-def _sought() -> Press:
-    found = _estimator().one(_READING)
-    return found.force_n, found.position_m

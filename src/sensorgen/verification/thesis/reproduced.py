@@ -59,7 +59,7 @@ def row(of_chapter: str, kind: Kind, item: Item) -> Row:
     elif item.uncovered:
         verdict = Verdict(NOT_COVERED, f"({item.uncovered})")
     else:
-        verdict = judged(item.expected(), parts)
+        verdict = judged(item, parts)
     return Row(of_chapter, kind, item, parts, verdict)
 
 
