@@ -1,6 +1,7 @@
 """Compression of the thesis's triangular cells as slicers should print them: writes models/solved_prints.yaml."""
 
 from itertools import product
+from json import dumps
 from pathlib import Path
 
 from sensorgen.design.design import make
@@ -41,7 +42,7 @@ def main() -> None:
             f"    displacement_um: {curve.displacement_m * 1e6:.5g}\n"
             f"    stress_kpa: {[round(p / 1e3, 6) for p in curve.stress_pa]}\n"
             f"    rise_percent: {[round(100 * (r - 1), 6) for r in curve.ratio]}\n"
-            f"    within: {curve.within:.4g}\n"
+            f"    within: {curve.within:.4g}\n" + (f"    doubts: {dumps(law.doubts)}\n" if law.doubts else "")
         )
         print(walls, quality, along, film, content(cell), law.doubts)
         FILE.write_text(HEAD + "".join(found.values()), "utf-8")

@@ -223,8 +223,8 @@ def test_a_design_gets_its_file_and_what_was_found(slicer, tmp_path):
     again = slice_design(SMALL, tmp_path / "out", "prusa", force=True)
     folder = tmp_path / "out" / SMALL.name
     assert sorted(p.name for p in folder.iterdir()) == [f"{SMALL.name}.prusa.gcode", f"{SMALL.name}.prusa.gcode.json"]
-    content = made.gcode.read_bytes()
+    content = Path(made.gcode).read_bytes()
     assert made.sha256 == again.sha256 == sha256(content).hexdigest()
     assert content.endswith(b"M0 H1\n")
-    assert made.code == 0
-    assert made.checked.report.tools[0].material == "etpu"
+    assert not made.errors()
+    assert made.tools[0].material == "etpu"

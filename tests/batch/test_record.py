@@ -14,7 +14,7 @@ from sensorgen.prediction.bodies import estimated
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import to_json
 from sensorgen.workflows.batch import make
-from sensorgen.workflows.batch.record import RECORD, Differences, differences
+from sensorgen.workflows.batch.record import RECORD, Differences, differences, read
 
 TRI = design.make({"shape": "tri", "parameters": {"length_mm": 20.0, "width_mm": 10.0}})
 
@@ -26,8 +26,8 @@ def copy(small, tmp_path):
 
 
 def test_every_file_has_its_hash(small, contents):
-    record = json.loads((small.folder / RECORD).read_text("utf-8"))
-    assert record == small.record
+    record = read(small.folder)
+    assert record == json.loads(small.record.to_json())
     files = {k: hashlib.sha256(v).hexdigest() for k, v in contents(small.folder).items() if k != RECORD}
     assert record["files"] == files
     assert {"plan.yaml", "plate.svg", "labels.html"} | {f"small.{f}.3mf" for f in ("prusa", "cura", "orca")} <= set(
@@ -36,7 +36,7 @@ def test_every_file_has_its_hash(small, contents):
 
 
 def test_every_specimen_is_traced_to_its_design_and_has_what_it_should_measure(small):
-    record = small.record
+    record = read(small.folder)
     found = record["specimens"]
     assert sorted(found) == ["26 SX60 1 fine", "26 triX .2mm 1 fine", "26 triX .2mm 2 fine"]
     assert [s["order"] for s in found.values()] == [1, 2, 3]
@@ -52,17 +52,17 @@ def test_every_specimen_is_traced_to_its_design_and_has_what_it_should_measure(s
 
 
 def test_the_design_files_beside_it_make_the_same_designs(small):
-    for key in small.record["designs"]:
+    for key in small.record.designs:
         data = json.loads((small.folder / "designs" / f"{key}.json").read_text("utf-8"))
         assert design.make(data).id() == key
 
 
 def test_tools_lots_and_the_checklist(small):
-    tools = small.record["tools"]
+    tools = read(small.folder)["tools"]
     assert {tool: (t["material"], t["lot"], t["cam_dial"]) for tool, t in tools.items()} == {
         "3": ("etpu", "PI-2026-014", 3.0), "4": ("x60", None, 5.0),
     }  # fmt: skip
-    lines = small.record["checklist"]
+    lines = read(small.folder)["checklist"]
     text = "\n".join(lines)
     for said in (
         "Dry etpu (lot PI-2026-014): 65 C for 5 h", "Load T4 with x60 (lot not named", "Cam dial of T3: 3",
@@ -84,6 +84,29 @@ def test_made_again_it_is_the_same_to_the_byte(small, tmp_path, contents):
 
 def test_verify_finds_nothing_where_nothing_changed(copy):
     assert not differences(copy)
+
+
+def test_a_record_of_an_earlier_version_verifies(tmp_path):
+    """Written by hand: version 0.1.0 had the prediction of a specimen in ``expected``."""
+    (tmp_path / "plate.svg").write_text("<svg/>")
+    files = {"plate.svg": hashlib.sha256(b"<svg/>").hexdigest()}
+    content = {"batch": "26", "specimens": {"26 triX": {"expected": {"capacitance_f": 1e-5}}}, "files": files}
+    seal = hashlib.sha256(json.dumps(content, sort_keys=True, ensure_ascii=False).encode()).hexdigest()
+    (tmp_path / RECORD).write_text(json.dumps(content | {"sha256": seal}))
+    assert not differences(tmp_path)
+    (tmp_path / RECORD).write_text(json.dumps(content | {"sha256": seal, "batch": "27"}))
+    assert differences(tmp_path) == Differences(record=True)
+
+
+def test_the_keys_of_a_record_stay(small):
+    record = read(small.folder)
+    assert set(record) == {
+        "batch", "iteration", "seed", "printer", "quality", "layout", "tower", "tools", "checklist", "bake",
+        "specimens", "predictions", "designs", "slicers", "versions", "files", "sha256",
+    }  # fmt: skip
+    (piece, *_), (spool, *_) = list(record["specimens"].values()), list(record["tools"].values())
+    assert set(piece) == {"order", "design", "design_id", "iteration", "copy", "centre_mm", "size_mm"}
+    assert set(spool) == {"material", "title", "lot", "drying", "cam_dial", "note"}
 
 
 def test_verify_finds_what_is_missing_changed_and_extra(copy):
@@ -142,7 +165,7 @@ def test_a_design_that_cannot_be_printed_stops_the_batch(plan, tmp_path):
     assert error.value.findings
     assert not (tmp_path / "out").exists()
     found = make(path, tmp_path / "out", gcode=False, force=True)
-    expected = found.record["predictions"][found.record["specimens"]["26 triX 1 fine"]["design_id"]]
+    expected = read(found.folder)["predictions"][read(found.folder)["specimens"]["26 triX 1 fine"]["design_id"]]
     assert expected["drawn"]["status"] == "short"
     assert expected["drawn"]["reason"]
 
@@ -161,5 +184,5 @@ def test_a_place_that_cannot_be_written_to(plan, tmp_path):
 
 def test_tabs_are_bodies_of_their_own_and_take_room(plan, tmp_path):
     with_tabs = make(plan("labels: {tab: true}\n" + plan().read_text("utf-8")), tmp_path / "out", gcode=False)
-    sizes = {tuple(s["size_mm"]) for s in with_tabs.record["specimens"].values()}
+    sizes = {tuple(s["size_mm"]) for s in read(with_tabs.folder)["specimens"].values()}
     assert all(length > 30 for length, _ in sizes)

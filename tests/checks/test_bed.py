@@ -28,7 +28,7 @@ HAIR = 1e-6
 def test_the_bed_is_the_limit(printer, size, value_and_limit):
     found = list(bed.check(Scene((), size), load_printer(printer)))
     assert [(f.value_mm, f.limit_mm) for f in found] == value_and_limit
-    assert all(f.severity == "error" and f.advice and f.margin_mm() < 0 for f in found)
+    assert all(f.severity == "error" and f.advice and f.margin_mm < 0 for f in found)
 
 
 def test_a_sensor_that_fits_the_other_way_round_is_told_so():

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from sensorgen.checks.review import report, review
+from sensorgen.core.document import to_json
 from sensorgen.core.findings import SEVERITIES, Finding
 from sensorgen.design.design import make
 from sensorgen.scene.scene import Body, box
@@ -35,15 +36,14 @@ def test_findings_come_with_the_worst_first_and_complete():
 
 
 def test_the_margin_is_negative_on_either_side_of_the_limit():
-    assert Finding("9-bridge", "error", "b", "m", "a", value_mm=0.3, limit_mm=0.22).margin_mm() == -0.08
-    assert Finding("5-width", "error", "b", "m", "a", value_mm=0.1, limit_mm=0.12).margin_mm() == -0.02
-    assert Finding("5-width", "info", "b", "m", "a").margin_mm() is None
+    assert Finding("9-bridge", "error", "b", "m", "a", value_mm=0.3, limit_mm=0.22).margin_mm == -0.08
+    assert Finding("5-width", "error", "b", "m", "a", value_mm=0.1, limit_mm=0.12).margin_mm == -0.02
+    assert Finding("5-width", "info", "b", "m", "a").margin_mm is None
 
 
 def test_the_report_is_plain_json():
     design = make(BAD)
-    text = json.dumps(report(design, review(design)), allow_nan=False)
-    first = json.loads(text)["findings"][0]
+    first = json.loads(to_json(report(design, review(design))))["findings"][0]
     told = {"rule", "severity", "body", "layer", "place_mm", "value_mm", "limit_mm", "margin_mm", "advice", "waiver"}
     assert set(first) >= told
 

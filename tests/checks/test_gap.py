@@ -72,7 +72,7 @@ def test_a_film_of_broken_layers_is_told_with_its_printed_value(sensor, findings
     found = findings(sensor(film_mm=film_mm, bottom_mm=bottom_mm), "2-film")
     assert found[0].severity == "warning"
     assert f"will print {printed_mm:g} mm thick" in found[0].message
-    assert found[0].margin_mm() == pytest.approx(-abs(film_mm - printed_mm))
+    assert found[0].margin_mm == pytest.approx(-abs(film_mm - printed_mm))
 
 
 @pytest.mark.parametrize("film_mm", [0.2 - HAIR, 0.2, 0.2 + HAIR])

@@ -23,6 +23,11 @@ class Said:
     err: str
 
     @property
+    def words(self):
+        """The output without its line breaks and columns."""
+        return " ".join(self.out.split())
+
+    @property
     def line(self) -> str:
         """The one line on stderr; anything else there is a fault."""
         assert self.err.count("\n") == 1, self.err

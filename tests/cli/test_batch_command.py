@@ -29,12 +29,12 @@ def test_a_batch_and_its_verification(run, plan):
     assert "[ ] Clean the nozzles of T3, T4" in said.out
     assert max(map(len, said.out.splitlines())) <= 120
     said = run("batch", "verify", "out/plan")
-    assert (said.code, said.out, said.err) == (0, "out/plan: as recorded\n", "")
+    assert (said.code, said.out, said.err) == (0, "as recorded\n", "")
     Path("out/plan/plate.svg").write_text("other")
     Path("out/plan/plan.yaml").unlink()
     said = run("batch", "verify", "out/plan")
     assert said.code == 1
-    assert said.out.splitlines() == ["missing  plan.yaml", "changed  plate.svg", "out/plan: differs from its record"]
+    assert said.out.splitlines() == ["missing  plan.yaml", "changed  plate.svg", "differs from its record"]
 
 
 def test_json(run, plan):

@@ -81,7 +81,7 @@ def test_a_recording_shows_what_its_presses_change(run, files, lived):
     assert (said.code, said.err) == (0, "")
     table = said.out[said.out.index("start [s]") :].splitlines()
     assert len(table) == 1 + len(MADE)
-    assert all(len(line) == 77 and line.count("(") in (0, 4) for line in table)
+    assert all(len(line) <= 80 and line.count("(") in (0, 4) for line in table)
     assert "99.7kHz" in table[0]
     assert "14 zero, " in said.out
     assert "2 with errors" in said.out
@@ -105,7 +105,7 @@ def test_a_recording_shows_what_its_presses_change(run, files, lived):
 def test_without_a_rig_presses_are_found_in_the_readings_and_their_forces_are_not_known(run, files):
     said = run("bench", "show", "run.mat")
     assert "found by the readings alone" in said.out
-    assert "?     ?" in said.out
+    assert "force [N]" not in said.out
     presses = json.loads(run("bench", "show", "run.mat", "--json").out)["presses"]
     assert len(MADE) - 1 <= len(presses) <= len(MADE)
     assert all(p["force_n"] is None for p in presses)

@@ -43,7 +43,7 @@ def test_hysteresis_of_a_film_that_answers_slowly(run, tmp_path):
     lived = write(tmp_path, "slow", SLOW, law=made.answering(0.01, 3.0), noise=2e-4, ramp_s=4.0)
     said = run("bench", "hysteresis", "slow.mat", "--rig", "slow.csv", "--plot", "ways.png")
     assert (said.code, said.err) == (0, "")
-    assert len(said.out.splitlines()) == 1 + len(SLOW) + 1
+    assert len(said.out.splitlines()) == 1 + 2 * len(SLOW) + 1
     assert (tmp_path / "ways.png").read_bytes().startswith(b"\x89PNG")
     data = json.loads(run("bench", "hysteresis", "slow.mat", "--rig", "slow.csv", "--json").out)
     assert data["tones_hz"] == TONES.tolist()
@@ -76,7 +76,7 @@ def test_sets_on_one_scale_and_in_a_table(run, tmp_path):
     said = run(*words, "-o", "sets.csv", "--plot", "sets.png")
     assert (said.code, said.err) == (0, "")
     lines = said.out.splitlines()
-    assert [line.split()[-1] for line in lines[1:]] == ["a.mat", "b.mat", "sets.csv", "sets.png"]
+    assert [line.split()[0] for line in lines[1:]] == ["a.mat", "a.mat", "b.mat", "b.mat", "sets.csv", "sets.png"]
     rows = list(csv.DictReader((tmp_path / "sets.csv").read_text().splitlines()))
     assert [row["set"] for row in rows] == ["a.mat"] * 6 + ["b.mat"] * 6
     of = made.sensor()

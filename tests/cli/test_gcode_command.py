@@ -31,7 +31,7 @@ def file(tmp_path):
 def test_a_good_file(run, file):
     said = run("gcode", "check", file())
     assert (said.code, said.err) == (0, "")
-    assert "T3    etpu" in said.out
+    assert "   3  etpu" in said.out
     assert "1 info" in said.out
 
 

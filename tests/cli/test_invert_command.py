@@ -128,7 +128,7 @@ def test_blank_where_the_reading_does_not_say(run, tmp_path):
 
 def test_what_to_do_is_said(run, tmp_path):
     (tmp_path / "m.csv").write_text(table(np.zeros(3), np.full(3, 50.0)))
-    assert "average them, choose frequencies nearer" in run("invert", *DESIGN, "m.csv").out
+    assert "average them, choose frequencies nearer" in run("invert", *DESIGN, "m.csv").words
     (tmp_path / "m.csv").write_text(table())
     said = run("invert", "tri", "--dielectric", "0.2", "m.csv")
     assert "no fit" in said.out
@@ -149,7 +149,8 @@ def test_one_tone_says_so(run, tmp_path):
         (["m.csv", "--prior", "x"], "--prior 'x': expected uniform"),
         (["m.csv", "--prior", "force=a+-1"], "not a force"),
         (["m.csv", "--prior", "force=1+-0"], "standard deviation above 0"),
-        (["m.csv", "--force-limit", "0"], "force limit of 0 N"), (["m.csv", "--force-limit", "x"], "--force-limit"),
+        (["m.csv", "--force-limit", "0"], "--force-limit: 0; expected above 0"),
+        (["m.csv", "--force-limit", "x"], "--force-limit"),
         (["m.csv", "-o", "."], "cannot write '.'"), (["m.csv", "-o", "m.csv/x.csv"], "cannot write 'm.csv/x.csv'"),
         (["bad.csv", "-o", "o.csv"], "bad.csv, row 6, column re_ohm_1.1kHz: 'x' is not a number"),
     ],

@@ -309,7 +309,7 @@ M84"""
     assert "heat-left" in errors(lines.splitlines()[:-2], other)
     without_t = [line for line in lines.splitlines() if line != "T0"]
     assert found(without_t, other) == set()  # its first tool is in hand
-    assert check(without_t, other).report.tools[0].tool == 0
+    assert check(without_t, other).tools[0].tool == 0
     assert {"tool", "cold"} & errors(["M83", "G1 X1 E1"], other) == {"cold"}
 
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -94,7 +95,7 @@ M623
 @pytest.mark.parametrize("text", [MARLIN, BAMBU, THUMBNAIL, "G1", "\n\n", "%\nO1000\nG20 G90 G17\nX1 Y2\nM30\n%"])
 def test_other_printers_files_are_followed_and_judged(text):
     result = check(text.splitlines(), DIABASE)
-    json.dumps(result.as_dict(), allow_nan=False)
+    json.dumps(asdict(result), allow_nan=False)
     assert result.findings
 
 
@@ -123,7 +124,7 @@ def test_ends_of_lines_change_nothing(text, end, tmp_path):
     path = tmp_path / "a.gcode"
     path.write_bytes(end.join(text.splitlines()).encode())
     one, other = check(path, DIABASE), check(text.splitlines(), DIABASE)
-    assert one.report.tools == other.report.tools
+    assert one.tools == other.tools
     assert [(f.rule, f.message) for f in one.findings] == [(f.rule, f.message) for f in other.findings]
 
 
@@ -142,7 +143,7 @@ def test_small_letters_line_numbers_and_checksums_change_nothing(text):
     ):
         again = check(other, DIABASE)
         assert [(f.rule, f.message) for f in again.findings] == [(f.rule, f.message) for f in plain.findings]
-        assert again.report.tools == plain.report.tools
+        assert again.tools == plain.tools
 
 
 COMMANDS = """
@@ -172,7 +173,7 @@ LINES = st.lists(st.lists(WORDS, max_size=6).map(" ".join), max_size=25)
 @example(["G28", "M83", "T2", "G10 P2 Snan", "M104 Tnan S0", "M104 Snan", "M116 Pnan", "G4 Snan", "G1 X1 E1"])
 def test_anything_is_followed_without_a_traceback(lines):
     result = check(lines, DIABASE)
-    json.dumps(result.as_dict(), allow_nan=False)
+    json.dumps(asdict(result), allow_nan=False)
     motion = follow(lines)
     assert np.isfinite(motion.rows).all()
     found = paths.paths_of(motion, DIABASE, "slicer")
@@ -194,4 +195,4 @@ def test_any_bytes_are_read_or_refused(tmp_path_factory, content, head):
         result = check(path, DIABASE)
     except BadInput:  # and nothing else
         return
-    json.dumps(result.as_dict(), allow_nan=False)
+    json.dumps(asdict(result), allow_nan=False)

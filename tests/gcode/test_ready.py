@@ -105,7 +105,7 @@ def with_control(**more):
 
 @pytest.mark.parametrize("text", [PRUSA, CURA], ids=["prusa", "cura"])
 def test_what_is_written_passes_the_check(text):
-    assert check(made(text).splitlines(), DIABASE).findings == []
+    assert check(made(text).splitlines(), DIABASE).findings == ()
     assert check(text.splitlines(), DIABASE).errors()
 
 

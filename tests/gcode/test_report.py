@@ -16,7 +16,7 @@ DIABASE = load_printer("diabase-h5")
 
 
 def test_filament_mass_and_purge_of_each_tool():
-    result = check(OWN.splitlines(), DIABASE).report
+    result = check(OWN.splitlines(), DIABASE)
     three, four = result.tools
     assert (three.tool, three.material, three.filament_mm, three.purge_mm) == (3, "etpu", pytest.approx(0.2), 0.0)
     assert (four.tool, four.material, four.filament_mm, four.purge_mm) == (
@@ -34,10 +34,10 @@ def test_filament_mass_and_purge_of_each_tool():
 
 def test_a_material_may_be_named_and_none_means_no_mass():
     lines = ["M83", "T5", "G1 X1 E1"]
-    assert check(lines, DIABASE).report.tools[0].mass_g is None  # bvoh or pla
-    named = check(lines, DIABASE, {5: "x60"}).report.tools[0]
+    assert check(lines, DIABASE).tools[0].mass_g is None  # bvoh or pla
+    named = check(lines, DIABASE, {5: "x60"}).tools[0]
     assert (named.material, named.mass_g) == ("x60", pytest.approx(math.pi * 1.75**2 / 4 * 1e-3))
-    assert check(lines, DIABASE, {5: "nothing"}).report.tools[0].mass_g is None
+    assert check(lines, DIABASE, {5: "nothing"}).tools[0].mass_g is None
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_a_material_may_be_named_and_none_means_no_mass():
     ],
 )
 def test_time_by_hand(lines, expected):
-    assert check(["G90", "M83", *lines], DIABASE).report.time_s == pytest.approx(expected)
+    assert check(["G90", "M83", *lines], DIABASE).time_s == pytest.approx(expected)
 
 
 def test_a_feed_of_none_takes_long_but_not_for_ever():
@@ -64,5 +64,5 @@ def test_a_feed_of_none_takes_long_but_not_for_ever():
 
 
 def test_spot_extrusion_is_purge():
-    tool = check(["M83", "T3", "G1 E5", "G1 E-2", "G1 E2", "G1 X1 E.5"], DIABASE).report.tools[0]
+    tool = check(["M83", "T3", "G1 E5", "G1 E-2", "G1 E2", "G1 X1 E.5"], DIABASE).tools[0]
     assert (tool.filament_mm, tool.purge_mm) == (5.5, 5.0)

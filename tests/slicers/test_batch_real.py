@@ -18,7 +18,7 @@ from sensorgen.export.slicers import run
 from sensorgen.measure.log import batches
 from sensorgen.measure.log.entries import Prediction, RawFile
 from sensorgen.workflows.batch import make, tab
-from sensorgen.workflows.batch.record import RECORD, differences
+from sensorgen.workflows.batch.record import RECORD, differences, read
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
 MACHINE = load_printer("diabase-h5")
@@ -63,11 +63,11 @@ def twenty(tmp_path_factory):
 
 def printed_by(batch, slicer):
     """Lines of the bodies, and for each specimen which of them lie within its place on the record."""
-    lines = paths.read(batch.folder / batch.record["slicers"][slicer]["gcode"], MACHINE).model()
+    lines = paths.read(batch.folder / read(batch.folder)["slicers"][slicer]["gcode"], MACHINE).model()
     middle = (lines.start_mm + lines.end_mm)[:, :2] / 2
     inside = {
         name: (np.abs(middle - s["centre_mm"]) <= np.array(s["size_mm"]) / 2 + 0.05).all(axis=1)
-        for name, s in batch.record["specimens"].items()
+        for name, s in read(batch.folder)["specimens"].items()
     }
     return lines, inside
 
@@ -97,7 +97,7 @@ def test_every_line_lies_within_one_specimen(small, slicer):
 def test_every_specimen_is_printed_whole_with_both_tools_and_its_tab(small, slicer):
     lines, inside = printed_by(small, slicer)
     for name, rows in inside.items():
-        length_mm = small.record["specimens"][name]["size_mm"][0]
+        length_mm = read(small.folder)["specimens"][name]["size_mm"][0]
         sensor = design.make({"shape": "tri", "parameters": {"length_mm": 12.0, "width_mm": 10.0}})
         (label,) = tab.bodies(sensor, name)
         assert length_mm == pytest.approx(12 + tab.size_mm(sensor, name)[0])
@@ -105,7 +105,7 @@ def test_every_specimen_is_printed_whole_with_both_tools_and_its_tab(small, slic
         for tool, volume in exact.items():
             assert printed[tool] == pytest.approx(volume, rel=0.12), (name, tool)
         # Raised letters: X60 above the tab's plate and beyond the sensor's end.
-        centre = small.record["specimens"][name]["centre_mm"][0]
+        centre = read(small.folder)["specimens"][name]["centre_mm"][0]
         end = centre - length_mm / 2 + 12
         above = rows & (lines.start_mm[:, 0] > end + LINE_MM) & (lines.end_mm[:, 2] > tab.PLATE_MM + 0.05)
         assert (lines.tool[above] == 4).all()
@@ -122,10 +122,10 @@ def test_copies_of_a_design_are_printed_alike(small):
 def test_all_but_the_gcode_is_the_same_without_slicing(small, tmp_path):
     path = tmp_path / "plan.yaml"
     path.write_text(SMALL, "utf-8")
-    files = make(path, tmp_path / "out", gcode=False).record["files"]
-    assert {name: small.record["files"][name] for name in files} == files
+    files = make(path, tmp_path / "out", gcode=False).record.files
+    assert {name: read(small.folder)["files"][name] for name in files} == files
     more = {"plan.prusa.gcode", "plan.cura.gcode", "prusa/raw.gcode", "prusa/profile.ini", "cura/raw.gcode"}
-    assert set(small.record["files"]) - set(files) == more | {"cura/settings.json"}
+    assert set(read(small.folder)["files"]) - set(files) == more | {"cura/settings.json"}
 
 
 def test_twenty_sensors_in_one_file(twenty):
@@ -144,7 +144,7 @@ def test_skirt_and_tower_stay_on_the_bed_and_off_the_specimens(twenty):
     names = np.array(ways.kinds)[ways.kind]
     tower_rows = np.char.startswith(names.astype(str), "wipe tower")
     assert tower_rows.any()
-    (kept,) = twenty.record["tower"]
+    (kept,) = read(twenty.folder)["tower"]
     at = ways.end_mm[tower_rows][:, :2]
     assert (at >= [kept["x0"] - 1, kept["y0"] - 1]).all()
     assert (at <= [kept["x1"] + 1, kept["y1"] + 1]).all()
@@ -157,7 +157,7 @@ def test_the_record_names_slicer_profile_and_gcode(small):
     assert set(slicers) == {"prusa", "cura"}
     for used in slicers.values():
         assert used["version"][0].isdigit()
-        assert {used["gcode"], used["raw"], used["profile"]} <= set(small.record["files"])
+        assert {used["gcode"], used["raw"], used["profile"]} <= set(read(small.folder)["files"])
     assert not differences(small.folder)
     assert not [p for p in small.folder.rglob("*") if p.suffix in (".stl", ".part")]
 
@@ -172,8 +172,8 @@ def stand_in(folder, monkeypatch, script):
 
 
 def test_each_designs_prediction_is_that_of_the_first_slicers_print(small):
-    first = next(iter(small.record["slicers"].values()))["printed"]
-    for key, found in small.record["predictions"].items():
+    first = next(iter(read(small.folder)["slicers"].values()))["printed"]
+    for key, found in read(small.folder)["predictions"].items():
         assert found == first[key]["prediction"]
         assert found["body"].startswith("printed, ")
         assert found["capacitance"]["value"] == pytest.approx(found["drawn"]["capacitance"]["value"], rel=0.3)
@@ -184,13 +184,13 @@ def test_the_log_keeps_the_predictions(small):
     file = RawFile(uid="0" * 64, name=RECORD, size=path.stat().st_size)
     kept = [json.loads(row.data) for row in batches.rows(path, file) if isinstance(row, Prediction)]
     assert len(kept) == 2  # copies share one
-    assert all(data in small.record["predictions"].values() for data in kept)
+    assert all(data in read(small.folder)["predictions"].values() for data in kept)
 
 
 @pytest.mark.parametrize("slicer", ["prusa", "cura"])
 def test_the_record_says_what_is_printed_of_each_design(small, slicer):
-    found = small.record["slicers"][slicer]["printed"]
-    assert set(found) == {piece["design_id"] for piece in small.record["specimens"].values()}
+    found = read(small.folder)["slicers"][slicer]["printed"]
+    assert set(found) == {piece["design_id"] for piece in read(small.folder)["specimens"].values()}
     made = {printed["design"].partition("-")[0]: printed for printed in found.values()}
     plain, prisms = made["reference"], made["trix"]
     assert all(row["ratio"] and 0.9 < row["ratio"] < 1.1 for row in plain["layers"])
@@ -248,7 +248,7 @@ def test_faults_of_the_gcode_are_on_record_and_in_the_exit_code(tmp_path, monkey
     script = 'while [ "$1" != --output ]; do shift; done\n' + "".join(f"echo '{line}' >> \"$2\"\n" for line in lines)
     stand_in(tmp_path, monkeypatch, script)
     batch = made(tmp_path, SMALL.replace("[prusa, cura]", "[prusa]"))
-    found = batch.record["slicers"]["prusa"]["findings"]
+    found = read(batch.folder)["slicers"]["prusa"]["findings"]
     assert any(f["severity"] == "error" and "900" in f["message"] for f in found)
     assert batch.gcode_errors() == sum(f["severity"] == "error" for f in found)
     assert not differences(batch.folder)
@@ -260,25 +260,25 @@ def test_masses_are_those_of_what_the_plan_loads(tmp_path, monkeypatch):
     script = 'while [ "$1" != --output ]; do shift; done\n' + "".join(f"echo '{line}' >> \"$2\"\n" for line in lines)
     stand_in(tmp_path, monkeypatch, script)
     batch = made(tmp_path, SMALL.replace("[prusa, cura]", "[prusa]\ntools: {x60: 1, etpu: 2}"))
-    (used,) = batch.record["slicers"]["prusa"]["tools"]
+    (used,) = read(batch.folder)["slicers"]["prusa"]["tools"]
     assert (used["tool"], used["material"]) == (1, "x60")
-    assert batch.record["tools"]["1"]["material"] == "x60"
+    assert read(batch.folder)["tools"]["1"]["material"] == "x60"
 
 
 def test_the_check_of_the_real_files_finds_no_error_and_sums_them_up(small, twenty):
     for batch, slicer in ((small, "prusa"), (small, "cura"), (twenty, "prusa")):
-        used = batch.record["slicers"][slicer]
+        used = read(batch.folder)["slicers"][slicer]
         assert [f for f in used["findings"] if f["severity"] == "error"] == []
         assert [(t["tool"], t["material"]) for t in used["tools"]] == [(3, "etpu"), (4, "x60")]
     # Twenty sensors of 100 x 10 mm: what is printed of each material besides purging, near the bodies' volume.
     exact = {3: 0.0, 4: 0.0}
-    for name in twenty.record["specimens"]:
+    for name in read(twenty.folder)["specimens"]:
         shape, film = ("reference", 0.6) if "SX60" in name else ("tri", float(name.split()[2][:2]))
         along = {"along": name.split()[1][-1].lower()} if shape == "tri" else {}
         sensor = design.make({"shape": shape, "parameters": {"dielectric_mm": film, **along}})
         for body in sensor.printed.bodies:
             exact[sensor.tool(body.material)] += body.volume_mm3()
     area_mm2 = np.pi / 4 * MACHINE.filament_mm**2
-    for t in twenty.record["slicers"]["prusa"]["tools"]:
+    for t in read(twenty.folder)["slicers"]["prusa"]["tools"]:
         printed = (t["filament_mm"] - t["purge_mm"]) * area_mm2
         assert printed == pytest.approx(exact[t["tool"]], rel=0.06)

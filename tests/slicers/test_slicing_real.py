@@ -55,8 +55,8 @@ def test_each_variant_passes_the_printers_check(name, orientation, quality, slic
     made = sliced([alone(variant)], slicer, tmp_path)
     result = check(made.ready, variant.machine)
     assert result.errors(strict=True) == []
-    assert {tool.tool for tool in result.report.tools} == {3, 4}
-    assert all(tool.purge_mm > 5 for tool in result.report.tools)  # the tower primes both
+    assert {tool.tool for tool in result.tools} == {3, 4}
+    assert all(tool.purge_mm > 5 for tool in result.tools)  # the tower primes both
     assert made.version.split(".")[0].isdecimal()
     printed = extruded.read(made.ready, variant.machine.filament_mm)
     assert set(printed.model_mm3()) == {3, 4}

@@ -1,11 +1,12 @@
 """Compensation: parameters changed so that the print has the requested dimensions."""
 
 from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
 from sensorgen.asprinted.printed import body, drawn_gap_mm
 from sensorgen.checks.widths import GAP_CLOSES
+from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.design import Design, fields, make, name_of
 from sensorgen.scene.scene import SLIVER_MM
@@ -36,9 +37,13 @@ class Change:
     after: float
     why: str
 
-    def as_dict(self) -> dict[str, str | float]:
-        """Plain data, for JSON."""
-        return asdict(self)
+
+def document(changes: Sequence[Change]) -> Iterator[Part]:
+    """What was changed, if anything."""
+    if changes:
+        yield "compensated for the print:"
+        yield Facts(tuple((f"  {c.what}", f"{c.before:g} -> {c.after:g}: {c.why}") for c in changes))
+        yield ""
 
 
 def compensated(design: Design, walls: str = "arachne", *, bake: bool = False) -> tuple[Design, list[Change]]:
@@ -137,7 +142,6 @@ def _printed_gap_mm(design: Design, walls: str) -> float:
 
 def _gap_kept(design: Design, asked: float, printed: float, walls: str) -> tuple[Design, list[Change]]:
     """The design whose printed gap is the asked one, by the film or by the period; itself where neither does it."""
-    known = fields(design.shape)
     lost = printed - asked
     if lost <= SLIVER_MM or lost == float("inf"):
         return design, []
@@ -147,11 +151,9 @@ def _gap_kept(design: Design, asked: float, printed: float, walls: str) -> tuple
         if abs(_printed_gap_mm(thinner, walls) - asked) < SLIVER_MM:
             why = f"the cogs' lowest {lost:g} mm are not printed"
             return thinner, [Change("dielectric_mm", film, round(film - lost, 9), why)]
-    return _longer(design, asked, walls) if "period_mm" in known else (design, [])
-
-
-def _longer(design: Design, asked: float, walls: str) -> tuple[Design, list[Change]]:
-    """The design with the shortest period whose tips are wide enough to print, and would be with less."""
+    if "period_mm" not in fields(design.shape):
+        return design, []
+    # The shortest period whose tips are wide enough to print, and would be with less.
     period = design.params.period_mm  # type: ignore[attr-defined]
 
     def keeps(steps: int) -> bool:

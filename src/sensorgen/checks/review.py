@@ -1,11 +1,12 @@
 """Design rule check: exact gap, valid bodies, and the findings of every rule about a design on its printer."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from sensorgen import checks
 from sensorgen.core.display import Displayed
-from sensorgen.core.findings import Finding
+from sensorgen.core.document import Part
+from sensorgen.core.findings import Finding, counted, counts, listed
 from sensorgen.design import materials
 from sensorgen.design.design import Design, fields
 from sensorgen.design.tower import tower
@@ -18,6 +19,11 @@ Step = Callable[[str], None]
 STEPS = ("meshes", "checks", "validity")
 LOST = "7-printed"
 _WIDENED = ("2-printed-gap", "5-width", LOST)  # rules that larger widths or a longer period satisfy
+
+
+def lost(found: Iterable[Finding]) -> list[Finding]:
+    """Errors of rule 7 that the design does not waive: bodies that are missing from a printed layer."""
+    return [f for f in found if f.rule == LOST and f.severity == "error" and not f.waiver]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +49,7 @@ class Review(Displayed):
 
     def lost(self) -> list[Finding]:
         """Errors of rule 7 that the design does not waive: bodies that are missing from a printed layer."""
-        return [f for f in self.findings if f.rule == LOST and f.severity == "error" and not f.waiver]
+        return lost(self.findings)
 
     def sliced(self) -> "Review":
         """The review without the estimate of rule 7, which G-code replaces."""
@@ -51,10 +57,7 @@ class Review(Displayed):
 
     def counts(self) -> dict[str, int]:
         """How many findings there are of each severity, and how many are waived."""
-        open_ones = [f.severity for f in self.findings if not f.waiver]
-        return {s: open_ones.count(s) for s in ("error", "warning", "info")} | {
-            "waived": len(self.findings) - len(open_ones)
-        }
+        return counts(self.findings)
 
 
 def review(design: Design, step: Step = lambda _: None, walls: str = "arachne") -> Review:
@@ -80,10 +83,6 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "arachne") 
     if any(not f.waiver for f in misfit):  # a sensor that no bed holds may be too large to mesh, too
         step("checks")
         return Review({}, misfit)
-    return _full(design, step, walls)
-
-
-def _full(design: Design, step: Step, walls: str) -> Review:
     scene = design.printed
     step("meshes")
     made = _meshes(design)
@@ -93,7 +92,8 @@ def _full(design: Design, step: Step, walls: str) -> Review:
     found = [_advised(f, list(fields(design.shape))) for f in found]
     if not any(f.severity == "error" and f.rule != LOST for f in found):
         step("validity")
-        found = [_fault(*fault) for fault in validity.faults(scene, made)] + found
+        advice = "change the parameters; if they make sense, this is a fault of sensorgen: report it"
+        found = [Finding("0-body", "error", body, what, advice) for body, what in validity.faults(scene, made)] + found
     return Review(made, design.waived(found) + design.idle_waivers(found))
 
 
@@ -121,37 +121,48 @@ def _crowding(design: Design) -> list[Finding]:
     length, width = (round(2 * limit, 3) for limit in free)
     return [
         Finding(
-            "8-bed",
-            "warning",
-            "sensor",
+            "8-bed", "warning", "sensor",
             f"it reaches into the far right corner, where the prime tower of {place.side_mm:g} mm stands",
             f"keep it shorter than {length:g} mm or narrower than {width:g} mm, or move the tower in the slicer",
-            reach[0],
-            round(free[0], 9),
+            reach[0], round(free[0], 9),
         )
-    ]
+    ]  # fmt: skip
 
 
-def _fault(body: str, what: str) -> Finding:
-    return Finding(
-        "0-body",
-        "error",
-        body,
-        what,
-        "change the parameters; if they make sense, this is a fault of sensorgen: report it",
+@dataclass(frozen=True)
+class CheckReport:
+    """The findings about a design, as in ``check.json``.
+
+    Attributes
+    ----------
+    name, design : str
+        Name and identity of the design.
+    printer, quality : str
+        What it was checked for.
+    counts : dict of str to int
+        Findings of each severity, and waived ones.
+    findings : tuple of Finding
+        All of them.
+    """
+
+    name: str
+    design: str
+    printer: str
+    quality: str
+    counts: dict[str, int]
+    findings: tuple[Finding, ...]
+
+    def document(self) -> Iterator[Part]:
+        """The findings, then their number."""
+        yield from listed(self.findings)
+        yield f"{self.name}: {counted(self.counts)}"
+
+
+def report(design: Design, held: Review) -> CheckReport:
+    """The findings as data."""
+    return CheckReport(
+        design.name, design.id(), design.machine.name, design.layers.name, held.counts(), tuple(held.findings)
     )
-
-
-def report(design: Design, held: Review) -> dict[str, object]:
-    """The findings as plain data for ``check.json``."""
-    return {
-        "name": design.name,
-        "design": design.id(),
-        "printer": design.machine.name,
-        "quality": design.layers.name,
-        "counts": held.counts(),
-        "findings": [f.as_dict() for f in held.findings],
-    }
 
 
 def draw(design: Design, held: Review, printed: Scene | None = None, source: str = "") -> str:

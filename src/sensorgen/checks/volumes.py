@@ -1,15 +1,16 @@
 """Rule 7: printed against drawn volume of every body in every layer, and the parts that are lost or merged."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from itertools import groupby
+from dataclasses import dataclass
+from itertools import groupby, pairwise
 
 import numpy as np
 import shapely
 
+from sensorgen.core.document import Column, Table
 from sensorgen.core.findings import Finding
 from sensorgen.scene.layers import LayerRegions, Region, drawn, parts
-from sensorgen.scene.scene import PLANE, SLIVER_MM, Body, Point, Prism, Scene
+from sensorgen.scene.scene import SLIVER_MM, Body, Point, Scene
 
 LOW, HIGH = 0.9, 1.1  # printed over drawn volume, within which nothing is said
 VANISHED = 0.1  # a part of which less than this share is printed is lost
@@ -34,6 +35,8 @@ class Row:
         Separate parts as drawn, those that are lost, and those that merge with a neighbour [-].
     place_mm : (float, float)
         Middle of the first lost part, or else of the first, at its front or left edge [mm].
+    ratio : float or None
+        Printed over drawn volume; None where nothing is drawn. From these two [-].
     """
 
     body: str
@@ -46,15 +49,36 @@ class Row:
     vanished: int
     fused: int
     place_mm: Point
+    ratio: float | None = None
+
+    def __post_init__(self) -> None:
+        """Derive the ratio."""
+        if self.exact_mm3 > 0:
+            object.__setattr__(self, "ratio", self.printed_mm3 / self.exact_mm3)
 
     @property
-    def ratio(self) -> float:
-        """Printed over drawn volume; infinite where nothing is drawn [-]."""
-        return self.printed_mm3 / self.exact_mm3 if self.exact_mm3 > 0 else float("inf")
+    def grown(self) -> bool:
+        """Whether more is printed than drawn."""
+        return self.printed_mm3 > self.exact_mm3
 
-    def as_dict(self) -> dict[str, object]:
-        """The row with its ratio, for JSON; None where nothing is drawn."""
-        return asdict(self) | {"ratio": self.ratio if self.exact_mm3 > 0 else None}
+
+def table(rows: Sequence[Row]) -> Table:
+    """Printed over drawn volume of every body, layer by layer from the top."""
+    bodies = list(dict.fromkeys(row.body for row in rows))
+    cells = {(row.layer, row.body): _cell(row) for row in rows}
+    spans = {row.layer: f"{row.bottom_mm:g}-{row.top_mm:g}" for row in rows}
+    layers = sorted(spans, reverse=True)
+    return Table(
+        "volumes", "printed over drawn volume (-n: missing parts, +n: merged parts)",
+        (Column("layer"), Column("height", "mm"), *map(Column, bodies)),
+        tuple((n, spans[n], *(cells.get((n, body), "") for body in bodies)) for n in layers),
+    )  # fmt: skip
+
+
+def _cell(row: Row) -> str:
+    lost = f" -{row.vanished}" if row.vanished else ""
+    fused = f" +{row.fused}" if row.fused else ""
+    return f"{'extra' if row.ratio is None else format(row.ratio, '.2f')}{lost}{fused}"
 
 
 def rows(
@@ -72,37 +96,40 @@ def rows(
         Volume extruded by layer, from 0, and body [mm3]; area times height of what is printed if not given.
     """
     boundaries = [printed[0].bottom_mm, *(layer.top_mm for layer in printed)]
+    exact_mm3 = {body.name: _drawn_mm3(body, boundaries) for body in scene.bodies}
     found = []
     for number, (meant, made) in enumerate(zip(drawn(scene, boundaries), printed, strict=True)):
         least = _LEAST * scene.size_mm[0] * scene.size_mm[1] * meant.height_mm
         for body in scene.bodies:
-            exact = sum(_between(prism, meant.bottom_mm, meant.top_mm) for prism in body.prisms)
+            exact = exact_mm3[body.name][number]
             area = made.region(body.name).area * made.height_mm
             volume = area if volumes_mm3 is None else volumes_mm3.get((number, body.name), 0.0)
             if max(exact, volume) > least:
-                found.append(_row(body.name, number + 1, meant, made, (exact, volume)))
+                plan = parts(meant.region(body.name))
+                lost, merged = _lost(plan, parts(made.region(body.name)))
+                x0, y0, x1, y1 = plan[lost[0] if lost else 0].bounds if plan else (0.0, 0.0, 0.0, 0.0)
+                place = (x0, (y0 + y1) / 2) if meant.along == "x" else ((x0 + x1) / 2, y0)
+                counts = len(plan), len(lost), merged
+                found.append(Row(body.name, number + 1, meant.bottom_mm, meant.top_mm, exact, volume, *counts, place))
     return found
 
 
-def _row(body: str, number: int, meant: LayerRegions, made: LayerRegions, volumes_mm3: tuple[float, float]) -> Row:
-    plan = parts(meant.region(body))
-    lost, merged = _lost(plan, parts(made.region(body)))
-    x0, y0, x1, y1 = plan[lost[0] if lost else 0].bounds if plan else (0.0, 0.0, 0.0, 0.0)
-    place = (x0, (y0 + y1) / 2) if meant.along == "x" else ((x0 + x1) / 2, y0)
-    return Row(body, number, meant.bottom_mm, meant.top_mm, *volumes_mm3, len(plan), len(lost), merged, place)
-
-
-def _between(prism: Prism, low_mm: float, high_mm: float) -> float:
-    """Volume of a prism between two heights, exact [mm3]."""
-    bottom, top = prism.span("z")
-    if top <= low_mm or bottom >= high_mm:
-        return 0.0
-    if prism.axis == "z" or (low_mm <= bottom and top <= high_mm):
-        return prism.volume_mm3() * (min(top, high_mm) - max(bottom, low_mm)) / (top - bottom)
-    side = PLANE[prism.axis][0]
-    low, high = prism.span(side)
-    clipped = shapely.clip_by_rect(shapely.Polygon(prism.outline), low - 1.0, low_mm, high + 1.0, high_mm)
-    return float(clipped.area) * (prism.end_mm - prism.start_mm)
+def _drawn_mm3(body: Body, boundaries_mm: Sequence[float]) -> list[float]:
+    """Volume of a body between neighbouring boundaries, exact [mm3]."""
+    bottom, top = np.array([p.span("z") for p in body.prisms]).T
+    volume = np.array([p.volume_mm3() for p in body.prisms])
+    lying = [p for p in body.prisms if p.axis != "z"]
+    slanted = np.array([p.axis != "z" for p in body.prisms])
+    outlines = np.array([shapely.Polygon(p.outline) for p in lying], dtype=object)
+    depth = np.array([p.end_mm - p.start_mm for p in lying])
+    left, right = shapely.bounds(outlines)[:, 0].min(initial=0.0), shapely.bounds(outlines)[:, 2].max(initial=0.0)
+    found = []
+    for low, high in pairwise(boundaries_mm):
+        share = (np.minimum(top, high) - np.maximum(bottom, low)).clip(0) / (top - bottom)
+        cut = slanted & (share > 0) & (share < 1)
+        clipped = shapely.clip_by_rect(outlines[cut[slanted]], left - 1.0, low, right + 1.0, high)
+        found.append(float((volume * share)[~cut].sum() + (shapely.area(clipped) * depth[cut[slanted]]).sum()))
+    return found
 
 
 def _lost(plan: Sequence[Region], made: Sequence[Region]) -> tuple[list[int], int]:
@@ -125,14 +152,14 @@ def findings(found: Iterable[Row], scene: Scene) -> list[Finding]:
     scene : Scene
         The sensor on its bed.
     """
-    outside = [row for row in found if row.exact_mm3 > 0 and not LOW <= row.ratio <= HIGH]
+    outside = [row for row in found if row.ratio is not None and not LOW <= row.ratio <= HIGH]
     return [finding for body in scene.bodies for finding in _of_body(body, [r for r in outside if r.body == body.name])]
 
 
 def _of_body(body: Body, outside: Sequence[Row]) -> Iterator[Finding]:
     """One finding for neighbouring layers with the same fault."""
     numbered = list(enumerate(outside))
-    for (_, fault, _), group in groupby(numbered, key=lambda p: (p[1].layer - p[0], _fault(p[1]), p[1].ratio > 1)):
+    for (_, fault, _), group in groupby(numbered, key=lambda p: (p[1].layer - p[0], _fault(p[1]), p[1].grown)):
         here = [row for _, row in group]
         first, last = here[0], here[-1]
         severe = fault == "is not printed at all" and not body.is_support()

@@ -1,13 +1,12 @@
 """``sensorgen bench``: what a rig is to do, and what it did."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import bench_hysteresis, bench_live, bench_sets, bench_show, show
+from sensorgen.cli import bench_hysteresis, bench_live, bench_sets, bench_show, render
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Values, one
 from sensorgen.core import units
@@ -15,7 +14,6 @@ from sensorgen.core.errors import BadInput, OutOfRange
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
-    from sensorgen.measure.signal.schedule import Plan
 
 PLAN: list[click.Parameter] = [
     click.Option(
@@ -44,7 +42,7 @@ PLAN: list[click.Parameter] = [
     ),
     click.Option(["--output", "-o"], metavar="FILE", help="CSV file to write; the terminal if not given."),
     click.Option(["--picture"], metavar="FILE.png", help="Draw the plan."),
-    click.Option(["--json", "as_json"], is_flag=True, help="Print as JSON."),
+    *render.options("json", "markdown", file=False),
 ]  # fmt: skip
 
 
@@ -55,60 +53,34 @@ def command() -> None:
 
 def _work(
     design: "Design", *, presses: int, repeats: int, force_n: Sequence[float], tip_mm: Sequence[float], dwell_s: float,
-    rest_s: float, seed: int, output: str | None, picture: str | None, as_json: bool,
+    rest_s: float, seed: int, output: str | None, picture: str | None,
 ) -> int:  # fmt: skip
-    plan = _plan(design, presses, repeats, force_n, one("--tip", tip_mm), dwell_s, rest_s, seed)
-    if picture:
-        _draw(plan, picture)
-    if output:
-        from sensorgen.core import files as store
-
-        store.replace(Path(output), plan.csv().encode())
-    if as_json:
-        steps = [asdict(step) for step in plan.steps()]
-        show.as_json(asdict(plan) | {"seconds": plan.seconds(), "steps": steps, "design": design.name})
-    elif output:
-        click.echo(f"{output}: {presses * (1 + repeats)} presses, {_lasting(plan.seconds())}")
-    else:
-        click.echo(plan.csv(), nl=False)
-    return 0
-
-
-def _plan(
-    design: "Design", presses: int, repeats: int, force_n: Sequence[float], tip_mm: float, dwell_s: float,
-    rest_s: float, seed: int,
-) -> "Plan":  # fmt: skip
-    from sensorgen.measure.signal.schedule import Plan
+    from sensorgen.core import files as store
+    from sensorgen.measure.signal.schedule import Plan, schedule
 
     if len(force_n) != 2:
         raise BadInput(f"--force: {len(force_n)} values; expected the least and the largest, as in 0,6N")
     if seed < 0:
         raise OutOfRange(f"--seed {seed}; expected a whole number from 0 on")
-    length = design.params.length_mm
-    if tip_mm > length:
-        raise OutOfRange(f"--tip {tip_mm:g} mm is longer than the sensor, {length:g} mm; expected a shorter one")
-    where = (tip_mm / 2, length - tip_mm / 2)
-    return Plan(seed, presses, (force_n[0], force_n[1]), where, dwell_s, rest_s, repeats)
+    length, tip = design.params.length_mm, one("--tip", tip_mm)
+    if tip > length:
+        raise OutOfRange(f"--tip {tip:g} mm is longer than the sensor, {length:g} mm; expected a shorter one")
+    where = (tip / 2, length - tip / 2)
+    made = schedule(Plan(seed, presses, (force_n[0], force_n[1]), where, dwell_s, rest_s, repeats), design.name)
+    if picture:
+        from sensorgen.analysis.plots import recordings
 
-
-def _draw(plan: "Plan", picture: str) -> None:
-    from sensorgen.analysis.plots import recordings
-    from sensorgen.core import files as store
-
-    if not picture.lower().endswith(".png"):
-        raise BadInput(f"--picture {picture}: expected a file that ends in .png")
-    store.replace(Path(picture), recordings.schedule(plan.steps(), plan.seconds()))
-
-
-def _lasting(seconds: float) -> str:
-    """A duration in words.
-
-    >>> _lasting(95), _lasting(7384)
-    ('1 min 35 s', '2 h 3 min')
-    """
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
+        if not picture.lower().endswith(".png"):
+            raise BadInput(f"--picture {picture}: expected a file that ends in .png")
+        store.replace(Path(picture), recordings.schedule(list(made.steps), made.seconds))
+    table = "".join(render.pieces(made, "csv"))
+    if output:
+        store.replace(Path(output), table.encode())
+    if render.form():
+        render.deliver(made)
+    else:
+        click.echo(f"{output}: {list(made.document())[-1]}" if output else table, nl=bool(output))
+    return 0
 
 
 command.add_command(

@@ -1,29 +1,22 @@
 """``sensorgen bench hysteresis``: how far the way down of each press lies from its way up."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import bench_opened, show
-from sensorgen.cli.log_text import visible
-from sensorgen.cli.log_words import as_json as json_option
+from sensorgen.cli import bench_opened, render
 from sensorgen.cli.log_words import made
-from sensorgen.core import units
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
     from sensorgen.measure.signal.hysteresis import Hysteresis
     from sensorgen.measure.signal.run import Processed
 
-_PARTS = ("R", "X")
 _LAW = "smooth"
 
 
-def _hysteresis(
-    what: str, rig_file: str | None, threshold_n: float, plot: str | None, *, as_json: bool, **how: Any
-) -> None:
+def _hysteresis(what: str, rig_file: str | None, threshold_n: float, plot: str | None, **how: Any) -> None:
     """Show how far readings on the way down of each press lie from those on its way up, at the same force.
 
     For presses that go up and down again over some seconds, with the rig's log that measured the force. The distance is
@@ -31,6 +24,7 @@ def _hysteresis(
     Drift is taken out by a law of time alone: what the film remembers of presses is what is looked for.
     """
     from sensorgen.measure.signal.hysteresis import of_presses
+    from sensorgen.measure.signal.results import of_ways
 
     if not how["keep_drift"]:
         how["law"] = how["law"] or _LAW
@@ -39,35 +33,7 @@ def _hysteresis(
         raise BadInput(f"{what}: no log of a rig; expected one with the force, with --rig FILE")
     found = of_presses(worked, threshold_n)
     files = [_drawn(worked, found.ways, bench_opened.name_of(what), plot)] if plot else []
-    if as_json:
-        tones = worked.recording.tones_hz.tolist()
-        presses = [_data(at, way) for at, way in found.ways.items()]
-        show.as_json({"tones_hz": tones, "presses": presses, "left_out": list(found.left_out), "files": files})
-        return
-    for line in (*_lines(worked, found.ways), *found.left_out, *files):
-        click.echo(visible(line))
-
-
-def _lines(worked: "Processed", ways: "dict[float, Hysteresis]") -> Iterator[str]:
-    """A line for each press: R and X at the first and at the last tone."""
-    tones = worked.recording.tones_hz.tolist()
-    ends = sorted({0, len(tones) - 1})
-    heads = [f"{part} {units.frequency_text(tones[k])}" for k in ends for part in _PARTS]
-    yield f"{'start [s]':>9} {'to [N]':>6}" + "".join(f" {head + ' ±':>15} {'at [N]':>6}" for head in heads)
-    for at, way in ways.items():
-        columns = [k + part * len(tones) for k in ends for part in (0, 1)]
-        said = (f" {f'{way.share[c]:.2%} {way.error[c]:.2%}':>15} {way.at_n[c]:6.2f}" for c in columns)
-        yield f"{at:9.2f} {way.force_n[-1]:6.2f}" + "".join(said)
-
-
-def _data(start_s: float, way: "Hysteresis") -> dict[str, Any]:
-    """For programs: of R, then of X, tone by tone."""
-    half = len(way.share) // 2
-    return {"time_s": start_s, "force_n": [float(way.force_n[0]), float(way.force_n[-1])]} | {
-        f"{name}_{part}": getattr(way, name)[k * half : (k + 1) * half].tolist()
-        for name in ("share", "error", "at_n", "lost")
-        for k, part in enumerate(("re", "im"))
-    }
+    render.deliver(of_ways(worked.recording.tones_hz, found, files))
 
 
 def _drawn(worked: "Processed", ways: "dict[float, Hysteresis]", name: str, plot: str) -> str:
@@ -90,5 +56,5 @@ command = made(
         metavar="N", help="Force from which on the tip presses.",
     ),
     click.Option(["--plot"], metavar="FILE.png", help="Draw the ways up and down over the force."),
-    json_option(),
+    *render.options("json", "markdown"),
 )  # fmt: skip

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli.log_words import columns_of, lcr_columns, opened, rig_columns, where
+from sensorgen.cli.log_words import columns_of, opened, recorded_columns, where
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 def options() -> list[click.Parameter]:
     """Words that say which recording is meant, and how it is worked up."""
     return [
-        lcr_columns(),
-        rig_columns(),
+        *recorded_columns(),
         click.Option(["--lockin"], type=click.IntRange(1), help="Which one, if the file has several."),
         click.Option(
             ["--drift", "law"], metavar="LAW",

@@ -1,14 +1,12 @@
 """``sensorgen bench sets``: what presses change, of several recordings on one scale."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import bench_opened, show
-from sensorgen.cli.log_text import visible
-from sensorgen.cli.log_words import as_json as json_option
+from sensorgen.cli import bench_opened, render
 from sensorgen.cli.log_words import made
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
@@ -20,7 +18,7 @@ if TYPE_CHECKING:
 
 def _sets(
     what: tuple[str, ...], rig_files: tuple[str, ...], output: str | None, plot: str | None, *, together: bool,
-    as_json: bool, **how: Any,
+    **how: Any,
 ) -> None:  # fmt: skip
     """Bring what presses change of several recordings to a scale from 0 to 1, tone by tone, R and X apart.
 
@@ -28,15 +26,13 @@ def _sets(
     of them --together, so that their sizes do. Files need a --rig each, in the same order; recordings of the log have
     theirs.
     """
+    from sensorgen.measure.signal.results import of_sets
+
     if rig_files and len(rig_files) != len(what):
         raise BadInput(f"{len(rig_files)} --rig for {len(what)} recordings; expected one each, in the same order")
     tones, sets = _read(what, rig_files or (None,) * len(what), **how)
     files = [*_table(sets, tones, output, together=together), *_drawn(sets, tones, plot, together=together)]
-    if as_json:
-        show.as_json({"tones_hz": tones.tolist(), "sets": {k: _data(v) for k, v in sets.items()}, "files": files})
-        return
-    for line in (*_lines(sets, tones), *files):
-        click.echo(visible(line))
+    render.deliver(of_sets(tones, sets, files))
 
 
 def _read(what: tuple[str, ...], rigs: tuple[str | None, ...], **how: Any) -> "tuple[Real, dict[str, Pairs]]":
@@ -55,27 +51,6 @@ def _read(what: tuple[str, ...], rigs: tuple[str | None, ...], **how: Any) -> "t
             raise BadInput(f"{name!r} twice; expected each recording once")
         tones, found[name] = worked.recording.tones_hz, worked.pairs
     return np.asarray(tones), found
-
-
-def _lines(sets: "Mapping[str, Pairs]", tones_hz: "Real") -> Iterator[str]:
-    """A line for each set: from which to which difference, at the first and at the last tone."""
-    ends = sorted({0, len(tones_hz) - 1})
-    heads = [f"Δ{part} {units.frequency_text(float(tones_hz[k]))} [ohm]" for k in ends for part in "RX"]
-    yield f"{'presses':>7}" + "".join(f" {head:>22}" for head in heads) + "  set"
-    for name, pairs in sets.items():
-        z = pairs.difference_ohm
-        spans = (part[:, k] for k in ends for part in (z.real, z.imag))
-        said = (f" {f'{span.min():.4g} to {span.max():.4g}':>22}" for span in spans)
-        yield f"{len(z):7}" + "".join(said) + f"  {name}"
-
-
-def _data(pairs: "Pairs") -> dict[str, Any]:
-    """For programs: the differences as they are; ``-o`` writes them on their scale."""
-    z = pairs.difference_ohm
-    return {
-        "force_n": pairs.force_n.tolist(), "position_mm": pairs.position_mm.tolist(),
-        "difference_re_ohm": z.real.tolist(), "difference_im_ohm": z.imag.tolist(),
-    }  # fmt: skip
 
 
 def _table(sets: "Mapping[str, Pairs]", tones_hz: "Real", output: str | None, *, together: bool) -> list[str]:
@@ -125,5 +100,5 @@ command = made(
     *bench_opened.options(),
     click.Option(["--output", "-o"], metavar="FILE.csv", help="Write a row per press, on its scale."),
     click.Option(["--plot"], metavar="FILE.png", help="Draw them over the force, tone by tone."),
-    json_option(),
+    *render.options("json", "markdown", file=False),
 )  # fmt: skip

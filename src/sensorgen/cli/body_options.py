@@ -15,6 +15,7 @@ from sensorgen.design.walls import WALLS
 from sensorgen.export.slicers import SLICERS
 
 if TYPE_CHECKING:
+    from sensorgen.asprinted.compensation import Change
     from sensorgen.asprinted.printed import Printed
     from sensorgen.design.body import Body
     from sensorgen.design.design import Design
@@ -49,6 +50,24 @@ def body_of(drawn: bool, slicer: str | None, walls: str | None) -> "Callable[[De
     if walls:
         return partial(bodies.estimated, walls=walls)
     return bodies.default_body
+
+
+def compensate_option() -> click.Option:
+    """``--compensate``, for commands that make files."""
+    return click.Option(
+        ["--compensate"], type=OneOf(("print", "bake")),
+        help="Change the design so that what is asked for comes out: whole layers, widths of a line, the electrode "
+        "gap; with bake also larger by the 20 % that the bake takes off.",
+    )  # fmt: skip
+
+
+def compensated(design: "Design", word: str | None, walls: str) -> "tuple[Design, list[Change]]":
+    """The design to print, and what was changed."""
+    if word is None:
+        return design, []
+    from sensorgen.asprinted.compensation import compensated as changed
+
+    return changed(design, walls, bake=word == "bake")
 
 
 def printed_of(design: "Design", slicer: str | None, walls: str | None) -> "Printed":

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import asprinted_text, show
+from sensorgen.cli import body_options, render, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
@@ -16,46 +16,25 @@ OWN: list[click.Parameter] = [
     click.Option(["--no-cad"], is_flag=True, help="Skip the STEP file (saves about 3 s)."),
     click.Option(["--force"], is_flag=True, help="Write the files even if checks report errors."),
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
-    asprinted_text.compensate_option(),
+    body_options.compensate_option(),
     click.Option(["--details"], is_flag=True, help="Print all findings and the whole prediction."),
-    click.Option(["--json", "as_json"], is_flag=True, help="Print the result as JSON."),
+    *render.options("json", "markdown"),
 ]
 
 
 def _work(
-    design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool, compensate: str | None, details: bool,
-    as_json: bool,
-) -> int:  # fmt: skip
-    from sensorgen.core import document
-    from sensorgen.core import files as store
-    from sensorgen.core.errors import Unprintable
-    from sensorgen.workflows.build import STEPS, as_dict, build
+    design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool, compensate: str | None, details: bool
+) -> int:
+    from sensorgen.checks.review import lost
+    from sensorgen.workflows.build import STEPS, DetailedBuild, build
 
-    design, changes = asprinted_text.compensated(design, compensate, "arachne", silent=as_json)
-    try:
-        with show.progress(STEPS) as step:
-            built = build(design, Path(out), cad=not no_cad, force=force, strict=strict, step=step)
-    except Unprintable as error:
-        if as_json:
-            show.as_json({"name": design.name, "folder": None, "findings": [f.as_dict() for f in error.findings]})
-        else:
-            click.echo(f"CHANGE  {design.name}\n")
-            show.findings(error.findings)
-        raise
-    code = 1 if built.review.lost() and not force else 0
-    files = sorted([*store.listed(built.folder), store.MANIFEST])
-    if as_json:
-        show.as_json(as_dict(design, built, files) | {"compensated": changes})
-        return code
-    click.echo(f"{built.verdict}  {design.name}: {show.summary(built.review)}\n")
-    if details:
-        show.findings(built.review.findings)
-        click.echo("\n".join(("", *document.text(built.prediction.document()))))
-    else:
-        click.echo("\n".join(document.text([*built.prediction.summary(), ""])))
-        show.findings(show.most_severe(built.review.findings, 3))
-    click.echo(f"\n{built.folder}: {len(files)} files; {'' if details else '--details prints all'}".rstrip("; "))
-    return code
+    design, changes = body_options.compensated(design, compensate, "arachne")
+    with render.refused(design.name), show.progress(STEPS) as step:
+        built = build(
+            design, Path(out), cad=not no_cad, force=force, strict=strict, compensated=changes, step=step
+        )  # fmt: skip
+    render.deliver(DetailedBuild(**vars(built)) if details else built)
+    return 1 if lost(built.findings) and not force else 0
 
 
 command = DesignGroup(

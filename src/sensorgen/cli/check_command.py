@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import show
+from sensorgen.cli import render, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
@@ -12,20 +12,16 @@ if TYPE_CHECKING:
 
 OWN: list[click.Parameter] = [
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
-    click.Option(["--json", "as_json"], is_flag=True, help="Print the findings as JSON."),
+    *render.options("json", "markdown"),
 ]
 
 
-def _work(design: "Design", *, strict: bool, as_json: bool) -> int:
+def _work(design: "Design", *, strict: bool) -> int:
     from sensorgen.checks.review import STEPS, report, review
 
     with show.progress(STEPS) as step:
         held = review(design, step)
-    if as_json:
-        show.as_json(report(design, held))
-    else:
-        show.findings(held.findings)
-        click.echo(f"{design.name}: {show.summary(held)}")
+    render.deliver(report(design, held))
     return 1 if held.errors(strict) or held.lost() else 0
 
 

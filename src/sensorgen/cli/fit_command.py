@@ -1,13 +1,11 @@
 """``sensorgen fit``: material values out of the log, as a new source."""
 
-from collections.abc import Iterator
-from math import exp
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import body_options, log_words, show
+from sensorgen.cli import body_options, log_words, render
 
 if TYPE_CHECKING:
     from sensorgen.analysis.fit import Fit
@@ -15,14 +13,14 @@ if TYPE_CHECKING:
 
 def _work(
     iteration: int, file: str | None, output: str | None, seed: int, drawn: bool, slicer: str | None, walls: str | None,
-    *, dry_run: bool, as_json: bool,
-) -> int:  # fmt: skip
+    *, dry_run: bool,
+) -> None:  # fmt: skip
     """Fit material values to what was measured, and keep them as a source.
 
     A design takes them where it names the source, as in etpu@fit-23. A quarter of the specimens is held back, to
     see whether the values predict what they were not fitted to.
     """
-    from dataclasses import asdict
+    from dataclasses import replace
 
     from sensorgen.analysis.fit import fit, text
     from sensorgen.core import files as store
@@ -30,18 +28,13 @@ def _work(
 
     with log_words.opened(file) as log:
         made = fit(log, iteration, seed, body_options.body_of(drawn, slicer, walls))
-    path = Path(output) if output else own.path(made.source)
-    keep = bool(made.values) and not dry_run
-    if keep:
+    if made.values and not dry_run:
+        path = Path(output) if output else own.path(made.source)
         store.replace(path, text(made).encode())
-    if as_json:
-        show.as_json(asdict(made) | {"file": str(path) if keep else None})
-        return 0
-    click.echo("\n".join(_lines(made)))
-    if keep:
-        how = f"; take them with {_taken(made)}" if not output else ""
-        click.echo(f"in {path}{how}")
-    return 0
+        made = replace(made, file=str(path))
+    render.deliver(made)
+    if made.file and not output and not render.form():
+        click.echo(f"take them with {_taken(made)}")
 
 
 def _taken(made: "Fit") -> str:
@@ -53,20 +46,6 @@ def _taken(made: "Fit") -> str:
     return " ".join(f"--material {part}={name}@{made.source}" for name, part in parts.items())
 
 
-def _lines(made: "Fit") -> Iterator[str]:
-    yield f"iteration {made.iteration}: {made.specimens} specimens fitted to, {len(made.held_back)} held back"
-    for value in made.values:
-        yield f"  {value.material} {value.quantity} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})"
-        yield f"    {value.note}"
-    for untold in made.untold:
-        yield f"  not determined: {untold.parameter}: {untold.why}"
-    for error in made.errors:
-        before, after = (f"a factor of {exp(e):.3g}" for e in (error.before, error.after))
-        yield f"  {error.observable} of {error.count} held back: off by {before} before, {after} after (rms)"
-    if made.left_out:
-        yield f"  left out: {len(made.left_out)}; sensorgen report --iteration {made.iteration} says why"
-
-
 command = click.Command(
     "fit", callback=_work, help=_work.__doc__, short_help="Fit material values to what was measured.",
     params=[
@@ -76,6 +55,6 @@ command = click.Command(
         click.Option(["--seed"], type=int, default=23, show_default=True, help="Of the split."),
         *body_options.body_options(),
         click.Option(["--dry-run"], is_flag=True, help="Write no file."),
-        log_words.as_json(),
+        *render.options(file=False),
     ],
 )  # fmt: skip

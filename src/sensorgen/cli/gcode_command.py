@@ -2,6 +2,7 @@
 
 import click
 
+from sensorgen.cli import render
 from sensorgen.cli.words import completed
 
 
@@ -11,31 +12,7 @@ def _printers() -> list[str]:
     return printer_names()
 
 
-@click.group("gcode", short_help="Check G-code before the printer does.")
-def command() -> None:
-    """Check G-code, whoever has sliced it."""
-
-
-@command.command("check", short_help="Simulate the printer: what would go wrong, and what it takes.")
-@click.argument("file", metavar="FILE")
-@click.option(
-    "--printer",
-    default="diabase-h5",
-    show_default=True,
-    metavar="NAME",
-    shell_complete=completed(_printers),
-    help="A printer that is listed, or a YAML file.",
-)
-@click.option(
-    "--material",
-    "materials",
-    multiple=True,
-    metavar="TOOL=NAME",
-    help="What a tool prints, for its mass; the printer's usual material if not given.",
-)
-@click.option("--strict", is_flag=True, help="Treat warnings as errors.")
-@click.option("--json", "as_json", is_flag=True, help="Print findings and report as JSON.")
-def check(file: str, printer: str, materials: tuple[str, ...], strict: bool, as_json: bool) -> int:
+def _check(file: str, printer: str, materials: tuple[str, ...], *, strict: bool) -> int:
     """Simulate the printer with a file: position, tool, temperatures, fans, limits.
 
     Says what would go wrong, with lines, and what the print takes: time, filament and mass of each tool, tool
@@ -43,18 +20,13 @@ def check(file: str, printer: str, materials: tuple[str, ...], strict: bool, as_
     """
     from pathlib import Path
 
-    from sensorgen.cli import gcode_text, show
     from sensorgen.design.printer import load_printer
+    from sensorgen.export.gcode.check import CheckedFile
     from sensorgen.export.gcode.check import check as checked
 
     machine = load_printer(printer)
     found = checked(Path(file), machine, _loaded(materials, machine.tool_numbers))
-    if as_json:
-        show.as_json({"file": file, "printer": machine.name, **found.as_dict()})
-    else:
-        for line in (*gcode_text.findings(found), *gcode_text.report(found.report)):
-            click.echo(line)
-        click.echo(f"{file}: {gcode_text.summary(found)}")
+    render.deliver(CheckedFile(**vars(found), file=file, printer=machine.name))
     return 1 if found.errors(strict) else 0
 
 
@@ -72,3 +44,27 @@ def _loaded(words: tuple[str, ...], tools: tuple[int, ...]) -> dict[int, str]:
             )
         found[int(tool)] = materials.load(name).name
     return found
+
+
+command = click.Group(
+    "gcode", help="Check G-code, whoever has sliced it.", short_help="Check G-code before the printer does.",
+    commands=[
+        click.Command(
+            "check", callback=_check, help=_check.__doc__,
+            short_help="Simulate the printer: what would go wrong, and what it takes.",
+            params=[
+                click.Argument(["file"], metavar="FILE"),
+                click.Option(
+                    ["--printer"], default="diabase-h5", show_default=True, metavar="NAME",
+                    shell_complete=completed(_printers), help="A printer that is listed, or a YAML file.",
+                ),
+                click.Option(
+                    ["--material", "materials"], multiple=True, metavar="TOOL=NAME",
+                    help="What a tool prints, for its mass; the printer's usual material if not given.",
+                ),
+                click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
+                *render.options(),
+            ],
+        )
+    ],
+)  # fmt: skip

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import body_options, show
+from sensorgen.cli import body_options, render, show
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import Length, OneOf, Share
+from sensorgen.cli.words import Length, OneOf, Share, Values, one
 from sensorgen.core import files as store
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
@@ -20,24 +20,9 @@ if TYPE_CHECKING:
     from sensorgen.design.design import Design
     from sensorgen.measure.readings import Readings
     from sensorgen.prediction.inverse import Estimator, Prior
-    from sensorgen.prediction.inverse.answers import InversionSummary, Summary
+    from sensorgen.prediction.inverse.answers import Summary
 
 _NORMAL = re.compile(r"(force|position)=(.+?)(?:\+-|±)(.+)")
-
-
-class _Force(click.ParamType):  # type: ignore[type-arg]
-    """A force, in newtons unless it names another unit."""
-
-    name = "n"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:  # noqa: ARG002
-        """Read a force as typed [N]."""
-        if isinstance(value, float):
-            return value
-        try:
-            return units.force_n(value)
-        except BadInput as error:
-            raise error.within("--force-limit") from None
 
 
 OWN: list[click.Parameter] = [
@@ -50,7 +35,10 @@ OWN: list[click.Parameter] = [
         ["--prior"], metavar="WHAT",
         help="Prior: uniform, or force=3+-1, position=50+-20 (N, mm), or both with a comma.",
     ),
-    click.Option(["--force-limit", "force_limit_n"], type=_Force(), help="Largest force to look for [default: 13 N]."),
+    click.Option(
+        ["--force-limit", "force_limit_n"], type=Values(units.FORCE_N, zero=False), metavar="N",
+        help="Largest force to look for [default: 13 N].",
+    ),
     click.Option(["--tip", "tip_mm"], type=Length(), default="10mm", show_default=True, help="Length of the tip."),
     click.Option(
         ["--compression"], type=OneOf(("unconfined", "bonded")),
@@ -61,11 +49,12 @@ OWN: list[click.Parameter] = [
         help="Write a row per sample, '-' to the terminal; readings from the standard input go there by themselves.",
     ),
     *body_options.body_options(),
-    click.Option(["--json", "as_json"], is_flag=True, help="Print the summary as JSON."),
+    *render.options("json", "markdown", file=False),
 ]  # fmt: skip
 
 
-def _work(design: "Design", *, measured: str, output: str | None, as_json: bool, **how: Any) -> int:
+def _work(design: "Design", *, measured: str, output: str | None, **how: Any) -> int:
+    """The rows go to the terminal or to a file; the summary to the terminal, beside rows to the standard error."""
     from sensorgen.measure.readings import readings
     from sensorgen.prediction.inverse.answers import Summary
 
@@ -77,32 +66,11 @@ def _work(design: "Design", *, measured: str, output: str | None, as_json: bool,
         with _sink(place) as write:
             for text in _answers(source, estimator, summary, live=live, written=place is not None):
                 write(text)
-    beside = place == "-"
-    for line in _summary(summary.result(), as_json=as_json):
-        click.echo(line, err=beside)
-    if not as_json and not beside:
+    for piece in render.pieces(summary.result(), render.form()):
+        click.echo(piece, nl=False, err=place == "-")
+    if not render.form() and place != "-":
         click.echo(output or "--output FILE.csv writes force and position of every sample")
     return 0
-
-
-def _summary(found: "InversionSummary", *, as_json: bool) -> Iterator[str]:
-    if as_json:
-        from pydantic import TypeAdapter
-
-        from sensorgen.prediction.inverse.answers import InversionSummary
-
-        yield show.json_text(TypeAdapter(InversionSummary).dump_python(found, mode="json")).rstrip()
-        return
-
-    def said(value: float | None, unit: str) -> str:
-        return "unknown" if value is None else f"{value:.3g} {unit}"
-
-    counts = ", ".join(f"{count} {words}" for words, count in found.statuses.items())
-    yield f"{found.samples} sample{'s' * (found.samples != 1)}: {counts}"
-    force, position = said(found.median_force_error_n, "N"), said(found.median_position_error_mm, "mm")
-    yield f"median standard errors: force {force}, position {position}"
-    yield from (f"note: {doubt}" for doubt in found.doubts)
-    yield from found.advice
 
 
 def _estimator(
@@ -111,7 +79,7 @@ def _estimator(
     *,
     noise: float,
     prior: str | None,
-    force_limit_n: float | None,
+    force_limit_n: tuple[float, ...] | None,
     tip_mm: float,
     compression: str | None,
     **body: Any,
@@ -123,7 +91,7 @@ def _estimator(
 
     query = Query(tip=Tip(tip_mm * units.M_PER_MM), law=compression or "")
     model = sensor_model(body_options.body_of(**body)(design), query)[0]
-    limit = FORCE_LIMIT_N if force_limit_n is None else force_limit_n
+    limit = one("--force-limit", force_limit_n) if force_limit_n else FORCE_LIMIT_N
     return Estimator(model.sensor, source.frequency_hz, noise, _prior(prior), limit), model.doubts
 
 

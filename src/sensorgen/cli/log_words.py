@@ -1,4 +1,4 @@
-"""Words that the commands of ``sensorgen log`` share, and what opens the log that they name."""
+"""Options that the commands of ``sensorgen log`` and ``bench`` share, and the log that they name."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,37 +18,16 @@ def where() -> click.Option:
     return click.Option(["--log", "file"], metavar="FILE", help=about)
 
 
-def as_json() -> click.Option:
-    """For programs."""
-    return click.Option(["--json", "as_json"], is_flag=True, help="Print as JSON.")
-
-
-def remark() -> click.Option:
-    """Of whoever measures."""
-    return click.Option(["--remark"], metavar="TEXT", default="", help="Anything worth knowing, in your own words.")
-
-
-def ahead() -> click.Option:
-    """A prediction before the measurement."""
-    about = "Log first what the specimen's design is expected to measure, if the log does not have it."
-    return click.Option(["--predict"], is_flag=True, help=about)
-
-
-def corrects() -> click.Option:
-    """A row that is to be corrected."""
-    return click.Option(["--corrects"], metavar="NUMBER", type=int, help="Number of the row that this one corrects.")
-
-
-def lcr_columns() -> click.Option:
-    """Names of columns in an instrument's CSV."""
+def recorded_columns() -> list[click.Parameter]:
+    """Names of columns in an instrument's CSV, and in a rig's log."""
     about = "Column of the readings' file, if it is CSV and calls it otherwise: time_s, stamp_s, re_ohm_1.1kHz ..."
-    return click.Option(["--column", "columns"], metavar="OURS=THEIRS", multiple=True, help=about)
-
-
-def rig_columns() -> click.Option:
-    """Names of columns in a rig's log."""
-    about = "Column of the rig's log: time_s, set_force_n, set_position_mm, force_n, error."
-    return click.Option(["--rig-column", "rig_columns"], metavar="OURS=THEIRS", multiple=True, help=about)
+    return [
+        click.Option(["--column", "columns"], metavar="OURS=THEIRS", multiple=True, help=about),
+        click.Option(
+            ["--rig-column", "rig_columns"], metavar="OURS=THEIRS", multiple=True,
+            help="Column of the rig's log: time_s, set_force_n, set_position_mm, force_n, error.",
+        ),
+    ]  # fmt: skip
 
 
 def made(work: Callable[..., Any], name: str, about: str, *params: click.Parameter) -> click.Command:

@@ -1,17 +1,15 @@
 """``sensorgen log multimeter|import|bench|predict``: what goes into the log."""
 
-import difflib
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import show
+from sensorgen.cli import render
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.log_words import ahead, columns_of, corrects, lcr_columns, made, opened, remark, rig_columns, where
-from sensorgen.cli.log_words import as_json as json_option
+from sensorgen.cli.log_words import columns_of, made, opened, recorded_columns, where
 from sensorgen.cli.settings import pairs
 from sensorgen.cli.words import OneOf
 from sensorgen.core.errors import BadInput
@@ -22,8 +20,9 @@ if TYPE_CHECKING:
 
 
 def _multimeter(
-    specimen: str, y_words: str, z_words: str, file: str | None, corrects: int | None, *, as_json: bool, **how: Any
-) -> None:
+    specimen: str, y_words: str, z_words: str, file: str | None, corrects: int | None, *, predict: bool,
+    visa: str | None, axis: str | None, wires: str, baked: bool | None, remark: str, measured_at: str,
+) -> None:  # fmt: skip
     """Log the resistances of one specimen, named as in '23 triY .2mm 3'.
 
     Several readings have / between them, as in --z '2.3k / 3.8k'. A small m is taken for mega, and asked for on a
@@ -31,33 +30,33 @@ def _multimeter(
     """
     from sensorgen.measure.log import Reading, notes
 
-    meter = {key: how.pop(key) for key in ("visa", "axis", "wires")}
-    if meter["visa"] and (y_words or z_words):
+    if visa and (y_words or z_words):
         raise BadInput("--visa beside --y or --z; expected the meter's readings or words, not both")
     notes.specimen(specimen)  # a wrong name is told before anybody measures
-    _ahead(specimen, file, wanted=how.pop("predict"), as_json=as_json)
-    if meter["visa"]:
-        y_words, z_words, how["instrument"] = _measured(**meter)
-        how["source"] = meter["visa"]
-    if not (y_words.strip() or z_words.strip() or how["remark"]):
+    if predict:
+        _predict_ahead(specimen, file)
+    instrument, source = "", "typed"
+    if visa:
+        y_words, z_words, instrument = _measured(visa, axis, wires)
+        source = visa
+    if not (y_words.strip() or z_words.strip() or remark):
         raise BadInput("nothing to log; expected --y, --z, --visa or --remark")
     mega = _asked_mega(y=y_words, z=z_words)
     with opened(file, create=True) as log:
-        supersedes = _uid(log, Reading, corrects)
-        new = log.add([notes.reading(specimen, y_words, z_words, mega=mega, supersedes=supersedes, **how)])
-        _say_logged(new, log, as_json=as_json)
+        row = notes.reading(
+            specimen, y_words, z_words, mega=mega, supersedes=_uid(log, Reading, corrects), baked=baked, remark=remark,
+            measured_at=measured_at, instrument=instrument, source=source,
+        )  # fmt: skip
+        _deliver(log.add([row]), log)
 
 
-def _ahead(specimen: str, file: str | None, *, wanted: bool, as_json: bool) -> None:
-    """Log what is expected before the specimen is measured, and say so beside what is said of the reading."""
-    if not wanted:
-        return
-    from sensorgen.cli import log_text
-    from sensorgen.workflows import stored_prediction as ahead
+def _predict_ahead(specimen: str, file: str | None) -> None:
+    """Log what is expected before the specimen is measured; beside JSON, which has the measurement alone."""
+    from sensorgen.workflows import stored_prediction
 
     with opened(file, create=True) as log:
-        for entry in ahead.predict(log, specimen):
-            click.echo("logged " + "\n".join(log_text.of(entry)), err=as_json)
+        for row in stored_prediction.predict(log, specimen):
+            click.echo(f"logged prediction {row.number} of {specimen}", err=bool(render.form()))
 
 
 def _asked_mega(**typed: str) -> bool:
@@ -97,31 +96,14 @@ def _uid(log: "Log", kind: "type[Entry]", number: int | None) -> str:
     return old.uid
 
 
-def _say_logged(new: Sequence["Entry"], log: "Log", *, as_json: bool, known: str = "") -> None:
-    """Say what was logged, or that it was ``known``, and where."""
-    from sensorgen.cli import log_text
+def _deliver(new: "Sequence[Entry]", log: "Log", known: str = "") -> None:
+    """Show what was logged, or that it was ``known``."""
+    from sensorgen.measure.log import listing
 
-    if as_json:
-        show.as_json([log_text.plain(entry) for entry in new])
-        return
-    for entry in new:
-        click.echo("logged " + "\n".join([*log_text.of(entry), *log_text.corrections(entry, log), *_near(entry, log)]))
-    if not new:
-        click.echo(known)
-    click.echo(f"in {log.path}")
+    render.deliver(listing.logged(log, new, known), before=[f"{'logged' if new else 'not logged'} in {log.path}"])
 
 
-def _near(entry: "Entry", log: "Log") -> Iterator[str]:
-    """A hint where a specimen is on no print bed of its iteration, and another with nearly its name is."""
-    from sensorgen.measure.log import Print, Reading
-
-    if isinstance(entry, Reading) and not entry.batch:
-        names = [printed.specimen for printed in log.entries(Print, iteration=entry.iteration)]
-        for near in difflib.get_close_matches(entry.specimen, names, n=1, cutoff=0.8):
-            yield f"no print bed here has {entry.specimen!r}; near is {near!r}: --corrects {entry.number}, if meant"
-
-
-def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, thesis: bool, as_json: bool) -> None:
+def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, thesis: bool) -> None:
     """Log all rows of a file, or none of them.
 
     A table of readings as CSV, the batch.json of a print bed, or what 'log export' wrote. Rows that the log has are
@@ -134,17 +116,12 @@ def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, the
     named = dict(pairs(columns, "--column"))
     with opened(file, create=True) as log:
         done = importing.thesis(log) if thesis else importing.import_file(log, Path(str(path)), named)
-        if as_json:
-            show.as_json(vars(done))
-            return
-        for line in done.lines():
-            click.echo(line)
-        click.echo(f"in {log.path}")
+        render.deliver(done, before=[f"import into {log.path}"])
 
 
 def _bench(
     specimen: str, lcr_file: str, rig_file: str | None, remark: str, file: str | None, corrects: int | None, *,
-    columns: tuple[str, ...], rig_columns: tuple[str, ...], predict: bool, as_json: bool,
+    columns: tuple[str, ...], rig_columns: tuple[str, ...], predict: bool,
 ) -> None:  # fmt: skip
     """Log a recording of one specimen, its files kept whole.
 
@@ -152,48 +129,47 @@ def _bench(
     """
     from sensorgen.measure.log import BenchRun, bench
 
-    maps = {
-        "columns": columns_of(columns, "--column"),
-        "rig_columns": columns_of(rig_columns, "--rig-column"),
-    }
-    _ahead(specimen, file, wanted=predict, as_json=as_json)
+    ours, rig = columns_of(columns, "--column"), columns_of(rig_columns, "--rig-column")
+    if predict:
+        _predict_ahead(specimen, file)
     with opened(file, create=True) as log:
         new = bench.log_recording(
-            log, specimen, Path(lcr_file), Path(rig_file) if rig_file else None, **maps, remark=remark,
-            supersedes=_uid(log, BenchRun, corrects),
+            log, specimen, Path(lcr_file), Path(rig_file) if rig_file else None, columns=ours, rig_columns=rig,
+            remark=remark, supersedes=_uid(log, BenchRun, corrects),
         )  # fmt: skip
-        _say_logged(
-            new,
-            log,
-            as_json=as_json,
-            known=f"{specimen}: the log has this very recording; --corrects NUMBER changes remark or columns",
-        )
+        _deliver(new, log, f"{specimen}: the log has this very recording; --corrects NUMBER changes remark or columns")
 
 
-def _predict(design: "Design", *, file: str | None, as_json: bool) -> int:
+def _predict(design: "Design", *, file: str | None) -> int:
     from sensorgen.workflows.stored_prediction import predicted_row
 
     with opened(file, create=True) as log:
         new = log.add([predicted_row(design)])
-        _say_logged(new, log, as_json=as_json, known=f"{design.name}: the log has this very prediction")
+        _deliver(new, log, f"{design.name}: the log has this very prediction")
     return 0
 
 
+_OF_READINGS: list[click.Parameter] = [
+    click.Option(["--remark"], metavar="TEXT", default="", help="Anything worth knowing, in your own words."),
+    click.Option(
+        ["--predict"], is_flag=True,
+        help="Log first what the specimen's design is expected to measure, if the log does not have it.",
+    ),
+    click.Option(["--corrects"], metavar="NUMBER", type=int, help="Number of the row that this one corrects."),
+    where(),
+    *render.options("json", "markdown"),
+]  # fmt: skip
 multimeter = made(
     _multimeter, "multimeter", "Log resistances of one specimen.",
     click.Argument(["specimen"]),
     click.Option(["--y", "y_words"], metavar="WORDS", default="", help="Resistance along an electrode, as 0.65k."),
     click.Option(["--z", "z_words"], metavar="WORDS", default="", help="Resistance between the electrodes."),
     click.Option(["--baked/--unbaked"], default=None, help="Whether the specimen was baked before."),
-    remark(),
-    ahead(),
     click.Option(["--measured-at"], metavar="WHEN", default="", help="When it was measured, in your own words."),
-    corrects(),
     click.Option(["--visa"], metavar="ADDRESS", help="Read the meter there, as GPIB0::22::INSTR: first Y, then Z."),
     click.Option(["--axis"], type=OneOf(("y", "z")), help="Let the meter read this one only."),
     click.Option(["--wires"], type=OneOf(("2", "4")), default="2", show_default=True, help="Leads of the meter."),
-    where(),
-    json_option(),
+    *_OF_READINGS,
 )  # fmt: skip
 table = made(
     _import, "import", "Log a table, a print bed, or an export of a log.",
@@ -204,23 +180,18 @@ table = made(
         help="Which column is which, as y='Resistance in Y': specimen, y, z, remark, baked, measured_at.",
     ),
     where(),
-    json_option(),
+    *render.options("json", "markdown"),
 )  # fmt: skip
 bench = made(
     _bench, "bench", "Log a recording of one specimen.",
     click.Argument(["specimen"]),
     click.Argument(["lcr_file"]),
     click.Argument(["rig_file"], required=False),
-    lcr_columns(),
-    rig_columns(),
-    remark(),
-    ahead(),
-    corrects(),
-    where(),
-    json_option(),
+    *recorded_columns(),
+    *_OF_READINGS,
 )  # fmt: skip
 predict = DesignGroup(
-    _predict, [where(), json_option()], name="predict",
+    _predict, [where(), *render.options("json", "markdown")], name="predict",
     help="Keep what a design is expected to measure, so that no later comparison can be tuned.",
     short_help="Log what a design is expected to measure.",
 )  # fmt: skip

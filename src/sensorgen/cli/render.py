@@ -1,7 +1,8 @@
 """Results as text, JSON, CSV or Markdown, to the terminal or a file: the one way out of every command."""
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,11 +18,11 @@ _ABOUT = {"json": "Print as JSON.", "csv": "Print the table as CSV, all digits."
 _FORM, _FILE = "sensorgen.form", "sensorgen.output"  # in the context's meta
 
 
-def options(*forms: str, file: bool = True) -> list[click.Parameter]:
+def options(*forms: str, file: bool = True, csv: str = _ABOUT["csv"]) -> list[click.Parameter]:
     """``--json``, ``--csv``, ``--markdown``, or those named, and ``--output``; :func:`deliver` obeys them."""
     flags = [
         click.Option([f"--{form}", f"as_{form}"], is_flag=True, expose_value=False, callback=_choose, help=about)
-        for form, about in _ABOUT.items() if form in (forms or _ABOUT)
+        for form, about in (_ABOUT | {"csv": csv}).items() if form in (forms or _ABOUT)
     ]  # fmt: skip
     output = click.Option(
         ["--output", "-o"], metavar="FILE", expose_value=False, callback=_to, help="Write this file."
@@ -66,6 +67,20 @@ def deliver(result: "Documented", *, before: "Iterable[Part]" = ()) -> None:
     write(pieces(result, form(), before))
 
 
+@contextmanager
+def refused(name: str) -> Iterator[None]:
+    """Deliver the findings for which a design, or a plan, is not made."""
+    from sensorgen.core.errors import Unprintable
+
+    try:
+        yield
+    except Unprintable as error:
+        from sensorgen.core.findings import Refused
+
+        deliver(Refused(name, tuple(error.findings)))
+        raise
+
+
 def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> Iterable[str]:
     """A result as pieces of text.
 
@@ -83,8 +98,8 @@ def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> 
     if wanted == "json":
         return [document.to_json(result)]
     if wanted == "csv" and hasattr(result, "csv"):
-        lines: Iterable[str] = result.csv()
-        return lines
+        blocks: Iterable[str] = result.csv()
+        return blocks
     if wanted == "csv":
         tables = [part for part in result.document() if isinstance(part, document.Table)]
         if not tables:

@@ -1,24 +1,29 @@
 """``sensorgen schema``: JSON schemas of files."""
 
-from typing import Any
+import json
 
 import click
 
-from sensorgen.cli import show
+from sensorgen.cli import render
 
 
-def _schema(name: str) -> dict[str, Any]:
-    if name == "prediction":
+def _schema(of: str) -> None:
+    """Print a schema."""
+    if of == "design":
+        from sensorgen.cli import catalogue
+
+        found = catalogue.schema()
+    else:
         from sensorgen.prediction.results import adapter
 
-        return adapter().json_schema(mode="serialization")
-    from sensorgen.cli import catalogue
-
-    return catalogue.schema()
+        found = adapter().json_schema(mode="serialization")
+    render.write([json.dumps(found, indent=2, ensure_ascii=False), "\n"])
 
 
-@click.command("schema", help="Print the JSON schema of a design file or of prediction.json.")
-@click.argument("of", type=click.Choice(["design", "prediction"]), default="design")
-def command(of: str) -> None:
-    """Print a schema."""
-    show.as_json(_schema(of))
+command = click.Command(
+    "schema", callback=_schema, help=_schema.__doc__,
+    short_help="Print the JSON schema of a design file or of prediction.json.",
+    params=[
+        click.Argument(["of"], type=click.Choice(["design", "prediction"]), default="design"), render.options()[-1]
+    ],
+)  # fmt: skip

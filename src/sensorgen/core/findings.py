@@ -1,7 +1,9 @@
-"""What a check has found, as plain data for the terminal, the drawing and ``check.json``."""
+"""Findings of checks, as data and for people."""
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from sensorgen.core.document import Facts, Part
 
 SEVERITIES = ("error", "warning", "info")
 
@@ -34,6 +36,8 @@ class Finding:
         Where it goes on through the layers after, the last of them [-].
     waiver : str
         The design's reason to accept it, or "".
+    margin_mm : float or None
+        Distance of the value to the limit, negative: it is on the wrong side. From these two [mm].
     """
 
     rule: str
@@ -48,13 +52,81 @@ class Finding:
     count: int = 1
     last_layer: int | None = None
     waiver: str = ""
+    margin_mm: float | None = None
 
-    def margin_mm(self) -> float | None:
-        """How far the value is from the limit; negative, since a finding is on the wrong side of it [mm]."""
-        if self.value_mm is None or self.limit_mm is None:
-            return None
-        return -round(abs(self.value_mm - self.limit_mm), 9)
+    def __post_init__(self) -> None:
+        """Derive the margin."""
+        if self.value_mm is not None and self.limit_mm is not None:
+            object.__setattr__(self, "margin_mm", -round(abs(self.value_mm - self.limit_mm), 9))
 
-    def as_dict(self) -> dict[str, Any]:
-        """The finding with its margin, for JSON."""
-        return asdict(self) | {"margin_mm": self.margin_mm()}
+    @property
+    def place(self) -> str:
+        """Rule, body and layers, in words."""
+        layers = f", layer {self.layer}" if self.layer else ""
+        layers += f" to {self.last_layer}" if self.last_layer else ""
+        return f"{self.rule}  {self.body}{layers}" + (f", {self.count} places" if self.count > 1 else "")
+
+    @property
+    def text(self) -> str:
+        """What is the matter, where, and what to change."""
+        x, y, z = self.place_mm or (0.0, 0.0, 0.0)
+        at = f" ({'first ' if self.count > 1 else ''}at x {x:g}, y {y:g}, z {z:g} mm)" if self.place_mm else ""
+        return f"{self.message}{at} {f'accepted: {self.waiver}' if self.waiver else f'-> {self.advice}'}"
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A design, or a plan, that is not made because of findings.
+
+    Attributes
+    ----------
+    name : str
+        Of the design or the plan.
+    findings : tuple of Finding
+        All of them.
+    folder, gcode : None
+        Nothing was written.
+    """
+
+    name: str
+    findings: tuple[Finding, ...]
+    folder: None = None
+    gcode: None = None
+
+    def document(self) -> Iterator[Part]:
+        """The verdict, and the findings."""
+        yield f"CHANGE  {self.name}"
+        yield ""
+        yield from listed(self.findings)
+
+
+def listed(found: Iterable[Finding]) -> Iterator[Part]:
+    """Findings as facts, each with what to change."""
+    heads = (("waived" if f.waiver else f.severity, f) for f in found)
+    if rows := tuple(row for head, f in heads for row in ((head, f.place), ("", f.text))):
+        yield Facts(rows)
+
+
+def counts(found: Sequence[Finding]) -> dict[str, int]:
+    """How many findings there are of each severity, and how many are waived [-]."""
+    heads = ["waived" if f.waiver else f.severity for f in found]
+    return {head: heads.count(head) for head in (*SEVERITIES, "waived")}
+
+
+def counted(counts: Mapping[str, int]) -> str:
+    """Numbers of findings by severity, in words.
+
+    >>> counted({"error": 0, "warning": 2, "info": 1}), counted({})
+    ('2 warnings, 1 info', 'no findings')
+    """
+    words = (f"{n} {kind}{'s' if n > 1 and kind in ('error', 'warning') else ''}" for kind, n in counts.items() if n)
+    return ", ".join(words) or "no findings"
+
+
+def most_severe(found: Sequence[Finding], count: int) -> list[Finding]:
+    """The first findings that matter: each rule and advice once, with all its places, the severe first."""
+    merged: dict[tuple[str, str, str], Finding] = {}
+    for f in sorted((f for f in found if not f.waiver), key=lambda f: SEVERITIES.index(f.severity)):
+        key = (f.severity, f.rule, f.advice)
+        merged[key] = replace(merged[key], count=merged[key].count + f.count) if key in merged else f
+    return list(merged.values())[:count]

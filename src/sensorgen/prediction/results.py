@@ -273,6 +273,10 @@ class Prediction(Displayed):
         yield ""
         yield from (f"assumed: {assumption}" for assumption in self.assumptions)
 
+    def explained(self) -> Iterator[Part]:
+        """Which models were used, their cost and error."""
+        yield from (*self.plan.document(), "") if self.plan else ()
+
     def judgement(self) -> Iterator[Part]:
         """Identifiability and error budget; or why there are none."""
         if self.identifiability:
@@ -322,12 +326,13 @@ def adapter() -> "TypeAdapter[Prediction]":
 
 def to_json(prediction: Prediction) -> str:
     """A prediction as JSON, the same for the same prediction: without run times; infinities are "Infinity"."""
-    return adapter().dump_json(_timeless(prediction)).decode()
+    return adapter().dump_json(timeless(prediction)).decode()
 
 
-def _timeless(prediction: Prediction) -> Prediction:
+def timeless(prediction: Prediction) -> Prediction:
+    """A prediction without run times, which differ from run to run."""
     plan, drawn = prediction.plan, prediction.drawn
-    return replace(prediction, plan=plan and without_times(plan), drawn=drawn and _timeless(drawn))
+    return replace(prediction, plan=plan and without_times(plan), drawn=drawn and timeless(drawn))
 
 
 def from_json(text: str) -> Prediction:

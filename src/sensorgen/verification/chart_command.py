@@ -1,5 +1,6 @@
 """``sensorgen chart``: every model on every standard scene, time against error."""
 
+import json
 from pathlib import Path
 
 import click
@@ -52,4 +53,4 @@ def command(scene: tuple[str, ...], budget: float, output: str, as_json: bool) -
         if not as_json:
             click.echo(str(Path(output) / name))
     if as_json:
-        show.as_json(rows)
+        click.echo(json.dumps(rows, indent=2, ensure_ascii=False))

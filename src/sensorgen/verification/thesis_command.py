@@ -1,5 +1,6 @@
 """``sensorgen thesis``: every numbered item of the thesis, its value, ours, and a verdict."""
 
+import json
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -33,7 +34,8 @@ def command(output: str, formats: tuple[str, ...]) -> int:
     with show.progress(CHAPTERS) as step:
         rows = thesis.rows(step)
     made: dict[str, Callable[[Sequence[thesis.Row]], str]] = {
-        "html": thesis.html, "md": thesis.markdown, "json": lambda rows: show.json_text(thesis.plain(rows)),
+        "html": thesis.html, "md": thesis.markdown,
+        "json": lambda rows: json.dumps(thesis.plain(rows), indent=2, ensure_ascii=False) + "\n",
     }  # fmt: skip
     for name in dict.fromkeys(formats):
         file = Path(output) / f"thesis.{name}"

@@ -2,17 +2,22 @@
 
 import json
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
+from sensorgen.asprinted import compensation
+from sensorgen.asprinted.compensation import Change
 from sensorgen.checks.review import Review, Step, draw, report, review
+from sensorgen.core import document
 from sensorgen.core import files as store
+from sensorgen.core.document import Part
 from sensorgen.core.errors import Unprintable
+from sensorgen.core.findings import Finding, counted, counts, listed, most_severe
 from sensorgen.core.version import __version__
 from sensorgen.design import materials, printer
 from sensorgen.design.design import Design
@@ -22,7 +27,7 @@ from sensorgen.export.slicers.loads import loads
 from sensorgen.export.threemf.part import parts_of
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.results import Prediction, to_json
+from sensorgen.prediction.results import Prediction, timeless, to_json
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
 LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")
@@ -35,23 +40,58 @@ class Built:
 
     Attributes
     ----------
+    name : str
+        Of the design.
     folder : Path
         Where the files are.
-    review : Review
-        The findings.
+    files : tuple of str
+        Their names there.
+    verdict : str
+        CHANGE where a check reports an error, PRINT WITH WARNINGS, or PRINT.
+    findings : tuple of Finding
+        Of the checks.
     prediction : Prediction
         Of the print, with the drawing's beside it.
+    compensated : tuple of Change
+        How the design differs from the one that was asked for.
     """
 
-    folder: Path
-    review: Review
-    prediction: Prediction
+    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
-    @property
-    def verdict(self) -> str:
-        """CHANGE where a check reports an error, PRINT WITH WARNINGS, or PRINT."""
-        counts = self.review.counts()
-        return "CHANGE" if counts["error"] else "PRINT WITH WARNINGS" if counts["warning"] else "PRINT"
+    name: str
+    folder: Path
+    files: tuple[str, ...]
+    verdict: str
+    findings: tuple[Finding, ...]
+    prediction: Prediction
+    compensated: tuple[Change, ...] = ()
+
+    def document(self) -> Iterator[Part]:
+        """Verdict, quantities drawn beside printed, and the three findings that matter most."""
+        yield from self._head()
+        yield from self.prediction.summary()
+        yield ""
+        yield from listed(most_severe(self.findings, 3))
+        yield ""
+        yield f"{self.folder}: {len(self.files)} files; --details prints all"
+
+    def _head(self) -> Iterator[Part]:
+        yield from compensation.document(self.compensated)
+        yield f"{self.verdict}  {self.name}: {counted(counts(self.findings))}"
+        yield ""
+
+
+@dataclass(frozen=True)
+class DetailedBuild(Built):
+    """A build that shows people everything."""
+
+    def document(self) -> Iterator[Part]:
+        """Verdict, all findings, and the whole prediction."""
+        yield from self._head()
+        yield from listed(self.findings)
+        yield ""
+        yield from self.prediction.document()
+        yield f"{self.folder}: {len(self.files)} files"
 
 
 def build(
@@ -61,6 +101,7 @@ def build(
     cad: bool = True,
     force: bool = False,
     strict: bool = False,
+    compensated: Sequence[Change] = (),
     step: Step = lambda _: None,
 ) -> Built:
     """Write all files of a design into ``out/<name>``.
@@ -77,6 +118,8 @@ def build(
         Write the files even if checks report errors.
     strict : bool
         Take warnings for errors.
+    compensated : sequence of Change
+        How the design differs from the one that was asked for, for the record.
     step : callable
         Called with the next step, for a progress display.
 
@@ -110,7 +153,12 @@ def build(
         store.write(stage, {store.MANIFEST: json_bytes(_manifest(design, stage))})
         store.publish(stage, folder)
         step("done")
-    return Built(folder, held, predicted)
+    number = held.counts()
+    return Built(
+        design.name, folder, tuple(sorted([*store.listed(folder), store.MANIFEST])),
+        "CHANGE" if number["error"] else "PRINT WITH WARNINGS" if number["warning"] else "PRINT",
+        tuple(held.findings), timeless(predicted), tuple(compensated),
+    )  # fmt: skip
 
 
 def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> Iterator[tuple[str, bytes]]:
@@ -126,21 +174,9 @@ def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> I
         yield path, text.encode()
     step("drawing")
     yield f"{name}.svg", draw(design, held).encode()
-    yield "check.json", json_bytes(report(design, held))
+    yield "check.json", document.to_json(report(design, held)).encode()
     yield "prediction.json", json_bytes(json.loads(to_json(predicted)))
     yield "design.json", json_bytes(design.model_dump(mode="json"))
-
-
-def as_dict(design: Design, built: Built, files: list[str]) -> dict[str, Any]:
-    """The result as plain data, for JSON."""
-    return {
-        "name": design.name,
-        "folder": str(built.folder),
-        "files": files,
-        "verdict": built.verdict,
-        "findings": [finding.as_dict() for finding in built.review.findings],
-        "prediction": json.loads(to_json(built.prediction)),
-    }
 
 
 def _await(job: "Future[None]", step: Step) -> None:

@@ -1,85 +1,92 @@
 """A design to its G-code file: checked as a design, sliced, and checked again as G-code."""
 
-import json
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
+from sensorgen.asprinted import compensation
+from sensorgen.asprinted.compensation import Change
 from sensorgen.asprinted.printed import rule7
-from sensorgen.checks.review import Review, review
+from sensorgen.checks import volumes
+from sensorgen.checks.review import review
 from sensorgen.checks.volumes import Row
+from sensorgen.core import document
 from sensorgen.core import files as store
+from sensorgen.core.document import Part
 from sensorgen.core.errors import Unprintable
-from sensorgen.core.findings import Finding
+from sensorgen.core.findings import Finding, counted, counts, listed
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.check import Checked, check
 from sensorgen.export.slicers import TIME_LIMIT_S, WALLS
-from sensorgen.export.slicing import Sliced, Step, alone, sliced
+from sensorgen.export.slicing import Step, alone, sliced
 
 
 @dataclass(frozen=True)
-class Printed:
-    """What slicing a design has left behind.
+class Slicer:
+    """Name and version of a slicer."""
+
+    name: str
+    version: str
+
+
+@dataclass(frozen=True)
+class Volumes:
+    """Printed over exact volume per body and layer, and what rule 7 says of it."""
+
+    layers: tuple[Row, ...]
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Printed(Checked):
+    """G-code of a design, as in the JSON beside it; without run times, so that equal slicing gives equal bytes.
 
     Attributes
     ----------
-    gcode : Path
-        The file for the printer.
-    slicer, version : str
+    name, design : str
+        Name and identity of the design.
+    gcode, sha256 : str
+        The file for the printer, and its SHA-256.
+    slicer : Slicer
         Who sliced it.
-    seconds, own_seconds : float
-        Time that the slicer took, and that everything around it took [s].
-    review : Review
+    sensorgen, printer, quality : str
+        Version of sensorgen; the printer and the quality.
+    design_findings : tuple of Finding
         What the checks of the design found.
-    checked : Checked
-        What the check of the file found, and what it takes.
-    sha256 : str
-        Of the file.
-    rows, printed : tuple of Row, tuple of Finding
-        Printed over exact volume per body and layer, and what rule 7 says of it.
-    forced : bool
-        Whether errors of the design were to be accepted.
+    printed : Volumes
+        Volumes as printed.
+    compensated : tuple of Change
+        How the design differs from the one that was asked for.
     """
 
-    design: Design
-    gcode: Path
-    slicer: str
-    version: str
-    seconds: float
-    own_seconds: float
-    review: Review
-    checked: Checked
+    name: str
+    design: str
+    gcode: str
     sha256: str
-    rows: tuple[Row, ...]
-    printed: tuple[Finding, ...]
-    forced: bool
+    slicer: Slicer
+    sensorgen: str
+    printer: str
+    quality: str
+    design_findings: tuple[Finding, ...]
+    printed: Volumes
+    compensated: tuple[Change, ...] = ()
 
     @property
-    def code(self) -> int:
-        """Exit code: 1 where the printer's file has errors, or a body is missing from a layer against the will [-]."""
-        lost = any(f.severity == "error" and not f.waiver for f in self.printed) and not self.forced
-        return 1 if lost or self.checked.errors() else 0
+    def lost(self) -> bool:
+        """Whether a body is missing from a layer against the will of the design."""
+        return any(f.severity == "error" and not f.waiver for f in self.printed.findings)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data, for JSON; times are not in it, so that equal slicing gives equal bytes."""
-        return {
-            "name": self.design.name,
-            "design": self.design.id(),
-            "gcode": str(self.gcode),
-            "sha256": self.sha256,
-            "slicer": {"name": self.slicer, "version": self.version},
-            "sensorgen": __version__,
-            "printer": self.design.machine.name,
-            "quality": self.design.layers.name,
-            "design_findings": [f.as_dict() for f in self.review.findings],
-            "printed": {
-                "layers": [row.as_dict() for row in self.rows],
-                "findings": [f.as_dict() for f in self.printed],
-            },
-            **self.checked.as_dict(),
-        }
+    def document(self) -> Iterator[Part]:
+        """Findings about design, file and print, and what the file takes."""
+        yield from compensation.document(self.compensated)
+        yield f"{self.name}: {counted(counts(self.design_findings))} (sensorgen check shows them)"
+        yield from super().document()
+        yield volumes.table(self.printed.layers)
+        yield from listed(self.printed.findings)
+        yield f"{self.gcode}: {self.slicer.name} {self.slicer.version}; {counted(self.counts())}"
 
 
 def slice_design(
@@ -91,6 +98,7 @@ def slice_design(
     time_limit_s: float = TIME_LIMIT_S,
     force: bool = False,
     strict: bool = False,
+    compensated: Sequence[Change] = (),
     step: Step = lambda _: None,
 ) -> Printed:
     """Write ``out/<name>/<name>.<slicer>.gcode``, and beside it ``.json`` with what was found and made.
@@ -111,6 +119,8 @@ def slice_design(
         Slice even if checks report errors.
     strict : bool
         Take warnings for errors.
+    compensated : sequence of Change
+        How the design differs from the one that was asked for, for the record.
     step : callable
         Called with the next step, for a progress display.
 
@@ -127,37 +137,19 @@ def slice_design(
     held = review(design, walls=WALLS.get(slicer, "arachne"))
     if held.errors(strict) and not force:
         raise Unprintable(held.findings)
-    folder = out / design.name
-    target = folder / f"{design.name}.{slicer}.gcode"
+    target = out / design.name / f"{design.name}.{slicer}.gcode"
     with tempfile.TemporaryDirectory() as stage:
         made = sliced([alone(design)], slicer, Path(stage), program=program, time_limit_s=time_limit_s, step=step)
         content = made.ready.read_bytes()
         loaded = {design.tool(name): name for name in design.used()}
-        held = held.sliced()
         checked = check(made.ready, design.machine, loaded, others_empty=True)
-        rows = rule7(design, made.lines)
-    result = _printed(design, target, made, held, (checked, *rows), content, forced=force)
-    store.replace(target, content)
-    text = json.dumps(result.as_dict() | {"gcode": target.name}, indent=2, ensure_ascii=False) + "\n"
-    store.replace(folder / f"{target.name}.json", text.encode())
-    return result
-
-
-def _printed(
-    design: Design,
-    target: Path,
-    made: Sliced,
-    held: Review,
-    found: tuple[Checked, list[Row], list[Finding]],
-    content: bytes,
-    *,
-    forced: bool,
-) -> Printed:
-    from hashlib import sha256
-
-    checked, rows, printed = found
-
-    return Printed(
-        design, target, made.slicer, made.version, made.seconds, made.own_seconds, held, checked,
-        sha256(content).hexdigest(), tuple(rows), tuple(printed), forced,
+        layers, findings = rule7(design, made.lines)
+    result = Printed(
+        **vars(checked), name=design.name, design=design.id(), gcode=target.name, sha256=sha256(content).hexdigest(),
+        slicer=Slicer(made.slicer, made.version), sensorgen=__version__, printer=design.machine.name,
+        quality=design.layers.name, design_findings=tuple(held.sliced().findings),
+        printed=Volumes(tuple(layers), tuple(findings)), compensated=tuple(compensated),
     )  # fmt: skip
+    store.replace(target, content)
+    store.replace(target.with_name(f"{target.name}.json"), document.to_json(result).encode())
+    return replace(result, gcode=str(target))

@@ -1,6 +1,11 @@
 """What a fit gives: values with their uncertainty, what the data do not determine, and errors before and after."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from math import exp
+from typing import Annotated
+
+from sensorgen.core.document import Column, Facts, Part, Table
 
 LEVEL = 0.95  # of the intervals
 
@@ -19,12 +24,12 @@ class Fitted:
         What it rests on.
     """
 
-    material: str
-    quantity: str
-    value: float
-    low: float
-    high: float
-    note: str
+    material: Annotated[str, Column("material")]
+    quantity: Annotated[str, Column("quantity")]
+    value: Annotated[float, Column("value")]
+    low: Annotated[float, Column("low")]
+    high: Annotated[float, Column("high")]
+    note: Annotated[str, Column("note", hidden=True)]
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,8 @@ class Fit:
         What could not be used, and why.
     log : str
         SHA-256 of what was fitted to: names, readings and raw files.
+    file : str or None
+        Where the source is kept; None if it is not.
     """
 
     iteration: int
@@ -88,8 +95,24 @@ class Fit:
     held_back: tuple[str, ...]
     left_out: tuple[tuple[str, str], ...]
     log: str
+    file: str | None = None
 
     @property
     def source(self) -> str:
         """Name of the source that it makes."""
         return f"fit-{self.iteration}"
+
+    def document(self) -> Iterator[Part]:
+        """Values, what stays open, errors, and where the source is."""
+        yield f"iteration {self.iteration}: {self.specimens} specimens fitted to, {len(self.held_back)} held back"
+        if self.values:
+            yield Table.of("values", "", self.values)
+            yield Facts(tuple((f"{v.quantity}:", v.note) for v in self.values))
+        yield from (f"not determined: {untold.parameter}: {untold.why}" for untold in self.untold)
+        for error in self.errors:
+            before, after = (f"a factor of {exp(e):.3g}" for e in (error.before, error.after))
+            yield f"{error.observable} of {error.count} held back: off by {before} before, {after} after (rms)"
+        if self.left_out:
+            yield f"left out: {len(self.left_out)}; sensorgen report --iteration {self.iteration} says why"
+        if self.file:
+            yield f"in {self.file}"

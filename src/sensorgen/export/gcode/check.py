@@ -1,10 +1,10 @@
 """Check of a G-code file on a simulated printer: faults, time, filament."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
-from sensorgen.core.findings import SEVERITIES
+from sensorgen.core.document import Facts, Part
+from sensorgen.core.findings import SEVERITIES, counted
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import commands, limits
 from sensorgen.export.gcode.files import Source
@@ -13,12 +13,17 @@ from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.report import Report, report
 
 
-@dataclass(frozen=True)
-class Checked:
-    """What was found, the severe first, and what the file takes."""
+@dataclass(frozen=True, kw_only=True)
+class Checked(Report):
+    """What a file takes, and what was found.
 
-    findings: list[Found]
-    report: Report
+    Attributes
+    ----------
+    findings : tuple of Found
+        The severe first.
+    """
+
+    findings: tuple[Found, ...]
 
     def errors(self, strict: bool = False) -> list[Found]:
         """Findings that refuse the file; with ``strict`` also the warnings."""
@@ -29,9 +34,28 @@ class Checked:
         """How many findings there are of each severity [-]."""
         return {severity: sum(f.severity == severity for f in self.findings) for severity in SEVERITIES}
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data, for JSON."""
-        return {"findings": [asdict(f) for f in self.findings], **asdict(self.report)}
+    def document(self) -> Iterator[Part]:
+        """Findings, each with what to change, and what the file takes."""
+        rows = []
+        for f in self.findings:
+            more = f" and {f.count - 1} more" if f.count > 1 else ""
+            rows += [(f.severity, f"{f.rule}, line {f.line}{more}"), ("", f"{f.message} -> {f.advice}")]
+        if rows:
+            yield Facts(tuple(rows))
+        yield from super().document()
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckedFile(Checked):
+    """A checked file by its name, and the printer's."""
+
+    file: str
+    printer: str
+
+    def document(self) -> Iterator[Part]:
+        """Findings, what the file takes, and how many findings there are."""
+        yield from super().document()
+        yield f"{self.file}: {counted(self.counts())}"
 
 
 def check(
@@ -71,4 +95,4 @@ def check(
     found = [*limits.check(motion, machine), *commands.check(motion, machine)]
     if others_empty:
         found += limits.check_loaded(motion, loads)
-    return Checked(merged(found), report(motion, machine, loads))
+    return Checked(**vars(report(motion, machine, loads)), findings=merged(found))

@@ -46,11 +46,11 @@ class Findings(list[Found]):
         self.append(Found(rule, "warning", line, message, advice))
 
 
-def merged(found: Iterable[Found]) -> list[Found]:
+def merged(found: Iterable[Found]) -> tuple[Found, ...]:
     """Findings of the same words as one, which has the first line; the severe first, and then by line."""
     kept: dict[tuple[str, str, str], Found] = {}
     for f in found:
         key = (f.rule, f.severity, f.message)
         old = kept.get(key)
         kept[key] = f if old is None else replace(old, count=old.count + f.count)
-    return sorted(kept.values(), key=lambda f: (SEVERITIES.index(f.severity), f.line, f.rule))
+    return tuple(sorted(kept.values(), key=lambda f: (SEVERITIES.index(f.severity), f.line, f.rule)))

@@ -101,9 +101,7 @@ def _below(motion: Motion, _: Printer) -> Iterator[Found]:
     lowest = np.minimum(motion.start_mm[:, 2], motion.end_mm[:, 2])
     printed = np.where(prints, lowest, -np.inf)
     named = ((e.row, e.command) for e in motion.events if e.command.code == "G92")
-    anew = {
-        row for row, command in named if command.has("Z") or not command.has("XYE")
-    }  # heights count anew
+    anew = {row for row, command in named if command.has("Z") or not command.has("XYE")}  # heights count anew
     edges = [0, *sorted(anew), len(lowest)]
     wrong = np.zeros(len(lowest), dtype=bool)
     for start, end in pairwise(edges):

@@ -4,9 +4,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
+from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import MissingValue, UnknownName
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer
@@ -19,12 +21,12 @@ from sensorgen.export.gcode.timing import seconds
 class OfTool:
     """What one tool prints: filament and its part that is no body [mm], volume [mm3], mass [g] where known."""
 
-    tool: int
-    material: str
-    filament_mm: float
-    purge_mm: float
-    volume_mm3: float
-    mass_g: float | None
+    tool: Annotated[int, Column("tool")]
+    material: Annotated[str, Column("material")]
+    filament_mm: Annotated[float, Column("filament", "mm")]
+    purge_mm: Annotated[float, Column("purged", "mm")]
+    volume_mm3: Annotated[float, Column("volume", "mm3")]
+    mass_g: Annotated[float | None, Column("mass", "g")]
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,32 @@ class Report:
     tools: tuple[OfTool, ...]
     tool_changes: int
     box_mm: tuple[tuple[float, ...], tuple[float, ...]] | None
+
+    def document(self) -> Iterator[Part]:
+        """What the file takes."""
+        facts = [
+            ("time", f"{clock(self.time_s)} at its feeds, without acceleration, heating and changing tools"),
+            ("tool changes", str(self.tool_changes)),
+            ("layers", str(self.layers or "not counted by the file")),
+        ]
+        if self.box_mm:
+            spans = (f"{axis} {low:g} to {high:g}" for axis, low, high in zip("xyz", *self.box_mm, strict=True))
+            facts.append(("printed", f"{', '.join(spans)} mm"))
+        yield Facts(tuple(facts))
+        if self.tools:
+            yield Table.of("tools", "", self.tools)
+
+
+def clock(seconds: float) -> str:
+    """A duration as hours and minutes, or minutes and seconds.
+
+    >>> clock(59.6), clock(4000.0)
+    ('1 min 00 s', '1 h 07 min')
+    """
+    whole = round(seconds)
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02} s"
+    return f"{whole // 3600} h {round(seconds / 60) % 60:02} min"
 
 
 def report(motion: Motion, machine: Printer, loaded: dict[int, str] | None = None) -> Report:

@@ -93,7 +93,7 @@ def run(
 
 
 def _wait(command: Sequence[str], said: BinaryIO, environment: Mapping[str, str], runner: Runner) -> int:
-    """Exit code of a process; afterwards it has ended, together with whatever it started itself."""
+    """Exit code of a process, which always ends here, together with whatever it started itself."""
     end = time.monotonic() + runner.time_limit_s
     process = subprocess.Popen(  # noqa: S603 - a slicer found by name, with our own arguments
         list(command), stdin=subprocess.DEVNULL, stdout=said, stderr=said, env=environment, start_new_session=True

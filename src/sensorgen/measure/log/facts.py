@@ -1,11 +1,13 @@
 """Summary of a recording as it was logged: samples, marks, frequencies and clocks; JSON in the field ``facts``."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput
+from sensorgen.core.units import si
 
 if TYPE_CHECKING:
     from sensorgen.measure.recording import Recording, RigLog
@@ -40,6 +42,14 @@ class LockIn:
     epoch_s: float | None = None
     notes: tuple[str, ...] = ()
 
+    def words(self) -> Iterator[tuple[str, str]]:
+        """Samples and marks, then frequencies and time, for people."""
+        marks = ", ".join(f"{n} {mark}" for mark, n in self.counts.items() if n and mark not in ("samples", "valid"))
+        counts = f"{self.counts['samples']} samples, {self.counts['valid']} of them sound; {marks or 'no marks'}"
+        yield f"lock-in {self.lockin}", counts
+        frequencies = ", ".join(si(tone, "Hz") for tone in self.tones_hz)
+        yield "", f"{frequencies}; {self.seconds:.5g} s by {self.program or self.format}"
+
 
 @dataclass(frozen=True)
 class Rig:
@@ -70,6 +80,12 @@ class Rig:
     explained: float | None = None
     notes: tuple[str, ...] = ()
 
+    def words(self) -> Iterator[tuple[str, str]]:
+        """Rows and errors, then clocks and remarks, for people."""
+        marked = f"; {self.samples} samples beside them, or while it was silent" if self.samples else ""
+        yield "rig", f"{self.rows} rows, {self.errors} with errors{marked}"
+        yield from (("", line) for line in (self.clocks, *self.notes) if line)
+
 
 @dataclass(frozen=True)
 class Facts:
@@ -89,6 +105,13 @@ class Facts:
     columns: dict[str, str] = field(default_factory=dict)
     rig_columns: dict[str, str] = field(default_factory=dict)
     rig: Rig | None = None
+
+    def words(self) -> Iterator[tuple[str, str]]:
+        """Lock-ins and rig, for people."""
+        for one in self.lockins:
+            yield from one.words()
+        if self.rig:
+            yield from self.rig.words()
 
 
 _CLOCK = ("offset_s", "offset_error_s", "skew", "skew_error", "explained")
@@ -132,19 +155,24 @@ def summarised(
     from sensorgen.measure.recording import joined_all
 
     joined = joined_all(recordings, rig) if rig else ()
-    lockins, beside = [], None
-    for one in [each.recording for each in joined] or recordings:  # joining marks the rig's errors
-        source = one.source
-        lockins.append(LockIn(
-            tuple(one.tones_hz.tolist()), one.counts(), float(one.time_s[-1]), source.format, source.program,
-            source.lockin, _known(source.rate_hz), _known(source.bandwidth_hz), _known(one.epoch_s), source.notes,
-        ))  # fmt: skip
+    marked = [one.recording for one in joined] or recordings  # joining marks the rig's errors
+    beside = None
     if rig:
         first = joined[0]
         numbers: dict[str, Any] = {name: _known(getattr(first, name)) for name in _CLOCK}
         samples = first.recording.counts()["rig error"]
         beside = Rig(**rig.counts(), samples=samples, clocks=first.clock_text(), notes=first.notes, **numbers)
-    return Facts(tuple(lockins), dict(columns), dict(rig_columns), beside)
+    return Facts(tuple(map(lockin, marked)), dict(columns), dict(rig_columns), beside)
+
+
+def lockin(recording: "Recording") -> LockIn:
+    """Summary of the recording of one lock-in."""
+    source = recording.source
+    return LockIn(
+        tuple(recording.tones_hz.tolist()), recording.counts(), float(recording.time_s[-1]), source.format,
+        source.program, source.lockin, _known(source.rate_hz), _known(source.bandwidth_hz), _known(recording.epoch_s),
+        source.notes,
+    )  # fmt: skip
 
 
 def _known(value: float) -> float | None:

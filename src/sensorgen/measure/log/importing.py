@@ -1,9 +1,10 @@
 """Import files into the log: tables of readings, print beds, and exported logs; each file as a whole or not at all."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from sensorgen.core.document import Part
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import batches, exchange, files, tables
 from sensorgen.measure.log.entries import Entry, RawFile, Reading
@@ -31,12 +32,14 @@ class Imported:
     doubtful: int
     left_out: tuple[str, ...] = ()
 
-    def lines(self) -> list[str]:
-        """The result as text."""
+    def document(self) -> Iterator[Part]:
+        """Rows, and the columns that were ignored."""
         known = f"{self.rows - self.new} were there" if self.new < self.rows else ""
         doubtful = f"{self.doubtful} with doubts" if self.doubtful else ""
         rows = ", ".join(filter(None, (f"{self.new} of {self.rows} rows logged", known, doubtful)))
-        return [rows, *([f"columns left out: {', '.join(self.left_out)}"] if self.left_out else [])]
+        yield rows
+        if self.left_out:
+            yield f"columns left out: {', '.join(self.left_out)}"
 
 
 def thesis(log: Log) -> Imported:

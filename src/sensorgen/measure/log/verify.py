@@ -2,12 +2,44 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import dataclass
 from hashlib import sha256
 
+from sensorgen.core.document import Part
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import files
 from sensorgen.measure.log.entries import Prediction, RawFile
 from sensorgen.measure.log.logbook import TABLES, Log
+
+
+@dataclass(frozen=True)
+class Verified:
+    """Result of a verification.
+
+    Attributes
+    ----------
+    log : str
+        The log's file.
+    rows : int
+        Number of its rows, if it is sound; else 0.
+    faults : tuple of str
+        What is wrong.
+    """
+
+    log: str
+    rows: int
+    faults: tuple[str, ...]
+
+    def document(self) -> Iterator[Part]:
+        """The faults, or that there are none."""
+        yield from self.faults or (f"the log is sound: {self.rows} rows", self.log)
+
+
+def verified(log: Log) -> Verified:
+    """Verify an open log."""
+    found = tuple(faults(log))
+    rows = 0 if found else sum(log.count(kind, superseded=True) for kind in TABLES)
+    return Verified(str(log.path), rows, found)
 
 
 def faults(log: Log) -> Iterator[str]:

@@ -4,12 +4,14 @@ Forces and positions are independent and uniform, so that neither drift nor cree
 come at random times of the run, not one after the other, so that they show repeatability and not relaxation.
 """
 
-import csv
-import io
-from dataclasses import asdict, dataclass, fields
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Annotated
 
 import numpy as np
 
+from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import OutOfRange
 
 MOST_PRESSES = 100_000
@@ -34,13 +36,13 @@ class Step:
         Length of the press, and of the rest after it [s].
     """
 
-    press: int
-    point: int
-    start_s: float
-    force_n: float
-    position_mm: float
-    dwell_s: float
-    rest_s: float
+    press: Annotated[int, Column("press")]
+    point: Annotated[int, Column("point")]
+    start_s: Annotated[float, Column("start", "s")]
+    force_n: Annotated[float, Column("force", "N")]
+    position_mm: Annotated[float, Column("position", "mm", digits=5)]
+    dwell_s: Annotated[float, Column("dwell", "s")]
+    rest_s: Annotated[float, Column("rest", "s")]
 
 
 @dataclass(frozen=True)
@@ -99,10 +101,41 @@ class Plan:
         """Length of the run [s]."""
         return self.rest_s + self.presses * (1 + self.repeats) * (self.dwell_s + self.rest_s)
 
-    def csv(self) -> str:
-        """The plan as CSV, a row per press."""
-        text = io.StringIO()
-        table = csv.DictWriter(text, [field.name for field in fields(Step)], lineterminator="\n")
-        table.writeheader()
-        table.writerows(asdict(step) for step in self.steps())
-        return text.getvalue()
+
+@dataclass(frozen=True)
+class Schedule:
+    """A plan with its presses.
+
+    Attributes
+    ----------
+    plan : Plan
+        Its parameters.
+    design : str
+        Name of the design.
+    seconds : float
+        Length of the run [s].
+    steps : tuple of Step
+        In the order of the run.
+    """
+
+    plan: Plan
+    design: str
+    seconds: float
+    steps: tuple[Step, ...]
+
+    def to_json(self) -> str:
+        """Parameters and presses."""
+        rest = {"seconds": self.seconds, "steps": [asdict(step) for step in self.steps], "design": self.design}
+        return json.dumps(asdict(self.plan) | rest, indent=2, ensure_ascii=False) + "\n"
+
+    def document(self) -> Iterator[Part]:
+        """The presses, then their number and the length of the run."""
+        yield Table.of("presses", "", self.steps)
+        minutes, rest = divmod(round(self.seconds), 60)
+        hours, minutes = divmod(minutes, 60)
+        yield f"{len(self.steps)} presses, {f'{hours} h {minutes} min' if hours else f'{minutes} min {rest} s'}"
+
+
+def schedule(plan: Plan, design: str) -> Schedule:
+    """The presses of a plan for a design."""
+    return Schedule(plan, design, plan.seconds(), tuple(plan.steps()))

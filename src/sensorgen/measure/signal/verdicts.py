@@ -1,7 +1,7 @@
 """Diagnose a specimen by its resistances: open electrode, short, leak, dry joint or intact.
 
-Between the electrodes an intact film insulates; readings of a leaking one are in
-:mod:`sensorgen.measure.signal.leakage`. A short without resistance of its own, at a distance x from the contacts,
+Between the electrodes an intact film insulates; readings of a film that leaks, and what a leak does to them, are
+in :mod:`sensorgen.measure.signal.leakage`. A short without resistance of its own, at a distance x from the contacts,
 reads :math:`2 R_Y x / L`: a reading below :math:`2 R_Y` may be a short, a reading above it is none.
 """
 

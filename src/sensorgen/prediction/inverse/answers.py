@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from sensorgen.core.document import Part
 from sensorgen.core.units import M_PER_MM
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
 from sensorgen.prediction.inverse.verdict import Status
@@ -93,6 +94,19 @@ class InversionSummary:
     median_residual_over_noise: float | None
     doubts: tuple[str, ...]
     advice: tuple[str, ...]
+
+    def document(self) -> Iterator[Part]:
+        """Counts, standard errors, doubts and advice."""
+
+        def said(value: float | None, unit: str) -> str:
+            return "unknown" if value is None else f"{value:.3g} {unit}"
+
+        counts = ", ".join(f"{count} {words}" for words, count in self.statuses.items())
+        yield f"{self.samples} sample{'s' * (self.samples != 1)}: {counts}"
+        force, position = said(self.median_force_error_n, "N"), said(self.median_position_error_mm, "mm")
+        yield f"median standard errors: force {force}, position {position}"
+        yield from (f"note: {doubt}" for doubt in self.doubts)
+        yield from self.advice
 
 
 class Summary:

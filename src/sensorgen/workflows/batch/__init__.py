@@ -1,25 +1,27 @@
 """Print batches: a plan of designs and copies becomes one plate, with a record of what lies where."""
 
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
-from sensorgen.checks.review import Review, Step, review
+from sensorgen.checks.review import Review, Step, lost, review
 from sensorgen.core import files as store
+from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput, OutOfRange, Unprintable
-from sensorgen.core.findings import Finding
+from sensorgen.core.findings import Finding, counted, counts
 from sensorgen.design.design import Design
 from sensorgen.export import threemf
 from sensorgen.export.slicers import TIME_LIMIT_S
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.results import Prediction
+from sensorgen.prediction.results import Prediction, timeless
 from sensorgen.workflows.batch import picture, printing, record, sheet, tab
 from sensorgen.workflows.batch.layout import Plate, Room, Size, column, packed, room
 from sensorgen.workflows.batch.pieces import Piece, pieces, shuffled, tools
 from sensorgen.workflows.batch.plan import Plan, load
+from sensorgen.workflows.batch.record import PrintedDesign, Record, ResolvedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes, versions
 
 STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "as printed", "record", "done")
@@ -65,24 +67,37 @@ class Batch:
     ----------
     folder : Path
         Where the files are.
-    record : dict
+    record : Record
         As in ``batch.json``.
-    findings : dict
+    findings : dict of str to list of Finding
         Findings about each design, by its name.
     """
 
     folder: Path
-    record: dict[str, Any]
+    record: Record
     findings: dict[str, list[Finding]]
 
-    def gcode_errors(self) -> int:
-        """How many findings of severity error the check of the G-code has [-]."""
-        return sum(f["severity"] == "error" for used in self.record["slicers"].values() for f in used["findings"])
+    def errors(self, *, force: bool = False) -> bool:
+        """Whether a file for the printer has errors, or, unless ``force``, a layer of a body is not printed at all.
 
-    def lost(self) -> int:
-        """How many layers of bodies are not printed at all, against the will of their design [-]."""
-        designs = (made for used in self.record["slicers"].values() for made in used["printed"].values())
-        return sum(f["severity"] == "error" and not f["waiver"] for made in designs for f in made["findings"])
+        Without G-code, by the checks' estimate.
+        """
+        plates = self.record.slicers.values()
+        estimated = [] if plates else [bool(lost(found)) for found in self.findings.values()]
+        missing = any([*estimated, *(made.lost for plate in plates for made in plate.printed.values())])
+        return any(plate.errors() for plate in plates) or (missing and not force)
+
+    def to_json(self) -> str:
+        """The folder, then the record."""
+        return f'{{\n  "folder": {json.dumps(str(self.folder))},{self.record.to_json()[1:]}'
+
+    def document(self) -> Iterator[Part]:
+        """The record, the numbers of findings, and the folder."""
+        yield from self.record.document()
+        yield ""
+        yield "findings, as sensorgen check shows them"
+        yield Facts(tuple((f"  {name}", counted(counts(found))) for name, found in self.findings.items()))
+        yield f"{self.folder}: {len(self.record.files) + 1} files"
 
 
 def arranged(path: Path) -> Arranged:
@@ -167,7 +182,7 @@ def make(
     held = {key: review(design) for key, design in found.designs.items()}
     _refuse_unprintable(found, held, force=force, strict=strict)
     step("predictions")
-    predicted = {key: evaluate(bodies.estimated(design)) for key, design in found.designs.items()}
+    predicted = {key: timeless(evaluate(bodies.estimated(design))) for key, design in found.designs.items()}
     folder = out / found.plan.name
     with store.staging(folder) as stage:
         step("3MF")
@@ -178,12 +193,12 @@ def make(
         families = [family for family in threemf.FAMILIES if family not in sliced_from]
         for name, content in (*printing.threemfs(found.plan.name, on_plate, families), *_files(found)):
             store.write(stage, {name: content})
-        sliced: dict[str, Any] = {
+        sliced: dict[str, SlicedPlate] = {
             s: printing.gcode(found.plan.name, on_plate, s, stage, time_limit_s, step) for s in slicers
         }
         step("record")
-        made = record.sealed(_record(found, predicted, sliced, stage))
-        store.write(stage, {record.RECORD: json_bytes(made)})
+        made = _record(found, predicted, sliced, stage).sealed()
+        store.write(stage, {record.RECORD: made.to_json().encode()})
         store.publish(stage, folder, record.RECORD)
     step("done")
     return Batch(folder, made, {found.designs[key].name: held[key].findings for key in held})
@@ -207,25 +222,17 @@ def _files(found: Arranged) -> Iterator[tuple[str, bytes]]:
 
 
 def _record(
-    found: Arranged, predicted: Mapping[str, Prediction], sliced: Mapping[str, Any], stage: Path
-) -> dict[str, Any]:
+    found: Arranged, predicted: dict[str, Prediction], sliced: dict[str, SlicedPlate], stage: Path
+) -> Record:  # fmt: skip
     plan, first = found.plan, found.pieces[0].design
     loaded = record.tools(plan, found.tools)
-    return {
-        "batch": plan.name,
-        "iteration": plan.iteration,
-        "seed": plan.seed,
-        "printer": first.machine.name,
-        "quality": first.layers.name,
-        "layout": plan.layout.model_dump(),
-        "tower": [vars(kept) for kept in found.room.kept],
-        "tools": loaded,
-        "checklist": record.checklist(plan, loaded),
-        "bake": [step.model_dump() for step in plan.bake],
-        "specimens": record.specimens(found.pieces, found.plate),
-        "predictions": record.predictions(predicted, sliced),
-        "designs": record.designs(found.designs),
-        "slicers": dict(sliced),
-        "versions": versions(),
-        "files": store.hashes(stage),
-    }
+    for plate in reversed(sliced.values()):
+        predicted |= {key: made.prediction for key, made in plate.printed.items() if isinstance(made, PrintedDesign)}
+    return Record(
+        batch=plan.name, iteration=plan.iteration, seed=plan.seed, printer=first.machine.name,
+        quality=first.layers.name, layout=plan.layout, tower=found.room.kept, tools=loaded,
+        checklist=record.checklist(plan, loaded), bake=plan.bake,
+        specimens=record.specimens(found.pieces, found.plate), predictions=predicted,
+        designs={key: ResolvedDesign(design.name, design.resolved()) for key, design in found.designs.items()},
+        slicers=sliced, versions=versions(), files=store.hashes(stage),
+    )  # fmt: skip

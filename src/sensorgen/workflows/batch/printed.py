@@ -1,20 +1,18 @@
 """The prints of the designs of a plate: one copy of each is read from the slicer's G-code."""
 
-import json
 from collections.abc import Sequence
-from functools import partial
-from typing import Any
 
 from sensorgen.asprinted import printed as asprinted
 from sensorgen.core.errors import SensorgenError
 from sensorgen.export.slicing import Placed, Sliced
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.results import to_json
+from sensorgen.prediction.results import timeless
+from sensorgen.workflows.batch.record import PrintedDesign, UnreadDesign
 
 
-def of_designs(found: Sequence[Placed], made: Sliced, content: bytes) -> dict[str, Any]:
-    """Prediction, printed volumes and findings of each design's print, by its identity; or why there are none.
+def of_designs(found: Sequence[Placed], made: Sliced, content: bytes) -> dict[str, PrintedDesign | UnreadDesign]:
+    """The print of each design, by its identity.
 
     Parameters
     ----------
@@ -31,17 +29,12 @@ def of_designs(found: Sequence[Placed], made: Sliced, content: bytes) -> dict[st
     return {key: _of(piece, made, content) for key, piece in firsts.items()}
 
 
-def _of(piece: Placed, made: Sliced, content: bytes) -> dict[str, Any]:
+def _of(piece: Placed, made: Sliced, content: bytes) -> PrintedDesign | UnreadDesign:
     design, source = piece.design, f"{made.slicer} {made.version}"
     try:
         printed = asprinted.body(design, made.lines, slicer=source, centre_mm=piece.sensor_mm())
-        body = bodies.sliced(design, partial(lambda: printed), source, content + piece.name.encode())
-        return {
-            "specimen": piece.name,
-            "design": design.name,
-            "prediction": json.loads(to_json(evaluate(body))),
-            "layers": [row.as_dict() for row in printed.rows()],
-            "findings": [finding.as_dict() for finding in printed.findings()],
-        }
+        body = bodies.sliced(design, lambda: printed, source, content + piece.name.encode())
+        predicted = timeless(evaluate(body))
+        return PrintedDesign(piece.name, design.name, predicted, tuple(printed.rows()), tuple(printed.findings()))
     except SensorgenError as error:
-        return {"specimen": piece.name, "design": design.name, "findings": [], "reason": str(error)}
+        return UnreadDesign(piece.name, design.name, str(error))

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from shutil import rmtree
-from typing import Any
 
 from sensorgen.checks.review import Step
 from sensorgen.core import files as store
@@ -16,6 +15,7 @@ from sensorgen.workflows.batch import printed, tab
 from sensorgen.workflows.batch.layout import Plate
 from sensorgen.workflows.batch.pieces import Piece, tools
 from sensorgen.workflows.batch.plan import Plan
+from sensorgen.workflows.batch.record import SlicedPlate
 from sensorgen.workflows.build import json_bytes
 
 
@@ -38,7 +38,7 @@ def threemfs(name: str, found: Sequence[Placed], families: Sequence[str]) -> Ite
 
 def gcode(
     name: str, found: Sequence[Placed], slicer: str, folder: Path, time_limit_s: float, step: Step
-) -> dict[str, Any]:
+) -> SlicedPlate:
     """Slice a plate into ``folder``, and say by what; the 3MF on record is the one that PrusaSlicer took.
 
     Parameters
@@ -55,13 +55,8 @@ def gcode(
         How long the slicer may take [s].
     step : callable
         Called repeatedly while the slicer works.
-
-    Returns
-    -------
-    dict
-        Version of the slicer, the names of its files, the print of each design, what the check of the printer's
-        file found, and what it takes.
     """
+    machine = found[0].design.machine
     inside, own, ready = folder / f".{slicer}", folder / slicer, folder / f"{name}.{slicer}.gcode"
     made = slicing.sliced(found, slicer, inside, title=name, time_limit_s=time_limit_s, step=lambda _: step("slicing"))
     own.mkdir()
@@ -73,22 +68,13 @@ def gcode(
         (inside / settings).replace(own / settings)
     else:
         settings = "settings.json"
-        store.write(own, {settings: json_bytes(_engine_settings(found))})
+        engine = curaengine.engine_settings(machine, found[0].design.layers, slicing.plate_loads(found))
+        store.write(own, {settings: json_bytes(asdict(engine))})
     rmtree(inside)  # what is left are the bodies again, as the slicer took them
     loaded = tools(piece.design for piece in found)
-    checked = check(ready, found[0].design.machine, loaded, others_empty=True)
+    checked = check(ready, machine, loaded, others_empty=True)
     step("as printed")
-    printed_designs = printed.of_designs(found, made, ready.read_bytes())
-    return {
-        "version": made.version,
-        "gcode": ready.name,
-        "raw": f"{slicer}/raw.gcode",
-        "profile": f"{slicer}/{settings}",
-        "printed": printed_designs,
-        **checked.as_dict(),
-    }
-
-
-def _engine_settings(found: Sequence[Placed]) -> dict[str, Any]:
-    design = found[0].design
-    return asdict(curaengine.engine_settings(design.machine, design.layers, slicing.plate_loads(found)))
+    return SlicedPlate(
+        **vars(checked), version=made.version, gcode=ready.name, raw=f"{slicer}/raw.gcode",
+        profile=f"{slicer}/{settings}", printed=printed.of_designs(found, made, ready.read_bytes()),
+    )  # fmt: skip

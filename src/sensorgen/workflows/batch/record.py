@@ -1,105 +1,311 @@
 """The record of a batch, ``batch.json``: what is where on the plate, made of what, and what it should measure."""
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from sensorgen.checks.volumes import Row
 from sensorgen.core import files as store
+from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput, MissingValue
+from sensorgen.core.findings import Finding
 from sensorgen.core.records import shown
+from sensorgen.core.units import si
 from sensorgen.design import materials
-from sensorgen.design.design import Design
-from sensorgen.prediction.results import Prediction, to_json
-from sensorgen.workflows.batch.layout import Plate
+from sensorgen.export.gcode.check import Checked
+from sensorgen.prediction.results import Prediction
+from sensorgen.workflows.batch.layout import Plate, Rect
 from sensorgen.workflows.batch.pieces import Piece
-from sensorgen.workflows.batch.plan import Plan
-from sensorgen.workflows.build import json_bytes
+from sensorgen.workflows.batch.plan import Bake, Filament, Layout, Plan
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 RECORD = "batch.json"
 
 
-def specimens(pieces: Sequence[Piece], plate: Plate) -> dict[str, Any]:
-    """Every specimen by its name, in the order of the plate: design, place, copy.
+@dataclass(frozen=True)
+class Specimen:
+    """A specimen on the plate.
 
-    Parameters
+    Attributes
     ----------
-    pieces, plate : sequence of Piece, mapping of int to Rect
-        The specimens, and where they lie.
+    order : int
+        Its number on the plate, from 1.
+    design, design_id : str
+        Name and identity of its design.
+    iteration, copy : int or None
+        Of its name.
+    centre_mm, size_mm : (float, float)
+        Middle on the bed, and length and width [mm].
     """
-    found = {}
-    for order, (number, place) in enumerate(plate.items(), 1):
-        piece = pieces[number]
-        found[piece.name] = {
-            "order": order,
-            "design": piece.design.name,
-            "design_id": piece.design_id,
-            "iteration": piece.specimen.iteration,
-            "copy": piece.specimen.replicate,
-            "centre_mm": [round(c, 6) for c in place.centre_mm],
-            "size_mm": [round(place.x1 - place.x0, 6), round(place.y1 - place.y0, 6)],
-        }
-    return found
+
+    order: int
+    design: str
+    design_id: str
+    iteration: int | None
+    copy: int | None
+    centre_mm: tuple[float, float]
+    size_mm: tuple[float, float]
 
 
-def predictions(estimated: Mapping[str, Prediction], sliced: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """What each design should measure, by its identity: of the first slicer's print, else of the estimated one.
+@dataclass(frozen=True)
+class Spool:
+    """What is on a tool; None for what neither the plan nor the material's file gives."""
 
-    Parameters
+    material: str
+    title: str
+    lot: str | None
+    drying: str | None
+    cam_dial: float | None
+    note: str
+
+    @property
+    def name(self) -> str:
+        """Material with its lot."""
+        return f"{self.material} ({f'lot {self.lot}' if self.lot else 'lot not named: write it down'})"
+
+
+@dataclass(frozen=True)
+class ResolvedDesign:
+    """A design with all that decides it, as plain data."""
+
+    name: str
+    resolved: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class PrintedDesign:
+    """The print of a design: one specimen as it is read from the G-code of the plate.
+
+    Attributes
     ----------
-    estimated : mapping of str to Prediction
-        By a design's identity.
-    sliced : mapping
-        Results of every slicer, as in ``batch.json``: each with its prints' predictions.
+    specimen, design : str
+        Name of the specimen that was read, and of its design.
+    prediction : Prediction
+        What it should measure.
+    layers : tuple of Row
+        Printed over drawn volume.
+    findings : tuple of Finding
+        Rule 7.
     """
-    found = {key: json.loads(to_json(predicted)) for key, predicted in estimated.items()}
-    for made in reversed(list(sliced.values())):
-        found |= {key: design["prediction"] for key, design in made["printed"].items() if design.get("prediction")}
-    return found
+
+    specimen: str
+    design: str
+    prediction: Prediction
+    layers: tuple[Row, ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def lost(self) -> int:
+        """How many layers of bodies are not printed at all, against the will of the design [-]."""
+        return sum(f.severity == "error" and not f.waiver for f in self.findings)
+
+    @property
+    def words(self) -> str:
+        """Gap, resistance and capacitance."""
+        found = self.prediction
+        gaps = [f"{p.gap.value * 1e3:g} mm" for p in (found, found.drawn) if p and p.gap]
+        gap = f"electrode gap {gaps[0]} (drawn {gaps[1]}), " if len(gaps) > 1 else ""
+        lost = f"; {self.lost} layers of bodies are not printed at all" if self.lost else ""
+        resistance, capacitance = _expected(found)
+        if resistance is None or capacitance is None:
+            return f"{gap}no prediction{lost}"
+        return f"{gap}R {si(resistance, 'ohm')}, C {si(capacitance, 'F')}{lost}"
 
 
-def tools(plan: Plan, loaded: Mapping[int, str]) -> dict[str, Any]:
-    """What is on each tool, by the printer's own number: material, lot, drying, cam dial."""
-    return {str(tool): _spool(plan, name) for tool, name in loaded.items()}
+@dataclass(frozen=True)
+class UnreadDesign:
+    """A design whose print cannot be read from the G-code, with the reason."""
+
+    specimen: str
+    design: str
+    reason: str
+    findings: tuple[Finding, ...] = ()
+
+    lost = 0
+
+    @property
+    def words(self) -> str:
+        """The reason."""
+        return self.reason
 
 
-def _spool(plan: Plan, name: str) -> dict[str, Any]:
-    material, filament = materials.load(name), plan.filaments.get(name)
+@dataclass(frozen=True, kw_only=True)
+class SlicedPlate(Checked):
+    """G-code of the plate by one slicer.
+
+    Attributes
+    ----------
+    version : str
+        Of the slicer.
+    gcode, raw, profile : str
+        Files for the printer, of the slicer itself, and with its settings.
+    printed : dict of str to PrintedDesign or UnreadDesign
+        The print of each design, by its identity.
+    """
+
+    version: str
+    gcode: str
+    raw: str
+    profile: str
+    printed: dict[str, PrintedDesign | UnreadDesign]
+
+    def in_short(self, slicer: str) -> Iterator[str]:
+        """Time, filament, findings and prints."""
+        spools = (
+            f"T{t.tool} {t.filament_mm / 1000:.2f} m" + ("" if t.mass_g is None else f", {t.mass_g:.1f} g")
+            for t in self.tools
+        )
+        taken = f"at least {self.time_s / 3600:.1f} h; {'; '.join(spools)}; {self.tool_changes} tool changes"
+        yield f"{slicer} {self.version}: {taken}"
+        yield from (f"  {f.severity}: line {f.line}: {f.message}; {f.advice}" for f in self.findings)
+        yield from (f"  {made.design} as printed: {made.words}" for made in self.printed.values())
+
+
+@dataclass(frozen=True)
+class Record:
+    """The record of a batch.
+
+    Attributes
+    ----------
+    batch, iteration, seed
+        As in the plan.
+    printer, quality : str
+        Names.
+    layout : Layout
+        As in the plan.
+    tower : tuple of Rect
+        What specimens stay clear of.
+    tools : dict of str to Spool
+        By the printer's own number.
+    checklist : tuple of str
+        What is done by hand before, at and after the print.
+    bake : tuple of Bake
+        As in the plan.
+    specimens : dict of str to Specimen
+        By name, in the order of the plate.
+    predictions : dict of str to Prediction
+        What each design should measure, by its identity: of the first slicer's print, else of the estimated one.
+    designs : dict of str to ResolvedDesign
+        By identity.
+    slicers : dict of str to SlicedPlate
+        By the slicer's name.
+    versions : dict of str to str
+        Of this software and its libraries.
+    files : dict of str to str
+        SHA-256 of every file.
+    sha256 : str
+        Of all the rest of the record, so that a change by hand shows.
+    """
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
+
+    batch: str
+    iteration: int
+    seed: int
+    printer: str
+    quality: str
+    layout: Layout
+    tower: tuple[Rect, ...]
+    tools: dict[str, Spool]
+    checklist: tuple[str, ...]
+    bake: tuple[Bake, ...]
+    specimens: dict[str, Specimen]
+    predictions: dict[str, Prediction]
+    designs: dict[str, ResolvedDesign]
+    slicers: dict[str, SlicedPlate]
+    versions: dict[str, str]
+    files: dict[str, str]
+    sha256: str = ""
+
+    def to_json(self) -> str:
+        """As in ``batch.json``."""
+        return _adapter().dump_json(self, indent=2).decode() + "\n"
+
+    def sealed(self) -> "Record":
+        """The record with its own SHA-256."""
+        return replace(self, sha256=_seal(json.loads(self.to_json())))
+
+    def document(self) -> Iterator[Part]:
+        """Specimens, checklist, and what the slicers made."""
+        yield f"{self.batch}: {len(self.specimens)} specimens on {self.printer}, {self.quality}"
+        yield Table.of("specimens", "", [
+            _Place(s.order, name, s.design, *s.centre_mm, *_expected(self.predictions[s.design_id]))
+            for name, s in self.specimens.items()
+        ])  # fmt: skip
+        yield ""
+        yield "checklist"
+        yield from (f"  [ ] {line}" for line in self.checklist)
+        for slicer, plate in self.slicers.items():
+            yield from ("", *plate.in_short(slicer))
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A line of the table of specimens."""
+
+    order: Annotated[int, Column("no.")]
+    specimen: Annotated[str, Column("specimen")]
+    design: Annotated[str, Column("design")]
+    x_mm: Annotated[float, Column("x", "mm")]
+    y_mm: Annotated[float, Column("y", "mm")]
+    resistance_ohm: Annotated[float | None, Column("R", "ohm", si=True)]
+    capacitance_f: Annotated[float | None, Column("C", "F", si=True)]
+
+
+def _expected(found: Prediction) -> tuple[float | None, float | None]:
+    """Resistance of all electrodes and capacitance [ohm], [F]; None where nothing is predicted."""
+    if found.capacitance is None:
+        return None, None
+    return sum(r.value for r in found.resistance.values()), found.capacitance.value
+
+
+@cache
+def _adapter() -> "TypeAdapter[Record]":
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(Record)
+
+
+def specimens(pieces: Sequence[Piece], plate: Plate) -> dict[str, Specimen]:
+    """Every specimen by its name, in the order of the plate."""
     return {
-        "material": name,
-        "title": material.title,
-        "lot": filament.lot if filament and filament.lot else None,
-        "drying": (filament.drying if filament else "") or material.drying or None,
-        "cam_dial": _cam_dial(material),
-        "note": filament.note if filament else "",
-    }
+        (piece := pieces[number]).name: Specimen(
+            order, piece.design.name, piece.design_id, piece.specimen.iteration, piece.specimen.replicate,
+            (round(place.centre_mm[0], 6), round(place.centre_mm[1], 6)),
+            (round(place.x1 - place.x0, 6), round(place.y1 - place.y0, 6)),
+        )
+        for order, (number, place) in enumerate(plate.items(), 1)
+    }  # fmt: skip
 
 
-def _cam_dial(material: materials.Material) -> float | None:
-    try:
-        return material.value("cam_dial").value
-    except MissingValue:
-        return None
+def tools(plan: Plan, loaded: Mapping[int, str]) -> dict[str, Spool]:
+    """What is on each tool, by the printer's own number."""
+    found = {}
+    for tool, name in loaded.items():
+        material, filament = materials.load(name), plan.filaments.get(name, Filament())
+        try:
+            cam_dial = material.value("cam_dial").value
+        except MissingValue:
+            cam_dial = None
+        drying = filament.drying or material.drying or None
+        found[str(tool)] = Spool(name, material.title, filament.lot or None, drying, cam_dial, filament.note)
+    return found
 
 
-def checklist(plan: Plan, loaded: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """What is done by hand before, at and after the print, in this order.
-
-    Parameters
-    ----------
-    plan : Plan
-        With its bake.
-    loaded : mapping
-        As of :func:`tools`.
-    """
+def checklist(plan: Plan, loaded: Mapping[str, Spool]) -> tuple[str, ...]:
+    """What is done by hand before, at and after the print, in this order."""
     numbers = ", ".join(f"T{tool}" for tool in loaded)
     bake = [f"Bake at {b.temperature_c:g} C for {b.hours:g} h" + (f": {b.note}" if b.note else "") for b in plan.bake]
-    return [
-        *(f"Dry {s['material']} ({_lot(s)}): {s['drying'] or 'no source says how'}" for s in loaded.values()),
-        *(f"Load T{tool} with {s['material']} ({_lot(s)})" for tool, s in loaded.items()),
-        *(f"Cam dial of T{tool}: {s['cam_dial']:g}" for tool, s in loaded.items() if s["cam_dial"] is not None),
+    return (
+        *(f"Dry {s.name}: {s.drying or 'no source says how'}" for s in loaded.values()),
+        *(f"Load T{tool} with {s.name}" for tool, s in loaded.items()),
+        *(f"Cam dial of T{tool}: {s.cam_dial:g}" for tool, s in loaded.items() if s.cam_dial is not None),
         f"Clean the nozzles of {numbers}",
         "Clean the plate, home, and level it",
         "Watch the first layer of every specimen; note which failed",
@@ -107,22 +313,7 @@ def checklist(plan: Plan, loaded: Mapping[str, Mapping[str, Any]]) -> list[str]:
         *(["Measure R along the electrodes and between them, not baked"] if bake else []),
         *bake,
         "Measure R along the electrodes and between them" + (", baked" if bake else ""),
-    ]
-
-
-def _lot(spool: Mapping[str, Any]) -> str:
-    return f"lot {spool['lot']}" if spool["lot"] else "lot not named: write it down"
-
-
-def designs(found: Mapping[str, Design]) -> dict[str, dict[str, Any]]:
-    """Every design under its hash, with all that decides it."""
-    return {key: {"name": design.name, "resolved": design.resolved()} for key, design in found.items()}
-
-
-def sealed(content: Mapping[str, Any]) -> dict[str, Any]:
-    """A record as JSON has it, with the SHA-256 of all the rest of it, so that a change by hand shows."""
-    plain = json.loads(json_bytes(content))
-    return {**plain, "sha256": _seal(plain)}
+    )
 
 
 def _seal(content: Mapping[str, Any]) -> str:
@@ -146,6 +337,13 @@ class Differences:
     def __bool__(self) -> bool:
         """Whether anything differs."""
         return bool(self.missing or self.changed or self.extra or self.record)
+
+    def document(self) -> Iterator[Part]:
+        """A line for each file that differs."""
+        yield from (f"{word:8} {name}" for word in ("missing", "changed", "extra") for name in getattr(self, word))
+        if self.record:
+            yield "changed  batch.json: it does not hold what was written"
+        yield "differs from its record" if self else "as recorded"
 
 
 def read(folder: Path) -> dict[str, Any]:

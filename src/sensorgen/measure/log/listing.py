@@ -1,0 +1,192 @@
+"""Rows of a log for people and for JSON: listed, and one by one with everything about them."""
+
+import difflib
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from math import isinf
+from typing import Any
+
+from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.units import si
+from sensorgen.measure.log import facts
+from sensorgen.measure.log.entries import BenchRun, Entry, Prediction, Print, Reading
+from sensorgen.measure.log.logbook import Log
+
+_REMARK = 20  # letters of a remark in a list
+_READING = (
+    Column("no."), Column("specimen"), Column("Y", "ohm", right=True), Column("Z", "ohm", right=True), Column("remark"),
+)  # fmt: skip
+_RECORDING = tuple(map(Column, ("no.", "specimen", "recording", "remark")))
+
+
+@dataclass(frozen=True)
+class Listing:
+    """The latest readings and recordings of a log; ``notes`` has the numbers of all rows, and the log's file."""
+
+    readings: tuple[Reading, ...]
+    recordings: tuple[BenchRun, ...]
+    notes: tuple[str, ...]
+
+    def to_json(self) -> str:
+        """Readings and recordings with all their fields."""
+        return _json({"readings": _plain(self.readings), "recordings": _plain(self.recordings)})
+
+    def document(self) -> Iterator[Part]:
+        """A line for each row, "?" where something is to be doubted."""
+        if self.readings:
+            rows = (
+                (r.number, r.specimen, short(r.y_ohm), short(r.z_ohm), ("? " if r.doubts else "") + _remark(r))
+                for r in self.readings
+            )
+            yield Table("readings", "", _READING, tuple(rows))
+        if self.recordings:
+            runs = ((run.number, run.specimen, run.file[:12], run.remark) for run in self.recordings)
+            yield Table("recordings", "", _RECORDING, tuple(runs))
+        yield from self.notes
+
+
+def listing(log: Log, iteration: int | None = None, last: int | None = None) -> Listing:
+    """Readings and recordings, the latest last; those that a later one corrects are left out.
+
+    Parameters
+    ----------
+    log : Log
+        An open log.
+    iteration : int, optional
+        Of this iteration only.
+    last : int, optional
+        At most so many of each [-].
+    """
+    wanted: dict[str, Any] = {} if iteration is None else {"iteration": iteration}
+    readings, recordings = log.readings(last=last, **wanted), log.recordings(last=last, **wanted)
+    names = {Reading: "readings", BenchRun: "recordings", Prediction: "predictions"}
+    total = ", ".join(f"{log.count(kind)} {name}" for kind, name in names.items())
+    more = [f"the latest {last} are shown; --all shows all"] if last is not None and len(readings) >= last else []
+    return Listing(readings, recordings, (total, *more, str(log.path)))
+
+
+@dataclass(frozen=True)
+class Detail:
+    """A row, and remarks on it: which row it corrects, or which one corrects it."""
+
+    entry: Entry
+    remarks: tuple[tuple[str, str], ...] = ()
+
+    def document(self) -> Iterator[Part]:
+        """Everything about it."""
+        row = self.entry
+        kind = {Reading: "reading", BenchRun: "recording"}.get(type(row), type(row).__name__.lower())
+        name = f"{kind} {row.number}: {getattr(row, 'specimen', '')}".rstrip()
+        yield f"{name}, written {row.written!r}" if isinstance(row, Reading) and row.written != row.specimen else name
+        known = (*(_of_reading(row) if isinstance(row, Reading) else _of_other(row)), ("logged", row.logged_at))
+        doubts = (("doubtful", doubt) for doubt in getattr(row, "doubts", ()))
+        summary = facts.from_json(row.facts).words() if isinstance(row, BenchRun) else ()
+        rows = ((name, fact) for name, fact in (*known, *doubts, *summary, *self.remarks) if fact)
+        yield Facts(tuple((f"  {name}", fact) for name, fact in rows))
+
+
+def _of_reading(r: Reading) -> tuple[tuple[str, str], ...]:
+    return (
+        ("Y", _ohms(r.y_words, r.y_ohm)),
+        ("Z", _ohms(r.z_words, r.z_ohm)),
+        ("baked", {None: "", True: "yes", False: "no"}[r.baked]),
+        ("remark", r.remark),
+        ("measured", r.measured_at),
+        ("instrument", r.instrument),
+        ("design", f"{r.design} ({r.design_id})" if r.design_id else ""),
+        ("batch", r.batch),
+        ("source", r.source + (f", row {r.source_row}" if r.source_row is not None else "")),
+    )
+
+
+def _of_other(row: Entry) -> Iterator[tuple[str, str]]:
+    """A recording, a print or a prediction."""
+    names = ("file", "rig_file", "remark", "design", "design_id", "batch", "batch_uid")
+    return ((name, getattr(row, name, "")) for name in names)
+
+
+@dataclass(frozen=True)
+class Details:
+    """Some rows with everything about them; ``empty`` is what to say where there is none."""
+
+    rows: tuple[Detail, ...]
+    empty: str = ""
+
+    def to_json(self) -> str:
+        """The rows with all their fields."""
+        return _json(_plain(row.entry for row in self.rows))
+
+    def document(self) -> Iterator[Part]:
+        """Row by row."""
+        for row in self.rows:
+            yield from row.document()
+        if not self.rows:
+            yield self.empty
+
+
+def details(log: Log, entries: Iterable[Entry]) -> Details:
+    """Rows of an open log with their corrections."""
+    return Details(tuple(Detail(entry, tuple(_corrections(entry, log))) for entry in entries))
+
+
+def logged(log: Log, entries: Iterable[Entry], known: str) -> Details:
+    """New rows with hints; ``known`` is what to say where the log had all of them."""
+    found = (Detail(entry, (*_corrections(entry, log), *_near(entry, log))) for entry in entries)
+    return Details(tuple(found), known)
+
+
+def _near(entry: Entry, log: Log) -> Iterator[tuple[str, str]]:
+    """A hint where a specimen is on no print bed of its iteration, and another with nearly its name is."""
+    if isinstance(entry, Reading) and not entry.batch:
+        names = [printed.specimen for printed in log.entries(Print, iteration=entry.iteration)]
+        for near in difflib.get_close_matches(entry.specimen, names, n=1, cutoff=0.8):
+            hint = f"no print bed here has {entry.specimen!r}; near is {near!r}: --corrects {entry.number}, if meant"
+            yield "hint", hint
+
+
+def _corrections(entry: Entry, log: Log) -> Iterator[tuple[str, str]]:
+    if isinstance(entry, Reading | BenchRun):
+        if entry.supersedes:
+            for old in log.entries(type(entry), superseded=True, uid=entry.supersedes):
+                yield "corrects", f"row {old.number}"
+        for new in log.entries(type(entry), superseded=True, supersedes=entry.uid):
+            yield "corrected", f"by row {new.number}"
+
+
+def short(values: Sequence[float]) -> str:
+    """Readings for a list, as people write them [ohm]; below 1 ohm without a prefix, for m would be taken for mega.
+
+    >>> short((0.8, 650.0, 2300.0, 1.1e6, float("inf"))), short(())
+    ('0.8 / 650 / 2.3k / 1.1M / OL', '-')
+    """
+    found = (
+        "OL" if isinf(value) else f"{value:g}" if abs(value) < 1 else si(value, "").replace(" ", "") for value in values
+    )
+    return " / ".join(found) or "-"
+
+
+def _ohms(words: str, values: Sequence[float]) -> str:
+    found = ", ".join("OL" if isinf(value) else si(value, "ohm") for value in values) or "-"
+    return f"{found}, written {words!r}" if words else ""
+
+
+def _remark(r: Reading) -> str:
+    state = {None: "", True: "baked; ", False: "" if "bake" in r.remark else "not baked; "}[r.baked]
+    remark = (state + r.remark).removesuffix("; ")
+    return remark if len(remark) <= _REMARK else remark[: _REMARK - 1] + "…"
+
+
+def _plain(entries: Iterable[Entry]) -> list[dict[str, object]]:
+    """Rows for JSON, which has no infinity: an overload is "OL"."""
+    return [{name: _cell(value) for name, value in asdict(entry).items()} for entry in entries]
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, tuple):
+        return [_cell(item) for item in value]
+    return "OL" if isinstance(value, float) and isinf(value) else value
+
+
+def _json(data: object) -> str:
+    return json.dumps(data, indent=2, ensure_ascii=False) + "\n"

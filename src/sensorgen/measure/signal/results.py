@@ -1,0 +1,259 @@
+"""A processed recording, its hysteresis, and several recordings side by side: for people and for JSON."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import floor, isnan, log10
+
+from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.units import frequency_text
+from sensorgen.measure.log import facts
+from sensorgen.measure.recording import RigLog
+from sensorgen.measure.recording.samples import Complex, Real
+from sensorgen.measure.signal.hysteresis import Hysteresis, Ways
+from sensorgen.measure.signal.presses import Pairs
+from sensorgen.measure.signal.run import Processed
+
+Values = tuple[float, ...]
+
+
+def _ends(tones_hz: Sequence[float]) -> list[int]:
+    """The first and the last frequency, which people see; JSON has all."""
+    return sorted({0, len(tones_hz) - 1})
+
+
+def _values(found: Real) -> Values:
+    return tuple(found.tolist())
+
+
+@dataclass(frozen=True)
+class PressResult:
+    """A press; R and X before it and under it, their differences and standard errors, at each frequency [ohm].
+
+    Force and position are None where they are not known.
+    """
+
+    time_s: float
+    force_n: float | None
+    position_mm: float | None
+    before_re_ohm: Values
+    before_im_ohm: Values
+    pressed_re_ohm: Values
+    pressed_im_ohm: Values
+    difference_re_ohm: Values
+    difference_im_ohm: Values
+    error_re_ohm: Values
+    error_im_ohm: Values
+
+
+@dataclass(frozen=True)
+class RecordingResult:
+    """A processed recording.
+
+    Attributes
+    ----------
+    file, lockin, program, rate_hz
+        As in :class:`sensorgen.measure.recording.Source`.
+    tones_hz : tuple of float
+        Frequencies [Hz].
+    counts, rig : dict of str to int
+        Samples by mark; rows of the rig's log and those with errors, None without one.
+    seconds : float
+        Time of the last sample [s].
+    notes : tuple of str
+        Remarks.
+    by_force : bool
+        Whether the rig's log says where presses are; else the readings do.
+    drift : float or None
+        By how much Z drifted at the frequency where it drifted most [-]; None if no drift was removed.
+    drift_law, drift_reason : str or None
+        Its law, and why this one.
+    presses : tuple of PressResult
+        What each press changes.
+    files : tuple of str
+        That were written.
+    """
+
+    file: str
+    lockin: int
+    program: str
+    rate_hz: float
+    tones_hz: Values
+    counts: dict[str, int]
+    rig: dict[str, int] | None
+    seconds: float
+    notes: tuple[str, ...]
+    by_force: bool
+    drift: float | None
+    drift_law: str | None
+    drift_reason: str | None
+    presses: tuple[PressResult, ...]
+    files: tuple[str, ...]
+
+    def document(self) -> Iterator[Part]:
+        """Samples, rig, drift, and a line for each press."""
+        lockin = facts.LockIn(self.tones_hz, self.counts, self.seconds, self.program, lockin=self.lockin)
+        rig: Iterable[tuple[str, str]] = [("rig", "no log: forces and positions are not known")]
+        if self.rig:
+            rig = facts.Rig(self.rig["rows"], self.rig["errors"]).words()
+        rows = [*lockin.words(), *rig, *(("", note) for note in self.notes)]
+        if self.drift is not None:
+            rows.append(("drift", f"{self.drift:.2%} of Z over the run, fitted to the rest, taken out of the presses"))
+            rows.append(("", f"{self.drift_law}: {self.drift_reason}"))
+        if self.presses:
+            how = "" if self.by_force else ", found by the readings alone"
+            rows.append(("presses", f"{len(self.presses)}{how}; ΔR and ΔX [ohm], standard errors in brackets"))
+        yield Facts(tuple(rows))
+        if self.presses:
+            heads = (f"Δ{part} {frequency_text(self.tones_hz[k])}" for k in _ends(self.tones_hz) for part in "RX")
+            columns = (Column("start", "s"), Column("force", "N", digits=3), Column("at", "mm", digits=3))
+            changes = (Column(head, right=True) for head in heads)
+            yield Table("presses", "", (*columns, *changes), tuple(map(self._row, self.presses)))
+        yield from self.files
+
+    def _row(self, press: PressResult) -> tuple[float | str | None, ...]:
+        changes = (
+            in_brackets(value[k], error[k])
+            for k in _ends(self.tones_hz)
+            for value, error in (
+                (press.difference_re_ohm, press.error_re_ohm), (press.difference_im_ohm, press.error_im_ohm)
+            )
+        )  # fmt: skip
+        return press.time_s, press.force_n, press.position_mm, *changes
+
+
+def in_brackets(value: float, error: float) -> str:
+    """A value, with its standard error in units of its last digit: one digit of it, two where it begins with 1.
+
+    >>> in_brackets(-12.3456, 0.0312), in_brackets(12345.6, 41.0), in_brackets(1.0, 0.0), in_brackets(-2.0, 0.0996)
+    ('-12.35(3)', '12350(40)', '1', '-2.00(10)')
+    """
+    if not error > 0:
+        return f"{value:.6g}"
+    power = floor(log10(float(f"{error:.1e}")))
+    power -= error < 1.95 * 10.0**power
+    last = round(error / 10.0**power)
+    shown = round(value, -power) + 0.0  # never -0
+    return f"{shown:.{-power}f}({last})" if power < 0 else f"{shown:.0f}({last * 10**power})"
+
+
+def of_recording(worked: Processed, rig: RigLog | None, files: Iterable[str] = ()) -> RecordingResult:
+    """The result for a processed recording, the rig's log beside it, and files that were written of it."""
+    one, drift, pairs = worked.recording, worked.drift, worked.pairs
+    return RecordingResult(
+        file=one.source.file, lockin=one.source.lockin, program=one.source.program or one.source.format,
+        rate_hz=one.source.rate_hz, tones_hz=_values(one.tones_hz), counts=one.counts(),
+        rig=rig.counts() if rig else None, seconds=float(one.time_s[-1]), notes=worked.notes, by_force=worked.by_force,
+        drift=float(abs(drift.at(one.time_s[-1:])).max()) if drift else None, drift_law=drift.law if drift else None,
+        drift_reason=drift.reason if drift else None,
+        presses=tuple(_press(pairs, i) for i in range(len(pairs.time_s))) if pairs else (), files=tuple(files),
+    )  # fmt: skip
+
+
+def _press(pairs: Pairs, i: int) -> PressResult:
+    force_n, position_mm = (None if isnan(v) else float(v) for v in (pairs.force_n[i], pairs.position_mm[i]))
+    found: list[Complex] = [pairs.before_ohm[i], pairs.pressed_ohm[i], pairs.difference_ohm[i], pairs.error_ohm[i]]
+    parts = (_values(part) for z in found for part in (z.real, z.imag))
+    return PressResult(float(pairs.time_s[i]), force_n, position_mm, *parts)
+
+
+@dataclass(frozen=True)
+class PressHysteresis:
+    """Hysteresis of R and X during one press, at each frequency; as in :class:`.hysteresis.Hysteresis`."""
+
+    time_s: float
+    force_n: tuple[float, float]
+    share_re: Values
+    share_im: Values
+    error_re: Values
+    error_im: Values
+    at_n_re: Values
+    at_n_im: Values
+    lost_re: Values
+    lost_im: Values
+
+
+@dataclass(frozen=True)
+class HysteresisResult:
+    """Hysteresis of a run: its frequencies [Hz], its presses, those left out and why, and files that were written."""
+
+    tones_hz: Values
+    presses: tuple[PressHysteresis, ...]
+    left_out: tuple[str, ...]
+    files: tuple[str, ...]
+
+    def document(self) -> Iterator[Part]:
+        """A line for each press and frequency, the first and the last one."""
+        share, error, at = Column("of R", "%", digits=3), Column("±", "%", digits=2), Column("at", "N", digits=3)
+        columns = (
+            Column("start", "s"), Column("to", "N", digits=3), Column("frequency"),
+            share, error, at, Column("of X", "%", digits=3), error, at,
+        )  # fmt: skip
+        rows = (
+            (
+                p.time_s, p.force_n[1], frequency_text(self.tones_hz[k]),
+                100 * p.share_re[k], 100 * p.error_re[k], p.at_n_re[k],
+                100 * p.share_im[k], 100 * p.error_im[k], p.at_n_im[k],
+            )
+            for p in self.presses for k in _ends(self.tones_hz)
+        )  # fmt: skip
+        yield Table("presses", "", columns, tuple(rows))
+        yield from (*self.left_out, *self.files)
+
+
+def of_ways(tones_hz: Real, found: Ways, files: Iterable[str] = ()) -> HysteresisResult:
+    """The result for the hysteresis of a run, and files that were written of it."""
+    presses = tuple(_of_way(start, way) for start, way in found.ways.items())
+    return HysteresisResult(_values(tones_hz), presses, found.left_out, tuple(files))
+
+
+def _of_way(start_s: float, way: Hysteresis) -> PressHysteresis:
+    half = len(way.share) // 2
+    parts = (_values(p) for v in (way.share, way.error, way.at_n, way.lost) for p in (v[:half], v[half:]))
+    return PressHysteresis(start_s, (float(way.force_n[0]), float(way.force_n[-1])), *parts)
+
+
+@dataclass(frozen=True)
+class SetResult:
+    """What the presses of a recording change: a row for each press, a column for each frequency."""
+
+    force_n: Values
+    position_mm: Values
+    difference_re_ohm: tuple[Values, ...]
+    difference_im_ohm: tuple[Values, ...]
+
+
+@dataclass(frozen=True)
+class SetsResult:
+    """Recordings side by side: frequencies [Hz], sets by name, and files that were written."""
+
+    tones_hz: Values
+    sets: dict[str, SetResult]
+    files: tuple[str, ...]
+
+    def document(self) -> Iterator[Part]:
+        """Least and largest difference of each set, at the first and the last frequency."""
+        least = (Column(f"{end} Δ{part}", "ohm") for part in "RX" for end in ("least", "most"))
+        rows = (
+            (name, len(found.force_n), frequency_text(self.tones_hz[k]), *_range(found.difference_re_ohm, k),
+             *_range(found.difference_im_ohm, k))
+            for name, found in self.sets.items() for k in _ends(self.tones_hz)
+        )  # fmt: skip
+        yield Table("sets", "", (Column("set"), Column("presses"), Column("frequency"), *least), tuple(rows))
+        yield from self.files
+
+
+def _range(values: tuple[Values, ...], k: int) -> tuple[float, float]:
+    column = [row[k] for row in values]
+    return min(column), max(column)
+
+
+def of_sets(tones_hz: Real, sets: Mapping[str, Pairs], files: Iterable[str] = ()) -> SetsResult:
+    """The result for recordings by name, and files that were written of them."""
+    found = {
+        name: SetResult(
+            _values(pairs.force_n), _values(pairs.position_mm), tuple(map(_values, pairs.difference_ohm.real)),
+            tuple(map(_values, pairs.difference_ohm.imag)),
+        )
+        for name, pairs in sets.items()
+    }  # fmt: skip
+    return SetsResult(_values(tones_hz), found, tuple(files))
