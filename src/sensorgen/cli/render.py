@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from sensorgen.core.document import Documented, Part
 
 _ABOUT = {"json": "Print as JSON.", "csv": "Print the table as CSV, all digits.", "markdown": "Print as Markdown."}
+_COLOURS = {"error": "red", "warning": "yellow", "info": "blue"}
 _FORM, _FILE = "sensorgen.form", "sensorgen.output"  # in the context's meta
 
 
@@ -77,7 +78,7 @@ def refused(name: str) -> Iterator[None]:
     except Unprintable as error:
         from sensorgen.core.findings import Refused
 
-        deliver(Refused(name, tuple(error.findings)))
+        deliver(Refused(name, tuple(error.findings), len(error.stopping)))
         raise
 
 
@@ -106,7 +107,15 @@ def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> 
             raise BadInput("--csv: this result has no table; expected --json")
         return [document.comma_separated(tables[0])]
     shown = document.markdown if wanted else document.text
-    return (f"{line}\n" for line in shown([*before, *result.document()]))
+    return (f"{_coloured(line)}\n" for line in shown([*before, *result.document()]))
+
+
+def _coloured(line: str) -> str:
+    """A line of a finding begins with its severity, in colour at a terminal."""
+    head, space, rest = line.partition(" ")
+    if head not in _COLOURS or form() or click.get_current_context().meta.get(_FILE) or not sys.stdout.isatty():
+        return line
+    return click.style(head, fg=_COLOURS[head], bold=head == "error") + space + rest
 
 
 def verdict(*problems: str) -> int:

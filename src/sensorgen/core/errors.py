@@ -43,14 +43,14 @@ class NotInstalled(MissingValue):
 
 
 class Unprintable(SensorgenError):
-    """A design whose checks found errors; ``findings`` holds all of them."""
+    """A design whose checks found errors: ``findings`` holds all that they found, the ``stopping`` ones first."""
 
-    def __init__(self, findings: Sequence[Any]) -> None:
-        """Take the findings (see :class:`sensorgen.core.findings.Finding`)."""
-        self.findings = list(findings)
-        open_ones = [f for f in self.findings if not f.waiver]
-        first = f"{open_ones[0].rule}, {open_ones[0].message}" if open_ones else "the checks found errors"
-        super().__init__(f"{first}; nothing was written (--force writes the files anyway)")
+    def __init__(self, findings: Sequence[Any], stopping: Sequence[Any]) -> None:
+        """Take the findings (see :class:`sensorgen.core.findings.Finding`), and those for which nothing is written."""
+        self.stopping = list(stopping)
+        self.findings = [*self.stopping, *(f for f in findings if f not in self.stopping)]
+        first = self.stopping[0]
+        super().__init__(f"{first.rule}, {first.message}; nothing was written (--force writes the files anyway)")
 
 
 class Unwritable(SensorgenError):
