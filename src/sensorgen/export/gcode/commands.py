@@ -108,7 +108,7 @@ class _Simulation:
             self.homed |= {axis for axis in AXES if event.command.has(axis) or not event.command.has(AXES)}
         self.levelled |= code in self.control.levels
         if code in self.control.ends:
-            self.ended = " ".join([code, *(f"{a}{b}" for a, b in event.command.words)])
+            self.ended = str(event.command)
         self.stopped = code if code in STOPS else self.stopped
         self.effects.obey(event)
         judge(event.command, event.number, self.found)
