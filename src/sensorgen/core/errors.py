@@ -1,7 +1,8 @@
 """What went wrong, in words that tell the user what to do."""
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, Self
 
 
@@ -13,6 +14,21 @@ class SensorgenError(Exception):
         if where:
             self.args = (f"{where}: {self}",)
         return self
+
+
+@contextmanager
+def within(where: str) -> Iterator[None]:
+    """Lead the message of an error that is raised inside by the file or key that it is about.
+
+    >>> with within("design.yaml"):
+    ...     raise SensorgenError("no such shape")
+    Traceback (most recent call last):
+    sensorgen.core.errors.SensorgenError: design.yaml: no such shape
+    """
+    try:
+        yield
+    except SensorgenError as error:
+        raise error.within(where) from None
 
 
 class OutOfRange(SensorgenError):
