@@ -21,6 +21,7 @@ from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.scene.scene import Body, Prism, Scene, box, rectangle
 from sensorgen.scene.sections import columns, sections
 from sensorgen.solvers.contact import cell as cells
+from sensorgen.solvers.contact import pressed
 
 HERE = Path(__file__).parent
 PICTURES = HERE.parent / "docs" / "pictures"
@@ -155,16 +156,16 @@ def fineness_table():
 
 def choices_table():
     """What is not the mesh: penalty, step and apex, each varied."""
-    penalty, step = press2d.penalty_pa, press2d._STEP
+    penalty, step = pressed.penalty_pa, press2d._STEP
     yield "\n## What is not the mesh (used: penalty 60 E, steps 10 kPa, apex 1 um)\n"
     yield "| cell | varied | displacement changes by at most | rise of C by at most | said |"
     yield "|---|---|---|---|---|"
     for name, made in CELLS.items():
         used = once(made(), solids(), STRESSES, Fineness(), EPS)
         for factor in (0.5, 2):
-            press2d.penalty_pa = lambda softest_pa, factor=factor: factor * penalty(softest_pa)
+            pressed.penalty_pa = lambda softest_pa, factor=factor: factor * penalty(softest_pa)
             yield changed_row(name, f"penalty {60 * factor:g} E", made(), used, Fineness())
-            press2d.penalty_pa, press2d._STEP = penalty, step * factor / 4
+            pressed.penalty_pa, press2d._STEP = penalty, step * factor / 4
             press2d._STEP = step
             if name.startswith("tri"):
                 yield changed_row(name, f"apex {factor:g} um", made(), used, Fineness(factor * 1e-3))
@@ -178,7 +179,7 @@ def changed_row(name, varied, cell, used, fineness):
 
 def method_tables():
     """Penalty and load step."""
-    penalty, step = press2d.penalty_pa, press2d._STEP
+    penalty, step = pressed.penalty_pa, press2d._STEP
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained", sharey=True)
     studies = (
         (axes[0], "penalty [MPa]", (10, 30, 60, 100, 300, 360, 1000), STRESSES, 360),
@@ -191,11 +192,11 @@ def method_tables():
         yield "|---|---|---|---|"
         for value in values:
             if ax is axes[0]:
-                press2d.penalty_pa = lambda _, value=value: value * 1e6
+                pressed.penalty_pa = lambda _, value=value: value * 1e6
             else:
                 press2d._STEP = value * 1e3 / 6e6
             found = once(tri()[1], solids(), stresses, Fineness(3e-3), EPS)
-            press2d.penalty_pa, press2d._STEP = penalty, step
+            pressed.penalty_pa, press2d._STEP = penalty, step
             rows.append((value, found.displacement_m[-1] * 1e6, rise(found)[-1]))
             yield f"| {value:g} | {rows[-1][1]:.3f} | {rows[-1][2]:.2f} | {'; '.join(found.faults)} |"
         x, u, c = np.array(rows).T

@@ -30,6 +30,7 @@ from sensorgen.prediction.identifiability.fisher import bounds, slopes  # noqa: 
 from sensorgen.prediction.inverse import Estimator  # noqa: E402
 
 SAMPLES = 1_000_000
+THESIS_RATE_HZ = 66.6666
 NOISE, RATE = 1e-3, 140.0
 READ = """
 import re, sys, time
@@ -109,11 +110,11 @@ def filter_table():
     yield "| cut-off [Hz] | second-order sections | polynomials (b, a) |"
     yield "|---|---|---|"
     for cutoff in (0.2727, 0.027, 0.00027):
-        count = round(16 * lowpass.THESIS_RATE_HZ / cutoff)
+        count = round(16 * THESIS_RATE_HZ / cutoff)
         step = np.ones(count)
-        sos = signal.sosfilt(lowpass.sections(lowpass.THESIS_RATE_HZ, cutoff), step)
+        sos = signal.sosfilt(lowpass.sections(THESIS_RATE_HZ, cutoff), step)
         with np.errstate(over="ignore", invalid="ignore"):
-            direct = signal.lfilter(*signal.butter(4, cutoff, fs=lowpass.THESIS_RATE_HZ), step)
+            direct = signal.lfilter(*signal.butter(4, cutoff, fs=THESIS_RATE_HZ), step)
         yield f"| {cutoff:g} | {abs(sos[-1] - 1):.1e} | {abs(direct[-1] - 1):.1e} |"
 
 

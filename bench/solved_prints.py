@@ -1,6 +1,7 @@
 """Compression of the thesis's triangular cells as slicers should print them: writes models/solved_prints.yaml."""
 
 from itertools import product
+from json import dumps
 from pathlib import Path
 
 from sensorgen.design.design import make
@@ -11,7 +12,7 @@ from sensorgen.prediction.sensor_model import piece
 FILE = Path(__file__).parents[1] / "src" / "sensorgen" / "models" / "solved_prints.yaml"
 HEAD = """\
 # Rise of the capacitance of printed triangular cells with stress, as bench/solved_prints.py solved it: by press2d, its
-# usual mesh, held against the next coarser one ("within"); layers of 0.1 and 0.06 mm, by the rules of walls. Keys are the
+# usual mesh, held against the next coarser one ("within"); layers of 0.1 and 0.06 mm, walls as named. Keys are the
 # content of the cross-section. "held" are the changes under other boundary and contact conditions of the drawn cell.
 source: plane-strain finite elements with frictionless contact, neo-Hookean, nu 0.4999, of the printed cell
 youngs_modulus_pa: {etpu: 22.0e6, x60: 6.0e6}
@@ -41,7 +42,7 @@ def main() -> None:
             f"    displacement_um: {curve.displacement_m * 1e6:.5g}\n"
             f"    stress_kpa: {[round(p / 1e3, 6) for p in curve.stress_pa]}\n"
             f"    rise_percent: {[round(100 * (r - 1), 6) for r in curve.ratio]}\n"
-            f"    within: {curve.within:.4g}\n"
+            f"    within: {curve.within:.4g}\n" + (f"    doubts: {dumps(law.doubts)}\n" if law.doubts else "")
         )
         print(walls, quality, along, film, content(cell), law.doubts)
         FILE.write_text(HEAD + "".join(found.values()), "utf-8")

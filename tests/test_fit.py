@@ -9,7 +9,6 @@ import yaml
 from drawn_sensor import sensor_of
 from scipy import stats
 
-from sensorgen.analysis.comparison.leaky import across_ohm, along_ohm
 from sensorgen.analysis.fit import Fit, Fitted, Untold, fit, text
 from sensorgen.analysis.fit.fitting import held_back
 from sensorgen.analysis.fit.resistance import Allowed, leak, resistivity
@@ -21,6 +20,7 @@ from sensorgen.design.design import make
 from sensorgen.design.materials import own
 from sensorgen.design.specimen_name import design_of, parse
 from sensorgen.measure.log import Log, bench, notes
+from sensorgen.measure.signal.leakage import across_ohm, along_ohm
 from sensorgen.prediction.bodies import default_body, drawn
 from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.prediction.evaluate import evaluate

@@ -2,6 +2,10 @@
 
 ``predict`` is the answer that all others are held to; that it is right is held against reference solutions that no
 sensorgen made. Each entry point has one adapter below: where an output's form changes, its adapter does, and no test.
+
+At commit 0645a80 these differed, for tri with a film of 0.2 mm: capacitance by build, log, report and fit (48.7 to
+81.1 pF) from predict, cell and batch (64.2 pF) and from the print (61.5 pF); gap by check (0.3 mm) from predict (0.2 mm);
+errors and exit code by build (none, 0) from slice (two, 1); resistance by all (without cogs) from the solved electrodes.
 """
 
 import contextlib
@@ -341,7 +345,7 @@ def _rows(table):
     return [dict(zip(names, row, strict=True)) for row in table["rows"]]
 
 
-# ---- who is asked for what, and what differs today -------------------------------------------------------------------
+# ---- who is asked for what -------------------------------------------------------------------------------------------
 
 KEPT = (build, batch, log_predict, log_show, python)
 ASKED = {
@@ -355,30 +359,6 @@ ASKED = {
     "resolution drawn": (predict_drawn, *KEPT),
     "errors": (build, check, batch, draw),
 }
-ALL = tuple(DESIGNS)
-SOLVED = ("trix", "triy", "rect", "own", "compensated", "upside-down")  # a cell that no closed form has
-PRISMS = ("trix", "triy", "own", "compensated", "upside-down")  # of which the slicer drops layers
-
-OWN_CELL = "bounds the cell of the computed outlines anew; of the own design it takes whole periods only"
-UNAWARE = "does not count what is not printed"
-RED = {  # who differs today, why, and for which designs: what is mended has to go from here, as xfail is strict
-    ("capacitance printed", "compress"): (OWN_CELL, SOLVED),
-    ("capacitance drawn", "compress"): (OWN_CELL, SOLVED),
-    ("errors", "batch"): (f"{UNAWARE} unless it slices", PRISMS),
-}
-
-
-def cases():
-    """Every quantity by every entry point, of the designs that are red today apart from the others."""
-    for quantity, entries in ASKED.items():
-        for entry in entries:
-            name = f"{quantity}-{entry.__name__.strip('_')}"  # slice_
-            why, red = RED.get((quantity, entry.__name__), ("", ()))
-            if green := [design for design in DESIGNS if design not in red]:
-                yield pytest.param(quantity, entry, green, id=name)
-            if red:
-                marked = pytest.mark.xfail(strict=True, raises=AssertionError, reason=f"{why}: {', '.join(red)}")
-                yield pytest.param(quantity, entry, red, id=f"{name}-differs", marks=marked)
 
 
 @pytest.fixture(scope="module")
@@ -402,12 +382,19 @@ def _solved_once(_cache, monkeypatch, tmp_path_factory):
     monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path_factory.getbasetemp() / "one-answer"))
 
 
-@pytest.mark.parametrize(("quantity", "entry", "designs"), list(cases()))
-def test_whoever_is_asked_says_the_same(quantity, entry, designs, asked, monkeypatch, program):
+@pytest.mark.parametrize(
+    ("quantity", "entry"),
+    [
+        pytest.param(quantity, entry, id=f"{quantity}-{entry.__name__}")
+        for quantity, entries in ASKED.items()
+        for entry in entries
+    ],
+)
+def test_whoever_is_asked_says_the_same(quantity, entry, asked, monkeypatch, program):
     if quantity == "errors":
         program("prusa-slicer", "prusa-slicer")
     differing, known = {}, slice_ if quantity == "errors" else predict
-    for name in designs:
+    for name in DESIGNS:
         if name == "double" and entry in (fit, invert):
             continue  # a line needs a capacitance, which three electrodes do not have
         design = asked(name)

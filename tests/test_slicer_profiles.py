@@ -8,13 +8,13 @@ import uuid
 from pathlib import Path
 from xml.etree import ElementTree
 
+import extruded
 import pytest
 
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SlicerFailed, UnknownName
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names
 from sensorgen.design.tower import MARGIN_MM, tower
-from sensorgen.export.gcode import extruded
 from sensorgen.export.slicers import cura, curaengine, prusa
 from sensorgen.export.slicers.loads import Load, recipes
 from sensorgen.export.slicers.run import run

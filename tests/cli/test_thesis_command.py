@@ -49,4 +49,4 @@ def test_wrong_words(run, few, tmp_path):
     (tmp_path / "file").write_text("x")
     said = run("thesis", "-o", "file/below")
     assert said.code == 2
-    assert "cannot write to 'file/below'" in said.line
+    assert "cannot write 'file/below/thesis.html'" in said.line

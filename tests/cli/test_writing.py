@@ -195,7 +195,7 @@ SIGNALS = {"SIGINT": 130, "SIGTERM": 143, "SIGKILL": -9}
 
 def writing(process, out):
     """Wait until this build has begun to write (or is done); its folder is there before the prediction."""
-    while process.poll() is None and not (out / f".x.{process.pid}.part/x.prusa.3mf").exists():
+    while process.poll() is None and not list(out.glob(f".x.*.{process.pid}.part/x.prusa.3mf")):
         time.sleep(0.001)
 
 

@@ -151,7 +151,7 @@ def test_any_text_comes_back_from_csv(words):
 def test_any_numbers_come_back(ohm, baked, number):
     for annotation, value in ((tuple[float, ...], ohm), (bool | None, baked), (int | None, number)):
         assert fields.from_cell(annotation, fields.to_cell(value)) == value
-        assert fields.FROM_SQL[annotation](fields.to_sql(value)) == value
+        assert fields.from_sql(annotation, fields.to_sql(value)) == value
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from sensorgen.core.errors import BadInput, UnknownName, Unwritable
+from sensorgen.core.files import part_of
 from sensorgen.measure.log import (
     TABLES,
     Batch,
@@ -20,7 +21,6 @@ from sensorgen.measure.log import (
     RawFile,
     Reading,
     database,
-    durable,
     schema,
     verify,
 )
@@ -297,8 +297,8 @@ def test_a_log_is_made_where_there_are_no_links(path, monkeypatch):
 def test_parts_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path):
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
-    mine = durable.part_of(tmp_path / "log.db")
-    assert mine != durable.part_of(tmp_path / "log.db")
+    mine = part_of(tmp_path / "log.db")
+    assert mine != part_of(tmp_path / "log.db")
     stay = [mine.name, f".log.db.ab.{os.getppid()}.part", "log.db.1.part", ".log.db.part", f".x.{dead.pid}.part.txt"]
     go = [f".log.db.ab.{dead.pid}.part", f".log.db.ab.{os.getpid()}.part"]
     for name in (*stay, *go):

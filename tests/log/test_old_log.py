@@ -137,6 +137,15 @@ def test_old_readings_alone_are_imported(command, path):
     assert "9 of 9 rows logged" in command("log", "import", OLD / "export" / "readings.csv")
 
 
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_old_readings_in_every_format_are_the_same(suffix, command, path, tmp_path):
+    """Of another log of that commit, with an overload, a correction and doubts."""
+    before = table(OLD / "other" / "readings.csv")
+    command("log", "import", OLD / "other" / f"readings.{suffix}")
+    command("log", "export", tmp_path / "now.csv")
+    assert as_then(table(tmp_path / "now.csv"), before) == before
+
+
 def test_the_old_record_of_a_batch_is_imported(command, path):
     """Three specimens of two designs, their predictions, the bed and its file."""
     (record,) = (OLD / "log.db.files").rglob("*.json")

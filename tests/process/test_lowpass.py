@@ -9,9 +9,16 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.measure.recording import Clock, Recording, Source
 from sensorgen.measure.recording.samples import blank
 from sensorgen.measure.signal import lowpass
-from sensorgen.measure.signal.lowpass import CUTOFF_HZ, THESIS_RATE_HZ, Live
+from sensorgen.measure.signal.lowpass import CUTOFF_HZ, Live
 
 RATE = 140.0
+THESIS_RATE_HZ = 66.6666
+
+
+def response_db(frequency_hz, cutoff_hz, rate_hz, order=4):
+    """Gain of one pass: abs(H)^2 = 1 / (1 + (tan(pi f / fs) / tan(pi fc / fs))^(2 n))."""
+    ratio = np.tan(np.pi * frequency_hz / rate_hz) / np.tan(np.pi * cutoff_hz / rate_hz)
+    return -10 * np.log10(1 + ratio ** (2 * order))
 
 
 def gain_db(run, frequency, rate=RATE):
@@ -24,7 +31,7 @@ def gain_db(run, frequency, rate=RATE):
 @pytest.mark.parametrize("rate", [RATE, THESIS_RATE_HZ])
 @pytest.mark.parametrize("over", [0.2, 0.5, 1.0, 2.0, 4.0])
 def test_gain_is_that_of_the_closed_form_once_and_twice(rate, over):
-    expected = lowpass.response_db(over * CUTOFF_HZ, CUTOFF_HZ, rate)
+    expected = response_db(over * CUTOFF_HZ, CUTOFF_HZ, rate)
     assert gain_db(Live(rate), over * CUTOFF_HZ, rate) == pytest.approx(expected, abs=2e-3, rel=4e-4)
     assert gain_db(lambda w: lowpass.offline(w, rate), over * CUTOFF_HZ, rate) == pytest.approx(
         2 * expected, abs=2e-3, rel=4e-4
@@ -32,7 +39,7 @@ def test_gain_is_that_of_the_closed_form_once_and_twice(rate, over):
 
 
 def test_cut_off_is_3_db_once_and_6_db_forward_and_backward():
-    assert lowpass.response_db(CUTOFF_HZ, CUTOFF_HZ, RATE) == pytest.approx(-3.0103, abs=1e-4)
+    assert response_db(CUTOFF_HZ, CUTOFF_HZ, RATE) == pytest.approx(-3.0103, abs=1e-4)
     assert gain_db(lambda w: lowpass.offline(w, RATE), CUTOFF_HZ) == pytest.approx(-6.0206, abs=2e-3)
 
 

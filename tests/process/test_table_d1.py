@@ -6,7 +6,7 @@ from math import nan
 import pytest
 from scipy import stats
 
-from sensorgen.measure.log import Log, importing
+from sensorgen.measure.log import Log, importing, tables
 from sensorgen.measure.signal.verdicts import Evidence, expected_from, verdict
 from sensorgen.measure.signal.yields import dependence, groups
 
@@ -16,7 +16,7 @@ def judged(tmp_path_factory):
     with Log(tmp_path_factory.mktemp("d1") / "log.db", create=True) as log:
         importing.thesis(log)
         made = [
-            Evidence(f"row {r.source_row}", r.y_ohm, r.z_ohm, nan, r.shape, r.film_mm, remark(r), str(r.iteration))
+            Evidence(f"row {r.source_row}", r.y_ohm, r.z_ohm, nan, r.shape, r.film_mm, remark(r))
             for r in log.readings()
         ]
     expected = {shape: expected_from([e for e in made if e.shape == shape and e.remark != "not baked"])
@@ -60,13 +60,12 @@ def test_neither_film_nor_shape_decides_whether_they_are_shorted(judged):
 
 def test_how_hard_they_are_shorted_depends_on_both_and_on_holes(judged):
     """A tenth of R_Y and less: the bridge lies near the contacts, or there are many."""
+    of_23 = {f"row {r.source_row}" for r in tables.thesis() if r.iteration == 23}
     hard = {"order": 0.1}
     shape = groups(judged, lambda e: (e.shape,), **hard)
     assert counts(shape) == {("rect",): (5, 26), ("tri",): (18, 33)}
     assert dependence(shape) == pytest.approx(stats.fisher_exact([[5, 21], [18, 15]]).pvalue)
-    prisms = groups(
-        [(e, v) for e, v in judged if (e.shape, e.iteration) == ("tri", "23")], lambda e: (e.film_mm,), **hard
-    )
+    prisms = groups([(e, v) for e, v in judged if e.shape == "tri" and e.name in of_23], lambda e: (e.film_mm,), **hard)
     assert counts(prisms) == {(0.0,): (10, 10), (0.1,): (5, 11), (0.2,): (3, 9)}
     assert dependence(prisms) == pytest.approx(0.0034, abs=1e-4)
     holes = groups(judged, lambda e: (e.remark == "holes",), **hard)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from sensorgen.analysis.comparison import of_iteration, predicted
-from sensorgen.analysis.comparison.leaky import across_ohm, along_ohm, electrode_and_leak
 from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.design.specimen_name import design_of, parse
 from sensorgen.measure.log import Log, notes
 from sensorgen.measure.log.batches import prediction
+from sensorgen.measure.signal.leakage import across_ohm, along_ohm, electrode_and_leak
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor

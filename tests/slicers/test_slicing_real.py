@@ -5,12 +5,13 @@ Small sensors of few cells: what their G-code says does not depend on how often 
 
 from pathlib import Path
 
+import extruded
 import numpy as np
 import pytest
 
 from sensorgen.core import yamlfile
 from sensorgen.design import design
-from sensorgen.export.gcode import extruded, paths
+from sensorgen.export.gcode import paths
 from sensorgen.export.gcode.check import check
 from sensorgen.export.gcode.files import text_of
 from sensorgen.export.gcode.motion import follow

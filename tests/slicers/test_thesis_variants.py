@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+import extruded
 import numpy as np
 import pytest
 
 from sensorgen.design import design
-from sensorgen.export.gcode import extruded
 from sensorgen.export.slicers import curaengine, prusa
 from sensorgen.export.slicers.loads import Load
 from sensorgen.scene.geometry import meshes

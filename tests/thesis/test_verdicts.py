@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from sensorgen.verification.thesis import shown
+from sensorgen.verification.thesis.items import Item
 from sensorgen.verification.thesis.verdicts import (
     DIFFERS,
     MISPRINT,
     UNEXPLAINED,
-    Expected,
     Part,
     digits,
     judged,
@@ -16,16 +16,20 @@ from sensorgen.verification.thesis.verdicts import (
 )
 
 
+def expected_of(**announced):
+    return Item(number="1.1", says="It says something.", **announced)
+
+
 def part(printed, ours=1.0, corrected=None, name="x", **more):
     return Part(name, "m", ours, printed, corrected, **more)
 
 
 def word(*parts, **expected):
-    return judged(Expected(**expected), parts).word
+    return judged(expected_of(**expected), parts).word
 
 
 def test_what_agrees_agrees_by_its_worst_part():
-    assert judged(Expected(tolerance=1e-3), [part(1.0), part(1.0005)]).text() == "agrees to 3 digits"
+    assert judged(expected_of(tolerance=1e-3), [part(1.0), part(1.0005)]).text() == "agrees to 3 digits"
     assert word(part(1.0), part(1.01), tolerance=1e-3) == UNEXPLAINED
 
 
@@ -56,7 +60,7 @@ def test_no_number_is_never_agreement():
     assert word(part(1.0, ours=np.nan)) == UNEXPLAINED
     assert word(part(np.nan, corrected=1.0), erratum="said") == MISPRINT
     assert word(part(np.nan, corrected=np.nan), erratum="said") == UNEXPLAINED
-    assert "no number" in judged(Expected(), [part(np.nan)]).text()
+    assert "no number" in judged(expected_of(), [part(np.nan)]).text()
 
 
 def test_distances():

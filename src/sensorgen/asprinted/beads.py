@@ -8,18 +8,17 @@ import shapely
 from numpy.typing import NDArray
 
 from sensorgen.checks.estimate import ROUND
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import UnknownName
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.paths import Paths
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, parts
-from sensorgen.scene.scene import SLIVER_MM, Point, Scene
+from sensorgen.scene.scene import SLIVER_MM, Point
 
 CONVENTIONS = ("vol", "deposit", "stadium")
 FULL = 0.95  # a plate of which this share is filled has no holes but between rounded lines
 _CUTS = (-0.37, -0.2, 0.0, 0.17, 0.41)  # places of the cuts, in shares of a tenth of the sensor, from its middle
 _LEVEL_MM = 0.01  # a line belongs to a layer whose top it is this near
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,17 +39,17 @@ class Beads:
         Line of the file, from 1 [-].
     """
 
-    start_mm: Floats
-    end_mm: Floats
-    width_mm: Floats
-    height_mm: Floats
-    volume_mm3: Floats
-    layer: NDArray[np.int64]
-    body: NDArray[np.int64]
-    tool: NDArray[np.int64]
-    number: NDArray[np.int64]
+    start_mm: Real
+    end_mm: Real
+    width_mm: Real
+    height_mm: Real
+    volume_mm3: Real
+    layer: Whole
+    body: Whole
+    tool: Whole
+    number: Whole
 
-    def corners_mm(self, convention: str) -> Floats:
+    def corners_mm(self, convention: str) -> Real:
         """Each line as a rectangle in plan, (n, 4, 2): half a width longer at both ends, wide by a convention [mm]."""
         middle, way = (self.start_mm + self.end_mm) / 2, self.end_mm - self.start_mm
         length = np.hypot(*way.T)
@@ -59,11 +58,11 @@ class Beads:
         corners = (middle + along + aside, middle + along - aside, middle - along - aside, middle - along + aside)
         return np.stack(corners, axis=1)
 
-    def widths_mm(self, convention: str) -> Floats:
+    def widths_mm(self, convention: str) -> Real:
         """Width of each line by a convention [mm]."""
         return self.width_mm + ROUND * self.height_mm if convention == "stadium" else self.width_mm
 
-    def of(self, rows: NDArray[np.bool_]) -> "Beads":
+    def of(self, rows: Mask) -> "Beads":
         """The lines of a mask."""
         return Beads(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
@@ -95,30 +94,23 @@ def beads(design: Design, paths: Paths, centre_mm: Point | None = None) -> Beads
     height = np.diff(heights)[layer]
     volume = found.volume_mm3(machine.filament_mm)
     width = volume / (found.length_mm() * height)
-    body = _owners(design, scene, found.tool, layer, middle)
-    columns = (*ends, width, height, volume, layer, body, found.tool, found.number)
-    return Beads(*(c[here] for c in columns))
-
-
-def _owners(
-    design: Design, scene: Scene, tool: NDArray[np.int64], layer: NDArray[np.int64], middle: Floats
-) -> NDArray[np.int64]:
-    """The body that each line belongs to: of its tool's, the one that is drawn nearest in its layer, or near it."""
+    # The body that each line belongs to: of its tool's, the one that is drawn nearest in its layer, or near it
     layers = drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))
-    owner = np.zeros(len(tool), np.int64)
+    body = np.zeros(len(found.tool), np.int64)
     for one in {design.tool(body.material) for body in scene.bodies}:
         mine = {body.name: k for k, body in enumerate(scene.bodies) if design.tool(body.material) == one}
-        for number in np.unique(layer[tool == one]):
-            rows = np.flatnonzero((tool == one) & (layer == number))
+        for number in np.unique(layer[found.tool == one]):
+            rows = np.flatnonzero((found.tool == one) & (layer == number))
             near = sorted(layers, key=lambda each: abs(each.bottom_mm - layers[number].bottom_mm))
             each = next(each for each in near if mine.keys() & each.regions.keys())
             shown = {name: region for name, region in each.regions.items() if name in mine}
             numbers = np.array([mine[name] for name in shown])
-            owner[rows] = numbers[0] if len(shown) == 1 else numbers[_nearest(list(shown.values()), middle[rows])]
-    return owner
+            body[rows] = numbers[0] if len(shown) == 1 else numbers[_nearest(list(shown.values()), middle[rows])]
+    columns = (*ends, width, height, volume, layer, body, found.tool, found.number)
+    return Beads(*(c[here] for c in columns))
 
 
-def _nearest(regions: Sequence[Region], places_mm: Floats) -> NDArray[np.intp]:
+def _nearest(regions: Sequence[Region], places_mm: Real) -> NDArray[np.intp]:
     """Which region is nearest to each place."""
     places = shapely.points(places_mm)
     found = [parts(region) for region in regions]
@@ -155,24 +147,20 @@ def layers(
     """
     if convention not in CONVENTIONS:
         raise UnknownName("convention for a line's width", convention, CONVENTIONS)
-    scene = design.printed
-    plan = drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))
-    return [
-        _printed(layer, scene, lines.of(lines.layer == k), convention, electrode_wins=electrode_wins)
-        for k, layer in enumerate(plan)
-    ]
-
-
-def _printed(layer: LayerRegions, scene: Scene, lines: Beads, convention: str, *, electrode_wins: bool) -> LayerRegions:
-    cover = _strips if layer.along else _union
-    regions: dict[str, Region] = {}
-    for k in _order(scene, lines, electrode_wins=electrode_wins):
-        name = scene.bodies[k].name
-        filled = cover(lines.of(lines.body == k), layer, scene.size_mm, convention)
-        if layer.along and len(plan := parts(layer.region(name))) == 1:
-            filled = plan[0] if filled.area > FULL * scene.size_mm[0] * scene.size_mm[1] else filled
-        regions[name] = cleaned(shapely.difference(filled, shapely.union_all(list(regions.values()))))
-    return layer.mapped(regions)
+    scene, found = design.printed, []
+    for number, layer in enumerate(drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))):
+        here, cover = lines.of(lines.layer == number), _strips if layer.along else _union
+        bodies, regions = np.unique(here.body).tolist(), dict[str, Region]()
+        # As they are printed, tool by tool.
+        first = {k: here.number[here.tool == here.tool[here.body == k][0]].min() for k in bodies}
+        for k in sorted(bodies, key=lambda k: (electrode_wins and not scene.bodies[k].terminal, first[k], k)):
+            name = scene.bodies[k].name
+            filled = cover(here.of(here.body == k), layer, scene.size_mm, convention)
+            if layer.along and len(plan := parts(layer.region(name))) == 1:
+                filled = plan[0] if filled.area > FULL * scene.size_mm[0] * scene.size_mm[1] else filled
+            regions[name] = cleaned(shapely.difference(filled, shapely.union_all(list(regions.values()))))
+        found.append(layer.mapped(regions))
+    return found
 
 
 def _strips(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convention: str) -> Region:
@@ -184,7 +172,7 @@ def _strips(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convent
     return shapely.multipolygons(shapely.box(low, 0.0, high, long) if axis == 0 else shapely.box(0.0, low, long, high))
 
 
-def _cut(lines: Beads, axis: int, at_mm: float, convention: str) -> Floats:
+def _cut(lines: Beads, axis: int, at_mm: float, convention: str) -> Real:
     """Runs along an axis, (n, 2), in which a line square to it meets the beads [mm]."""
     here = lines.corners_mm(convention)
     u, v = here[:, :, axis], here[:, :, 1 - axis] - at_mm
@@ -200,7 +188,7 @@ def _cut(lines: Beads, axis: int, at_mm: float, convention: str) -> Floats:
     return runs
 
 
-def _merged(runs: Floats) -> tuple[Floats, Floats]:
+def _merged(runs: Real) -> tuple[Real, Real]:
     """Union of runs, (n, 2), and the sum of the lengths of those in each [mm]."""
     runs = runs[runs[:, 0].argsort()]
     if not len(runs):
@@ -216,21 +204,12 @@ def _union(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], conventi
     ways = shapely.linestrings(np.stack([lines.start_mm, lines.end_mm], axis=1))
     region = shapely.union_all(shapely.buffer(ways, lines.widths_mm(convention) / 2, quad_segs=4))
     if convention == "deposit":
-        region = shapely.union_all([_pushed(part, lines) for part in parts(region)])
+        wider = []
+        for part in parts(region):  # by what its lines overlap
+            inside = shapely.contains_xy(part, (lines.start_mm + lines.end_mm) / 2)
+            deposited = float((lines.volume_mm3[inside] / lines.height_mm[inside]).sum())
+            wider.append(part.buffer(max(deposited - part.area, 0.0) / part.length, join_style="mitre"))
+        region = shapely.union_all(wider)
     slit = ROUND * layer.height_mm
     closed = region.buffer(slit, join_style="mitre").buffer(-slit, join_style="mitre")
     return shapely.clip_by_rect(closed, 0.0, 0.0, size_mm[0], size_mm[1])
-
-
-def _pushed(part: Region, lines: Beads) -> Region:
-    """A connected part, wider by what its lines overlap."""
-    inside = shapely.contains_xy(part, (lines.start_mm + lines.end_mm) / 2)
-    deposited = float((lines.volume_mm3[inside] / lines.height_mm[inside]).sum())
-    return part.buffer(max(deposited - part.area, 0.0) / part.length, join_style="mitre")
-
-
-def _order(scene: Scene, lines: Beads, *, electrode_wins: bool) -> list[int]:
-    """The bodies of a layer as they are printed, tool by tool."""
-    here = np.unique(lines.body).tolist()
-    first = {k: lines.number[lines.tool == lines.tool[lines.body == k][0]].min() for k in here}
-    return sorted(here, key=lambda k: (electrode_wins and not scene.bodies[k].terminal, first[k], k))

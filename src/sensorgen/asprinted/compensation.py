@@ -142,7 +142,6 @@ def _printed_gap_mm(design: Design, walls: str) -> float:
 
 def _gap_kept(design: Design, asked: float, printed: float, walls: str) -> tuple[Design, list[Change]]:
     """The design whose printed gap is the asked one, by the film or by the period; itself where neither does it."""
-    known = fields(design.shape)
     lost = printed - asked
     if lost <= SLIVER_MM or lost == float("inf"):
         return design, []
@@ -152,11 +151,9 @@ def _gap_kept(design: Design, asked: float, printed: float, walls: str) -> tuple
         if abs(_printed_gap_mm(thinner, walls) - asked) < SLIVER_MM:
             why = f"the cogs' lowest {lost:g} mm are not printed"
             return thinner, [Change("dielectric_mm", film, round(film - lost, 9), why)]
-    return _longer(design, asked, walls) if "period_mm" in known else (design, [])
-
-
-def _longer(design: Design, asked: float, walls: str) -> tuple[Design, list[Change]]:
-    """The design with the shortest period whose tips are wide enough to print, and would be with less."""
+    if "period_mm" not in fields(design.shape):
+        return design, []
+    # The shortest period whose tips are wide enough to print, and would be with less.
     period = design.params.period_mm  # type: ignore[attr-defined]
 
     def keeps(steps: int) -> bool:

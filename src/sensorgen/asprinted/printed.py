@@ -1,5 +1,6 @@
 """A design as printed: its layers, estimated or from G-code, as a scene with electrode gap, volumes and lost parts."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,7 +22,7 @@ from sensorgen.design.walls import WALLS
 from sensorgen.export.gcode.paths import Paths
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.layers import LayerRegions, drawn, scene_of
-from sensorgen.scene.scene import Body, Point, Scene, rectangle
+from sensorgen.scene.scene import Point, Scene, rectangle
 from sensorgen.solvers.network.nodes import Lines
 
 _JOINED_MM = 1e-4
@@ -94,8 +95,12 @@ class Printed:
 
     def rows(self) -> list[Row]:
         """Printed and drawn volume per body and layer."""
-        extruded = None if self.lines is None else _extruded(self.lines, self.design.printed)
-        return volumes.rows(self.design.printed, self.first, extruded)
+        lines, scene, extruded = self.lines, self.design.printed, None
+        if lines is not None:
+            total = np.zeros((int(lines.layer.max(initial=0)) + 1, len(scene.bodies)))
+            np.add.at(total, (lines.layer, lines.body), lines.volume_mm3)
+            extruded = {(k, b.name): float(row[n]) for k, row in enumerate(total) for n, b in enumerate(scene.bodies)}
+        return volumes.rows(scene, self.first, extruded)
 
     def findings(self) -> list[Finding]:
         """Rule 7, with the design's waivers."""
@@ -160,13 +165,6 @@ def rule7(design: Design, paths: Paths, centre_mm: Point | None = None) -> tuple
     return rows, design.waived(volumes.findings(rows, design.printed))
 
 
-def _extruded(lines: Beads, scene: Scene) -> dict[tuple[int, str], float]:
-    """Volume by layer and body [mm3]."""
-    total = np.zeros((int(lines.layer.max(initial=0)) + 1, len(scene.bodies)))
-    np.add.at(total, (lines.layer, lines.body), lines.volume_mm3)
-    return {(k, body.name): float(row[n]) for k, row in enumerate(total) for n, body in enumerate(scene.bodies)}
-
-
 def cell(design: Design, layers: Sequence[LayerRegions], plan: Window) -> Cell:
     """The unit cell of printed layers.
 
@@ -193,24 +191,17 @@ def cell(design: Design, layers: Sequence[LayerRegions], plan: Window) -> Cell:
 
 def gap_mm(scene: Scene) -> float:
     """Smallest distance of two electrodes in a scene of upright prisms; infinite where there are no two [mm]."""
-    found: dict[str, list[Body]] = {}
-    for body in filter(lambda b: b.terminal, scene.bodies):
-        found.setdefault(body.terminal, []).append(body)
-    return min((_apart_mm(one, other) for one, other in combinations(found.values(), 2)), default=float("inf"))
-
-
-def _apart_mm(one: Sequence[Body], other: Sequence[Body]) -> float:
-    """Smallest distance of the prisms of two electrodes [mm]."""
-    (plans, z), (others, other_z) = (_upright(bodies) for bodies in (one, other))
-    height = np.maximum(z[:, None, 0] - other_z[:, 1], other_z[:, 0] - z[:, None, 1]).clip(0.0)
-    return float(np.round(np.hypot(shapely.distance(plans[:, None], others), height).min(), 9))
-
-
-def _upright(bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray]:
-    """Plans, (n,), and heights, (n, 2), of all prisms [mm]."""
-    prisms = [p for body in bodies for p in body.prisms]
-    plans = [p.outline if p.axis == "z" else rectangle(*p.span("x"), *p.span("y")) for p in prisms]
-    return np.array([shapely.Polygon(plan) for plan in plans]), np.array([p.span("z") for p in prisms])
+    plans, spans = defaultdict[str, list[shapely.Polygon]](list), defaultdict[str, list[Point]](list)
+    for end, p in ((body.terminal, p) for body in scene.bodies if body.terminal for p in body.prisms):
+        plan = p.outline if p.axis == "z" else rectangle(*p.span("x"), *p.span("y"))
+        plans[end].append(shapely.Polygon(plan))
+        spans[end].append(p.span("z"))
+    apart = [np.inf]
+    for one, other in combinations(plans, 2):
+        low, high = (np.array(spans[end]) for end in (one, other))
+        height = np.maximum(low[:, None, 0] - high[:, 1], high[:, 0] - low[:, None, 1]).clip(0.0)
+        apart.append(np.hypot(shapely.distance(np.array(plans[one])[:, None], plans[other]), height).min())
+    return float(np.round(min(apart), 9))
 
 
 def drawn_gap_mm(design: Design) -> float:

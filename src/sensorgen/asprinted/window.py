@@ -10,15 +10,14 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.affinity import translate
 
+from sensorgen.core.arrays import Real
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, outlines, parts
-from sensorgen.scene.scene import SLIVER_MM, Body, Outline, Point, Scene, rectangle
+from sensorgen.scene.scene import SLIVER_MM, Body, Point, Scene, rectangle
 from sensorgen.scene.sections import Section
 from sensorgen.scene.unit_cell import Band, Slice, cell, mirrored
 
-Floats = NDArray[np.float64]
 ROUNDED_MM = 2e-3  # edges nearer than this are one: G-code has three decimals
 
 
@@ -61,7 +60,18 @@ def _period(layers: Sequence[LayerRegions], conducting: set[str], size_mm: Seque
     end, wide = size_mm[axis], size_mm[1 - axis]
     patterned = [layer for layer in layers if layer.along != "xy"[axis]]
     if all(layer.along for layer in patterned):
-        piece = mirrored(_level(patterned, axis, end, wide)).slices
+        # The pattern of strips as slices of one level band each, named by all that stands there
+        regions = list({region for layer in patterned for region in layer.regions.values()})
+        places = np.unique(np.append(shapely.get_coordinates(regions)[:, axis], [0.0, end]))
+        places = places[np.append(True, np.diff(places) > SLIVER_MM)]
+        middles = (places[:-1] + places[1:]) / 2
+        x, y = (middles, wide / 2) if axis == 0 else (wide / 2, middles)
+        looks = np.array([shapely.contains_xy(region, x, y) for region in regions], dtype=bool)
+        bands = [
+            (Band(look.tobytes().hex(), "", (0.0, 0.0), (1.0, 1.0)),) for look in looks.T.reshape(len(middles), -1)
+        ]
+        strips = [Slice(a, b, band) for (a, b), band in zip(pairwise(places.tolist()), bands, strict=True)]
+        piece = mirrored(strips).slices
     else:
         piece = cell(_stacked(patterned, axis, end, wide), (len(patterned) + 1) * (wide + 1.0)).slices
     low, width = piece[0].left_mm, piece[-1].right_mm - piece[0].left_mm
@@ -80,18 +90,6 @@ def _period(layers: Sequence[LayerRegions], conducting: set[str], size_mm: Seque
     return start, start + 2 * width
 
 
-def _level(layers: Sequence[LayerRegions], axis: int, end: float, wide: float) -> list[Slice]:
-    """The pattern of strips as slices of one level band each, named by all that stands there."""
-    regions = list({region for layer in layers for region in layer.regions.values()})
-    places = np.unique(np.append(shapely.get_coordinates(regions)[:, axis], [0.0, end]))
-    places = places[np.append(True, np.diff(places) > SLIVER_MM)]
-    middles = (places[:-1] + places[1:]) / 2
-    x, y = (middles, wide / 2) if axis == 0 else (wide / 2, middles)
-    looks = np.array([shapely.contains_xy(region, x, y) for region in regions], dtype=bool).T.reshape(len(middles), -1)
-    bands = [(Band(look.tobytes().hex(), "", (0.0, 0.0), (1.0, 1.0)),) for look in looks]
-    return [Slice(a, b, band) for (a, b), band in zip(pairwise(places.tolist()), bands, strict=True)]
-
-
 def _stacked(layers: Sequence[LayerRegions], axis: int, end: float, wide: float) -> Section:
     """Patterned layers beside each other as one section, whose mirrors are those of all of them."""
     looks = {tuple(layer.regions.items()): layer for layer in layers}
@@ -99,38 +97,29 @@ def _stacked(layers: Sequence[LayerRegions], axis: int, end: float, wide: float)
     for number, layer in enumerate(looks.values()):
         for name, region in layer.regions.items():
             body = Body(name, name, ())
-            regions += [(body, _shifted(outline, axis, 1.0 + number * (wide + 1.0))) for outline in outlines(region)]
+            up = 1.0 + number * (wide + 1.0)
+            regions += [(body, tuple((p[axis], p[1 - axis] + up) for p in o)) for o in outlines(region)]
     return Section("xy"[axis], wide, 0.0, tuple(regions))
-
-
-def _shifted(outline: Outline, axis: int, by_mm: float) -> Outline:
-    return tuple((p[axis], p[1 - axis] + by_mm) for p in outline)
 
 
 def cut(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:
     """The part of some layers within a window, moved to the origin, with edges that rounding parted made one [mm]."""
     (x0, x1), (y0, y1) = to.x_mm, to.y_mm
-    found = [
-        layer.mapped(
-            {n: translate(shapely.clip_by_rect(r, x0, y0, x1, y1), -x0, -y0) for n, r in layer.regions.items()}
-        )
-        for layer in layers
-    ]
-    strips = [region for layer in found if layer.along for region in layer.regions.values()]
-    edges = shapely.get_coordinates(strips)
-    places = [_snapped(edges[:, axis], side) for axis, side in enumerate(to.sides_mm())]
+    found = []
+    for layer in layers:
+        inside = {n: translate(shapely.clip_by_rect(r, x0, y0, x1, y1), -x0, -y0) for n, r in layer.regions.items()}
+        found.append(layer.mapped(inside))
+    drawn = shapely.get_coordinates([region for layer in found if layer.along for region in layer.regions.values()])
+    places = []  # edges, rising, and where each goes: to the middle of those that rounding parted, or to the side
+    for axis, side in enumerate(to.sides_mm()):
+        edges = np.unique(np.append(drawn[:, axis], [0.0, side]))
+        groups = np.split(edges, np.flatnonzero(np.diff(edges) >= ROUNDED_MM) + 1)
+        middles = [np.full(len(g), round(float(g.mean()), 6)) for g in groups[1:-1]]
+        places.append((edges, np.concatenate([0.0 * groups[0], *middles, 0.0 * groups[-1] + side])))
     return [layer.mapped({n: _moved(r, places, layer.along) for n, r in layer.regions.items()}) for layer in found]
 
 
-def _snapped(edges: Floats, side: float) -> tuple[Floats, Floats]:
-    """Edges, rising, and where each goes: to the middle of those that rounding parted, or to the window's side."""
-    edges = np.unique(np.append(edges, [0.0, side]))
-    groups = np.split(edges, np.flatnonzero(np.diff(edges) >= ROUNDED_MM) + 1)
-    middles = [np.full(len(g), round(float(g.mean()), 6)) for g in groups[1:-1]]
-    return edges, np.concatenate([0.0 * groups[0], *middles, 0.0 * groups[-1] + side])
-
-
-def _moved(region: Region, places: list[tuple[Floats, Floats]], along: str) -> Region:
+def _moved(region: Region, places: list[tuple[Real, Real]], along: str) -> Region:
     """A region with its edges where they belong; slanted ones on a grid of the file's decimals."""
     if along:
         sides = zip(places * 2, shapely.bounds(parts(region)).T, strict=True)
@@ -139,7 +128,7 @@ def _moved(region: Region, places: list[tuple[Floats, Floats]], along: str) -> R
         return shapely.union_all(shapely.box(x0, y0, x1, y1)[wide])
     high = np.array([to[-1] for _, to in places])
 
-    def to_sides(at: Floats) -> Floats:
+    def to_sides(at: Real) -> Real:
         return np.where(at < ROUNDED_MM, 0.0, np.where(at > high - ROUNDED_MM, high, at))
 
     return cleaned(shapely.transform(shapely.set_precision(region, ROUNDED_MM / 2), to_sides))
@@ -151,14 +140,12 @@ def evened(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:
     For crossed strips, whose lopsided cell would take sixteen times the bricks. Widths stay; a strip that is printed a
     little aside moves to its place, which changes the field in second order.
     """
-    sides = np.array([*to.sides_mm(), *to.sides_mm()])
-    return [
-        layer.mapped({n: _evened(r, sides) for n, r in layer.regions.items()}) if layer.along else layer
-        for layer in layers
-    ]
-
-
-def _evened(region: Region, sides: Floats) -> Region:
-    bounds = shapely.bounds(parts(region))
-    mirrored = (sides - bounds)[::-1][:, [2, 3, 0, 1]]
-    return shapely.union_all(shapely.box(*((bounds + mirrored) / 2).round(6).T))
+    sides, found = np.array([*to.sides_mm(), *to.sides_mm()]), []
+    for layer in layers:
+        regions = dict(layer.regions)
+        for name, region in regions.items() if layer.along else ():
+            bounds = shapely.bounds(parts(region))
+            mirrored = (sides - bounds)[::-1][:, [2, 3, 0, 1]]
+            regions[name] = shapely.union_all(shapely.box(*((bounds + mirrored) / 2).round(6).T))
+        found.append(layer.mapped(regions))
+    return found

@@ -3,7 +3,6 @@
 Rule 7, printed against drawn volume, is estimated here; after slicing it is taken from the G-code.
 """
 
-from collections.abc import Iterable
 from dataclasses import replace
 
 from sensorgen.checks import bed, bridges, estimate, gap, grid, volumes, widths
@@ -37,11 +36,7 @@ def findings(scene: Scene, printer: Printer, quality: Quality, gap_mm: float, wa
         *bridges.check(slices, printer, quality),
         *(f for f in printed if f.severity == "error"),  # rules 4 and 5 have its warnings
     ]
-    return sorted(_merged(found), key=lambda f: (SEVERITIES.index(f.severity), int(f.rule.partition("-")[0])))
-
-
-def _merged(found: Iterable[Finding]) -> Iterable[Finding]:
-    """The same finding in layer after layer becomes one, from the first layer to the last."""
+    # The same finding in layer after layer becomes one, from the first layer to the last
     merged: dict[tuple[str, str, str, str], list[Finding]] = {}
     for finding in found:
         alike = merged.setdefault((finding.rule, finding.severity, finding.body, finding.message), [])
@@ -50,4 +45,7 @@ def _merged(found: Iterable[Finding]) -> Iterable[Finding]:
             alike[-1] = replace(before, last_layer=finding.layer)
         else:
             alike.append(finding)
-    return (finding for alike in merged.values() for finding in alike)
+    return sorted(
+        (finding for alike in merged.values() for finding in alike),
+        key=lambda f: (SEVERITIES.index(f.severity), int(f.rule.partition("-")[0])),
+    )

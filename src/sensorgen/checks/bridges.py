@@ -1,22 +1,19 @@
 """Rule 9: bridges, overhangs and islands over air. Any body below supports, whatever its material."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import ceil
 from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from sensorgen.checks.slices import TOUCH_MM, Slices
 from sensorgen.checks.widths import VANISHES
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.scene.layers import Region, cleaned, is_rectilinear
-from sensorgen.scene.scene import Body
-
-Mask = NDArray[np.bool_]
-Lengths = NDArray[np.float64]
+from sensorgen.scene.scene import SLIVER_MM, Body
 
 
 class _Span(NamedTuple):
@@ -30,15 +27,16 @@ class _Span(NamedTuple):
 def check(slices: Slices, printer: Printer, quality: Quality) -> Iterator[Finding]:
     """Findings about bridges (supported at both ends), overhangs (at one) and islands (at none)."""
     line, least = printer.line_mm(), VANISHES * printer.nozzle_mm
-    known: dict[tuple[Region, Region], dict[str, _Span]] = {}
+    known: dict[tuple[int, ...], dict[str, _Span]] = {}
     for layer in range(1, len(slices.layers)):
         # What vanishes in the slicer neither needs support nor gives any.
-        ground = shapely.union_all([slices.printed(b, layer - 1, least) for b in slices.scene.bodies])
+        ground = [r for b in slices.scene.bodies if not (r := slices.printed(b, layer - 1, least)).is_empty]
         for body in slices.scene.bodies:
             shape = slices.printed(body, layer, least)
-            if (shape, ground) not in known:
-                known[shape, ground] = _spans(shape, ground, least)
-            yield from _judged(body, layer + 1, slices.layers.mids_mm[layer], known[shape, ground], quality, line)
+            key = (id(shape), *map(id, ground))
+            if key not in known:
+                known[key] = _spans(shape, ground, least)
+            yield from _judged(body, layer + 1, slices.layers.mids_mm[layer], known[key], quality, line)
 
 
 def _judged(
@@ -64,31 +62,41 @@ def _judged(
         )  # fmt: skip
 
 
-def _grid(shape: Region, ground: Region, step_mm: float) -> tuple[tuple[Lengths, Lengths], Mask, Mask]:
+def _grid(
+    shape: Region, ground: Sequence[Region], step_mm: float, rectilinear: bool
+) -> tuple[tuple[Real, Real], Mask, Mask]:
     """Lines along x and y, and which cells between them the shape fills, and the ground.
 
     The lines are those of all edges; where some are slanted, lines a step apart.
     """
-    x, y = (np.unique(at.round(9)) for at in shapely.get_coordinates([shape, ground]).T)
-    if not (is_rectilinear(shape) and is_rectilinear(ground)):
+    x, y = (np.unique(at.round(9)) for at in shapely.get_coordinates([shape, *ground]).T)
+    if rectilinear:
+        x, y = (at[np.diff(at, prepend=-np.inf) > SLIVER_MM] for at in (x, y))
+    else:
         x, y = (np.linspace(at[0], at[-1], ceil((at[-1] - at[0]) / step_mm) + 1) for at in (x, y))
     middles = np.meshgrid((x[:-1] + x[1:]) / 2, (y[:-1] + y[1:]) / 2, indexing="ij")
-    return (x, y), shapely.contains_xy(shape, *middles), shapely.contains_xy(ground, *middles)
+    below = np.any([shapely.contains_xy(region, *middles) for region in ground], axis=0)
+    return (x, y), shapely.contains_xy(shape, *middles), below
 
 
-def _spans(shape: Region, ground: Region, least_mm: float) -> dict[str, _Span]:
+def _spans(shape: Region, ground: Sequence[Region], least_mm: float) -> dict[str, _Span]:
     """Longest bridge, overhang and island of a shape above a ground, along x or y.
 
     Every unsupported place is held along x or along y; the better way counts. Places that are held neither way,
     as the corners of a roof that juts out on two sides, hold on to those that are.
     """
     found = dict.fromkeys(("bridge", "overhang", "island"), _Span())
-    if cleaned(shapely.difference(shape, ground)).is_empty:
+    if shape.is_empty or any(shape is region for region in ground):
         return found
-    lines, filled, below = _grid(shape, ground, least_mm / 2)
+    if shapely.covers(ground, shapely.box(*shape.bounds)).any():
+        return found
+    rectilinear = is_rectilinear(shapely.multipolygons(shapely.get_parts([shape, *ground])))
+    if not rectilinear and cleaned(shapely.difference(shape, shapely.union_all(ground))).is_empty:
+        return found
+    lines, filled, below = _grid(shape, ground, least_mm / 2, rectilinear)
     air = filled & ~below
 
-    def note(kind: str, lengths: Lengths, where: Mask) -> None:
+    def note(kind: str, lengths: Real, where: Mask) -> None:
         i, j = np.unravel_index(np.argmax(np.where(where, lengths, 0.0)), where.shape)
         if where[i, j] and lengths[i, j] > found[kind].mm:
             x, y = (float(line[k] + line[k + 1]) / 2 for line, k in zip(lines, (i, j), strict=True))
@@ -105,7 +113,7 @@ def _spans(shape: Region, ground: Region, least_mm: float) -> dict[str, _Span]:
     return found
 
 
-def _best(filled: Mask, lines: tuple[Lengths, Lengths], air: Mask) -> tuple[NDArray[np.int64], Lengths, Lengths]:
+def _best(filled: Mask, lines: tuple[Real, Real], air: Mask) -> tuple[Whole, Real, Real]:
     """Best support of every unsupported place: number of ends, length, and its narrower stretch [mm]."""
     ways = [_held(filled, air, lines[0]), tuple(m.T for m in _held(filled.T, air.T, lines[1]))]
     ends, lengths = (np.stack([way[k] for way in ways]) for k in (0, 1))
@@ -114,7 +122,7 @@ def _best(filled: Mask, lines: tuple[Lengths, Lengths], air: Mask) -> tuple[NDAr
     return *(np.take_along_axis(m, best, 0)[0] for m in (ends, lengths)), lengths.min(axis=0)
 
 
-def _held(filled: Mask, air: Mask, line: Lengths) -> tuple[NDArray[np.int64], Lengths]:
+def _held(filled: Mask, air: Mask, line: Real) -> tuple[Whole, Real]:
     """Along the first axis: number of supported ends of each unsupported stretch, and its length [mm]."""
     ends = np.zeros(filled.shape, np.int64)
     lengths = np.zeros(filled.shape)

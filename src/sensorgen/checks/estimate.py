@@ -4,8 +4,7 @@ The rules were found by slicing with PrusaSlicer 2.5 (Arachne and classic walls)
 they scale with the nozzle. Capacitance of the estimate: within 2 % of PrusaSlicer's G-code, 7 % of CuraEngine's.
 """
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
 from math import pi
 
 import numpy as np
@@ -15,7 +14,7 @@ from sensorgen.checks.widths import SWELLS, VANISHES
 from sensorgen.core.errors import UnknownName
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, narrow_mm, parts, united
-from sensorgen.scene.scene import SLIVER_MM, Body, Scene
+from sensorgen.scene.scene import SLIVER_MM, Scene
 
 ROUND = 1 - pi / 4  # a bead's rounded sides take this share of its height from its width
 
@@ -72,39 +71,43 @@ def layers(scene: Scene, printer: Printer, quality: Quality, walls: str = "arach
     """
     if walls not in RULES:
         raise UnknownName("walls", walls, RULES)
-    wide = RULES[walls]
-    return [_printed(layer, scene, printer, wide) for layer in drawn(scene, quality.boundaries_mm(scene.size_mm[2]))]
+    found: list[LayerRegions] = []
+    known: dict[object, Mapping[str, Region]] = {}  # of equal layers, which share their regions
+    for layer in drawn(scene, quality.boundaries_mm(scene.size_mm[2])):
+        key = round(layer.height_mm, 12), *((name, id(region)) for name, region in layer.regions.items())
+        if key not in known:
+            known[key] = _printed(layer, scene, printer, RULES[walls])
+        found.append(layer.mapped(known[key]))
+    return found
 
 
-def _printed(layer: LayerRegions, scene: Scene, printer: Printer, wide: Rule) -> LayerRegions:
+def _printed(layer: LayerRegions, scene: Scene, printer: Printer, wide: Rule) -> dict[str, Region]:
     length, width, _ = scene.size_mm
     regions: dict[str, Region] = {}
-    for body in sorted((b for b in scene.bodies if b.name in layer.regions), key=_order):
-        found = _widened(layer, body.name, length * width, partial(_width, wide, layer.height_mm, printer))
-        widened = shapely.clip_by_rect(found, 0.0, 0.0, length, width)
-        others = shapely.union_all(list(regions.values()))
-        regions[body.name] = cleaned(shapely.difference(united(widened), others))
-    return layer.mapped(regions)
+    # Electrodes first and support last, as their tools are.
+    for body in sorted(scene.bodies, key=lambda b: (b.is_support(), not b.terminal)):
+        if body.name in layer.regions:
+            widened = shapely.clip_by_rect(
+                _widened(layer, body.name, length * width, printer, wide), 0.0, 0.0, length, width
+            )
+            others = shapely.get_parts(list(regions.values()))
+            met = np.unique(shapely.STRtree(others).query(widened, predicate="intersects")[1])
+            found = united(widened)
+            regions[body.name] = cleaned(
+                shapely.difference(found, shapely.union_all(others[met])) if met.size else found
+            )
+    return regions
 
 
-def _width(wide: Rule, layer_mm: float, printer: Printer, width_mm: float) -> float:
-    return wide(width_mm, layer_mm, printer)
-
-
-def _order(body: Body) -> tuple[bool, bool]:
-    """Electrodes first and support last, as their tools are."""
-    return body.is_support(), not body.terminal
-
-
-def _widened(layer: LayerRegions, body: str, plan_mm2: float, wide: Callable[[float], float]) -> Sequence[Region]:
+def _widened(layer: LayerRegions, body: str, plan_mm2: float, printer: Printer, wide: Rule) -> Sequence[Region]:
     """The parts of a body in a layer as their walls print them."""
     found = parts(layer.region(body))
     if not found or found[0].area > plan_mm2 * (1 - SLIVER_MM):
         return found
     bounds = shapely.bounds(found)
     across = {"y": bounds[:, 2] - bounds[:, 0], "x": bounds[:, 3] - bounds[:, 1]}
-    width = across[layer.along] if layer.along else np.array([narrow_mm(part) for part in found])
-    printed = np.array([wide(w) for w in width.tolist()])
+    width = across[layer.along] if layer.along else narrow_mm(found)
+    printed = np.array([wide(w, layer.height_mm, printer) for w in width.tolist()])
     more = (printed - width)[:, None] / 2
     if layer.along:
         sides = np.array([-1, 0, 1, 0] if layer.along == "y" else [0, -1, 0, 1])

@@ -75,7 +75,10 @@ def _printed(
     }
     by_gap: dict[float | None, list[str]] = {}
     for walls, least in widths.items():
-        by_gap.setdefault(_printed_gap_mm(pair, slices, least), []).append(walls)
+        low, high = (slices.printed_layers(body, least) for body in pair)
+        boundaries = slices.layers.boundaries_mm
+        gap = round(boundaries[high[0]] - boundaries[low[-1] + 1], 9) if low and high else None
+        by_gap.setdefault(gap, []).append(walls)
     if all(gap is not None and abs(gap - gap_mm) <= TOUCH_MM for gap in by_gap):
         return
     said = (f"{'nothing' if gap is None else f'{gap:g} mm'} ({', '.join(walls)})" for gap, walls in by_gap.items())
@@ -85,10 +88,3 @@ def _printed(
         "widen narrow parts to a line, use thinner layers, or put the faces on layer boundaries",
         max((gap for gap in by_gap if gap is not None), default=None), round(gap_mm, 9), place_mm=place,
     )  # fmt: skip
-
-
-def _printed_gap_mm(pair: Pair, slices: Slices, least_mm: float) -> float | None:
-    """Distance of two electrodes without parts up to ``least_mm`` wide; None if one vanishes [mm]."""
-    low, high = (slices.printed_layers(body, least_mm) for body in pair)
-    boundaries = slices.layers.boundaries_mm
-    return round(boundaries[high[0]] - boundaries[low[-1] + 1], 9) if low and high else None

@@ -83,10 +83,6 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "arachne") 
     if any(not f.waiver for f in misfit):  # a sensor that no bed holds may be too large to mesh, too
         step("checks")
         return Review({}, misfit)
-    return _full(design, step, walls)
-
-
-def _full(design: Design, step: Step, walls: str) -> Review:
     scene = design.printed
     step("meshes")
     made = _meshes(design)
@@ -96,7 +92,8 @@ def _full(design: Design, step: Step, walls: str) -> Review:
     found = [_advised(f, list(fields(design.shape))) for f in found]
     if not any(f.severity == "error" and f.rule != LOST for f in found):
         step("validity")
-        found = [_fault(*fault) for fault in validity.faults(scene, made)] + found
+        advice = "change the parameters; if they make sense, this is a fault of sensorgen: report it"
+        found = [Finding("0-body", "error", body, what, advice) for body, what in validity.faults(scene, made)] + found
     return Review(made, design.waived(found) + design.idle_waivers(found))
 
 
@@ -124,25 +121,12 @@ def _crowding(design: Design) -> list[Finding]:
     length, width = (round(2 * limit, 3) for limit in free)
     return [
         Finding(
-            "8-bed",
-            "warning",
-            "sensor",
+            "8-bed", "warning", "sensor",
             f"it reaches into the far right corner, where the prime tower of {place.side_mm:g} mm stands",
             f"keep it shorter than {length:g} mm or narrower than {width:g} mm, or move the tower in the slicer",
-            reach[0],
-            round(free[0], 9),
+            reach[0], round(free[0], 9),
         )
-    ]
-
-
-def _fault(body: str, what: str) -> Finding:
-    return Finding(
-        "0-body",
-        "error",
-        body,
-        what,
-        "change the parameters; if they make sense, this is a fault of sensorgen: report it",
-    )
+    ]  # fmt: skip
 
 
 @dataclass(frozen=True)

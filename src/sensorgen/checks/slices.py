@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
-from shapely import MultiPolygon
+import shapely
 
 from sensorgen.design.printer import Quality
-from sensorgen.scene.layers import Region, drawn, narrow_mm, parts, region_at
+from sensorgen.scene.layers import Region, drawn, narrow_mm, region_at
 from sensorgen.scene.scene import Body, Scene
 
 TOUCH_MM = 1e-9  # below this a distance is rounding
@@ -46,7 +46,7 @@ class Slices:
         self.scene = scene
         self.layers = Layers(tuple(quality.boundaries_mm(scene.size_mm[2])))
         self._drawn = drawn(scene, self.layers.boundaries_mm)
-        self._wider: dict[tuple[Region, float], Region] = {}
+        self._wider: dict[tuple[int, float], Region] = {}
 
     def body(self, body: Body, layer: int) -> Region:
         """Region of a body in a layer."""
@@ -57,10 +57,12 @@ class Slices:
         return region_at(body, self.layers.mids_mm[layer] + above_mm)
 
     def printed(self, body: Body, layer: int, least_mm: float) -> Region:
-        """What of a body is wider than ``least_mm`` in a layer."""
-        key = self.body(body, layer), least_mm
+        """What of a body is wider than ``least_mm`` in a layer: one object for equal layers, which share a region."""
+        region = self.body(body, layer)
+        key = id(region), least_mm
         if key not in self._wider:
-            self._wider[key] = MultiPolygon([p for p in parts(key[0]) if narrow_mm(p) > least_mm + TOUCH_MM])
+            found = shapely.get_parts(region)
+            self._wider[key] = shapely.multipolygons(found[narrow_mm(found) > least_mm + TOUCH_MM])
         return self._wider[key]
 
     def printed_layers(self, body: Body, least_mm: float) -> list[int]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, pairwise
 
 import numpy as np
 import shapely
@@ -10,7 +10,7 @@ import shapely
 from sensorgen.core.document import Column, Table
 from sensorgen.core.findings import Finding
 from sensorgen.scene.layers import LayerRegions, Region, drawn, parts
-from sensorgen.scene.scene import PLANE, SLIVER_MM, Body, Point, Prism, Scene
+from sensorgen.scene.scene import SLIVER_MM, Body, Point, Scene
 
 LOW, HIGH = 0.9, 1.1  # printed over drawn volume, within which nothing is said
 VANISHED = 0.1  # a part of which less than this share is printed is lost
@@ -96,37 +96,40 @@ def rows(
         Volume extruded by layer, from 0, and body [mm3]; area times height of what is printed if not given.
     """
     boundaries = [printed[0].bottom_mm, *(layer.top_mm for layer in printed)]
+    exact_mm3 = {body.name: _drawn_mm3(body, boundaries) for body in scene.bodies}
     found = []
     for number, (meant, made) in enumerate(zip(drawn(scene, boundaries), printed, strict=True)):
         least = _LEAST * scene.size_mm[0] * scene.size_mm[1] * meant.height_mm
         for body in scene.bodies:
-            exact = sum(_between(prism, meant.bottom_mm, meant.top_mm) for prism in body.prisms)
+            exact = exact_mm3[body.name][number]
             area = made.region(body.name).area * made.height_mm
             volume = area if volumes_mm3 is None else volumes_mm3.get((number, body.name), 0.0)
             if max(exact, volume) > least:
-                found.append(_row(body.name, number + 1, meant, made, (exact, volume)))
+                plan = parts(meant.region(body.name))
+                lost, merged = _lost(plan, parts(made.region(body.name)))
+                x0, y0, x1, y1 = plan[lost[0] if lost else 0].bounds if plan else (0.0, 0.0, 0.0, 0.0)
+                place = (x0, (y0 + y1) / 2) if meant.along == "x" else ((x0 + x1) / 2, y0)
+                counts = len(plan), len(lost), merged
+                found.append(Row(body.name, number + 1, meant.bottom_mm, meant.top_mm, exact, volume, *counts, place))
     return found
 
 
-def _row(body: str, number: int, meant: LayerRegions, made: LayerRegions, volumes_mm3: tuple[float, float]) -> Row:
-    plan = parts(meant.region(body))
-    lost, merged = _lost(plan, parts(made.region(body)))
-    x0, y0, x1, y1 = plan[lost[0] if lost else 0].bounds if plan else (0.0, 0.0, 0.0, 0.0)
-    place = (x0, (y0 + y1) / 2) if meant.along == "x" else ((x0 + x1) / 2, y0)
-    return Row(body, number, meant.bottom_mm, meant.top_mm, *volumes_mm3, len(plan), len(lost), merged, place)
-
-
-def _between(prism: Prism, low_mm: float, high_mm: float) -> float:
-    """Volume of a prism between two heights, exact [mm3]."""
-    bottom, top = prism.span("z")
-    if top <= low_mm or bottom >= high_mm:
-        return 0.0
-    if prism.axis == "z" or (low_mm <= bottom and top <= high_mm):
-        return prism.volume_mm3() * (min(top, high_mm) - max(bottom, low_mm)) / (top - bottom)
-    side = PLANE[prism.axis][0]
-    low, high = prism.span(side)
-    clipped = shapely.clip_by_rect(shapely.Polygon(prism.outline), low - 1.0, low_mm, high + 1.0, high_mm)
-    return float(clipped.area) * (prism.end_mm - prism.start_mm)
+def _drawn_mm3(body: Body, boundaries_mm: Sequence[float]) -> list[float]:
+    """Volume of a body between neighbouring boundaries, exact [mm3]."""
+    bottom, top = np.array([p.span("z") for p in body.prisms]).T
+    volume = np.array([p.volume_mm3() for p in body.prisms])
+    lying = [p for p in body.prisms if p.axis != "z"]
+    slanted = np.array([p.axis != "z" for p in body.prisms])
+    outlines = np.array([shapely.Polygon(p.outline) for p in lying], dtype=object)
+    depth = np.array([p.end_mm - p.start_mm for p in lying])
+    left, right = shapely.bounds(outlines)[:, 0].min(initial=0.0), shapely.bounds(outlines)[:, 2].max(initial=0.0)
+    found = []
+    for low, high in pairwise(boundaries_mm):
+        share = (np.minimum(top, high) - np.maximum(bottom, low)).clip(0) / (top - bottom)
+        cut = slanted & (share > 0) & (share < 1)
+        clipped = shapely.clip_by_rect(outlines[cut[slanted]], left - 1.0, low, right + 1.0, high)
+        found.append(float((volume * share)[~cut].sum() + (shapely.area(clipped) * depth[cut[slanted]]).sum()))
+    return found
 
 
 def _lost(plan: Sequence[Region], made: Sequence[Region]) -> tuple[list[int], int]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sensorgen.checks.slices import TOUCH_MM, Slices
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer
-from sensorgen.scene.layers import Region, is_box, is_rectilinear, parts
+from sensorgen.scene.layers import Region, are_boxes, is_rectilinear
 from sensorgen.scene.scene import Body, Point
 
 # As shares of the nozzle.
@@ -84,17 +84,17 @@ def check(slices: Slices, printer: Printer) -> Iterator[Finding]:
     """Findings about widths and gaps at mid-layer, one per body, band and run of layers."""
     bands, closes = _bands(printer), GAP_CLOSES * printer.nozzle_mm
     gap = _Band(closes, "warning", "closes when sliced", f"widen it to {closes:.2g} mm or more", "gap")
-    known: dict[Region, list[list[Stretch]]] = {}
+    known: dict[int, tuple[list[Stretch], list[Stretch]]] = {}  # equal layers share one region
     for body in slices.scene.bodies:
         narrow, gaps = [], []
         for layer, mid in enumerate(slices.layers.mids_mm):
             region = slices.body(body, layer)
-            if region not in known:
-                limits = (bands[-1].upto_mm, False), (closes - 3 * TOUCH_MM, True)
-                known[region] = [stretches(region, limit, gaps=between) for limit, between in limits]
-            for band, here in _by_band(bands, body, layer, known[region][0], slices):
-                narrow.append(_Narrow(band, layer, mid, here))
-            gaps += [_Narrow(gap, layer, mid, known[region][1])] if known[region][1] else []
+            if id(region) not in known:
+                across = stretches(region, bands[-1].upto_mm)
+                known[id(region)] = across, stretches(region, closes - 3 * TOUCH_MM, gaps=True)
+            across, between = known[id(region)]
+            narrow += [_Narrow(band, layer, mid, here) for band, here in _by_band(bands, body, layer, across, slices)]
+            gaps += [_Narrow(gap, layer, mid, between)] if between else []
         yield from _findings("5-width", body, narrow)
         yield from _findings("6-gap", body, gaps)
 
@@ -108,21 +108,23 @@ def _by_band(
         here = [s for s in here if below is None or s.width_mm > below.upto_mm + TOUCH_MM]
         if band.severity == "error" and here:
             half = slices.layers.mids_mm[layer] - slices.layers.boundaries_mm[layer]
-            near = [slices.near(body, layer, sign * _NEAR * half) for sign in (-1, 1)]
-            tips = [s for s in here if _tapers(s, near)]
-            here = [s for s in here if s not in tips]
+            # Tips lose half of their width up to the layer's boundary, and so all of it up to the next sample.
+            width, middle, way = (np.array([getattr(s, k) for s in here]) for k in ("width_mm", "middle_mm", "way"))
+            reach = 0.75 * width[:, None] * way
+            lines = shapely.linestrings(np.stack([middle - reach, middle + reach], axis=1))
+            lengths = []
+            for sign in (-1, 1):
+                polygons = shapely.get_parts(slices.near(body, layer, sign * _NEAR * half))
+                line, part = shapely.STRtree(polygons).query(lines)
+                inside = shapely.length(shapely.intersection(lines[line], polygons[part]))
+                lengths.append(np.bincount(line, inside, len(lines)))
+            tapers: list[bool] = (abs(lengths[1] - lengths[0]) / 2 / _NEAR > 0.49 * width).tolist()
+            tips = [s for s, ends in zip(here, tapers, strict=True) if ends]
+            here = [s for s, ends in zip(here, tapers, strict=True) if not ends]
             if tips:
                 yield replace(band, severity="warning", noun="tip"), tips
         if here:
             yield replace(band, severity="warning") if band.severity == "error" and body.is_support() else band, here
-
-
-def _tapers(stretch: Stretch, near: list[Region]) -> bool:
-    """Whether a stretch loses half of its width up to the layer's boundary, and so all of it up to the next sample."""
-    middle, way = np.array(stretch.middle_mm), np.array(stretch.way)
-    line = shapely.LineString([middle - 0.75 * stretch.width_mm * way, middle + 0.75 * stretch.width_mm * way])
-    below, above = shapely.length(shapely.intersection(line, near))
-    return bool(abs(above - below) / 2 / _NEAR > 0.49 * stretch.width_mm)
 
 
 def _findings(rule: str, body: Body, found: Sequence[_Narrow]) -> Iterator[Finding]:
@@ -146,40 +148,47 @@ def stretches(region: Region, limit_mm: float, *, gaps: bool = False) -> list[St
 
     Rectilinear regions are also looked at from the ends of their edges, where other widths may face them.
     """
-    starts, ends = _edges(region)
-    if not len(starts):
+    polygons = shapely.get_parts(region)
+    low, high = shapely.bounds(polygons).reshape(-1, 2, 2).swapaxes(0, 1)
+    boxes, far = are_boxes(polygons), limit_mm + 2 * TOUCH_MM
+    if gaps:  # boxes near no other part, and boxes that are wide, have none
+        near = shapely.STRtree(polygons).query(shapely.box(*(low - far).T, *(high + far).T))
+        here = ~boxes | np.isin(np.arange(len(boxes)), near[0][near[0] != near[1]])
+    else:
+        here = ~boxes | ((high - low).min(axis=1, initial=np.inf) <= far)
+    if not here.any():
         return []
-    way = (ends - starts)[:, ::-1] * [1.0, -1.0]
-    way /= np.hypot(*way.T)[:, None] * (-1.0 if gaps else 1.0)
-    tree = shapely.STRtree(shapely.boundary(shapely.get_parts(region)))
-    found: dict[tuple[float, ...], Stretch] = {}
-    has_corners = is_rectilinear(region) and not all(map(is_box, parts(region)))
-    for share in (0.5, 1e-6, 1 - 1e-6) if has_corners else (0.5,):
-        known = {stretch.width_mm for stretch in found.values()}
-        places = starts + share * (ends - starts)
-        for k, width in _across(tree, places, way, limit_mm):
-            if share == 0.5 or width not in known:
-                middle = (places[k] + way[k] * width / 2).round(9).tolist()
-                found.setdefault((width, *np.round(middle, 6)), Stretch(width, (middle[0], middle[1]), tuple(way[k])))
-    return sorted(found.values(), key=lambda s: (s.width_mm, abs(s.way[1]), s.middle_mm))
-
-
-def _edges(region: Region) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Start and end of every edge, the region on its right."""
-    rings = shapely.get_rings(shapely.get_parts(shapely.normalize(shapely.simplify(region, 0.0))))
+    # Start and end of every edge, the region on its right
+    simple = shapely.normalize(shapely.simplify(shapely.multipolygons(polygons[here]), 0.0))
+    rings = shapely.get_rings(shapely.get_parts(simple))
     corners, ring = shapely.get_coordinates(rings, return_index=True)
     same = ring[1:] == ring[:-1]
-    return corners[:-1][same], corners[1:][same]
+    starts, ends = corners[:-1][same], corners[1:][same]
+    way = (ends - starts)[:, ::-1] * [1.0, -1.0]
+    way /= np.hypot(*way.T)[:, None] * (-1.0 if gaps else 1.0)
+    tree = shapely.STRtree(shapely.linestrings(np.stack([starts, ends], axis=1)))
+    found: dict[tuple[float, ...], Stretch] = {}
+    has_corners = not boxes.all() and is_rectilinear(region)
+    for share in (0.5, 1e-6, 1 - 1e-6) if has_corners else (0.5,):
+        known = {stretch.width_mm for stretch in found.values()}
+        widths = _across(tree, starts + share * (ends - starts), way, limit_mm)
+        met = np.flatnonzero(np.isfinite(widths))
+        middles = (starts[met] + share * (ends - starts)[met] + way[met] * widths[met, None] / 2).round(9)
+        for width, out, (x, y), at in zip(
+            widths[met].tolist(), way[met].tolist(), middles.tolist(), middles.round(6).tolist(), strict=True
+        ):
+            if share == 0.5 or width not in known:
+                found.setdefault((width, *at), Stretch(width, (x, y), tuple(out)))
+    return sorted(found.values(), key=lambda s: (s.width_mm, abs(s.way[1]), s.middle_mm))
 
 
 def _across(
     tree: shapely.STRtree, places: NDArray[np.float64], way: NDArray[np.float64], limit_mm: float
-) -> Iterator[tuple[int, float]]:
-    """Numbers of places from which an edge is met within a distance, and that distance [mm]."""
+) -> NDArray[np.float64]:
+    """Distances from places at which an edge is met (n,), inf where none is within the limit [mm]."""
     rays = shapely.linestrings(np.stack([places + 1e-8 * way, places + (limit_mm + 2 * TOUCH_MM) * way], axis=1))
-    ray, edge = tree.query(rays, predicate="intersects")
+    ray, edge = tree.query(rays)
     met = shapely.intersection(rays[ray], tree.geometries[edge])
     nearest = np.full(len(places), np.inf)
-    np.minimum.at(nearest, ray, shapely.distance(shapely.points(places[ray]), met))
-    for k in np.flatnonzero(nearest <= limit_mm + TOUCH_MM).tolist():
-        yield k, round(float(nearest[k]), 9)
+    np.fmin.at(nearest, ray, shapely.distance(shapely.points(places[ray]), met))
+    return np.array([round(w, 9) if w <= limit_mm + TOUCH_MM else np.inf for w in nearest.tolist()])

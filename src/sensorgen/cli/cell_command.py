@@ -20,13 +20,13 @@ OWN: list[click.Parameter] = [
         "Relative width of the bounds; 1e-3 for a cross-section and 1e-2 in 3D if not given, as in all commands."
     ),
     click.Option(["--model"], metavar="NAME", default="", help="Ask this model only: columns, thesis-3.35."),
-    click.Option(
-        ["--frequency"], type=Values(FREQUENCY_HZ, zero=False), default=None,
-        help="Of the field, where a dielectric leaks: --set resistivity_x60=1e8; a loss_x60=0.02 needs none.",
+    options.option(
+        "--frequency", Values(FREQUENCY_HZ, zero=False),
+        "Of the field, where a dielectric leaks: --set resistivity_x60=1e8; a loss_x60=0.02 needs none.",
     ),
-    click.Option(
-        ["--press", "press_mm"], type=Values(LENGTH_MM, zero=True), default=None,
-        help="Displacement of the top, as 20um or 0:0.05:0.01, for formulas of it; solved: compress.",
+    options.option(
+        "--press press_mm", Values(LENGTH_MM, zero=True),
+        "Displacement of the top, as 20um or 0:0.05:0.01, for formulas of it; solved: compress.",
     ),
     options.explain(), options.no_cache(), *body_options.body_options(), *sweeps.options(), *render.options(),
 ]  # fmt: skip

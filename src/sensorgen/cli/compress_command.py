@@ -8,6 +8,7 @@ import click
 
 from sensorgen.cli import body_options, options, render, settings, sweeps
 from sensorgen.cli.designs import DesignGroup
+from sensorgen.cli.options import option
 from sensorgen.cli.words import OneOf, Values
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
@@ -16,31 +17,30 @@ if TYPE_CHECKING:
     from sensorgen.design.design import Design
 
 
-def _choice(flag: str, name: str, choices: list[str], about: str) -> click.Option:
-    return click.Option([flag, name], type=OneOf(choices), default=choices[0], show_default=True, help=about)
-
-
 OWN: list[click.Parameter] = [
-    click.Option(
-        ["--stress"], type=Values(units.STRESS_KPA, zero=True), default="0:100:10", show_default=True,
-        help="Stresses on the top [kPa]; 0 is put before them.",
+    option(
+        "--stress", Values(units.STRESS_KPA, zero=True), "Stresses on the top [kPa]; 0 is put before them.",
+        default="0:100:10",
     ),
-    _choice("--base", "base", ["bonded", "sliding"], "Boundary condition of the bottom."),
-    _choice("--sides", "period", ["fixed", "free"], "Sides: fixed, or free to move (with --base sliding)."),
-    _choice("--top", "top", ["even", "rigid"], "Even pressure, or a stiff plate."),
-    _choice("--contact", "contact", ["frictionless", "stick"], "What faces do that touch."),
-    click.Option(
-        ["--model"], type=OneOf(["press2d", "press3d", "springs", "unconfined", "bonded"]), default=None,
-        help="Finite elements of a cross-section or of boxes, springs of columns, or laws of a plate, free to widen "
+    option("--base", OneOf(("bonded", "sliding")), "Boundary condition of the bottom.", default="bonded"),
+    option(
+        "--sides period", OneOf(("fixed", "free")), "Sides: fixed, or free to move (with --base sliding).",
+        default="fixed",
+    ),
+    option("--top", OneOf(("even", "rigid")), "Even pressure, or a stiff plate.", default="even"),
+    option("--contact", OneOf(("frictionless", "stick")), "What faces do that touch.", default="frictionless"),
+    option(
+        "--model", OneOf(("press2d", "press3d", "springs", "unconfined", "bonded")),
+        "Finite elements of a cross-section or of boxes, springs of columns, or laws of a plate, free to widen "
         "sideways (B.49) or bonded; the first that fits if not given.",
     ),
     options.accuracy(
         "How far the bounds of C may be apart, the error of the mesh in them: the coarsest mesh that will do."
     ),
     options.explain(), *body_options.body_options(),
-    click.Option(["--check-mesh"], is_flag=True, help="Solve on a finer mesh too, and compare."),
+    options.flag("--check-mesh", "Solve on a finer mesh too, and compare."),
     options.no_cache(), *sweeps.options(),
-    click.Option(["--plot"], metavar="FILE.png", help="Draw displacement and capacitance over stress."),
+    option("--plot", None, "Draw displacement and capacitance over stress.", metavar="FILE.png"),
     *render.options(),
 ]  # fmt: skip
 
@@ -84,7 +84,7 @@ def _work(
         from sensorgen.core import files
 
         files.replace(Path(plot), figure.png(found))
-    render.deliver(found, before=[*found.plan.document(), ""] if explain else ())
+    render.deliver(found, before=found.explained() if explain else ())
     return render.verdict(*found.problems())
 
 

@@ -1,5 +1,7 @@
 """Options that several commands have."""
 
+from typing import Any
+
 import click
 
 from sensorgen.cli import render
@@ -8,58 +10,63 @@ from sensorgen.core import units
 from sensorgen.core.errors import BadInput
 
 
+def option(
+    flags: str, kind: "click.ParamType[Any] | None", about: str, *, default: str | None = None,
+    metavar: str | None = None, multiple: bool = False,
+) -> click.Option:  # fmt: skip
+    """An option; its flags with the parameter's name where that is another one: ``--tip tip_mm``."""
+    return click.Option(
+        flags.split(), type=kind, default=default, show_default=default is not None, metavar=metavar, multiple=multiple,
+        help=about,
+    )  # fmt: skip
+
+
+def flag(name: str, about: str) -> click.Option:
+    """An option without a value."""
+    return click.Option([name], is_flag=True, help=about)
+
+
 def accuracy(about: str) -> click.Option:
     """``--accuracy``, a number above 0."""
-    return click.Option(["--accuracy"], type=Ratio(), default=None, help=about)
+    return option("--accuracy", Ratio(), about)
 
 
 def compression(
     *laws: str, about: str = "Compression law of a plate; the best of the cell if not given."
 ) -> click.Option:
     """``--compression``: a law of plates, or one of ``laws``."""
-    return click.Option(["--compression"], type=OneOf(("unconfined", "bonded", *laws)), help=about)
+    return option("--compression", OneOf(("unconfined", "bonded", *laws)), about)
 
 
 def force() -> click.Option:
     """``--force``, one [N]."""
-    return click.Option(
-        ["--force", "force_n"], type=Values(units.FORCE_N, zero=False), default="6N", show_default=True,
-        help="Force of the press.",
-    )  # fmt: skip
+    return option("--force force_n", Values(units.FORCE_N, zero=False), "Force of the press.", default="6N")
 
 
-def tip(flag: str, name: str, about: str) -> click.Option:
+def tip(flags: str, about: str) -> click.Option:
     """Length of a tip, one [mm]."""
-    return click.Option(
-        [flag, name], type=Values(units.LENGTH_MM, zero=False), metavar="MM", default="10mm", show_default=True,
-        help=about,
-    )  # fmt: skip
+    return option(flags, Values(units.LENGTH_MM, zero=False), about, default="10mm", metavar="MM")
 
 
 def frequencies() -> click.Option:
     """``--frequencies`` [Hz]."""
-    return click.Option(
-        ["--frequencies", "frequency_hz"], type=Values(units.FREQUENCY_HZ, zero=False),
-        help="Frequencies, as in 1.1kHz,2.3kHz; the thesis's seven if not given.",
-    )  # fmt: skip
+    about = "Frequencies, as in 1.1kHz,2.3kHz; the thesis's seven if not given."
+    return option("--frequencies frequency_hz", Values(units.FREQUENCY_HZ, zero=False), about)
 
 
 def noise() -> click.Option:
     """``--noise`` [-]."""
-    return click.Option(
-        ["--noise"], type=Share(), default="0.1%", show_default=True,
-        help="Standard error of R and of X of a reading, relative to |Z|.",
-    )  # fmt: skip
+    return option("--noise", Share(), "Standard error of R and of X of a reading, relative to |Z|.", default="0.1%")
 
 
 def explain() -> click.Option:
     """``--explain``."""
-    return click.Option(["--explain"], is_flag=True, help="Print which models were used, and their cost and error.")
+    return flag("--explain", "Print which models were used, and their cost and error.")
 
 
 def no_cache() -> click.Option:
     """``--no-cache``."""
-    return click.Option(["--no-cache"], is_flag=True, help="Solve anew, and keep nothing.")
+    return flag("--no-cache", "Solve anew, and keep nothing.")
 
 
 def refuse_explain(given: bool, *, many: bool) -> None:

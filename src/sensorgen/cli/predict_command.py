@@ -8,6 +8,7 @@ import click
 
 from sensorgen.cli import body_options, options, render, show
 from sensorgen.cli.designs import DesignGroup
+from sensorgen.cli.options import option
 from sensorgen.cli.words import Length, OneOf, Values, proper
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
@@ -19,19 +20,18 @@ if TYPE_CHECKING:
 _WORK = ("cell, compression and line",)
 
 OWN: list[click.Parameter] = [
-    click.Option(
-        ["--force", "force_n"], type=Values(units.FORCE_N, zero=True),
-        help="Forces as START:STOP:STEP, one, or a list [N]; 0:6:0.1 where only positions are given.",
+    option(
+        "--force force_n", Values(units.FORCE_N, zero=True),
+        "Forces as START:STOP:STEP, one, or a list [N]; 0:6:0.1 where only positions are given.",
     ),
-    click.Option(
-        ["--position", "position_mm"], type=Values(units.LENGTH_MM, zero=True),
-        help="Positions of the tip's middle [mm]; the whole sensor in 100 steps where only forces are given.",
+    option(
+        "--position position_mm", Values(units.LENGTH_MM, zero=True),
+        "Positions of the tip's middle [mm]; the whole sensor in 100 steps where only forces are given.",
     ),
-    options.frequencies(),
-    click.Option(["--tip", "tip_mm"], type=Length(), default=None, help="Length of the tip.  [default: 10 mm]"),
-    click.Option(
-        ["--tip-radius", "radius_mm"], type=Length(), default=None,
-        help="Radius of a hard round tip across the sensor, with --profile hertz or parabola: its contact grows with "
+    options.frequencies(), option("--tip tip_mm", Length(), "Length of the tip.  [default: 10 mm]"),
+    option(
+        "--tip-radius radius_mm", Length(),
+        "Radius of a hard round tip across the sensor, with --profile hertz or parabola: its contact grows with "
         "the force up to the tip's length. All of the tip touches if not given.",
     ),
     options.compression(
@@ -39,17 +39,18 @@ OWN: list[click.Parameter] = [
         "cross-section, up to minutes in 3D); if not given, solved in a cross-section.",
     ),
     options.noise(),
-    click.Option(
-        ["--profile"], type=OneOf(("uniform", "hertz", "parabola")), default="uniform", show_default=True,
-        help="Pressure under the tip: of a flat one, of a round one on a thick body, of a round one on a thin film.",
+    option(
+        "--profile", OneOf(("uniform", "hertz", "parabola")),
+        "Pressure under the tip: of a flat one, of a round one on a thick body, of a round one on a thin film.",
+        default="uniform",
     ),
     options.accuracy(
         "Of |Z|: cell, compression and line by the least expensive models that together meet it. Exit code 1 where "
         "they do not."
     ),
     options.explain(), *body_options.body_options(),
-    click.Option(["--plot"], metavar="DIR", help="Draw R, X, sensitivities and inverse maps there, as PNG and HTML."),
-    *render.options(),
+    option("--plot", None, "Draw R, X, sensitivities and inverse maps there, as PNG and HTML.", metavar="DIR"),
+    *render.options(csv="Print R and X as CSV, a row per force and position."),
 ]  # fmt: skip
 
 
@@ -90,7 +91,7 @@ def _work(
     if plot and not isinstance(found, Prediction):
         _plot(found, Path(plot))
     else:
-        render.deliver(found, before=[*prediction.plan.document(), ""] if explain and prediction.plan else ())
+        render.deliver(found, before=prediction.explained() if explain else ())
     return render.verdict(*prediction.problems(accuracy))
 
 

@@ -19,11 +19,11 @@ _COLOURS = {"error": "red", "warning": "yellow", "info": "blue", "CHANGE": "red"
 _FORM, _FILE = "sensorgen.form", "sensorgen.output"  # in the context's meta
 
 
-def options(*forms: str, file: bool = True) -> list[click.Parameter]:
+def options(*forms: str, file: bool = True, csv: str = _ABOUT["csv"]) -> list[click.Parameter]:
     """``--json``, ``--csv``, ``--markdown``, or those named, and ``--output``; :func:`deliver` obeys them."""
     flags = [
         click.Option([f"--{form}", f"as_{form}"], is_flag=True, expose_value=False, callback=_choose, help=about)
-        for form, about in _ABOUT.items() if form in (forms or _ABOUT)
+        for form, about in (_ABOUT | {"csv": csv}).items() if form in (forms or _ABOUT)
     ]  # fmt: skip
     output = click.Option(
         ["--output", "-o"], metavar="FILE", expose_value=False, callback=_to, help="Write this file."

@@ -7,6 +7,7 @@ import click
 
 from sensorgen.cli import body_options, options, render, show
 from sensorgen.cli.designs import DesignGroup
+from sensorgen.cli.options import option
 from sensorgen.cli.words import OneOf, Pad, one, proper
 from sensorgen.core import units
 
@@ -17,20 +18,20 @@ if TYPE_CHECKING:
 SETS = ("one-edge", "opposite", "two-edges", "corner", "corners")
 
 OWN: list[click.Parameter] = [
-    click.Option(
-        ["--contacts"], type=OneOf([*SETS, "all"]),
-        help="Contacts to read: one edge, both ends, two edges that meet, one corner, or four.  [default: all, or "
+    option(
+        "--contacts", OneOf([*SETS, "all"]),
+        "Contacts to read: one edge, both ends, two edges that meet, one corner, or four.  [default: all, or "
         "those of --pad]",
     ),
-    click.Option(
-        ["--pad", "pads"], type=Pad(), multiple=True,
-        help="Contacts of your own, on top and on the bottom at the same place; give one for each pair to read, as "
-        "in 90-100,0-10 [mm], or 0,20-60 for a stretch of an edge.",
+    option(
+        "--pad pads", Pad(),
+        "Contacts of your own, on top and on the bottom at the same place; give one for each pair to read, as "
+        "in 90-100,0-10 [mm], or 0,20-60 for a stretch of an edge.", multiple=True,
     ),
     options.frequencies(),
-    options.force(), options.tip("--tip", "tip_mm", "Side of the square tip."), options.noise(), options.compression(),
+    options.force(), options.tip("--tip tip_mm", "Side of the square tip."), options.noise(), options.compression(),
     *body_options.body_options(),
-    click.Option(["--plot"], type=click.Path(path_type=Path), metavar="DIR", help="Write maps of the bounds there."),
+    option("--plot", click.Path(path_type=Path), "Write maps of the bounds there.", metavar="DIR"),
     *render.options(),
 ]  # fmt: skip
 

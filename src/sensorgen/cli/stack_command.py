@@ -7,6 +7,7 @@ import click
 
 from sensorgen.cli import options, render
 from sensorgen.cli.designs import DesignGroup
+from sensorgen.cli.options import option
 from sensorgen.cli.words import Share, Values, one, proper
 from sensorgen.core import units
 
@@ -15,20 +16,17 @@ if TYPE_CHECKING:
 
 OWN: list[click.Parameter] = [
     options.force(),
-    click.Option(
-        ["--position", "position_mm"], type=Values(units.LENGTH_MM, zero=True),
-        help="Position of the tip's middle [mm]; the sensor's middle if not given.",
+    option(
+        "--position position_mm", Values(units.LENGTH_MM, zero=True),
+        "Position of the tip's middle [mm]; the sensor's middle if not given.",
     ),
     options.frequencies(),
-    options.tip("--touch", "tip_mm", "Length of the tip that presses, and of the body that touches."),
+    options.tip("--touch tip_mm", "Length of the tip that presses, and of the body that touches."),
     options.noise(),
-    click.Option(
-        ["--drift"], type=Share(), default="10%", show_default=True,
-        help="What the films' permittivity may have drifted by, both alike.",
-    ),
-    click.Option(
-        ["--within", "within_n"], type=Values(units.FORCE_N, zero=False), default="0.1N", show_default=True,
-        help="Largest force that a touch may be mistaken for.",
+    option("--drift", Share(), "What the films' permittivity may have drifted by, both alike.", default="10%"),
+    option(
+        "--within within_n", Values(units.FORCE_N, zero=False), "Largest force that a touch may be mistaken for.",
+        default="0.1N",
     ),
     options.compression(), *render.options(),
 ]  # fmt: skip

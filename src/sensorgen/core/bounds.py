@@ -1,7 +1,7 @@
 """A number known to lie between two others, or near one."""
 
 from dataclasses import dataclass
-from math import inf, prod
+from math import isinf, prod
 
 from sensorgen.core.units import prefix
 
@@ -102,12 +102,14 @@ class Bounds:
     def words(self) -> str:
         """Best value, and the range in the same unit; lengths in mm.
 
+        A quantity without an upper bound has two digits and no range.
+
         >>> Bounds.of(6.15e-11, "F", print=Interval(3.6e-11, 9.5e-11)).words(), Bounds.of(2e-4, "m").words()
         ('61.5 pF (36 to 95)', '0.2 mm')
         """
         name, size = {"m": ("m", 1e-3), "1/kPa": ("", 1.0)}.get(self.unit) or prefix(self.value)
         low, value, high = (end / size for end in (self.lower, self.value, self.upper))
-        if high == inf:
+        if isinf(high):
             return f"{value:.2g} {name}{self.unit} (error unknown)"
         if f"{low:.2g}" == f"{high:.2g}":
             return f"{value:.4g} {name}{self.unit}"

@@ -9,12 +9,14 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
+from secrets import token_hex
 from types import FrameType
 from typing import Any, BinaryIO
 
 from sensorgen.core.errors import Unwritable
 
 MANIFEST = "manifest.json"
+_OURS: set[str] = set()  # parts of this process: an earlier process may have had the same number
 
 
 @contextmanager
@@ -26,12 +28,12 @@ def staging(folder: Path) -> Iterator[Path]:
     Unwritable
         The place cannot be written to, or the disk is full.
     """
-    stage = folder.parent / f".{folder.name}.{os.getpid()}.part"
+    stage = part_of(folder)
     try:
         try:
             _refuse_file(folder)
             folder.parent.mkdir(parents=True, exist_ok=True)
-            _sweep(folder)
+            remove_stale_parts(folder.parent, folder.name)
             stage.mkdir()
             yield stage
         except OSError as error:
@@ -55,12 +57,33 @@ def _refuse_file(folder: Path) -> None:
             )
 
 
-def _sweep(folder: Path) -> None:
-    """Remove what a killed run of this name has left."""
-    for left in folder.parent.glob(f".{folder.name}.*.part"):
+def part_of(target: Path) -> Path:
+    """Temporary place to write before it is renamed to ``target``: a new one each time, with the process id."""
+    part = target.parent / f".{target.name}.{token_hex(4)}.{os.getpid()}.part"
+    _OURS.add(part.name)
+    return part
+
+
+def remove_stale_parts(folder: Path, name: str = "*") -> None:
+    """Remove what killed runs have left of a name, or of all names in a folder."""
+    for left in folder.glob(f".{name}.*.part"):
         pid = left.name.split(".")[-2]
-        if re.fullmatch("[0-9]{1,9}", pid) and not alive(int(pid)):
-            shutil.rmtree(left, ignore_errors=True)
+        if re.fullmatch("[0-9]{1,9}", pid) and left.name not in _OURS and not alive(int(pid)):
+            if left.is_dir():
+                shutil.rmtree(left, ignore_errors=True)
+            else:
+                with suppress(OSError):
+                    left.unlink()
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush a folder's entries to the disk; Windows has no such call."""
+    if os.name != "nt":
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def alive(pid: int) -> bool:
@@ -133,7 +156,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     Unwritable
         The place cannot be written to, or the disk is full.
     """
-    part = path.parent / f".{path.name}.{os.getpid()}.part"
+    part = part_of(path)
     try:
         if path.exists() and not path.is_file():
             raise Unwritable(f"cannot write {str(path)!r}: it is a folder or a device; expected a file")

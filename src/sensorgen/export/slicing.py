@@ -4,7 +4,6 @@ import re
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from os import SEEK_END
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +11,9 @@ import numpy as np
 from sensorgen.core import files as store
 from sensorgen.core.errors import BadInput, SlicerFailed, UnknownName
 from sensorgen.design.design import Design
-from sensorgen.design.printer import Printer
 from sensorgen.export import threemf
 from sensorgen.export.gcode.files import text_of
 from sensorgen.export.gcode.motion import follow
-from sensorgen.export.gcode.moves import Motion
 from sensorgen.export.gcode.paths import Paths, paths_of
 from sensorgen.export.gcode.ready import ready
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S, curaengine, prusa, stl
@@ -50,17 +47,12 @@ class Placed:
 
     def sensor_mm(self) -> tuple[float, float]:
         """Middle of the sensor alone, without what is printed with it [mm]."""
-        middles = (
-            (size / 2, (min(0.0, *low) + max(size, *high)) / 2)
-            for size, (low, high) in zip(self.design.printed.size_mm[:2], map(self._reach, "xy"), strict=True)
-        )
-        x, y = (place + own - whole for place, (own, whole) in zip(self.centre_mm, middles, strict=True))
-        return x, y
-
-    def _reach(self, axis: str) -> tuple[list[float], list[float]]:
-        """Where the extra bodies' prisms start and end along an axis of the sensor [mm]."""
-        spans = [prism.span(axis) for body in self.extra for prism in body.prisms] or [(0.0, 0.0)]
-        return [start for start, _ in spans], [end for _, end in spans]
+        found = []
+        for axis, size, place in zip("xy", self.design.printed.size_mm, self.centre_mm, strict=False):
+            spans = [prism.span(axis) for body in self.extra for prism in body.prisms] or [(0.0, 0.0)]
+            low, high = min(0.0, *(start for start, _ in spans)), max(size, *(end for _, end in spans))
+            found.append(place + size / 2 - (low + high) / 2)
+        return found[0], found[1]
 
 
 @dataclass(frozen=True)
@@ -140,42 +132,30 @@ def sliced(
     started = time.perf_counter()
     check(pieces)
     step("meshes")
-    bodies = plate_parts(pieces)
+    bodies, machine = plate_parts(pieces), pieces[0].design.machine
     raw, made = folder / "raw.gcode", folder / "ready.gcode"
     step("files")
     runner = Runner(program, time_limit_s, lambda: step("slicing"))
     try:
-        work = _prepared(pieces, bodies, slicer, folder, raw, runner, title)
-        before = time.perf_counter()
-        work()
-        seconds = time.perf_counter() - before
+        seconds = _run(pieces, bodies, slicer, raw, runner, title)
     except OSError as error:
         raise store.unwritable(folder, error) from None
-    version = _version(raw, slicer)
-    step("G-code")
-    machine = pieces[0].design.machine
-    motion = _make_ready(raw, made, machine)
-    _refuse_cut(raw, machine)
-    lines = paths_of(motion, machine, "slicer")
-    step("done")
-    return Sliced(raw, made, lines, slicer, version, seconds, time.perf_counter() - started - seconds)
-
-
-def _make_ready(raw: Path, made: Path, machine: Printer) -> Motion:
-    """Write a slicer's file in the words of a printer; the answer is what the slicer's file does.
-
-    Raises
-    ------
-    BadInput
-        See :func:`sensorgen.export.gcode.ready.ready`.
-    Unwritable
-        The place cannot be written to, or the disk is full.
-    """
     text = text_of(raw)
+    version = _version(text, slicer)
+    step("G-code")
     motion = follow(text)
     with store.replacing(made) as file:
         file.writelines(ready(text, motion, machine))
-    return motion
+    end = machine.end_gcode.strip().rpartition("\n")[2].strip().encode()
+    placeholder = set(b"{[") & set(end)  # that the slicer fills in
+    if end and not placeholder and end not in map(bytes.strip, text[-_TAIL:].splitlines()):
+        raise SlicerFailed(
+            f"the slicer's file is cut short: it lacks the printer's last line, {end.decode()!r}; "
+            "see that the disk is not full, and slice again"
+        )
+    lines = paths_of(motion, machine, "slicer")
+    step("done")
+    return Sliced(raw, made, lines, slicer, version, seconds, time.perf_counter() - started - seconds)
 
 
 def check(pieces: Sequence[Placed]) -> None:
@@ -247,33 +227,31 @@ def _corner_mm(design: Design) -> tuple[float, float]:
     return x - wide / 2, y - deep / 2
 
 
-def _prepared(
-    pieces: Sequence[Placed],
-    bodies: list[threemf.Part],
-    slicer: str,
-    folder: Path,
-    raw: Path,
-    runner: Runner,
-    title: str,
-) -> Callable[[], None]:
-    """Write what the slicer reads; the answer runs it."""
-    design, all_loads = pieces[0].design, plate_loads(pieces)
+def _run(
+    pieces: Sequence[Placed], bodies: list[threemf.Part], slicer: str, raw: Path, runner: Runner, title: str
+) -> float:
+    """Write what the slicer reads beside its file, and run it; the answer is the time that it took [s]."""
+    design, all_loads, folder = pieces[0].design, plate_loads(pieces), raw.parent
     folder.mkdir(parents=True, exist_ok=True)
     if slicer == "prusa":
         plate, profile = folder / "plate.3mf", folder / "profile.ini"
         named = title or " ".join(piece.name for piece in pieces)[:80]
         plate.write_bytes(threemf.plate("prusa", named, bodies, _corner_mm(design)))
         profile.write_text(prusa.profile(design.machine, design.layers, all_loads), "utf-8")
-        return lambda: prusa.slice_3mf(plate, profile, raw, runner)
-    settings = curaengine.engine_settings(design.machine, design.layers, all_loads)
-    shift_mm = np.array([-c for c in design.machine.bed_centre_mm()] + [0.0])
-    files = [(folder / f"{part.name}.stl", part) for part in bodies]
-    for path, part in files:
-        path.write_bytes(stl.content(part.mesh, shift_mm))
-    return lambda: curaengine.slice_bodies([(p, part.extruder) for p, part in files], settings, raw, runner)
+        before = time.perf_counter()
+        prusa.slice_3mf(plate, profile, raw, runner)
+    else:
+        settings = curaengine.engine_settings(design.machine, design.layers, all_loads)
+        shift_mm = np.array([-c for c in design.machine.bed_centre_mm()] + [0.0])
+        files = [(folder / f"{part.name}.stl", part) for part in bodies]
+        for path, part in files:
+            path.write_bytes(stl.content(part.mesh, shift_mm))
+        before = time.perf_counter()
+        curaengine.slice_bodies([(path, part.extruder) for path, part in files], settings, raw, runner)
+    return time.perf_counter() - before
 
 
-def _version(raw: Path, slicer: str) -> str:
+def _version(text: bytes, slicer: str) -> str:
     """Version of the slicer, as its file says.
 
     Raises
@@ -281,8 +259,7 @@ def _version(raw: Path, slicer: str) -> str:
     SlicerFailed
         It is older than the profiles.
     """
-    with raw.open(encoding="utf-8", errors="replace") as file:
-        found = re.search(_NAMED[slicer], file.read(_HEAD))
+    found = re.search(_NAMED[slicer], text[:_HEAD].decode("utf-8", "replace"))
     if found is None:
         return "unknown"
     version = found[1].strip(".")
@@ -290,23 +267,3 @@ def _version(raw: Path, slicer: str) -> str:
         oldest = ".".join(map(str, _OLDEST[slicer]))
         raise SlicerFailed(f"the slicer is version {version}; the profiles need {oldest} or later")
     return version
-
-
-def _refuse_cut(raw: Path, machine: Printer) -> None:
-    """Refuse a file that does not end as the printer's files do.
-
-    Raises
-    ------
-    SlicerFailed
-        The last line of the printer's own end is not there: the slicer was stopped, or its disk is full.
-    """
-    end = machine.end_gcode.strip().rpartition("\n")[2].strip().encode()
-    if not end or set(b"{[") & set(end):  # nothing, or a placeholder that the slicer fills in
-        return
-    with raw.open("rb") as file:
-        file.seek(max(0, file.seek(0, SEEK_END) - _TAIL))
-        if end not in map(bytes.strip, file):
-            raise SlicerFailed(
-                f"the slicer's file is cut short: it lacks the printer's last line, {end.decode()!r}; "
-                "see that the disk is not full, and slice again"
-            )

@@ -8,7 +8,7 @@ fails, cells are converted one by one, so that the message can name the cell.
 import csv
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import islice
@@ -141,10 +141,13 @@ class Table:
         else:  # no quotes: every separator separates, and splitting is faster
             cells = [line.rstrip("\r\n").split(self._separator) if text else [] for line in lines]
         if values is None:
-            values = np.array([
-                [self._number(row, line[at], at, date=at in dates) for at in numbers]
-                for row, line in zip(rows, cells, strict=True)
-            ]).reshape(len(rows), len(numbers))  # fmt: skip
+            values = np.empty((len(rows), len(numbers)))
+            for k, at in np.ndindex(values.shape):
+                comma, column = self._separator == ";", numbers[at]
+                try:
+                    values[k, at] = number(cells[k][column], decimal_comma=comma, date=column in dates)
+                except BadInput as error:
+                    raise error.within(f"{self.name}, row {rows[k]}, column {self.names[column]}") from None
         return Block(rows, values, [[line[at] for at in text] for line in cells])
 
     def _converted_at_once(self, lines: list[str], numbers: Sequence[int]) -> NDArray[np.float64] | None:
@@ -195,12 +198,6 @@ class Table:
         advice = "; if the numbers have decimal commas, write ';' between the columns" if decimal else ""
         raise self.error(row, f"{len(cells)} cells, but the header has {wanted}{advice}")
 
-    def _number(self, row: int, text: str, column: int, *, date: bool) -> float:
-        try:
-            return number(text, decimal_comma=self._separator == ";", date=date)
-        except BadInput as error:
-            raise error.within(f"{self.name}, row {row}, column {self.names[column]}") from None
-
 
 @contextmanager
 def opened(path: Path | str, columns: Mapping[str, str] = SAME_NAMES) -> Iterator[Table]:
@@ -218,15 +215,12 @@ def opened(path: Path | str, columns: Mapping[str, str] = SAME_NAMES) -> Iterato
         return
     if Path(path).is_dir():
         raise BadInput(f"{path} is a folder; expected a CSV file")
-    with _open(path) as file:
-        yield Table(str(path), file, columns)
-
-
-def _open(path: Path | str) -> IO[str]:
     try:
-        return Path(path).open(encoding="utf-8-sig", errors="surrogateescape", newline="\n")
+        file = Path(path).open(encoding="utf-8-sig", errors="surrogateescape", newline="\n")  # noqa: SIM115 - below
     except (OSError, ValueError) as error:
         raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
+    with file:
+        yield Table(str(path), file, columns)
 
 
 def listed(names: Sequence[str]) -> str:
@@ -256,19 +250,11 @@ def number(text: str, *, decimal_comma: bool = False, date: bool = False) -> flo
     try:
         value = float(stripped) if stripped else np.nan
     except ValueError:
-        if date:
-            value = _seconds(stripped)
+        with suppress(ValueError):
+            found = datetime.fromisoformat(stripped) if date else None
+            value = found.timestamp() if found and found.tzinfo else None
     if value is None or "_" in stripped or not stripped.isascii():  # Python reads 1_0 and other scripts' digits too
         raise BadInput(f"{text[:60]!r} is not a number; leave the cell empty where nothing was measured")
     if np.isinf(value):
         raise BadInput(f"{text[:60]!r} is not finite; leave the cell empty where nothing was measured")
     return value
-
-
-def _seconds(date: str) -> float | None:
-    """Seconds since 1970 of an ISO 8601 date with a time zone."""
-    try:
-        found = datetime.fromisoformat(date)
-    except ValueError:
-        return None
-    return found.timestamp() if found.tzinfo else None

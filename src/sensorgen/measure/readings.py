@@ -116,7 +116,12 @@ def _impedance_columns(names: Sequence[str]) -> tuple[dict[float, int], dict[flo
     parts: dict[str, dict[float, int]] = {"re": {}, "im": {}}
     for at, name in enumerate(names):
         if match := _IMPEDANCE.fullmatch(name):
-            part, frequency = parts[match[1].lower()], _frequency(name, match[2])
+            try:
+                part, frequency = parts[match[1].lower()], units.frequency_hz(match[2])
+            except BadInput as error:
+                raise error.within(f"column {name}") from None
+            if not frequency > 0:
+                raise BadInput(f"column {name}: expected a frequency above 0 Hz")
             if frequency in part:
                 raise BadInput(f"columns {names[part[frequency]]} and {name} are the same part of one impedance")
             part[frequency] = at
@@ -127,13 +132,3 @@ def _impedance_columns(names: Sequence[str]) -> tuple[dict[float, int], dict[flo
     if not parts["re"]:
         raise BadInput(f"no impedances among the columns {listed(names)}; {_EXPECTED}")
     return parts["re"], parts["im"]
-
-
-def _frequency(name: str, text: str) -> float:
-    try:
-        frequency = units.frequency_hz(text)
-    except BadInput as error:
-        raise error.within(f"column {name}") from None
-    if not frequency > 0:
-        raise BadInput(f"column {name}: expected a frequency above 0 Hz")
-    return frequency

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Protocol, cast
 
 from sensorgen.core import plugins
-from sensorgen.core.bounds import Disc, Interval
+from sensorgen.core.bounds import Interval
 from sensorgen.scene.scene import Scene
 
 
@@ -35,14 +35,6 @@ class CapacitanceModel(Protocol):
 
     def capacitance(self, scene: Scene, permittivity: Mapping[str, float], width: float = ...) -> Interval:
         """Bounds at real relative permittivities, no wider than ``width`` where the model can [F]."""
-        ...
-
-
-class LossyModel(CapacitanceModel, Protocol):
-    """A capacitance model that handles dielectric loss and leakage."""
-
-    def lossy(self, scene: Scene, permittivity: Mapping[str, complex], width: float = ...) -> Disc:
-        """Bounds at complex relative permittivities [F]."""
         ...
 
 

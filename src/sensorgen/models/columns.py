@@ -6,7 +6,7 @@ the columns' own potential where it has no jumps, and the best potential that de
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
@@ -212,7 +212,12 @@ class _Row:
 
     def is_smooth(self) -> bool:
         """Whether the columns' own potentials agree along all lines between them."""
-        return all(_meet(self.stacks[a], self.stacks[b]) for a, b in set(pairwise(self.names)))
+        for a, b in set(pairwise(self.names)):
+            (za, ua), (zb, ub) = self.stacks[a].potential(1), self.stacks[b].potential(0)
+            z = np.concatenate([za, zb])
+            if np.abs(np.interp(z, za, ua) - np.interp(z, zb, ub)).max() >= _JUMP:
+                return False
+        return True
 
 
 def _distinct(part: Part) -> dict[int, Column]:
@@ -242,27 +247,10 @@ def _stack(cell: Column, permittivity: Mapping[str, float]) -> _Stack:
     if gap is None:
         raise ValueError("an electrode does not cover the whole sensor: ask why_not_applicable() first")
     lines, eps = [gap.bottom_mm], []
-    for bottom, top, value in _filled(gap, permittivity):
-        if max(top[0] - bottom[0], top[1] - bottom[1]) > 0:
-            lines.append(top)
-            eps.append(value)
+    layers = [(layer.bottom_mm, layer.top_mm, layer.body.material) for layer in gap.layers]
+    for bottom, top, material in [*layers, (gap.top_mm, gap.top_mm, "air")]:
+        for line, below in ((bottom, "air"), (top, material)):
+            if max(line[0] - lines[-1][0], line[1] - lines[-1][1]) > 0:
+                lines.append(line)
+                eps.append(permittivity[below])
     return _Stack(cell.right_mm - cell.left_mm, np.array(lines), np.array(eps))
-
-
-def _filled(
-    gap: _Gap, permittivity: Mapping[str, float]
-) -> Iterator[tuple[tuple[float, float], tuple[float, float], float]]:
-    """The layers of a gap with the air between them."""
-    at = gap.bottom_mm
-    for layer in gap.layers:
-        yield at, layer.bottom_mm, permittivity["air"]
-        yield layer.bottom_mm, layer.top_mm, permittivity[layer.body.material]
-        at = layer.top_mm
-    yield at, gap.top_mm, permittivity["air"]
-
-
-def _meet(left: _Stack, right: _Stack) -> bool:
-    """Whether the potentials of two neighbours agree along the line between them."""
-    (za, ua), (zb, ub) = left.potential(1), right.potential(0)
-    z = np.concatenate([za, zb])
-    return bool(np.abs(np.interp(z, za, ua) - np.interp(z, zb, ub)).max() < _JUMP)

@@ -10,9 +10,9 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.core import yamlfile
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import MissingValue, OutOfRange
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ REACH = 3.0  # factor on its last stress up to which a curve is extrapolated by 
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _SAME = 1e-6  # relative difference up to which two parameters are one
 _EARLY = np.array([1 / 16, 1 / 4])  # of the first stress: knots of a curve that begins with a power of the stress
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -88,6 +86,8 @@ class Curve:
         Relative changes of the rise under other boundary and contact conditions [-].
     displacement_m : float or None
         Of the top at the last stress [m]; None if unknown.
+    doubts : tuple of str
+        What its solution is to be doubted for.
     onset : float
         Factor on the distance from 1 of the power of the stress with which the curve begins [-].
 
@@ -107,6 +107,7 @@ class Curve:
     boundary_changes: tuple[float, ...] = ()
     displacement_m: float | None = None
     onset: float = 1.0
+    doubts: tuple[str, ...] = ()
 
     def capacitive_strain(self, stress_pa: Real) -> tuple[Real, Real]:
         """Capacitive strain [-] and its derivative [1/Pa]; OutOfRange below 0 and far beyond the last point."""
@@ -118,7 +119,15 @@ class Curve:
                 f"a stress of {np.max(stress_pa):.4g} Pa; the curve {self.name!r} ends at {last:.4g} Pa and is "
                 f"extended up to {REACH:g} times that: press less, or with a larger tip"
             )
-        rise, slope = self._rise(stress_pa)
+        # C'/C'(0) - 1, accurate for small stresses too [-], and its derivative [1/Pa]
+        starts, *pieces = self._cubics
+        k = np.clip(np.searchsorted(starts, stress_pa, side="right") - 1, 0, None)
+        h, before, linear, quadratic, cubic = (piece[k] for piece in pieces)
+        inside = np.minimum(stress_pa, self.stress_pa[-1])
+        t = (inside - starts[k]) / h
+        value = before + t * (linear + t * (quadratic + t * cubic))
+        slope = (linear + t * (2 * quadratic + 3 * t * cubic)) / h
+        rise = value + (stress_pa - inside) * self.slope_per_pa[-1]
         return rise / (1 + rise), slope / (1 + rise) ** 2
 
     def foundation_stiffness_pa_per_m(self, gap_m: float) -> float:  # noqa: ARG002 - the cell's own height is in it
@@ -168,17 +177,6 @@ class Curve:
         slope = power * begun / early
         first = (2 - power) * begun[0] / early[0]  # a parabola to the first of them
         return np.insert(p, 1, early), np.insert(r, 1, begun), np.concatenate([[first], slope, m[1:]])
-
-    def _rise(self, at: Real) -> tuple[Real, Real]:
-        """C'/C'(0) - 1, accurate for small stresses too [-], and its derivative [1/Pa]."""
-        starts, *pieces = self._cubics
-        k = np.clip(np.searchsorted(starts, at, side="right") - 1, 0, None)
-        h, before, linear, quadratic, cubic = (piece[k] for piece in pieces)
-        inside = np.minimum(at, self.stress_pa[-1])
-        t = (inside - starts[k]) / h
-        value = before + t * (linear + t * (quadratic + t * cubic))
-        slope = (linear + t * (2 * quadratic + 3 * t * cubic)) / h
-        return value + (at - inside) * self.slope_per_pa[-1], slope
 
 
 Compression = Plate | Curve
@@ -301,7 +299,10 @@ def _curve(cell: Mapping[str, Any], scale: float) -> Curve:
     stress = [kpa * _PA_PER_KPA * scale for kpa in cell["stress_kpa"]]
     found = curve("solved", cell["source"], stress, [1 + percent / 100 for percent in cell["rise_percent"]])
     changes, displacement_m = tuple(cell["held"].values()), cell["displacement_um"] / _UM_PER_M
-    return replace(found, within=cell["within"], boundary_changes=changes, displacement_m=displacement_m)
+    return replace(
+        found, within=cell["within"], boundary_changes=changes, displacement_m=displacement_m,
+        doubts=tuple(cell.get("doubts", ())),
+    )  # fmt: skip
 
 
 def _cells() -> dict[str, Any]:

@@ -86,12 +86,6 @@ def electrode_resistance(
         raise OutOfRange(f"accuracy is {width:g}; expected a number above 0, as 1e-4")
     bodies = tuple(replace(b, material=_METAL, terminal="") for b in scene.bodies if b.terminal == terminal)
     alone = Scene(bodies, scene.size_mm)
-    _refuse_short(alone, terminal, axis)
-    return _per_resistivity(alone, axis, width).times(resistivity_ohm_m / M_PER_MM)
-
-
-def _refuse_short(alone: Scene, terminal: str, axis: str) -> None:
-    """Refuse an electrode that does not reach both ends of the sensor."""
     if not alone.bodies:
         raise OutOfRange(f"no {terminal} electrode in this scene: its resistance is not defined")
     spans = np.array([p.span(axis) for b in alone.bodies for p in b.prisms])
@@ -101,6 +95,7 @@ def _refuse_short(alone: Scene, terminal: str, axis: str) -> None:
             f"the {terminal} electrode runs from {low:g} to {high:g} mm along {axis}; expected 0 to {end:g} mm, from "
             "end to end of the sensor"
         )
+    return _per_resistivity(alone, axis, width).times(resistivity_ohm_m / M_PER_MM)
 
 
 @lru_cache(maxsize=32)
@@ -118,7 +113,15 @@ def _per_resistivity(alone: Scene, axis: str, width: float) -> Interval:
     if len(along) == 1:
         return _best(_in_plane(alone, along[0], width), simple)
     if all(p.is_box() for b in alone.bodies for p in b.prisms):
-        simple = _best(_known_in_space(alone, axis, width), simple)
+        # Kept on disk: a cell of boxes takes a third of a second.
+        look = [(p.axis, p.outline, p.start_mm, p.end_mm) for b in alone.bodies for p in b.prisms]
+        content = sha256(dumps([look, alone.size_mm]).encode()).hexdigest()
+        question = {"what": "conduction", "scene": content, "axis": axis, "width": width}
+        found = cached.known(question)
+        if found is None:
+            found = [(step.lower, step.upper) for step in _in_space(alone, axis, width)]
+            cached.keep(question, found)
+        simple = _best((Interval(*ends) for ends in found), simple)
     if simple.upper == np.inf:
         raise _interrupted(
             alone, axis, "no prism of it runs unchanged from end to end; expected a plate under the cogs"
@@ -182,18 +185,6 @@ def _in_plane(alone: Scene, section: Section, width: float) -> Iterator[Interval
 
 def _conducting(band: Band) -> Band:
     return replace(band, material=_METAL if band.material == _METAL else "")
-
-
-def _known_in_space(alone: Scene, axis: str, width: float) -> Iterator[Interval]:
-    """The same as :func:`_in_space`, kept on disk: a cell of boxes takes a third of a second."""
-    look = [(p.axis, p.outline, p.start_mm, p.end_mm) for b in alone.bodies for p in b.prisms]
-    content = sha256(dumps([look, alone.size_mm]).encode()).hexdigest()
-    question = {"what": "conduction", "scene": content, "axis": axis, "width": width}
-    found = cached.known(question)
-    if found is None:
-        found = [(step.lower, step.upper) for step in _in_space(alone, axis, width)]
-        cached.keep(question, found)
-    return (Interval(*ends) for ends in found)
 
 
 def _in_space(alone: Scene, axis: str, width: float) -> Iterator[Interval]:

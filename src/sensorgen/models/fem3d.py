@@ -14,7 +14,7 @@ from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.electrostatics import bounds as fem
-from sensorgen.solvers.electrostatics.bounds import Fields, Turned, disc, turned
+from sensorgen.solvers.electrostatics.bounds import Fields, disc, turned
 from sensorgen.solvers.electrostatics.boxes import Pair, whole
 from sensorgen.solvers.electrostatics.bricks import Grid, grid, layered
 
@@ -153,18 +153,15 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     found = []
     for layers, order, flux_order in _RUNGS:
         pair = Pair.of(layered(coarse, [abs(v) for v in values], layers), values, order, flux_order)
-        found.append(disc(_fields(pair, turn), turn, pair.flux.shares.tolist()))
+        # The part, and how sure it is, by its flux.
+        u, level = pair.potential.solved(), pair.flux.solved()
+        rho = np.array([turn.weight[eps] for eps in pair.flux.eps.tolist()])
+        upper, lower = ((x * boxes.answers(x)).sum() for x, boxes in ((u, pair.potential), (level, pair.flux)))
+        part, unmet = pair.part(level, rho)
+        most = float(np.ptp(pair.flux.shares))
+        size = unmet / most if most else 0.0
+        fields = Fields(lower, upper, part, size, pair.apart(u, level, rho), pair.unknowns())
+        found.append(disc(fields, turn, pair.flux.shares.tolist()))
         if found[-1].width() <= width:
             break
     return min(found, key=Disc.width).times(EPS0_F_PER_M * M_PER_MM)
-
-
-def _fields(pair: Pair, turn: Turned) -> Fields:
-    """Potential and flux of a cell; the part, and how sure it is, by its flux."""
-    u, level = pair.potential.solved(), pair.flux.solved()
-    rho = np.array([turn.weight[eps] for eps in pair.flux.eps.tolist()])
-    upper, lower = ((x * boxes.answers(x)).sum() for x, boxes in ((u, pair.potential), (level, pair.flux)))
-    part, unmet = pair.part(level, rho)
-    most = float(np.ptp(pair.flux.shares))
-    size = unmet / most if most else 0.0
-    return Fields(lower, upper, part, size, pair.apart(u, level, rho), pair.unknowns())

@@ -10,17 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.solvers.line.inputs import (
-    HIGHEST_OHM,
-    Complex,
-    PressedLine,
-    check_fit,
-    far_load,
-    in_blocks,
-    passive,
-    read,
-)
+from sensorgen.solvers.line.inputs import HIGHEST_OHM, PressedLine, check_fit, far_load, in_blocks, passive, read
 from sensorgen.solvers.line.slopes import slopes
 from sensorgen.solvers.line.tanhc import tanhc
 
@@ -191,7 +183,14 @@ def _through(
             current, voltage = _march(np.asarray(0j), y, r, lengths)
         else:
             voltage, current = _march(load, r, y, lengths)
-        return _finite(np.asarray(np.divide(voltage, current), np.complex128), current)
+        # Z, infinite where no current flows; one sum decides whether any value has to be checked
+        z = np.asarray(np.divide(voltage, current), np.complex128)
+        if abs(z.sum()) < HIGHEST_OHM:  # neither part of Z changes its sign: nothing cancels
+            return z
+        idle = np.asarray(current == 0)
+        if not (idle | (np.abs(z) < HIGHEST_OHM)).all():
+            raise OutOfRange("the line's numbers are too extreme for double precision")
+        return np.where(idle, complex(np.inf, 0.0), z)
 
 
 def _march(
@@ -212,13 +211,3 @@ def _march(
         if count % UNDIVIDED == 0:
             top, bottom = top / bottom, np.asarray(1.0)
     return top, bottom
-
-
-def _finite(z: Complex, current: NDArray[Any]) -> Complex:
-    """Z, infinite where no current flows; one sum decides whether any value has to be checked."""
-    if abs(z.sum()) < HIGHEST_OHM:  # neither part of Z changes its sign: nothing cancels
-        return z
-    idle = np.asarray(current == 0)
-    if not (idle | (np.abs(z) < HIGHEST_OHM)).all():
-        raise OutOfRange("the line's numbers are too extreme for double precision")
-    return np.where(idle, complex(np.inf, 0.0), z)

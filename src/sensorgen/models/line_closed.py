@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import OutOfRange, UnknownName
-from sensorgen.solvers.line.inputs import Complex, Inputs, PressedLine, read
+from sensorgen.solvers.line.inputs import Inputs, PressedLine, read
 
 SOURCE = "Thesis appendix B, Eqs. B.39, B.42, B.48, B.51, B.53, and Eqs. 2.24 and B.54"
 COST = 0

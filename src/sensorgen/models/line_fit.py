@@ -9,16 +9,15 @@ the thesis. Kept for comparison; :mod:`sensorgen.prediction.inverse` does the wo
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange, UnknownName
 
 SOURCE = "Thesis appendix C.1, Eqs. C.1 to C.5, as printed and corrected"
 COST = 0
 
 FORMS = ("corrected", "printed")
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

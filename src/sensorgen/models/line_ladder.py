@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import OutOfRange
-from sensorgen.solvers.line.inputs import Complex, Inputs, PressedLine, read
+from sensorgen.solvers.line.inputs import Inputs, PressedLine, read
 
 SOURCE = "Thesis Figs. 2.3, 2.4 and B.4: cells of finite length"
 COST = 1

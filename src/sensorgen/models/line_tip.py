@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import line
 from sensorgen.models.compression import Compression
@@ -15,9 +15,6 @@ from sensorgen.solvers.line.slopes import Chain
 
 SOURCE = line.SOURCE
 COST = 0
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

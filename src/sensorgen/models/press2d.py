@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Scene
@@ -17,18 +17,7 @@ from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.solvers.contact.cell import Cell
 from sensorgen.solvers.contact.cell import cell_of as cell
 from sensorgen.solvers.contact.mesh import Fineness, Mesh, Unmeshed, mesh_of
-from sensorgen.solvers.contact.pressed import (
-    DEEPEST,
-    Elastic,
-    Pressed,
-    Run,
-    check,
-    compared,
-    law_of,
-    penalty_pa,
-    reached,
-    with_capacitances,
-)
+from sensorgen.solvers.contact.pressed import Elastic, Pressed, Run, check, compared, solve, with_capacitances
 
 SOURCE = (
     "neo-Hookean plane strain, displacement with bubble and pressure (Crouzeix and Raviart 1973), penalty contact with "
@@ -43,8 +32,6 @@ _STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid
 _FIELD_GROWTH = 0.2  # of the triangles of the capacitance's mesh, per distance [-]
 _MISFIT = 1e-3  # of a solid's area: gaps that were closed in the wrong place change more [-]
 _COARSER = (3, 9)  # times the size of the triangles at an apex, where the finer ones do not converge [-]
-
-Real = NDArray[np.float64]
 
 
 def press(
@@ -92,16 +79,13 @@ def press(
         coarser = replace(fineness, apex_mm=factor * fineness.apex_mm)
         again, other = _solved(cell, solids, stress_pa, boundary, coarser, told)
         if (again.converged_pa, -len(again.faults)) > (best.converged_pa, -len(best.faults)):
-            best, run = replace(again, doubts=(*again.doubts, _coarsened(first, again, coarser))), other
+            both = len(first.stress_pa)
+            apart = float(np.abs(again.displacement_m[1:both] / first.displacement_m[1:] - 1).max(initial=0.0))
+            known = f"displacement {apart:.1%} off up to {first.converged_pa / 1e3:.4g} kPa"
+            apex = f"triangles of {coarser.apex_mm * 1e3:.3g} um at the apex, because finer ones do not converge"
+            doubt = f"{apex}: {known if both > 1 else 'error not known'}"
+            best, run = replace(again, doubts=(*again.doubts, doubt)), other
     return _with_fields(best, cell, run, permittivity) if permittivity else best
-
-
-def _coarsened(first: Pressed, again: Pressed, coarser: Fineness) -> str:
-    """Error of coarser triangles at the apex, as far as the finer ones converged."""
-    both = len(first.stress_pa)
-    apart = float(np.abs(again.displacement_m[1:both] / first.displacement_m[1:] - 1).max(initial=0.0))
-    known = f"displacement {apart:.1%} off up to {first.converged_pa / 1e3:.4g} kPa" if both > 1 else "error not known"
-    return f"triangles of {coarser.apex_mm * 1e3:.3g} um at the apex, because finer ones do not converge: {known}"
 
 
 def _solved(
@@ -112,29 +96,14 @@ def _solved(
     fineness: Fineness,
     step: Callable[[float], None],
 ) -> tuple[Pressed, Run[Mesh]]:
-    from sensorgen.solvers.contact.boundary import free_of, top_load
-    from sensorgen.solvers.contact.contact import faces_of
-    from sensorgen.solvers.contact.element import Elements
-    from sensorgen.solvers.contact.load import Problem
-
     mesh = mesh_of(cell, fineness)
-    law, softest_pa = law_of(["", *(r.material for r in cell.regions)], mesh.region, solids)
-    faces = faces_of(mesh)
-    problem = Problem(
-        Elements(mesh, law),
-        faces,
-        free_of(mesh.points_m, boundary),
-        top_load(mesh.points_m, *mesh.top()),
-        penalty_pa(softest_pa),
-        boundary.contact == "stick",
-        sound=lambda places_m: not faces.crossed(places_m, mesh.outline, DEEPEST),
-    )
-    longest_pa = softest_pa * (_STICKING_STEP if problem.stick else _STEP)
-    found, states = reached(problem, stress_pa, longest_pa, step, SOURCE)
+    materials = [cell.regions[k - 1].material for k in mesh.region.tolist()]
+    longest = _STICKING_STEP if boundary.contact == "stick" else _STEP
+    found, run = solve(mesh, [solids[m] for m in materials], stress_pa, boundary, longest, SOURCE, step)
     if not cell.mirrored:
         said = "mirrors stand at both ends of the period, though it is not its own mirror image"
         found = replace(found, doubts=(said, *found.doubts))
-    return found, Run(problem, mesh, states)
+    return found, run
 
 
 def _with_fields(found: Pressed, cell: Cell, run: Run[Mesh], permittivity: Mapping[str, float]) -> Pressed:

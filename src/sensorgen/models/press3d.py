@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
@@ -17,17 +16,7 @@ from sensorgen.scene.scene import Scene
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.solvers.contact.bricks import Bricks, bricks_of
 from sensorgen.solvers.contact.mapped_field import Orders
-from sensorgen.solvers.contact.pressed import (
-    Elastic,
-    Pressed,
-    Run,
-    check,
-    compared,
-    law_of,
-    penalty_pa,
-    reached,
-    with_capacitances,
-)
+from sensorgen.solvers.contact.pressed import Elastic, Pressed, Run, check, compared, solve, with_capacitances
 
 if TYPE_CHECKING:
     from sensorgen.solvers.contact.bricks import BrickMesh
@@ -44,8 +33,6 @@ __all__ = ["BoundaryConditions", "Elastic", "Pieces", "Pressed", "cell", "compar
 _STEP = 1 / 60  # longest load step over the least Young's modulus: 100 kPa for 6 MPa [-]
 _MOST = 4000  # solid bricks: more would take hours
 _OPEN = (1e-4, 1e-3, 1e-2)  # least height of a gap in the field, over that as drawn: to be tried in turn [-]
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -144,34 +131,16 @@ def _solved(
     boundary: BoundaryConditions,
     step: Callable[[float], None],
 ) -> "tuple[Pressed, Run[BrickMesh]]":
-    from sensorgen.solvers.contact.boundary import free_of, top_load
     from sensorgen.solvers.contact.bricks import mesh_of
-    from sensorgen.solvers.contact.contact import brick_faces_of
-    from sensorgen.solvers.contact.element import Elements
-    from sensorgen.solvers.contact.factors import Solver
-    from sensorgen.solvers.contact.load import Problem
 
     mesh = mesh_of(cut, cut.fill > 0)
-    law, softest_pa = law_of([r.material for r in cut.regions], mesh.region, solids)
-    used = np.zeros(len(mesh.points_m), bool)
-    used[mesh.outer] = True
-    free = free_of(mesh.points_m, boundary, cut.spans_m(), used)
-    first = free.tocsc().indices[free.tocsc().indptr[:-1]]
-    problem = Problem(
-        Elements(mesh, law),
-        brick_faces_of(mesh),
-        free,
-        top_load(mesh.points_m, *mesh.top()),
-        penalty_pa(softest_pa),
-        boundary.contact == "stick",
-        solver=Solver(mesh.lattice[first // 3]),
-    )
-    found, states = reached(problem, stress_pa, _STEP * softest_pa, step, SOURCE)
-    last = states[-1]
-    if (problem.gaps(last.pairs, last.u_m) < 0).any():
+    materials = [cut.regions[k].material for k in mesh.region.tolist()]
+    found, run = solve(mesh, [solids[m] for m in materials], stress_pa, boundary, _STEP, SOURCE, step)
+    last = run.states[-1]
+    if (run.problem.gaps(last.pairs, last.u_m) < 0).any():
         how = "and hold fast" if boundary.contact == "stick" else "without friction"
         found = replace(found, doubts=(*found.doubts, f"faces of gaps touch, {how}"))
-    return found, Run(problem, mesh, states)
+    return found, run
 
 
 def _with_fields(found: Pressed, run: "Run[BrickMesh]", permittivity: Mapping[str, float], orders: Orders) -> Pressed:

@@ -9,16 +9,14 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange, UnknownName
 
 SOURCE = "Hertz (1882) for a round tip on a thick soft body; Johnson, Contact Mechanics (1985), 5.8 for a thin one"
 COST = 0
 
 BLUNT_M = 1e-6  # a round tip touches over this length at least, so that no force is a point's
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import line, line_tip
 from sensorgen.models.compression import Compression
@@ -18,9 +19,6 @@ from sensorgen.solvers.line.inputs import in_range
 
 UNIFORM = "uniform"
 PIECES = 16  # changes of Z under a tip of another profile are then right to 1e-3
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 class Patch(NamedTuple):
@@ -132,7 +130,7 @@ class Sensor:
         left, right = np.maximum(low, 0.0), np.minimum(high, self.length_m)
         return Patch(left, np.where(self.whole(at), self.tip_m, right - left))
 
-    def whole(self, position_m: ArrayLike) -> NDArray[np.bool_]:
+    def whole(self, position_m: ArrayLike) -> Mask:
         """Whether a tip centred at ``position_m`` [m] lies on the sensor whole, flush with an end or not."""
         at = np.asarray(position_m, float)
         return np.asarray((at - self.tip_m / 2 >= 0) & (at + self.tip_m / 2 <= self.length_m))

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from numpy.typing import ArrayLike
 
+from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import UnknownName
-from sensorgen.solvers.sheet.network import BY, Complex
+from sensorgen.solvers.sheet.network import BY
 from sensorgen.solvers.sheet.parts import Contact, Patch, Port, Sheet
 from sensorgen.solvers.sheet.solve import Bounds, Solution, bounds, contact_sets, depth_m, solution
 

@@ -6,8 +6,8 @@ Each column is free to bulge, independent of its neighbours, and carries load on
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.overlay import parts
@@ -18,8 +18,6 @@ COST = 0
 
 _PLACES = (np.arange(256) + 0.5) / 256  # in each column; evenly, because gaps close from one side
 _HALVINGS = 60  # of the interval that holds the displacement
-
-Real = NDArray[np.float64]
 
 
 def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Sequence[float]) -> Real:
@@ -54,7 +52,26 @@ def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Seq
     -----
     It ignores that columns hold each other and that rubber keeps its volume: see ``docs/compression.md`` for its error.
     """
-    gap, compliance, width, height = _columns(scene, modulus_pa)
+    # Gap [mm], compliance t / M [mm/Pa], width [mm] and thickness [mm] at places in all columns
+    share, rows = _PLACES, []
+    try:
+        found = parts(scene)
+    except ValueError as error:
+        raise BadInput(f"no springs of columns: {error}") from None
+    for part in found:
+        for column in part.columns:
+            bottoms, tops = (
+                np.array([getattr(layer, key) for layer in column.layers]) @ np.array([1 - share, share])
+                for key in ("bottom_mm", "top_mm")
+            )
+            solid = tops - bottoms
+            gap = np.maximum(bottoms[1:] - tops[:-1], 0.0).sum(axis=0)
+            moduli = np.array([modulus_pa[layer.body.material] for layer in column.layers])
+            width = np.full(len(share), (column.right_mm - column.left_mm) * part.depth_mm)
+            rows.append(np.array([gap, (solid / moduli[:, None]).sum(axis=0), width, solid.sum(axis=0)]))
+    gap, compliance, width, solid = np.concatenate(rows, axis=1)
+    height = float((gap + solid).min() * M_PER_MM)
+    gap, compliance = gap * M_PER_MM, compliance * M_PER_MM
     stress = np.asarray(stress_pa, float)
     if (stress < 0).any():
         raise OutOfRange(f"a stress of {stress.min():g} Pa pulls; expected 0 or more")
@@ -71,26 +88,3 @@ def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Seq
 def _stress(displacement_m: Real, gap: Real, compliance: Real, width: Real) -> Real:
     share = np.maximum(displacement_m[:, None] - gap, 0.0) / compliance
     return np.asarray(share @ width / width.sum())
-
-
-def _columns(scene: Scene, modulus_pa: Mapping[str, float]) -> tuple[Real, Real, Real, float]:
-    """Gap [m], compliance t / M [m/Pa] and width [m] at places in all columns, and the least total thickness [m]."""
-    share = _PLACES
-    rows = []
-    try:
-        found = parts(scene)
-    except ValueError as error:
-        raise BadInput(f"no springs of columns: {error}") from None
-    for part in found:
-        for column in part.columns:
-            bottoms, tops = (
-                np.array([getattr(layer, key) for layer in column.layers]) @ np.array([1 - share, share])
-                for key in ("bottom_mm", "top_mm")
-            )
-            solid = tops - bottoms
-            gap = np.maximum(bottoms[1:] - tops[:-1], 0.0).sum(axis=0)
-            moduli = np.array([modulus_pa[layer.body.material] for layer in column.layers])
-            weight = np.full(len(share), (column.right_mm - column.left_mm) * part.depth_mm)
-            rows.append(np.array([gap, (solid / moduli[:, None]).sum(axis=0), weight, solid.sum(axis=0)]))
-    gap, compliance, weight, solid = np.concatenate(rows, axis=1)
-    return gap * M_PER_MM, compliance * M_PER_MM, weight, float((gap + solid).min() * M_PER_MM)

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.solvers.line.inputs import check_fit, numbers, passive
 from sensorgen.solvers.multiline import (
     Body,
     Line,
-    Matrix,
     Touch,
     diagonal,
     directions,
@@ -37,13 +37,12 @@ __all__ = [
 SOURCE = "Coupled lines (telegrapher's equations in matrices), joined as doubling does it for Riccati's equation"
 COST = 0
 
-Real = NDArray[np.float64]
 Law = Callable[[Real], tuple[Real, Real]]
 
 
 def impedance(
     r_ohm_per_m: Sequence[Sequence[ArrayLike]], y_s_per_m: Sequence[Sequence[ArrayLike]], length_m: Sequence[ArrayLike]
-) -> Matrix:
+) -> Complex:
     r"""Voltages across the films at x = 0 by the loop currents there; the far end is open.
 
     .. math:: R = \begin{pmatrix} r_0 + r_1 & -r_1 \\ -r_1 & r_1 + r_2 \end{pmatrix}, \quad
@@ -88,7 +87,7 @@ def impedance(
 
 def admittance(
     r_ohm_per_m: Sequence[Sequence[ArrayLike]], y_s_per_m: Sequence[Sequence[ArrayLike]], length_m: Sequence[ArrayLike]
-) -> Matrix:
+) -> Complex:
     """The inverse of :func:`impedance` [S], which is finite always; parameters and errors are the same.
 
     >>> admittance([[0.0, 0.0]], [[1j]], [2.0]).tolist()
@@ -163,7 +162,7 @@ class Film(NamedTuple):
     tan_delta: float = 0.0
     leak_s_per_m: float = 0.0
 
-    def y_s_per_m(self, omega: Real) -> NDArray[np.complex128]:
+    def y_s_per_m(self, omega: Real) -> Complex:
         """Admittance per length, unloaded, at an angular frequency [1/s]."""
         return np.asarray(self.leak_s_per_m + _turned(self, omega))
 
@@ -179,10 +178,10 @@ class Press(NamedTuple):
 class Response(NamedTuple):
     """Impedance matrix and its derivatives, each (..., n, n)."""
 
-    impedance_ohm: Matrix
-    by_force_ohm_per_n: Matrix
-    by_position_ohm_per_m: Matrix
-    by_film_ohm: tuple[Matrix, ...]
+    impedance_ohm: Complex
+    by_force_ohm_per_n: Complex
+    by_position_ohm_per_m: Complex
+    by_film_ohm: tuple[Complex, ...]
     """By the logarithm of each film's capacitance, pressed or not: what a drift of its permittivity does [ohm]."""
 
 
@@ -219,13 +218,13 @@ class Stack:
                 f"{len(self.tracks)} tracks and {len(self.films)} films: expected one track more than films"
             )
 
-    def impedance(self, frequency_hz: ArrayLike, press: Press = Press()) -> Matrix:  # noqa: B008 - immutable
+    def impedance(self, frequency_hz: ArrayLike, press: Press = Press()) -> Complex:  # noqa: B008 - immutable
         """Impedance matrix [ohm]; as :meth:`response`, but also where it is infinite."""
         return impedance(*self.sections(frequency_hz, press))
 
     def touched(
         self, frequency_hz: ArrayLike, touch: Touch, body: Body, driven: int, low: int, bridge: bool = True
-    ) -> NDArray[np.complex128]:
+    ) -> Complex:
         """Impedance that an instrument reads between two tracks while a body touches the top [ohm].
 
         Parameters
@@ -334,7 +333,7 @@ class Stack:
         )
         return Response(np.broadcast_to(z, by_force.shape), by_force, by_position, tuple(by_film))
 
-    def _by_force(self, omega: Real, press: Press) -> tuple[Matrix, Matrix]:
+    def _by_force(self, omega: Real, press: Press) -> tuple[Complex, Complex]:
         """How R and Y under the tip rise per newton."""
         area = self.width_m * np.asarray(press.length_m, float)
         rise = [track.r_ohm_per_m * track.piezoresistance_per_pa / area for track in self.tracks]
@@ -346,7 +345,7 @@ class Stack:
         ]
         return loops(_last(rise)).astype(complex), diagonal(_last(slopes))
 
-    def _by_film(self, y: Sequence[ArrayLike], which: int) -> Matrix:
+    def _by_film(self, y: Sequence[ArrayLike], which: int) -> Complex:
         """How Y rises with the logarithm of one film's capacitance."""
         changes = [
             (np.asarray(value) - film.leak_s_per_m) * (k == which)
@@ -355,7 +354,7 @@ class Stack:
         return diagonal(_last(changes))
 
 
-def _turned(film: Film, omega: Real) -> NDArray[np.complex128]:
+def _turned(film: Film, omega: Real) -> Complex:
     return np.asarray((film.tan_delta + 1j) * omega * film.capacitance_f_per_m)
 
 

@@ -15,7 +15,6 @@ the solid does. Nodes away from the crossings would join places that differ in p
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.solvers.network import links as links
@@ -66,19 +65,8 @@ def resistance(
     OutOfRange
         A resistivity or the planes make no sense, no line reaches beyond a plane, or nothing conducts between them.
     """
-    _check(resistivity_ohm_m, contact_ohm_m2, ends_m, area_m2)
-    pairs = links.near(lines)
-    crossings = links.crossings(lines, pairs)
-    nodes = Nodes.of(lines, crossings.places())
-    found = links.gathered(lines, nodes, pairs, crossings)
-    conductance = found.conductance_s(resistivity_ohm_m, contact_ohm_m2)
-    current, unknowns = _current(nodes, found, conductance, ends_m)
-    if not current > 0:
-        raise OutOfRange("no line conducts from one end to the other: expected lines that meet, or a contact that does")
-    return Resistance(float(area_m2 / (resistivity_ohm_m * current)), unknowns, len(conductance))
+    from scipy.sparse.csgraph import connected_components
 
-
-def _check(resistivity_ohm_m: float, contact_ohm_m2: float, ends_m: tuple[float, float], area_m2: float) -> None:
     if not 0 < resistivity_ohm_m < np.inf:
         raise OutOfRange(f"a resistivity of {resistivity_ohm_m:g} ohm m; expected a number above 0")
     if not contact_ohm_m2 >= 0:
@@ -87,14 +75,12 @@ def _check(resistivity_ohm_m: float, contact_ohm_m2: float, ends_m: tuple[float,
         raise OutOfRange(
             f"ends at {ends_m[0]:g} and {ends_m[1]:g} m, area {area_m2:g} m2; expected a length and an area"
         )
-
-
-def _current(
-    nodes: Nodes, found: links.Links, conductance: NDArray[np.float64], ends_m: tuple[float, float]
-) -> tuple[float, int]:
-    """Current along x in a mean field of 1 V/m [A], and the unknowns that it took."""
-    from scipy.sparse.csgraph import connected_components
-
+    pairs = links.near(lines)
+    crossings = links.crossings(lines, pairs)
+    nodes = Nodes.of(lines, crossings.places())
+    found = links.gathered(lines, nodes, pairs, crossings)
+    conductance = found.conductance_s(resistivity_ohm_m, contact_ohm_m2)
+    # Current along x in a mean field of 1 V/m [A]
     x = nodes.place_m[:, 0]
     left, right = x <= ends_m[0], x >= ends_m[1]
     if not left.any() or not right.any():
@@ -107,4 +93,6 @@ def _current(
     if free.any():
         inner = np.flatnonzero(free)
         current -= product(matrix[inner][:, inner], (matrix @ right.astype(float))[inner], leaving[inner])
-    return current, int(free.sum())
+    if not current > 0:
+        raise OutOfRange("no line conducts from one end to the other: expected lines that meet, or a contact that does")
+    return Resistance(float(area_m2 / (resistivity_ohm_m * current)), int(free.sum()), len(conductance))

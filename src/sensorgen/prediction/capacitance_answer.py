@@ -105,15 +105,15 @@ class CellCapacitance:
     plan: tuple[Candidate, ...] = ()
     values: tuple[MaterialValue, ...] = ()
 
-    def rows(self) -> Sequence["CellCapacitance"]:
-        """The only row."""
-        return (self,)
+    def table(self) -> Table:
+        """One row."""
+        return Table.of("cell", "", (self,))
 
     def document(self) -> Iterator[Part]:
         """Capacitance of the sensor, bounds per area, and what they rest on."""
         ends = [end * (self.area_m2 or 0.0) for end in (self.lower_f_per_m2, self.upper_f_per_m2) if end is not None]
         yield f"{self.design}, {self.body}: {' to '.join(si(end, 'F') for end in ends)}{', stored' * self.known}"
-        yield Table.of("cell", "", self.rows())
+        yield self.table()
         yield Facts(tuple(self._facts()))
 
     def _facts(self) -> Iterator[tuple[str, str]]:

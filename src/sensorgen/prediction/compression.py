@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import takewhile
 from math import inf
-from typing import Annotated
 
 import numpy as np
 
@@ -43,6 +42,13 @@ Step = Callable[[float], None]
 Bounded = tuple[Pressed, tuple[float, ...]]  # and the share by which each capacitance may be off [-]
 ALL = (*MODELS, *closed_form.MODELS)
 
+COLUMNS = (
+    Column("stress", "kPa", key="stress_kpa"), Column("displacement", "um", key="displacement_um"),
+    Column("C, lower", "F/m2", key="lower_f_per_m2", digits=7, si=True),
+    Column("C, upper", "F/m2", key="upper_f_per_m2", digits=7, si=True),
+    *(Column(k, key=k, hidden=True) for k in ("converged_kpa", "relative_width", "model", "reached", "reason")),
+)  # fmt: skip
+
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _OF_OUTLINES = "of the capacitance of the deformed outlines as computed; the outlines' own error is not in them"
 _OF_ALL = "of the capacitance of the deformed outlines, plus the difference from the next coarser mesh: an estimate"
@@ -78,21 +84,6 @@ class Asked:
     accuracy: float = inf
     check_mesh: bool = False
     keep: bool = True
-
-
-@dataclass(frozen=True, kw_only=True)
-class Row:
-    """One stress of a result, or the reason why there is none."""
-
-    stress_kpa: Annotated[float | None, Column("stress", "kPa")] = None
-    displacement_um: Annotated[float | None, Column("displacement", "um")] = None
-    lower_f_per_m2: Annotated[float | None, Column("C, lower", "F/m2", digits=7, si=True)] = None
-    upper_f_per_m2: Annotated[float | None, Column("C, upper", "F/m2", digits=7, si=True)] = None
-    converged_kpa: Annotated[float | None, Column("converged", "kPa", hidden=True)] = None
-    relative_width: Annotated[float | None, Column("width", hidden=True)] = None
-    model: Annotated[str | None, Column("model", hidden=True)] = None
-    reached: Annotated[bool | None, Column("reached", hidden=True)] = None
-    reason: Annotated[str, Column("reason", hidden=True)] = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,28 +136,25 @@ class CompressionResult(Displayed):
     plan: Plan | None = None
     reason: str = ""
 
-    def rows(self) -> Sequence[Row]:
+    def table(self) -> Table:
         """A row for each stress; one with the reason where there is no answer."""
-        if self.model is None:
-            return (Row(reason=self.reason),)
         curve = zip(self.stress_kpa, self.displacement_um, self.lower_f_per_m2, self.upper_f_per_m2, strict=True)
-        return [
-            Row(
-                stress_kpa=stress, displacement_um=displacement, lower_f_per_m2=lower, upper_f_per_m2=upper,
-                converged_kpa=self.converged_kpa, relative_width=self.relative_width, model=self.model,
-                reached=self.reached, reason="; ".join(self.faults),
-            )
-            for stress, displacement, lower, upper in curve
-        ]  # fmt: skip
+        more = self.converged_kpa, self.relative_width, self.model, self.reached, self.reason or "; ".join(self.faults)
+        rows = curve if self.model else [(None,) * 4]
+        return Table("compression", "", COLUMNS, tuple((*row, *more) for row in rows))
 
     def document(self) -> Iterator[Part]:
         """The curve, how the cell was held, and what is uncertain."""
         yield self.design
-        yield Table.of("compression", "", self.rows())
+        yield self.table()
         width = "" if self.relative_width is None else f"; largest relative width {self.relative_width:.2g}"
         target = "" if self.accuracy is None else f" (target {self.accuracy:g})"
         yield f"converged up to {self.converged_kpa:.4g} kPa{width}{target}"
         yield from self.remarks()
+
+    def explained(self) -> Iterator[Part]:
+        """Which meshes were used, their cost and error."""
+        yield from (*self.plan.document(), "") if self.plan else ()
 
     def remarks(self) -> Sequence[str]:
         """How the cell was held, what is wrong with the answer, and what is uncertain."""
@@ -221,7 +209,7 @@ def answer(body: Body, asked: Asked, *, step: Step | None = None) -> Compression
         found = _pressed(case, asked, USUAL, step)
         if asked.check_mesh:
             found = press2d.compared(found, _pressed(case, asked, USUAL + 1, step))
-        return _result(body, case, found, _OF_OUTLINES)
+        return _result(body, case, found, _OF_OUTLINES, asked)
     except NotInstalled as error:
         if asked.model:
             raise
@@ -286,7 +274,7 @@ def _within(body: Body, asked: Asked, step: Step | None) -> CompressionResult:
     (found, off), level = run_until_within(plan.levels[0], find, lambda answer: _width(*answer))
     width = _width(found, off)
     return replace(
-        _result(body, case, _widened(found, off), _OF_ALL), accuracy=asked.accuracy,
+        _result(body, case, _widened(found, off), _OF_ALL, asked), accuracy=asked.accuracy,
         relative_width=width if width < inf else None, reached=width <= asked.accuracy,
         plan=replace(plan, levels=(level,)),
     )  # fmt: skip
@@ -342,8 +330,8 @@ def _pressed(case: Case, asked: Asked, level: int, step: Step | None) -> Pressed
     return pressed(case, stress_pa, level, keep=asked.keep, step=step)
 
 
-def _result(body: Body, case: Case, found: Pressed, bounds: str) -> CompressionResult:
-    c = found.capacitance_f_per_m2
+def _result(body: Body, case: Case, found: Pressed, bounds: str, asked: Asked) -> CompressionResult:
+    c = _from_rest(body, found.capacitance_f_per_m2, asked)
     return CompressionResult(
         design=body.design.name, body=body.provenance, model=case.model, held=dict(vars(case.boundary)),
         stress_kpa=tuple(p / _PA_PER_KPA for p in found.stress_pa.tolist()),
@@ -352,6 +340,24 @@ def _result(body: Body, case: Case, found: Pressed, bounds: str) -> CompressionR
         upper_f_per_m2=tuple(i.upper if i else None for i in c),
         converged_kpa=found.converged_pa / _PA_PER_KPA, faults=found.faults, doubts=found.doubts, bounds=bounds,
     )  # fmt: skip
+
+
+def _from_rest(body: Body, found: Sequence[Interval | None], asked: Asked) -> Sequence[Interval | None]:
+    """Capacitances that begin with that of the sensor at rest, as all predictions have it [F/m2].
+
+    Those of a sensor of whole and broken periods, of which one was pressed, are scaled by what both differ at rest.
+    """
+    try:
+        rest = at_rest.answer(body, at_rest.Asked(keep=asked.keep))
+    except Unpredictable:
+        return found
+    first = found[0] if found else None
+    if first is None or rest.lower_f_per_m2 is None or rest.upper_f_per_m2 is None:
+        return found
+    known = Interval(rest.lower_f_per_m2, rest.upper_f_per_m2)
+    apart = known.upper < first.lower or first.upper < known.lower
+    factor = known.middle() / first.middle() if apart else 1.0
+    return [known, *(c and c.times(factor) for c in found[1:])]
 
 
 def _closed_form(body: Body, asked: Asked, model: str) -> CompressionResult:

@@ -206,11 +206,11 @@ def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece
     return Law(free, (soft,), ("plate free to expand sideways: bonded to its electrodes it would be stiffer",), (tied,))
 
 
-def _cell(found: Curve, moduli: Mapping[str, MaterialValue], doubts: tuple[str, ...] = ()) -> Law:
+def _cell(found: Curve, moduli: Mapping[str, MaterialValue]) -> Law:
     """Law of a solved cell, with the errors of its rise and onset, and under other boundary conditions."""
     others = tuple(replace(found.scaled_rise(1 + sign * found.within), onset=1 + sign * _ONSET) for sign in (-1, 1))
     other_boundaries = tuple(found.scaled_rise(1 + change) for change in found.boundary_changes)
-    return Law(found, tuple(moduli.values()), doubts, others, other_boundaries)
+    return Law(found, tuple(moduli.values()), found.doubts, others, other_boundaries)
 
 
 def solved(
@@ -261,11 +261,11 @@ def solved(
     short = curve.stress_pa[-1] < STRESS_PA[-1]
     ended = [f"the solution of the cell ended at {curve.stress_pa[-1] / 1e3:.3g} kPa"] if short else []
     doubts = (*found.doubts, *([_LANDING] if found.fall_m else []), *ended)
-    return _cell(curve, {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, doubts)
+    return _cell(replace(curve, doubts=doubts), {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}})
 
 
 def at_a_few_pressures(design: Design, printed: Piece, answer: Answer, stress_pa: float) -> Law | None:
-    """What is known at once of a printed cell; a cross-section is solved at a few pressures on the coarsest mesh.
+    """The stored law of a printed cell; else a cross-section is solved at a few pressures on the coarsest mesh.
 
     Its own error is not known: it tells by how much ways to print differ, which is far more.
 

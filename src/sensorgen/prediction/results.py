@@ -273,6 +273,10 @@ class Prediction(Displayed):
         yield ""
         yield from (f"assumed: {assumption}" for assumption in self.assumptions)
 
+    def explained(self) -> Iterator[Part]:
+        """Which models were used, their cost and error."""
+        yield from (*self.plan.document(), "") if self.plan else ()
+
     def judgement(self) -> Iterator[Part]:
         """Identifiability and error budget; or why there are none."""
         if self.identifiability:

@@ -25,8 +25,8 @@ class Point(Protocol):
         """Name of the design."""
         ...
 
-    def rows(self) -> Sequence[Any]:
-        """Dataclasses whose fields are annotated with columns; one or more."""
+    def table(self) -> Table:
+        """Its rows; of all results of a sweep with the same columns."""
         ...
 
     def remarks(self) -> Sequence[str]:
@@ -61,11 +61,12 @@ class Sweep(Generic[Result]):
 
     def document(self) -> Iterator[Part]:
         """All rows in one table, and each remark once, with the values it is about unless it is about all."""
-        rows = [(value, row) for value, result in self._points() for row in result.rows()]
-        table = Table.of("sweep", "", [row for _, row in rows])
-        yield table.beside(Column(self.key, digits=6, key=self.key), [value for value, _ in rows])
+        points = list(zip(self.values, self.results, strict=True))
+        key = Column(self.key, digits=6, key=self.key)
+        cells = tuple((value, *row) for value, result in points for row in result.table().cells)
+        yield Table("sweep", "", (key, *self.results[0].table().columns), cells)
         for remark in dict.fromkeys(chain(*(result.remarks() for result in self.results))):
-            of = [shown(value, 6) for value, result in self._points() if remark in result.remarks()]
+            of = [shown(value, 6) for value, result in points if remark in result.remarks()]
             yield f"{remark} ({self.key} {', '.join(of)})" if len(of) < len(self.values) else remark
 
     def problems(self) -> Sequence[str]:
@@ -79,9 +80,6 @@ class Sweep(Generic[Result]):
         results = json.loads(to_json(self.results))
         rows = [{self.key: value} | result for value, result in zip(self.values, results, strict=True)]
         return json.dumps(rows, indent=2, ensure_ascii=False) + "\n"
-
-    def _points(self) -> Iterator[tuple[Value, Result]]:
-        return zip(self.values, self.results, strict=True)
 
 
 def sweep(

@@ -61,15 +61,15 @@ class FormulaResult:
     seconds: float | None = None
     values: tuple[MaterialValue, ...] = ()
 
-    def rows(self) -> Sequence["FormulaResult"]:
-        """The only row."""
-        return (self,)
+    def table(self) -> Table:
+        """One row."""
+        return Table.of("formula", "", (self,))
 
     def document(self) -> Iterator[Part]:
         """The value and its source."""
         pressed = f", pressed by {self.press_mm:g} mm" if self.press_mm is not None else ""
         yield f"{self.design}{pressed}; without bounds"
-        yield Table.of("formula", "", self.rows())
+        yield self.table()
         yield self.reason
 
     def remarks(self) -> Sequence[str]:

@@ -1,5 +1,6 @@
 """Layers as regions in plan: what every body covers at one height, as polygons [mm]."""
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -8,11 +9,13 @@ from typing import TypeAlias
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from sensorgen.scene.scene import SLIVER_MM, Body, Outline, Prism, Scene, box, rectangle, rounded
 
 Region: TypeAlias = Polygon | MultiPolygon
+EMPTY = MultiPolygon()
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class LayerRegions:
 
     def region(self, body: str) -> Region:
         """What a body covers; empty where it is absent."""
-        return self.regions.get(body, MultiPolygon())
+        return self.regions.get(body, EMPTY)
 
     def mapped(self, regions: Mapping[str, Region]) -> "LayerRegions":
         """The layer with other regions, empty ones left out."""
@@ -78,10 +81,10 @@ def cleaned(region: Region) -> Region:
     return shapely.multipolygons(found[wide])
 
 
-def is_box(part: Polygon) -> bool:
-    """Whether a polygon is a rectangle along the axes."""
-    x0, y0, x1, y1 = part.bounds
-    return bool(abs((x1 - x0) * (y1 - y0) - part.area) < SLIVER_MM**2)
+def are_boxes(polygons: Sequence[Polygon] | NDArray[np.object_]) -> NDArray[np.bool_]:
+    """Which polygons are rectangles along the axes (n,)."""
+    x0, y0, x1, y1 = shapely.bounds(polygons).T
+    return np.asarray(abs((x1 - x0) * (y1 - y0) - shapely.area(polygons)) < SLIVER_MM**2)
 
 
 def is_rectilinear(region: Region) -> bool:
@@ -92,13 +95,16 @@ def is_rectilinear(region: Region) -> bool:
     return bool((steps[ring[1:] == ring[:-1]] < SLIVER_MM).all())
 
 
-def narrow_mm(part: Polygon) -> float:
-    """Smaller side of the smallest rectangle around a polygon [mm]."""
-    x0, y0, x1, y1 = part.bounds
-    if is_box(part):
-        return float(min(x1 - x0, y1 - y0))
-    around = np.diff(shapely.get_coordinates(shapely.minimum_rotated_rectangle(part))[:3], axis=0)
-    return float(np.hypot(*around.T).min())
+def narrow_mm(polygons: Sequence[Polygon] | NDArray[np.object_]) -> NDArray[np.float64]:
+    """Smaller side of the smallest rectangle around each polygon (n,) [mm]."""
+    found = np.array(polygons, dtype=object)
+    x0, y0, x1, y1 = shapely.bounds(found).T
+    narrow: NDArray[np.float64] = np.minimum(x1 - x0, y1 - y0)
+    turned = ~are_boxes(found)
+    if turned.any():
+        corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(found[turned])).reshape(-1, 5, 2)
+        narrow[turned] = np.hypot(*np.diff(corners[:, :3], axis=1).T).min(axis=0)
+    return narrow
 
 
 def drawn(scene: Scene, boundaries_mm: Sequence[float]) -> tuple[LayerRegions, ...]:
@@ -132,13 +138,16 @@ def region_at(body: Body, z_mm: float) -> Region:
 @lru_cache(maxsize=64)
 def _united(outlines: frozenset[Outline]) -> Region:
     """Union of outlines; equal layers share one."""
-    return united([Polygon(outline) for outline in outlines])
+    by_corners = defaultdict(list)
+    for outline in outlines:
+        by_corners[len(outline)].append(outline)
+    return united([part for alike in by_corners.values() for part in shapely.polygons(np.array(alike))])
 
 
 def _along(regions: Mapping[str, Region], scene: Scene) -> str:
     """The axis along which everything runs from edge to edge, "y" first; "" where there is none."""
-    found = [part for region in regions.values() for part in parts(region)]
-    if not all(map(is_box, found)):
+    found = shapely.get_parts(list(regions.values()))
+    if not are_boxes(found).all():
         return ""
     low, high = shapely.bounds(found).reshape(-1, 2, 2).swapaxes(0, 1)
     whole = (low < SLIVER_MM) & (high > np.array(scene.size_mm[:2]) - SLIVER_MM)
@@ -179,11 +188,12 @@ def outlines(region: Region) -> Iterator[Outline]:
     """Outlines without holes that together are a region: rectangles where all its edges run along the axes."""
     for part in parts(region):
         x0, y0, x1, y1 = part.bounds
-        at = None if is_box(part) else _cut_at(part)
+        is_box = are_boxes([part])[0]
+        at = None if is_box else _cut_at(part)
         if at is not None:
             for left, right in ((x0, at), (at, x1)):
                 yield from outlines(shapely.clip_by_rect(part, left, y0, right, y1))
-        elif is_box(part):
+        elif is_box:
             yield rectangle(x0, x1, y0, y1)
         else:
             corners = shapely.get_coordinates(shapely.simplify(part, SLIVER_MM))[:-1]

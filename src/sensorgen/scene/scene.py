@@ -4,7 +4,7 @@ Plain data without a CAD kernel. Drawing, checks, meshes, solids and models all 
 disagree about the sensor. x runs along the sensor, y across it, z up; the corner is at 0, 0, 0.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from math import isfinite
 
@@ -47,9 +47,9 @@ class Prism:
         """Refuse outlines that no body can have, and turn those that run clockwise."""
         reason = _no_outline(self.outline)
         if reason:
-            raise BadInput(
-                f"an outline {reason}: {_told(self.outline)}; expected at least three corners around an area, each once"
-            )
+            some = ", ".join(f"({u:.6g}, {v:.6g})" for u, v in self.outline[:_TOLD])
+            told = some + (", ..." if len(self.outline) > _TOLD else "") or "none"
+            raise BadInput(f"an outline {reason}: {told}; expected at least three corners around an area, each once")
         if area_mm2(self.outline) < 0:
             object.__setattr__(self, "outline", self.outline[::-1])
 
@@ -81,7 +81,15 @@ class Prism:
         if axis == self.axis:
             return [self.outline] if self.start_mm <= at_mm < self.end_mm else []
         here = PLANE[self.axis].index(axis)
-        runs = _crossings([(p[here], p[1 - here]) for p in self.outline], at_mm)
+        # Intervals in which the plane runs inside the outline
+        points = [(p[here], p[1 - here]) for p in self.outline]
+        edges = zip(points, points[1:] + points[:1], strict=True)
+        heights = sorted(
+            a[1] if a[1] == b[1] else a[1] + (at_mm - a[0]) / (b[0] - a[0]) * (b[1] - a[1])
+            for a, b in edges
+            if (a[0] <= at_mm) != (b[0] <= at_mm)
+        )
+        runs = list(zip(heights[::2], heights[1::2], strict=True))
         if PLANE[axis].index(self.axis) == 0:
             return [rectangle(self.start_mm, self.end_mm, low, high) for low, high in runs]
         return [rectangle(low, high, self.start_mm, self.end_mm) for low, high in runs]
@@ -221,12 +229,6 @@ def _no_outline(outline: Outline) -> str:
     return "encloses nothing" if abs(area) < SLIVER_MM**2 else ""
 
 
-def _told(outline: Outline) -> str:
-    """The first corners of an outline, in words [mm]."""
-    some = ", ".join(f"({u:.6g}, {v:.6g})" for u, v in outline[:_TOLD])
-    return some + (", ..." if len(outline) > _TOLD else "") or "none"
-
-
 def clipped(outline: Iterable[Point], end_mm: float) -> Outline:
     """The part of an outline with first coordinate between 0 and ``end_mm`` [mm], exactly.
 
@@ -238,32 +240,17 @@ def clipped(outline: Iterable[Point], end_mm: float) -> Outline:
     """
     points = [(rounded(u), rounded(v)) for u, v in outline]
     for sign, limit in ((-1.0, 0.0), (1.0, end_mm)):
-        points = list(_half_plane(points, sign, limit))
+        kept: list[Point] = []  # on the near side of a vertical line (Sutherland and Hodgman, 1974)
+        for a, b in zip(points[-1:] + points[:-1], points, strict=True):
+            a_in, b_in = sign * (a[0] - limit) <= 0, sign * (b[0] - limit) <= 0
+            if a_in != b_in:
+                share = (limit - a[0]) / (b[0] - a[0])
+                kept.append((limit, round(a[1] + share * (b[1] - a[1]), 12)))
+            kept += [b] if b_in else []
+        points = kept
     distinct = tuple(p for k, p in enumerate(points) if p != points[k - 1])
     width = max((p[0] for p in distinct), default=0.0) - min((p[0] for p in distinct), default=0.0)
     return distinct if len(distinct) > 2 and width > SLIVER_MM else ()
-
-
-def _half_plane(points: list[Point], sign: float, limit: float) -> Iterator[Point]:
-    """Corners of the part of an outline on the near side of a vertical line (Sutherland and Hodgman, 1974)."""
-    for a, b in zip(points[-1:] + points[:-1], points, strict=True):
-        a_in, b_in = sign * (a[0] - limit) <= 0, sign * (b[0] - limit) <= 0
-        if a_in != b_in:
-            share = (limit - a[0]) / (b[0] - a[0])
-            yield (limit, round(a[1] + share * (b[1] - a[1]), 12))
-        if b_in:
-            yield b
-
-
-def _crossings(points: list[Point], at_mm: float) -> list[Point]:
-    """Intervals in which the line ``first coordinate = at_mm`` runs inside an outline [mm]."""
-    edges = zip(points, points[1:] + points[:1], strict=True)
-    heights = sorted(
-        a[1] if a[1] == b[1] else a[1] + (at_mm - a[0]) / (b[0] - a[0]) * (b[1] - a[1])
-        for a, b in edges
-        if (a[0] <= at_mm) != (b[0] <= at_mm)
-    )
-    return list(zip(heights[::2], heights[1::2], strict=True))
 
 
 def _turned(prism: Prism, size_mm: tuple[float, float, float]) -> Prism:

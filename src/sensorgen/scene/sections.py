@@ -1,7 +1,6 @@
 """Cross-sections of a scene, and the vertical columns that they are made of."""
 
 from bisect import bisect_left
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -121,12 +120,11 @@ def columns(section: Section) -> list[Column]:
 def alike(section: Section) -> list[int]:
     """Of each column, the number of the first that looks like it: as wide, of the same bodies at the same heights."""
     firsts: dict[object, int] = {}
-    return [firsts.setdefault(_look(column), k) for k, column in enumerate(_columns(section))]
-
-
-def _look(column: Column) -> object:
-    lines = ((layer.body.name, *map(rounded, (*layer.bottom_mm, *layer.top_mm))) for layer in column.layers)
-    return rounded(column.right_mm - column.left_mm), *lines
+    found = []
+    for k, column in enumerate(_columns(section)):
+        lines = ((layer.body.name, *map(rounded, (*layer.bottom_mm, *layer.top_mm))) for layer in column.layers)
+        found.append(firsts.setdefault((rounded(column.right_mm - column.left_mm), *lines), k))
+    return found
 
 
 @lru_cache(maxsize=8)
@@ -141,7 +139,7 @@ def _columns(section: Section) -> list[Column]:
                 left, right = va + (cuts[k] - ua) * slope, va + (cuts[k + 1] - ua) * slope
                 edges[k].append(((left, vb if cuts[k + 1] == ub else right), number))
     return [
-        Column(left, right, tuple(_layers(section, found)))
+        Column(left, right, _layers(section, found))
         for (left, right), found in zip(pairwise(cuts), edges, strict=True)
         if right - left > ROUNDING_MM
     ]
@@ -162,17 +160,13 @@ def overlap(scene: Scene) -> str | None:
     return None
 
 
-def _layers(section: Section, edges: list[tuple[Point, int]]) -> Iterator[Layer]:
+def _layers(section: Section, edges: list[tuple[Point, int]]) -> tuple[Layer, ...]:
     by_region: dict[int, list[Point]] = {}
     for line, number in edges:
         by_region.setdefault(number, []).append(line)
-    layers = [
-        Layer(section.regions[number][0], low, high)
-        for number, lines in by_region.items()
-        for low, high in _pairs(sorted(lines, key=sum))
-    ]
-    yield from sorted(layers, key=lambda layer: sum(layer.bottom_mm) + sum(layer.top_mm))
-
-
-def _pairs(lines: list[Point]) -> Iterator[tuple[Point, Point]]:
-    yield from zip(lines[::2], lines[1::2], strict=True)
+    layers = []
+    for number, lines in by_region.items():
+        rising = sorted(lines, key=sum)
+        body = section.regions[number][0]
+        layers += [Layer(body, low, high) for low, high in zip(rising[::2], rising[1::2], strict=True)]
+    return tuple(sorted(layers, key=lambda layer: sum(layer.bottom_mm) + sum(layer.top_mm)))

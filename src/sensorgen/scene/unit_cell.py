@@ -6,7 +6,7 @@ no fringe arises there; a section without such planes is continued by its own mi
 """
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from itertools import pairwise
@@ -112,8 +112,18 @@ def cell(section: Section, height_mm: float, evenly: bool = True) -> Cell:
 
 def mirrored(slices: list[Slice], evenly: bool = True) -> Cell:
     """The smallest run of slices that mirrors at its own two sides continue to all of them."""
-    whole = _straightened(slices)
-    places = _candidates(whole)
+    # Slices as wide as their interfaces are straight
+    whole: list[Slice] = []
+    for here in slices:
+        last = whole[-1] if whole else None
+        joined = Slice(last.left_mm, here.right_mm, _bridged(last, here)) if last else None
+        if last and joined and len(joined.bands) == len(last.bands) and _runs_on(joined, last, here):
+            whole[-1] = joined
+        else:
+            whole.append(here)
+    # Where a mirror may stand: between slices, and in the middle of level ones
+    edges = {whole[0].left_mm, *(s.right_mm for s in whole)}
+    places = sorted(edges | {(s.left_mm + s.right_mm) / 2 for s in whole if s.is_flat()})
     end = whole[-1].right_mm
     is_mirror = cache(partial(_is_mirror, whole))
     for fits in (_is_even, _has_room) if evenly else (_shows_periods, _is_even, _has_room):
@@ -137,11 +147,7 @@ def _slice(column: Column, height_mm: float) -> Slice:
         bands.append(Band("" if terminal else layer.body.material, terminal, layer.bottom_mm, layer.top_mm))
         at = layer.top_mm
     bands.append(Band("air", "", at, (height_mm, height_mm)))
-    return Slice(column.left_mm, column.right_mm, tuple(_joined(bands)))
-
-
-def _joined(bands: Iterable[Band]) -> list[Band]:
-    """Bands without those of no height, and neighbours of one material as one."""
+    # Bands without those of no height, and neighbours of one material as one
     found: list[Band] = []
     for band in bands:
         if max(t - b for b, t in zip(band.bottom_mm, band.top_mm, strict=True)) <= ROUNDING_MM:
@@ -149,20 +155,7 @@ def _joined(bands: Iterable[Band]) -> list[Band]:
         if found and found[-1].is_same(band):
             band = Band(band.material, band.terminal, found.pop().bottom_mm, band.top_mm)
         found.append(band)
-    return found
-
-
-def _straightened(slices: Iterable[Slice]) -> list[Slice]:
-    """Slices as wide as their interfaces are straight."""
-    found: list[Slice] = []
-    for here in slices:
-        last = found[-1] if found else None
-        joined = Slice(last.left_mm, here.right_mm, _bridged(last, here)) if last else None
-        if last and joined and len(joined.bands) == len(last.bands) and _runs_on(joined, last, here):
-            found[-1] = joined
-        else:
-            found.append(here)
-    return found
+    return Slice(column.left_mm, column.right_mm, tuple(found))
 
 
 def _bridged(last: Slice, here: Slice) -> tuple[Band, ...]:
@@ -179,12 +172,6 @@ def _runs_on(joined: Slice, last: Slice, here: Slice) -> bool:
     middle = joined.lines_mm(here.left_mm)
     lines = zip(middle, last.lines_mm(last.right_mm), here.lines_mm(here.left_mm), strict=True)
     return all(max(abs(m - a), abs(m - b)) < ROUNDING_MM for m, a, b in lines)
-
-
-def _candidates(slices: list[Slice]) -> list[float]:
-    """Where a mirror may stand: between slices, and in the middle of level ones."""
-    edges = {slices[0].left_mm, *(s.right_mm for s in slices)}
-    return sorted(edges | {(s.left_mm + s.right_mm) / 2 for s in slices if s.is_flat()})
 
 
 def _is_even(start_mm: float, piece_mm: float, whole_mm: float) -> bool:
@@ -262,33 +249,22 @@ def _folded(slices: list[Slice], low: float, high: float) -> Iterator[Slice]:
         for k in range(first, last + 1):
             start = low + k * width
             for piece in _cut([s], start, start + width):
-                yield _mirrored(piece, start, width, low) if k % 2 else _moved(piece, low - start)
-
-
-def _moved(piece: Slice, by_mm: float) -> Slice:
-    return Slice(piece.left_mm + by_mm, piece.right_mm + by_mm, piece.bands)
-
-
-def _mirrored(piece: Slice, start: float, width: float, low: float) -> Slice:
-    bands = tuple(Band(b.material, b.terminal, b.bottom_mm[::-1], b.top_mm[::-1]) for b in piece.bands)
-    end = 2 * start + width
-    return Slice(end - piece.right_mm + low - start, end - piece.left_mm + low - start, bands)
+                left, right, bands = piece.left_mm - start, piece.right_mm - start, piece.bands
+                if k % 2:
+                    left, right = width - right, width - left
+                    bands = tuple(Band(b.material, b.terminal, b.bottom_mm[::-1], b.top_mm[::-1]) for b in bands)
+                yield Slice(low + left, low + right, bands)
 
 
 def _cell(slices: list[Slice], low: float, high: float) -> Cell:
     """The piece between two places, cut where a sensor's end falls into it, and how often each part occurs."""
     pieces = [(p.left_mm, p.right_mm) for p in _folded(slices, low, high)]
     inside = _cut(slices, low, high)
-    ends = _distinct(
-        sorted({x for piece in pieces for x in piece} | {x for s in inside for x in (s.left_mm, s.right_mm)})
-    )
-    parts = [p for a, b in pairwise(ends) for p in _cut(inside, a, b)]
+    ends = sorted({x for piece in pieces for x in piece} | {x for s in inside for x in (s.left_mm, s.right_mm)})
+    distinct = [x for k, x in enumerate(ends) if k == 0 or x - ends[k - 1] > 10 * ROUNDING_MM]
+    parts = [p for a, b in pairwise(distinct) for p in _cut(inside, a, b)]
     middles = [(p.left_mm + p.right_mm) / 2 for p in parts]
     shares = [float(sum(a < m < b for a, b in pieces)) for m in middles]
     if max(shares) == min(shares):
         return Cell(tuple(inside), (shares[0],) * len(inside))
     return Cell(tuple(parts), tuple(shares))
-
-
-def _distinct(values: list[float]) -> list[float]:
-    return [v for k, v in enumerate(values) if k == 0 or v - values[k - 1] > 10 * ROUNDING_MM]

@@ -10,10 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.solvers.line.inputs import check_fit, passive
-
-Matrix = NDArray[np.complex128]  # (..., n, n)
 
 _SMALL = 0.25  # of R Y l^2, up to which the series below serves
 _LITTLE = 0.5  # of a voltage
@@ -23,11 +22,11 @@ _TERMS = 17  # of exp(N l) with |N l| up to 0.5: the next is below 1e-19 of the 
 class Line(NamedTuple):
     """What a length of line is made of, per length, and how these matrices move in one direction of interest."""
 
-    series: Matrix  # R [ohm/m]
-    shunt: Matrix  # Y [S/m]
-    by_series: Matrix | float = 0.0
-    by_shunt: Matrix | float = 0.0
-    by_tilt: Matrix | float = 0.0  # A [1/m]
+    series: Complex  # R [ohm/m]
+    shunt: Complex  # Y [S/m]
+    by_series: Complex | float = 0.0
+    by_shunt: Complex | float = 0.0
+    by_tilt: Complex | float = 0.0  # A [1/m]
 
 
 class Piece(NamedTuple):
@@ -43,10 +42,10 @@ class Piece(NamedTuple):
         S, the voltage that arrives at an open far end, and 1 - S [-]: each keeps its digits where it is small.
     """
 
-    opened: Matrix
-    shorted: Matrix
-    passed: Matrix
-    lost: Matrix
+    opened: Complex
+    shorted: Complex
+    passed: Complex
+    lost: Complex
 
 
 class Moving(NamedTuple):
@@ -56,7 +55,7 @@ class Moving(NamedTuple):
     by: Piece
 
 
-def piece(line: Line, length_m: NDArray[np.float64]) -> Moving:
+def piece(line: Line, length_m: Real) -> Moving:
     """A length of line, by halving it until a series serves, and doubling that again.
 
     Parameters
@@ -66,50 +65,30 @@ def piece(line: Line, length_m: NDArray[np.float64]) -> Moving:
     length_m : array
         Length, with two axes of 1 at its end [m].
     """
-    halvings = _halvings(line, length_m)
+    # How often to halve: the sum of R_kk |Y_kk| bounds every eigenvalue of R Y, whatever the units of each film
+    rates = np.einsum("...kk,...kk->...", line.series, np.abs(line.shunt))
+    size = float(np.max(rates.real * length_m[..., 0, 0] ** 2, initial=0.0))
+    if not np.isfinite(size):
+        raise OutOfRange("the stack's numbers are too extreme for double precision")
+    halvings = max(0, int(np.ceil(np.log2(size / _SMALL) / 2))) if size > _SMALL else 0
     made = _short(line, length_m * 0.5**halvings)
     for _ in range(halvings):
         made = _doubled(made)
     return made
 
 
-def _halvings(line: Line, length_m: NDArray[np.float64]) -> int:
-    """How often to halve: the sum of R_kk |Y_kk| bounds every eigenvalue of R Y, whatever the units of each film."""
-    rates = np.einsum("...kk,...kk->...", line.series, np.abs(line.shunt))
-    size = float(np.max(rates.real * length_m[..., 0, 0] ** 2, initial=0.0))
-    if not np.isfinite(size):
-        raise OutOfRange("the stack's numbers are too extreme for double precision")
-    return max(0, int(np.ceil(np.log2(size / _SMALL) / 2))) if size > _SMALL else 0
-
-
-def _short(line: Line, length_m: NDArray[np.float64]) -> Moving:
+def _short(line: Line, length_m: Real) -> Moving:
     """A piece so short that the exponential of its equations is a few terms of its series."""
     n = line.series.shape[-1]
     generator = _generator(line.series, line.shunt, 0.0) * length_m
     moved = _generator(line.by_series, line.by_shunt, line.by_tilt, like=generator) * length_m
-    power: Matrix = np.eye(2 * n, dtype=complex)
+    power: Complex = np.eye(2 * n, dtype=complex)
     by_power = np.zeros_like(power)
     grown, by_grown = np.zeros_like(generator), np.zeros_like(moved)
     for k in range(1, _TERMS + 1):
         power, by_power = power @ generator / k, (by_power @ generator + power @ moved) / k
         grown, by_grown = grown + power, by_grown + by_power
-    return Moving(*_seen(grown, by_grown, n))
-
-
-def _generator(
-    series: Matrix | float, shunt: Matrix | float, tilt: Matrix | float, like: Matrix | None = None
-) -> Matrix:
-    """[[A, -R], [-Y, -A^T]]."""
-    n = np.shape(series)[-1] if like is None else like.shape[-1] // 2
-    blocks = [np.zeros((n, n), complex) + block for block in (tilt, series, shunt)]
-    a, r, y = np.broadcast_arrays(*blocks)
-    return np.concatenate(
-        [np.concatenate([a, -r], axis=-1), np.concatenate([-y, -np.swapaxes(a, -1, -2)], axis=-1)], axis=-2
-    )
-
-
-def _seen(grown: Matrix, by_grown: Matrix, n: int) -> tuple[Piece, Piece]:
-    """A piece from its transfer matrix exp(N l) less 1, v and i at the far end from those at the near one."""
+    # ``grown`` is the transfer matrix exp(N l) less 1: v and i at the far end from those at the near one.
     shunt, series, rest = grown[..., n:, :n], grown[..., :n, n:], grown[..., n:, n:]
     by_shunt, by_series, by_rest = by_grown[..., n:, :n], by_grown[..., :n, n:], by_grown[..., n:, n:]
     inverse = np.linalg.inv(np.eye(n) + rest)
@@ -119,7 +98,19 @@ def _seen(grown: Matrix, by_grown: Matrix, n: int) -> tuple[Piece, Piece]:
     by = Piece(
         -inverse @ (by_shunt + by_rest @ opened), -(by_series + shorted @ by_rest) @ inverse, -by_lost, by_lost
     )  # fmt: skip
-    return found, by
+    return Moving(found, by)
+
+
+def _generator(
+    series: Complex | float, shunt: Complex | float, tilt: Complex | float, like: Complex | None = None
+) -> Complex:
+    """[[A, -R], [-Y, -A^T]]."""
+    n = np.shape(series)[-1] if like is None else like.shape[-1] // 2
+    blocks = [np.zeros((n, n), complex) + block for block in (tilt, series, shunt)]
+    a, r, y = np.broadcast_arrays(*blocks)
+    return np.concatenate(
+        [np.concatenate([a, -r], axis=-1), np.concatenate([-y, -np.swapaxes(a, -1, -2)], axis=-1)], axis=-2
+    )
 
 
 def _doubled(moving: Moving) -> Moving:
@@ -131,8 +122,17 @@ def _doubled(moving: Moving) -> Moving:
     turn_1, turn_2 = behind @ by.passed, before @ _turned(by.passed)
     lost = lost + passed @ (meet.lost + meet.passed @ lost)
     by_passed = by.passed @ halfway + passed @ (by_meet.passed @ passed + meet.passed @ by.passed)
+    # S is a product where little arrives, and 1 less what is lost where much does: a product's errors double.
+    product = passed @ halfway
+    largest = np.abs(np.einsum("...kk->...k", product)).max(axis=-1)[..., None, None]
+    arriving = np.where(largest < _LITTLE, product, np.eye(lost.shape[-1]) - lost)
     return Moving(
-        Piece(opened + behind @ passed, shorted + before @ _turned(passed), _arriving(passed @ halfway, lost), lost),
+        Piece(
+            opened + behind @ passed,
+            shorted + before @ _turned(passed),
+            arriving,
+            lost,
+        ),
         Piece(
             by.opened + _turned(passed) @ by_meet.opened @ passed + turn_1 + _turned(turn_1),
             by.shorted + passed @ by_meet.shorted @ _turned(passed) + turn_2 + _turned(turn_2),
@@ -142,13 +142,7 @@ def _doubled(moving: Moving) -> Moving:
     )
 
 
-def _arriving(product: Matrix, lost: Matrix) -> Matrix:
-    """S, as a product where little arrives, and as 1 less what is lost where much does: a product's errors double."""
-    largest = np.abs(np.einsum("...kk->...k", product)).max(axis=-1)[..., None, None]
-    return np.where(largest < _LITTLE, product, np.eye(lost.shape[-1]) - lost)
-
-
-def ahead(moving: Moving, admittance: Matrix, by: Matrix) -> tuple[Matrix, Matrix]:
+def ahead(moving: Moving, admittance: Complex, by: Complex) -> tuple[Complex, Complex]:
     """Admittance before a piece, and its derivative, from those behind it [S]."""
     (opened, shorted, passed, _), by_piece = moving
     meet = Meeting(shorted, admittance)
@@ -163,19 +157,19 @@ def ahead(moving: Moving, admittance: Matrix, by: Matrix) -> tuple[Matrix, Matri
 class Meeting:
     """Where a piece with the impedance X behind it meets an admittance W: what v before it makes of v, i after."""
 
-    def __init__(self, impedance: Matrix, admittance: Matrix) -> None:
+    def __init__(self, impedance: Complex, admittance: Complex) -> None:
         """Solve with scaled unknowns, so that films of very different admittance keep their digits."""
         n = admittance.shape[-1]
         size = np.abs(np.einsum("...kk->...k", admittance))
         scale = np.exp2(np.rint(np.log2(np.where(size > 0, size, 1.0)) / 2))
         across = scale[..., :, None] / scale[..., None, :]
         inverse = np.linalg.inv(np.eye(n) + across * (impedance @ admittance))
-        self.passed: Matrix = inverse / across  # type: ignore[assignment]
-        self.admittance: Matrix = admittance @ self.passed
-        self.impedance: Matrix = self.passed @ impedance
-        self.lost: Matrix = self.impedance @ admittance  # 1 - passed
+        self.passed: Complex = inverse / across  # type: ignore[assignment]
+        self.admittance: Complex = admittance @ self.passed
+        self.impedance: Complex = self.passed @ impedance
+        self.lost: Complex = self.impedance @ admittance  # 1 - passed
 
-    def slopes(self, by_impedance: Matrix, by_admittance: Matrix) -> Piece:
+    def slopes(self, by_impedance: Complex, by_admittance: Complex) -> Piece:
         """Derivatives of ``admittance``, ``impedance``, ``passed`` and ``lost`` by X and W."""
         inward = by_admittance @ self.passed
         outward = self.passed @ by_impedance
@@ -188,14 +182,11 @@ class Meeting:
         )
 
 
-def _turned(matrix: Matrix) -> Matrix:
+def _turned(matrix: Complex) -> Complex:
     return np.swapaxes(matrix, -1, -2)
 
 
-Real = NDArray[np.float64]
-
-
-def march(lines: Sequence[Line], lengths: Sequence[Real]) -> tuple[Matrix, Matrix]:
+def march(lines: Sequence[Line], lengths: Sequence[Real]) -> tuple[Complex, Complex]:
     """Admittance at the contacts and its derivative, from the open far end; the stack may be of any sections."""
     n = lines[0].series.shape[-1]
     w = by = np.zeros((n, n), complex)
@@ -207,7 +198,7 @@ def march(lines: Sequence[Line], lengths: Sequence[Real]) -> tuple[Matrix, Matri
     return w, by
 
 
-def inverse(admittance_s: Matrix) -> Matrix:
+def inverse(admittance_s: Complex) -> Complex:
     """Z = 1/W with scaled unknowns; inf + 0j where a film carries no current."""
     size = np.abs(np.einsum("...kk->...k", admittance_s))
     idle = (size == 0).any(axis=-1)[..., None, None]
@@ -235,18 +226,15 @@ def loops(r: NDArray[Any]) -> NDArray[Any]:
     return found
 
 
-def diagonal(values: NDArray[Any]) -> Matrix:
+def diagonal(values: NDArray[Any]) -> Complex:
     """Admittance matrix of the films, which do not see each other."""
     return np.asarray(np.eye(values.shape[-1]) * values[..., None, :], complex)
 
 
-def directions(deep: int, *changes: Matrix | float) -> Matrix:
+def directions(deep: int, *changes: Complex | float) -> Complex:
     """The directions of interest along one axis in front of ``deep`` others."""
     found = np.stack(np.broadcast_arrays(*(np.asarray(change, complex) for change in changes)))
     return found.reshape(len(changes), *(1,) * (deep + 1 - found.ndim), *found.shape[1:])
-
-
-Complex = NDArray[np.complex128]
 
 
 class Body(NamedTuple):
@@ -301,7 +289,7 @@ def with_body(r: list[Any], y: list[Any], touching: Complex) -> tuple[list[Any],
     return [[*section, 0.0] for section in r], [[*section, touching * (k == 1)] for k, section in enumerate(y)]
 
 
-def reading(admittance_s: Matrix, across: Real, tie: Real, body_s: Complex, bridge: bool) -> Complex:
+def reading(admittance_s: Complex, across: Real, tie: Real, body_s: Complex, bridge: bool) -> Complex:
     """What the instrument reads between driven and low track [ohm].
 
     Parameters
@@ -324,7 +312,7 @@ def reading(admittance_s: Matrix, across: Real, tie: Real, body_s: Complex, brid
 _UNRELATED = 1e-12  # of the largest: singular values below it are rounding, and their directions undetermined
 
 
-def standard_errors(slopes: NDArray[np.complex128], noise: Real) -> Real:
+def standard_errors(slopes: Complex, noise: Real) -> Real:
     r"""Smallest standard errors of an unbiased estimate, none of the quantities being known beforehand.
 
     .. math:: \sigma_a^2 = (F^{-1})_{aa}, \quad

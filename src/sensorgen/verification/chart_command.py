@@ -1,18 +1,13 @@
 """``sensorgen chart``: every model on every standard scene, time against error."""
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
 from sensorgen.cli import show
 from sensorgen.cli.words import Ratio
-from sensorgen.core.errors import UnknownName, Unwritable
-
-if TYPE_CHECKING:
-    from sensorgen.verification.chart.measured import Point
+from sensorgen.core.errors import UnknownName
 
 FILES = ("chart.csv", "chart.png", "chart.html")
 
@@ -31,8 +26,13 @@ def command(scene: tuple[str, ...], budget: float, output: str, as_json: bool) -
     and chart.csv, which also says why a model is silent on a scene. The scenes are cells at rest and pressed, blocks,
     lines, sheets, stacks and printed tracks of which the answer is known from elsewhere.
     """
+    import csv
+    import io
+
     from sensorgen.analysis.plots.libraries import needed
+    from sensorgen.core import files as store
     from sensorgen.verification import chart
+    from sensorgen.verification.chart import plot
 
     needed("matplotlib", "plotly")
     for name in scene:
@@ -42,33 +42,15 @@ def command(scene: tuple[str, ...], budget: float, output: str, as_json: bool) -
     with show.progress(names) as step:
         points = chart.points(names, budget, step)
     rows = [vars(one) for one in (*points, *chart.silent(names, points))]
-    _write(Path(output), points, rows)
-    if as_json:
-        click.echo(json.dumps(rows, indent=2, ensure_ascii=False))
-    else:
-        for name in FILES:
-            click.echo(str(Path(output) / name))
-
-
-def _write(folder: Path, points: Sequence["Point"], rows: Sequence[dict[str, Any]]) -> None:
-    from sensorgen.core import files as store
-    from sensorgen.verification.chart import plot as chart
-
-    files = dict(zip(FILES, (_csv(rows).encode(), chart.png(points), chart.html(points).encode()), strict=True))
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise Unwritable(f"cannot write to {str(folder)!r}: {error.strerror or error}") from None
-    for name, content in files.items():
-        store.replace(folder / name, content)
-
-
-def _csv(rows: Sequence[dict[str, Any]]) -> str:
-    import csv
-    import io
-
     text = io.StringIO()
     table = csv.DictWriter(text, list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n")
     table.writeheader()
     table.writerows(rows)
-    return text.getvalue()
+    for name, content in zip(
+        FILES, (text.getvalue().encode(), plot.png(points), plot.html(points).encode()), strict=True
+    ):
+        store.replace(Path(output) / name, content)
+        if not as_json:
+            click.echo(str(Path(output) / name))
+    if as_json:
+        click.echo(json.dumps(rows, indent=2, ensure_ascii=False))

@@ -2,18 +2,13 @@
 
 import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from sensorgen.cli import FOUND_ERRORS, show
 from sensorgen.cli.words import OneOf
-from sensorgen.core.errors import Unwritable
-
-if TYPE_CHECKING:
-    from sensorgen.verification.thesis import Row
 
 FORMATS = ("html", "md", "json")
 
@@ -31,37 +26,21 @@ def command(output: str, formats: tuple[str, ...]) -> int:
 
     Ends with 1 where a value differs for an unknown reason. What takes long is solved once and kept.
     """
+    from sensorgen.core import files as store
     from sensorgen.verification import thesis
     from sensorgen.verification.thesis.items import CHAPTERS
+    from sensorgen.verification.thesis.verdicts import UNEXPLAINED, WORDS
 
     with show.progress(CHAPTERS) as step:
         rows = thesis.rows(step)
-    _write(Path(output), rows, formats)
-    return _verdict(rows)
-
-
-def _write(folder: Path, rows: Sequence["Row"], formats: Sequence[str]) -> None:
-    from sensorgen.core import files as store
-    from sensorgen.verification import thesis
-
-    made = {
-        "html": lambda: thesis.html(rows),
-        "md": lambda: thesis.markdown(rows),
-        "json": lambda: json.dumps(thesis.plain(rows), indent=2, ensure_ascii=False) + "\n",
-    }
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise Unwritable(f"cannot write to {str(folder)!r}: {error.strerror or error}") from None
+    made: dict[str, Callable[[Sequence[thesis.Row]], str]] = {
+        "html": thesis.html, "md": thesis.markdown,
+        "json": lambda rows: json.dumps(thesis.plain(rows), indent=2, ensure_ascii=False) + "\n",
+    }  # fmt: skip
     for name in dict.fromkeys(formats):
-        store.replace(folder / f"thesis.{name}", made[name]().encode())
-        click.echo(str(folder / f"thesis.{name}"))
-
-
-def _verdict(rows: Sequence["Row"]) -> int:
-    """How many of each, and 1 where something is unexplained."""
-    from sensorgen.verification.thesis.verdicts import UNEXPLAINED, WORDS
-
+        file = Path(output) / f"thesis.{name}"
+        store.replace(file, made[name](rows).encode())
+        click.echo(str(file))
     counts = Counter(row.verdict.word for row in rows)
     click.echo(", ".join(f"{counts[word]} {word}" for word in WORDS if counts[word]))
     for row in rows:

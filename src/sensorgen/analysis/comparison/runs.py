@@ -8,11 +8,10 @@ import numpy as np
 from sensorgen.core.errors import SensorgenError
 from sensorgen.measure.log import BenchRun, Log
 from sensorgen.measure.log.bench import read_again
-from sensorgen.measure.recording import joined_all
-from sensorgen.measure.recording.rig import RigLog
+from sensorgen.measure.recording import Joined, joined_all
 from sensorgen.measure.recording.samples import Complex, Real, Recording
 from sensorgen.measure.signal import presses
-from sensorgen.measure.signal.run import Processed, processed
+from sensorgen.measure.signal.run import processed
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,40 +70,26 @@ def runs(log: Log, iteration: int, left_out: list[tuple[str, str]]) -> Iterator[
 
 
 def _of_entry(log: Log, entry: BenchRun) -> Iterator[Run]:
+    """All lock-ins of a recording, each with the rig's log, or without if they cannot be joined."""
     found, pressed = read_again(log, entry)
-    beside, without = _beside(found, pressed)
-    for one in beside:
-        yield _brought(entry, one, without)
-
-
-def _beside(found: Sequence[Recording], pressed: RigLog | None) -> tuple[list[Processed], str]:
-    """All lock-ins of a recording, each with the rig's log, or without if they cannot be joined; and why without."""
-    if pressed is None:
-        return [processed(one) for one in found], "no log of the rig: force and position are not known"
-    try:
-        joined = joined_all(found, pressed)
-        return [processed(one, with_rig) for one, with_rig in zip(found, joined, strict=True)], ""
-    except SensorgenError as error:
-        return [processed(one) for one in found], f"not joined with the rig's log: {error}"
-
-
-def _brought(entry: BenchRun, done: Processed, without: str) -> Run:
-    one = done.recording
-    counts = {name: count for name, count in one.counts().items() if count and name not in ("samples", "valid")}
-    notes = [
-        *filter(None, [without]),
-        *done.notes,
-        *(f"{count} samples marked: {name}" for name, count in counts.items()),
-    ]
-    mean, error = _mean(done.pairs.before_ohm if done.pairs else one.impedance_ohm[one.valid()])
-    pairs = done.pairs if done.by_force else None
-    return Run(entry, one, done.filtered_s, done.filtered_ohm, mean, error, pairs, tuple(notes))
-
-
-def _mean(z: Complex) -> tuple[Complex, Complex]:
-    """Mean of rows, and the standard error of its parts."""
-    z = z[np.isfinite(z).all(axis=1)]
-    scatter = (
-        (z.real.std(axis=0, ddof=1) + 1j * z.imag.std(axis=0, ddof=1)) if len(z) > 1 else np.full(z.shape[1], np.nan)
-    )
-    return z.mean(axis=0), np.asarray(scatter / np.sqrt(max(len(z), 1)))
+    beside: Sequence[Joined | None] = [None] * len(found)
+    without = "no log of the rig: force and position are not known"
+    if pressed is not None:
+        try:
+            beside, without = joined_all(found, pressed), ""
+        except SensorgenError as error:
+            without = f"not joined with the rig's log: {error}"
+    for recording, with_rig in zip(found, beside, strict=True):
+        done = processed(recording, with_rig)
+        one = done.recording
+        marked = {name: count for name, count in one.counts().items() if count and name not in ("samples", "valid")}
+        marks = (f"{count} samples marked: {name}" for name, count in marked.items())
+        notes = (*filter(None, [without]), *done.notes, *marks)
+        z = done.pairs.before_ohm if done.pairs else one.impedance_ohm[one.valid()]
+        z = z[np.isfinite(z).all(axis=1)]
+        scatter = np.full(z.shape[1], complex("nan"))
+        if len(z) > 1:
+            scatter = z.real.std(axis=0, ddof=1) + 1j * z.imag.std(axis=0, ddof=1)
+        spread = np.asarray(scatter / np.sqrt(max(len(z), 1)))
+        pairs = done.pairs if done.by_force else None
+        yield Run(entry, one, done.filtered_s, done.filtered_ohm, z.mean(axis=0), spread, pairs, notes)

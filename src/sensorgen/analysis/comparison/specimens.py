@@ -166,7 +166,7 @@ def _evidence(reading: Reading, of: Predicted | None) -> Evidence:
     ry, rz = (tuple(v for v in values if v >= 0) for values in (reading.y_ohm, reading.z_ohm))
     return Evidence(
         reading.specimen, ry, rz, nan, reading.shape, reading.film_mm, reading.remark,
-        str(reading.iteration or ""), of is not None and of.touches,
+        of is not None and of.touches,
     )  # fmt: skip
 
 

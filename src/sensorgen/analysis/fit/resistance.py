@@ -12,13 +12,13 @@ from math import exp, isfinite, log
 import numpy as np
 
 from sensorgen.analysis.comparison import Compared
-from sensorgen.analysis.comparison.leaky import electrode_and_leak
 from sensorgen.analysis.fit.results import LEVEL, Fitted, Untold
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.materials import FILM_LEAK
 from sensorgen.design.values import resistivities
 from sensorgen.measure.recording.samples import Real
+from sensorgen.measure.signal.leakage import electrode_and_leak
 from sensorgen.prediction.electrodes import electrode_resistance
 
 RESISTIVITY = "resistivity_ohm_m"

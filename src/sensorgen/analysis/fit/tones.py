@@ -14,6 +14,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.materials import FILM_LEAK
 from sensorgen.measure.recording.samples import Complex, Real
 
+MODULUS = "youngs_modulus_pa"
 _SURE = 2.0  # standard errors on either side of a value
 _UNSURE = log(3.0)  # standard error of a logarithm from which on the data do not tell
 _FLOOR = 1e-4  # of ln Z: no bench is right to more
@@ -97,9 +98,33 @@ def values(fits: Sequence[OfRun]) -> list[Fitted | Untold]:
     """What the recordings say together, each counting the same."""
     if not fits:
         none = "no recording of the bench: resistances at direct current do not depend on it"
-        return [Untold(PERMITTIVITY, none), Untold("youngs_modulus_pa", none)]
-    film = fits[0].of.film
-    return [*_resistivity(fits), _permittivity(fits, film), _modulus(fits, film), _leak(fits, film)]
+        return [Untold(PERMITTIVITY, none), Untold(MODULUS, none)]
+    sensor, film = fits[0].of.model.sensor, fits[0].of.film
+    electrode = fits[0].of.body.design.slot("top_electrode")[0].name
+    along = [
+        (fit.resistivity[0] + log(fit.of.model.sensor.common_resistivity_ohm_m()), fit.resistivity[1]) for fit in fits
+    ]
+    moduli = [
+        (fit.stiffness[0] + log(t.value), fit.stiffness[1]) for fit in fits if fit.stiffness
+        for t in fit.of.model.values if t.material == film and t.quantity == MODULUS
+    ]  # fmt: skip
+    rho = f"Re Z of {len(fits)} recordings: one value for both electrodes, along them"
+    law = f"by the law of compression {sensor.compression.name}; all moduli move together"
+    modulus: Fitted | Untold = Untold(MODULUS, "no recording with presses whose force and position are known")
+    if moduli:
+        modulus = _value(film, MODULUS, _together(moduli), f"presses of {len(moduli)} recordings, {law}", len(moduli))
+    return [
+        _value(electrode, "resistivity_ohm_m", _together(along), rho, len(fits)), _permittivity(fits, film), modulus,
+        _leak(fits, film),
+    ]  # fmt: skip
+
+
+def _value(material: str, quantity: str, ln: tuple[float, float], note: str, count: int) -> Fitted | Untold:
+    """A value by the logarithm and its standard error, unless that leaves it open."""
+    at, error = ln
+    if error > _UNSURE:
+        return Untold(quantity, f"{count} recordings leave a factor of {exp(error):.3g} open")
+    return Fitted(material, quantity, exp(at), exp(at - _SURE * error), exp(at + _SURE * error), note)
 
 
 def _together(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
@@ -115,21 +140,6 @@ def _together(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
         return float(at[0]), own
     wider = float(stdtrit(count - 1, (1 + LEVEL) / 2)) / _SURE
     return float(at.mean()), max(own, wider * float(at.std(ddof=1)) / sqrt(count))
-
-
-def _resistivity(fits: Sequence[OfRun]) -> list[Fitted | Untold]:
-    factors = [(fit.resistivity[0] + log(fit.of.model.sensor.common_resistivity_ohm_m()), fit.resistivity[1])
-               for fit in fits]  # fmt: skip
-    at, error = _together(factors)
-    material = fits[0].of.body.design.slot("top_electrode")[0].name
-    if error > _UNSURE:
-        return [Untold("resistivity_ohm_m", f"Re Z of {len(fits)} recordings leaves a factor of {exp(error):.3g} open")]
-    return [Fitted(material, "resistivity_ohm_m", *_interval(at, error),
-                   f"Re Z of {len(fits)} recordings: one value for both electrodes, along them")]  # fmt: skip
-
-
-def _interval(at: float, error: float) -> tuple[float, float, float]:
-    return exp(at), exp(at - _SURE * error), exp(at + _SURE * error)
 
 
 def _permittivity(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
@@ -149,23 +159,8 @@ def _permittivity(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
         found.append((log(fit.of.permittivity) + at, sqrt(fit.capacitance[1] ** 2 + open_**2) / slope))
     at, _ = _together(found)
     error = max(_together(found)[1], max(e for _, e in found))  # bounds of a model do not average out
-    if error > _UNSURE:
-        return Untold(PERMITTIVITY, f"{len(fits)} recordings leave a factor of {exp(error):.3g} open")
-    return Fitted(film, PERMITTIVITY, *_interval(at, error),
-                  f"Im Z of {len(fits)} recordings; the interval holds the bounds of the cell's model")  # fmt: skip
-
-
-def _modulus(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
-    quantity = "youngs_modulus_pa"
-    found = [(fit.stiffness[0] + log(_modulus_of(fit, film)), fit.stiffness[1]) for fit in fits if fit.stiffness]
-    if not found:
-        return Untold(quantity, "no recording with presses whose force and position are known")
-    at, error = _together(found)
-    if error > _UNSURE:
-        return Untold(quantity, f"{len(found)} recordings leave a factor of {exp(error):.3g} open")
-    law = fits[0].of.model.sensor.compression.name
-    note = f"presses of {len(found)} recordings, by the law of compression {law}; all moduli move together"
-    return Fitted(film, quantity, *_interval(at, error), note)
+    note = f"Im Z of {len(fits)} recordings; the interval holds the bounds of the cell's model"
+    return _value(film, PERMITTIVITY, (at, error), note, len(fits))
 
 
 def _leak(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
@@ -180,7 +175,3 @@ def _leak(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
         return Untold("leak", f"{len(found)} recordings differ too much: {at:.2g} S/m2, give or take {error:.2g}")
     return Fitted(film, FILM_LEAK, at, at - _SURE * error, at + _SURE * error,
                   f"Z of {len(found)} recordings at their lowest tones")  # fmt: skip
-
-
-def _modulus_of(fit: OfRun, film: str) -> float:
-    return next(t.value for t in fit.of.model.values if t.material == film and t.quantity == "youngs_modulus_pa")

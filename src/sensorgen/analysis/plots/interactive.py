@@ -32,8 +32,15 @@ def _all_traces(panels: Sequence[Panel]) -> Iterator[Data]:
     """Of all panels; a name that comes again is not in the legend again."""
     named: set[str] = set()
     for k, panel in enumerate(panels):
+        places = ({"yaxis": f"y{k + 1}"} if k else {}) | ({"xaxis": f"x{k + 1}"} if k and not _alike(panels) else {})
         for part in panel.content:
-            for trace in _traces(part, panel, k, panels):
+            if isinstance(part, Body):
+                traces = [_body(part)]
+            elif isinstance(part, Map):
+                traces = [trace | places for trace in _map(part, panel, _domain(panels, k))]
+            else:
+                traces = [_curve(part, panel) | places]
+            for trace in traces:
                 if trace.get("showlegend"):
                     trace["showlegend"] = trace["name"] not in named
                     named.add(trace["name"])
@@ -118,19 +125,6 @@ def _scene(panel: Panel, stretch: tuple[float, float, float]) -> Data:
         "aspectmode": "manual", "aspectratio": dict(zip("xyz", (size / size.max() * 2).tolist(), strict=True)),
         "camera": {"eye": {"x": -0.75, "y": -1.25, "z": 0.75}},
     }  # fmt: skip
-
-
-def _traces(part: Curve | Map | Body, panel: Panel, k: int, panels: Sequence[Panel]) -> Iterator[Data]:
-    if isinstance(part, Body):
-        yield _body(part)
-        return
-    places = {"yaxis": f"y{k + 1}"} if k else {}
-    if k and not _alike(panels):
-        places["xaxis"] = f"x{k + 1}"
-    if isinstance(part, Map):
-        yield from (trace | places for trace in _map(part, panel, _domain(panels, k)))
-    else:
-        yield _curve(part, panel) | places
 
 
 def _body(body: Body) -> Data:

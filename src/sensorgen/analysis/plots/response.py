@@ -156,36 +156,34 @@ def inverse(of: Response, which: str) -> Figure:
     """
     unit = {"position": "mm", "force": "N"}[which]
     colour = np.broadcast_to(of.position_mm if which == "position" else of.force_n[:, None], of.folds().shape[1:])
-    lines = {
-        name: np.unique(np.linspace(0, len(v) - 1, min(LINES, len(v))).round().astype(int))
-        for name, v in (("force", of.force_n), ("position", of.position_mm))
-    }
-    forces, positions = (", ".join(f"{v:.3g}" for v in values[lines[name]])
-                         for name, values in (("force", of.force_n), ("position", of.position_mm)))  # fmt: skip
+    forces, positions = (
+        np.unique(np.linspace(0, len(v) - 1, min(LINES, len(v))).round().astype(int))
+        for v in (of.force_n, of.position_mm)
+    )
     choices = {}
     for k, f in enumerate(of.frequency_hz):
-        (r, r_unit), (x, x_unit) = (_scaled(of.values(part)[k]) for part in ("resistance", "reactance"))
+        r, x = of.values("resistance")[k], of.values("reactance")[k]
+        (r_divisor, r_unit), (x_divisor, x_unit) = scale(r, "Ω"), scale(x, "Ω")
+        r, x = r / r_divisor, x / x_divisor
         folded = of.folds()[k]
         content: tuple[Curve | Map, ...] = (
             Map(r, x, colour, f"{which} [{unit}]"),
-            *(Curve("line", "", r[j], x[j], colour="#000000") for j in lines["force"]),
-            *(Curve("line", "", r[:, i], x[:, i], colour="#000000", dash="dash") for i in lines["position"]),
+            *(Curve("line", "", r[j], x[j], colour="#000000") for j in forces),
+            *(Curve("line", "", r[:, i], x[:, i], colour="#000000", dash="dash") for i in positions),
             *([Curve("points", "", r[folded], x[folded], colour="#ff0000")] if folded.any() else []),
         )
         choices[frequency(f)] = (
             Panel(content, Axis(f"R [{r_unit}]"), Axis(f"X [{x_unit}]"), title=frequency(f)),
         )  # fmt: skip
     folds = "; red: folds" if of.folds().any() else ""
-    title = f"{which.capitalize()} from R and X\nsolid lines: {forces} N; dashed: {positions} mm{folds}"
+    solid, dashed = (
+        ", ".join(f"{v:.3g}" for v in values) for values in (of.force_n[forces], of.position_mm[positions])
+    )
+    title = f"{which.capitalize()} from R and X\nsolid lines: {solid} N; dashed: {dashed} mm{folds}"
     alt = (
         f"{which.capitalize()} in colours over R and X. Lines of constant force are solid, of constant position dashed."
     )
     return Figure(f"inverse-{which}", title, alt, choices, "frequency", columns=4)
-
-
-def _scaled(values: Real) -> tuple[Real, str]:
-    divisor, unit = scale(values, "Ω")
-    return values / divisor, unit
 
 
 def figures(of: Response) -> Iterator[Figure]:

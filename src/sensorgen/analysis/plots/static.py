@@ -83,37 +83,22 @@ def drawn(figure: Figure, panels: Sequence[Panel], title: str = "") -> "Drawn":
     made.suptitle(title, fontsize="large", x=0.01, ha="left", wrap=True)
     how: Any = {"projection": "3d"} if panels[0].solid else {}
     grid = made.subplots(len(rows), columns, squeeze=False, height_ratios=heights, subplot_kw=how).ravel().tolist()
-    for k, axes in enumerate(grid):
-        if k >= len(panels):
-            axes.set_axis_off()
-        else:
-            _panel(axes, panels[k], figure)
-            _labelled(axes, panels, k, columns)
-    if not figure.beside:
-        _legend(made, grid)
+    for axes in grid[len(panels) :]:
+        axes.set_axis_off()
+    for k, (axes, panel) in enumerate(zip(grid, panels, strict=False)):
+        _panel(axes, panel, figure)
+        if panel.solid:
+            axes.set(xlabel=panel.x.title, ylabel=panel.y.title, zlabel=panel.z.title)
+        else:  # titles of the axes: across under the last panel of those alike, upwards at the first one
+            below, before = panels[k + columns : k + columns + 1], panels[k - 1 : k] if k % columns else ()
+            axes.set_xlabel("" if below and below[0].x.title == panel.x.title else panel.x.title)
+            axes.set_ylabel("" if before and before[0].y.title == panel.y.title else panel.y.title)
+    handles = [axes.get_legend_handles_labels() for axes in grid]
+    named = {label: handle for pair in handles for handle, label in zip(*pair, strict=True)}
+    if named and not figure.beside:  # every name once, under the panels
+        ncols = min(len(named), 6 if made.get_figwidth() > 9 else 4)
+        made.legend(named.values(), named.keys(), loc="outside lower left", ncols=ncols, frameon=False)
     return made
-
-
-def _labelled(axes: "Axes", panels: Sequence[Panel], k: int, columns: int) -> None:
-    """Titles of the axes: across under the last panel of those alike, upwards at the first one."""
-    panel = panels[k]
-    below, before = panels[k + columns : k + columns + 1], panels[k - 1 : k] if k % columns else ()
-    if panel.solid:
-        axes.set(xlabel=panel.x.title, ylabel=panel.y.title, zlabel=panel.z.title)
-        return
-    axes.set_xlabel("" if below and below[0].x.title == panel.x.title else panel.x.title)
-    axes.set_ylabel("" if before and before[0].y.title == panel.y.title else panel.y.title)
-
-
-def _legend(made: "Drawn", grid: Sequence["Axes"]) -> None:
-    """Every name once, under the panels."""
-    named = {
-        label: handle for axes in grid
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-    }  # fmt: skip
-    if named:
-        columns = min(len(named), 6 if made.get_figwidth() > 9 else 4)
-        made.legend(named.values(), named.keys(), loc="outside lower left", ncols=columns, frameon=False)
 
 
 def _panel(axes: "Axes", panel: Panel, figure: Figure) -> None:

@@ -1,6 +1,6 @@
 """Content of a report, whatever it is written as."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Annotated
@@ -114,73 +114,48 @@ def report(log: Log, iteration: int, step: Callable[[str], None] = lambda _: Non
     step("recordings")
     recorded = list(runs(log, iteration, left_out))
     if not found.rows and not recorded:
-        raise BadInput(_no_readings(log, iteration, left_out))
+        known = ", ".join(map(str, known_iterations(log))) or "none"
+        lost = "; ".join(f"{what}: {why}" for what, why in left_out)
+        raise BadInput(
+            f"the log has no readings of iteration {iteration}{f' ({lost})' if lost else ''}; iterations in it: "
+            f"{known}. Log some with: sensorgen log multimeter SPECIMEN --y 0.65k --z OL"
+        )
     step("residuals")
     explanations = explained.explanations(found, recorded)
     impedances = recordings.impedances(recorded, found) if recorded else None
-    verdicts = bool(found.rows)
-    headline = [*electrodes.headline(found), *(yields.headline(found) if verdicts else ())]
-    findings = [
-        *(yields.findings(found) if verdicts else ()), *explained.sentences(explanations), *electrodes.findings(found)
-    ]  # fmt: skip
+    verdicts = (*yields.headline(found),) if found.rows else ()
+    shorts = (*yields.findings(found),) if found.rows else ()
+    headline = (*electrodes.headline(found), *verdicts)
+    findings = (*shorts, *explained.sentences(explanations), *electrodes.findings(found))
     step("variants")
-    sections = (
-        _measured(found, impedances),
-        _verdicts(found),
-        _explained(explanations),
-        _recordings(recorded),
-        Section("variants", "The variants", tuple(variants.figures(found)), variants.identifiability(found),
-                variants=variants.variants(found)),
-        Section("left-out", "What was left out, and why", tables=_left_out(left_out)),
-        Section("provenance", "Provenance", tables=(origins(log, found),)),
-    )  # fmt: skip
+    sections = list(_sections(log, found, recorded, explanations, impedances, left_out))
     step("page")
     return Report(
         iteration, datetime.now(UTC).isoformat(timespec="seconds"), (*headline, *recordings.headline(impedances)),
-        tuple(findings), tuple(s for s in sections if s.tables or s.figures or s.variants),
+        findings, tuple(s for s in sections if s.tables or s.figures or s.variants),
     )  # fmt: skip
 
 
-def _no_readings(log: Log, iteration: int, left_out: Sequence[tuple[str, str]]) -> str:
-    known = ", ".join(map(str, known_iterations(log))) or "none"
-    lost = "; ".join(f"{what}: {why}" for what, why in left_out)
-    return (
-        f"the log has no readings of iteration {iteration}{f' ({lost})' if lost else ''}; iterations in it: {known}. "
-        "Log some with: sensorgen log multimeter SPECIMEN --y 0.65k --z OL"
-    )
-
-
-def _measured(found: Comparison, impedances: Table | None) -> Section:
-    tables = [electrodes.readings(found)] if found.rows else []
-    drawn = [*electrodes.figures(found), *(recordings.residuals(impedances) if impedances else ())]
-    notes = electrodes.NOTES if found.rows else ()
-    return Section(
-        "measured", "Measured and predicted", tuple(drawn), (*tables, *([impedances] if impedances else [])), notes
-    )
-
-
-def _verdicts(found: Comparison) -> Section:
-    if not found.rows:
-        return Section("verdicts", "Verdicts and yield")
-    tables = (*([yields.table(found)] if len(found.last) > 1 else []), electrodes.reasons(found))
-    return Section("verdicts", "Verdicts and yield", yields.figures(found), tables, yields.notes(found))
-
-
-def _explained(found: Sequence[explained.Explanation]) -> Section:
-    notes = (
-        "Each parameter is moved alone, for all specimens together, until the squared residuals are least. Film "
-        "resistance is compared up to the meter's highest range, the prediction for a film without leakage; it is not "
-        "compared where the electrodes touch as drawn.",
-    )
-    tables = (explained.table(found),) if found else ()
-    return Section("explained-by", "Which parameter explains the residuals", (), tables, notes)
-
-
-def _recordings(recorded: Sequence[Run]) -> Section:
-    tables = (recordings.facts(recorded),) if recorded else ()
-    return Section("recorded", "Recordings", tuple(recordings.figures(recorded)), tables)
-
-
-def _left_out(rows: Sequence[tuple[str, str]]) -> tuple[Table, ...]:
-    caption = "What was left out, or taken with care, and why"
-    return (Table.of("left_out", caption, tuple(LeftOut(*row) for row in rows)),) if rows else ()
+def _sections(
+    log: Log, found: Comparison, recorded: Sequence[Run], explanations: Sequence[explained.Explanation],
+    impedances: Table | None, left_out: Sequence[tuple[str, str]],
+) -> Iterator[Section]:  # fmt: skip
+    figures = (*electrodes.figures(found), *(recordings.residuals(impedances) if impedances else ()))
+    tables = (*([electrodes.readings(found)] if found.rows else ()), *([impedances] if impedances else ()))
+    yield Section("measured", "Measured and predicted", figures, tables, electrodes.NOTES if found.rows else ())
+    if found.rows:
+        tables = (*([yields.table(found)] if len(found.last) > 1 else ()), electrodes.reasons(found))
+        yield Section("verdicts", "Verdicts and yield", yields.figures(found), tables, yields.notes(found))
+    if explanations:
+        tables, title = (explained.table(explanations),), "Which parameter explains the residuals"
+        yield Section("explained-by", title, (), tables, (explained.NOTE,))
+    if recorded:
+        tables = (recordings.facts(recorded),)
+        yield Section("recorded", "Recordings", tuple(recordings.figures(recorded)), tables)
+    drawings = tuple(variants.figures(found))
+    yield Section("variants", "The variants", drawings, variants.identifiability(found), (), variants.variants(found))
+    if left_out:
+        caption = "What was left out, or taken with care, and why"
+        tables = (Table.of("left_out", caption, tuple(LeftOut(*row) for row in left_out)),)
+        yield Section("left-out", "What was left out, and why", tables=tables)
+    yield Section("provenance", "Provenance", tables=(origins(log, found),))

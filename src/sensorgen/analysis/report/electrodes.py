@@ -63,22 +63,18 @@ class VerdictRow:
 
 def readings(found: Comparison) -> Table:
     """A row for each reading, the largest deviation first."""
-    ordered = sorted(found.rows, key=lambda row: -abs(row.residual) if isfinite(row.residual) else 1.0)
-    return Table.of(
-        "readings", "Every reading and its prediction; the largest deviation first", tuple(map(_row, ordered))
-    )
-
-
-def _row(row: Compared) -> ReadingRow:
-    r, v = row.reading, row.verdict
-    expected = row.predicted.ry_ohm if row.predicted else None
-    bounds = (expected.lower, expected.middle(), expected.upper) if expected else (nan, nan, nan)
-    within = {None: "", True: "yes", False: "no"}[row.inside]
-    return ReadingRow(
-        r.number, r.specimen, row.predicted.design if row.predicted else "", v.ry_ohm,
-        max(row.evidence.ry_ohm, default=nan), *bounds, exp(row.residual), within, v.rz_ohm,
-        max(row.evidence.rz_ohm, default=nan), v.ratio, v.leak_s, v.word,
-    )  # fmt: skip
+    rows = []
+    for row in sorted(found.rows, key=lambda row: -abs(row.residual) if isfinite(row.residual) else 1.0):
+        r, v = row.reading, row.verdict
+        expected = row.predicted.ry_ohm if row.predicted else None
+        bounds = (expected.lower, expected.middle(), expected.upper) if expected else (nan, nan, nan)
+        rows.append(ReadingRow(
+            r.number, r.specimen, row.predicted.design if row.predicted else "", v.ry_ohm,
+            max(row.evidence.ry_ohm, default=nan), *bounds, exp(row.residual),
+            {None: "", True: "yes", False: "no"}[row.inside], v.rz_ohm, max(row.evidence.rz_ohm, default=nan), v.ratio,
+            v.leak_s, v.word,
+        ))  # fmt: skip
+    return Table.of("readings", "Every reading and its prediction; the largest deviation first", rows)
 
 
 def reasons(found: Comparison) -> Table:

@@ -7,13 +7,13 @@ the part of that sum that it takes away.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import exp, inf, log, nan, sqrt
 from typing import Annotated
 
 import numpy as np
 
 from sensorgen.analysis.comparison import Comparison
-from sensorgen.analysis.comparison.leaky import across_ohm, along_ohm
 from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
 from sensorgen.analysis.comparison.runs import Run
 from sensorgen.analysis.report.electrodes import usable
@@ -21,6 +21,7 @@ from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.measure.recording.samples import Complex, Real
+from sensorgen.measure.signal.leakage import across_ohm, along_ohm
 from sensorgen.measure.signal.verdicts import INTACT_OHM
 
 RESISTIVITY, PERMITTIVITY, MODULUS, FILM, LEAK = PARAMETERS = (
@@ -31,6 +32,12 @@ _GRID = 31
 _STEP = 1e-3
 _OPEN = log(1e6)  # a larger factor is shown as this one: nothing is known
 _FLAT = 1e-9  # share below which a parameter has no effect
+
+NOTE = (
+    "Each parameter is moved alone, for all specimens together, until the squared residuals are least. Film resistance "
+    "is compared up to the meter's highest range, the prediction for a film without leakage; it is not compared where "
+    "the electrodes touch as drawn."
+)
 
 Model = Callable[[str, float], Complex]
 
@@ -91,23 +98,22 @@ def sentences(found: Sequence[Explanation]) -> Iterator[str]:
 
 def _resistances(found: Comparison) -> Iterator[Kind]:
     """Electrodes, and films up to what the meter can tell from an open circuit."""
+
+    def along(ohm: float, parameter: str, value: float) -> float:
+        return along_ohm(ohm * (value if parameter == RESISTIVITY else 1.0), value if parameter == LEAK else 0.0)
+
+    def across(ohm: float, parameter: str, value: float) -> float:
+        return min(across_ohm(ohm, value if parameter == LEAK else 0.0), INTACT_OHM)
+
     rows = usable(found)
     middles = [row.predicted.ry_ohm.middle() for row in rows if row.predicted and row.predicted.ry_ohm]
     if rows:
         measured = np.log([row.verdict.ry_ohm for row in rows]).astype(complex)
-        yield Kind("electrode resistance", measured, _of_electrodes(middles, _along))
+        yield Kind("electrode resistance", measured, _of_electrodes(middles, along))
     both = [k for k, row in enumerate(rows) if row.verdict.rz_ohm > 0 and not row.evidence.touching]
     if both:
         measured = np.log([min(rows[k].verdict.rz_ohm, INTACT_OHM) for k in both]).astype(complex)
-        yield Kind("film resistance", measured, _of_electrodes([middles[k] for k in both], _across))
-
-
-def _along(ohm: float, parameter: str, value: float) -> float:
-    return along_ohm(ohm * (value if parameter == RESISTIVITY else 1.0), value if parameter == LEAK else 0.0)
-
-
-def _across(ohm: float, parameter: str, value: float) -> float:
-    return min(across_ohm(ohm, value if parameter == LEAK else 0.0), INTACT_OHM)
+        yield Kind("film resistance", measured, _of_electrodes([middles[k] for k in both], across))
 
 
 def _of_electrodes(middles: Sequence[float], law: Callable[[float, str, float], float]) -> Model:
@@ -128,28 +134,26 @@ def _impedances(found: Comparison, recorded: Sequence[Run]) -> Iterator[Kind]:
         except SensorgenError:
             continue
     if known:
-        yield Kind("impedance at rest", np.concatenate([np.log(run.rest_ohm) for run, _ in known]), _rest(known))
+        rest = np.concatenate([np.log(run.rest_ohm) for run, _ in known])
+        yield Kind("impedance at rest", rest, partial(_modelled, known, loaded=False))
     loaded = [(run, of) for run, of in known if run.pairs is not None]
     if loaded:
         measured = [np.log(r.pairs.pressed_ohm / r.pairs.before_ohm).ravel() for r, _ in loaded if r.pairs]
-        yield Kind("impedance under load", np.concatenate(measured), _loaded(loaded))
+        yield Kind("impedance under load", np.concatenate(measured), partial(_modelled, loaded, loaded=True))
 
 
-def _rest(known: Sequence[tuple[Run, Movable]]) -> Model:
-    return lambda parameter, value: np.concatenate(
-        [at_rest(moved(of.model.sensor, **_moves(of, parameter, value)), run.recording.tones_hz) for run, of in known]
-    )
-
-
-def _loaded(known: Sequence[tuple[Run, Movable]]) -> Model:
-    def of_run(run: Run, of: Movable, parameter: str, value: float) -> Complex:
-        sensor = moved(of.model.sensor, **_moves(of, parameter, value))
-        assert run.pairs is not None  # noqa: S101 - chosen so
-        stiffness = value if parameter == MODULUS else 1.0
-        where = run.pairs.force_n, run.pairs.position_mm * M_PER_MM
-        return pressed(sensor, run.recording.tones_hz, *where, stiffness).ravel()
-
-    return lambda parameter, value: np.concatenate([of_run(run, of, parameter, value) for run, of in known])
+def _modelled(known: Sequence[tuple[Run, Movable]], parameter: str, value: float, *, loaded: bool) -> Complex:
+    """Ln Z of recordings at rest, or its change under load, with one parameter moved."""
+    found = []
+    for run, of in known:
+        sensor, f = moved(of.model.sensor, **_moves(of, parameter, value)), run.recording.tones_hz
+        if loaded and run.pairs is not None:
+            stiffness = value if parameter == MODULUS else 1.0
+            where = run.pairs.force_n, run.pairs.position_mm * M_PER_MM
+            found.append(pressed(sensor, f, *where, stiffness).ravel())
+        else:
+            found.append(at_rest(sensor, f))
+    return np.concatenate(found)
 
 
 def _moves(of: Movable, parameter: str, value: float) -> dict[str, float]:

@@ -4,11 +4,11 @@ import base64
 import csv
 import io
 import json
-from collections.abc import Iterator
+from typing import Any
 
 from sensorgen.analysis.plots.pages import render
 from sensorgen.analysis.report.contents import Report
-from sensorgen.core.document import exact, plain, safe, shown, spreadsheet
+from sensorgen.core.document import Table, exact, plain, safe, shown, spreadsheet
 from sensorgen.core.document import markdown as document
 
 MOST_ROWS = 2000  # of a table on the page: a browser has to lay out all of them
@@ -25,22 +25,13 @@ def html(report: Report) -> str:
 
 def markdown(report: Report) -> str:
     """Headings, sentences and tables."""
-    return "\n".join(_lines(report)) + "\n"
-
-
-def _lines(report: Report) -> Iterator[str]:
-    yield from (f"# {safe(report.title)}", "")
-    yield from (f"**{safe(text)}**  " for text in report.headline)
-    yield ""
-    yield from (f"- {safe(text)}" for text in report.findings)
+    lines = [f"# {safe(report.title)}", "", *(f"**{safe(text)}**  " for text in report.headline), ""]
+    lines += [f"- {safe(text)}" for text in report.findings]
     for section in report.sections:
-        yield from ("", f"## {safe(section.title)}", "")
-        yield from (f"- {safe(v.design)} (design {v.design_id}): {safe(v.words)}" for v in section.variants)
-        for table in section.tables:
-            yield from document([table])
-        for note in section.notes:
-            yield from ("", safe(note))
-    yield from ("", f"Made {report.made_at}.")
+        lines += ["", f"## {safe(section.title)}", ""]
+        lines += [f"- {safe(v.design)} (design {v.design_id}): {safe(v.words)}" for v in section.variants]
+        lines += [*document(section.tables), *(line for note in section.notes for line in ("", safe(note)))]
+    return "\n".join([*lines, "", f"Made {report.made_at}."]) + "\n"
 
 
 def comma_separated(report: Report) -> str:
@@ -57,24 +48,21 @@ def comma_separated(report: Report) -> str:
 
 def as_json(report: Report) -> str:
     """Everything but the figures."""
+
+    def of_table(t: Table) -> dict[str, Any]:
+        columns = [{"name": c.name, "unit": c.unit, "about": c.about} for c in t.columns]
+        return {"key": t.key, "caption": t.caption, "columns": columns, "rows": [[*map(plain, row)] for row in t.cells]}
+
     sections = [
         {
-            "key": s.key, "title": s.title, "notes": list(s.notes),
-            "tables": [
-                {
-                    "key": t.key, "caption": t.caption,
-                    "columns": [{"name": c.name, "unit": c.unit, "about": c.about} for c in t.columns],
-                    "rows": [[plain(v) for v in row] for row in t.cells],
-                }
-                for t in s.tables
-            ],
+            "key": s.key, "title": s.title, "notes": s.notes, "tables": [*map(of_table, s.tables)],
             "variants": [{"design": v.design, "design_id": v.design_id, "words": v.words} for v in s.variants],
         }
         for s in report.sections
     ]  # fmt: skip
     told = {
-        "title": report.title, "iteration": report.iteration, "made_at": report.made_at,
-        "headline": list(report.headline), "findings": list(report.findings), "sections": sections,
+        "title": report.title, "iteration": report.iteration, "made_at": report.made_at, "headline": report.headline,
+        "findings": report.findings, "sections": sections,
     }  # fmt: skip
     return json.dumps(told, ensure_ascii=False, indent=1, allow_nan=False) + "\n"
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from sensorgen.analysis.comparison import Comparison, Predicted
+from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.comparison.runs import Run
 from sensorgen.analysis.plots import recordings as plots
 from sensorgen.analysis.plots.figure import BLUE, ORANGE, Axis, Curve, Figure, Panel
@@ -62,32 +62,28 @@ class RecordingRow:
 
 def impedances(recorded: Sequence[Run], found: Comparison) -> Table:
     """Impedance at rest, frequency by frequency, and its prediction."""
-    rows = tuple(
-        row for run in recorded for row in _rows(run, found.predictions.get(found.names.get(run.entry.specimen, "")))
-    )
+    rows: list[ImpedanceRow] = []
+    for run in recorded:
+        of = found.predictions.get(found.names.get(run.entry.specimen, ""))
+        capacitance = [
+            None if c is None else c / _F_PER_PF for c in _predicted(of.prediction.capacitance if of else None)
+        ]
+        for f, z, error in zip(run.recording.tones_hz.tolist(), run.rest_ohm, run.rest_error_ohm, strict=True):
+            known = of.prediction.impedance if of else ()
+            expected = next((e for e in known if abs(e.frequency_hz / f - 1) < _SAME), None)
+            middle = complex(expected.re.value, expected.im.value) if expected else complex("nan")
+            off = (complex(z) - middle) / abs(middle)
+            rows.append(ImpedanceRow(
+                run.name, of.design if of else "", f,
+                float(z.real), float(error.real), *_predicted(expected.re if expected else None),
+                float(z.imag), float(error.imag), *_predicted(expected.im if expected else None),
+                off.real if expected else None, off.imag if expected else None,
+                float(-1 / (2 * pi * f * z.imag)) / _F_PER_PF, *capacitance,
+            ))  # fmt: skip
     return Table.of("impedance", "Impedance at rest and its prediction, by frequency", rows)
 
 
-def _rows(run: Run, of: Predicted | None) -> Iterator[ImpedanceRow]:
-    c = of.prediction.capacitance if of else None
-    capacitance = (c.value / _F_PER_PF, c.lower / _F_PER_PF, c.upper / _F_PER_PF) if c else (None, None, None)
-    for f, z, error in zip(run.recording.tones_hz.tolist(), run.rest_ohm, run.rest_error_ohm, strict=True):
-        known = of.prediction.impedance if of else ()
-        expected = next((e for e in known if abs(e.frequency_hz / f - 1) < _SAME), None)
-        off = None
-        if expected:
-            middle = complex(expected.re.value, expected.im.value)
-            off = (complex(z) - middle) / abs(middle)
-        c_pf = float(-1 / (2 * pi * f * z.imag)) / _F_PER_PF
-        yield ImpedanceRow(
-            run.name, of.design if of else "", f,
-            float(z.real), float(error.real), *_predicted(expected.re if expected else None),
-            float(z.imag), float(error.imag), *_predicted(expected.im if expected else None),
-            off.real if off is not None else None, off.imag if off is not None else None, c_pf, *capacitance,
-        )  # fmt: skip
-
-
-def _predicted(of: Bounds | None) -> tuple[Cell, Cell, Cell]:
+def _predicted(of: Bounds | None) -> tuple[float | None, float | None, float | None]:
     return (of.value, of.lower, of.upper) if of else (None, None, None)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import nan
 from typing import Annotated
 
-from sensorgen.analysis.comparison import Comparison, Predicted
+from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, Body, Curve, Figure, Panel
 from sensorgen.checks.review import draw, review
 from sensorgen.core.document import Column, Table
@@ -53,38 +53,30 @@ class IdentifiabilityRow:
 
 def variants(found: Comparison) -> tuple[Variant, ...]:
     """Every variant that a specimen was printed of."""
-    return tuple(
-        Variant(name, body.design.id(), draw(body.design, review(body.design)), _words(found.predictions[name]))
-        for name, body in found.bodies.items()
-    )
-
-
-def _words(of: Predicted) -> str:
-    r, c = of.ry_ohm, of.capacitance_f
-    parts = [
-        f"electrode resistance {r.lower:.4g} to {r.upper:.4g} ohm" if r else "electrode resistance unknown",
-        f"capacitance {c.lower / _F_PER_PF:.4g} to {c.upper / _F_PER_PF:.4g} pF"
-        if c
-        else f"no capacitance: {of.reason}",
-        of.provenance,
-    ]
-    return "; ".join(parts)
+    made = []
+    for name, body in found.bodies.items():
+        of, design = found.predictions[name], body.design
+        r, c = of.ry_ohm, of.capacitance_f
+        words = (
+            f"electrode resistance {r.lower:.4g} to {r.upper:.4g} ohm" if r else "electrode resistance unknown",
+            f"capacitance {c.lower / _F_PER_PF:.4g} to {c.upper / _F_PER_PF:.4g} pF" if c
+            else f"no capacitance: {of.reason}", of.provenance,
+        )  # fmt: skip
+        made.append(Variant(name, design.id(), draw(design, review(design)), "; ".join(words)))
+    return tuple(made)
 
 
 def identifiability(found: Comparison) -> tuple[Table, ...]:
     """A row for each variant with a prediction."""
-    rows = tuple(_row(name, of.prediction.identifiability, of.reason) for name, of in found.predictions.items())
+    rows = []
+    for name, of in found.predictions.items():
+        card = of.prediction.identifiability
+        known = (card.sigma_force_n, card.sigma_position_m, card.correlation) if card else (None, None, None)
+        force, place, together = (nan if value is None else value for value in known)
+        verdict = card.verdict if card else of.reason or "no prediction"
+        rows.append(IdentifiabilityRow(name, force, place / M_PER_MM, together, verdict))
     caption = f"Predicted identifiability of {FORCE_N:g} N in the middle, by seven frequencies (Cramér-Rao)"
     return (Table.of("identifiability", caption, rows),) if rows else ()
-
-
-def _row(name: str, found: Identifiability | None, reason: str) -> IdentifiabilityRow:
-    if found is None:
-        return IdentifiabilityRow(name, nan, nan, nan, reason or "no prediction")
-    force, place, together = (
-        nan if value is None else value for value in (found.sigma_force_n, found.sigma_position_m, found.correlation)
-    )
-    return IdentifiabilityRow(name, force, place / M_PER_MM, together, found.verdict)
 
 
 def figures(found: Comparison) -> Iterator[Figure]:

@@ -112,11 +112,8 @@ def findings(found: Comparison) -> Iterator[str]:
 
 
 def _range(share: Share) -> str:
-    return (
-        f"{100 * share.low:.2g} to {100 * share.high:.2g} %"
-        if share.count < share.total
-        else f"{100 * share.low:.2g} to 100 %"
-    )
+    high = f"{100 * share.high:.2g}" if share.count < share.total else "100"
+    return f"{100 * share.low:.2g} to {high} %"
 
 
 def _name(group: Group) -> str:

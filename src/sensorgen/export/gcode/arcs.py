@@ -85,28 +85,20 @@ class Arcs:
 
     def chords(self) -> tuple[Ints, Floats, Floats]:
         """Chords of all arcs in order: which arc each belongs to, and where it starts and ends, (m, 3) [mm]."""
-        count = self._count()
+        sag = np.minimum(SAG_MM / (2 * np.maximum(self.radius_mm(), SAG_MM)), 0.5)
+        angle = 4 * np.arcsin(np.sqrt(sag))  # acos(1 - sag / radius) would be 0 for a large one
+        count = np.asarray(np.clip(np.ceil(np.abs(self.turn) / angle), 1, MOST_CHORDS), np.int64)
         which = np.repeat(np.arange(len(self)), count)
         step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-        start, end = self._at(which, step / count[which]), self._at(which, (step + 1) / count[which])
-        first, last = step == 0, step == count[which] - 1
-        start[first], end[last] = self.start_mm, self.end_mm
-        return which, start, end
-
-    def _count(self) -> Ints:
-        """How many chords each takes."""
-        sag = np.minimum(SAG_MM / (2 * np.maximum(self.radius_mm(), SAG_MM)), 0.5)
-        step = 4 * np.arcsin(np.sqrt(sag))  # acos(1 - sag / radius) would be 0 for a large one
-        return np.asarray(np.clip(np.ceil(np.abs(self.turn) / step), 1, MOST_CHORDS), np.int64)
-
-    def _at(self, which: Ints, share: Floats) -> Floats:
-        """Places at a share of the way of some arcs."""
-        angle = _angle(self.start_mm[:, :2] - self.centre_mm)[which] + self.turn[which] * share
-        radius, (x, y) = self.radius_mm()[which], self.centre_mm[which].T
-        bottom, top = self.start_mm[which, 2], self.end_mm[which, 2]
-        return np.column_stack(
-            [x + radius * np.cos(angle), y + radius * np.sin(angle), bottom + (top - bottom) * share]
-        )
+        ends = []
+        for share in (step / count[which], (step + 1) / count[which]):
+            at = _angle(self.start_mm[:, :2] - self.centre_mm)[which] + self.turn[which] * share
+            radius, (x, y) = self.radius_mm()[which], self.centre_mm[which].T
+            bottom, top = self.start_mm[which, 2], self.end_mm[which, 2]
+            z = bottom + (top - bottom) * share
+            ends.append(np.column_stack([x + radius * np.cos(at), y + radius * np.sin(at), z]))
+        ends[0][step == 0], ends[1][step == count[which] - 1] = self.start_mm, self.end_mm
+        return which, ends[0], ends[1]
 
 
 def _angle(off: Floats) -> Floats:

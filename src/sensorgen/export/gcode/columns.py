@@ -68,72 +68,47 @@ def read(text: bytes) -> Columns:
     >>> found.plain.tolist(), found.rest.tolist(), found.words[:, :4].tolist()
     ([0, 3], [1], [[1.5, nan, nan, -0.2], [nan, nan, 2.0, nan]])
     """
-    piece = _Piece(text)
-    line, words = piece.moves()
-    rest = piece.end > piece.start
+    data = np.frombuffer(text, np.uint8)
+    sorts = np.frombuffer(text.translate(_SORT), np.uint8)
+    end = np.flatnonzero(data == ord("\n"))
+    start = np.concatenate([[0], end[:-1] + 1])
+    stops = np.flatnonzero(sorts == END)
+    stop = stops[np.searchsorted(stops, start)]  # of the code, before a comment
+    # lines that start with G0 to G3 and a space, and are ASCII
+    plain: Mask = stop - start >= len("G1 ")
+    letter, digit, space = (np.where(plain, start + k, 0) for k in range(3))
+    plain &= (data[letter] == ord("G")) & (sorts[digit] == DIGIT) & (data[digit] < ord("4")) & (sorts[space] == SPACE)
+    plain[np.searchsorted(end, np.flatnonzero(data > 127))] = False
+    # lines in whose words no byte stands behind one that it may not follow
+    pairs = sorts[:-1] * np.uint8(_SORTS) + sorts[1:]
+    wrong = np.frombuffer(pairs.tobytes().translate(_WRONG), np.uint8)
+    before = np.concatenate([[0], np.cumsum(wrong, dtype=np.int32)])
+    plain &= before[stop] == before[np.minimum(start + 2, stop)]
+    line, words = _numbers(data, start, stop, np.flatnonzero(plain))
+    rest = end > start
     rest[line] = False
-    code = piece.bytes[piece.start[line] + 1] - float(ord("0"))
-    return Columns(piece.start, piece.end, line, code, words, np.flatnonzero(rest))
+    return Columns(start, end, line, data[start[line] + 1] - float(ord("0")), words, np.flatnonzero(rest))
 
 
-class _Piece:
-    """Bytes of some lines, their sorts, where each line starts and ends, and where its code stops."""
+def _numbers(data: Bytes, start: Ints, stop: Ints, line: Ints) -> tuple[Ints, Floats]:
+    """Those of some lines whose words are numbers, each letter once, and these numbers."""
 
-    def __init__(self, text: bytes) -> None:
-        self.bytes = np.frombuffer(text, np.uint8)
-        self.sorts = np.frombuffer(text.translate(_SORT), np.uint8)
-        self.end = np.flatnonzero(self.bytes == ord("\n"))
-        self.start = np.concatenate([[0], self.end[:-1] + 1])
-        stops = np.flatnonzero(self.sorts == END)
-        self.stop = stops[np.searchsorted(stops, self.start)]
-
-    def moves(self) -> tuple[Ints, Floats]:
-        """Lines that are plain moves, and the numbers of their words."""
-        line = np.flatnonzero(self._starts() & self._well_formed())
-        put, row, word = self._words_of(line)
-        wrong = _dots_twice(put, word)
-        if wrong.any():
-            line = np.delete(line, row[wrong])
-            put, row, word = self._words_of(line)
-        words = np.full((len(line), len(WORDS)), np.nan)
-        words[row, _COLUMN[put[word]]] = _numbers(put)
-        once = np.bincount(row, minlength=len(line)) == len(WORDS) - np.isnan(words).sum(axis=1)
-        return line[once], words[once]
-
-    def _starts(self) -> Mask:
-        """Lines that start with G0 to G3 and a space, and are ASCII."""
-        starts: Mask = self.stop - self.start >= len("G1 ")
-        letter, digit, space = (np.where(starts, self.start + k, 0) for k in range(3))
-        starts &= (self.bytes[letter] == ord("G")) & (self.sorts[digit] == DIGIT) & (self.bytes[digit] < ord("4"))
-        starts &= self.sorts[space] == SPACE
-        starts[np.searchsorted(self.end, np.flatnonzero(self.bytes > 127))] = False
-        return starts
-
-    def _well_formed(self) -> Mask:
-        """Lines in whose words no byte stands behind one that it may not follow."""
-        pairs = self.sorts[:-1] * np.uint8(_SORTS) + self.sorts[1:]
-        wrong = np.frombuffer(pairs.tobytes().translate(_WRONG), np.uint8)
-        before = np.concatenate([[0], np.cumsum(wrong, dtype=np.int32)])
-        return np.asarray(before[self.stop] == before[np.minimum(self.start + 2, self.stop)])
-
-    def _words_of(self, line: Ints) -> tuple[Bytes, Ints, Ints]:
+    def words_of(line: Ints) -> tuple[Bytes, Ints, Ints]:
         """Bytes behind G0 to G3 of some lines; of each word the number of its line, and its place in the bytes."""
-        edges = np.zeros(len(self.bytes) + 1, np.int8)
-        edges[self.start[line] + 2] = 1
-        edges[self.stop[line]] = -1
-        put = self.bytes[np.cumsum(edges[:-1], dtype=np.int8).view(np.bool_)]
+        edges = np.zeros(len(data) + 1, np.int8)
+        edges[start[line] + 2] = 1
+        edges[stop[line]] = -1
+        put = data[np.cumsum(edges[:-1], dtype=np.int8).view(np.bool_)]
         word = np.flatnonzero(put >= ord("E"))
-        return put, np.searchsorted(np.cumsum(self.stop[line] - self.start[line] - 2), word, side="right"), word
+        return put, np.searchsorted(np.cumsum(stop[line] - start[line] - 2), word, side="right"), word
 
-
-def _dots_twice(put: Bytes, word: Ints) -> Mask:
-    """Words whose number has two dots."""
+    put, row, word = words_of(line)
     of = np.searchsorted(word, np.flatnonzero(put == ord("."))) - 1
-    wrong = np.zeros(len(word), np.bool_)
-    wrong[of[1:][of[1:] == of[:-1]]] = True
-    return wrong
-
-
-def _numbers(put: Bytes) -> Floats:
-    """The numbers behind all words."""
-    return np.fromstring(put.tobytes().translate(_BLANK), dtype=np.float64, sep=" ")
+    twice = of[1:][of[1:] == of[:-1]]  # words whose number has two dots
+    if len(twice):
+        line = np.delete(line, row[twice])
+        put, row, word = words_of(line)
+    words = np.full((len(line), len(WORDS)), np.nan)
+    words[row, _COLUMN[put[word]]] = np.fromstring(put.tobytes().translate(_BLANK), dtype=np.float64, sep=" ")
+    once = np.bincount(row, minlength=len(line)) == len(WORDS) - np.isnan(words).sum(axis=1)
+    return line[once], words[once]

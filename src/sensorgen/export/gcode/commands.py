@@ -1,14 +1,12 @@
 """What the commands of a file ask of the machine, one after the other: tools, heat, homing, modes, fans, macros."""
 
-from collections.abc import Callable, Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode.effects import STOPS, Effects, judge
-from sensorgen.export.gcode.found import Found, error
-from sensorgen.export.gcode.heat import Heaters, known_tool, tool_there
+from sensorgen.export.gcode.found import Findings, Found
+from sensorgen.export.gcode.heat import Heaters
 from sensorgen.export.gcode.moves import NO_TOOL, Change, Event, Motion
 from sensorgen.export.gcode.reading import macro_name
 from sensorgen.export.gcode.remarks import PRUSA
@@ -16,7 +14,7 @@ from sensorgen.export.gcode.remarks import PRUSA
 AXES = "XYZ"
 
 
-def check(motion: Motion, machine: Printer) -> Iterator[Found]:
+def check(motion: Motion, machine: Printer) -> Findings:
     """Findings of all rules on commands, and on what is printed between them.
 
     Parameters
@@ -28,17 +26,18 @@ def check(motion: Motion, machine: Printer) -> Iterator[Found]:
     """
     simulation = _Simulation(motion, machine)
     for event in motion.events:
-        yield from simulation.until(event.row)
-        yield from simulation.obey(event)
-    yield from simulation.until(len(motion.rows))
-    yield from simulation.end()
+        simulation.until(event.row)
+        simulation.obey(event)
+    simulation.until(len(motion.rows))
+    simulation.end()
+    return simulation.found
 
 
 class _Simulation:
     """The machine between two moves."""
 
     def __init__(self, motion: Motion, machine: Printer) -> None:
-        self.motion, self.machine, self.control = motion, machine, machine.control
+        self.motion, self.machine, self.control, self.found = motion, machine, machine.control, Findings()
         self.pushes = np.flatnonzero(motion.filament_mm != 0)
         self.prints = np.flatnonzero(motion.extruded_mm > 0)
         self.travels = np.flatnonzero(motion.length_mm > 0)
@@ -46,91 +45,65 @@ class _Simulation:
         start = machine.tool_at_start()
         self.tool = NO_TOOL if start is None else start
         self.last: Change | None = None
-        self.heaters, self.effects = Heaters(machine), Effects()
+        self.heaters, self.effects = Heaters(machine, self.found), Effects(self.found)
         self.homed: set[str] = set()
         self.levelled = not self.control.levels
-        self.relative = False
-        self.absolute_e = True
+        self.relative, self.absolute_e = False, True
         self.row = 0
         self.ended = self.stopped = ""
         self.seen: set[str] = set()
-        self.warned: set[str] = set()
-        self.does: dict[str, Callable[[Event], Iterator[Found]]] = {
-            "G10": self._tool_settings, "M104": self._temperature, "M109": self._temperature, "M568": self._state,
-            "M140": self._bed, "M190": self._bed, "M106": self._fan, "M107": self._fan, "M98": self._macro,
-            "M82": self._absolute, "M83": self._relative_e, "G90": self._mode, "G91": self._mode, "G92": self._place,
-            "M116": self._waits, "M18": self._motors_off, "M84": self._motors_off, "M561": self._unlevelled,
-            "M290": self._height,
-        }  # fmt: skip
 
-    # What holds for a stretch of moves.
-
-    def until(self, row: int) -> Iterator[Found]:
+    def until(self, row: int) -> None:
         """Judge the moves from the last event to this one."""
         first, self.row = self.row, row
-        if first == row:
-            return
-        if (number := self._first(self.pushes, first, row)) is not None:
-            yield from self._pushing(number)
-        if (number := self._first(self.prints, first, row)) is not None:
-            yield from self._printing(number)
-            yield from self._too_late(number)
-        if (number := self._first(self.travels, first, row)) is not None:
-            yield from self._moving(number)
+        pushed, printed, moved = (self._first(rows, first, row) for rows in (self.pushes, self.prints, self.travels))
+        if pushed:
+            self._pushing(pushed)
+        if printed:
+            self._printing(printed)
+        if moved and self.homed != set(AXES):
+            self.found.warning("home", moved, "a move comes before all axes are homed", "home first")
+        if moved and self.ended:
+            self.found.warning("end", moved, f"moves after {self.ended} are never reached", "remove them")
 
-    def _first(self, rows: NDArray[np.int64], start: int, end: int) -> int | None:
-        """Line of the first of some moves in a stretch."""
+    def _first(self, rows: NDArray[np.int64], start: int, end: int) -> int:
+        """Line of the first of some moves in a stretch; 0 if there is none."""
         place = int(np.searchsorted(rows, start))
-        return int(self.motion.rows[rows[place], 9]) if place < len(rows) and rows[place] < end else None
+        return int(self.motion.rows[rows[place], 9]) if place < len(rows) and rows[place] < end else 0
 
-    def _pushing(self, number: int) -> Iterator[Found]:
+    def _pushing(self, number: int) -> None:
+        error = self.found.error
         if self.tool == NO_TOOL:
-            yield error("tool", number, "filament is moved before a tool is taken", "take a tool first (T)")
+            error("tool", number, "filament is moved before a tool is taken", "take a tool first (T)")
         elif self.tool in self.control.spindles:
-            yield error("tool", number, f"tool {self.tool} is a spindle and cannot extrude", "use another tool")
+            error("tool", number, f"tool {self.tool} is a spindle and cannot extrude", "use another tool")
         else:
-            yield from self.heaters.cold(self.tool, number)
+            self.heaters.check_cold(self.tool, number)
         if self.absolute_e and self.control.relative_e:
-            yield error(
-                "absolute-e", number, "filament is moved with absolute E", "write M83 at the start, and relative E"
-            )
+            advice = "write M83 at the start, and relative E"
+            error("absolute-e", number, "filament is moved with absolute E", advice)
 
-    def _printing(self, number: int) -> Iterator[Found]:
+    def _printing(self, number: int) -> None:
+        error = self.found.error
         if self.homed != set(AXES):
-            yield error(
-                "home",
-                number,
-                "the file prints before all axes are homed",
-                f"home first ({' or '.join(self.control.homes)})",
-            )
+            advice = f"home first ({' or '.join(self.control.homes)})"
+            error("home", number, "the file prints before all axes are homed", advice)
         if not self.levelled:
-            yield error(
-                "level", number, "the file prints before the bed is levelled",
-                f"level first ({' or '.join(self.control.levels)})",
-            )  # fmt: skip
-        yield from self.effects.printing()
+            advice = f"level first ({' or '.join(self.control.levels)})"
+            error("level", number, "the file prints before the bed is levelled", advice)
+        self.effects.printing()
         if self.relative:
-            yield error("relative", number, "the file prints in relative coordinates (G91)", "write G90 before it")
-
-    def _moving(self, number: int) -> Iterator[Found]:
-        if self.homed != set(AXES):
-            yield Found("home", "warning", number, "a move comes before all axes are homed", "home first")
-        if self.ended:
-            yield Found("end", "warning", number, f"moves after {self.ended} are never reached", "remove them")
-
-    def _too_late(self, number: int) -> Iterator[Found]:
+            error("relative", number, "the file prints in relative coordinates (G91)", "write G90 before it")
         if ended := self.ended or self.stopped:
             message = f"lines after {ended} are never printed: it ends the print"
-            yield error("end", number, message, "end the print after its last line")
+            error("end", number, message, "end the print after its last line")
 
-    # What each command does.
-
-    def obey(self, event: Event) -> Iterator[Found]:
+    def obey(self, event: Event) -> None:
         """Follow one command."""
         code = event.command.code
         self.seen.add(code)
         if change := self.changes.get(event.number):
-            yield from self._take(change)
+            self._take(change)
         if code in self.control.homes:
             self.homed |= {axis for axis in AXES if event.command.has(axis) or not event.command.has(AXES)}
         self.levelled |= code in self.control.levels
@@ -138,142 +111,88 @@ class _Simulation:
             self.ended = " ".join([code, *(f"{a}{b}" for a, b in event.command.words)])
         self.stopped = code if code in STOPS else self.stopped
         self.effects.obey(event)
-        yield from judge(event.command, event.number)
-        if code in self.does:
-            yield from self.does[code](event)
+        judge(event.command, event.number, self.found)
+        self.heaters.obey(event, self.tool)
+        self._modes(event)
+        self._machine(event)
 
-    def _take(self, change: Change) -> Iterator[Found]:
-        yield from tool_there(self.machine, change.number, change.tool, "is taken") if change.tool != NO_TOOL else ()
+    def _take(self, change: Change) -> None:
+        if change.tool != NO_TOOL:
+            self.heaters.check_tool(change.number, change.tool, "is taken")
         last, self.last, self.tool = self.last, change, change.tool
         self.heaters.take(change.tool)
         twice = last and (last.tool, last.macro) == (change.tool, not change.macro) and last.number != change.number
-        if last and twice and self._first(self.prints, last.row, change.row) is None:
-            yield error(
-                "tool-change", change.number,
-                f"tool {change.tool} is taken twice, by T and by its macro: the macro takes it itself",
-                "leave one of them out",
-            )  # fmt: skip
+        if last and twice and not self._first(self.prints, last.row, change.row):
+            message = f"tool {change.tool} is taken twice, by T and by its macro: the macro takes it itself"
+            self.found.error("tool-change", change.number, message, "leave one of them out")
 
-    def _tool_settings(self, event: Event) -> Iterator[Found]:
-        if event.command.has("SR") and not event.command.has("L"):
-            yield from self.heaters.told(event, "P", self.tool)
-        elif event.command.has("P") and not event.command.has("L"):
-            yield from known_tool(self.machine, event, "P", "is set")
+    def _modes(self, event: Event) -> None:
+        """What later lines mean, and what the axes still know."""
+        code, command = event.command.code, event.command
+        if code in ("M82", "M83"):
+            self.absolute_e = code == "M82"
+            if self.absolute_e and self.control.relative_e:
+                advice = "leave it out, and write relative E"
+                self.found.error("absolute-e", event.number, "M82 makes E absolute", advice)
+        elif code in ("G90", "G91"):
+            self.relative = code == "G91"
+        elif code == "G92" and (command.has(AXES) or not command.has("E")):
+            message = "G92 names the place anew; limits are checked in the new coordinates"
+            self.found.warning("place", event.number, message, "leave it out")
+        elif code in ("M18", "M84") and not command.has("S"):  # the axes may drift; S only sets when that happens
+            self.homed -= {axis for axis in AXES if command.has(axis) or not command.has(f"{AXES}E")}
+        elif code == "M561":
+            self.levelled = not self.control.levels
 
-    def _temperature(self, event: Event) -> Iterator[Found]:
-        yield from self.heaters.told(event, "T", self.tool)
-
-    def _state(self, event: Event) -> Iterator[Found]:
-        yield from self.heaters.state(event, self.tool)
-
-    def _waits(self, event: Event) -> Iterator[Found]:
-        yield from known_tool(self.machine, event, "P", "is waited for")
-
-    def _bed(self, event: Event) -> Iterator[Found]:
-        yield from self.heaters.bed(event)
-
-    def _fan(self, event: Event) -> Iterator[Found]:
-        fan = self.control.layer_fan
-        if fan is not None and not event.command.has("P"):
-            self.warned.add("fan")
-            yield Found(
-                "fan", "warning", event.number, f"{event.command.code} names no fan, and may miss the one on the part",
-                f"name it: M106 P{fan} S..",
-            )  # fmt: skip
-
-    def _macro(self, event: Event) -> Iterator[Found]:
-        name = macro_name(event.command)
-        if event.number not in self.changes and name not in self.control.macros:
+    def _machine(self, event: Event) -> None:
+        """Fans, macros, and M290, which shifts all heights as for a tool whose nozzle stands higher than others."""
+        code, command, fan = event.command.code, event.command, self.control.layer_fan
+        if code in ("M106", "M107") and fan is not None and not command.has("P"):
+            message = f"{code} names no fan, and may miss the one on the part"
+            self.found.warning("fan", event.number, message, f"name it: M106 P{fan} S..")
+        name = macro_name(command) if code == "M98" and event.number not in self.changes else None
+        if name is not None and name not in self.control.macros:
             known = ", ".join(filter(None, (self.control.prime_macro, *self.control.macros))) or "none"
-            yield error(
-                "macro", event.number, f"unknown macro {name[:60]!r}; {self.machine.name} has {known}",
-                "leave it out, or add it to the printer's file (control: macros)",
-            )  # fmt: skip
-
-    def _absolute(self, event: Event) -> Iterator[Found]:
-        self.absolute_e = True
-        if self.control.relative_e:
-            yield error("absolute-e", event.number, "M82 makes E absolute", "leave it out, and write relative E")
-
-    def _relative_e(self, _: Event) -> Iterator[Found]:
-        self.absolute_e = False
-        yield from ()
-
-    def _mode(self, event: Event) -> Iterator[Found]:
-        self.relative = event.command.code == "G91"
-        yield from ()
-
-    def _place(self, event: Event) -> Iterator[Found]:
-        if event.command.has(AXES) or not event.command.has("E"):
-            yield Found(
-                "place", "warning", event.number, "G92 names the place anew; limits are checked in the new coordinates",
-                "leave it out",
-            )  # fmt: skip
-
-    def _motors_off(self, event: Event) -> Iterator[Found]:
-        """The axes may drift, and count as not homed; a number of seconds only sets when that happens."""
-        if not event.command.has("S"):
-            self.homed -= {axis for axis in AXES if event.command.has(axis) or not event.command.has(f"{AXES}E")}
-        yield from ()
-
-    def _unlevelled(self, _: Event) -> Iterator[Found]:
-        self.levelled = not self.control.levels
-        yield from ()
-
-    def _height(self, event: Event) -> Iterator[Found]:
-        """All heights are shifted, as for a tool whose nozzle stands higher than the printer's others."""
+            message = f"unknown macro {name[:60]!r}; {self.machine.name} has {known}"
+            advice = "leave it out, or add it to the printer's file (control: macros)"
+            self.found.error("macro", event.number, message, advice)
         meant_mm = self.control.tool_offsets_mm.get(self.tool, 0.0)
-        given_mm = next((event.command.number(letter) for letter in "SZ" if event.command.has(letter)), None)
-        if given_mm is not None and (given_mm != meant_mm or event.command.number("R") != 0):
-            yield Found(
-                "height", "warning", event.number,
-                f"M290 shifts all heights; the printer's file says {meant_mm:g} mm for tool {self.tool}",
-                f"write M290 S{meant_mm:g} R0, or leave it out",
-            )  # fmt: skip
+        given_mm = [command.number(letter) for letter in "SZ" if command.has(letter)] if code == "M290" else []
+        if given_mm[:1] not in ([], [None]) and (given_mm[0] != meant_mm or command.number("R") != 0):
+            message = f"M290 shifts all heights; the printer's file says {meant_mm:g} mm for tool {self.tool}"
+            self.found.warning("height", event.number, message, f"write M290 S{meant_mm:g} R0, or leave it out")
 
-    # What must have come by the end.
-
-    def end(self) -> Iterator[Found]:
+    def end(self) -> None:
         """Judge the file as a whole."""
-        last = max(1, self.motion.lines)
+        last, error, warning = max(1, self.motion.lines), self.found.error, self.found.warning
         if self.relative:
-            yield error("relative", last, "the file ends in relative coordinates (G91)", "write G90 after the last G91")
+            error("relative", last, "the file ends in relative coordinates (G91)", "write G90 after the last G91")
         if not len(self.prints):
-            yield Found("read", "warning", last, "the file prints nothing", "check that it is the right file")
+            warning("read", last, "the file prints nothing", "check that it is the right file")
         if "G90" not in self.seen:
-            yield Found(
-                "start", "warning", 1, "no G90: places count as the printer happens to take them", "write G90 first"
-            )
+            warning("start", 1, "no G90: places count as the printer happens to take them", "write G90 first")
         if not {"M140", "M190"} & self.seen:
-            yield Found("start", "warning", 1, "no command for the bed: it stays as it is", "heat it (M140 or M190)")
+            warning("start", 1, "no command for the bed: it stays as it is", "heat it (M140 or M190)")
         if self.control.ends and not self.ended:
             ends = " or ".join(self.control.ends)
-            yield Found("end", "warning", last, f"no {ends}: the file may be cut short", f"end with {ends}")
-        yield from self._left_on(last)
-        yield from self._raw()
-
-    def _raw(self) -> Iterator[Found]:
-        """A slicer's own file counts tools from 0: those that the printer has too would be the wrong ones."""
+            warning("end", last, f"no {ends}: the file may be cut short", f"end with {ends}")
+        self._left_on(last)
         settings = [e.command for e in self.motion.events if e.command.code == "G10" and e.command.has("S")]
         untouched = settings and not any(command.has("R") for command in settings)
-        if self.control.names_tools and self.motion.maker == PRUSA and untouched and "fan" in self.warned:
-            yield error(
-                "raw", 1, "this is PrusaSlicer's own file: it counts tools from 0, and the printer from 1",
-                "let sensorgen slice write it",
-            )  # fmt: skip
+        fan_missed = any(f.rule == "fan" for f in self.found)
+        if self.control.names_tools and self.motion.maker == PRUSA and untouched and fan_missed:
+            # those of its tools that the printer has too would be the wrong ones
+            message = "this is PrusaSlicer's own file: it counts tools from 0, and the printer from 1"
+            error("raw", 1, message, "let sensorgen slice write it")
 
-    def _left_on(self, last: int) -> Iterator[Found]:
-        hot = self.heaters.hot()
-        if not hot:
-            return
-        names = ", ".join(map(str, hot))
-        if self.ended:
-            yield Found(
-                "heat-left", "info", last, f"tools {names} are left on to the macro of {self.ended}",
-                "switch them off in the file (G10 P.. S0 R0) if that macro does not",
-            )  # fmt: skip
-        else:
-            yield error(
+    def _left_on(self, last: int) -> None:
+        names = ", ".join(map(str, self.heaters.hot()))
+        if names and self.ended:
+            message = f"tools {names} are left on to the macro of {self.ended}"
+            advice = "switch them off in the file (G10 P.. S0 R0) if that macro does not"
+            self.found.append(Found("heat-left", "info", last, message, advice))
+        elif names:
+            self.found.error(
                 "heat-left", last, f"tools {names} are still heated at the end of the file",
                 "switch them off (G10 P.. S0 R0), or end as the printer's other files do"
                 f" ({' or '.join(self.control.ends) or 'see its manual'}); the file may be cut short",

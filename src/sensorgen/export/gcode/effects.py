@@ -4,10 +4,9 @@ After RepRapFirmware's dictionary of G-code. Some hold until they are taken back
 until ``M221 S100``) and are refused only if lines are printed meanwhile; a few are wrong wherever they stand.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
-from sensorgen.export.gcode.found import Found, error
+from sensorgen.export.gcode.found import Findings, Found
 from sensorgen.export.gcode.moves import Event
 from sensorgen.export.gcode.words import Command
 
@@ -47,15 +46,6 @@ class Effect:
     words: str = ""
     neutral: float | None = None
 
-    def is_neutral(self, command: Command) -> bool:
-        """Whether a command takes the effect back."""
-        given = [command.number(letter) for letter in self.words if command.has(letter)]
-        return bool(given) and all(value == self.neutral for value in given)
-
-    def speaks(self, command: Command) -> bool:
-        """Whether a command changes anything; without words most of them only ask."""
-        return not self.words or command.has(self.words)
-
 
 _EFFECTS = {
     **dict.fromkeys(PLACES, Effect("place of work", "whose offset is unknown")),
@@ -82,35 +72,55 @@ _ENDS = {"G54": "place of work", "G69": "rotation", "G94": "feed", "M29": "file"
 
 
 class Effects:
-    """What holds while a file is followed."""
+    """What holds while a file is followed; nothing at first."""
 
-    def __init__(self) -> None:
-        """Nothing does."""
+    def __init__(self, found: Findings) -> None:
+        """Take the list that findings go to."""
+        self.found = found
         self.held: dict[tuple[str, str], tuple[int, str]] = {}  # name and tool or drive: line, and what is printed
 
     def obey(self, event: Event) -> None:
-        """Follow one command."""
+        """Follow one command; without its words most of them only ask."""
         command = event.command
         if ended := _ENDS.get(command.code):
             self.held.pop((ended, ""), None)
         effect = _OFFSETS if command.code == "G10" else _EFFECTS.get(command.code)
-        if effect is None or not effect.speaks(command):
+        if effect is None or (effect.words and not command.has(effect.words)):
             return
         key = effect.name, command.text("P") or command.text("D") or ""
-        if effect.is_neutral(command) and command.number("L") != 20:  # L20 offsets so that the nozzle is there
+        given = [command.number(letter) for letter in effect.words if command.has(letter)]
+        neutral = given and all(value == effect.neutral for value in given)
+        if neutral and command.number("L") != 20:  # L20 offsets so that the nozzle is there
             self.held.pop(key, None)
         else:
             self.held[key] = event.number, f"lines are printed {effect.says} ({_text(command)})"
 
-    def printing(self) -> Iterator[Found]:
-        """What is wrong with lines printed now; each reported once."""
+    def printing(self) -> None:
+        """Report what is wrong with lines printed now, each once."""
         for number, message in self.held.values():
-            yield error("effect", number, message, "leave it out, and let the slicer place, scale and meter the print")
+            self.found.error(
+                "effect", number, message, "leave it out, and let the slicer place, scale and meter the print"
+            )
         self.held.clear()
 
 
-def judge(command: Command, number: int) -> Iterator[Found]:
-    """What is wrong with a command wherever it stands.
+# What is wrong wherever it stands: rule, severity, message behind the command, advice.
+_WRONG = {
+    **dict.fromkeys(("M112", "M999"), ("end", "error", "stops the machine at once", "leave it out")),
+    **dict.fromkeys(
+        ("M23", "M32", "M701", "M702", "M997"), ("macro", "error", "runs what the check cannot see", "leave it out")
+    ),
+    **dict.fromkeys(PAUSES, ("pause", "info", "waits until somebody goes on", "be there, or leave it out")),
+    **dict.fromkeys(SETTINGS, (
+        "settings", "warning", "changes the machine itself; the check goes by the printer's file",
+        "leave it to the machine's own configuration",
+    )),
+    "M121": ("modes", "warning", "takes earlier modes back; that is not followed", "write them out"),
+}  # fmt: skip
+
+
+def judge(command: Command, number: int, found: Findings) -> None:
+    """Add what is wrong with a command wherever it stands.
 
     Parameters
     ----------
@@ -118,32 +128,21 @@ def judge(command: Command, number: int) -> Iterator[Found]:
         Not of a move.
     number : int
         Its line.
+    found : Findings
+        Grows.
     """
     code = command.code
     if code[0] == "G" and code not in _KNOWN_G:
-        yield error("read", number, f"{code} is not simulated: its target is unknown", "write plain moves")
-    elif code in ("M112", "M999"):
-        yield error("end", number, f"{code} stops the machine at once", "leave it out")
-    elif code in ("M23", "M32", "M701", "M702", "M997"):
-        yield error("macro", number, f"{code} runs what the check cannot see", "leave it out")
-    elif code in PAUSES:
-        yield Found("pause", "info", number, f"{code} waits until somebody goes on", "be there, or leave it out")
-    elif code in SETTINGS:
-        yield Found(
-            "settings", "warning", number, f"{code} changes the machine itself; the check goes by the printer's file",
-            "leave it to the machine's own configuration",
-        )  # fmt: skip
-    elif code == "M121":
-        yield Found("modes", "warning", number, "M121 takes earlier modes back; that is not followed", "write them out")
+        found.error("read", number, f"{code} is not simulated: its target is unknown", "write plain moves")
+    elif code in _WRONG:
+        rule, severity, message, advice = _WRONG[code]
+        found.append(Found(rule, severity, number, f"{code} {message}", advice))
     elif code == "M220" and command.number("S") not in (None, 100.0):
-        yield Found(
-            "speed", "warning", number, f"{_text(command)} changes all speeds; the check goes by the feeds (F)",
-            "let the slicer set the speeds",
-        )  # fmt: skip
+        message = f"{_text(command)} changes all speeds; the check goes by the feeds (F)"
+        found.warning("speed", number, message, "let the slicer set the speeds")
     elif code[0] == "T" and command.number("P") is not None:
-        yield Found(
-            "tool-change", "warning", number, f"{_text(command)} leaves macros of the tool change out", "leave P out"
-        )
+        message = f"{_text(command)} leaves macros of the tool change out"
+        found.warning("tool-change", number, message, "leave P out")
 
 
 def _text(command: Command) -> str:

@@ -34,9 +34,16 @@ class Found:
     count: int = 1
 
 
-def error(rule: str, line: int, message: str, advice: str) -> Found:
-    """A finding that refuses the file."""
-    return Found(rule, "error", line, message, advice)
+class Findings(list[Found]):
+    """Findings of a check as it goes on."""
+
+    def error(self, rule: str, line: int, message: str, advice: str) -> None:
+        """Add a finding that refuses the file."""
+        self.append(Found(rule, "error", line, message, advice))
+
+    def warning(self, rule: str, line: int, message: str, advice: str) -> None:
+        """Add a finding that does not."""
+        self.append(Found(rule, "warning", line, message, advice))
 
 
 def merged(found: Iterable[Found]) -> tuple[Found, ...]:

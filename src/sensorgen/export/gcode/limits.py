@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.design.printer import Printer
-from sensorgen.export.gcode.found import Found, error
+from sensorgen.export.gcode.found import Found
 from sensorgen.export.gcode.moves import NO_TOOL, Motion
-from sensorgen.export.gcode.words import Command
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -48,7 +47,9 @@ def check_loaded(motion: Motion, loaded: Mapping[int, str]) -> Iterator[Found]:
     for tool in np.setdiff1d(tools[motion.extruded_mm > 0], [NO_TOOL, *loaded]).astype(int).tolist():
         number = int(motion.number[np.flatnonzero((tools == tool) & (motion.extruded_mm > 0))[0]])
         known = ", ".join(f"{name} on {one}" for one, name in loaded.items())
-        yield error("tool", number, f"tool {tool} prints, and nothing is on it; loaded are {known}", "use another tool")
+        yield Found(
+            "tool", "error", number, f"tool {tool} prints, and nothing is on it; loaded are {known}", "use another tool"
+        )
 
 
 def _found(motion: Motion, wrong: Mask, rule: str, severity: str, message: str, advice: str) -> Iterator[Found]:
@@ -75,7 +76,7 @@ def _reach(motion: Motion, machine: Printer) -> Iterator[Found]:
 
 def _bed(motion: Motion, machine: Printer) -> Iterator[Found]:
     """Nothing is printed beside the bed or above the print volume."""
-    prints = _prints(motion)
+    prints = (motion.extruded_mm > 0) & (motion.across_mm > 0)
     middle = np.array(machine.bed_centre_mm())
     low, high = (box[:, :2] for box in motion.box_mm())
     beside = np.maximum(high - middle, middle - low) - np.array(machine.bed_mm) / 2
@@ -95,10 +96,13 @@ def _bed(motion: Motion, machine: Printer) -> Iterator[Found]:
 
 def _below(motion: Motion, _: Printer) -> Iterator[Found]:
     """No move across goes lower than what is already printed: the nozzle would plough through it."""
-    prints, across = _prints(motion), motion.across_mm > 0
+    across = motion.across_mm > 0
+    prints = (motion.extruded_mm > 0) & across
     lowest = np.minimum(motion.start_mm[:, 2], motion.end_mm[:, 2])
     printed = np.where(prints, lowest, -np.inf)
-    edges = [0, *sorted({e.row for e in motion.events if _names_z(e.command)}), len(lowest)]
+    named = ((e.row, e.command) for e in motion.events if e.command.code == "G92")
+    anew = {row for row, command in named if command.has("Z") or not command.has("XYE")}  # heights count anew
+    edges = [0, *sorted(anew), len(lowest)]
     wrong = np.zeros(len(lowest), dtype=bool)
     for start, end in pairwise(edges):
         top = np.maximum.accumulate(printed[start:end])
@@ -109,13 +113,10 @@ def _below(motion: Motion, _: Printer) -> Iterator[Found]:
     )  # fmt: skip
 
 
-def _names_z(command: Command) -> bool:
-    """Whether heights count anew."""
-    return command.code == "G92" and (command.has("Z") or not command.has("XYE"))
-
-
 def _speed(motion: Motion, machine: Printer) -> Iterator[Found]:
-    """No axis is asked for more than its limit."""
+    """A feed is above 0, and no axis is asked for more than its limit."""
+    message, advice = "a move has a feed of 0 or less", "give a feed (F)"
+    yield from _found(motion, motion.feed_mm_min <= 0, "speed", "error", message, advice)
     feed = motion.feed_mm_min / MM_MIN
     across, filament = motion.across_mm, np.abs(motion.filament_mm)
     up = np.abs(motion.rows[:, 5] - motion.rows[:, 2])
@@ -137,13 +138,6 @@ def _speed(motion: Motion, machine: Printer) -> Iterator[Found]:
                 f"{what} with {name} at {most:.0f} mm/min; the limit is {limit * MM_MIN:.0f}: {then}",
                 "lower the feed (F)",
             )  # fmt: skip
-
-
-def _feed(motion: Motion, _: Printer) -> Iterator[Found]:
-    """A feed is above 0."""
-    yield from _found(
-        motion, motion.feed_mm_min <= 0, "speed", "error", "a move has a feed of 0 or less", "give a feed (F)"
-    )
 
 
 def _purge(motion: Motion, machine: Printer) -> Iterator[Found]:
@@ -170,11 +164,6 @@ def _read(motion: Motion, _: Printer) -> Iterator[Found]:
             yield Found("read", severity, rest[0].number, message, advice, len(rest))
 
 
-def _prints(motion: Motion) -> Mask:
-    rows: Mask = (motion.extruded_mm > 0) & (motion.across_mm > 0)
-    return rows
-
-
 RULES: tuple[Callable[[Motion, Printer], Iterator[Found]], ...] = (
-    _reach, _bed, _below, _speed, _feed, _purge, _read,
+    _reach, _bed, _below, _speed, _purge, _read,
 )  # fmt: skip

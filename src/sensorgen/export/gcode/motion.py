@@ -62,9 +62,12 @@ class _Steps:
         back = self.moves & (self.code < 2) & ~np.isnan(self.words["R"])
         faults += [Fault(n >> SHIFT, "R of G0 or G1 goes by a stored place") for n in self.place[back].tolist()]
         arcs, wrong = self._arcs(rows)
+        before = iter(self._rows([*(place for place, _ in said.events), *(place for place, _, _ in said.changes)]))
+        events = [Event(next(before), place >> SHIFT, command) for place, command in said.events]
+        changes = [Change(next(before), place >> SHIFT, tool, macro) for place, tool, macro in said.changes]
         return Motion(
-            rows, arcs, self._events(), self._changes(), self._track(said.tools), tuple(said.kinds),
-            self._track(said.kind), self._track(said.width_mm), self._track(said.height_mm), self._track(said.layer),
+            rows, arcs, events, changes, self._track(said.tools), tuple(said.kinds), self._track(said.kind),
+            self._track(said.width_mm), self._track(said.height_mm), self._track(said.layer),
             self._track(said.absolute_e), sorted([*said.faults, *faults, *wrong], key=lambda fault: fault.number),
             said.lines, said.maker,
         )  # fmt: skip
@@ -76,26 +79,19 @@ class _Steps:
             yield _before(_state(self.words[axis], sets))
         for axis in "XYZ":
             yield _state(self.words[axis], sets)
-        filament = self._filament()
+        given, absolute = self.words["E"], self._held(self.said.absolute_e, 1.0) > 0
+        at = _state(given, absolute | ~self.moves)
+        filament = np.where(self.moves & ~np.isnan(given), np.where(absolute, at - _before(at), given), 0.0)
         yield _extruded(filament, self._held(self.said.tools, NO_TOOL))
         yield filament
-        yield self._feed()
+        last = _last(~np.isnan(self.words["F"]))
+        yield np.where(last < 0, DEFAULT_FEED_MM_MIN, self.words["F"][last])
         yield (self.place >> SHIFT).astype(np.float64)
 
     def _held(self, holding: Holding, before: float) -> Floats:
         """What holds for each step."""
         rows = np.searchsorted(self.place, np.array(holding.places, np.int64))
         return Track(rows.tolist(), holding.values.tolist()).column(len(self.place), before)
-
-    def _filament(self) -> Floats:
-        """Filament that each step pushes [mm]."""
-        given, absolute = self.words["E"], self._held(self.said.absolute_e, 1.0) > 0
-        at = _state(given, absolute | ~self.moves)
-        return np.where(self.moves & ~np.isnan(given), np.where(absolute, at - _before(at), given), 0.0)
-
-    def _feed(self) -> Floats:
-        last = _last(~np.isnan(self.words["F"]))
-        return np.where(last < 0, DEFAULT_FEED_MM_MIN, self.words["F"][last])
 
     def _arcs(self, rows: Floats) -> tuple[Arcs, list[Fault]]:
         """Moves that are arcs, and what is wrong with those that cannot be."""
@@ -118,8 +114,6 @@ class _Steps:
         ]
         return Arcs.of(row[fits], start[fits], end[fits], centre[fits], clockwise[fits]), faults
 
-    # Places of the file as numbers of moves.
-
     def _rows(self, places: Sequence[int]) -> list[int]:
         """How many moves come before each of some places."""
         found: list[int] = np.searchsorted(self.place[self.moves], np.array(places, np.int64)).tolist()
@@ -127,17 +121,6 @@ class _Steps:
 
     def _track(self, holding: Holding) -> Track:
         return Track(self._rows(holding.places), holding.values.tolist())
-
-    def _events(self) -> list[Event]:
-        rows = self._rows([place for place, _ in self.said.events])
-        return [Event(row, place >> SHIFT, what) for row, (place, what) in zip(rows, self.said.events, strict=True)]
-
-    def _changes(self) -> list[Change]:
-        rows = self._rows([place for place, _, _ in self.said.changes])
-        return [
-            Change(row, place >> SHIFT, tool, macro)
-            for row, (place, tool, macro) in zip(rows, self.said.changes, strict=True)
-        ]
 
 
 def _last(given: Mask) -> Ints:
@@ -162,24 +145,17 @@ def _extruded(filament: Floats, tool: Floats) -> Floats:
     extruded = np.maximum(filament, 0.0)
     for one in np.unique(tool[filament < 0]):
         rows = np.flatnonzero((tool == one) & (filament != 0))
-        pushed = filament[rows]
-        done = 0
+        pushed, step = filament[rows], 0
         for first in np.flatnonzero(pushed < 0).tolist():
-            if first >= done:
-                done = _made_good(extruded, rows, pushed, first)
+            if first < step:
+                continue
+            step, owed = first, -pushed[first]
+            while owed and step + 1 < len(rows):  # until the tool owes nothing any more
+                step += 1
+                extruded[rows[step]] = max(0.0, pushed[step] - owed)
+                owed = max(0.0, owed - pushed[step])
+            step += 1
     return extruded
-
-
-def _made_good(extruded: Floats, rows: Ints, pushed: Floats, step: int) -> int:
-    """Follow a tool from where it draws filament back to where it owes nothing any more; the step after that."""
-    owed = 0.0
-    while step < len(rows):
-        extruded[rows[step]] = max(0.0, pushed[step] - owed)
-        owed = max(0.0, owed - pushed[step])
-        step += 1
-        if owed == 0:
-            break
-    return step
 
 
 def _fitting(centre: Floats, start: Floats, end: Floats) -> Floats:

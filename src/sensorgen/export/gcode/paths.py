@@ -8,13 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.design.printer import Printer
-from sensorgen.export.gcode.extruded import NOT_MODEL
 from sensorgen.export.gcode.files import Source
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.moves import NO_TOOL, Motion
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+# What the slicers' ";TYPE:" comments call lines that are not part of a body, in lower case.
+NOT_MODEL = frozenset(
+    {
+        "skirt", "brim", "skirt/brim", "prime-tower", "prime tower", "prime pillar", "wipe tower", "custom",
+        "support", "support-interface", "support material", "support material interface",
+    }
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,20 +118,22 @@ def read(source: Source, machine: Printer, numbering: Literal["printer", "slicer
 def paths_of(motion: Motion, machine: Printer, numbering: Literal["printer", "slicer"] = "printer") -> Paths:
     """The lines that a followed file prints; see :func:`read`."""
     rows, start, end, share = _straight(motion, np.flatnonzero(motion.extruded_mm > 0))
-    count = len(motion.rows)
+    count, own = len(motion.rows), np.array([*machine.tool_numbers, NO_TOOL])
     tools = motion.tools.column(count, NO_TOOL)[rows].astype(np.int64)
+    if numbering == "slicer":  # one that the printer lacks stays negative
+        tools = own[np.where(tools < len(own) - 1, np.maximum(tools, 0), len(own) - 1)]
+    else:  # a file without any tool means the printer's first
+        tools = np.where(tools == NO_TOOL, own[0], tools)
+    if motion.layer.rows:
+        layer = motion.layer.column(count, 0)[rows].astype(np.int64)
+    else:
+        heights = np.round(motion.end_mm[rows, 2], 4)
+        layer = np.unique(heights, return_inverse=True)[1].astype(np.int64).ravel() + 1
     return Paths(
-        start_mm=start,
-        end_mm=end,
-        filament_mm=motion.extruded_mm[rows] * share,
-        tool=_own_numbers(tools, machine) if numbering == "slicer" else _or_first(tools, machine),
-        kind=motion.kind.column(count, 0)[rows].astype(np.int64),
-        height_mm=motion.height_mm.column(count)[rows],
-        width_mm=motion.width_mm.column(count)[rows],
-        layer=_layers(motion, rows),
-        number=motion.number[rows],
-        kinds=motion.kinds,
-    )
+        start, end, motion.extruded_mm[rows] * share, tools, motion.kind.column(count, 0)[rows].astype(np.int64),
+        motion.height_mm.column(count)[rows], motion.width_mm.column(count)[rows], layer, motion.number[rows],
+        motion.kinds,
+    )  # fmt: skip
 
 
 def _straight(motion: Motion, rows: Integers) -> tuple[Integers, Floats, Floats, Floats]:
@@ -138,22 +147,3 @@ def _straight(motion: Motion, rows: Integers) -> tuple[Integers, Floats, Floats,
     starts, ends = np.concatenate([motion.start_mm[kept], start]), np.concatenate([motion.end_mm[kept], end])
     share = np.concatenate([np.ones(len(kept)), 1.0 / np.bincount(which, minlength=1)[which]])
     return every[order], starts[order], ends[order], share[order]
-
-
-def _or_first(tools: Integers, machine: Printer) -> Integers:
-    """A file without any tool means the printer's first."""
-    return np.where(tools == NO_TOOL, machine.tool_numbers[0], tools)
-
-
-def _own_numbers(tools: Integers, machine: Printer) -> Integers:
-    """The printer's numbers for a slicer's, which count from 0; one that the printer lacks stays negative."""
-    known = np.array([*machine.tool_numbers, NO_TOOL])
-    within = tools < len(machine.tool_numbers)
-    return known[np.where(within, np.maximum(tools, 0), len(known) - 1)]
-
-
-def _layers(motion: Motion, rows: Integers) -> Integers:
-    if motion.layer.rows:
-        return motion.layer.column(len(motion.rows), 0)[rows].astype(np.int64)
-    heights = np.round(motion.end_mm[rows, 2], 4)
-    return np.unique(heights, return_inverse=True)[1].astype(np.int64).ravel() + 1

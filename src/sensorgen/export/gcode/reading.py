@@ -6,7 +6,6 @@ places sort as the file runs.
 
 import re
 from array import array
-from collections.abc import Callable, Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -22,8 +21,7 @@ PLACE = 92.0  # code of a row that says where the nozzle is, as G92 does
 MOST_FAULTS = 10_000  # enough to know that a file is none
 _PIECE = 1 << 20  # bytes that are read at once
 _TOOL = re.compile("-?[0-9]{1,6}")
-_NONE = [np.nan] * len(columns.WORDS)
-_Does = Callable[[Command, int], None]
+_MOVES = ("G0", "G1", "G2", "G3")
 _note = lru_cache(maxsize=4096)(remarks.read)
 
 
@@ -78,18 +76,23 @@ class Reading:
         self._places: list[Ints] = []
         self._rows: list[Floats] = []
         self._own_places, self._own_rows = array("q"), array("d")
-        self._does = {
-            **dict.fromkeys(("G0", "G1", "G2", "G3"), self._move), "G28": self._home, "G92": self._place,
-            "M98": self._call, **{code: self._holds(*what) for code, what in self._modes().items()},
+        self._sets = {
+            "G17": (self.level, 1.0), "G18": (self.level, 0.0), "G19": (self.level, 0.0),
+            "G20": (self.scale, INCH_MM), "G21": (self.scale, 1.0), "G90": (self.relative, 0.0),
+            "G91": (self.relative, 1.0), "M82": (self.absolute_e, 1.0), "M83": (self.absolute_e, 0.0),
         }  # fmt: skip
-        for piece in _pieces(text):
-            self._read(piece)
+        start = 0
+        while start < len(text):  # whole lines, many at once
+            end = text.find(b"\n", min(start + _PIECE, len(text)) - 1) + 1 or len(text)
+            self._read(text[start:end])
+            start = end
 
     def table(self) -> tuple[Ints, Floats]:
         """Places and rows of all moves, in order: the code, and the numbers of ``columns.WORDS``; once."""
+        own = np.array(self._own_rows).reshape(-1, 1 + len(columns.WORDS))
         places, rows = (
             np.concatenate([*self._places, np.array(self._own_places, np.int64)]),
-            np.concatenate([*self._rows, self._own()]),
+            np.concatenate([*self._rows, own]),
         )
         self._places, self._rows = [], []  # a million moves take room
         if not self._own_places:
@@ -97,31 +100,19 @@ class Reading:
         order = np.argsort(places, kind="stable")
         return places[order], rows[order]
 
-    def _own(self) -> Floats:
-        return np.array(self._own_rows).reshape(-1, 1 + len(columns.WORDS))
-
-    def _modes(self) -> dict[str, tuple[Holding, float]]:
-        return {
-            "G17": (self.level, 1.0), "G18": (self.level, 0.0), "G19": (self.level, 0.0),
-            "G20": (self.scale, INCH_MM), "G21": (self.scale, 1.0), "G90": (self.relative, 0.0),
-            "G91": (self.relative, 1.0), "M82": (self.absolute_e, 1.0), "M83": (self.absolute_e, 0.0),
-        }  # fmt: skip
-
     def _read(self, piece: bytes) -> None:
         found = columns.read(piece)
         first = self.lines + 1
         self._places.append((found.plain + first) << SHIFT)
         self._rows.append(np.column_stack([found.code, found.words]))
         for row in found.rest.tolist():
-            self._rest(piece[found.start[row] : found.end[row]], first + row)
+            line = piece[found.start[row] : found.end[row]]
+            text = line.decode("utf-8", "surrogateescape")
+            if text[0] == ";" and line.isascii():
+                self._remark(text[1:], (first + row) << SHIFT)
+            elif not text.isspace():
+                self._other(text, first + row)
         self.lines += len(found.start)
-
-    def _rest(self, line: bytes, number: int) -> None:
-        text = line.decode("utf-8", "surrogateescape")
-        if text[0] == ";" and line.isascii():
-            self._remark(text[1:], number << SHIFT)
-        elif not text.isspace():
-            self._other(text, number)
 
     def _remark(self, text: str, place: int) -> None:
         for quantity, value in _note(text):
@@ -150,36 +141,36 @@ class Reading:
         for here, command in enumerate(said.commands, place):
             if command.code[0] == "T":
                 self._select(command.code[1:], here)
+            elif command.code in self._sets:
+                holding, value = self._sets[command.code]
+                holding.put(here, value)
+            elif command.code == "M98":
+                if self._macro and (called := self._macro.fullmatch(macro_name(command))):
+                    self._select(called[1], here, macro=True)
             else:
-                self._does.get(command.code, _nothing)(command, here)
-            if command.code not in ("G0", "G1", "G2", "G3"):
+                self._position(command, here)
+            if command.code not in _MOVES:
                 self.events.append((here, command))
 
     def _fault(self, place: int, what: str, *, severe: bool = True) -> None:
         if len(self.faults) < MOST_FAULTS:
             self.faults.append(Fault(place >> SHIFT, what, severe))
 
-    # What each command says, by its code.
-
-    def _put(self, place: int, code: float, numbers: list[float]) -> None:
+    def _position(self, command: Command, place: int) -> None:
+        """Add a row for a move, or for a command that names the place anew."""
+        if command.code in _MOVES:
+            numbers = [self._number(command, letter, place) for letter in columns.WORDS]
+            if command.has("H") and command.number("H") != 0:
+                self._fault(place, f"H{command.text('H')} of {command.code}: an axis goes until it meets something")
+        elif command.code == "G92":
+            numbers = [0.0 if not command.has("XYZE") else self._number(command, letter, place) for letter in "XYZE"]
+        elif command.code == "G28":
+            numbers = [0.0 if not command.has("XYZ") or command.has(letter) else np.nan for letter in "XYZ"]
+        else:
+            return
         self._own_places.append(place)
-        self._own_rows.extend((code, *numbers))
-
-    def _move(self, command: Command, place: int) -> None:
-        numbers = [self._number(command, letter, place) for letter in columns.WORDS]
-        if command.has("H") and command.number("H") != 0:
-            self._fault(place, f"H{command.text('H')} of {command.code}: an axis goes until it meets something")
-        self._put(place, float(command.code[1:]), numbers)
-
-    def _place(self, command: Command, place: int) -> None:
-        every = not command.has("XYZE")
-        numbers = [0.0 if every else self._number(command, letter, place) for letter in "XYZE"]
-        self._put(place, PLACE, [*numbers, *_NONE[4:]])
-
-    def _home(self, command: Command, place: int) -> None:
-        every = not command.has("XYZ")
-        numbers = [0.0 if every or command.has(letter) else np.nan for letter in "XYZ"]
-        self._put(place, PLACE, [*numbers, *_NONE[3:]])
+        self._own_rows.append(float(command.code[1:]) if command.code in _MOVES else PLACE)
+        self._own_rows.extend(numbers + [np.nan] * (len(columns.WORDS) - len(numbers)))
 
     def _number(self, command: Command, letter: str, place: int) -> float:
         """Number of a word; nan without the word, or where it has none."""
@@ -191,13 +182,6 @@ class Reading:
             self._fault(place, f"{letter}{text} of {command.code} is no number")
             return np.nan
         return value
-
-    def _holds(self, what: Holding, value: float) -> _Does:
-        return lambda _, place: what.put(place, value)
-
-    def _call(self, command: Command, place: int) -> None:
-        if self._macro and (found := self._macro.fullmatch(macro_name(command))):
-            self._select(found[1], place, macro=True)
 
     def _select(self, digits: str, place: int, *, macro: bool = False) -> None:
         if not _TOOL.fullmatch(digits):
@@ -211,16 +195,3 @@ class Reading:
 def macro_name(command: Command) -> str:
     """File that ``M98`` calls, without drive and folders."""
     return (command.text("P") or "").rpartition(":")[2].rpartition("/")[2]
-
-
-def _nothing(_: Command, __: int) -> None:
-    """Most commands move nothing."""
-
-
-def _pieces(text: bytes) -> Iterator[bytes]:
-    """Whole lines, many at once."""
-    start = 0
-    while start < len(text):
-        end = text.find(b"\n", min(start + _PIECE, len(text)) - 1) + 1 or len(text)
-        yield text[start:end]
-        start = end

@@ -13,13 +13,12 @@ comments, moves and everything else stay as they are. What changes is the printe
 - commands after the printer's last one are never reached and go.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from math import isfinite
 from sys import maxsize
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import Printer
@@ -62,14 +61,24 @@ def ready(text: bytes, motion: Motion, machine: Printer) -> Iterator[bytes]:
     G1 X1 E1 F60 ; T2
     G10 P3 S0 R0
     """
-    _refuse_absolute(motion, machine)
+    moved = motion.filament_mm != 0
+    absolute = np.flatnonzero(moved & (motion.absolute_e.column(len(motion.rows), 1.0) > 0))
+    if machine.control.relative_e and len(absolute):
+        raise BadInput(
+            f"line {motion.number[absolute[0]]} of the slicer's file moves filament with absolute E (M82); "
+            f"{machine.name} prints with relative E: let the slicer write that"
+        )
     writer, moves = _Writer(machine), np.unique(motion.number)
     starts = np.flatnonzero(np.frombuffer(b"\n" + text, np.uint8) == ord("\n")).tolist()  # of each line, and the end
     commands = {event.number for event in motion.events}
-    before, end = dict(_preheats(motion, machine)), _last_line(motion)
+    before, end = (
+        dict(_preheats(motion, machine)),
+        int(motion.number[moved].max(initial=0)),
+    )  # the last to move filament
     done = 0  # lines
     for number in sorted({*commands, *before, end, len(starts)} - {0}):
-        move = _after(moves, done)
+        place = int(np.searchsorted(moves, done, side="right"))
+        move = int(moves[place]) if place < len(moves) else maxsize
         if move <= number and (held := writer.take()):
             yield text[starts[done] : starts[move - 1]] + _coded(held)
             done = move - 1
@@ -84,32 +93,8 @@ def ready(text: bytes, motion: Motion, machine: Printer) -> Iterator[bytes]:
     yield from (text[starts[n] : starts[n + 1]] for n in range(done, len(starts) - 1) if n + 1 not in said)
 
 
-def _after(moves: NDArray[np.int64], done: int) -> int:
-    """Line of the first move after some lines; without one, beyond all lines."""
-    place = int(np.searchsorted(moves, done, side="right"))
-    return int(moves[place]) if place < len(moves) else maxsize
-
-
 def _coded(lines: Iterable[str]) -> bytes:
     return "".join(lines).encode("utf-8", "surrogateescape")
-
-
-def _refuse_absolute(motion: Motion, machine: Printer) -> None:
-    if not machine.control.relative_e:
-        return
-    absolute = motion.absolute_e.column(len(motion.rows), 1.0) > 0
-    wrong = np.flatnonzero(absolute & (motion.filament_mm != 0))
-    if len(wrong):
-        raise BadInput(
-            f"line {motion.number[wrong[0]]} of the slicer's file moves filament with absolute E (M82); "
-            f"{machine.name} prints with relative E: let the slicer write that"
-        )
-
-
-def _last_line(motion: Motion) -> int:
-    """Line of the last move of filament; 0 if there is none."""
-    moved = np.flatnonzero(motion.filament_mm != 0)
-    return int(motion.number[moved[-1]]) if len(moved) else 0
 
 
 def _preheats(motion: Motion, machine: Printer) -> Iterator[tuple[int, list[str]]]:
@@ -145,22 +130,21 @@ class _Writer:
         self.ended = False
         self.hot: list[int] = []
         self.offset_mm = None if self.control.tool_offsets_mm else 0.0  # an earlier print may have left another
-        self.changes: dict[str, Callable[[Command], Sequence[str] | None]] = {
-            "G10": self._tool_settings, "M104": self._temperature, "M109": self._temperature, "M106": self._fan,
-            "M107": self._fan_off, "M82": self._absolute, "M116": self._of_tool, "M568": self._state,
-        }  # fmt: skip
 
     def line(self, line: str) -> Iterator[str]:
-        """A line that may have to change."""
+        """A line that may have to change; its comment stays behind the first command, or goes with what it spoke of."""
         said = words.parse(line)
         made = [self._command(command) for command in said.commands]
         if all(new is None for new in made):
             yield line
         else:
-            texts = [
+            code, semicolon, remark = line.rstrip("\r\n").partition(";")
+            gap = code[len(code.rstrip()) :]
+            texts = (
                 text for c, new in zip(said.commands, made, strict=True) for text in (_text(c) if new is None else new)
-            ]
-            yield from _with_remark(line, texts)
+            )
+            for place, text in enumerate(texts):
+                yield f"{text}{gap}{semicolon}{remark}\n" if place == 0 and semicolon else f"{text}\n"
         for command in said.commands:
             self.homed |= command.code in self.control.homes
             self.ended |= command.code in self.control.ends
@@ -178,9 +162,20 @@ class _Writer:
 
     def _command(self, command: Command) -> Sequence[str] | None:
         """Other words for a command; None where it stays."""
-        if command.code[0] == "T" and command.code != "T-1":
+        code, fan = command.code, self.control.layer_fan
+        if code[0] == "T" and code != "T-1":
             return self._change(command)
-        return self.changes.get(command.code, _stays)(command)
+        if code in ("M104", "M109"):
+            return self._temperature(command)
+        if code in ("G10", "M568"):
+            return self._tool_settings(command)
+        if code == "M106" and fan is not None and not command.has("P"):
+            return _text(Command("M106", (("P", str(fan)), *command.words)))
+        if code == "M107" and fan is not None:
+            return [f"M106 P{fan} S0"]
+        if code == "M82" and self.control.relative_e:
+            return []
+        return self._of_tool(command) if code == "M116" else None
 
     def _change(self, command: Command) -> Sequence[str]:
         self.tool = _own(self.machine, float(command.code[1:]))
@@ -197,13 +192,19 @@ class _Writer:
         return []
 
     def _tool_settings(self, command: Command) -> Sequence[str] | None:
-        if not command.has("SR"):
-            return None  # retraction by the firmware, or offsets of a place of work
-        if not self.control.names_tools:
-            return self._of_tool(command)
+        """``G10`` and ``M568`` with temperatures; the state that the latter may also set, by itself."""
+        if not command.has("SR") or not self.control.names_tools:
+            # G10 without them is retraction by the firmware, or offsets of a place of work
+            return self._of_tool(command) if command.code == "M568" or command.has("SR") else None
         index = command.number("P")
         tool = self.tool if index is None else _own(self.machine, index)
-        return None if tool is None else [self._settings(tool, command.number("S"), command.number("R"))]
+        if tool is None:
+            return None if command.code == "G10" else self._of_tool(command)
+        settings = [self._settings(tool, command.number("S"), command.number("R"))]
+        if command.code == "M568" and command.has("A"):
+            state = Command("M568", tuple(word for word in command.words if word[0] not in "SR"))
+            settings += self._of_tool(state) or _text(state)
+        return settings
 
     def _temperature(self, command: Command) -> Sequence[str] | None:
         active = command.number("S")
@@ -230,25 +231,6 @@ class _Writer:
             raise BadInput(f"the slicer's file sets tool {tool} to a temperature that is no number")
         return " ".join([f"G10 P{tool}", *(f"{letter}{value:g}" for letter, value in given if value is not None)])
 
-    def _state(self, command: Command) -> Sequence[str] | None:
-        """``M568``: temperatures as those of G10, and the state by itself."""
-        settings = self._tool_settings(command) if self.control.names_tools else None
-        state = Command("M568", tuple(word for word in command.words if word[0] not in "SR"))
-        if not settings:
-            return self._of_tool(command)
-        return [*settings, *(self._of_tool(state) or _text(state))] if command.has("A") else settings
-
-    def _fan(self, command: Command) -> Sequence[str] | None:
-        if self.control.layer_fan is None or command.has("P"):
-            return None
-        return _text(Command("M106", (("P", str(self.control.layer_fan)), *command.words)))
-
-    def _fan_off(self, _: Command) -> Sequence[str] | None:
-        return None if self.control.layer_fan is None else [f"M106 P{self.control.layer_fan} S0"]
-
-    def _absolute(self, _: Command) -> Sequence[str] | None:
-        return [] if self.control.relative_e else None
-
     def _of_tool(self, command: Command, letter: str = "P") -> Sequence[str] | None:
         """A command that names a tool, with the printer's number of it."""
         index = command.number(letter)
@@ -258,17 +240,5 @@ class _Writer:
         return _text(Command(command.code, tuple((n, own if n == letter else t) for n, t in command.words)))
 
 
-def _stays(_: Command) -> None:
-    return None
-
-
 def _text(command: Command) -> list[str]:
     return [" ".join([command.code, *(f"{letter}{text}" for letter, text in command.words)])]
-
-
-def _with_remark(line: str, texts: Sequence[str]) -> Iterator[str]:
-    """The new texts as lines; the old line's comment stays behind the first, or goes with what it spoke of."""
-    code, semicolon, remark = line.rstrip("\r\n").partition(";")
-    gap = code[len(code.rstrip()) :]
-    for place, text in enumerate(texts):
-        yield f"{text}{gap}{semicolon}{remark}\n" if place == 0 and semicolon else f"{text}\n"

@@ -7,14 +7,13 @@ from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import MissingValue, UnknownName
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer
-from sensorgen.export.gcode.extruded import NOT_MODEL
 from sensorgen.export.gcode.moves import NO_TOOL, Motion
+from sensorgen.export.gcode.paths import NOT_MODEL
 from sensorgen.export.gcode.timing import seconds
 
 
@@ -95,17 +94,25 @@ def report(motion: Motion, machine: Printer, loaded: dict[int, str] | None = Non
     loaded : dict of int to str, optional
         Material of each tool; the printer's usual ones where a tool has one only.
     """
-    printed = motion.extruded_mm > 0
-    across = printed & (motion.length_mm > 0)
+    printed = (motion.extruded_mm > 0) & (motion.length_mm > 0)
+    low, high = motion.box_mm()  # axis by axis: a copy of all places would take much room
+    corners = (
+        [tuple(float(of(box[printed, k])) for k in range(3)) for box, of in ((low, np.min), (high, np.max))]
+        if printed.any()
+        else None
+    )
     taken = [change.tool for change in motion.changes if change.tool != NO_TOOL]
+    waits = (e.command for e in motion.events if e.command.code == "G4")
+    dwells_s = sum((w.number("S") or 0.0) + (w.number("P") or 0.0) / 1000 for w in waits)
+    moving_s = float(seconds(motion, machine.max_speed_mm_s).sum())
     return Report(
         lines=motion.lines,
         moves=len(motion.rows),
         layers=int(max(motion.layer.values, default=0)),
-        time_s=float(seconds(motion, machine.max_speed_mm_s).sum()) + _dwells(motion),
-        tools=_tools(motion, machine, usual(machine) | (loaded or {})),
+        time_s=moving_s + (dwells_s if 0 <= dwells_s < math.inf else 0.0),
+        tools=tuple(_tools(motion, machine, usual(machine) | (loaded or {}))),
         tool_changes=sum(a != b for a, b in pairwise(taken)),
-        box_mm=_box_mm(motion, across) if across.any() else None,
+        box_mm=(corners[0], corners[1]) if corners else None,
     )
 
 
@@ -116,46 +123,18 @@ def usual(machine: Printer) -> dict[int, str]:
     return {tool: material for material, tool in named if tools.count(tool) == 1}
 
 
-def _box_mm(motion: Motion, printed: NDArray[np.bool_]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Lowest and highest place of some moves, axis by axis: a copy of all places would take much room [mm]."""
-    low, high = motion.box_mm()
-    return tuple(float(low[printed, k].min()) for k in range(3)), tuple(float(high[printed, k].max()) for k in range(3))
-
-
-def _dwells(motion: Motion) -> float:
-    """Time that the file waits on purpose, G4 [s]."""
-    waits = (e.command for e in motion.events if e.command.code == "G4")
-    total = sum((w.number("S") or 0.0) + (w.number("P") or 0.0) / 1000 for w in waits)
-    return total if 0 <= total < math.inf else 0.0
-
-
-def _tools(motion: Motion, machine: Printer, loaded: dict[int, str]) -> tuple[OfTool, ...]:
-    count = len(motion.rows)
-    start = machine.tool_at_start()
+def _tools(motion: Motion, machine: Printer, loaded: dict[int, str]) -> Iterator[OfTool]:
+    count, start, extruded = len(motion.rows), machine.tool_at_start(), motion.extruded_mm
     tools = motion.tools.column(count, NO_TOOL if start is None else start).astype(np.int64)
     kinds = motion.kind.column(count, 0).astype(np.int64)
     waste = np.array([kind in NOT_MODEL for kind in motion.kinds])[kinds] | (motion.length_mm == 0)
-    extruded = motion.extruded_mm
-    found = []
     for tool in np.unique(tools[extruded > 0]).tolist():
-        length_mm = float(extruded[tools == tool].sum())
+        material = loaded.get(tool, "")
+        length_mm, purge_mm = (float(extruded[rows].sum()) for rows in (tools == tool, (tools == tool) & waste))
         volume_mm3 = length_mm * math.pi / 4 * machine.filament_mm**2
-        density = _density_kg_m3(loaded.get(tool, ""))
-        found.append(
-            OfTool(
-                tool=tool,
-                material=loaded.get(tool, ""),
-                filament_mm=length_mm,
-                purge_mm=float(extruded[(tools == tool) & waste].sum()),
-                volume_mm3=volume_mm3,
-                mass_g=None if density is None else volume_mm3 * density * 1e-6,
-            )
-        )
-    return tuple(found)
-
-
-def _density_kg_m3(material: str) -> float | None:
-    try:
-        return materials.load(material).value("density_kg_m3").value if material else None
-    except (MissingValue, UnknownName):
-        return None
+        try:
+            density = materials.load(material).value("density_kg_m3").value if material else None
+        except (MissingValue, UnknownName):
+            density = None
+        mass_g = None if density is None else volume_mm3 * density * 1e-6
+        yield OfTool(tool, material, length_mm, purge_mm, volume_mm3, mass_g)

@@ -119,7 +119,9 @@ def _read(text: str) -> Line:
         elif kind == "bracket":
             remark = remark or token["bracket"]
         elif kind == "checksum":
-            faults += _checksum(text, token.start("checksum") - 1, int(token["checksum"]))
+            given, line = int(token["checksum"]), text[: token.start("checksum") - 1].encode("utf-8", "surrogateescape")
+            if (found := reduce(lambda a, b: a ^ b, line, 0)) != given:
+                faults.append(f"checksum {given} is wrong: the line makes {found}")
         else:
             faults.append(f"{token['junk']!r} means nothing here")
     made = tuple(Command(code, tuple(words)) for code, words in commands)
@@ -131,28 +133,14 @@ def _take(commands: list[tuple[str, list[tuple[str, str]]]], letter: str, value:
     if letter == "N" and not commands:
         return []
     if letter in "GM" or (letter == "T" and not commands):
-        code = _code(letter, value)
-        if code is None:
+        if not _NUMBER.fullmatch(value):
             return [f"{letter}{value!s} is no command"]
-        commands.append((code, []))
+        number = float(value)
+        commands.append((f"{letter}{int(number)}" if number == int(number) else f"{letter}{value}", []))
         return []
     if not commands:
         return [f"{letter}{value} stands before any command"]
     quoted = value.startswith('"')
     text = value[1:].removesuffix('"').replace('""', '"') if quoted else value
     commands[-1][1].append((letter, text))
-    if value.count('"') % 2:
-        return [f"the string after {letter} does not end"]
-    return []
-
-
-def _code(letter: str, value: str) -> str | None:
-    if not _NUMBER.fullmatch(value):
-        return None
-    number = float(value)
-    return f"{letter}{int(number)}" if number == int(number) else f"{letter}{value}"
-
-
-def _checksum(text: str, end: int, given: int) -> list[str]:
-    found = reduce(lambda a, b: a ^ b, text[:end].encode("utf-8", "surrogateescape"), 0)
-    return [] if found == given else [f"checksum {given} is wrong: the line makes {found}"]
+    return [f"the string after {letter} does not end"] if value.count('"') % 2 else []

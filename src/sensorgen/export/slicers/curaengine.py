@@ -12,10 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from string import Template
 
 from sensorgen.core.errors import SlicerFailed
-from sensorgen.design.printer import Printer, Quality, folder
+from sensorgen.design.printer import Printer, Quality
 from sensorgen.export.slicers import cura
 from sensorgen.export.slicers.loads import Load, recipes
 from sensorgen.export.slicers.run import USUAL, Runner, find, run
@@ -55,17 +54,19 @@ def engine_settings(printer: Printer, quality: Quality, loads: Mapping[int, Load
     used = recipes(printer, quality, loads)
     files = cura.profiles(printer, quality, loads)
     own = f"quality/{printer.name}/{printer.name}_{quality.name}"
-    common = cura.of_all(printer, quality, used)
-    tools = {}
+    shared, tools = cura.context(printer, quality, used), {}
+    of_all: dict[str, str] = {}
     for index, r in used.items():
         profile = _sections(files[f"{own}_{cura.material_id(r)}.inst.cfg"])["values"]
-        tools[index] = profile | _engine("tool", cura.of_tool(printer, quality, r)) | {"extruder_nr": str(index)}
+        engine = _sections(cura.fill("engine.ini", shared, r=r))
+        of_all = of_all or engine["all"]
+        tools[index] = profile | engine["tool"] | {"extruder_nr": str(index)}
     return EngineSettings(
         printer=printer.name,
         files={path: text for path, text in files.items() if path.startswith(("definitions/", "extruders/"))},
-        common=_sections(files[f"{own}_global.inst.cfg"])["values"] | _engine("all", common),
+        common=_sections(files[f"{own}_global.inst.cfg"])["values"] | of_all,
         tools=tools,
-        unused={i: _engine("unused", common) for i in range(len(printer.tool_numbers)) if i not in used},
+        unused={i: {"prime_tower_min_volume": "0"} for i in range(len(printer.tool_numbers)) if i not in used},
     )
 
 
@@ -103,9 +104,16 @@ def slice_bodies(
             place = Path(here) / name
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_text(text, "utf-8")
-        command = [program, "slice", *_arguments(stls, settings, Path(here)), "-o", str(gcode)]
-        search = os.pathsep.join(map(str, _search(Path(here))))
-        run(command, gcode, {"CURA_ENGINE_SEARCH_PATH": search}, runner)
+        # General settings, then each tool's, then each body under its tool: the engine reads in this order.
+        command = [program, "slice", "-j", str(Path(here) / "definitions" / f"{settings.printer}.def.json")]
+        command += _given(settings.common)
+        for index, values in sorted((settings.unused | settings.tools).items()):
+            command += [f"-e{index}", *_given(values)]
+        for path, index in stls:
+            command += [f"-e{index}", "-l", str(path), "-s", f"extruder_nr={index}"]
+        command += ["-o", str(gcode)]
+        search = [str(base / kind) for base in (Path(here), resources()) for kind in ("definitions", "extruders")]
+        run(command, gcode, {"CURA_ENGINE_SEARCH_PATH": os.pathsep.join(search)}, runner)
 
 
 def resources() -> Path:
@@ -122,27 +130,8 @@ def resources() -> Path:
     raise SlicerFailed(f"Cura's definitions are not in {RESOURCES[0]}; on Debian: apt install cura")
 
 
-def _search(here: Path) -> list[Path]:
-    return [base / kind for base in (here, resources()) for kind in ("definitions", "extruders")]
-
-
-def _arguments(stls: Sequence[tuple[Path, int]], settings: EngineSettings, here: Path) -> list[str]:
-    """General settings, then each tool's, then each body under its tool: the engine reads in this order."""
-    words = ["-j", str(here / "definitions" / f"{settings.printer}.def.json"), *_given(settings.common)]
-    for index, values in sorted((settings.unused | settings.tools).items()):
-        words += [f"-e{index}", *_given(values)]
-    for path, index in stls:
-        words += [f"-e{index}", "-l", str(path), "-s", f"extruder_nr={index}"]
-    return words
-
-
 def _given(values: Mapping[str, str]) -> list[str]:
     return [word for key, value in values.items() for word in ("-s", f"{key}={value}")]
-
-
-def _engine(section: str, names: Mapping[str, str]) -> dict[str, str]:
-    said = _sections((folder() / "cura" / "engine.ini").read_text("utf-8"))[section]
-    return {key: Template(value).safe_substitute(names) for key, value in said.items()}
 
 
 @lru_cache(maxsize=16)

@@ -1,13 +1,17 @@
 """What each tool prints, as numbers that the printer can do: the one source of every profile."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.design.design import Design, Infill
 from sensorgen.design.materials import Material
-from sensorgen.design.printer import Printer, Quality
+from sensorgen.design.printer import Printer, Quality, folder
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 PATTERNS = ("rectilinear", "grid", "concentric", "honeycomb", "triangles")
 RETRACTION_SPEED_MM_S = 40.0  # PrusaSlicer's default; slower where the printer's extruder is
@@ -51,6 +55,16 @@ class Recipe:
     retraction_mm: float
     retraction_speed_mm_s: float
 
+    @property
+    def label(self) -> str:
+        """Material and source."""
+        return f"{self.material.name}@{self.source}" if self.source else self.material.name
+
+    @property
+    def slow_speed_mm_s(self) -> float:
+        """Slowest speed of layers that must cool [mm/s]."""
+        return min(10.0, self.speed_mm_s)
+
 
 def recipe(printer: Printer, quality: Quality, tool: int, load: Load) -> Recipe:
     """Look up a load's numbers and hold them against the printer's limits.
@@ -73,26 +87,34 @@ def recipe(printer: Printer, quality: Quality, tool: int, load: Load) -> Recipe:
     UnknownName
         No infill pattern goes by that name.
     """
-    where = f"{load.material.name} on tool {tool}"
-    limits = printer.max_speed_mm_s
+    where, limits = f"{load.material.name} on tool {tool}", printer.max_speed_mm_s
     pattern = load.infill_pattern or quality.infill_pattern
     if pattern not in PATTERNS:
         raise UnknownName("infill pattern", pattern, PATTERNS)
-    infill = _value(load, tool, "infill_percent") if load.infill_percent is None else load.infill_percent
+
+    def value(quantity: str, what: str, low: float, high: float, own: float | None = None) -> float:
+        try:
+            found = load.material.value(quantity, load.source).value if own is None else own
+        except MissingValue as error:
+            advice = "add it under 'print' in the material's file, or load another material"
+            raise MissingValue(f"tool {tool}: {error}; {advice}") from None
+        return _between(where, what, found, low, high)
+
+    walls = value("wall_lines", "walls [lines]", 1, 100)
+    if walls != round(walls):
+        raise OutOfRange(f"{where}: walls [lines] is {walls:g}; expected a whole number")
     return Recipe(
         material=load.material,
         source=load.source,
-        nozzle_c=_between(
-            where, "nozzle temperature [C]", _value(load, tool, "nozzle_temperature_c"), 0, printer.max_nozzle_c
-        ),
-        bed_c=_between(where, "bed temperature [C]", _value(load, tool, "bed_temperature_c"), 0, printer.max_bed_c),
-        speed_mm_s=_between(where, "speed [mm/s]", _value(load, tool, "speed_mm_s"), 0.1, limits.xy),
-        fan_percent=_between(where, "fan [%]", _value(load, tool, "fan_percent"), 0, 100),
-        infill_percent=_between(where, "infill [%]", infill, 1, 100),
+        nozzle_c=value("nozzle_temperature_c", "nozzle temperature [C]", 0, printer.max_nozzle_c),
+        bed_c=value("bed_temperature_c", "bed temperature [C]", 0, printer.max_bed_c),
+        speed_mm_s=value("speed_mm_s", "speed [mm/s]", 0.1, limits.xy),
+        fan_percent=value("fan_percent", "fan [%]", 0, 100),
+        infill_percent=value("infill_percent", "infill [%]", 1, 100, load.infill_percent),
         infill_pattern=pattern,
-        wall_lines=_whole(where, "walls [lines]", _value(load, tool, "wall_lines")),
-        flow_percent=_between(where, "flow [%]", _value(load, tool, "flow_percent"), 10, 200),
-        retraction_mm=_between(where, "retraction [mm]", _value(load, tool, "retraction_mm"), 0, 20),
+        wall_lines=int(walls),
+        flow_percent=value("flow_percent", "flow [%]", 10, 200),
+        retraction_mm=value("retraction_mm", "retraction [mm]", 0, 20),
         retraction_speed_mm_s=min(RETRACTION_SPEED_MM_S, limits.extruder),
     )
 
@@ -123,7 +145,9 @@ def recipes(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> di
     _between(printer.name, "first layer height [mm]", quality.first_layer_mm, printer.min_layer_mm, printer.nozzle_mm)
     _between(quality.name, "travel speed [mm/s]", quality.travel_speed_mm_s, 1, printer.max_speed_mm_s.xy)
     made = {tool: recipe(printer, quality, tool, loads[tool]) for tool in sorted(loads)}
-    _one_bed(made)
+    if len({r.bed_c for r in made.values()}) > 1:
+        each = ", ".join(f"{r.material.name} on tool {tool} {r.bed_c:g} C" for tool, r in made.items())
+        raise BadInput(f"one bed, two temperatures: {each}; name sources that agree, or print without one of them")
     return {printer.slicer_index(tool): made[tool] for tool in sorted(made, key=printer.slicer_index)}
 
 
@@ -135,18 +159,21 @@ def by_hand(material: Material) -> list[str]:
     return found
 
 
+def templates(slicer: str, **filters: Callable[..., str]) -> "Environment":
+    """The profile templates of a slicer; ``n`` writes numbers."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    made = Environment(  # noqa: S701 - plain text; XML and JSON are escaped by filters
+        loader=FileSystemLoader(folder() / slicer), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )  # fmt: skip
+    made.filters |= {"n": number, **filters}
+    return made
+
+
 def number(value: float) -> str:
     """A number as profiles write it: as short as it is exact to a millionth [-]."""
     return f"{value:.6f}".rstrip("0").rstrip(".")
-
-
-def _value(load: Load, tool: int, quantity: str) -> float:
-    try:
-        return load.material.value(quantity, load.source).value
-    except MissingValue as error:
-        raise MissingValue(
-            f"tool {tool}: {error}; add it under 'print' in the material's file, or load another material"
-        ) from None
 
 
 def _between(where: str, what: str, value: float, low: float, high: float) -> float:
@@ -155,15 +182,3 @@ def _between(where: str, what: str, value: float, low: float, high: float) -> fl
             f"{where}: {what} is {value:g}; expected {low:g} to {high:g}: change it, or the printer's limit"
         )
     return value
-
-
-def _whole(where: str, what: str, value: float) -> int:
-    if value != round(_between(where, what, value, 1, 100)):
-        raise OutOfRange(f"{where}: {what} is {value:g}; expected a whole number")
-    return int(value)
-
-
-def _one_bed(made: Mapping[int, Recipe]) -> None:
-    if len({r.bed_c for r in made.values()}) > 1:
-        each = ", ".join(f"{r.material.name} on tool {tool} {r.bed_c:g} C" for tool, r in made.items())
-        raise BadInput(f"one bed, two temperatures: {each}; name sources that agree, or print without one of them")

@@ -6,8 +6,8 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -18,6 +18,7 @@ from sensorgen.export.slicers import TIME_LIMIT_S
 KEPT_LINES = 12
 _TICK_S = 0.1
 _KEPT_BYTES = 1 << 16
+_SIGNALS = {number.value: number.name for number in signal.Signals}  # SIGXFSZ where files may not be larger
 
 
 @dataclass(frozen=True)
@@ -50,12 +51,9 @@ def find(program: str, package: str, given: str = "") -> str:
     SlicerFailed
         It is not installed; the message names the package that has it.
     """
-    if given:
-        path = shutil.which(given)
-        if path is None:
-            raise SlicerFailed(f"there is no program {given!r}; name the file of {program}, or leave it out")
-        return path
-    path = shutil.which(program)
+    path = shutil.which(given or program)
+    if path is None and given:
+        raise SlicerFailed(f"there is no program {given!r}; name the file of {program}, or leave it out")
     if path is None:
         raise SlicerFailed(f"{program} is not installed or not on PATH; on Debian: apt install {package}")
     return path
@@ -84,24 +82,23 @@ def run(
         except OSError as error:
             raise SlicerFailed(f"cannot run {command[0]}: {error.strerror or error}") from None
         if code != 0:
-            raise SlicerFailed(f"{name} {_failed(code)}: {_last_words(said)}")
+            how = (
+                f"failed with exit code {code}"
+                if code > 0
+                else f"was ended by {_SIGNALS.get(-code, f'signal {-code}')}"
+            )
+            raise SlicerFailed(f"{name} {how}: {_last_words(said)}")
         if not gcode.is_file() or gcode.stat().st_size == 0:
             raise SlicerFailed(f"{name} ended well but wrote no {gcode}: {_last_words(said)}")
 
 
-def _failed(code: int) -> str:
-    """Exit code in words; a negative one is a signal, as SIGXFSZ where files may not be larger."""
-    if code > 0:
-        return f"failed with exit code {code}"
-    try:
-        return f"was ended by {signal.Signals(-code).name}"
-    except ValueError:
-        return f"was ended by signal {-code}"
-
-
 def _wait(command: Sequence[str], said: BinaryIO, environment: Mapping[str, str], runner: Runner) -> int:
+    """Exit code of a process, which always ends here, together with whatever it started itself."""
     end = time.monotonic() + runner.time_limit_s
-    with _started(command, said, environment) as process:
+    process = subprocess.Popen(  # noqa: S603 - a slicer found by name, with our own arguments
+        list(command), stdin=subprocess.DEVNULL, stdout=said, stderr=said, env=environment, start_new_session=True
+    )
+    try:
         while True:
             runner.tick()
             left = end - time.monotonic()
@@ -110,30 +107,14 @@ def _wait(command: Sequence[str], said: BinaryIO, environment: Mapping[str, str]
             except subprocess.TimeoutExpired:
                 if left <= 0:
                     raise
-
-
-@contextmanager
-def _started(
-    command: Sequence[str], said: BinaryIO, environment: Mapping[str, str]
-) -> Iterator["subprocess.Popen[bytes]"]:
-    """A process that ends with this block, together with whatever it started itself."""
-    process = subprocess.Popen(  # noqa: S603 - a slicer found by name, with our own arguments
-        list(command), stdin=subprocess.DEVNULL, stdout=said, stderr=said, env=environment, start_new_session=True
-    )
-    try:
-        yield process
     finally:
         if process.poll() is None:
             with suppress(ProcessLookupError):
-                _end(process)
+                if hasattr(os, "killpg"):
+                    os.killpg(process.pid, signal.SIGKILL)
+                else:  # Windows
+                    process.kill()
             process.wait()
-
-
-def _end(process: "subprocess.Popen[bytes]") -> None:
-    if hasattr(os, "killpg"):
-        os.killpg(process.pid, signal.SIGKILL)
-    else:  # Windows
-        process.kill()
 
 
 def _last_words(said: BinaryIO) -> str:

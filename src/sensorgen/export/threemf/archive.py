@@ -40,15 +40,8 @@ def pack(files: Iterable[tuple[str, Iterable[str]]]) -> bytes:
     target = io.BytesIO()
     with zipfile.ZipFile(target, "w") as archive:
         for path, pieces in (("[Content_Types].xml", [_KINDS]), ("_rels/.rels", [_START]), *files):
-            with archive.open(_entry(path), "w") as stream:
-                for piece in pieces:
-                    stream.write(piece.encode())
+            entry = zipfile.ZipInfo(path)  # dated 1980-01-01, as far back as a zip goes
+            entry.compress_type, entry.create_system, entry.external_attr = zipfile.ZIP_DEFLATED, _UNIX, _MODE
+            with archive.open(entry, "w") as stream:
+                stream.writelines(piece.encode() for piece in pieces)
     return target.getvalue()
-
-
-def _entry(path: str) -> zipfile.ZipInfo:
-    entry = zipfile.ZipInfo(path)  # dated 1980-01-01, as far back as a zip goes
-    entry.compress_type = zipfile.ZIP_DEFLATED
-    entry.create_system = _UNIX
-    entry.external_attr = _MODE
-    return entry

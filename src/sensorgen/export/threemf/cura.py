@@ -36,25 +36,15 @@ _NAMESPACE = {"cura": "http://software.ultimaker.com/xml/cura/3mf/2015/10"}
 
 def files(title: str, parts: Sequence[Part], shift_mm: NDArray[np.float64]) -> Iterator[tuple[str, Iterator[str]]]:
     """Path and text of each file; ``shift_mm`` leads from sensor to bed coordinates [mm]."""
-    if len(parts) == 1:
-        parts, shift_mm = _centred(parts[0], shift_mm)
-    yield core.MODEL, core.model(title, {}, _NAMESPACE, parts, _objects(title, parts), shift_mm)
-
-
-def _centred(part: Part, shift_mm: NDArray[np.float64]) -> tuple[list[Part], NDArray[np.float64]]:
-    # Cura makes no group of one: it shifts a lone mesh by the middle of its box a second time.
-    vertices_mm = part.mesh.vertices_mm
-    middle = (vertices_mm.min(axis=0) + vertices_mm.max(axis=0)) / 2
-    return [replace(part, mesh=replace(part.mesh, vertices_mm=vertices_mm - middle))], shift_mm + middle
-
-
-def _objects(title: str, parts: Sequence[Part]) -> Iterator[str]:
-    if len(parts) == 1:
-        yield from core.body(core.OBJECT_ID, parts[0], parts, _group(parts[0]))
-        return
-    for place, part in enumerate(parts):
-        yield from core.body(core.body_id(place), part, parts, _group(part))
-    yield from core.assembly(title, len(parts))
+    if len(parts) > 1:
+        objects = core.bodies(title, parts, _group)
+    else:  # Cura makes no group of one: it shifts a lone mesh by the middle of its box a second time
+        vertices_mm = parts[0].mesh.vertices_mm
+        middle = (vertices_mm.min(axis=0) + vertices_mm.max(axis=0)) / 2
+        alone = replace(parts[0], mesh=replace(parts[0].mesh, vertices_mm=vertices_mm - middle))
+        parts, shift_mm = [alone], shift_mm + middle
+        objects = core.body(core.OBJECT_ID, alone, parts, _group(alone))
+    yield core.MODEL, core.model(title, {}, _NAMESPACE, parts, objects, shift_mm)
 
 
 def _group(part: Part) -> str:

@@ -35,14 +35,8 @@ _VERSION = {"BambuStudio:3mfVersion": "1"}
 
 def files(title: str, parts: Sequence[Part], shift_mm: NDArray[np.float64]) -> Iterator[tuple[str, Iterator[str]]]:
     """Path and text of each file; ``shift_mm`` leads from sensor to bed coordinates [mm]."""
-    yield core.MODEL, core.model(title, _VERSION, _NAMESPACE, parts, _objects(title, parts), shift_mm)
+    yield core.MODEL, core.model(title, _VERSION, _NAMESPACE, parts, core.bodies(title, parts), shift_mm)
     yield CONFIG, _config(title, parts)
-
-
-def _objects(title: str, parts: Sequence[Part]) -> Iterator[str]:
-    for place, part in enumerate(parts):
-        yield from core.body(core.body_id(place), part, parts)
-    yield from core.assembly(title, len(parts))
 
 
 def _config(title: str, parts: Sequence[Part]) -> Iterator[str]:

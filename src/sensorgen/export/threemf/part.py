@@ -72,30 +72,26 @@ def check(title: str, parts: Sequence[Part], centre_mm: tuple[float, float]) -> 
         raise BadInput("no bodies to write: a 3MF needs at least one")
     if not all(math.isfinite(c) for c in centre_mm):
         raise OutOfRange(f"centre {centre_mm} mm on the bed is not finite")
-    _check_text("title", title)
-    for part in parts:
-        _check_words(part)
-        _check_mesh(part)
     names = [part.name for part in parts]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise BadInput(f"two bodies are called {twice[0]!r}: name each body once")
-
-
-def _check_text(what: str, text: str) -> None:
-    if wrong := _NOT_XML.search(text):
-        raise BadInput(f"{what} {text!r} has the character {wrong[0]!r}, which a 3MF cannot hold: remove it")
-
-
-def _check_words(part: Part) -> None:
-    for what in ("name", "material"):
-        _check_text(what, getattr(part, what))
-    for text in (*part.settings.keys(), *part.settings.values()):
-        _check_text(f"setting of body {part.name!r}", text)
-    if not re.fullmatch("#[0-9a-fA-F]{6}", part.colour):
-        raise BadInput(f"colour {part.colour!r} of body {part.name!r} is not of the form #rrggbb")
-    if part.extruder < 0:
-        raise OutOfRange(f"extruder {part.extruder} of body {part.name!r} is below 0: slicers count from 0")
+    texts = [("title", title)]
+    for part in parts:
+        settings = (*part.settings.keys(), *part.settings.values())
+        texts += [
+            ("name", part.name),
+            ("material", part.material),
+            *((f"setting of body {part.name!r}", s) for s in settings),
+        ]
+        if not re.fullmatch("#[0-9a-fA-F]{6}", part.colour):
+            raise BadInput(f"colour {part.colour!r} of body {part.name!r} is not of the form #rrggbb")
+        if part.extruder < 0:
+            raise OutOfRange(f"extruder {part.extruder} of body {part.name!r} is below 0: slicers count from 0")
+        _check_mesh(part)
+    for what, text in texts:
+        if wrong := _NOT_XML.search(text):
+            raise BadInput(f"{what} {text!r} has the character {wrong[0]!r}, which a 3MF cannot hold: remove it")
 
 
 def _check_mesh(part: Part) -> None:

@@ -48,15 +48,12 @@ def _config(title: str, parts: Sequence[Part]) -> Iterator[str]:
     for part in parts:
         end = first + len(part.mesh.triangles)
         yield f'<volume firstid="{first}" lastid="{end - 1}">\n'
-        yield from (_metadata("volume", key, value) for key, value in _volume(part).items())
+        own = {"name": part.name, "volume_type": "ModelPart", "extruder": str(part.extruder + 1)}
+        entries = dict(sorted(part.settings.items())) | own  # settings cannot take a body to another tool
+        yield from (_metadata("volume", key, value) for key, value in entries.items())
         yield "</volume>\n"
         first = end
     yield "</object>\n</config>\n"
-
-
-def _volume(part: Part) -> dict[str, str]:
-    own = {"name": part.name, "volume_type": "ModelPart", "extruder": str(part.extruder + 1)}
-    return dict(sorted(part.settings.items())) | own  # settings cannot take a body to another tool
 
 
 def _metadata(kind: str, key: str, value: str) -> str:

@@ -8,11 +8,11 @@ import os
 import sqlite3
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from sensorgen.core.errors import BadInput, SensorgenError, Unwritable
-from sensorgen.measure.log.durable import part_of, remove_stale_parts, sync_folder
+from sensorgen.core.files import part_of, remove_stale_parts, sync_folder
 from sensorgen.measure.log.schema import APPLICATION_ID, STEPS, VERSION
 
 WAIT_S = 20.0  # for another writer to finish
@@ -169,12 +169,9 @@ def _create(path: Path) -> None:
 
 def _empty() -> bytes:
     """Content of an empty log file."""
-    connection = _in_memory()
-    try:
+    with closing(_in_memory()) as connection:
         connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         content = bytearray(connection.serialize())
-    finally:
-        connection.close()
     content[_FORMAT] = _WAL  # file format 1.3 of SQLite: a database in memory cannot be switched to WAL
     return bytes(content)
 
@@ -193,30 +190,25 @@ def _take_steps(connection: sqlite3.Connection, version: int) -> None:
 
 
 def _migrate(connection: sqlite3.Connection, path: Path) -> None:
-    version = _version(connection)
-    if version > VERSION or version < 1:
+    def version() -> int:
+        return int(connection.execute("PRAGMA user_version").fetchone()[0])
+
+    if not 1 <= version() <= VERSION:
         raise BadInput(
-            f"the log {str(path)!r} is of version {version}; expected up to {VERSION}: take a newer sensorgen"
+            f"the log {str(path)!r} is of version {version()}; expected up to {VERSION}: take a newer sensorgen"
         )
-    if version < VERSION:
+    if version() < VERSION:
         with transaction(connection, path):
-            _take_steps(connection, _version(connection))  # another program may have migrated it meanwhile
-
-
-def _version(connection: sqlite3.Connection) -> int:
-    return int(connection.execute("PRAGMA user_version").fetchone()[0])
+            _take_steps(connection, version())  # another program may have migrated it meanwhile
 
 
 def _check_tables(connection: sqlite3.Connection, path: Path) -> None:
     """Refuse a file whose tables or triggers are not those of this version."""
-    sound = _in_memory()
-    try:
+    with closing(_in_memory()) as sound:
         expected, present = (
             set(database.execute("SELECT type, name, sql FROM sqlite_schema WHERE sql IS NOT NULL"))
             for database in (sound, connection)
         )
-    finally:
-        sound.close()
     wrong = (expected - present) | {item for item in present - expected if item[0] == "trigger"}
     if wrong:
         names = ", ".join(sorted({f"{name!r:.40}" for _, name, _ in wrong}))

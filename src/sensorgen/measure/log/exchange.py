@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from sensorgen.core import files as store
+from sensorgen.core.document import spreadsheet
 from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
 from sensorgen.measure.csv_table import Table
 from sensorgen.measure.log import entries, files
-from sensorgen.measure.log.durable import part_of
 from sensorgen.measure.log.entries import Entry, RawFile, Reading
 from sensorgen.measure.log.fields import Value, from_cell, from_sql, to_cell, to_sql
 from sensorgen.measure.log.logbook import TABLES, Log
@@ -26,7 +26,6 @@ from sensorgen.measure.log.logbook import TABLES, Log
 FORMATS = ("csv", "parquet")
 FILES = {kind: f"{table.replace('_', '-')}s" if table != "batch" else "batches" for kind, table in TABLES.items()}
 _COLUMNS = {kind: {k: v for k, v in entries.columns(kind).items() if k != "number"} for kind in TABLES}
-_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "'", "＝", "＋", "－", "＠")
 
 
 def columns(kind: type[Entry]) -> dict[str, Any]:
@@ -68,7 +67,7 @@ def export(log: Log, place: Path) -> int:
         raise BadInput(
             f"cannot export to {str(place)!r}; expected a .csv or .parquet file, or a folder that is not there"
         )
-    part = part_of(place)
+    part = store.part_of(place)
     try:
         (part / "files").mkdir(parents=True)
         rows = sum(_write_table(log, kind, part / f"{name}.csv", "csv") for kind, name in FILES.items())
@@ -99,19 +98,16 @@ def _write_table(log: Log, kind: type[Entry], path: Path, file_format: str) -> i
 
 def csv_lines(kind: type[Entry], rows: Iterable[Entry]) -> Iterator[str]:
     """Rows as CSV, the header first."""
-    wanted = columns(kind)
-    yield _line(list(wanted))
+    wanted, target = columns(kind), io.StringIO(newline="")
+    writer = csv.writer(target, lineterminator="\r\n")  # \n alone leaves a bare \r unquoted
+    writer.writerow(wanted)
+    yield target.getvalue()
     for entry in rows:
-        cells = {name: to_cell(getattr(entry, name)) for name in wanted}
-        yield _line([
-            f"'{cell}" if wanted[name] is str and cell.startswith(_FORMULA) else cell for name, cell in cells.items()
-        ])  # fmt: skip
-
-
-def _line(cells: list[str]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\r\n").writerow(cells)  # \n alone leaves a bare \r unquoted
-    return text.getvalue()
+        target.seek(0)
+        target.truncate()
+        cells = ((getattr(entry, name), annotation) for name, annotation in wanted.items())
+        writer.writerow([spreadsheet(value) if annotation is str else to_cell(value) for value, annotation in cells])
+        yield target.getvalue()
 
 
 def from_csv(kind: type[Entry], table: Table) -> Iterator[Entry]:
@@ -122,17 +118,13 @@ def from_csv(kind: type[Entry], table: Table) -> Iterator[Entry]:
     BadInput
         A cell that the export did not write; with file, row and column.
     """
+
+    def convert(annotation: Any, cell: str) -> Value:
+        return from_cell(annotation, cell.removeprefix("'") if annotation is str else cell)
+
     for number, cells in table.text_rows():
         values = dict(zip(table.names, cells, strict=True))
-        yield _entry(kind, values, f"{table.name}, row {number}", _from_cell)
-
-
-def _from_cell(annotation: Any, cell: str) -> Value:
-    return from_cell(annotation, cell.removeprefix("'") if annotation is str else cell)
-
-
-def _from_parquet(annotation: Any, value: Any) -> Value:
-    return from_sql(annotation, to_sql(tuple(value) if isinstance(value, list) else value))
+        yield _entry(kind, values, f"{table.name}, row {number}", convert)
 
 
 def _entry(
@@ -188,7 +180,11 @@ def from_parquet(path: Path) -> tuple[type[Entry], list[Entry]]:
     kind = kind_of(table.column_names)
     if kind is None:
         raise BadInput(f"{str(path)!r}: columns {shown(table.column_names)}; expected those of the export of a log")
-    return kind, [_entry(kind, row, f"{path}, row {k}", _from_parquet) for k, row in enumerate(rows, 1)]
+
+    def convert(annotation: Any, value: Any) -> Value:
+        return from_sql(annotation, to_sql(tuple(value) if isinstance(value, list) else value))
+
+    return kind, [_entry(kind, row, f"{path}, row {k}", convert) for k, row in enumerate(rows, 1)]
 
 
 def _pyarrow() -> Any:

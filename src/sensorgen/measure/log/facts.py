@@ -10,7 +10,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
 
 if TYPE_CHECKING:
-    from sensorgen.measure.recording import Joined, Recording, RigLog
+    from sensorgen.measure.recording import Recording, RigLog
 
 
 @dataclass(frozen=True)
@@ -114,6 +114,9 @@ class Facts:
             yield from self.rig.words()
 
 
+_CLOCK = ("offset_s", "offset_error_s", "skew", "skew_error", "explained")
+
+
 def to_json(facts: Facts) -> str:
     """Facts as JSON."""
     return str(_adapter().dump_json(facts, exclude_none=facts.rig is None).decode())
@@ -153,8 +156,13 @@ def summarised(
 
     joined = joined_all(recordings, rig) if rig else ()
     marked = [one.recording for one in joined] or recordings  # joining marks the rig's errors
-    lockins = tuple(lockin(one) for one in marked)
-    return Facts(lockins, dict(columns), dict(rig_columns), _rig(rig, joined[0]) if rig else None)
+    beside = None
+    if rig:
+        first = joined[0]
+        numbers: dict[str, Any] = {name: _known(getattr(first, name)) for name in _CLOCK}
+        samples = first.recording.counts()["rig error"]
+        beside = Rig(**rig.counts(), samples=samples, clocks=first.clock_text(), notes=first.notes, **numbers)
+    return Facts(tuple(map(lockin, marked)), dict(columns), dict(rig_columns), beside)
 
 
 def lockin(recording: "Recording") -> LockIn:
@@ -164,14 +172,6 @@ def lockin(recording: "Recording") -> LockIn:
         tuple(recording.tones_hz.tolist()), recording.counts(), float(recording.time_s[-1]), source.format,
         source.program, source.lockin, _known(source.rate_hz), _known(source.bandwidth_hz), _known(recording.epoch_s),
         source.notes,
-    )  # fmt: skip
-
-
-def _rig(log: "RigLog", joined: "Joined") -> Rig:
-    return Rig(
-        **log.counts(), samples=joined.recording.counts()["rig error"], clocks=joined.clock_text(), notes=joined.notes,
-        offset_s=_known(joined.offset_s), offset_error_s=_known(joined.offset_error_s), skew=_known(joined.skew),
-        skew_error=_known(joined.skew_error), explained=_known(joined.explained),
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from hashlib import file_digest
 from pathlib import Path
 
 from sensorgen.core.errors import BadInput, Unwritable
-from sensorgen.measure.log.durable import part_of, remove_stale_parts, sync_folder
+from sensorgen.core.files import part_of, remove_stale_parts, sync_folder
 from sensorgen.measure.log.entries import RawFile
 
 CHANGED = "changed while it was read: log it when it is complete"

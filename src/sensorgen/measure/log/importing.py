@@ -64,11 +64,23 @@ def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> Imported:
     BadInput
         A file that cannot be read; with its name, row and column. Nothing is logged then.
     """
-    if path.is_dir():
-        return _add(log, _exported(log, path))
     if path.suffix.lower() == ".json":
         return _add(log, list(batches.rows(path, files.keep(log.files, path))))
-    return _add(log, *_table(path, columns))
+    if not path.is_dir():
+        return _add(log, *_table(path, columns))
+    exported: list[Entry] = []
+    for kind, name in exchange.FILES.items():
+        file = next((p for suffix in exchange.FORMATS if (p := path / f"{name}.{suffix}").is_file()), None)
+        if file is None:
+            raise BadInput(f"{str(path)!r} has no {name}.csv; expected the folder of an exported log")
+        rows = _table(file, {})[0]
+        if not all(isinstance(row, kind) for row in rows):
+            raise BadInput(f"{file}: columns of another table; expected those of {name}")
+        exported += rows
+    for row in exported:
+        if isinstance(row, RawFile):
+            files.keep(log.files, path / "files" / row.uid, row)
+    return _add(log, exported)
 
 
 def _table(path: Path, columns: Mapping[str, str]) -> tuple[Sequence[Entry], Sequence[str]]:
@@ -78,23 +90,6 @@ def _table(path: Path, columns: Mapping[str, str]) -> tuple[Sequence[Entry], Seq
     with tables.opened(path) as table:
         kind = exchange.kind_of(table.names)
         return (list(exchange.from_csv(kind, table)), ()) if kind else tables.readings(table, columns, path.name)
-
-
-def _exported(log: Log, folder: Path) -> list[Entry]:
-    """Rows of an exported log, after its raw files were copied."""
-    exported: list[Entry] = []
-    for kind, name in exchange.FILES.items():
-        path = next((p for suffix in exchange.FORMATS if (p := folder / f"{name}.{suffix}").is_file()), None)
-        if path is None:
-            raise BadInput(f"{str(folder)!r} has no {name}.csv; expected the folder of an exported log")
-        rows = _table(path, {})[0]
-        if not all(isinstance(row, kind) for row in rows):
-            raise BadInput(f"{path}: columns of another table; expected those of {name}")
-        exported += rows
-    for row in exported:
-        if isinstance(row, RawFile):
-            files.keep(log.files, folder / "files" / row.uid, row)
-    return exported
 
 
 def _add(log: Log, rows: Sequence[Entry], left_out: Iterable[str] = ()) -> Imported:

@@ -22,7 +22,7 @@ from sensorgen.measure.log.entries import (
     Specimen,
     columns,
 )
-from sensorgen.measure.log.fields import FROM_SQL, Value, to_sql
+from sensorgen.measure.log.fields import Value, from_sql, to_sql
 
 PLACE = "SENSORGEN_LOG"  # environment variable with another file
 TABLES: dict[type[Any], str] = {
@@ -216,35 +216,28 @@ class Log:
         if isinstance(entry, Specimen):
             self._insert("INSERT OR IGNORE", _SPECIMEN, entry)
         if isinstance(entry, Reading | BenchRun):
-            self._check_correction(entry)
-            entry = self._with_print(entry)
+            entry = self._checked(entry)
         entry = dataclasses.replace(entry, logged_at=entry.logged_at or now, number=0)
         return dataclasses.replace(entry, number=self._insert("INSERT", _SQL[kind], entry))
 
-    def _check_correction(self, entry: Reading | BenchRun) -> None:
-        if not entry.supersedes:
-            return
-        kind = type(entry)
-        old = next(self.entries(kind, superseded=True, uid=entry.supersedes), None)
-        if old is None:
-            raise BadInput(f"nothing to correct: no row {entry.supersedes!r} in the log")
-        later = next(self.entries(kind, superseded=True, supersedes=entry.supersedes), None)
-        if later:
-            raise BadInput(f"row {old.number} was corrected before, by row {later.number}; correct that one")
-
-    def _with_print(self, entry: Reading | BenchRun) -> Reading | BenchRun:
-        """Entry with batch and design of the specimen's latest print, if it is new and the log has the print."""
+    def _checked(self, entry: Reading | BenchRun) -> Reading | BenchRun:
+        """Entry whose correction is sound; a new one with batch and design of the specimen's latest print."""
+        if entry.supersedes:
+            kind = type(entry)
+            old = next(self.entries(kind, superseded=True, uid=entry.supersedes), None)
+            later = next(self.entries(kind, superseded=True, supersedes=entry.supersedes), None)
+            if old is None:
+                raise BadInput(f"nothing to correct: no row {entry.supersedes!r} in the log")
+            if later:
+                raise BadInput(f"row {old.number} was corrected before, by row {later.number}; correct that one")
         if entry.batch or entry.logged_at:
             return entry
         printed = self._connection.execute(_LATEST_PRINT, [entry.specimen]).fetchone()
         return dataclasses.replace(entry, **dict(zip(_FROM_PRINT, printed, strict=True))) if printed else entry
 
     def _insert(self, verb: str, sql: _Statements, entry: Any) -> int:
-        values = [to_sql(getattr(entry, name)) for name in sql.stored]
-        values = [
-            None if name in _NULL_IF_EMPTY and value == "" else value
-            for name, value in zip(sql.stored, values, strict=True)
-        ]
+        given = ((name, to_sql(getattr(entry, name))) for name in sql.stored)
+        values = [None if name in _NULL_IF_EMPTY and value == "" else value for name, value in given]
         return int(self._connection.execute(f"{verb} {sql.insert}", values).lastrowid or 0)
 
     def _rows(self, sql: str, values: Sequence[Value] = ()) -> Iterator[tuple[Any, ...]]:
@@ -257,7 +250,7 @@ class Log:
         values = {}
         for (name, annotation), value in zip(_SQL[kind].columns.items(), row, strict=True):
             try:
-                values[name] = "" if value is None and name in _NULL_IF_EMPTY else FROM_SQL[annotation](value)
+                values[name] = "" if value is None and name in _NULL_IF_EMPTY else from_sql(annotation, value)
             except (TypeError, ValueError, KeyError, OverflowError, RecursionError):
                 held = f"column {name} of a {kind.__name__} holds {value!r:.60}"
                 raise BadInput(f"the log {str(self.path)!r} is damaged: {held}") from None

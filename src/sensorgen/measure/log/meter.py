@@ -46,7 +46,14 @@ class Meter:
                 self._port = self._connect()
                 if address.upper().startswith("ASRL"):
                     self._port.write("SYST:REM")  # over RS-232 the 34401A accepts no other command before this
-            self.name = self._identify()
+            reply = self._query("*IDN?")
+            fields = re.sub(r"\s*,\s*", ",", reply.upper())
+            name = next((name for model, name in KNOWN.items() if f",{model}," in fields), "")
+            if not name:
+                raise InstrumentFailed(
+                    f"{address} is {reply!r:.80}; expected {' or '.join(KNOWN.values())}: or type it with --y, --z"
+                )
+            self.name = f"{name} ({reply})"
             with self._failures():
                 self._port.write("*CLS")  # errors from before are not ours
         except BaseException:
@@ -88,16 +95,6 @@ class Meter:
         port.read_termination = port.write_termination = "\n"
         port.timeout = TIMEOUT_S * 1e3
         return port
-
-    def _identify(self) -> str:
-        reply = self._query("*IDN?")
-        fields = re.sub(r"\s*,\s*", ",", reply.upper())
-        name = next((name for model, name in KNOWN.items() if f",{model}," in fields), "")
-        if not name:
-            raise InstrumentFailed(
-                f"{self.address} is {reply!r:.80}; expected {' or '.join(KNOWN.values())}: or type it with --y, --z"
-            )
-        return f"{name} ({reply})"
 
     def _query(self, command: str) -> str:
         with (

@@ -3,7 +3,6 @@
 import dataclasses
 import re
 import uuid
-from collections.abc import Iterator
 from functools import lru_cache
 
 from sensorgen.core.errors import BadInput, SensorgenError
@@ -77,7 +76,9 @@ def reading(
     film_expected = (name.iteration or 0) < FIRST_WITH_FILMS
     doubts = [doubt for doubt in name.assumed if doubt != specimen_name.NO_FILM or film_expected]
     doubts += [f"{axis}: {doubt}" for axis, parsed in (("y", y), ("z", z)) for doubt in parsed.doubts]
-    doubts += _blanks(y.ohm, z.ohm) if table else []
+    if table and not (y.ohm and z.ohm):
+        blank = f"{'z' if y.ohm else 'y'} blank: not measured, or an overload"
+        doubts.append(blank if y.ohm or z.ohm else "no measurement")
     if unbaked and baked:
         doubts.append("baked, but the remark says that it is not")
     design_id, design = design_fields(written)
@@ -101,13 +102,6 @@ def resistance(axis: str, text: str, *, mega: bool = False) -> Resistances:
         return resistances.parse(text, mega=mega)
     except BadInput as error:
         raise error.within(f"resistance in {axis.upper()}") from None
-
-
-def _blanks(y_ohm: tuple[float, ...], z_ohm: tuple[float, ...]) -> Iterator[str]:
-    if not y_ohm and not z_ohm:
-        yield "no measurement"
-    elif not y_ohm or not z_ohm:
-        yield f"{'z' if y_ohm else 'y'} blank: not measured, or an overload"
 
 
 def design_fields(written: str) -> tuple[str, str]:

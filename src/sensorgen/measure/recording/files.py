@@ -42,23 +42,21 @@ def read_all(path: Path | str, columns: Mapping[str, str] | None = None) -> tupl
         HDF5 without h5py.
     """
     path = Path(path)
-    file_format = _format(checked_head(path, MOST_BYTES, "a recording as .mat, HDF5 or CSV"))
+    head = checked_head(path, MOST_BYTES, "a recording as .mat, HDF5 or CSV")
+    matlab = head.startswith(b"MATLAB")
+    file_format = "MATLAB 5" if matlab or head[126:128] in (b"IM", b"MI") else "CSV"
+    if any(head[at : at + len(_HDF)] == _HDF for at in _HDF_PLACES):
+        file_format = "MATLAB 7.3" if matlab else "HDF5"
     try:
         if file_format == "CSV":
             return (table.recording(path, columns or {}),)
         try:
-            matlab5 = file_format == "MATLAB 5"
-            tree = (
-                matfive.variables(path.read_bytes(), tiepie.WANTED) if matlab5 else hdf.variables(path, tiepie.WANTED)
-            )
+            if file_format == "MATLAB 5":
+                tree = matfive.variables(path.read_bytes(), tiepie.WANTED)
+            else:
+                tree = hdf.variables(path, tiepie.WANTED)
             return tiepie.recordings(tree, Source(path.name, file_format))
         except SensorgenError as error:
             raise error.within(str(path)) from None
     except OSError as error:
         raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None
-
-
-def _format(head: bytes) -> str:
-    if any(head[at : at + len(_HDF)] == _HDF for at in _HDF_PLACES):
-        return "MATLAB 7.3" if head.startswith(b"MATLAB") else "HDF5"
-    return "MATLAB 5" if head.startswith(b"MATLAB") or head[126:128] in (b"IM", b"MI") else "CSV"

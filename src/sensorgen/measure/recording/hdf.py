@@ -4,8 +4,7 @@ Only data in the file itself are read: links to other files are refused, and obj
 pickles, are not numbers. MATLAB's arrays get MATLAB's shape.
 """
 
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -37,20 +36,14 @@ def variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
     BadInput
         A file that is damaged, links to other files, or has other data than numbers and text.
     """
-    with _opened(path) as file:
-        reader = _Reader(file)
-        return {name: reader.member(file, name, 0) for name in wanted if name in file}
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
     try:
         import h5py
     except ImportError:
         raise MissingValue("HDF5 and MATLAB 7.3 files need h5py: pip install h5py, or save with -v7") from None
     try:
         with h5py.File(path, "r") as file:
-            yield file
+            reader = _Reader(file)
+            return {name: reader.member(file, name, 0) for name in wanted if name in file}
     except _BROKEN as error:
         reason = " ".join(str(error).split())[:200]
         raise BadInput(f"the HDF5 file is damaged or cut off: {reason}") from None
@@ -98,7 +91,11 @@ class _Reader:
         if members and all(self._refers(item) and _CLASS not in item.attrs for item in members):
             count = min(map(len, fields.values()))
             return [{name: values[i] for name, values in fields.items()} for i in range(count)]
-        return [fields | {name: _attribute(v) for name, v in group.attrs.items() if not name.startswith("MATLAB_")}]
+        for name, value in group.attrs.items():
+            if not name.startswith("MATLAB_"):
+                text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+                fields[name] = text if isinstance(text, str) else np.atleast_2d(np.asarray(text))
+        return [fields]
 
     def _array(self, item: Any) -> Any:
         names = item.dtype.names
@@ -120,9 +117,3 @@ class _Reader:
         if item.attrs[_CLASS] in (b"char", "char"):
             return "".join(chr(int(c)) if 0 <= c < 0xD800 else "\ufffd" for c in values.ravel())
         return values.T
-
-
-def _attribute(value: Any) -> Any:
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "replace")
-    return value if isinstance(value, str) else np.atleast_2d(np.asarray(value))

@@ -8,7 +8,7 @@ import numpy as np
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.recording.offset import Offset, estimated
 from sensorgen.measure.recording.rig import RigLog
-from sensorgen.measure.recording.samples import Bools, Real, Recording
+from sensorgen.measure.recording.samples import Real, Recording
 
 _SILENT = 5.0  # median row distances beyond which the rig's log has a gap
 
@@ -106,33 +106,26 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
 def _joined(recording: Recording, rig: RigLog, time: Real, offset: Offset) -> Joined:
     """Columns of the rig at the samples' times."""
     at = time - offset.offset_s - offset.skew * (time - offset.middle_s)
-    good = ~rig.error
-    rows = rig.time_s[good]
+    rows, force, set_force, position = rig.sound()
     before = np.searchsorted(rows, at, side="right") - 1
     inside = (before >= 0) & (at <= rows[-1])
     held = np.clip(before, 0, len(rows) - 1)
     step = float(np.median(np.diff(rows)))
     after = np.minimum(held + 1, len(rows) - 1)
     silent = ~inside | ((rows[after] - rows[held] > _SILENT * step) & (at - rows[held] > step))
-    force = np.where(np.isfinite(rig.force_n), rig.force_n, rig.set_force_n)[good]
     mask = np.where(silent, np.nan, 1.0)
+    finite = np.isfinite(rig.time_s)
+    order = np.argsort(rig.time_s[finite], kind="stable")
+    every, error = rig.time_s[finite][order], rig.error[finite][order]
+    later = np.clip(np.searchsorted(every, at), 1, len(every) - 1)
+    nearest = np.where(at - every[later - 1] <= every[later] - at, later - 1, later)
     marks = dict(recording.marks)
-    marks["rig error"] = marks["rig error"] | silent | _beside_error(rig, at)
+    marks["rig error"] = marks["rig error"] | silent | error[nearest]  # of the nearest row
     notes = list(rig.notes)
     if silent.any():
         notes.append(f"{np.count_nonzero(silent)} samples while the rig was silent")
     return Joined(
-        replace(recording, marks=marks), np.interp(at, rows, force) * mask, rig.set_force_n[good][held] * mask,
-        rig.set_position_mm[good][held] * mask, offset.offset_s, offset.error_s, offset.skew, offset.skew_error,
+        replace(recording, marks=marks), np.interp(at, rows, force) * mask, set_force[held] * mask,
+        position[held] * mask, offset.offset_s, offset.error_s, offset.skew, offset.skew_error,
         offset.explained, tuple(notes),
     )  # fmt: skip
-
-
-def _beside_error(rig: RigLog, at: Real) -> Bools:
-    """Samples whose nearest row reports an error."""
-    finite = np.isfinite(rig.time_s)
-    order = np.argsort(rig.time_s[finite], kind="stable")
-    rows, error = rig.time_s[finite][order], rig.error[finite][order]
-    after = np.clip(np.searchsorted(rows, at), 1, len(rows) - 1)
-    nearest = np.where(at - rows[after - 1] <= rows[after] - at, after - 1, after)
-    return np.asarray(error[nearest])

@@ -65,7 +65,9 @@ def variables(content: bytes, wanted: Collection[str]) -> dict[str, Any]:
         if array.type != _MATRIX:
             raise _damaged(f"an array was expected, not data of type {array.type}", element.offset)
         try:
-            name = _name(array, order)
+            pieces = list(islice(_elements(array.data, order, array.offset), 3))
+            named = len(pieces) == 3 and pieces[2].type in _TEXTS  # some classes store their name elsewhere
+            name = _text(pieces[2], order) if named else ""
             if name in wanted:
                 values[name] = _Array(array, order).value()
         except BadInput as error:
@@ -124,12 +126,6 @@ def _unpacked(element: _Element, order: str) -> _Element:
     if inside is None:
         raise _damaged("a packed array is empty", element.offset)
     return inside
-
-
-def _name(array: _Element, order: str) -> str:
-    """Name of a variable; "" for classes that store it elsewhere."""
-    pieces = list(islice(_elements(array.data, order, array.offset), 3))
-    return _text(pieces[2], order) if len(pieces) == 3 and pieces[2].type in _TEXTS else ""
 
 
 def _text(piece: _Element, order: str) -> str:

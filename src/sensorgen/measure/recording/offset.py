@@ -89,18 +89,11 @@ def estimated(recording: Recording, time: Real, rig: RigLog, within_s: float) ->
     return _refined(time[used], signal, rig, _correlated(time[used], signal, rig, within_s))
 
 
-def _force(rig: RigLog) -> tuple[Real, Real, Real]:
-    """Time [s], force [N] and position [mm] of the rows without errors."""
-    good = ~rig.error
-    force = np.where(np.isfinite(rig.force_n), rig.force_n, rig.set_force_n)[good]
-    return rig.time_s[good], force, rig.set_position_mm[good]
-
-
 def _correlated(time: Real, signal: Real, rig: RigLog, within_s: float) -> float:
     """Offset with the largest cross-correlation of signal and force [s]."""
     from scipy.signal import correlate
 
-    rows, force, _ = _force(rig)
+    rows, force, _, _ = rig.sound()
     step = max(_GRID_S, (np.ptp(time) + np.ptp(rows)) / _MOST_GRID)
     ours = _high_pass(np.interp(np.arange(time[0], time[-1], step), time, signal))
     theirs = _high_pass(np.interp(np.arange(rows[0], rows[-1], step), rows, force))
@@ -130,7 +123,7 @@ def _high_pass(values: Real) -> Real:
 
 def _responses(rig: RigLog) -> Callable[[Real], Real]:
     """Terms of force and position in the fit, at any times of the rig's clock."""
-    rows, force, position = _force(rig)
+    rows, force, _, position = rig.sound()
     where = (position - position.mean()) / max(float(np.ptp(position)), 1e-9)
     slow = [relaxation(rows, force, tau) for tau in _RELAXATION_S]
 

@@ -43,6 +43,12 @@ class RigLog:
     error: Bools
     notes: tuple[str, ...] = ()
 
+    def sound(self) -> tuple[Real, Real, Real, Real]:
+        """Time [s], force (the set one if none was measured), set force [N] and position [mm] of sound rows."""
+        good = ~self.error
+        force = np.where(np.isfinite(self.force_n), self.force_n, self.set_force_n)
+        return self.time_s[good], force[good], self.set_force_n[good], self.set_position_mm[good]
+
     def counts(self) -> dict[str, int]:
         """Number of rows, and of those with an error."""
         return {"rows": len(self.time_s), "errors": int(np.count_nonzero(self.error))}

@@ -16,7 +16,6 @@ from sensorgen.measure.recording import clock
 from sensorgen.measure.recording.samples import Bools, Complex, Real, Recording, Source, blank, sifted
 
 WANTED = ("impedance_data", "impedance_time", "timestamps", "settings", "ref_offset", "sig_offset", "offset_time")
-_INPUTS = ("ref_offset", "sig_offset")
 _MARGIN = 0.99  # of a range, as in the program itself
 _START_UP = 1.6  # settling time of the demodulator times its bandwidth
 _EXPECTED = "expected a recording of TiePieLCR: impedance_data with lockin1, impedance_time and settings.dem_freqs"
@@ -167,32 +166,22 @@ def _clipped(tree: Tree, k: int, count: int, time_s: Real, settings: Tree) -> Bo
     The program detects clipping in its waveforms and displays it, but the file has only the means of the two inputs: a
     mean at the end of the range is clipping. Waveforms that clip symmetrically cannot be detected.
     """
-    clipped, limits = np.zeros(len(time_s), bool), _largest_means(settings)
+    clipped = np.zeros(len(time_s), bool)
     try:
         at = _vectors(tree, "offset_time", count)[k]
-        means = {name: _vectors(tree, name, count)[k] for name in _INPUTS}
-    except BadInput:
-        return clipped
-    order = np.argsort(at, kind="stable")
-    for name in limits:
-        if len(means[name]) == len(at) > 0:
-            clipped |= np.interp(time_s, at[order], np.abs(means[name])[order]) >= _MARGIN * limits[name]
-    return clipped
-
-
-def _largest_means(settings: Tree) -> dict[str, float]:
-    """Largest mean that each input can show, in the file's units; empty where the file lacks the ranges.
-
-    The file has the reference as volts times its amplifier's amperes or coulombs per volt, and the signal as volts over
-    the gain before the input; the ranges are those of the inputs themselves.
-    """
-    try:
+        means = [_vectors(tree, name, count)[k] for name in ("ref_offset", "sig_offset")]
         ranges = _vector(settings["scope_range_list"], "scope_range_list")
         reference, signal = ranges[_vector(settings["scope_ranges"], "scope_ranges").astype(int)]
-    except (BadInput, KeyError, IndexError, ValueError):
-        return {}
+    except (BadInput, KeyError, IndexError, ValueError):  # the file lacks the means or the ranges
+        return clipped
+    # the file has the reference as volts times its amplifier's amperes or coulombs per volt, and the signal as volts
+    # over the gain before the input; the ranges are those of the inputs themselves
     amplifier, gain = _gain(settings, "reference_gain_list", "reference"), _gain(settings, "gain_list", "gain")
-    return dict(zip(_INPUTS, (float(reference * amplifier), float(signal / gain)), strict=True))
+    order = np.argsort(at, kind="stable")
+    for mean, limit in zip(means, (float(reference * amplifier), float(signal / gain)), strict=True):
+        if len(mean) == len(at) > 0:
+            clipped |= np.interp(time_s, at[order], np.abs(mean)[order]) >= _MARGIN * limit
+    return clipped
 
 
 def _gain(settings: Tree, listed: str, chosen: str) -> float:

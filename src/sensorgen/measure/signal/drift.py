@@ -10,7 +10,7 @@ is used. The fit is made in ln Z because creep of the permittivity multiplies Z,
 readings too.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,6 +99,8 @@ def fitted(
     """
     for name in among:
         check(name)
+    if not among:
+        raise BadInput(f"no law of drift to choose from; expected some of {', '.join(LAWS)}")
     rest = valid & ~_disturbed(time_s, force_n, settle_s)
     if np.count_nonzero(rest) < _LEAST:
         raise BadInput(f"{np.count_nonzero(rest)} readings at rest; expected {_LEAST} or more to fit a drift to")
@@ -112,24 +114,17 @@ def fitted(
     for name in among:
         if "wandering" in name:
             fits[name] = laws.wandering(bins, fits["memory" if "memory" in name else "smooth"])
-    return _chosen({name: fits[name] for name in LAWS if name in among}, start)
+    scores = {name: fits[name].bic() for name in LAWS if name in among}
+    best = min(scores, key=lambda name: scores[name])
+    others = [f"{other} {scores[other] - scores[best]:.0f}" for other in scores if scores[other] > scores[best]]
+    reason = f"BIC higher of {', '.join(others)}" if others else "the only law"
+    return Drift(best, f"{LAWS[best]} ({reason})", start, fits[best])
 
 
 def check(law: str) -> None:
     """Refuse an unknown law."""
     if law not in LAWS:
         raise UnknownName("law of drift", law, LAWS)
-
-
-def _chosen(fits: Mapping[str, laws.Fit], start_s: float) -> Drift:
-    """Law with the least BIC."""
-    if not fits:
-        raise BadInput(f"no law of drift to choose from; expected some of {', '.join(LAWS)}")
-    scores = {name: fit.bic() for name, fit in fits.items()}
-    name = min(scores, key=lambda name: scores[name])
-    others = [f"{other} {scores[other] - scores[name]:.0f}" for other in scores if scores[other] > scores[name]]
-    reason = f"BIC higher of {', '.join(others)}" if others else "the only law"
-    return Drift(name, f"{LAWS[name]} ({reason})", start_s, fits[name])
 
 
 def _disturbed(time_s: Real, force_n: Real, settle_s: float) -> Bools:

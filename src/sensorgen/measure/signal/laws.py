@@ -166,6 +166,7 @@ def relaxing(bins: Bins, fit: Fit, time_s: Real, force_n: Real, fastest_s: float
     fastest_s : float
         Shortest time constant that is visible at rest [s].
     """
+    from scipy.optimize import minimize
 
     def memory(log_tau: float) -> Relaxation:
         tau = float(np.exp(log_tau))
@@ -182,21 +183,15 @@ def relaxing(bins: Bins, fit: Fit, time_s: Real, force_n: Real, fastest_s: float
     best, logs = fit, np.empty(0)
     for _ in range(_MOST_MEMORIES):
         first = min(taus, key=lambda x: misfit(np.append(logs, x)))
-        logs = _refined(misfit, np.append(logs, first), taus[[0, -1]])
+        start, ends = np.append(logs, first), (taus[0], taus[-1])
+        simplex = np.clip(start + 0.1 * np.vstack([np.zeros_like(start), np.eye(len(start))]), *ends)
+        how = {"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-4, "maxfev": 80 * len(start)}
+        logs = minimize(misfit, start, method="Nelder-Mead", bounds=[ends] * len(start), options=how).x
         more = explained(bins, (*fit.terms, *(memory(x) for x in logs)), fit.shared + len(logs))
         if more.bic() >= best.bic():
             break
         best = more
     return best
-
-
-def _refined(score: Callable[[Real], float], start: Real, ends: Real) -> Real:
-    """Minimum of a score near a start, with the same bounds for every parameter."""
-    from scipy.optimize import minimize
-
-    simplex = np.clip(start + 0.1 * np.vstack([np.zeros_like(start), np.eye(len(start))]), *ends)
-    how = {"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-4, "maxfev": 80 * len(start)}
-    return np.asarray(minimize(score, start, method="Nelder-Mead", bounds=[tuple(ends)] * len(start), options=how).x)
 
 
 def wandering(bins: Bins, fit: Fit) -> Fit:

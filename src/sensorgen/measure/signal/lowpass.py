@@ -6,17 +6,16 @@ recording: the thesis's 66.6666 Hz belongs to another version of the instrument'
 """
 
 from dataclasses import dataclass, field
-from math import ceil, log10
+from math import ceil
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.measure.recording.samples import Bools, Complex, Real, Recording
+from sensorgen.measure.recording.samples import Complex, Real, Recording
 
 CUTOFF_HZ = 0.2727
-THESIS_RATE_HZ = 66.6666
 ORDER = 4
 _SETTLED = 3.0  # over the cut-off: settling time of the filter
 _END = 0.5  # over the cut-off: length of the ends that are extrapolated
@@ -80,26 +79,20 @@ class Live:
         """Filter the next samples (n, m); where a sample is nan, the last reading is held and the result is nan."""
         from scipy.signal import sosfilt, sosfilt_zi
 
-        missing = np.isnan(block)
-        held = self._held(np.array(block), missing)
+        missing, held = np.isnan(block), np.array(block)
+        last = np.full(block.shape[1], np.nan, block.dtype) if self._last is None else self._last
+        for j in np.flatnonzero(missing.any(axis=0)):  # gaps get the reading before, at the begin the first one
+            gap, before = missing[:, j], np.maximum.accumulate(np.where(missing[:, j], -1, np.arange(len(block))))
+            first = held[np.argmin(gap), j] if np.isnan(last[j]) and not gap.all() else last[j]
+            held[:, j] = np.where(before >= 0, held[before, j], first)
+        if len(held):
+            self._last = held[-1].copy()
         if self._state is None:
             self._state = np.full((len(self._sections), 2, block.shape[1]), np.nan, block.dtype)
         fresh = np.isnan(self._state[0, 0]) & bool(len(block))  # a column begins with its own first reading
         self._state[:, :, fresh] = sosfilt_zi(self._sections)[:, :, None] * held[:1, fresh]
         filtered, self._state = sosfilt(self._sections, held, axis=0, zi=self._state)
         return np.where(missing, np.nan, filtered)
-
-    def _held(self, values: NDArray[Any], missing: Bools) -> NDArray[Any]:
-        """Samples with gaps filled by the reading before, at the begin by the first reading."""
-        last = np.full(values.shape[1], np.nan, values.dtype) if self._last is None else self._last
-        for j in np.flatnonzero(missing.any(axis=0)):
-            places = np.where(missing[:, j], -1, np.arange(len(values)))
-            held = np.maximum.accumulate(places)
-            first = values[np.argmin(missing[:, j]), j] if np.isnan(last[j]) and not missing[:, j].all() else last[j]
-            values[:, j] = np.where(held >= 0, values[held, j], first)
-        if len(values):
-            self._last = values[-1].copy()
-        return values
 
 
 def offline(values: NDArray[Any], rate_hz: float, cutoff_hz: float = CUTOFF_HZ) -> NDArray[Any]:
@@ -187,24 +180,3 @@ def evenly(time_s: Real, values: Complex, rate_hz: float) -> tuple[Real, Complex
     for j in range(values.shape[1]):
         even[:, j] = np.interp(grid, time_s, values[:, j])
     return grid, even
-
-
-def response_db(frequency_hz: float, cutoff_hz: float, rate_hz: float, order: int = ORDER) -> float:
-    r"""Gain of one pass [dB].
-
-    .. math:: |H|^2 = \frac{1}{1 + (\tan(\pi f / f_s) / \tan(\pi f_c / f_s))^{2n}}
-
-    Parameters
-    ----------
-    frequency_hz, cutoff_hz, rate_hz : float
-        Frequency of the signal, cut-off frequency and sampling rate [Hz].
-    order : int
-        Of the filter.
-
-    Examples
-    --------
-    >>> round(response_db(0.2727, 0.2727, 140.0), 3)
-    -3.01
-    """
-    ratio = np.tan(np.pi * frequency_hz / rate_hz) / np.tan(np.pi * cutoff_hz / rate_hz)
-    return -10 * log10(1 + float(ratio) ** (2 * order))

@@ -74,7 +74,9 @@ def by_readings(time_s: Real, impedance_ohm: Complex) -> list[Press]:
     if len(time_s) < 2 * _LEAST:
         raise BadInput(f"{len(time_s)} readings; expected at least {2 * _LEAST} to find presses in")
     width = min(max(1, round(_STEP_S / float(np.median(np.diff(time_s))))), len(time_s) // 2)
-    before, after = _means_beside(principal_component(impedance_ohm), width)
+    sums = np.concatenate([[0.0], np.cumsum(np.pad(principal_component(impedance_ohm), width, mode="edge"))])
+    means = (sums[width:] - sums[:-width]) / width  # over so many samples before, and from, each sample
+    before, after = means[: len(time_s)], means[width : width + len(time_s)]
     step = after - before
     limit = _SIGNIFICANT * float(np.median(np.abs(step - np.median(step)))) / _MAD
     edges = sorted(
@@ -88,13 +90,6 @@ def _spans(on: Bools) -> list[tuple[int, int]]:
     """First samples, and those after the last, of every span that is on."""
     edges = np.diff(np.concatenate([[False], on, [False]]).astype(int))
     return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
-
-
-def _means_beside(values: Real, width: int) -> tuple[Real, Real]:
-    """Means over so many samples before, and from, each sample."""
-    sums = np.concatenate([[0.0], np.cumsum(np.pad(values, width, mode="edge"))])
-    means = (sums[width:] - sums[:-width]) / width
-    return means[: len(values)], means[width : width + len(values)]
 
 
 def _returning(edges: list[tuple[int, int]], before: Real, after: Real, width: int) -> list[tuple[int, int]]:

@@ -89,7 +89,8 @@ def processed(
     removed, pairs, z = None, None, one.impedance_ohm
     if remove_drift and spans:
         among = (law,) if law else drift.LAWS if rig else drift.BY_TIME
-        pressing = force if rig else _unit_force(one.time_s, spans)
+        unit = np.any([(one.time_s >= a) & (one.time_s <= b) for a, b in spans], axis=0).astype(float)
+        pressing = force if rig else unit  # 1 N, for laws of drift that need only the times of presses
         try:
             removed = drift.fitted(one.time_s, z, valid, pressing, among=tuple(among))
             z = removed.removed(one.time_s, z)
@@ -101,11 +102,3 @@ def processed(
     except BadInput as error:
         notes.append(f"no presses: {error}")
     return Processed(one, force, *filtered, removed, pairs, rig is not None, tuple(notes))
-
-
-def _unit_force(time_s: Real, spans: list[presses.Press]) -> Real:
-    """1 N during presses, for laws of drift that need only their times [N]."""
-    force = np.zeros_like(time_s)
-    for span in spans:
-        force[(time_s >= span.start_s) & (time_s <= span.end_s)] = 1.0
-    return force

@@ -1,20 +1,17 @@
-r"""Diagnose a specimen by its resistances: open electrode, short, leak, dry joint or intact.
+"""Diagnose a specimen by its resistances: open electrode, short, leak, dry joint or intact.
 
-The resistance along an electrode is :math:`R_Y = \rho L / (H W)`; between the electrodes an intact film insulates. With
-electrodes of :math:`R_Y` each and a film of uniform leakage, :math:`G` in all, the resistance of the line is
-
-.. math:: R_Z = \sqrt{\frac{2 R_Y}{G}} \coth \sqrt{2 R_Y G},
-
-which tends to :math:`1/G` for a small leak. A short without resistance of its own, at a distance x from the contacts,
+Between the electrodes an intact film insulates; readings of a film that leaks, and what a leak does to them, are
+in :mod:`sensorgen.measure.signal.leakage`. A short without resistance of its own, at a distance x from the contacts,
 reads :math:`2 R_Y x / L`: a reading below :math:`2 R_Y` may be a short, a reading above it is none.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isnan, nan, sqrt, tanh
+from math import inf, isnan, nan
 from statistics import median
 
 from sensorgen.core.errors import OutOfRange
+from sensorgen.measure.signal.leakage import leak_s
 
 WORDS = ("open electrode", "short", "leak", "dry joint", "intact", "unknown")
 """Verdicts, the gravest first; unknown where a reading is missing."""
@@ -41,8 +38,6 @@ class Evidence:
         For groups.
     film_mm : float or None
         For groups [mm].
-    iteration : str
-        For groups.
     touching : bool
         Whether the electrodes touch by design: such a short is no fault of the print.
     """
@@ -54,7 +49,6 @@ class Evidence:
     shape: str = ""
     film_mm: float | None = None
     remark: str = ""
-    iteration: str = ""
     touching: bool = False
 
 
@@ -77,8 +71,6 @@ class Verdict:
         R_Z over R_Y [-].
     leak_s : float
         Leakage of the whole film with that reading [S]; inf for a reading of 0.
-    over_expected : float
-        R_Y over its expected value [-].
     reasons : tuple of str
         Reasons with numbers.
     """
@@ -90,68 +82,12 @@ class Verdict:
     rz_ohm: float
     ratio: float
     leak_s: float
-    over_expected: float
     reasons: tuple[str, ...]
 
     @property
     def same_order(self) -> bool | None:
         """Whether R_Z is below ten times R_Y; None where one is missing."""
         return None if isnan(self.ratio) else self.ratio <= ORDER
-
-
-def electrode_ohm(resistivity_ohm_m: float, length_m: float, thickness_m: float, width_m: float) -> float:
-    """Resistance of a uniform electrode, rho L / (H W) [ohm].
-
-    Parameters
-    ----------
-    resistivity_ohm_m : float
-        rho [ohm m].
-    length_m, thickness_m, width_m : float
-        L, H and W [m].
-
-    Examples
-    --------
-    >>> round(electrode_ohm(0.07, 0.1, 0.4e-3, 0.02), 1)
-    875.0
-    """
-    return resistivity_ohm_m * length_m / (thickness_m * width_m)
-
-
-def leak_s(rz_ohm: float, ry_ohm: float) -> float:
-    r"""Leakage of the whole film with a reading of ``rz_ohm`` between electrodes of ``ry_ohm`` each [S].
-
-    With :math:`q = \sqrt{2 R_Y G}`, :math:`R_Z / 2 R_Y = \coth(q) / q`, which falls with q.
-
-    Parameters
-    ----------
-    rz_ohm : float
-        Resistance between the electrodes, inf for an overload [ohm].
-    ry_ohm : float
-        Resistance of one electrode, end to end [ohm].
-
-    Raises
-    ------
-    OutOfRange
-        Readings below 0.
-
-    Examples
-    --------
-    >>> round(1 / leak_s(1e6, 600.0))  # far above the electrodes: the leakage alone, less a third of them
-    999600
-    """
-    if rz_ohm < 0 or ry_ohm < 0:
-        raise OutOfRange(f"readings of {ry_ohm:g} and {rz_ohm:g} ohm; expected numbers from 0 on")
-    if rz_ohm in (0, inf):
-        return inf if rz_ohm == 0 else 0.0
-    line = 2 * ry_ohm
-    if line == 0 or rz_ohm / line > 1e7:
-        return 1 / rz_ohm
-    ratio = rz_ohm / line
-    low, high = 0.5 * min(1 / ratio, 1 / sqrt(ratio)), 2 * max(1 / ratio, 1 / sqrt(ratio))
-    for _ in range(200):
-        middle = sqrt(low * high)
-        low, high = (middle, high) if 1 / (middle * tanh(middle)) > ratio else (low, middle)
-    return low * high / line
 
 
 def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> Verdict:
@@ -182,18 +118,9 @@ def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> Verdict:
     film, why_film = _film(ry, rz, of.expected_ohm, intact_ohm)
     leak = nan if isnan(rz) or isnan(ry) or ry == inf else leak_s(rz, ry)
     ratio = nan if isnan(ry) or isnan(rz) or ry in (0, inf) else rz / ry
-    return Verdict(
-        _word(electrode, film), electrode, film, ry, rz, ratio, leak, ry / of.expected_ohm, (why_electrode, why_film)
-    )
-
-
-def _word(electrode: str, film: str) -> str:
-    """The gravest of the two; a sound half beside an unknown one proves nothing."""
-    if electrode == "open electrode" or film in ("short", "leak"):
-        return electrode if electrode == "open electrode" else film
-    if electrode == "dry joint":
-        return electrode
-    return "unknown" if "unknown" in (electrode, film) else "intact"
+    grave = [word for word in WORDS[:4] if word in (electrode, film)]
+    word = grave[0] if grave else "unknown" if "unknown" in (electrode, film) else "intact"
+    return Verdict(word, electrode, film, ry, rz, ratio, leak, (why_electrode, why_film))
 
 
 def _electrode(of: Evidence, ry: float) -> tuple[str, str]:

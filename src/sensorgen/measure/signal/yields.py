@@ -116,22 +116,16 @@ def groups(
     members: dict[tuple[Hashable, ...], list[Judged]] = {}
     for of, verdict in judged:
         members.setdefault(by(of), []).append((of, verdict))
-    return [
-        _group(key, members[key], confidence, order)
-        for key in sorted(members, key=lambda key: [(k is None, str(k)) for k in key])
-    ]
-
-
-def _group(key: tuple[Hashable, ...], judged: Sequence[Judged], confidence: float, order: float) -> Group:
-    open_ = [v for of, v in judged if not of.touching]
-    known = [v for v in open_ if v.word != "unknown"]
-    both = [v for v in open_ if not isnan(v.ratio)]
-    ratios = [v.ratio for _, v in judged if not isnan(v.ratio)]
-    return Group(
-        key, share(sum(v.word == "intact" for v in known), len(known), confidence),
-        share(sum(v.ratio <= order for v in both), len(both), confidence),
-        median(ratios) if ratios else nan, Counter(v.word for _, v in judged),
-    )  # fmt: skip
+    found = []
+    for key in sorted(members, key=lambda key: [(k is None, str(k)) for k in key]):
+        words = Counter(v.word for _, v in members[key])
+        ratios = [v.ratio for _, v in members[key] if not isnan(v.ratio)]
+        open_ = [v for of, v in members[key] if not of.touching]
+        known = [v.word == "intact" for v in open_ if v.word != "unknown"]
+        both = [v.ratio <= order for v in open_ if not isnan(v.ratio)]
+        intact, shorted = (share(sum(such), len(such), confidence) for such in (known, both))
+        found.append(Group(key, intact, shorted, median(ratios) if ratios else nan, words))
+    return found
 
 
 def dependence(of: Sequence[Group]) -> float:

@@ -75,10 +75,15 @@ def svg(
     taken: list[Point] = [place for panel in details for place in panels.letter_places(panel).values()]
     left, room = SPLIT + 3, RIGHT - SPLIT - 3
     rows = titleblock.rows(scene, details[0].frame, grid, gap[0] if gap else None, notes)
+    marks = []
+    if gap and gap[0].near[0] <= gap[1].view.end_mm:  # in the view that shows it smallest
+        mark, space = dimensions.gap(gap[1], gap[0])
+        taken += space
+        marks.append(mark)
     parts = [
         *_sections(scene, details, lanes, grid, materials),
         *(part for panel in details if printed for part in panels.outlined(panel, printed)),
-        *_gap_mark(gap, taken),
+        *marks,
         *markers.on_detail(shown, details, grid, taken),
         *(p for d, w, n in zip(details, wholes, NAMES, strict=False) for p in overview.draw(d, w, n, scene, materials)),
         *markers.on_overview(shown, details, wholes),
@@ -123,14 +128,6 @@ def _sections(
         yield from dimensions.rows(panel.frame, below, panel.frame.bed + 5.4, dimensions.ROW)
         yield panels.broken(panel)
         yield from panels.lettered(panel, letters, colours)
-
-
-def _gap_mark(gap: tuple[measures.Gap, Panel] | None, taken: list[Point]) -> Iterator[str]:
-    """The electrode gap in the view that shows it smallest; the room that it takes is added to ``taken``."""
-    if gap and gap[0].near[0] <= gap[1].view.end_mm:
-        marks, room = dimensions.gap(gap[1], gap[0])
-        taken += room
-        yield marks
 
 
 def _page(title: str, parts: Sequence[str]) -> str:

@@ -27,26 +27,21 @@ def beside(frame: Frame, lanes: Sequence[Sequence[Measure]]) -> Iterator[str]:
         for z in _ends(lane):
             yield line("thin", frame.left - 1, frame.y(z), x - 1, frame.y(z))
     for k, (x, lane) in enumerate(lanes_at):
-        yield from _lane(frame, x, lane, [frame.y(z) for further in lanes[k + 1 :] for z in _ends(further)])
+        passing = [frame.y(z) for further in lanes[k + 1 :] for z in _ends(further)]
+        falling = [(m, frame.y(m.low_mm), frame.y(m.high_mm)) for m in lane[::-1]]  # the page counts downwards
+        wanted = [_beside_lines((low + high) / 2, passing) for _, low, high in falling]
+        values = spread(wanted, [2.8] * len(lane), frame.top - 6, frame.bed + 6)
+        for (m, low, high), place in zip(falling, values, strict=True):
+            yield _distance((x, low), (x, high))
+            outside = not high <= place <= low
+            if outside:
+                yield line("thin", x, (low + high) / 2, x - 2.2, place)
+            yield text("end halo", x - (2.5 if outside else 1.2), place + 0.9, number(m.value_mm))
 
 
 def _ends(row: Sequence[Measure]) -> dict[float, float]:
     """Where the ends of measures are on their axis, and on the other one [mm]."""
     return {end: at for m in row for end, at in zip((m.low_mm, m.high_mm), m.ends_mm, strict=True)}
-
-
-def _lane(frame: Frame, x: float, lane: Sequence[Measure], passing: Sequence[float]) -> Iterator[str]:
-    """One lane at ``x`` on the page; ``passing`` are the extension lines of lanes further out [mm]."""
-    rising = [(m, frame.y(m.low_mm), frame.y(m.high_mm)) for m in lane]
-    falling = rising[::-1]  # the page counts downwards
-    wanted = [_beside_lines((low + high) / 2, passing) for _, low, high in falling]
-    places = spread(wanted, [2.8] * len(lane), frame.top - 6, frame.bed + 6)
-    for (m, low, high), place in zip(falling, places, strict=True):
-        yield _distance((x, low), (x, high))
-        outside = not high <= place <= low
-        if outside:
-            yield line("thin", x, (low + high) / 2, x - 2.2, place)
-        yield text("end halo", x - (2.5 if outside else 1.2), place + 0.9, number(m.value_mm))
 
 
 def _beside_lines(middle: float, passing: Sequence[float]) -> float:
@@ -63,22 +58,18 @@ def rows(frame: Frame, found: Sequence[Sequence[Measure]], start: float, step: f
         for u, z in sorted(_ends(row).items()):
             yield seen("thin", frame.x(u), frame.y(z), frame.x(u), y + beyond)
     for y, row in rows_at:
-        yield from _row(frame, row, y)
+        sizes = [width(number(m.value_mm)) for m in row]
+        middles = [frame.x((m.low_mm + m.high_mm) / 2) for m in row]
+        pitch = [0.0, *((a + b) / 2 + 0.8 for a, b in pairwise(sizes))]
+        for m, place in zip(row, spread(middles, pitch, frame.left, frame.right + 20), strict=True):
+            yield _distance((frame.x(m.low_mm), y), (frame.x(m.high_mm), y))
+            yield text("middle halo", place, y - 0.8, number(m.value_mm))
 
 
 def _fits(frame: Frame, row: Sequence[Measure]) -> bool:
     """Whether a row can be read: its values are no longer than itself."""
     length = sum(m.value_mm for m in row) * frame.per_mm
     return length >= NARROW if len(row) == 1 else sum(width(number(m.value_mm)) for m in row) < length
-
-
-def _row(frame: Frame, row: Sequence[Measure], y: float) -> Iterator[str]:
-    sizes = [width(number(m.value_mm)) for m in row]
-    middles = [frame.x((m.low_mm + m.high_mm) / 2) for m in row]
-    pitch = [0.0, *((a + b) / 2 + 0.8 for a, b in pairwise(sizes))]
-    for m, place in zip(row, spread(middles, pitch, frame.left, frame.right + 20), strict=True):
-        yield _distance((frame.x(m.low_mm), y), (frame.x(m.high_mm), y))
-        yield text("middle halo", place, y - 0.8, number(m.value_mm))
 
 
 def _distance(a: Point, b: Point) -> str:

@@ -49,15 +49,15 @@ def ranked(findings: Sequence[Finding]) -> list[Marked]:
     for f in sorted(findings, key=lambda f: (bool(f.waiver), SEVERITIES.index(f.severity))):
         message, advice = (_NUMBER.sub("#", words) for words in (f.message, f.advice))
         alike.setdefault((f.rule, f.severity, f.body, f.waiver, message, advice), []).append(f)
-    return [Marked(k, _merged(same), len(same)) for k, same in enumerate(alike.values(), start=1)]
-
-
-def _merged(same: Sequence[Finding]) -> Finding:
-    if len(same) == 1:
-        return same[0]
-    layers = [n for f in same for n in (f.layer, f.last_layer) if n is not None]
-    first, last = (min(layers), max(layers)) if layers else (None, None)
-    return replace(same[0], count=sum(f.count for f in same), layer=first, last_layer=last if last != first else None)
+    found = []
+    for k, same in enumerate(alike.values(), start=1):
+        layers = [n for f in same for n in (f.layer, f.last_layer) if n is not None]
+        first, last = min(layers, default=None), max(layers, default=None)
+        whole = replace(
+            same[0], count=sum(f.count for f in same), layer=first, last_layer=None if last == first else last
+        )
+        found.append(Marked(k, whole if len(same) > 1 else same[0], len(same)))
+    return found
 
 
 def height_mm(finding: Finding, boundaries_mm: Sequence[float]) -> float | None:
@@ -185,19 +185,14 @@ def placed(marked: Sequence[Marked], letters: Mapping[str, str], room: Room) -> 
 
 def listed(entries: Sequence[Entry], marked: Sequence[Marked], left: float, top: float, room: float) -> Iterator[str]:
     """The list of findings under its heading [mm on the page]."""
-    yield text("heading", left, top, fitted(_summary(marked, len(entries)), room, 3.2))
+    counts = [(sum(mark.merged for mark in marked if mark.kind == kind), kind) for kind in (*SEVERITIES, "waived")]
+    words = ", ".join(f"{n} {kind}{'s' if n > 1 and kind in ('error', 'warning') else ''}" for n, kind in counts if n)
+    rest = f"; {len(marked) - len(entries)} not shown, see check.json" if len(entries) < len(marked) else ""
+    yield text("heading", left, top, fitted(f"Findings: {words or 'no findings'}{rest}", room, 3.2))
     for entry in entries:
         yield _balloon(entry.mark, entry.x + RADIUS, entry.y + 0.6)
         for k, (kind, words) in enumerate(entry.rows):
             yield text(kind, entry.x + INDENT, entry.y + k * LINE, words)
-
-
-def _summary(marked: Sequence[Marked], shown: int) -> str:
-    if not marked:
-        return "Findings: no findings"
-    counts = [(sum(mark.merged for mark in marked if mark.kind == kind), kind) for kind in (*SEVERITIES, "waived")]
-    words = ", ".join(f"{n} {kind}{'s' if n > 1 and kind in ('error', 'warning') else ''}" for n, kind in counts if n)
-    return f"Findings: {words}" + (f"; {len(marked) - shown} not shown, see check.json" if shown < len(marked) else "")
 
 
 def _rows(mark: Marked, letters: Mapping[str, str], room: float, most: int) -> list[tuple[str, str]]:

@@ -58,7 +58,14 @@ def heights(views: Sequence[View], height_mm: float) -> list[list[Measure]]:
     whole = Measure(0.0, height_mm)
     bodies = _new((Measure(*span) for view in views for span in _extents(view)), [*chain, whole])
     bodies = sorted(sorted(bodies, key=lambda m: m.value_mm)[:MOST_EXTENTS], key=lambda m: m.low_mm)
-    return [lane for lane in (chain, *_lanes(bodies), [whole]) if lane and (lane != chain or len(chain) > 1)]
+    lanes: list[list[Measure]] = []  # side by side, those that overlap in different ones
+    for m in bodies:
+        free = next((lane for lane in lanes if lane[-1].high_mm <= m.low_mm + SAME_MM), None)
+        if free is None:
+            lanes.append([m])
+        else:
+            free.append(m)
+    return [lane for lane in (chain, *lanes, [whole]) if lane and (lane != chain or len(chain) > 1)]
 
 
 def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
@@ -73,7 +80,11 @@ def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
     chain = chain if 1 < len(chain) <= MOST_COLUMNS else []
     repeats = view.period_mm and len(edges) == len(view.period_mm)  # the view shows all of a period
     whole = [Measure(edges[0], edges[-1], (reach[0], reach[-1]))] if repeats else []
-    pieces = _new(_pieces(view), [*chain, *whole, Measure(0.0, view.end_mm)], by_value=True)[:MOST_PIECES]
+    sides = (side for _, outline in view.regions for side in _sides(outline))
+    flats = sorted((min(a[0], b[0]), max(a[0], b[0]), a[1]) for a, b in sides if a[1] == b[1])
+    flats = [flat for flat in flats if flat[0] > SAME_MM and flat[1] < view.end_mm - SAME_MM]
+    known = [*chain, *whole, Measure(0.0, view.end_mm)]
+    pieces = _new((Measure(low, high, (z, z)) for low, high, z in flats), known, by_value=True)[:MOST_PIECES]
     rows: tuple[list[list[Measure]], list[list[Measure]]] = ([], [])
     rows[not above].append(chain)
     for measure in pieces:
@@ -94,7 +105,13 @@ def nearest(view: View) -> Gap | None:
     for body, outline in view.regions:
         if body.terminal:
             terminals.setdefault(body.terminal, []).append(outline)
-    found = [gap for pair in permutations(terminals.values(), 2) for gap in _gaps(*pair)]
+    found = []
+    for corners, others in permutations(terminals.values(), 2):
+        edges = [edge for outline in others for edge in _sides(outline)]
+        for a, b in (side for outline in corners for side in _sides(outline)):
+            between = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
+            for place, at_corner in ((a, True), (between, False)):
+                found += [Gap(place, _foot(place, *edge), at_corner) for edge in edges]
     return min(found, key=lambda gap: (round(gap.value_mm, 6), gap.at_corner, abs(gap.near[0] - middle)), default=None)
 
 
@@ -116,19 +133,6 @@ def _extents(view: View) -> Iterator[Point]:
     return ((min(zs), max(zs)) for zs in by_body.values())
 
 
-def _pieces(view: View) -> Iterator[Measure]:
-    """Widths of flat edges, from the left, with their height."""
-    flats = [
-        (min(a[0], b[0]), max(a[0], b[0]), a[1])
-        for _, outline in view.regions
-        for a, b in _sides(outline)
-        if a[1] == b[1]
-    ]
-    for low, high, z in sorted(flats):
-        if low > SAME_MM and high < view.end_mm - SAME_MM:
-            yield Measure(low, high, (z, z))
-
-
 def _reach(view: View, at_mm: float, end: Callable[..., float]) -> float:
     """Height of the lowest or the highest corner at one place of the section [mm]."""
     return end((z for _, outline in view.regions for u, z in outline if abs(u - at_mm) < SAME_MM), default=0.0)
@@ -143,34 +147,12 @@ def _new(measures: Iterable[Measure], known: Sequence[Measure], by_value: bool =
     return kept
 
 
-def _lanes(measures: Iterable[Measure]) -> list[list[Measure]]:
-    """Measures side by side, those that overlap in different lanes."""
-    lanes: list[list[Measure]] = []
-    for m in measures:
-        free = next((lane for lane in lanes if lane[-1].high_mm <= m.low_mm + SAME_MM), None)
-        if free is None:
-            lanes.append([m])
-        else:
-            free.append(m)
-    return lanes
-
-
 def _distinct(values: Iterable[float]) -> list[float]:
     kept: list[float] = []
     for value in sorted(values):
         if not kept or value - kept[-1] > SAME_MM:
             kept.append(value)
     return kept
-
-
-def _gaps(corners: Sequence[Outline], others: Sequence[Outline]) -> Iterator[Gap]:
-    """From corners and middles of edges on one side to every edge of the other side."""
-    edges = [edge for outline in others for edge in _sides(outline)]
-    for a, b in (side for outline in corners for side in _sides(outline)):
-        middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
-        for edge in edges:
-            yield Gap(a, _foot(a, *edge), True)
-            yield Gap(middle, _foot(middle, *edge), False)
 
 
 def _sides(outline: Outline) -> Iterator[tuple[Point, Point]]:

@@ -3,12 +3,12 @@
 Numbers only; nothing here knows of paper.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
-from sensorgen.scene.scene import AXES, PLANE, SLIVER_MM, Body, Outline, Scene, area_mm2, clipped
+from sensorgen.scene.scene import AXES, SLIVER_MM, Body, Outline, Scene, area_mm2, clipped
 from sensorgen.scene.sections import Column, Section, columns
 
 PLACES = 8  # places tried for a section: two periods of crossed strips change eight times
@@ -73,22 +73,21 @@ def views(scene: Scene) -> list[View]:
 
 def _view(scene: Scene, across: str) -> View:
     """The section in which most of the terminals is seen: through the conductor strips, not beside them."""
-    section = max(_cuts(scene, "y" if across == "x" else "x"), key=_shown_mm2)
+    normal = "y" if across == "x" else "x"
+    spans = [(p.span(normal), body, p) for body in scene.bodies for p in body.prisms]
+    edges = sorted({edge for span, _, _ in spans for edge in span})
+    # Through the first stretches in which the sensor keeps one look.
+    stretches = [(low, high) for low, high in pairwise(edges) if high - low > SLIVER_MM]
+    cuts = []
+    for low, high in stretches[:PLACES]:
+        at = (low + high) / 2
+        cut = ((body, o) for (start, end), body, p in spans if start < at < end for o in p.cut(normal, at))
+        cuts.append(Section(across, high - low, at, tuple(cut)))
+    section = max(cuts, key=_shown_mm2)
     extent = scene.size_mm[AXES.index(across)]
     corners = sorted({u for _, outline in section.regions for u, _ in outline})
     probe = View(section, extent, (), corners[min(PROBE, len(corners) - 1)])
     return View(section, extent, period(probe.columns), probe.end_mm)
-
-
-def _cuts(scene: Scene, normal: str) -> Iterator[Section]:
-    """Sections through the first stretches of an axis in which the sensor keeps one look."""
-    spans = [(p.span(normal), body, p) for body in scene.bodies for p in body.prisms]
-    edges = sorted({edge for span, _, _ in spans for edge in span})
-    stretches = [(low, high) for low, high in pairwise(edges) if high - low > SLIVER_MM]
-    for low, high in stretches[:PLACES]:
-        at = (low + high) / 2
-        cut = ((body, o) for (start, end), body, p in spans if start < at < end for o in p.cut(normal, at))
-        yield Section(PLANE[normal][0], high - low, at, tuple(cut))
 
 
 def _shown_mm2(section: Section) -> tuple[float, float]:

@@ -126,9 +126,7 @@ class CadProcess:
             return "the CAD process gave an answer that cannot be read, and was stopped"
         if code < 0:
             return f"the CAD process was ended by {signal.Signals(-code).name}: there may be too little memory"
-        return f"the CAD process ended with exit code {code}: {self._last_words()}"
-
-    def _last_words(self) -> str:
         self._said.seek(0)
         lines = self._said.read().decode(errors="replace").splitlines()
-        return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
+        last = next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
+        return f"the CAD process ended with exit code {code}: {last}"

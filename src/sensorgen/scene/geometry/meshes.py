@@ -5,10 +5,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Mask, Whole
 from sensorgen.scene.geometry.mesh import Mesh
 from sensorgen.scene.scene import PLANE, Body, Outline, Prism
-
-Ints = NDArray[np.int64]
 
 
 def mesh(body: Body) -> Mesh:
@@ -47,7 +46,7 @@ def _prism(prism: Prism) -> Mesh:
     return Mesh(vertices, triangles.astype(np.int32))
 
 
-def _cap(outline: Outline) -> Ints:
+def _cap(outline: Outline) -> Whole:
     """Triangles of a flat outline, as indices of its corners."""
     if len(outline) == 3:
         return np.array([[0, 1, 2]])
@@ -63,7 +62,12 @@ def _grid(prisms: tuple[Prism, ...]) -> Mesh:
     for p in prisms:
         ends = (np.searchsorted(line, p.span(axis)) for line, axis in zip(lines, "xyz", strict=True))
         filled[tuple(slice(low, high) for low, high in ends)] = True
-    around = _surroundings(filled)
+    # Which of the eight cells around each grid point are filled, as bits x + 2 y + 4 z
+    padded = np.pad(filled, 1).astype(np.uint8)
+    around = np.zeros([n + 1 for n in filled.shape], np.uint8)
+    for bit, shift in enumerate(_CORNERS):
+        window = tuple(slice(s, s + n) for s, n in zip(shift, around.shape, strict=True))
+        around |= padded[window] << bit
     keys = np.concatenate([_faces(filled, around, axis, side) for axis in range(3) for side in (0, 1)])
     used = np.zeros(around.size * 4, bool)
     used[keys.ravel()] = True
@@ -75,17 +79,7 @@ def _grid(prisms: tuple[Prism, ...]) -> Mesh:
     return Mesh(vertices, triangles.astype(np.int32))
 
 
-def _surroundings(filled: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Which of the eight cells around each grid point are filled, as bits x + 2 y + 4 z."""
-    padded = np.pad(filled, 1).astype(np.uint8)
-    around = np.zeros([n + 1 for n in filled.shape], np.uint8)
-    for bit, shift in enumerate(_CORNERS):
-        window = tuple(slice(s, s + n) for s, n in zip(shift, around.shape, strict=True))
-        around |= padded[window] << bit
-    return around
-
-
-def _faces(filled: NDArray[np.bool_], around: NDArray[np.uint8], axis: int, side: int) -> Ints:
+def _faces(filled: Mask, around: NDArray[np.uint8], axis: int, side: int) -> Whole:
     """Outer faces on one side of the filled cells: (n, 4) keys of corners, counter-clockwise from outside.
 
     A key is four times the number of the grid point, plus the number of the solid at that point: two
@@ -112,7 +106,7 @@ def _faces(filled: NDArray[np.bool_], around: NDArray[np.uint8], axis: int, side
 _CORNERS = [(x, y, z) for z, y, x in product((0, 1), repeat=3)]
 
 
-def _number_solids() -> NDArray[np.int64]:
+def _number_solids() -> Whole:
     """For each pattern of eight cells around a point: which of the solids there each cell belongs to.
 
     Cells that share a face are one solid; (256, 8), cells in the order of the bits.

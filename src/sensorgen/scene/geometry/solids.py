@@ -132,7 +132,14 @@ def write_step(scene: Scene, colours: Mapping[str, str], title: str, path: Path)
         path.write_bytes(b"")  # says why it cannot, which the kernel does not
         # All faces are planes: curves in their parameters would say nothing new, in twice the time and the bytes.
         export_step(assembly, path, write_pcurves=False, timestamp=TIME_STAMP)
-        path.write_bytes(_settled(path.read_bytes(), [title, *(body.name for body in scene.bodies)]))
+        # What differs from run to run is made equal, and bodies get their real names.
+        step = path.read_bytes()
+        step = _PLACING.sub(rb"\1('\2','@\2@','',\3,\4,$)", step)
+        begin = step.find(_COLOURS)
+        begin, end = step.rfind(b"\n", 0, begin) + 1, step.rfind(b"ENDSEC;")
+        step = step[:begin] + _in_order(step[begin:end]) + step[end:]
+        names = [title, *(body.name for body in scene.bodies)]
+        path.write_bytes(_LABEL.sub(lambda match: _step_string(names[int(match[1])]), step))
     except OSError as error:
         raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
     except Exception as error:  # what the kernel throws while it translates
@@ -151,21 +158,8 @@ def _described(prism: Prism) -> str:
 
 
 def _label(number: int) -> str:
-    """A name that the kernel's writer neither wraps nor garbles; ``_settled`` puts the real one in."""
+    """A name that the kernel's writer neither wraps nor garbles; the real one is put in afterwards."""
     return f"@{number}@"
-
-
-def _settled(step: bytes, names: list[str]) -> bytes:
-    """The file with what differs from run to run made equal, and with the real names.
-
-    The kernel numbers placements on from the last file of the process, and writes colours in the order of addresses
-    in memory. Names it takes for Latin-1, and does not encode.
-    """
-    step = _PLACING.sub(rb"\1('\2','@\2@','',\3,\4,$)", step)
-    begin = step.find(_COLOURS)
-    begin, end = step.rfind(b"\n", 0, begin) + 1, step.rfind(b"ENDSEC;")
-    step = step[:begin] + _in_order(step[begin:end]) + step[end:]
-    return _LABEL.sub(lambda match: _step_string(names[int(match[1])]), step)
 
 
 def _in_order(colours: bytes) -> bytes:
@@ -219,7 +213,11 @@ def main() -> None:
     """Write one STEP file for each job on standard input, until it ends; answer None, or what went wrong."""
     with os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)  # what the kernel prints is no answer
-        _load()
+        gc.disable()  # what the import makes lives for good: not to look through it for garbage saves a tenth of it
+        import build123d  # noqa: F401
+
+        gc.freeze()
+        gc.enable()
         for scene, colours, title, path in _jobs(sys.stdin.buffer):
             answer: SensorgenError | None = None
             try:
@@ -230,15 +228,6 @@ def main() -> None:
                 answer = CadFailed(f"the CAD process failed on {title!r}: {type(error).__name__}: {error}")
             pickle.dump(answer, answers)
             answers.flush()
-
-
-def _load() -> None:
-    """Import build123d. What it makes lives for good: not looking through it for garbage saves a tenth of the time."""
-    gc.disable()
-    import build123d  # noqa: F401
-
-    gc.freeze()
-    gc.enable()
 
 
 def _jobs(stream: BinaryIO) -> Iterator[tuple[Scene, Mapping[str, str], str, Path]]:

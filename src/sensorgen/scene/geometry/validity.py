@@ -1,13 +1,15 @@
 """Are the meshes closed, oriented, apart from one another, and the electrodes apart?"""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sensorgen.scene.geometry.mesh import Mesh
-from sensorgen.scene.scene import Scene
+from sensorgen.scene.scene import AXES, Body, Scene
+from sensorgen.scene.sections import overlap, sections
 
 if TYPE_CHECKING:
     import manifold3d
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 OVERLAP_MM = 1e-9
 
 
+@lru_cache(maxsize=16)
 def solid(mesh: Mesh) -> "manifold3d.Manifold":
     """The mesh as a solid of manifold3d, in double precision; look at its ``status()``."""
     import manifold3d
@@ -48,9 +51,26 @@ def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
             found.append((body.name, f"encloses {got:.9g} mm3, not {exact:.9g} mm3"))
         elif (twice := _self_overlap_mm3(solids[body.name])) > OVERLAP_MM * solids[body.name].surface_area():
             found.append((body.name, f"overlaps itself by {twice:.3g} mm3"))
-    if found:
+        elif not np.allclose(solids[body.name].bounding_box(), _box_mm(body), rtol=0.0, atol=OVERLAP_MM):
+            found.append((body.name, "is not where it is drawn"))
+    if found or _are_apart(scene):
         return found
-    return [(f"{a} / {b}", f"overlap by {volume:.3g} mm3") for a, b, volume in _overlaps(solids)]
+    return _overlaps(solids)
+
+
+def _box_mm(body: Body) -> list[float]:
+    """Enclosing box: the lowest x, y and z, then the highest [mm]."""
+    spans = np.array([[p.span(axis) for axis in AXES] for p in body.prisms])
+    return [*spans[..., 0].min(axis=0), *spans[..., 1].max(axis=0)]
+
+
+def _are_apart(scene: Scene) -> bool:
+    """Whether the cross-sections show that no bodies overlap; solids take ten times longer to intersect."""
+    try:
+        sections(scene)
+    except ValueError:
+        return False
+    return overlap(scene) is None
 
 
 def _two_manifold(mesh: Mesh) -> bool:
@@ -69,17 +89,16 @@ def _self_overlap_mm3(solid: "manifold3d.Manifold") -> float:
     return float(solid.volume() - united.volume())
 
 
-def _overlaps(solids: Mapping[str, "manifold3d.Manifold"]) -> list[tuple[str, str, float]]:
-    shared = (
-        (a, b, (solids[a] ^ solids[b]).volume()) for a, b in combinations(solids, 2) if _near(solids[a], solids[b])
-    )
-    return [(a, b, v) for a, b, v in shared if v > OVERLAP_MM * min(solids[a].surface_area(), solids[b].surface_area())]
-
-
-def _near(a: "manifold3d.Manifold", b: "manifold3d.Manifold") -> bool:
-    """Whether their enclosing boxes share more than a face."""
-    box_a, box_b = np.array(a.bounding_box()), np.array(b.bounding_box())
-    return bool(np.all(np.minimum(box_a[3:], box_b[3:]) - np.maximum(box_a[:3], box_b[:3]) > OVERLAP_MM))
+def _overlaps(solids: Mapping[str, "manifold3d.Manifold"]) -> list[tuple[str, str]]:
+    found = []
+    for a, b in combinations(solids, 2):
+        one, other = solids[a], solids[b]
+        boxes = np.array([one.bounding_box(), other.bounding_box()])
+        if (boxes[:, 3:].min(axis=0) - boxes[:, :3].max(axis=0) > OVERLAP_MM).all():  # they share more than a face
+            volume = (one ^ other).volume()
+            if volume > OVERLAP_MM * min(one.surface_area(), other.surface_area()):
+                found.append((f"{a} / {b}", f"overlap by {volume:.3g} mm3"))
+    return found
 
 
 def electrode_gap_mm(scene: Scene, meshes: Mapping[str, Mesh]) -> float:

@@ -10,14 +10,11 @@ from functools import cached_property
 from itertools import pairwise, product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.solvers.contact.bricks import BrickMesh
 from sensorgen.solvers.contact.factors import solved_by_lu
-
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 _SHUT, _OPEN = 0.25, 0.5  # of a gap's width: below and above, its faces' nodes are opposite each other, or as they are
 _THIN = 0.1  # of a gap's width: its air deforms evenly

@@ -4,13 +4,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from sensorgen.core.arrays import Mask, Real, Whole
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 _SAME = 1e-9  # of the cell's width: places nearer than this are one
 
@@ -46,7 +45,7 @@ CHOICES = {
 
 
 def free_of(
-    points_m: Real, boundary: BoundaryConditions, spans_m: Real | None = None, used: NDArray[np.bool_] | None = None
+    points_m: Real, boundary: BoundaryConditions, spans_m: Real | None = None, used: Mask | None = None
 ) -> "csr_matrix":
     """Displacements (x, y of each node, or x, y, z) from the free ones, as a sparse matrix of ones.
 

@@ -5,19 +5,14 @@ from functools import cached_property
 from itertools import pairwise, product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import M_PER_MM
+from sensorgen.scene.raster import raster
 from sensorgen.scene.scene import Scene
-from sensorgen.scene.unit_cell import Band, Slice, mirrored
 from sensorgen.solvers.contact.cell import AIR, Region
 from sensorgen.solvers.contact.element import BRICK, BRICK_CORNERS, BRICK_INNER, BRICK_OUTER, ElementMesh
-
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
-
-_SAME_MM = 1e-9  # places nearer than this are one
 
 
 @dataclass(frozen=True)
@@ -54,7 +49,7 @@ class Bricks:
 
 
 def bricks_of(scene: Scene) -> Bricks:
-    """The cell of a scene of boxes, between mirrors at all four sides.
+    """The cell of a scene of boxes, between mirrors at its four sides.
 
     Raises
     ------
@@ -64,38 +59,13 @@ def bricks_of(scene: Scene) -> Bricks:
     prisms = [(body, p) for body in scene.bodies for p in body.prisms]
     if not all(p.is_box() for _, p in prisms):
         raise BadInput("pressing in 3D needs a scene of boxes: not all of its prisms are")
-    planes = [_planes([p.span(axis) for _, p in prisms]) for axis in "xyz"]
     regions = [Region(AIR, ""), *dict.fromkeys(Region(body.material, body.terminal) for body, _ in prisms)]
-    fill = np.zeros([len(p) - 1 for p in planes], np.int64)
-    for body, prism in prisms:
-        ends = [np.searchsorted(p, np.array(prism.span(a)) - _SAME_MM) for a, p in zip("xyz", planes, strict=True)]
-        here = tuple(slice(*end) for end in ends)
-        if fill[here].any():
-            raise BadInput(f"{body.name} overlaps its neighbour")
-        fill[here] = regions.index(Region(body.material, body.terminal))
-    for axis in (0, 1):
-        planes[axis], owner = _cell(planes[axis], np.moveaxis(fill, axis, 0))
-        fill = fill.take(owner, axis)
-    x, y, z = (p * M_PER_MM for p in planes)
-    return Bricks((x, y, z), fill, tuple(regions))
-
-
-def _planes(spans: list[tuple[float, float]]) -> Real:
-    values = np.unique(np.array(spans))
-    return np.asarray(values[np.concatenate([[True], np.diff(values) > _SAME_MM])])
-
-
-def _cell(planes: Real, fill: Whole) -> tuple[Real, Whole]:
-    """Planes of the smallest piece that mirrors at its ends continue to the whole, and from which slice each is."""
-    looks: dict[bytes, str] = {}
-    names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in fill]
-    slices = [
-        Slice(a, b, (Band(n, "", (0.0, 0.0), (1.0, 1.0)),))
-        for (a, b), n in zip(pairwise(planes.tolist()), names, strict=True)
-    ]
-    found = mirrored(slices).slices
-    middles = [(s.left_mm + s.right_mm) / 2 for s in found]
-    return np.array([found[0].left_mm, *(s.right_mm for s in found)]), np.searchsorted(planes, middles) - 1
+    try:
+        found = raster(scene, lambda body: regions.index(Region(body.material, body.terminal)), 0, ((), (), ()))
+    except ValueError as error:
+        raise BadInput(str(error)) from None
+    x, y, z = (p * M_PER_MM for p in found.planes_mm)
+    return Bricks((x, y, z), found.fill, tuple(regions))
 
 
 def _cut(planes: Real, pieces: int, shrink: float) -> tuple[Real, Whole]:
@@ -146,7 +116,7 @@ class BrickMesh(ElementMesh):
         return np.asarray(found)
 
 
-def mesh_of(bricks: Bricks, which: NDArray[np.bool_]) -> BrickMesh:
+def mesh_of(bricks: Bricks, which: Mask) -> BrickMesh:
     """Mesh some of the boxes of a cell."""
     boxes = np.argwhere(which)
     size = 2 * np.array(which.shape) + 1

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Point, Scene
-from sensorgen.scene.sections import Column, Layer, columns, sections
+from sensorgen.scene.sections import Column, columns, sections
 
 OUTSIDE = 0  # the region beyond the cell
 AIR = "air"
@@ -113,7 +113,7 @@ def _look(strip: Strip) -> tuple[object, ...]:
 
 
 def _strips(whole: list[Column], left: float, right: float) -> list[Strip]:
-    """Columns between two places: left, right, and each region with its bottom and top line.
+    """Columns between two places, air between their layers: left, right, and each region with bottom and top line.
 
     Columns that only go on with what the one before them began are one.
     """
@@ -121,7 +121,14 @@ def _strips(whole: list[Column], left: float, right: float) -> list[Strip]:
     for c in whole:
         a, b = max(c.left_mm, left), min(c.right_mm, right)
         if b - a > _SLIVER_MM:
-            strip = (a, b, _filled([_layer(c, x, a, b) for x in c.layers]))
+            layers: list[tuple[Region, Point, Point]] = []
+            for layer in c.layers:
+                low, high = (_at(c, line, a, b) for line in (layer.bottom_mm, layer.top_mm))
+                below = layers[-1][2] if layers else low
+                if max(low[k] - below[k] for k in range(2)) > _SLIVER_MM:
+                    layers.append((Region(AIR, ""), below, low))
+                layers.append((Region(layer.body.material, layer.body.terminal), low, high))
+            strip = (a, b, layers)
             found[-1:] = _joined(found[-1], strip) if found else [strip]
     return found
 
@@ -138,22 +145,6 @@ def _joined(one: Strip, other: Strip) -> list[Strip]:
                 return [one, other]
     layers = [(r, (u[0], x[1]), (v[0], y[1])) for (r, u, v), (_, x, y) in zip(before, after, strict=True)]
     return [(a, c, layers)]
-
-
-def _layer(column: Column, layer: Layer, left: float, right: float) -> tuple[Region, Point, Point]:
-    region = Region(layer.body.material, layer.body.terminal)
-    return region, _at(column, layer.bottom_mm, left, right), _at(column, layer.top_mm, left, right)
-
-
-def _filled(layers: list[tuple[Region, Point, Point]]) -> list[tuple[Region, Point, Point]]:
-    """Layers with air between them."""
-    found = layers[:1]
-    for region, low, high in layers[1:]:
-        below = found[-1][2]
-        if max(low[k] - below[k] for k in range(2)) > _SLIVER_MM:
-            found.append((Region(AIR, ""), below, low))
-        found.append((region, low, high))
-    return found
 
 
 def _at(column: Column, line: Point, left: float, right: float) -> Point:

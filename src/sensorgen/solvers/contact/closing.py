@@ -9,15 +9,12 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.units import M_PER_MM
 from sensorgen.solvers.contact.cell import OUTSIDE
 from sensorgen.solvers.contact.contact import Faces
 
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 Run = tuple[int, int]
 Sides = dict[Run, tuple[int, int]]
 

@@ -12,16 +12,12 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, vstack
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.solvers.contact.bricks import BrickMesh
 from sensorgen.solvers.contact.element import line_slopes, line_values
 from sensorgen.solvers.contact.mesh import Mesh, at_border
-
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 _STEEP = 0.3  # cosine of a face's slope, below which nothing rests on it [-]
 _PASS = 0.5  # share of the penalty that each of two faces brings [-]
@@ -156,13 +152,7 @@ class Faces:
     def project(self, places_m: Real, penalty_pa: float, kept: Pairs | None = None) -> Pairs:
         """Find the partner of every point at given places of the nodes (n, d); those of ``kept`` stay as they are."""
         rays = self.rays(places_m)
-        made = [self._met(places_m, rays, penalty_pa), *self._mirrored(places_m, rays, penalty_pa)]
-        if kept is None:
-            return _joined(made)
-        return _joined([*(p.some(~np.isin(p.point, kept.point)) for p in made), kept])
-
-    def _met(self, places_m: Real, rays: Rays, penalty_pa: float) -> Pairs:
-        """Points whose partner is on another face."""
+        # Points whose partner is on another face
         faces = places_m[self.nodes]
         point, face, s, _ = hit(rays, faces, self._depth_m)
         own, at = np.divmod(point, len(self._at))
@@ -170,7 +160,11 @@ class Faces:
         nodes = np.concatenate([self.nodes[face], self.nodes[own]], axis=1)
         _, looks = on_faces(s, faces[face])
         slips = tuple(self._rows(weights, nodes, rays.tangents[point, k]) for k in range(self._ways))
-        return self._pairs(self._rows(weights, nodes, -looks), slips, point, 0, _PASS * penalty_pa)
+        met = self._pairs(self._rows(weights, nodes, -looks), slips, point, 0, _PASS * penalty_pa)
+        made = [met, *self._mirrored(places_m, rays, penalty_pa)]
+        if kept is None:
+            return _joined(made)
+        return _joined([*(p.some(~np.isin(p.point, kept.point)) for p in made), kept])
 
     def _mirrored(self, places_m: Real, rays: Rays, penalty_pa: float) -> Iterator[Pairs]:
         """Points that look at a mirror; its image slips as they do."""

@@ -3,16 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
 from sensorgen.solvers.contact.cell import OUTSIDE, Cell
 from sensorgen.solvers.contact.closing import Sides, closed
 from sensorgen.solvers.contact.contact import Faces
 from sensorgen.solvers.contact.mesh import Mesh, at_border
-
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 _ROUND = [0, 3, 1, 4, 2, 5]  # the nodes of a triangle, in turn
 

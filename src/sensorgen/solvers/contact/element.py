@@ -15,10 +15,8 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
+from sensorgen.core.arrays import Real, Whole
 
 _STIFF = 1e6  # in the tangent of an incompressible element, the pressure's stiffness over mu
 _CHUNK = 2**19  # entries of element matrices at once: they stay in the cache

@@ -9,12 +9,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
 
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
+from sensorgen.core.arrays import Mask, Real, Whole
 
 _PIVOT = 1e-3  # share of its column below which a pivot of an indefinite matrix is exchanged [-]
 _LEAST = 60  # unknowns that are not halved any more
@@ -116,7 +114,7 @@ def _dissected(matrix: csr_matrix, places: Whole, block: Whole, pieces: list[tup
     return len(pieces) - 1
 
 
-def _cut(places: Whole) -> NDArray[np.bool_] | None:
+def _cut(places: Whole) -> Mask | None:
     """The lower part of a block cut across its longest side at the even place nearest to the middle; or None."""
     for axis in np.argsort(-np.ptp(places, axis=0), kind="stable"):
         here = places[:, axis]
@@ -157,8 +155,16 @@ def factored(matrix: csr_matrix, order: Order) -> Factors | None:
     rests: dict[int, Real] = {}
     parts: list[tuple[Real, Real]] = []
     for number, front in enumerate(order.fronts):
-        whole = _gathered(turned, front, [(order.fronts[c].outer, rests.pop(c)) for c in front.children])
         n = front.stop - front.start
+        whole = np.zeros((n + len(front.outer),) * 2)  # its own entries, and what its children leave
+        low, high = turned.indptr[front.start], turned.indptr[front.stop]
+        rows = np.repeat(np.arange(n), np.diff(turned.indptr[front.start : front.stop + 1]))
+        columns = turned.indices[low:high]
+        later = columns >= front.start
+        whole[rows[later], front.local(columns[later])] = turned.data[low:high][later]
+        for child in front.children:
+            at = front.local(order.fronts[child].outer)
+            whole[np.ix_(at, at)] += rests.pop(child)
         lower, failed = lapack.dpotrf(whole[:n, :n], lower=True, clean=True)
         if failed:
             return None
@@ -167,22 +173,6 @@ def factored(matrix: csr_matrix, order: Order) -> Factors | None:
         parts.append((inverse, coupling))
         rests[number] = whole[n:, n:] - coupling.T @ coupling
     return Factors(order, parts)
-
-
-def _gathered(turned: csr_matrix, front: Front, rests: list[tuple[Whole, Real]]) -> Real:
-    """A front with its own entries and what its children leave."""
-    n = front.stop - front.start
-    found = np.zeros((n + len(front.outer),) * 2)
-    low, high = turned.indptr[front.start], turned.indptr[front.stop]
-    rows = np.repeat(np.arange(n), np.diff(turned.indptr[front.start : front.stop + 1]))
-    columns = turned.indices[low:high]
-    later = columns >= front.start
-    here = front.local(columns[later])
-    found[rows[later], here] = turned.data[low:high][later]
-    for numbers, rest in rests:
-        at = front.local(numbers)
-        found[np.ix_(at, at)] += rest
-    return found
 
 
 @dataclass

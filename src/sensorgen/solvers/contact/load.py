@@ -5,16 +5,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix, diags
 from scipy.sparse.csgraph import connected_components
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.solvers.contact.contact import Faces, Pairs, carrying
 from sensorgen.solvers.contact.element import Elements, Inner, Tangent
 from sensorgen.solvers.contact.factors import by_lu
-
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 _ENOUGH = 1e-6  # residual over load
 _LEAST = 1e-7  # of the penalty: pressures below it are lost in the rounding of incompressible rubber [-]
@@ -111,7 +108,7 @@ class Problem:
         return pairs, self.gaps(pairs, state.u_m) / share
 
     @cached_property
-    def loose(self) -> NDArray[np.bool_]:
+    def loose(self) -> Mask:
         """Nodes of unsupported parts."""
         d, outer = self.dimension, self.elements.mesh.outer
         nodes = len(self.elements.mesh.points_m)

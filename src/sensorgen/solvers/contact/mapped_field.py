@@ -13,20 +13,18 @@ from functools import cache
 from itertools import combinations_with_replacement, product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.solvers.contact.bricks import BrickMesh
 from sensorgen.solvers.contact.element import brick_gradients, cofactor, determinant
 from sensorgen.solvers.contact.factors import Factors, factored, iterations, order_of
-from sensorgen.solvers.electrostatics.boxes import Element, flux, potential
+from sensorgen.solvers.electrostatics.boxes import Element, flux, hats, kron, legendres, potential
+from sensorgen.solvers.electrostatics.bricks import reached
 
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 Local = Callable[[Real, Real, int], tuple[Real, Real]]
 
 _ROUNDING = 1e-9
@@ -79,7 +77,16 @@ class Field:
         bricks = self.mesh.bricks
         of = [[k for k, r in enumerate(bricks.regions) if r.terminal == end] for end in ("bottom", "top")]
         ends = [np.isin(bricks.fill, regions) for regions in of]
-        self.carrying = _between(self.mesh, ends)
+        # Dielectric carries field in a piece that touches both electrodes
+        fill = np.where(ends[0], 0, np.where(ends[1], 1, 2))
+        inside = reached(fill, 0) & reached(fill, 1)
+        if not inside.any():
+            raise BadInput("no dielectric lies between a top and a bottom electrode")
+        if inside[:, :, [0, -1]].any():
+            raise BadInput("an electrode does not cover the whole cell")
+        if np.intersect1d(*(self.mesh.nodes[end[tuple(self.mesh.boxes.T)]] for end in ends)).size:
+            raise OutOfRange("the electrodes touch: the capacitance grows without bound")
+        self.carrying = np.asarray(inside[tuple(self.mesh.boxes.T)])
         # Legendre polynomials, of which the first on each face is a potential of 1/2
         kind, one = flux(self.orders.flux), np.zeros((6, (self.orders.flux + 1) ** 2))
         one[:, 0] = 2.0
@@ -182,23 +189,6 @@ class _System:
         return None
 
 
-def _between(mesh: BrickMesh, ends: list[Mask]) -> Mask:
-    """Which bricks carry field: dielectric in a piece that touches both electrodes."""
-    from scipy.ndimage import binary_dilation, label
-
-    free = ~(ends[0] | ends[1])
-    numbers, _ = label(free)
-    touched = [np.unique(numbers[binary_dilation(end) & free]) for end in ends]
-    inside = np.isin(numbers, np.intersect1d(touched[0], touched[1])) & free
-    if not inside.any():
-        raise BadInput("no dielectric lies between a top and a bottom electrode")
-    if inside[:, :, [0, -1]].any():
-        raise BadInput("an electrode does not cover the whole cell")
-    if np.intersect1d(*(mesh.nodes[end[tuple(mesh.boxes.T)]] for end in ends)).size:
-        raise OutOfRange("the electrodes touch: the capacitance grows without bound")
-    return np.asarray(inside[tuple(mesh.boxes.T)])
-
-
 def _system(boxes: Whole, ends: list[Mask], kind: Element, local: Local, order: int) -> _System:
     """Number the unknowns of boxes between two electrodes."""
     count = np.array(ends[0].shape)
@@ -263,14 +253,8 @@ def _fluxes(moved: Real, eps: Real, order: int) -> tuple[Real, Real]:
 def _hats(order: int) -> tuple[Real, Real, Real]:
     """Points along an axis, weights of their lattice, and gradients (points, n, 3) of hats and integrated Legendres."""
     at, weight = np.polynomial.legendre.leggauss(order + _MORE)
-    legendre = np.polynomial.legendre.legvander(at, order)
-    degree = np.arange(2, order + 1)
-    norm = np.sqrt(4 * degree - 2)
-    value = np.column_stack([(1 - at) / 2, (1 + at) / 2, (legendre[:, degree] - legendre[:, degree - 2]) / norm])
-    slope = np.column_stack(
-        [np.full_like(at, -0.5), np.full_like(at, 0.5), legendre[:, degree - 1] * (2 * degree - 1) / norm]
-    )
-    gradient = [_lattice([(value, slope)[int(a == axis)] for a in _AXES]) for axis in _AXES]
+    pair = hats(order, at)
+    gradient = [_lattice([pair[int(a == axis)] for a in _AXES]) for axis in _AXES]
     return at, _weights(weight), np.stack(gradient, axis=-1)
 
 
@@ -291,20 +275,12 @@ def _legendres(order: int) -> tuple[Real, Real, list[Real], Real, Real]:
     Raviart and Thomas: of one order more along its own axis, in orthonormal Legendre polynomials.
     """
     at, weight = np.polynomial.legendre.leggauss(order + _MORE)
-    norm = np.sqrt(np.arange(order + 2) + 0.5)
-    value = np.polynomial.legendre.legvander(at, order + 1) * norm
-    ends = np.polynomial.legendre.legvander(np.array([-1.0, 1.0]), order + 1) * norm
-    slope = np.polynomial.legendre.legval(at, np.polynomial.legendre.legder(np.diag(norm))).T
-    inwards = value[:, :-1].T @ (weight[:, None] * slope)  # (k + 1, k + 2)
+    value, ends, inwards = legendres(order, at, weight)  # (q, k + 2), (2, k + 2), (k + 1, k + 2)
     n, unit = order + 1, np.eye(order + 1)
     parts = [_lattice([value if a == axis else value[:, :-1] for a in _AXES]) for axis in _AXES]
-    divergence = np.concatenate([_kron([inwards if a == axis else unit for a in _AXES]) for axis in _AXES], axis=1)
+    divergence = np.concatenate([kron([inwards if a == axis else unit for a in _AXES]) for axis in _AXES], axis=1)
     faces = np.zeros((6 * n * n, 3, n * n * (n + 1)))
     for axis, side in product(_AXES, range(2)):
-        leaving = (-1, 1)[side] * _kron([ends[side : side + 1] if a == axis else unit for a in _AXES])
+        leaving = (-1, 1)[side] * kron([ends[side : side + 1] if a == axis else unit for a in _AXES])
         faces[(2 * axis + side) * n * n :][: n * n, axis] = leaving
     return at, _weights(weight), parts, divergence, faces.reshape(6 * n * n, -1)
-
-
-def _kron(factors: list[Real]) -> Real:
-    return np.asarray(np.kron(np.kron(factors[0], factors[1]), factors[2]))

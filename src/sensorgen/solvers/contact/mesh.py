@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import BadInput, NotInstalled
 from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Point
@@ -14,8 +14,6 @@ from sensorgen.solvers.contact import rings
 from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Edge
 from sensorgen.solvers.contact.element import TRIANGLE, ElementMesh
 
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
 Run = tuple[int, int]
 
 _SAME = 1e-9  # of the cell's size: places nearer than this are one
@@ -78,7 +76,7 @@ def of_triangles(points_m: Real, corners: Whole, region: Whole) -> Mesh:
     return Mesh(TRIANGLE, np.concatenate([points_m, middles]), triangles, region, rim)
 
 
-def at_border(mesh: Mesh) -> NDArray[np.bool_]:
+def at_border(mesh: Mesh) -> Mask:
     """Which sides of the rim lie on the straight border of the cell, and not within it."""
     a, b = (mesh.points_m[mesh.rim[:, k]] for k in range(2))
     ends = np.array([mesh.points_m.min(axis=0), mesh.points_m.max(axis=0)])

@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
@@ -21,11 +21,9 @@ from sensorgen.solvers.contact import rings
 from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Edge
 from sensorgen.solvers.contact.element import triangle_gradients
 from sensorgen.solvers.contact.factors import solved_by_lu
-from sensorgen.solvers.contact.mesh import Mesh, Net, Unmeshed, Whole, nearest, of_triangles, triangulated
+from sensorgen.solvers.contact.mesh import Mesh, Net, Unmeshed, nearest, of_triangles, triangulated
 from sensorgen.solvers.contact.wedge import Wedge, filled, wedges
 
-Real = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Edges = Mapping[Edge, tuple[int, int]]
 
 _ROUNDING = 1e-9
@@ -58,7 +56,13 @@ def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float,
     ends = [np.isin(np.arange(len(mesh.points_m)), mesh.outer[terminal == end]) for end in ("bottom", "top")]
     if (ends[0] & ends[1]).any():
         raise OutOfRange("the electrodes touch: the capacitance grows without bound")
-    inside = _between(mesh.outer, terminal == "", ends)
+    # Dielectric carries field in a piece that touches both electrodes
+    dielectric = terminal == ""
+    middles = mesh.outer[dielectric, 3:]
+    beside = coo_matrix((np.ones(middles.size), (middles.ravel(), middles[:, [1, 2, 0]].ravel())), (len(ends[0]),) * 2)
+    _, piece = connected_components(beside)
+    touched = [np.unique(piece[middles[end[middles].any(axis=1), 0]]) for end in ends]
+    inside = np.flatnonzero(dielectric)[np.isin(piece[middles[:, 0]], np.intersect1d(touched[0], touched[1]))]
     eps = np.array([permittivity.get(r.material, np.nan) for r in cell.regions])[mesh.region[inside] - 1]
     x = mesh.points_m[:, 0]
     width = float(np.ptp(x))
@@ -89,7 +93,15 @@ def _meshed(cell: Cell, coarse_mm: float, growth: float) -> Mesh:
     net = triangulated(cut, coarse_mm, growth, quick=True)
     new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
     corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])
-    _refuse_holes(edges, net.points_m[corners])
+    # Compare the area within the edges with that of the triangles (m, 3, 2), none of which may be turned over
+    placed = net.points_m[corners]
+    drawn = sum(
+        0.5 * (a[0] * b[1] - a[1] * b[0]) * ((left > 0) - (right > 0)) for (a, b), (left, right) in edges.items()
+    )
+    u, v = placed[:, 1] - placed[:, 0], placed[:, 2] - placed[:, 0]
+    parts = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / M_PER_MM**2
+    if parts.min() <= 0 or abs(parts.sum() / drawn - 1) > _HOLE:
+        raise Unmeshed("the mesh has holes or folds")
     region = np.concatenate([net.region, np.full(len(new), cell.air)])
     tips = [nearest(net.points_m, place) for place in rings.corners(edges, cell.left_mm, cell.right_mm)]
     return of_triangles(*rings.ringed(net.points_m, corners, region, tips, _RINGS))
@@ -112,17 +124,6 @@ def _side(a: Real, b: Real, p: Real) -> Real:
     return np.asarray(np.where(np.abs(turn) > _ROUNDING * size, np.sign(turn), 0.0))
 
 
-def _refuse_holes(edges: Edges, corners: Real) -> None:
-    """Compare the area within the edges with that of the triangles (m, 3, 2), none of which may be turned over."""
-    area = sum(
-        0.5 * (a[0] * b[1] - a[1] * b[0]) * ((left > 0) - (right > 0)) for (a, b), (left, right) in edges.items()
-    )
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    parts = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / M_PER_MM**2
-    if parts.min() <= 0 or abs(parts.sum() / area - 1) > _HOLE:
-        raise Unmeshed("the mesh has holes or folds")
-
-
 def _filling(net: Net, number: int, wedge: Wedge) -> list[tuple[int, int, int]]:
     """Triangles for a wedge, whose sides the mesher may have cut."""
     points, beside = net.points_m, defaultdict(list)
@@ -135,15 +136,6 @@ def _filling(net: Net, number: int, wedge: Wedge) -> list[tuple[int, int, int]]:
     while ring[-1] != tip:
         ring.append(next(k for k in beside[ring[-1]] if k != ring[-2]))
     return filled(ring[:-1], points.tolist())
-
-
-def _between(triangles: Whole, dielectric: Mask, ends: list[Mask]) -> Whole:
-    """Numbers of the dielectric triangles in pieces that touch both electrodes; others carry no field."""
-    middles = triangles[dielectric, 3:]
-    beside = coo_matrix((np.ones(middles.size), (middles.ravel(), middles[:, [1, 2, 0]].ravel())), (len(ends[0]),) * 2)
-    _, piece = connected_components(beside)
-    touched = [np.unique(piece[middles[end[middles].any(axis=1), 0]]) for end in ends]
-    return np.flatnonzero(dielectric)[np.isin(piece[middles[:, 0]], np.intersect1d(touched[0], touched[1]))]
 
 
 def _energy(triangles: Whole, local: Real, zero: Mask, one: Mask) -> float:

@@ -1,20 +1,21 @@
 """Result of a cell under pressure, in two or three dimensions, and the checks of its validity."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.solvers.contact.boundary import CHOICES, BoundaryConditions
 from sensorgen.solvers.contact.cell import Cell
+from sensorgen.solvers.contact.mesh import Mesh
 
 if TYPE_CHECKING:
-    from sensorgen.solvers.contact.element import Law
+    from sensorgen.solvers.contact.bricks import BrickMesh
     from sensorgen.solvers.contact.load import Problem, State
 
 _PENALTY = 60.0  # over the least Young's modulus of a solid [-]
@@ -23,9 +24,7 @@ DEEPEST = 0.3  # penetration over the side it happens on [-]
 _BALANCE = 0.01  # by which work and energy may differ [-]
 _LEVELS = 0.01  # by which two meshes may differ [-]
 
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
-AnyMesh = TypeVar("AnyMesh")
+AnyMesh = TypeVar("AnyMesh", Mesh, "BrickMesh")
 
 
 @dataclass(frozen=True)
@@ -104,33 +103,70 @@ def check(stress_pa: Sequence[float], boundary: BoundaryConditions) -> None:
             raise BadInput(f"{key} {getattr(boundary, key)!r}: expected {' or '.join(choices)}")
 
 
-def law_of(materials: Sequence[str], region: Whole, solids: Mapping[str, Elastic]) -> "tuple[Law, float]":
-    """Material law of elements by their region's number, and the least Young's modulus [Pa]."""
-    from sensorgen.solvers.contact.element import law
-
-    known = [solids[materials[k]] for k in region.tolist()]
-    moduli, ratios = np.array([[s.youngs_modulus_pa, s.poisson_ratio] for s in known]).T
-    return law(moduli, ratios), float(moduli.min())
-
-
 def penalty_pa(softest_pa: float) -> float:
     """Contact pressure per penetration, times the length of a side [Pa]; ``softest_pa`` is the least modulus."""
     return _PENALTY * softest_pa
 
 
-def reached(
-    problem: "Problem", stress_pa: Sequence[float], longest_pa: float, step: Callable[[float], None], source: str
-) -> tuple[Pressed, "list[State]"]:
-    """Press in load steps of at most ``longest_pa``, as far as it converges, and check the result.
+def solve(
+    mesh: AnyMesh,
+    solids: Sequence[Elastic],
+    stress_pa: Sequence[float],
+    boundary: BoundaryConditions,
+    longest: float,
+    source: str,
+    step: Callable[[float], None],
+) -> tuple[Pressed, Run[AnyMesh]]:
+    """Press a mesh of triangles or bricks as far as it converges, and check the result.
 
-    ``step`` is called with each pressure that is reached [Pa].
+    Parameters
+    ----------
+    mesh : Mesh or BrickMesh
+        Of the solid parts of a cell.
+    solids : sequence of Elastic
+        Of each element.
+    stress_pa : sequence of float
+        Increasing pressures, from 0 on [Pa].
+    boundary : BoundaryConditions
+        Base, period, top and contact.
+    longest : float
+        Load step over the least Young's modulus, at most [-].
+    source : str
+        Method.
+    step : callable
+        Called with each pressure that is reached [Pa].
     """
-    from sensorgen.solvers.contact import load
+    from sensorgen.solvers.contact.boundary import free_of, top_load
+    from sensorgen.solvers.contact.contact import brick_faces_of, faces_of
+    from sensorgen.solvers.contact.element import Elements, law
+    from sensorgen.solvers.contact.factors import Solver
+    from sensorgen.solvers.contact.load import Problem, curve
 
+    moduli, ratios = np.array([[s.youngs_modulus_pa, s.poisson_ratio] for s in solids]).T
+    softest, elements = float(moduli.min()), Elements(mesh, law(moduli, ratios))
+    load, penalty, stick = top_load(mesh.points_m, *mesh.top()), penalty_pa(softest), boundary.contact == "stick"
+    if isinstance(mesh, Mesh):
+        faces, outline = faces_of(mesh), mesh.outline
+
+        def sound(places_m: Real) -> bool:
+            return not faces.crossed(places_m, outline, DEEPEST)
+
+        problem = Problem(elements, faces, free_of(mesh.points_m, boundary), load, penalty, stick, sound=sound)
+    else:
+        used = np.isin(np.arange(len(mesh.points_m)), mesh.outer)
+        free = free_of(mesh.points_m, boundary, mesh.bricks.spans_m(), used)
+        first = free.tocsc().indices[free.tocsc().indptr[:-1]]
+        solver = Solver(mesh.lattice[first // 3])
+        problem = Problem(elements, brick_faces_of(mesh), free, load, penalty, stick, solver)
     states = []
-    for state in load.curve(problem, stress_pa, longest_pa):
+    for state in curve(problem, stress_pa, longest * softest):
         states.append(state)
         step(state.pressure_pa)
+    return _checked(problem, states, stress_pa[-1], source), Run(problem, mesh, states)
+
+
+def _checked(problem: "Problem", states: "Sequence[State]", last_pa: float, source: str) -> Pressed:
+    """Displacements at each load, and the faults of the solution: load, volume, penetration, balance of energy."""
     area, fall = np.abs(problem.load).sum(), problem.fall_m(states[0])
     stress = np.array([s.pressure_pa for s in states])
     down = np.array([problem.load @ s.u_m / area for s in states])
@@ -138,16 +174,16 @@ def reached(
     depth = np.array([-(problem.gaps(s.pairs, s.u_m) / s.pairs.length_m).min(initial=0.0) for s in states])
     energy = np.array([problem.elements.energy_j(s.u_m, s.inner) + problem.contact_energy(s) for s in states])
     imbalance = _imbalance(stress, (down - fall) * area, energy)
+    reached, wanted = f"{stress[-1] / 1e3:.4g}", f"{last_pa / 1e3:.4g}"
     faults = {
-        f"converged up to {stress[-1] / 1e3:.4g} of {stress_pa[-1] / 1e3:.4g} kPa": stress[-1]
-        < stress_pa[-1] * (1 - 1e-9),
+        f"converged up to {reached} of {wanted} kPa": stress[-1] < last_pa * (1 - 1e-9),
         f"a triangle is squeezed to {volume.min():.2g} of its volume": volume.min() < _LEAST_VOLUME,
         f"faces run into each other by {depth.max():.2g} of a side": depth.max() > DEEPEST,
         f"work and energy differ by {imbalance[-1]:.1%}": abs(imbalance[-1]) > _BALANCE,
     }
     said = (f"feet hang free as drawn: the top falls {fall * 1e6:.4g} um before they carry",) if fall > 0 else ()
     wrong = tuple(words for words, holds in faults.items() if holds)
-    return Pressed(stress, down, (), (), volume, depth, imbalance, fall, wrong, said, source), states
+    return Pressed(stress, down, (), (), volume, depth, imbalance, fall, wrong, said, source)
 
 
 def _imbalance(stress: Real, moved: Real, energy: Real) -> Real:

@@ -4,13 +4,10 @@ from collections.abc import Mapping
 from math import atan2, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.scene.scene import Point
 from sensorgen.solvers.contact.cell import Cell, Edge
-
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 _SHARP = 0.3  # an outline that turns by less is no corner [rad]
 _RATIO = 0.5  # of a ring to the one around it [-]
@@ -26,11 +23,7 @@ def corners(edges: Mapping[Edge, tuple[int, int]], left_mm: float, right_mm: flo
                 ways.setdefault(place, []).append(out)
                 if place[0] in (left_mm, right_mm) and out[0]:
                     ways[place].append(out * (-1, 1))
-    return [place for place, found in ways.items() if not _straight(found)]
-
-
-def _straight(ways: list[Real]) -> bool:
-    return len(ways) == 2 and bool(ways[0] @ ways[1] < -np.cos(_SHARP))
+    return [place for place, found in ways.items() if len(found) != 2 or found[0] @ found[1] >= -np.cos(_SHARP)]
 
 
 def notches(cell: Cell) -> list[Point]:
@@ -56,23 +49,19 @@ def _filled(ways: list[tuple[float, bool]]) -> float:
 def ringed(points: Real, triangles: Whole, region: Whole, tips: list[int], count: int) -> tuple[Real, Whole, Whole]:
     """Points (n, 2), corners of triangles (m, 3) and their regions, with so many rings around some of the points."""
     for tip in tips:
-        points, triangles, region = _cut(points, triangles, region, tip, count)
+        # Cut all sides that start at a point at the same shares, and so each triangle there into a small one and pairs
+        here = (triangles == tip).any(axis=1)
+        first = (triangles[here] == tip).argmax(axis=1)
+        _, *ends = np.take_along_axis(triangles[here], (first[:, None] + np.arange(3)) % 3, axis=1).T
+        beside = np.unique(ends)
+        levels = np.arange(count)[:, None] * len(beside)
+        a, b = (np.vstack([k, len(points) + levels + np.searchsorted(beside, k)]) for k in ends)
+        sides = [(a[1:], a[:-1], b[:-1]), (a[1:], b[:-1], b[1:]), (np.full_like(a[-1], tip), a[-1], b[-1])]
+        new = np.concatenate([np.stack(side, axis=-1).reshape(-1, 3) for side in sides])
+        near = points[tip] + _RATIO ** np.arange(1, count + 1)[:, None, None] * (points[beside] - points[tip])
+        points, triangles, region = (
+            np.concatenate([points, near.reshape(-1, 2)]),
+            np.concatenate([triangles[~here], new]),
+            np.concatenate([region[~here], np.tile(region[here], 2 * count + 1)]),
+        )
     return points, triangles, region
-
-
-def _cut(points: Real, triangles: Whole, region: Whole, tip: int, count: int) -> tuple[Real, Whole, Whole]:
-    """Cut all sides that start at a point at the same shares, and so each triangle there into a small one and pairs."""
-    here = (triangles == tip).any(axis=1)
-    first = (triangles[here] == tip).argmax(axis=1)
-    _, *ends = np.take_along_axis(triangles[here], (first[:, None] + np.arange(3)) % 3, axis=1).T
-    beside = np.unique(ends)
-    levels = np.arange(count)[:, None] * len(beside)
-    a, b = (np.vstack([k, len(points) + levels + np.searchsorted(beside, k)]) for k in ends)
-    sides = [(a[1:], a[:-1], b[:-1]), (a[1:], b[:-1], b[1:]), (np.full_like(a[-1], tip), a[-1], b[-1])]
-    new = np.concatenate([np.stack(side, axis=-1).reshape(-1, 3) for side in sides])
-    near = points[tip] + _RATIO ** np.arange(1, count + 1)[:, None, None] * (points[beside] - points[tip])
-    return (
-        np.concatenate([points, near.reshape(-1, 2)]),
-        np.concatenate([triangles[~here], new]),
-        np.concatenate([region[~here], np.tile(region[here], 2 * count + 1)]),
-    )

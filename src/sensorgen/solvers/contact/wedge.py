@@ -40,7 +40,21 @@ def wedges(edges: Mapping[Edge, tuple[int, int]], air: int) -> list[Wedge]:
     for tip in list(ahead):
         for out, into in product(ahead[tip], back[tip]):
             if _is_tip(tip, out, into, ahead) and not {out, into} & used:
-                found.append(_grown(tip, out, into, ahead, back))
+                # Walk along both sides, where the way across is shorter, until the air is thick or both sides meet.
+                first, second = [tip, out], [tip, into]
+                while first[-1] != second[-1] and ahead[first[-1]] and back[second[-1]]:
+                    on_first, on_second = ahead[first[-1]][0], back[second[-1]][0]
+                    if on_first == second[-1]:
+                        first.append(on_first)
+                        break
+                    thick = min(_off(first[-1], second[-1], on_second), _off(second[-1], first[-1], on_first))
+                    if thick > _THICK * min(_far(first[-1], on_first), _far(second[-1], on_second)):
+                        break
+                    if _far(on_first, second[-1]) < _far(first[-1], on_second):
+                        first.append(on_first)
+                    else:
+                        second.append(on_second)
+                found.append(Wedge(tuple(first), tuple(second)))
                 used |= {*found[-1].first[1:], *found[-1].second[1:]}
     return found
 
@@ -55,26 +69,6 @@ def _turn(tip: Point, a: Point, b: Point) -> float:
     """Angle from a to b around the tip, anticlockwise, from 0 to 2 pi."""
     angle = atan2(b[1] - tip[1], b[0] - tip[0]) - atan2(a[1] - tip[1], a[0] - tip[0])
     return angle % (2 * pi)
-
-
-def _grown(
-    tip: Point, out: Point, into: Point, ahead: Mapping[Point, list[Point]], back: Mapping[Point, list[Point]]
-) -> Wedge:
-    """Walk along both sides, always on where the way across is shorter, until the air is thick or both sides meet."""
-    first, second = [tip, out], [tip, into]
-    while first[-1] != second[-1] and ahead[first[-1]] and back[second[-1]]:
-        on_first, on_second = ahead[first[-1]][0], back[second[-1]][0]
-        if on_first == second[-1]:
-            first.append(on_first)
-            break
-        thick = min(_off(first[-1], second[-1], on_second), _off(second[-1], first[-1], on_first))
-        if thick > _THICK * min(_far(first[-1], on_first), _far(second[-1], on_second)):
-            break
-        if _far(on_first, second[-1]) < _far(first[-1], on_second):
-            first.append(on_first)
-        else:
-            second.append(on_second)
-    return Wedge(tuple(first), tuple(second))
 
 
 def _off(p: Point, a: Point, b: Point) -> float:

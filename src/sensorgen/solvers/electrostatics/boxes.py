@@ -19,12 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.core.bounds import Interval
 from sensorgen.solvers.electrostatics.bricks import Grid
 from sensorgen.solvers.electrostatics.elimination import HELD, Block, Solution, least
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -47,14 +45,14 @@ class Element:
         Places of the lattice from one element to the next.
     """
 
-    outer: tuple[Array, Array, Array]
-    coupling: tuple[Array, Array, Array]
-    inner: tuple[Array, Array, Array]
-    one: Array
-    numbers: Ints
+    outer: tuple[Real, Real, Real]
+    coupling: tuple[Real, Real, Real]
+    inner: tuple[Real, Real, Real]
+    one: Real
+    numbers: Whole
     pitch: int
 
-    def keys(self, boxes: Ints, count: Ints) -> Ints:
+    def keys(self, boxes: Whole, count: Whole) -> Whole:
         """Numbers of the shared unknowns of boxes, equal where boxes share them.
 
         Parameters
@@ -67,15 +65,15 @@ class Element:
         sizes = count * self.pitch + 1
         place = boxes[:, None, :] * self.pitch + self.numbers[None, :, :3]
         flat = (place[..., 0] * sizes[1] + place[..., 1]) * sizes[2] + place[..., 2]
-        found: Ints = flat * 3 + self.numbers[:, 3]
+        found: Whole = flat * 3 + self.numbers[:, 3]
         return found
 
-    def condensed(self, scale: Array) -> Array:
+    def condensed(self, scale: Real) -> Real:
         """Energy of the shared unknowns when those inside have found their best values, of a box of three scales."""
         shared, coupling, inner = (
             sum(s * g for s, g in zip(scale, of, strict=True)) for of in (self.outer, self.coupling, self.inner)
         )
-        found: Array = shared - coupling.T @ (coupling / inner[:, None])
+        found: Real = shared - coupling.T @ (coupling / inner[:, None])
         return found
 
 
@@ -89,7 +87,7 @@ def potential(order: int) -> Element:
     shared, inside = ends.any(1), ~ends.any(1)
     lattice = np.array([0, order, *range(1, order)])  # both ends, then the modes between them
     numbers = np.column_stack([lattice[places[shared]], np.zeros(shared.sum(), dtype=np.int64)])
-    whole = np.stack([_product([pair[int(a != axis)] for a in range(3)]) for axis in range(3)])
+    whole = np.stack([kron([pair[int(a != axis)] for a in range(3)]) for axis in range(3)])
     return Element(
         _three(whole[:, shared][:, :, shared]),
         _three(whole[:, inside][:, :, shared]),
@@ -100,31 +98,43 @@ def potential(order: int) -> Element:
     )
 
 
-def _product(factors: list[Array]) -> Array:
+def kron(factors: list[Real]) -> Real:
+    """Kronecker product of three matrices."""
     first, second, third = factors
     return np.kron(np.kron(first, second), third)
 
 
-def _modes(order: int) -> tuple[Array, Array, Array]:
+def _modes(order: int) -> tuple[Real, Real, Real]:
     """Stiffness and mass of two straight hats and of modes that vanish at both ends and diagonalise both; the modes."""
     at, weight = np.polynomial.legendre.leggauss(order + 1)
-    value = _values(order, at)
-    degree = np.arange(2, order + 1)
-    legendre = np.polynomial.legendre.legvander(at, order)
-    rising = legendre[:, degree - 1] * (2 * degree - 1) / np.sqrt(4 * degree - 2)
-    slope = np.column_stack([-0.5 + 0 * at, 0.5 + 0 * at, rising])
+    value, slope = hats(order, at)
     stiffness, mass = (v.T @ (weight[:, None] * v) for v in (slope, value))
     turn = np.eye(order + 1)
     turn[2:, 2:] = np.linalg.eigh(mass[2:, 2:]).eigenvectors  # the bubbles' stiffness is 1
     return turn.T @ stiffness @ turn, turn.T @ mass @ turn, turn
 
 
-def _values(order: int, at: Array) -> Array:
-    """Two straight hats, and bubbles of degree 2 and more, at some places."""
+def hats(order: int, at: Real) -> tuple[Real, Real]:
+    """Two straight hats, and bubbles of degree 2 and more (integrated Legendre), at some places; their slopes."""
     legendre = np.polynomial.legendre.legvander(at, order)
     degree = np.arange(2, order + 1)
-    bubbles = (legendre[:, degree] - legendre[:, degree - 2]) / np.sqrt(4 * degree - 2)
-    return np.column_stack([(1 - at) / 2, (1 + at) / 2, bubbles])
+    norm = np.sqrt(4 * degree - 2)
+    bubbles = (legendre[:, degree] - legendre[:, degree - 2]) / norm
+    rising = legendre[:, degree - 1] * (2 * degree - 1) / norm
+    half = np.full_like(at, 0.5)
+    return np.column_stack([(1 - at) / 2, (1 + at) / 2, bubbles]), np.column_stack([-half, half, rising])
+
+
+def legendres(order: int, at: Real, weight: Real) -> tuple[Real, Real, Real]:
+    """Orthonormal Legendre polynomials up to ``order`` + 1 at points of a quadrature, and at -1 and 1.
+
+    Third, the moments of their slopes with those up to ``order``: the divergence of a flux of Raviart and Thomas.
+    """
+    norm = np.sqrt(np.arange(order + 2) + 0.5)
+    value = np.polynomial.legendre.legvander(at, order + 1) * norm
+    ends = np.polynomial.legendre.legvander(np.array([-1.0, 1.0]), order + 1) * norm
+    slope = np.polynomial.legendre.legval(at, np.polynomial.legendre.legder(np.diag(norm))).T
+    return value, ends, value[:, :-1].T @ (weight[:, None] * slope)
 
 
 @cache
@@ -149,7 +159,7 @@ def flux(order: int) -> Element:
 
 
 @cache
-def traces(order: int, flux_order: int) -> Array:
+def traces(order: int, flux_order: int) -> Real:
     """What fluxes feel of potentials: moments of :func:`potential` with the functions on the faces of :func:`flux`.
 
     Parameters
@@ -164,7 +174,7 @@ def traces(order: int, flux_order: int) -> Array:
         unknowns, their product is the integral of the potential's gradient along the flux.
     """
     at, weight = np.polynomial.legendre.leggauss(order + flux_order + 2)
-    modes = _values(order, at) @ _modes(order)[2]
+    modes = hats(order, at)[0] @ _modes(order)[2]
     _, _, _, turn = _worked_out(flux_order)
     n = flux_order + 1
     legendre = np.polynomial.legendre.legvander(at, flux_order) * np.sqrt(np.arange(n) + 0.5)
@@ -180,28 +190,22 @@ def traces(order: int, flux_order: int) -> Array:
     return found
 
 
-def _worked_out(order: int) -> tuple[Array, Array, Array, Array]:
+def _worked_out(order: int) -> tuple[Real, Real, Real, Real]:
     """In one dimension: energy of a flux driven by potentials at two ends and between them, in the latter's modes.
 
     Returns the ends' matrix, that between modes and ends, the modes' energies, and the modes (orthonormal Legendre).
     """
-    at, weight = np.polynomial.legendre.leggauss(order + 2)
-    norm = np.sqrt(np.arange(order + 2) + 0.5)
-    value = np.polynomial.legendre.legvander(at, order + 1) * norm
-    ends = np.polynomial.legendre.legvander(np.array([-1.0, 1.0]), order + 1) * norm
-    slope = np.polynomial.legendre.legval(at, np.polynomial.legendre.legder(np.diag(norm))).T
-    divergence = value[:, :-1].T @ (weight[:, None] * slope)
+    _, ends, divergence = legendres(order, *np.polynomial.legendre.leggauss(order + 2))
     squares, turn = np.linalg.eigh(divergence @ divergence.T)
     drive = np.array([[-1.0], [1.0]]) * ends
     return drive @ drive.T, -turn.T @ divergence @ drive.T, squares, turn
 
 
-def _three(found: NDArray[np.float64]) -> tuple[Array, Array, Array]:
+def _three(found: Real) -> tuple[Real, Real, Real]:
     return found[0], found[1], found[2]
 
 
 Matrix = NDArray[Any]
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -226,8 +230,8 @@ class Boxes:
         Forces on the unknowns, in place of a top at 1 V.
     """
 
-    places: Ints
-    ids: Ints
+    places: Whole
+    ids: Whole
     scale: Real
     eps: Matrix
     shares: Real

@@ -5,17 +5,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sensorgen.scene.scene import Scene
-from sensorgen.scene.unit_cell import Band, Cell, Slice, mirrored
+from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.scene.raster import raster
+from sensorgen.scene.scene import Body, Scene
 from sensorgen.solvers.electrostatics.corners import exponent
 
 RATIO = 0.15  # of a layer's distance from an edge to the next layer's
-_ROUNDING_MM = 1e-9
 _INFINITE = 1 - 1e-6  # exponents of the potential below this: the field is infinite
-
-Ints = NDArray[np.int_]
 
 
 @dataclass(frozen=True)
@@ -34,10 +31,10 @@ class Grid:
         How often each place of the cell, or a mirror image, occurs in the sensor [-].
     """
 
-    planes_mm: tuple[NDArray[np.float64], ...]
-    fill: Ints
+    planes_mm: tuple[Real, ...]
+    fill: Whole
     names: list[str]
-    shares: NDArray[np.float64]
+    shares: Real
 
 
 def grid(scene: Scene) -> Grid:
@@ -48,96 +45,18 @@ def grid(scene: Scene) -> Grid:
     ValueError
         A prism is no box, bodies overlap, the electrodes touch, or one does not cover the sensor.
     """
-    cut = _cell(*_raster(scene))
-    _refuse_contact(cut.fill)
-    return _between(cut)
-
-
-def insulated(scene: Scene, axis: int) -> Grid:
-    """The repeating cell of boxes in air that insulates, with planes at 0 V and 1 V square to x (0) or y (1).
-
-    Raises
-    ------
-    ValueError
-        A prism is no box, bodies overlap, or none reaches from one plane to the other.
-    """
-    cut = _cell(*_raster(scene), evenly=False)
-    planes, sides = list(cut.planes_mm), [(int(k == axis),) * 2 for k in range(3)]
-    planes[axis] = np.pad(planes[axis], 1, mode="reflect", reflect_type="odd")
-    fill = np.pad(np.where(cut.fill == cut.names.index("air"), -1, cut.fill), sides)
-    np.moveaxis(fill, axis, 0)[-1] = 1
-    inside = _reached(fill, 0) & _reached(fill, 1)
-    if not inside.any():
-        raise ValueError("no body reaches from one end to the other")
-    x, y, z = planes
-    shares = np.pad(cut.shares, sides[:2], mode="edge")
-    return Grid((x, y, z), np.where(inside | (fill < 2), fill, -1), cut.names, shares)
-
-
-def _cell(planes: tuple[NDArray[np.float64], ...], fill: Ints, names: list[str], evenly: bool = True) -> Grid:
-    """The part of a raster between its mirrors."""
-    across, along = (mirrored(_slices(planes[axis], np.moveaxis(fill, axis, 0)), evenly) for axis in (0, 1))
-    middles = [[(s.left_mm + s.right_mm) / 2 for s in cell.slices] for cell in (across, along)]
-    at = [np.searchsorted(planes[axis], middles[axis]) - 1 for axis in (0, 1)]  # layers of the scene in the cell
-    shares = np.outer(across.shares, along.shares)
-    return Grid((_edges(across), _edges(along), planes[2]), fill[np.ix_(at[0], at[1])], names, shares)
-
-
-def _raster(scene: Scene) -> tuple[tuple[NDArray[np.float64], ...], Ints, list[str]]:
-    prisms = [(body, p) for body in scene.bodies for p in body.prisms]
-    if not all(p.is_box() for _, p in prisms):
-        raise ValueError("not all of it is boxes")
-    ends = [
-        {0.0, size} | {x for _, p in prisms for x in p.span(axis)}
-        for axis, size in zip("xyz", scene.size_mm, strict=True)
-    ]
-    planes = tuple(_distinct(np.array(sorted(e))) for e in ends)
-    names = ["@bottom", "@top", *sorted({b.material for b in scene.bodies if not b.terminal} | {"air"})]
-    fill = np.full([len(p) - 1 for p in planes], -1)
-    for body, prism in prisms:
-        here = tuple(
-            slice(*np.searchsorted(p, np.array(prism.span(a)) - _ROUNDING_MM))
-            for a, p in zip("xyz", planes, strict=True)
-        )
-        if (fill[here] >= 0).any():
-            raise ValueError(f"{body.name} overlaps its neighbour")
-        fill[here] = names.index(f"@{body.terminal}" if body.terminal else body.material)
-    fill[fill < 0] = names.index("air")
-    return planes, fill, names
-
-
-def _distinct(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    found: NDArray[np.float64] = values[np.concatenate([[True], np.diff(values) > _ROUNDING_MM])]
-    return found
-
-
-def _slices(planes: NDArray[np.float64], fill: Ints) -> list[Slice]:
-    """What a walk along one axis meets: one level band, named by all that stands on this place."""
-    looks: dict[bytes, str] = {}
-    names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in fill]
-    ends = pairwise(planes.tolist())
-    return [Slice(a, b, (Band(n, "", (0.0, 0.0), (1.0, 1.0)),)) for (a, b), n in zip(ends, names, strict=True)]
-
-
-def _edges(cell: Cell) -> NDArray[np.float64]:
-    return np.array([cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)])
-
-
-def _refuse_contact(fill: Ints) -> None:
-    """Refuse electrodes that share a face, an edge or a corner."""
+    cut = _cell(scene)
+    # Refuse electrodes that share a face, an edge or a corner
     corners = []
     for terminal in (0, 1):
-        full = np.pad(fill == terminal, 1)
+        full = np.pad(cut.fill == terminal, 1)
         for axis in range(3):
             full = full | np.roll(full, 1, axis)
         corners.append(full)
     if (corners[0] & corners[1]).any():
         raise ValueError("the electrodes touch: the capacitance grows without bound")
-
-
-def _between(cut: Grid) -> Grid:
-    """The grid with every dielectric outside the field turned to conductor; refuses an open field."""
-    inside = _reached(cut.fill, 0) & _reached(cut.fill, 1)
+    # The grid with every dielectric outside the field turned to conductor; refuses an open field
+    inside = reached(cut.fill, 0) & reached(cut.fill, 1)
     if not inside.any():
         raise ValueError("no dielectric lies between a top and a bottom electrode")
     if inside[:, :, [0, -1]].any():
@@ -149,8 +68,39 @@ def _between(cut: Grid) -> Grid:
     return Grid(cut.planes_mm, fill, ["@bottom", "@top", *(cut.names[k] for k in used)], cut.shares)
 
 
-def _reached(fill: Ints, terminal: int) -> NDArray[np.bool_]:
-    """Dielectric boxes that a walk through dielectric reaches from one electrode."""
+def insulated(scene: Scene, axis: int) -> Grid:
+    """The repeating cell of boxes in air that insulates, with planes at 0 V and 1 V square to x (0) or y (1).
+
+    Raises
+    ------
+    ValueError
+        A prism is no box, bodies overlap, or none reaches from one plane to the other.
+    """
+    cut = _cell(scene, evenly=False)
+    planes, sides = list(cut.planes_mm), [(int(k == axis),) * 2 for k in range(3)]
+    planes[axis] = np.pad(planes[axis], 1, mode="reflect", reflect_type="odd")
+    fill = np.pad(np.where(cut.fill == cut.names.index("air"), -1, cut.fill), sides)
+    np.moveaxis(fill, axis, 0)[-1] = 1
+    inside = reached(fill, 0) & reached(fill, 1)
+    if not inside.any():
+        raise ValueError("no body reaches from one end to the other")
+    x, y, z = planes
+    shares = np.pad(cut.shares, sides[:2], mode="edge")
+    return Grid((x, y, z), np.where(inside | (fill < 2), fill, -1), cut.names, shares)
+
+
+def _cell(scene: Scene, evenly: bool = True) -> Grid:
+    names = ["@bottom", "@top", *sorted({b.material for b in scene.bodies if not b.terminal} | {"air"})]
+
+    def number(body: Body) -> int:
+        return names.index(f"@{body.terminal}" if body.terminal else body.material)
+
+    found = raster(scene, number, names.index("air"), [(0.0, size) for size in scene.size_mm], evenly)
+    return Grid(found.planes_mm, found.fill, names, found.shares)
+
+
+def reached(fill: Whole, terminal: int) -> Mask:
+    """Dielectric boxes, 2 or more, that a walk through dielectric reaches from one electrode, 0 or 1."""
     found = fill == terminal
     allowed = found | (fill > 1)
     while True:
@@ -161,8 +111,7 @@ def _reached(fill: Ints, terminal: int) -> NDArray[np.bool_]:
             ahead[:-1] |= back[1:]
         grown &= allowed
         if (grown == found).all():
-            reached: NDArray[np.bool_] = found & (fill > 1)
-            return reached
+            return np.asarray(found & (fill > 1))
         found = grown
 
 
@@ -210,7 +159,7 @@ def _wanted(around: list[int], values: Sequence[float], layers: int) -> int:
     return 0
 
 
-def _graded(planes: NDArray[np.float64], layers: list[int]) -> tuple[NDArray[np.float64], Ints]:
+def _graded(planes: Real, layers: list[int]) -> tuple[Real, Whole]:
     """Planes with layers between them, and from which interval each layer comes."""
     found, owners = [planes[0]], []
     for k, (a, b) in enumerate(pairwise(planes.tolist())):

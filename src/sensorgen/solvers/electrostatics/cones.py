@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sensorgen.solvers.electrostatics.elimination import Numbers, Whole, added, eliminated
-from sensorgen.solvers.electrostatics.polynomials import Real, numbered
+from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.solvers.electrostatics.elimination import Numbers, added, eliminated
+from sensorgen.solvers.electrostatics.polynomials import numbered
 
 RATIO = 0.25  # of one ring's radius to the last; more lowers the error no further
 
@@ -72,7 +72,7 @@ class Layout:
         return cls(free, rim, outer, held, ring.reshape(shape), ring_signs.reshape(shape), tip, tip_signs)
 
 
-def _arranged(corners: Whole, spokes: int, levels: int, fixed: NDArray[np.bool_], order: int) -> tuple[Whole, Real]:
+def _arranged(corners: Whole, spokes: int, levels: int, fixed: Mask, order: int) -> tuple[Whole, Real]:
     """Unknowns of triangles, numbered from 1: by levels of so many points, then the held value, then all others."""
     points, after = np.arange(len(fixed)), np.roll(corners, -1, axis=1)
     ends = np.sort(np.stack([corners, after], axis=-1), axis=-1).reshape(-1, 2)
@@ -128,8 +128,14 @@ class Cone:
         for _ in range(doublings):
             ring, amid = _doubled(ring, m)
             between.append(amid)
-        matrix, innermost = _closed(ring, tip, m)
-        return cls(layout, matrix, in_ring, between, innermost, at_tip)
+        # A ring around the innermost triangles, without the unknowns amid them, and the matrix that gives those
+        inner, kept = slice(m, 2 * m), np.r_[:m, 2 * m : len(ring)]
+        mixed = ring[inner][:, kept]
+        mixed[:, m:] += tip[:m, m:]
+        innermost = -np.linalg.solve(ring[inner, inner] + tip[:m, :m], mixed)
+        both = ring[kept[:, None], kept]
+        both[m:, m:] += tip[m:, m:]
+        return cls(layout, both + mixed.T @ innermost, in_ring, between, innermost, at_tip)
 
     def inside(self, values: Numbers) -> tuple[Numbers, Numbers]:
         """Values in all rings' triangles (rings, s, 2, k) and in the innermost (s, k), from those ``matrix`` takes."""
@@ -167,14 +173,3 @@ def _doubled(ring: Numbers, m: int) -> tuple[Numbers, Numbers]:
     apart[outer, inner] = apart[inner, outer] = 0.0
     apart[held, held] *= 2
     return apart + mixed.T @ amid, amid
-
-
-def _closed(ring: Numbers, tip: Numbers, m: int) -> tuple[Numbers, Numbers]:
-    """A ring around the innermost triangles, without the unknowns amid them, and the matrix that gives those."""
-    inner, kept = slice(m, 2 * m), np.r_[:m, 2 * m : len(ring)]
-    mixed = ring[inner][:, kept]
-    mixed[:, m:] += tip[:m, m:]
-    amid = -np.linalg.solve(ring[inner, inner] + tip[:m, :m], mixed)
-    both = ring[kept[:, None], kept]
-    both[m:, m:] += tip[m:, m:]
-    return both + mixed.T @ amid, amid

@@ -1,7 +1,7 @@
 """How singular the field is at each corner: u grows as r^lambda, and lambda below 1 means an infinite field."""
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from functools import cache, lru_cache
 from itertools import pairwise
 from math import ceil, log
@@ -9,7 +9,7 @@ from math import ceil, log
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.solvers.electrostatics.triangles import Edge, Fan, Triangle, Triangles, edges_of, fan, fans
+from sensorgen.solvers.electrostatics.triangles import Edge, Triangle, Triangles, edges_of, fan, fans
 
 _DEGREE = 8  # of the polynomials in a sector
 _WIDEST = np.pi / 3  # of a sector
@@ -40,31 +40,21 @@ def exponents(mesh: Triangles, permittivity: Mapping[str, float]) -> dict[int, f
     for corner, (around,) in fans(mesh.triangles).items():
         edges = [tuple(sorted((corner, around.spokes[k]))) for k in (0, -1)]
         ends = None if around.closed else tuple(edge in mesh.terminals for edge in edges)
-        value = exponent(_sectors(mesh, corner, around, permittivity), ends)
+        away = mesh.points[[*around.spokes, *around.spokes[:1]]] - mesh.points[corner]
+        sines = away[:-1, 0] * away[1:, 1] - away[:-1, 1] * away[1:, 0]
+        angles = np.arctan2(sines, (away[:-1] * away[1:]).sum(axis=1)).tolist()
+        sectors: list[tuple[float, float]] = []  # angle and permittivity in turn, neighbours of one material as one
+        for angle, n in zip(angles, around.members, strict=False):
+            eps = permittivity[mesh.regions[n][0]]
+            before = sectors.pop()[0] if sectors and sectors[-1][1] == eps else 0.0
+            sectors.append((round(angle + before, 12), eps))
+        value = exponent(tuple(sectors), ends)
         if value < _HIGHEST:
             found[corner] = value
     return found
 
 
 _Sectors = tuple[tuple[float, float], ...]
-
-
-def _sectors(mesh: Triangles, corner: int, fan: Fan, permittivity: Mapping[str, float]) -> _Sectors:
-    """Angle and permittivity of the triangles around a corner, in turn."""
-    away = mesh.points[[*fan.spokes, *fan.spokes[:1]]] - mesh.points[corner]
-    angles = np.arctan2(
-        away[:-1, 0] * away[1:, 1] - away[:-1, 1] * away[1:, 0], (away[:-1] * away[1:]).sum(axis=1)
-    ).tolist()
-    return _merged((angle, permittivity[mesh.regions[n][0]]) for angle, n in zip(angles, fan.members, strict=False))
-
-
-def _merged(sectors: Iterable[tuple[float, float]]) -> _Sectors:
-    found: list[tuple[float, float]] = []
-    for angle, eps in sectors:
-        if found and found[-1][1] == eps:
-            angle += found.pop()[0]
-        found.append((round(angle, 12), eps))
-    return tuple(found)
 
 
 @cache
@@ -139,12 +129,21 @@ class _Splitter:
         self.mesh = mesh
         self.tipped = corners
         self.points: list[NDArray[np.float64]] = list(mesh.points)
-        lengths = {e: self._length(e) for corners in mesh.triangles for e in edges_of(corners)}
+        edges = dict.fromkeys(edge for corners in mesh.triangles for edge in edges_of(corners))
+        lengths = {(a, b): float(np.hypot(*(mesh.points[b] - mesh.points[a]))) for a, b in edges}
         self.radius: dict[int, float] = defaultdict(lambda: np.inf)
         for edge, length in lengths.items():
             for corner in edge:
                 self.radius[corner] = min(self.radius[corner], _REACH * length)
-        self.on_edge = {edge: self._edge_points(edge, length) for edge, length in lengths.items()}
+        # Numbers of the points on each edge around its first corner and around its second, the outermost first.
+        self.on_edge: dict[Edge, tuple[list[int], list[int]]] = {}
+        for edge, length in lengths.items():
+            self.on_edge[edge] = ([], [])
+            for made, corner, other in zip(self.on_edge[edge], edge, edge[::-1], strict=True):
+                here, there = mesh.points[corner], mesh.points[other]
+                for radius in self._radii(corner, length):
+                    made.append(len(self.points))
+                    self.points.append(here + (there - here) * (radius / length))
 
     def split(self) -> Triangles:
         """The finer mesh."""
@@ -156,13 +155,9 @@ class _Splitter:
             regions += [region] * len(new)
         terminals: dict[Edge, str] = {}
         for (a, b), name in self.mesh.terminals.items():
-            chain = [a, *self._chain(a, b), b]
+            chain = [a, *self._around(a, b)[::-1], *self._around(b, a), b]
             terminals |= {(min(e), max(e)): name for e in pairwise(chain)}
         return Triangles(np.array(self.points), triangles, regions, terminals)
-
-    def _length(self, edge: Edge) -> float:
-        a, b = (self.mesh.points[k] for k in edge)
-        return float(np.hypot(*(b - a)))
 
     def _radii(self, corner: int, length: float) -> list[float]:
         """Of the rings that cross an edge of some length at a corner, the largest first [mm]."""
@@ -172,24 +167,10 @@ class _Splitter:
             outer = [start * _RATIO**-k for k in range(ceil(log(_REACH * length / start) / -log(_RATIO)))][::-1]
         return outer or ([start] if corner in self.tipped else [])
 
-    def _edge_points(self, edge: Edge, length: float) -> tuple[list[int], list[int]]:
-        """Numbers of the points on an edge around its first corner and around its second, the outermost first."""
-        made: tuple[list[int], list[int]] = ([], [])
-        for side, corner in enumerate(edge):
-            here, there = self.mesh.points[corner], self.mesh.points[edge[1 - side]]
-            for radius in self._radii(corner, length):
-                made[side].append(len(self.points))
-                self.points.append(here + (there - here) * (radius / length))
-        return made
-
     def _around(self, corner: int, other: int) -> list[int]:
         """Points around a corner on its edge to another one, the outermost first."""
         edge = (min(corner, other), max(corner, other))
         return self.on_edge[edge][edge.index(corner)]
-
-    def _chain(self, a: int, b: int) -> list[int]:
-        """All points on an edge from one corner to the other, ends left out."""
-        return [*self._around(a, b)[::-1], *self._around(b, a)]
 
     def _parts(self, corners: Triangle) -> Iterator[Triangle]:
         hub: list[int] = []

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Whole = NDArray[np.int64]
-Real = NDArray[np.float64]
+from sensorgen.core.arrays import Whole
+
 Numbers = NDArray[Any]  # real or complex
 
 HELD = 2  # unknowns 0 and 1 have the values 0 and 1
@@ -127,7 +127,8 @@ def least(blocks: Sequence[Block], count: int, *, leaf: int = _LEAF, keep: bool 
         if len(which) > leaf:
             both = _sum([joined(half) for half in _halves(which, places[which])])
         else:
-            both = _sum([_leaf(blocks[k]) for k in which.tolist()])
+            leaves = [(b.ids, b.matrix() if callable(b.matrix) else b.matrix) for b in map(blocks.__getitem__, which)]
+            both = _sum([_Joined(ids, matrix, np.ones_like(ids)) for ids, matrix in leaves])
         done = both.seen == total[both.ids]
         if not done.any():
             return both
@@ -147,11 +148,6 @@ def least(blocks: Sequence[Block], count: int, *, leaf: int = _LEAF, keep: bool 
     at = np.flatnonzero(left.ids == 1)
     found.energy = left.matrix[at, at].sum()
     return found
-
-
-def _leaf(block: Block) -> _Joined:
-    matrix = block.matrix() if callable(block.matrix) else block.matrix
-    return _Joined(block.ids, matrix, np.ones_like(block.ids))
 
 
 def _halves(which: Whole, places: NDArray[Any]) -> tuple[Whole, Whole]:

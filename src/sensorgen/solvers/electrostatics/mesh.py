@@ -11,7 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from sensorgen.solvers.electrostatics.elimination import HELD, Numbers, Whole
+from sensorgen.core.arrays import Whole
+from sensorgen.solvers.electrostatics.elimination import HELD, Numbers
 from sensorgen.solvers.electrostatics.triangles import Edge, Fan, Triangles, fans
 
 
@@ -55,7 +56,9 @@ def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
     ends = {a for a, b in rim if a not in cones and _named((a, b)) in mesh.terminals}
     carrying = {loops[a] for a, b in rim if _named((a, b)) in mesh.terminals}  # a hole whose rim is all mirror does not
     count = HELD
-    for piece in _pieces(around):
+    names = _groups((corner, spoke) for corner, fan in around.items() for spoke in fan.spokes)
+    for least in sorted(set(names.values())):  # points of each connected piece of dielectric
+        piece = {k for k, name in names.items() if name == least}
         ground = min((mirrors[k] for k in piece if k in mirrors), default=-1)
         for name in sorted({mirrors[k] for k in piece if k in mirrors} - {ground}):
             held |= dict.fromkeys((k for k in piece if mirrors.get(k) == name), count)
@@ -97,13 +100,6 @@ def _groups(edges: Iterable[Edge]) -> dict[int, int]:
     return found
 
 
-def _pieces(around: dict[int, Fan]) -> Iterator[set[int]]:
-    """Points of each connected piece of dielectric."""
-    name = _groups((corner, spoke) for corner, fan in around.items() for spoke in fan.spokes)
-    for least in sorted(set(name.values())):
-        yield {k for k, n in name.items() if n == least}
-
-
 def _cuts(
     around: dict[int, Fan], loops: dict[int, int], start: int, carrying: set[int], ends: set[int],
     cones: Collection[int],
@@ -121,18 +117,14 @@ def _cuts(
                 before[spoke] = here
                 todo.append(spoke)
             elif loops[spoke] in carrying - reached:
-                yield _path(before | {spoke: here}, spoke)
+                path = [spoke, here]
+                while before[path[-1]] != path[-1]:
+                    path.append(before[path[-1]])
+                yield path
                 reached.add(loops[spoke])
                 new = [k for k in loops if loops[k] == loops[spoke] and k in ends]
                 before |= {k: k for k in new}
                 todo += new
-
-
-def _path(before: dict[int, int], end: int) -> list[int]:
-    found = [end]
-    while before[found[-1]] != found[-1]:
-        found.append(before[found[-1]])
-    return found
 
 
 def _beside(around: dict[int, Fan], path: list[int]) -> Iterator[tuple[int, int]]:

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.solvers.electrostatics.cones import Cone, Layout, ring_corners
-from sensorgen.solvers.electrostatics.elimination import HELD, Block, Numbers, Whole, least
+from sensorgen.solvers.electrostatics.elimination import HELD, Block, Numbers, least
 from sensorgen.solvers.electrostatics.mesh import Cones, Flow
-from sensorgen.solvers.electrostatics.polynomials import Real, condensed, crossed, numbered
+from sensorgen.solvers.electrostatics.polynomials import condensed, crossed, numbered
 from sensorgen.solvers.electrostatics.triangles import Edge
 
 
@@ -241,7 +242,9 @@ class Plane:
 
         A constant has no energy, but rounding times 1e10 is some; both ends have about the same value.
         """
-        plain, *others = (_at_shortest(shapes) for shapes in self._shapes)
+        # The corner at which each triangle's shortest side starts.
+        starts = [((np.roll(s, -1, axis=1) - s) ** 2).sum(axis=-1).argmin(axis=-1) for s in self._shapes]
+        plain, *others = starts
         cones = [
             (_less(rings, ring.reshape(-1, 2)), _less(tips, tip))
             for (rings, tips), ring, tip in zip(f.cones, others[::2], others[1::2], strict=True)
@@ -282,13 +285,6 @@ class Plane:
             tips = np.stack([0 * away[:-1], away[:-1], away[1:]], axis=1)[: len(fan.members)]
             shapes += [ring_corners(tips), tips]
         return shapes
-
-
-def _at_shortest(corners: Real) -> Whole:
-    """Number of the corner at which each triangle's shortest side starts."""
-    sides = np.roll(corners, -1, axis=1) - corners
-    found: Whole = (sides**2).sum(axis=-1).argmin(axis=-1)
-    return found
 
 
 def _less(values: Numbers, corner: Whole) -> Numbers:

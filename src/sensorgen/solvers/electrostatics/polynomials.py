@@ -3,10 +3,8 @@
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
+from sensorgen.core.arrays import Real, Whole
 
 SIDES = ((0, 1), (1, 2), (2, 0))  # of a triangle, as pairs of its corners
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.scene.sections import ROUNDING_MM
-from sensorgen.scene.unit_cell import Cell, Slice
+from sensorgen.scene.unit_cell import Cell
 
 Edge = tuple[int, int]
 Triangle = tuple[int, int, int]
@@ -49,7 +49,15 @@ def triangles(cell: Cell) -> Triangles:
         The electrodes touch, none lies opposite the other, or the field between them would leave the sensor.
     """
     points, found = _all(cell)
-    _refuse_contact(points, found)
+    top, bottom = (
+        {p for corners, (what, _) in found if what == f"@{end}" for p in corners} for end in ("top", "bottom")
+    )
+    places = sorted((*points[p], p in top) for p in top | bottom)
+    for (x, z, end), (at, above, other) in pairwise(places):
+        if x == at and above - z < _CONTACT_MM and end != other:
+            raise ValueError("the electrodes touch: the capacitance grows without bound")
+    if top & bottom:
+        raise ValueError("the electrodes touch: the capacitance grows without bound")
     mesh, owners, inside = _triangulated(points, found)
     _refuse_open(points, owners, inside, cell)
     return mesh
@@ -72,7 +80,19 @@ def _triangulated(points: NDArray[np.float64], found: "_Found") -> tuple[Triangl
     for number, (corners, _) in enumerate(found):
         for edge in edges_of(corners):
             owners[edge].append(number)
-    inside = _between(found, owners)
+    # The dielectric triangles whose field runs from one electrode to the other
+    beside: dict[int, list[int]] = defaultdict(list)
+    for pair in (sides for sides in owners.values() if len(sides) == 2):
+        beside[pair[0]].append(pair[1])
+        beside[pair[1]].append(pair[0])
+    left = {n for n, (_, (what, _)) in enumerate(found) if what and not what.startswith("@")}
+    inside: set[int] = set()
+    while left:
+        piece, ends = _piece(found, beside, left)
+        left -= piece
+        inside |= piece if len(ends) == 2 else set()
+    if not inside:
+        raise ValueError("no dielectric lies between a top and a bottom electrode")
     terminals = {}
     for edge, sides in owners.items():
         names = {found[n][1][0] for n in sides}
@@ -88,21 +108,17 @@ def apart(mesh: Triangles) -> Triangles:
     """The same, with a point for each of the pieces that only touch there: no field runs through a point."""
     for corner, found in fans(mesh.triangles).items():
         if len(found) > 1:
-            return apart(_parted(mesh, corner, found[1]))
+            # One of a corner's fans with a new point at the same place
+            new = len(mesh.points)
+            corners, terminals = list(mesh.triangles), dict(mesh.terminals)
+            for n in found[1].members:
+                a, b, c = (new if k == corner else k for k in corners[n])
+                corners[n] = (a, b, c)
+            for spoke in found[1].spokes:
+                if name := terminals.pop((min(corner, spoke), max(corner, spoke)), ""):
+                    terminals[spoke, new] = name
+            return apart(Triangles(np.vstack([mesh.points, mesh.points[corner]]), corners, mesh.regions, terminals))
     return mesh
-
-
-def _parted(mesh: Triangles, corner: int, fan: "Fan") -> Triangles:
-    """One of a corner's fans with a new point at the same place."""
-    new = len(mesh.points)
-    corners, terminals = list(mesh.triangles), dict(mesh.terminals)
-    for n in fan.members:
-        a, b, c = (new if k == corner else k for k in corners[n])
-        corners[n] = (a, b, c)
-    for spoke in fan.spokes:
-        if name := terminals.pop((min(corner, spoke), max(corner, spoke)), ""):
-            terminals[spoke, new] = name
-    return Triangles(np.vstack([mesh.points, mesh.points[corner]]), corners, mesh.regions, terminals)
 
 
 def edges_of(corners: Triangle) -> list[Edge]:
@@ -117,32 +133,26 @@ _Found = list[tuple[Triangle, tuple[str, float]]]
 def _all(cell: Cell) -> tuple[NDArray[np.float64], _Found]:
     """All triangles of a cell, those of electrodes with "@top" or "@bottom" for a material."""
     ends = [cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)]
-    levels = [_levels(cell.slices, k) for k in range(len(ends))]
+    levels = []  # heights at which anything meets the line between slice k - 1 and slice k
+    for k in range(len(ends)):
+        sides = zip(cell.slices[max(k - 1, 0) : k + 1], (1, 0) if k else (0,), strict=False)
+        heights = sorted(z for s, side in sides for b in s.bands for z in (b.bottom_mm[side], b.top_mm[side]))
+        levels.append([z for n, z in enumerate(heights) if n == 0 or z - heights[n - 1] > ROUNDING_MM])
     first = np.concatenate([[0], np.cumsum([len(z) for z in levels])])
     points = np.array([(x, z) for x, heights in zip(ends, levels, strict=True) for z in heights])
     found: _Found = []
     for k, (here, share) in enumerate(zip(cell.slices, cell.shares, strict=True)):
         for band in here.bands:
-            left, right = (
-                [int(first[k + side]) + n for n in _between_levels(levels[k + side], *ends)]
-                for side, ends in enumerate(zip(band.bottom_mm, band.top_mm, strict=True))
-            )
+            taken = []  # levels from the band's lower to its upper line, at its left and right side
+            for side, lines in enumerate(zip(band.bottom_mm, band.top_mm, strict=True)):
+                low, high = lines[0] - 2 * ROUNDING_MM, lines[1] + 2 * ROUNDING_MM
+                within = range(bisect_left(levels[k + side], low), bisect_left(levels[k + side], high))
+                taken.append([int(first[k + side]) + n for n in within])
+            left, right = taken
             region = (f"@{band.terminal}" if band.terminal else band.material, share)
             polygon = [*left[::-1], *right]
             found += [(corners, region) for corners in fan(points[polygon], polygon)]
     return points, found
-
-
-def _levels(slices: tuple[Slice, ...], k: int) -> list[float]:
-    """Heights at which anything meets the line between slice k - 1 and slice k [mm]."""
-    sides = [(s, side) for s, side in zip(slices[max(k - 1, 0) : k + 1], (1, 0) if k else (0,), strict=False)]
-    heights = sorted(z for s, side in sides for b in s.bands for z in (b.bottom_mm[side], b.top_mm[side]))
-    return [z for n, z in enumerate(heights) if n == 0 or z - heights[n - 1] > ROUNDING_MM]
-
-
-def _between_levels(levels: list[float], low: float, high: float) -> range:
-    """Which of the levels a band takes in, from its lower to its upper line."""
-    return range(bisect_left(levels, low - 2 * ROUNDING_MM), bisect_left(levels, high + 2 * ROUNDING_MM))
 
 
 def fan(places: NDArray[np.float64], polygon: list[int]) -> Iterable[Triangle]:
@@ -156,55 +166,23 @@ def fan(places: NDArray[np.float64], polygon: list[int]) -> Iterable[Triangle]:
         ring = todo.pop()
         if len(ring) < 3:
             continue
-        k = _apex(places[ring])
+        # The corner from which the edge from the last to the first looks widest, flat triangles apart
+        corners = places[ring]
+        to_first, to_last = corners[0] - corners[1:-1], corners[-1] - corners[1:-1]
+        cross = to_last[:, 0] * to_first[:, 1] - to_last[:, 1] * to_first[:, 0]
+        dot = (to_first * to_last).sum(1)
+        angle = np.arctan2(cross, dot)
+        size = np.hypot(*to_first.T) * np.hypot(*to_last.T)
+        angle[np.abs(cross) < _FLAT * size] = -1.0
+        k = int(angle.argmax()) + 1
         yield polygon[ring[0]], polygon[ring[k]], polygon[ring[-1]]
         todo += [ring[: k + 1], ring[k:]]
-
-
-def _apex(corners: NDArray[np.float64]) -> int:
-    """The corner from which the edge from the last to the first looks widest, flat triangles apart."""
-    to_first, to_last = corners[0] - corners[1:-1], corners[-1] - corners[1:-1]
-    cross = to_last[:, 0] * to_first[:, 1] - to_last[:, 1] * to_first[:, 0]
-    dot = (to_first * to_last).sum(1)
-    angle = np.arctan2(cross, dot)
-    size = np.hypot(*to_first.T) * np.hypot(*to_last.T)
-    angle[np.abs(cross) < _FLAT * size] = -1.0
-    return int(angle.argmax()) + 1
 
 
 _FLAT = 1e-12  # sine of the angle of three corners on a line
 
 
-def _refuse_contact(points: NDArray[np.float64], found: _Found) -> None:
-    top, bottom = (
-        {p for corners, (what, _) in found if what == f"@{end}" for p in corners} for end in ("top", "bottom")
-    )
-    places = sorted((*points[p], p in top) for p in top | bottom)
-    for (x, z, end), (at, above, other) in pairwise(places):
-        if x == at and above - z < _CONTACT_MM and end != other:
-            raise ValueError("the electrodes touch: the capacitance grows without bound")
-    if top & bottom:
-        raise ValueError("the electrodes touch: the capacitance grows without bound")
-
-
 _CONTACT_MM = 1e-7  # a gap below a tenth of a nanometre is contact
-
-
-def _between(found: _Found, owners: dict[Edge, list[int]]) -> set[int]:
-    """The dielectric triangles whose field runs from one electrode to the other."""
-    beside: dict[int, list[int]] = defaultdict(list)
-    for pair in (sides for sides in owners.values() if len(sides) == 2):
-        beside[pair[0]].append(pair[1])
-        beside[pair[1]].append(pair[0])
-    left = {n for n, (_, (what, _)) in enumerate(found) if what and not what.startswith("@")}
-    inside: set[int] = set()
-    while left:
-        piece, ends = _piece(found, beside, left)
-        left -= piece
-        inside |= piece if len(ends) == 2 else set()
-    if not inside:
-        raise ValueError("no dielectric lies between a top and a bottom electrode")
-    return inside
 
 
 def _piece(found: _Found, beside: dict[int, list[int]], left: set[int]) -> tuple[set[int], set[str]]:
@@ -325,20 +303,16 @@ def fans(triangles: Sequence[Triangle]) -> dict[int, list[Fan]]:
     around: dict[int, dict[int, tuple[int, int]]] = defaultdict(dict)
     for number, (a, b, c) in enumerate(triangles):
         around[a][b], around[b][c], around[c][a] = (number, c), (number, a), (number, b)
-    return {corner: _fans(by_first) for corner, by_first in around.items()}
-
-
-def _fans(by_first: dict[int, tuple[int, int]]) -> list[Fan]:
-    """From each triangle's first spoke, with its number and last spoke."""
-    lasts = {last for _, last in by_first.values()}
-    found = []
-    for start in [first for first in by_first if first not in lasts] or [next(iter(by_first))]:
-        fan, spoke = Fan([], []), start
-        while spoke in by_first and not (fan.spokes and spoke == start):
-            fan.spokes.append(spoke)
-            number, spoke = by_first[spoke]
-            fan.members.append(number)
-        if spoke != start:
-            fan.spokes.append(spoke)
-        found.append(fan)
+    found: dict[int, list[Fan]] = defaultdict(list)
+    for corner, by_first in around.items():  # from each triangle's first spoke to its number and last spoke
+        lasts = {last for _, last in by_first.values()}
+        for start in [first for first in by_first if first not in lasts] or [next(iter(by_first))]:
+            fan, spoke = Fan([], []), start
+            while spoke in by_first and not (fan.spokes and spoke == start):
+                fan.spokes.append(spoke)
+                number, spoke = by_first[spoke]
+                fan.members.append(number)
+            if spoke != start:
+                fan.spokes.append(spoke)
+            found[corner].append(fan)
     return found

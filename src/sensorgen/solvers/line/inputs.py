@@ -8,11 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.core.units import EPS0_F_PER_M
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Slices = tuple[slice, ...]
 
 
@@ -206,9 +205,7 @@ def read(line: PressedLine) -> Inputs:
         shapes = ", ".join(f"{k} {v.shape}" for k, v in values.items() if v.ndim)
         raise BadInput(f"the line's inputs do not broadcast together: {shapes}") from None
     with np.errstate(all="ignore"):
-        _check_patch(found)
-        _check_strain(found)
-        _check_tracks(found)
+        _check(found)
     return found
 
 
@@ -277,31 +274,27 @@ def far_load(far_end: ArrayLike) -> Real | None:
     return None if load.size and np.isposinf(load).all() else in_range("far_end", load)
 
 
-def _check_patch(found: Inputs) -> None:
-    left, patch, length = found["left_m"], found["tip_m"], found["length_m"]
-    if _highest(left) + _highest(patch) <= _lowest(length):
-        return  # three numbers decide for a million samples
-    end = left + patch
-    bad = np.asarray(end > length * (1 + ROUNDING))
-    if bad.any():
-        far, size = (float(np.broadcast_to(v, bad.shape)[bad].flat[0]) for v in (end, length))
-        raise OutOfRange(f"the pressed patch ends at {far:g} m, beyond the sensor's {size:g} m")
+def _check(found: Inputs) -> None:
+    """Refuse a patch beyond the sensor, electrodes that touch, and a negative resistivity.
 
-
-def _check_strain(found: Inputs) -> None:
-    touches_at = _lowest(found["width_m"]) * _lowest(found["tip_m"]) * _lowest(found["modulus_pa"])
-    if touches_at > 0 and _highest(found["force_n"]) < touches_at * (1 - ROUNDING):
-        return
-    strain = found.strain()
-    if np.isinf(strain).any():
-        raise OutOfRange("a force presses on a patch without area: tip_m has to be above 0 where force_n is not 0")
-    if (strain >= 1).any():
-        raise OutOfRange(f"the force strains the film by {strain.max():.3g}: at 1 its electrodes touch (Eq. B.49)")
-
-
-def _check_tracks(found: Inputs) -> None:
+    Extremes of each quantity decide for a million samples, where they can.
+    """
+    left, patch, length, force = (found[name] for name in ("left_m", "tip_m", "length_m", "force_n"))
+    if _highest(left) + _highest(patch) > _lowest(length):
+        end = left + patch
+        bad = np.asarray(end > length * (1 + ROUNDING))
+        if bad.any():
+            far, size = (float(np.broadcast_to(v, bad.shape)[bad].flat[0]) for v in (end, length))
+            raise OutOfRange(f"the pressed patch ends at {far:g} m, beyond the sensor's {size:g} m")
+    touches_at = _lowest(found["width_m"]) * _lowest(patch) * _lowest(found["modulus_pa"])
+    if not (touches_at > 0 and _highest(force) < touches_at * (1 - ROUNDING)):
+        strain = found.strain()
+        if np.isinf(strain).any():
+            raise OutOfRange("a force presses on a patch without area: tip_m has to be above 0 where force_n is not 0")
+        if (strain >= 1).any():
+            raise OutOfRange(f"the force strains the film by {strain.max():.3g}: at 1 its electrodes touch (Eq. B.49)")
     for name in ("top_piezoresistance_per_n", "bottom_piezoresistance_per_n"):
-        if found[name].any() and (rise := found[name] * found["force_n"]).min(initial=0.0) < -1:
+        if found[name].any() and (rise := found[name] * force).min(initial=0.0) < -1:
             raise OutOfRange(f"{name} times force_n is {rise.min():.3g}: below -1 resistivity is negative")
 
 

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import MissingValue, OutOfRange, UnknownName
-from sensorgen.solvers.line.inputs import HIGHEST_OHM, NAMES, Complex, Inputs, PressedLine, read
+from sensorgen.solvers.line.inputs import HIGHEST_OHM, NAMES, Inputs, PressedLine, read
 from sensorgen.solvers.line.tanhc import sech_squared, tanhc, tanhc_slope
 
 Array = Any  # of numpy, or one of its scalars

@@ -7,15 +7,13 @@ a current is wanted, no potential: forward elimination of two right-hand sides t
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 _WIDEST = 1500  # beyond, a sparse factor is quicker
 _STRETCH = 4096  # unknowns that are eliminated at once, or four times the band
 
@@ -23,11 +21,11 @@ _STRETCH = 4096  # unknowns that are eliminated at once, or four times the band
 class _Rest(NamedTuple):
     """What elimination leaves to the unknowns after a stretch: of their matrix, as a band, and of both right sides."""
 
-    band: Floats
-    sides: Floats
+    band: Real
+    sides: Real
 
 
-def product(matrix: "csr_array[np.float64]", one: Floats, other: Floats) -> float:
+def product(matrix: "csr_array[np.float64]", one: Real, other: Real) -> float:
     """``one . matrix^-1 . other``.
 
     Parameters
@@ -52,10 +50,26 @@ def product(matrix: "csr_array[np.float64]", one: Floats, other: Floats) -> floa
 
     order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
     sides = np.stack([one, other], axis=1)[order]
-    column, below, value = _banded(matrix, order)
+    # Lower half of a symmetric matrix in another order: column, how far below the diagonal, and value
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    row, column = np.repeat(rank, np.diff(matrix.indptr)), rank[matrix.indices]
+    half = column <= row
+    column = column[half]
+    column, below, value = column, row[half] - column, matrix.data[half]
     wide = max(int(below.max()), 1)
     if wide > _WIDEST:
-        return _by_factor(matrix, one, other)
+        # The product by a sparse factor of the whole matrix
+        from scipy.sparse.linalg import splu
+
+        solver = splu(  # columns one by one: so sparse a factor has no panels worth their room
+            matrix.tocsc(),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            panel_size=1,
+            options={"SymmetricMode": True},
+        )
+        return float(one @ solver.solve(other))
     step = max(4 * wide, _STRETCH)
     stretch = np.append(0, np.cumsum(np.bincount(column // step)))
     by_stretch = np.argsort((column // step).astype(np.int32), kind="stable")
@@ -69,27 +83,7 @@ def product(matrix: "csr_array[np.float64]", one: Floats, other: Floats) -> floa
     return total
 
 
-def _by_factor(matrix: "csr_array[np.float64]", one: Floats, other: Floats) -> float:
-    """The product by a sparse factor of the whole matrix."""
-    from scipy.sparse.linalg import splu
-
-    solver = splu(  # columns one by one: so sparse a factor has no panels worth their room
-        matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, options={"SymmetricMode": True}
-    )
-    return float(one @ solver.solve(other))
-
-
-def _banded(matrix: "csr_array[np.float64]", order: NDArray[np.int32]) -> tuple[Ints, Ints, Floats]:
-    """Lower half of a symmetric matrix in another order: column, how far below the diagonal, and value."""
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    row, column = np.repeat(rank, np.diff(matrix.indptr)), rank[matrix.indices]
-    half = column <= row
-    column = column[half]
-    return column, row[half] - column, matrix.data[half]
-
-
-def _eliminated(band: Floats, sides: Floats, rest: _Rest) -> tuple[float, _Rest]:
+def _eliminated(band: Real, sides: Real, rest: _Rest) -> tuple[float, _Rest]:
     """One stretch: its part of the product, and what it leaves."""
     from scipy.linalg import solve_triangular
     from scipy.linalg.lapack import dpbtrf, dtbtrs

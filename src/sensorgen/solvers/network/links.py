@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sensorgen.solvers.network.nodes import Floats, Ints, Lines, Nodes, interleaved
+from sensorgen.core.arrays import Real, Whole
+from sensorgen.solvers.network.nodes import Lines, Nodes, interleaved
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -34,18 +34,18 @@ class Links:
         Contacts on the way: 0 along a line, else 1 [-].
     """
 
-    node: Ints
-    weight: Floats
-    area_m2: Floats
-    path_m: Floats
-    contacts: Floats
+    node: Whole
+    weight: Real
+    area_m2: Real
+    path_m: Real
+    contacts: Real
 
-    def conductance_s(self, resistivity_ohm_m: float, contact_ohm_m2: float) -> Floats:
+    def conductance_s(self, resistivity_ohm_m: float, contact_ohm_m2: float) -> Real:
         """Conductance of each resistor [S]."""
         contact = np.where(self.contacts > 0, contact_ohm_m2, 0.0)
         return np.asarray(self.area_m2 / (resistivity_ohm_m * self.path_m + contact))
 
-    def matrix(self, conductance_s: Floats, nodes: int) -> "csr_array[np.float64]":
+    def matrix(self, conductance_s: Real, nodes: int) -> "csr_array[np.float64]":
         """Currents that flow from all nodes at their potentials, (nodes, nodes) [S].
 
         Parameters
@@ -68,7 +68,7 @@ class Links:
 
     @classmethod
     def between(
-        cls, nodes: Nodes, one: tuple[Ints, Floats], other: tuple[Ints, Floats], area_m2: Floats, path_m: Floats
+        cls, nodes: Nodes, one: tuple[Whole, Real], other: tuple[Whole, Real], area_m2: Real, path_m: Real
     ) -> "Links":
         """Contacts between places of two pieces each (piece, share of its length)."""
         (a, wa), (b, wb) = nodes.weights(*one), nodes.weights(*other)
@@ -79,18 +79,18 @@ class Links:
 class Crossings:
     """Where lines of neighbouring layers cross: both pieces, the shares of their lengths, and the sine between them."""
 
-    one: Ints
-    other: Ints
-    share_one: Floats
-    share_other: Floats
-    sine: Floats
+    one: Whole
+    other: Whole
+    share_one: Real
+    share_other: Real
+    sine: Real
 
-    def places(self) -> tuple[Ints, Floats]:
+    def places(self) -> tuple[Whole, Real]:
         """All of them as (piece, share of its length)."""
         return np.concatenate([self.one, self.other]), np.concatenate([self.share_one, self.share_other])
 
 
-def near(lines: Lines) -> tuple[Ints, Ints]:
+def near(lines: Lines) -> tuple[Whole, Whole]:
     """Pairs of pieces, of one layer or of neighbouring ones, that may touch; the lower number first.
 
     By squares of a few widths that both pass through.
@@ -121,13 +121,13 @@ def near(lines: Lines) -> tuple[Ints, Ints]:
     return pairs // len(lines), pairs % len(lines)
 
 
-def _distinct(numbers: Ints) -> Ints:
+def _distinct(numbers: Whole) -> Whole:
     """Each number once, rising; ``np.unique`` sorts by hash tables, which takes ten times as long."""
     rising = np.sort(numbers)
     return np.asarray(rising[np.append(True, rising[1:] != rising[:-1])[: len(rising)]])
 
 
-def crossings(lines: Lines, pairs: tuple[Ints, Ints]) -> Crossings:
+def crossings(lines: Lines, pairs: tuple[Whole, Whole]) -> Crossings:
     """Pairs in neighbouring layers that cross at an angle."""
     i, j = pairs
     apart = lines.layer[i] != lines.layer[j]
@@ -142,7 +142,7 @@ def crossings(lines: Lines, pairs: tuple[Ints, Ints]) -> Crossings:
     return Crossings(i[hit], j[hit], s[hit], t[hit], np.abs(sine[hit]))
 
 
-def gathered(lines: Lines, nodes: Nodes, pairs: tuple[Ints, Ints], crossed: Crossings) -> Links:
+def gathered(lines: Lines, nodes: Nodes, pairs: tuple[Whole, Whole], crossed: Crossings) -> Links:
     """All resistors."""
     ends = _Ends(lines, pairs)
     neighbours = _alongside(lines, pairs, same_layer=True)
@@ -156,11 +156,11 @@ def gathered(lines: Lines, nodes: Nodes, pairs: tuple[Ints, Ints], crossed: Cros
 class _Alongside(NamedTuple):
     """Parallel pairs with a common stretch: both pieces, their distance, and the stretch along the first [m]."""
 
-    one: Ints
-    other: Ints
-    away_m: Floats
-    low_m: Floats
-    high_m: Floats
+    one: Whole
+    other: Whole
+    away_m: Real
+    low_m: Real
+    high_m: Real
 
 
 def _along(lines: Lines, nodes: Nodes, neighbours: _Alongside) -> Links:
@@ -172,7 +172,7 @@ def _along(lines: Lines, nodes: Nodes, neighbours: _Alongside) -> Links:
     return Links(node, weight, area, length, np.zeros(len(piece)))
 
 
-def _own_width_m(lines: Lines, neighbours: _Alongside) -> Floats:
+def _own_width_m(lines: Lines, neighbours: _Alongside) -> Real:
     """Width of each piece without half of what long neighbours overlap: one place conducts once [m]."""
     i, j, away, low, high = neighbours
     mean, stretch = (lines.width_m[i] + lines.width_m[j]) / 2, high - low
@@ -211,7 +211,7 @@ def _stacked(lines: Lines, nodes: Nodes, above: _Alongside) -> Links:
     return _distributed(lines, nodes, (i, j), (low, high), wide, (lines.height_m[i] + lines.height_m[j]) / 2)
 
 
-def _alongside(lines: Lines, pairs: tuple[Ints, Ints], *, same_layer: bool) -> _Alongside:
+def _alongside(lines: Lines, pairs: tuple[Whole, Whole], *, same_layer: bool) -> _Alongside:
     """Parallel pairs with a common stretch."""
     i, j = pairs
     way = lines.direction()
@@ -227,7 +227,7 @@ def _alongside(lines: Lines, pairs: tuple[Ints, Ints], *, same_layer: bool) -> _
 
 
 def _distributed(
-    lines: Lines, nodes: Nodes, pair: tuple[Ints, Ints], stretch: tuple[Floats, Floats], breadth: Floats, path: Floats
+    lines: Lines, nodes: Nodes, pair: tuple[Whole, Whole], stretch: tuple[Real, Real], breadth: Real, path: Real
 ) -> Links:
     """A contact along a stretch, as resistors at every node that either line has there, and at its ends."""
     i, j = pair
@@ -252,9 +252,30 @@ def _distributed(
 class _Ends:
     """Where pieces end on the side of another line of their layer, as infill does on a wall."""
 
-    def __init__(self, lines: Lines, pairs: tuple[Ints, Ints]) -> None:
+    def __init__(self, lines: Lines, pairs: tuple[Whole, Whole]) -> None:
         self.lines = lines
-        self.piece, self.side, self.wall, self.share, self.away, self.sine = _walls(lines, pairs)
+        # For each end of a piece the nearest line across it: piece, end (0 or 1), wall, share, distance [m] and sine
+        a, b = pairs
+        way, length = lines.direction(), lines.length_m()
+        jointed = (np.abs(a - b) == 1) & lines.joined[np.maximum(a, b)]
+        fits = (lines.layer[a] == lines.layer[b]) & ~jointed
+        a, b = a[fits], b[fits]
+        steep = np.abs(_dot(way[a], way[b])) < _PARALLEL
+        a, b = a[steep], b[steep]
+        mean, sine = (lines.width_m[a] + lines.width_m[b]) / 2, np.abs(_cross(way[a], way[b]))
+        found = []
+        for i, j in ((a, b), (b, a)):
+            for side, at in ((0, lines.start_m), (1, lines.end_m)):
+                gap = at[i] - lines.start_m[j]
+                foot, away = _dot(gap, way[j]), np.abs(_cross(way[j], gap))
+                touch = (foot >= 0) & (foot <= length[j]) & (away < 1.1 * mean) & (away > _STACKED * mean)
+                columns = i, np.full(len(i), side), j, foot / length[j], away, sine
+                found.append(np.stack([column[touch] for column in columns]))
+        every = np.concatenate(found, axis=1)
+        every = every[:, np.lexsort((every[4], every[1], every[0]))]
+        first = np.append(True, (np.diff(every[0]) != 0) | (np.diff(every[1]) != 0))[: every.shape[1]]
+        self.piece, self.side, self.wall = every[:3, first].astype(np.int64)
+        self.share, self.away, self.sine = every[3:, first]
         self.room = np.zeros((2, len(lines)))  # from a piece's start and end to the wall, along the piece [m]
         room = (self.away - lines.width_m[self.wall] / 2) / self.sine
         self.room[self.side, self.piece] = room
@@ -270,7 +291,7 @@ class _Ends:
         at = (i, self.side[free].astype(float)), (self.wall[free], self.share[free])
         return Links.between(nodes, *at, area, self.away[free])
 
-    def widened(self, i: Ints, j: Ints) -> tuple[Floats, Floats]:
+    def widened(self, i: Whole, j: Whole) -> tuple[Real, Real]:
         """Where neighbours i and j touch, along i: up to the wall, or to the piece that joins both there."""
         lines, length = self.lines, self.lines.length_m()
         way = lines.direction()
@@ -281,16 +302,12 @@ class _Ends:
         low = _reach((0.0, self.room[0, i]), (-np.minimum(start, end), self.room[np.where(back, 1, 0), j]), apart)
         high = _reach((length[i], self.room[1, i]), (np.maximum(start, end), self.room[np.where(back, 0, 1), j]), apart)
         bridge = lines.width_m[np.minimum(i + 1, len(lines) - 1)] / self.sines[1, i]
-        return -low, high - np.where(self._bridged(i, j), bridge, 0.0)
-
-    def _bridged(self, i: Ints, j: Ints) -> NDArray[np.bool_]:
-        """Whether one short piece joins the end of i with the start of j."""
-        joined = self.lines.joined
-        last = len(joined) - 1
-        return np.asarray((j == i + 2) & joined[np.minimum(i + 1, last)] & joined[np.minimum(i + 2, last)])
+        joined, last = self.lines.joined, len(lines) - 1
+        is_bridged = (j == i + 2) & joined[np.minimum(i + 1, last)] & joined[np.minimum(i + 2, last)]
+        return -low, high - np.where(is_bridged, bridge, 0.0)
 
 
-def _reach(one: tuple[float | Floats, Floats], other: tuple[float | Floats, Floats], apart: Floats) -> Floats:
+def _reach(one: tuple[float | Real, Real], other: tuple[float | Real, Real], apart: Real) -> Real:
     """How far two neighbours touch, of where each ends and what room it has there.
 
     Where both end on one wall, thus not far apart, to where the line between them meets it; else to the end of the
@@ -302,39 +319,9 @@ def _reach(one: tuple[float | Floats, Floats], other: tuple[float | Floats, Floa
     return np.where(one_wall, (a + room_a + b + room_b) / 2, shorter)
 
 
-def _walls(lines: Lines, pairs: tuple[Ints, Ints]) -> tuple[Ints, Ints, Ints, Floats, Floats, Floats]:
-    """For each end of a piece the nearest line across it: piece, end (0 or 1), wall, share, distance [m] and sine."""
-    a, b = pairs
-    way, length = lines.direction(), lines.length_m()
-    fits = (lines.layer[a] == lines.layer[b]) & ~_chained(lines, a, b)
-    a, b = a[fits], b[fits]
-    steep = np.abs(_dot(way[a], way[b])) < _PARALLEL
-    a, b = a[steep], b[steep]
-    mean, sine = (lines.width_m[a] + lines.width_m[b]) / 2, np.abs(_cross(way[a], way[b]))
-    found = []
-    for i, j in ((a, b), (b, a)):
-        for side, at in ((0, lines.start_m), (1, lines.end_m)):
-            gap = at[i] - lines.start_m[j]
-            foot, away = _dot(gap, way[j]), np.abs(_cross(way[j], gap))
-            touch = (foot >= 0) & (foot <= length[j]) & (away < 1.1 * mean) & (away > _STACKED * mean)
-            ends = i[touch], np.full(touch.sum(), side), j[touch], (foot / length[j])[touch], away[touch], sine[touch]
-            found.append(np.stack(ends))
-    every = np.concatenate(found, axis=1)
-    every = every[:, np.lexsort((every[4], every[1], every[0]))]
-    first = np.append(True, (np.diff(every[0]) != 0) | (np.diff(every[1]) != 0))[: every.shape[1]]
-    piece, side, wall, share, away, sine = every[:, first]
-    return piece.astype(np.int64), side.astype(np.int64), wall.astype(np.int64), share, away, sine
-
-
-def _chained(lines: Lines, i: Ints, j: Ints) -> NDArray[np.bool_]:
-    """Whether two pieces meet at a joint."""
-    high = np.maximum(i, j)
-    return np.asarray((np.abs(i - j) == 1) & lines.joined[high])
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
+def _dot(a: Real, b: Real) -> Real:
     return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1])
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
+def _cross(a: Real, b: Real) -> Real:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

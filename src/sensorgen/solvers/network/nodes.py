@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from sensorgen.core.arrays import Mask, Real, Whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,30 +23,30 @@ class Lines:
         Whether it goes on where the piece before it ended.
     """
 
-    start_m: Floats
-    end_m: Floats
-    width_m: Floats
-    height_m: Floats
-    layer: Ints
-    joined: NDArray[np.bool_]
+    start_m: Real
+    end_m: Real
+    width_m: Real
+    height_m: Real
+    layer: Whole
+    joined: Mask
 
     def __len__(self) -> int:
         """Number of pieces [-]."""
         return len(self.layer)
 
-    def length_m(self) -> Floats:
+    def length_m(self) -> Real:
         """Length of each piece [m]."""
         return np.asarray(np.hypot(*(self.end_m - self.start_m).T))
 
-    def direction(self) -> Floats:
+    def direction(self) -> Real:
         """Unit vector along each piece, (n, 2) [-]."""
         return np.asarray((self.end_m - self.start_m) / self.length_m()[:, None])
 
-    def goes_on(self) -> NDArray[np.bool_]:
+    def goes_on(self) -> Mask:
         """Whether another piece goes on where this one ends."""
         return np.append(self.joined[1:], False)
 
-    def at(self, piece: Ints, share: Floats) -> Floats:
+    def at(self, piece: Whole, share: Real) -> Real:
         """Places in plan, at a share of a piece's length, (m, 2) [m]."""
         return np.asarray(self.start_m[piece] + share[:, None] * (self.end_m - self.start_m)[piece])
 
@@ -71,12 +69,12 @@ class Nodes:
         Where each node lies in plan [m].
     """
 
-    key: Floats
-    number: Ints
-    place_m: Floats
+    key: Real
+    number: Whole
+    place_m: Real
 
     @classmethod
-    def of(cls, lines: Lines, places: tuple[Ints, Floats]) -> "Nodes":
+    def of(cls, lines: Lines, places: tuple[Whole, Real]) -> "Nodes":
         """Nodes at the ends of all pieces and at further places (piece, share of its length)."""
         every = np.arange(len(lines))
         key = np.sort(np.concatenate([2.0 * every, 2.0 * every + 1.0, 2.0 * places[0] + np.clip(places[1], 0.0, 1.0)]))
@@ -92,7 +90,7 @@ class Nodes:
         place[number] = lines.at(piece, key - 2.0 * piece)
         return cls(key, number, place)
 
-    def weights(self, piece: Ints, share: Floats) -> tuple[Ints, Floats]:
+    def weights(self, piece: Whole, share: Real) -> tuple[Whole, Real]:
         """The two nodes that a place lies between, (m, 2), and its weight on each; beyond a piece's ends too."""
         inside = 2.0 * piece + np.clip(share, _SAME / 2, 1.0 - _SAME / 2)
         after = np.searchsorted(self.key, inside)
@@ -100,7 +98,7 @@ class Nodes:
         t = (2.0 * piece + share - low) / (high - low)
         return np.stack([self.number[after - 1], self.number[after]], axis=1), np.stack([1.0 - t, t], axis=1)
 
-    def within(self, piece: Ints, low: Floats, high: Floats) -> tuple[Ints, Floats]:
+    def within(self, piece: Whole, low: Real, high: Real) -> tuple[Whole, Real]:
         """Nodes of pieces between two shares of their lengths: which query each answers, and its share."""
         first = np.searchsorted(self.key, 2.0 * piece + np.clip(low, 0.0, 1.0), side="right")
         last = np.searchsorted(self.key, 2.0 * piece + np.clip(high, 0.0, 1.0), side="left")
@@ -109,14 +107,14 @@ class Nodes:
         index = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + first[query]
         return query, self.key[index] - 2.0 * piece[query]
 
-    def steps(self) -> tuple[Ints, Ints, Ints]:
+    def steps(self) -> tuple[Whole, Whole, Whole]:
         """Neighbours along each piece: the piece, and the places of both in the list of nodes."""
         piece = (self.key // 2).astype(np.int64)
         here = np.flatnonzero(piece[1:] == piece[:-1])
         return piece[here], here, here + 1
 
 
-def interleaved(query: Ints, at: Floats) -> tuple[Ints, Floats, NDArray[np.float64]]:
+def interleaved(query: Whole, at: Real) -> tuple[Whole, Real, Real]:
     """Sorted places of each query, each once, and the length that each stands for (trapezoid rule)."""
     order = np.lexsort((at, query))
     query, at = query[order], at[order]

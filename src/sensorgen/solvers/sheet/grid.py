@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.solvers.sheet.parts import ROUNDING, Contact, Patch, Port, Sheet
 
-Real = NDArray[np.float64]
 GRADING = 3.0  # cells at a corner of a contact shrink with this power: above 2, potentials as sqrt(r) cost no order
 _TABLE = 4000  # points between which the grading is inverted; any monotone choice of lines will do
 
@@ -103,16 +103,12 @@ def _lines(size: float, borders: list[float], corners: set[float], cells: int) -
     total = spread[-1] - spread[0]
     parts = []
     for start, stop, low, high in zip(fixed[:-1], fixed[1:], spread[:-1], spread[1:], strict=True):
-        places = _stretch(start, stop)
+        # Places from start to stop, dense at both, so that the crowding can be inverted by interpolation
+        t = np.linspace(0.0, 1.0, _TABLE)
+        places = np.asarray(start + (stop - start) * t**4 * (35 - 84 * t + 70 * t**2 - 20 * t**3))
         count = max(1, round(cells * (high - low) / total))
         parts.append(np.interp(np.linspace(low, high, count + 1), _crowding(places, size, corners), places)[:-1])
     return np.append(np.concatenate(parts), size)
-
-
-def _stretch(start: float, stop: float) -> Real:
-    """Places from start to stop, dense at both, so that the crowding can be inverted by interpolation."""
-    t = np.linspace(0.0, 1.0, _TABLE)
-    return np.asarray(start + (stop - start) * t**4 * (35 - 84 * t + 70 * t**2 - 20 * t**3))
 
 
 def _crowding(at: Real, size: float, corners: set[float]) -> Real:

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.solvers.sheet.grid import Axis
 from sensorgen.solvers.sheet.parts import SIDES, Contact, Patch, Port, Sheet
 
-Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 BY = ("x_m", "y_m", "capacitance_factor", "top_resistance_factor", "bottom_resistance_factor")
@@ -47,7 +47,14 @@ def links(sheet: Sheet, axes: tuple[Axis, Axis], patch: Patch | None) -> Links:
     joined = np.array([np.concatenate([*ends[0], film]), np.concatenate([*ends[1], film + 1])])
 
     leak, capacitance, by_film = _film(sheet, axes, patch)
-    conductance, by_sheet = _sheets(sheet, axes, patch)
+    sides = enumerate(sheet.sheet_resistance_ohm)
+    ways = [(ohm, *_one_way(axes, along, patch, side)) for side, ohm in sides for along in range(2)]
+    # A perfect conductor's links do not matter.
+    conductance = np.concatenate([value / ohm if ohm else 0 * value for ohm, value, _ in ways])
+    by_sheet = {
+        name: np.concatenate([by.get(name, 0 * value) / ohm if ohm else 0 * value for ohm, value, by in ways])
+        for name in BY
+    }
     none, dead = np.zeros(len(film)), np.zeros(len(conductance))
     slopes = {
         name: np.array([np.append(by_sheet.get(name, dead), none), np.append(dead, by_film.get(name, none))])
@@ -118,20 +125,6 @@ def _folded(values: Real) -> Real:
     return found
 
 
-def _sheets(sheet: Sheet, axes: tuple[Axis, Axis], patch: Patch | None) -> tuple[Real, dict[str, Real]]:
-    """Conductance of the links in both sheets [S], and its derivatives; a perfect conductor's do not matter."""
-    found: list[Real] = []
-    slopes: dict[str, list[Real]] = {name: [] for name in BY}
-    for side, ohm in enumerate(sheet.sheet_resistance_ohm):
-        for along in range(2):
-            value, by = _one_way(axes, along, patch, side)
-            per_ohm = 1 / ohm if ohm else 0.0
-            found.append(value * per_ohm)
-            for name, parts in slopes.items():
-                parts.append(by[name] * per_ohm if name in by else np.zeros(len(value)))
-    return np.concatenate(found), {name: np.concatenate(parts) for name, parts in slopes.items()}
-
-
 def _one_way(axes: tuple[Axis, Axis], along: int, patch: Patch | None, side: int) -> tuple[Real, dict[str, Real]]:
     """Squares in parallel over squares in series, of the links along one axis, and its derivatives.
 
@@ -162,9 +155,6 @@ def _one_way(axes: tuple[Axis, Axis], along: int, patch: Patch | None, side: int
         f"{SIDES[side]}_resistance_factor": -width * length * series**2 * squares,
     }
     return turn((1 - width + width * series) * squares), {name: turn(value) for name, value in by.items()}
-
-
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -200,7 +190,11 @@ class Network:
         through the film is a case like any other: alpha is then infinite, or nothing for ports within one sheet.
         """
         y = admittance_s[self.film]
-        border = self._gather(y, self.film)
+        a, b = self.ends[:, self.film]
+        border = np.zeros(len(self.drive) + 1, complex)  # the last takes what belongs to a reference
+        np.add.at(border, a, y)
+        np.add.at(border, b, -y)
+        border = border[:-1]
         solved = self._inverse(admittance_s, np.column_stack([self.drive, border]))
         w, h = solved[:, :-1], solved[:, -1]
         through = self.crossing - border @ w
@@ -211,22 +205,11 @@ class Network:
         else:
             alpha = through / total
             z = np.outer(alpha, through) + self.drive.T @ w
-        along = self._differences(w - np.outer(h, alpha))
+        potentials = w - np.outer(h, alpha)
+        padded = np.vstack([potentials, np.zeros((1, potentials.shape[1]))])
+        along = np.asarray(padded[self.ends[0]] - padded[self.ends[1]])
         along[self.film] += alpha
         return z, along
-
-    def _gather(self, y: Complex, part: slice) -> Complex:
-        """Sum over the film's links at their top, minus that at their bottom, per unknown."""
-        a, b = self.ends[:, part]
-        size = len(self.drive)
-        found = np.zeros(size + 1, complex)  # the last takes what belongs to a reference
-        np.add.at(found, a, y)
-        np.add.at(found, b, -y)
-        return found[:size]
-
-    def _differences(self, potentials: Complex) -> Complex:
-        padded = np.vstack([potentials, np.zeros((1, potentials.shape[1]))])
-        return np.asarray(padded[self.ends[0]] - padded[self.ends[1]])
 
     def _inverse(self, admittance_s: Complex, right: Complex) -> Complex:
         if not len(right):

@@ -7,11 +7,10 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 
-Real = NDArray[np.float64]
 SIDES = ("top", "bottom")
 EDGES = ("left", "right", "front", "back")
 ROUNDING = 1e-9  # of a side: lines closer than this are one

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.solvers.sheet.grid import axes, fold, folds
-from sensorgen.solvers.sheet.network import BY, Complex, links, network
+from sensorgen.solvers.sheet.network import BY, links, network
 from sensorgen.solvers.sheet.parts import SIDES, Contact, Patch, Port, Sheet, check, check_patch, contacts_of
 
 COARSEST, FINEST = 10, 320  # cells between which a resolution is looked for
@@ -45,7 +46,14 @@ def solution(
 ) -> Solution:  # fmt: skip
     """See :func:`sensorgen.models.sheet.solve`."""
     names, tones = tuple(of), frequencies(frequency_hz)
-    _check(sheet, ports, patch, names)
+    contacts_of(sheet, ports)
+    if patch:
+        check_patch(sheet, patch)
+    for name in names:
+        if name not in BY:
+            raise UnknownName("input of a sheet to differentiate by", name, BY)
+    if names and not patch:
+        raise OutOfRange("a derivative by a patch needs a patch")
     if cells is not None:
         return _once(sheet, ports, tones, patch, names, cells)
     return _fine_enough(sheet, ports, tones, patch, names, accuracy)
@@ -66,7 +74,7 @@ def depth_m(sheet: Sheet, frequency_hz: float, patch: Patch | None = None) -> fl
     return float(1 / np.sqrt(abs(y) * ohm)) if abs(y) * ohm else float("inf")
 
 
-def frequencies(given: ArrayLike) -> NDArray[np.float64]:
+def frequencies(given: ArrayLike) -> Real:
     """Frequencies as an array [Hz], checked."""
     found = np.atleast_1d(np.asarray(given))
     if found.dtype.kind not in "iuf" or found.ndim != 1 or not found.size:
@@ -75,17 +83,6 @@ def frequencies(given: ArrayLike) -> NDArray[np.float64]:
     if bad.size:
         raise OutOfRange(f"frequency_hz has to be 0 or more and below {_HIGHEST_HZ:g}, not {bad[0]:g}")
     return found.astype(float)
-
-
-def _check(sheet: Sheet, ports: Sequence[Port], patch: Patch | None, names: tuple[str, ...]) -> None:
-    contacts_of(sheet, ports)
-    if patch:
-        check_patch(sheet, patch)
-    for name in names:
-        if name not in BY:
-            raise UnknownName("input of a sheet to differentiate by", name, BY)
-    if names and not patch:
-        raise OutOfRange("a derivative by a patch needs a patch")
 
 
 def _once(
@@ -108,7 +105,15 @@ def _unfolded(
 ) -> Solution:
     contacts = contacts_of(sheet, ports)
     grid = axes(sheet, contacts, cells)
-    _check_depth(sheet, patch, tones, max(axis.steps_m.max() for axis in grid), cells)
+    longest_m = max(axis.steps_m.max() for axis in grid)
+    depth = depth_m(sheet, float(tones.max()), patch)
+    if longest_m > depth:
+        need = float(cells * longest_m / depth) if depth else float("inf")
+        finer = f"{int(np.ceil(need))} cells or more, or " if need < _ANY_CELLS else ""
+        raise OutOfRange(
+            f"grid too coarse: at {tones.max():g} Hz current reaches {depth:.3g} m and a cell is {longest_m:.3g} m "
+            f"long: use {finer}a lower frequency"
+        )
     of = links(sheet, grid, patch)
     net = network(sheet, grid, contacts, ports, of)
     z = np.empty((len(tones), len(ports), len(ports)), complex)
@@ -124,17 +129,6 @@ def _unfolded(
     return Solution(z, by, cells, float("nan"))
 
 
-def _check_depth(sheet: Sheet, patch: Patch | None, tones: NDArray[Any], longest_m: float, cells: int) -> None:
-    depth = depth_m(sheet, float(tones.max()), patch)
-    if longest_m > depth:
-        need = float(cells * longest_m / depth) if depth else float("inf")
-        finer = f"{int(np.ceil(need))} cells or more, or " if need < _ANY_CELLS else ""
-        raise OutOfRange(
-            f"grid too coarse: at {tones.max():g} Hz current reaches {depth:.3g} m and a cell is {longest_m:.3g} m "
-            f"long: use {finer}a lower frequency"
-        )
-
-
 def _fine_enough(
     sheet: Sheet, ports: Sequence[Port], tones: NDArray[Any], patch: Patch | None, names: tuple[str, ...],
     accuracy: float,
@@ -147,7 +141,16 @@ def _fine_enough(
     while cells <= FINEST:
         found = _once(sheet, ports, tones, patch, names, cells)
         if before is not None:
-            error = _change(before.impedance_ohm, found.impedance_ohm) / 2
+            # Largest change of resistance or reactance, relative to those of the two ports that it couples
+            finite = np.isfinite(found.impedance_ohm)
+            worst = 0.0
+            for part in (np.real, np.imag):
+                new, old = (np.where(finite, part(z), 0.0) for z in (found.impedance_ohm, before.impedance_ohm))
+                own = np.sqrt(np.abs(np.einsum("fpp->fp", new)))
+                scale = own[:, :, None] * own[:, None, :]
+                relative = np.divide(np.abs(new - old), scale, out=np.zeros_like(scale), where=scale > 0)
+                worst = max(worst, float(relative.max()))
+            error = worst / 2
             if error <= accuracy:
                 return Solution(found.impedance_ohm, found.by, cells, error)
         before, cells = found, 2 * cells
@@ -155,21 +158,6 @@ def _fine_enough(
         f"{FINEST} cells reach a relative error of {error:.1g}, not {accuracy:g}: ask for less, or give the cells"
     )
 
-
-def _change(before: Complex, after: Complex) -> float:
-    """Largest change of resistance or reactance, relative to those of the two ports that it couples."""
-    finite = np.isfinite(after)
-    worst = 0.0
-    for part in (np.real, np.imag):
-        new, old = (np.where(finite, part(z), 0.0) for z in (after, before))
-        own = np.sqrt(np.abs(np.einsum("fpp->fp", new)))
-        scale = own[:, :, None] * own[:, None, :]
-        relative = np.divide(np.abs(new - old), scale, out=np.zeros_like(scale), where=scale > 0)
-        worst = max(worst, float(relative.max()))
-    return worst
-
-
-Real = NDArray[np.float64]
 
 ACCURACY = 3e-2  # of the impedances behind a bound [-]
 SHALLOWEST = 1 / 20  # depth of the current over the longer side, under which places would take hours [-]
@@ -216,7 +204,16 @@ class Bounds:
         """
         chosen = self.information if tones is None else self.information[:, :, list(tones)]
         known = np.diag([0.0, *(1 / spread**2 for spread in self.guess_m)]) if outline else 0.0
-        return _standard_errors(chosen.sum(2) + known)
+        # Square roots of the diagonal of the inverse, inf for what a singular information leaves open.
+        information = chosen.sum(2) + known
+        own = np.sqrt(np.einsum("...aa->...a", information))
+        unit = np.where(own > 0, own, 1.0)
+        values, vectors = np.linalg.eigh(information / (unit[..., :, None] * unit[..., None, :]))
+        distinct = values > _SINGULAR
+        weight = np.where(distinct, 1 / np.where(distinct, values, 1.0), 0.0)
+        errors = np.sqrt(np.einsum("...ak,...k->...a", vectors**2, weight)) / unit
+        open_ = np.einsum("...ak,...k->...a", vectors**2, ~distinct) > _SINGULAR**0.5
+        return np.where(open_, np.inf, errors)
 
     def located(self) -> float:
         """Share of the places where both x and y are known twice as well as from a uniform distribution [-]."""
@@ -275,7 +272,15 @@ def bounds(
     if places < 1:
         raise OutOfRange(f"bounds need one place or more along each side, not {places}")
     tones = frequencies(frequency_hz)
-    _refuse_depth(sheet, float(tones.max()), press)
+    # Refuse frequencies that would compute for hours: cells have to be as small as the depth
+    highest_hz = float(tones.max())
+    depth, side = depth_m(sheet, highest_hz, press), max(sheet.length_m, sheet.width_m)
+    if depth < SHALLOWEST * side:
+        most = highest_hz * (depth / (SHALLOWEST * side)) ** 2
+        raise OutOfRange(
+            f"at {highest_hz:g} Hz current reaches {depth:.3g} m; bounds take {SHALLOWEST:.0%} or more of the sheet's "
+            f"{side:g} m: use frequencies up to {most:.2g} Hz"
+        )
     middle = _moved(press, (sheet.length_m - press.length_m) / 2, (sheet.width_m - press.width_m) / 2)
     cells = solution(sheet, ports, tones, middle, (), None, ACCURACY).cells
     x, y = (np.linspace(0.0, end, places) for end in (sheet.length_m - press.length_m, sheet.width_m - press.width_m))
@@ -287,41 +292,15 @@ def bounds(
         z = np.einsum("fpp->fp", found.impedance_ohm)
         by = {name: np.einsum("fpp->fp", value) / z for name, value in found.by.items()}
         by_force = sum((by[name] * slope for name, slope in per_newton.items()), np.zeros_like(z))
-        information[i, j] = _information(np.stack([by_force, by["x_m"], by["y_m"]]), sheet, noise)
+        # relative derivatives (3, tones, ports); noise relative to the magnitude in both parts
+        relative = np.stack([by_force, by["x_m"], by["y_m"]])
+        scale = np.array([1.0, sheet.length_m, sheet.width_m])[:, None, None]
+        rows = np.concatenate([relative.real, relative.imag], axis=2) / noise
+        rows[np.abs(rows) * noise * scale < _ROUNDING] = 0.0
+        information[i, j] = np.einsum("afk,bfk->fab", rows, rows)
     guess = (sheet.length_m / 12**0.5, sheet.width_m / 12**0.5)
     return Bounds(x + press.length_m / 2, y + press.width_m / 2, tones, information, guess, cells)
 
 
-def _refuse_depth(sheet: Sheet, highest_hz: float, press: Patch) -> None:
-    """Refuse frequencies that would compute for hours: cells have to be as small as the depth."""
-    depth, side = depth_m(sheet, highest_hz, press), max(sheet.length_m, sheet.width_m)
-    if depth < SHALLOWEST * side:
-        most = highest_hz * (depth / (SHALLOWEST * side)) ** 2
-        raise OutOfRange(
-            f"at {highest_hz:g} Hz current reaches {depth:.3g} m; bounds take {SHALLOWEST:.0%} or more of the sheet's "
-            f"{side:g} m: use frequencies up to {most:.2g} Hz"
-        )
-
-
 def _moved(press: Patch, x_m: float, y_m: float) -> Patch:
     return replace(press, x_m=max(x_m, 0.0), y_m=max(y_m, 0.0))
-
-
-def _information(relative: NDArray[np.complex128], sheet: Sheet, noise: float) -> Real:
-    """Of each frequency, from relative derivatives (3, tones, ports); noise relative to the magnitude in both parts."""
-    scale = np.array([1.0, sheet.length_m, sheet.width_m])[:, None, None]
-    rows = np.concatenate([relative.real, relative.imag], axis=2) / noise
-    rows[np.abs(rows) * noise * scale < _ROUNDING] = 0.0
-    return np.asarray(np.einsum("afk,bfk->fab", rows, rows))
-
-
-def _standard_errors(information: Real) -> Real:
-    """Square roots of the diagonal of the inverse; inf for what a singular information leaves open."""
-    own = np.sqrt(np.einsum("...aa->...a", information))
-    unit = np.where(own > 0, own, 1.0)
-    values, vectors = np.linalg.eigh(information / (unit[..., :, None] * unit[..., None, :]))
-    known = values > _SINGULAR
-    weight = np.where(known, 1 / np.where(known, values, 1.0), 0.0)
-    errors = np.sqrt(np.einsum("...ak,...k->...a", vectors**2, weight)) / unit
-    open_ = np.einsum("...ak,...k->...a", vectors**2, ~known) > _SINGULAR**0.5
-    return np.where(open_, np.inf, errors)

@@ -3,7 +3,7 @@
 Times are the processor's, imports left out, so that a busy machine shows nearly what an idle one does.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from types import ModuleType
 
 from sensorgen import models
@@ -44,22 +44,19 @@ def silent(scenes: Sequence[str], found: Sequence[Point]) -> list[Silent]:
     found : sequence of Point
         What the others gave there.
     """
-    return [one for name in scenes for one in _silent(name, [p for p in found if p.scene == name])]
+    spoke = {(p.scene, p.model.partition(":")[0]) for p in found}
+    refused = {scene: kind_of(scene).why_not_applicable(scene) for scene in scenes}
+    return [
+        Silent(scene, name, refused[scene].get(name) or _unasked(name, kind_of(scene).ASKED))
+        for scene in scenes for name in models.names() if (scene, name) not in spoke
+    ]  # fmt: skip
+
+
+def _unasked(name: str, asked: str) -> str:
+    """Scenes that a model applies to, and the question that is none of its own."""
+    return f"{(registry.load(models, name).__doc__ or '').strip().partition(chr(10))[0]} Not {asked}."
 
 
 def kind_of(scene: str) -> ModuleType:
     """The module that measures a scene."""
     return next(kind for kind in KINDS if scene in kind.STANDARD)
-
-
-def _silent(scene: str, found: Sequence[Point]) -> Iterator[Silent]:
-    spoke, kind = {p.model.partition(":")[0] for p in found}, kind_of(scene)
-    refused = kind.why_not_applicable(scene)
-    for name in models.names():
-        if name not in spoke:
-            yield Silent(scene, name, refused.get(name) or f"{_about(name)} Not {kind.ASKED}.")
-
-
-def _about(name: str) -> str:
-    """Scenes that a model applies to."""
-    return (registry.load(models, name).__doc__ or "").strip().partition("\n")[0]

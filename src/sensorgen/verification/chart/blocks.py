@@ -19,7 +19,7 @@ from sensorgen.models.compression import Plate
 from sensorgen.models.press2d import Elastic, Fineness
 from sensorgen.models.press3d import BoundaryConditions, Pieces, Pressed
 from sensorgen.scene.scene import Body, Scene, box
-from sensorgen.verification.chart.measured import DIGITS, Point, timed
+from sensorgen.verification.chart.measured import DIGITS, Ladder, Point, climbed, relative
 from sensorgen.verification.chart.presses import has_mesher
 
 Real = NDArray[np.float64]
@@ -136,7 +136,7 @@ def points(name: str, budget_s: float) -> list[Point]:
         A finer mesh is not tried where that would take longer, estimated as ten times the last one [s].
     """
     standard = STANDARD[name]()
-    return [_point(name, standard, *found) for found in (*_cheap(standard), *_solved(standard, budget_s))]
+    return list(climbed(name, _models(standard), relative(standard.down_m, standard.known_to), budget_s))
 
 
 def why_not_applicable(name: str) -> dict[str, str]:
@@ -150,53 +150,36 @@ def why_not_applicable(name: str) -> dict[str, str]:
             "springs": "beside the strip nothing reaches the top"}  # fmt: skip
 
 
-Found = Iterator[tuple[str, str, Real, float]]
-
-
-def _cheap(standard: Standard) -> Found:
-    """Displacement by laws of plates and by springs, with the seconds that they took [m]."""
+def _models(standard: Standard) -> Iterator[Ladder]:
+    """Displacement [m] by laws of plates, by springs, and by finite elements in two and in three dimensions."""
     for law in standard.laws:
-        value, seconds = timed(lambda law=law: law.capacitive_strain(standard.stress_pa)[0])  # type: ignore[misc]
-        yield f"compression: {law.name}", "", value * standard.height_m, seconds
-    if not standard.columns:
-        return
-    moduli = {
-        name: s.youngs_modulus_pa / (1 - standard.plane * s.poisson_ratio**2) for name, s in standard.solids.items()
-    }
-    value, seconds = timed(lambda: springs.displacement_m(standard.scene, moduli, list(standard.stress_pa)))
-    yield "springs", "", value, seconds
-
-
-def _solved(standard: Standard, budget_s: float) -> Found:
-    """The same by finite elements from coarse to fine, in two and in three dimensions."""
+        work = partial(_by_law, standard, law)
+        yield f"compression: {law.name}", [("", work)]
+    if standard.columns:
+        moduli = {
+            name: s.youngs_modulus_pa / (1 - standard.plane * s.poisson_ratio**2) for name, s in standard.solids.items()
+        }
+        yield "springs", [("", lambda: springs.displacement_m(standard.scene, moduli, list(standard.stress_pa)))]
     if standard.plane and has_mesher() and not press2d.why_not_applicable(standard.scene):
-        yield from _finer(
-            "press2d", [(f"mesh {k}, ", partial(_flat, standard, m)) for k, m in enumerate(_MESHES, 1)], budget_s
-        )
+        yield "press2d", [(f"mesh {k}, ", partial(_flat, standard, m)) for k, m in enumerate(_MESHES, 1)]
     if not (standard.plane and standard.boundary.period == "free"):
-        yield from _finer("press3d", [(f"{n} pieces, ", partial(_deep, standard, n)) for n in _PIECES], budget_s)
+        yield "press3d", [(f"{n} pieces, ", partial(_deep, standard, n)) for n in _PIECES]
 
 
-def _finer(model: str, meshes: list[tuple[str, Callable[[], Pressed]]], budget_s: float) -> Found:
-    for said, work in meshes:
-        found, seconds = timed(work)
-        if not found.faults:
-            yield model, said, found.displacement_m[1:], seconds
-        if 10 * seconds > budget_s:
-            return
+def _by_law(standard: Standard, law: Plate) -> Real:
+    return np.asarray(law.capacitive_strain(standard.stress_pa)[0] * standard.height_m)
 
 
-def _flat(standard: Standard, mesh: Fineness) -> Pressed:
+def _flat(standard: Standard, mesh: Fineness) -> Real | None:
     cell = press2d.cell(standard.scene, standard.period_mm)
-    return press2d.press(cell, standard.solids, [0.0, *standard.stress_pa], None, standard.boundary, mesh)
+    stress = [0.0, *standard.stress_pa]
+    return _displacement_m(press2d.press(cell, standard.solids, stress, None, standard.boundary, mesh))
 
 
-def _deep(standard: Standard, pieces: int) -> Pressed:
-    cell = press3d.cell(standard.scene)
-    return press3d.press(cell, standard.solids, [0.0, *standard.stress_pa], None, standard.boundary, Pieces(pieces))
+def _deep(standard: Standard, pieces: int) -> Real | None:
+    cell, stress = press3d.cell(standard.scene), [0.0, *standard.stress_pa]
+    return _displacement_m(press3d.press(cell, standard.solids, stress, None, standard.boundary, Pieces(pieces)))
 
 
-def _point(scene: str, standard: Standard, model: str, said: str, value: Real, seconds: float) -> Point:
-    off = value / standard.down_m - 1
-    worst = float(off[np.argmax(np.abs(off))])
-    return Point(scene, model, max(abs(worst), standard.known_to), seconds, f"{said}off by {worst:+.3g} at most")
+def _displacement_m(found: Pressed) -> Real | None:
+    return None if found.faults else found.displacement_m[1:]

@@ -83,7 +83,18 @@ def points(name: str, budget_s: float) -> list[Point]:
         A model is not asked for more where that would take longer, estimated as ten times the last one [s].
     """
     standard = STANDARD[name]()
-    return [*_formulas(name, standard), *_bounds(name, standard, budget_s)]
+    area, found = standard.scene.size_mm[0] * standard.scene.size_mm[1] * M_PER_MM**2, []
+    for formula, law in thesis_cells.NAMED.items():
+        if standard.shape in law.shapes:
+            value, seconds = timed(partial(law.value_f_per_m2, standard.params, standard.permittivity["x60"]))
+            label = f"thesis_cells: {formula.removeprefix('thesis-')}"
+            found.append(point(name, label, Interval(value, value), standard, seconds, bounded=False))
+    for model, module in capacitance_models().items():
+        if not module.why_not_applicable(standard.scene):
+            given = (standard.scene, standard.permittivity)
+            for wanted, interval, seconds in _rungs(module.capacitance, given, module, budget_s):
+                found.append(point(name, model, interval.times(1 / area), standard, seconds, wanted=wanted))
+    return found
 
 
 def why_not_applicable(name: str) -> dict[str, str]:
@@ -92,17 +103,6 @@ def why_not_applicable(name: str) -> dict[str, str]:
     said = {model: module.why_not_applicable(scene) for model, module in capacitance_models().items()}
     only = "it has formulas of tri and rect alone"
     return {model: why for model, why in said.items() if why} | {"thesis_cells": only}
-
-
-def _bounds(name: str, standard: Standard, budget_s: float) -> Iterator[Point]:
-    """Every model with bounds, from coarse to fine."""
-    area = standard.scene.size_mm[0] * standard.scene.size_mm[1] * M_PER_MM**2
-    for model, module in capacitance_models().items():
-        if module.why_not_applicable(standard.scene):
-            continue
-        given = (standard.scene, standard.permittivity)
-        for wanted, interval, seconds in _rungs(module.capacitance, given, module, budget_s):
-            yield point(name, model, interval.times(1 / area), standard, seconds, wanted=wanted)
 
 
 def _rungs(
@@ -129,16 +129,6 @@ def _rungs(
         if width > asked or seconds * _DEARER > budget_s or width == 0:
             return
         wanted, last = 10.0 ** math.ceil(math.log10(width) - 1), width
-
-
-def _formulas(name: str, standard: Standard) -> Iterator[Point]:
-    """The thesis's formulas for this shape."""
-    for model, law in thesis_cells.NAMED.items():
-        if standard.shape in law.shapes:
-            given = standard.params, standard.permittivity["x60"]
-            value, seconds = timed(partial(law.value_f_per_m2, *given))
-            label = f"thesis_cells: {model.removeprefix('thesis-')}"
-            yield point(name, label, Interval(value, value), standard, seconds, bounded=False)
 
 
 def point(

@@ -6,7 +6,7 @@ upper one. Circles are drawn with straight lines that keep their mean radius.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from math import acosh, asinh, cos, log, pi, sin, sqrt, tan, tanh
+from math import acosh, asinh, cos, log, pi, sin, tan, tanh
 
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.scene.scene import Body, Outline, Prism, Scene, box
@@ -62,7 +62,7 @@ def stripline() -> Exact:
 
     .. math:: C = 4 \varepsilon_0 \frac{K(k)}{K(k')}, \quad k = \tanh\frac{\pi w}{2 b}
     """
-    low = Body("low", "etpu", (box(3.5, 4.5, 0, 1, _PLATE_MM, _FLOOR_MM), _floor(8.0)), "bottom")
+    low = Body("low", "etpu", (box(3.5, 4.5, 0, 1, _PLATE_MM, _FLOOR_MM), box(0, 8.0, 0, 1, 0, _PLATE_MM)), "bottom")
     roof = _FLOOR_MM + 0.5
     high = Body("high", "etpu", (box(0, 8, 0, 1, roof, roof + _PLATE_MM),), "top")
     wall = Body("wall", "wall", tuple(box(a, b, 0, 1, _PLATE_MM, _FLOOR_MM) for a, b in ((0, 3.5), (4.5, 8))))
@@ -78,8 +78,10 @@ def interdigital() -> Exact:
     Igreja and Dias, Sens. Actuators A 112, 291 (2004). The next finger is on a lid 4 pitches up, under a wall.
     """
     roof = _FLOOR_MM + 8.0
-    low = Body("low", "etpu", (box(0, 0.5, 0, 1, _PLATE_MM, _FLOOR_MM), _floor(2.0)), "bottom")
-    high = Body("high", "etpu", (box(1.5, 2, 0, 1, _PLATE_MM + 0.05, _FLOOR_MM), _lid(2.0, roof)), "top")
+    low = Body("low", "etpu", (box(0, 0.5, 0, 1, _PLATE_MM, _FLOOR_MM), box(0, 2.0, 0, 1, 0, _PLATE_MM)), "bottom")
+    high = Body(
+        "high", "etpu", (box(1.5, 2, 0, 1, _PLATE_MM + 0.05, _FLOOR_MM), box(0, 2, 0, 1, roof, roof + _PLATE_MM)), "top"
+    )
     walls = box(0.5, 1.5, 0, 1, _PLATE_MM, _FLOOR_MM), box(1.5, 2, 0, 1, _PLATE_MM, _PLATE_MM + 0.05)
     under_lid = box(0, 2, 0, 1, roof - _PLATE_MM, roof)
     scene = Scene((low, Body("wall", "wall", (*walls, under_lid)), high), (2.0, 1.0, roof + _PLATE_MM))
@@ -100,18 +102,10 @@ def _above(points: Iterable[tuple[float, float]]) -> Outline:
     return tuple((round(x, 12), round(z, 12) + _FLOOR_MM) for x, z in points)
 
 
-def _floor(length_mm: float) -> Prism:
-    return box(0, length_mm, 0, 1, 0, _PLATE_MM)
-
-
-def _lid(length_mm: float, at_mm: float) -> Prism:
-    return box(0, length_mm, 0, 1, at_mm, at_mm + _PLATE_MM)
-
-
 def _scene(low: Outline, high: Outline, length_mm: float, height_mm: float) -> Scene:
     """Two conductors over a wall that covers the whole floor."""
     bodies = (
-        Body("low", "etpu", (Prism("y", low, 0, 1), _floor(length_mm)), "bottom"),
+        Body("low", "etpu", (Prism("y", low, 0, 1), box(0, length_mm, 0, 1, 0, _PLATE_MM)), "bottom"),
         Body("wall", "wall", (box(0, length_mm, 0, 1, _PLATE_MM, _FLOOR_MM),)),
         Body("high", "etpu", (Prism("y", high, 0, 1),), "top"),
     )
@@ -119,11 +113,7 @@ def _scene(low: Outline, high: Outline, length_mm: float, height_mm: float) -> S
 
 
 def _ratio(k: float) -> float:
-    """K(k) / K(k'), complete elliptic integrals of the first kind, by arithmetic-geometric means."""
-    return _mean(1.0, k) / _mean(1.0, sqrt(1 - k * k))
+    """K(k) / K(k'), complete elliptic integrals of the first kind."""
+    from scipy.special import ellipk, ellipkm1
 
-
-def _mean(a: float, b: float) -> float:
-    while abs(a - b) > 1e-15 * a:
-        a, b = 0.5 * (a + b), sqrt(a * b)
-    return a
+    return float(ellipk(k * k) / ellipkm1(k * k))

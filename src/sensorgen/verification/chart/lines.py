@@ -5,19 +5,17 @@ The error is the larger one of abs(Z) and of Re Z by itself, at the worst freque
 a thousandth of abs(Z) at low tones, and is lost first.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import compression, line, line_abcd, line_closed, line_ladder, line_tip, sheet, stack
 from sensorgen.models.sheet import Patch, Sheet
 from sensorgen.solvers.line.inputs import PressedLine, read
-from sensorgen.verification.chart.measured import DIGITS, Point, timed
+from sensorgen.verification.chart.measured import DIGITS, Point, climbed
 
 ASKED = "the impedance of a pressed line"
 
@@ -91,8 +89,6 @@ _LADDERS = (1, 10, 100, 1000, 10_000)  # cells per section
 _GRIDS = (20, 40, 80)  # cells along the sheet
 _PIECES = (1, 4, 16, 64, 256)  # of a tip
 
-Model = Callable[..., Any]
-
 
 def points(name: str, budget_s: float) -> list[Point]:
     """Measure every model of the line.
@@ -104,44 +100,31 @@ def points(name: str, budget_s: float) -> list[Point]:
     budget_s : float
         A ladder gets no more cells where that would take longer, estimated as ten times the last one [s].
     """
-    return [*_closed(name), *_grown(name, budget_s)]
+    standard = STANDARD[name]
+    known = np.array(list(standard.known.values()))
 
+    def judge(found: Any) -> tuple[float, str]:
+        whole = float(np.max(abs(found - known) / abs(known)))
+        real = float(np.max(abs(found.real - known.real) / abs(known.real)))
+        return max(whole, real, DIGITS), f"abs(Z) off by {whole:.2g}, Re Z by {real:.2g}"
 
-def _closed(name: str) -> Iterator[Point]:
-    models: dict[str, Model] = {
-        "line": line.impedance,
-        "line_abcd": line_abcd.impedance,
-        "line_closed": line_closed.impedance,
-        "line_closed: B.48 as printed": partial(line_closed.impedance, as_printed="B.48"),
-        "line_closed: uniform": line_closed.uniform,
-        "line_closed: R and C in series": line_closed.series,
-        "stack: one film": _stack,
-    }
-    for model, work in models.items():
-        try:
-            yield _point(name, model, work)
-        except OutOfRange:
-            continue  # it has no number there
+    def of(work: Callable[..., Any], **more: Any) -> Callable[[], Any]:
+        return lambda: work(standard.line(), **more)
 
-
-def _grown(name: str, budget_s: float) -> Iterator[Point]:
-    """Ladders, grids and pieces of a tip, from coarse to fine."""
-    tip = partial(_tip, profile=STANDARD[name].profile)
-    pieces = _PIECES if STANDARD[name].profile != "uniform" else _PIECES[:1]
-    models: list[tuple[str, Model, tuple[int, ...], str]] = [
-        ("line_ladder", line_ladder.impedance, _LADDERS, "cells"),
-        ("sheet", _sheet, _GRIDS, "cells"),
-        ("line_tip", tip, pieces, "pieces"),
+    pieces = _PIECES if standard.profile != "uniform" else _PIECES[:1]
+    ladders = [
+        ("line", [("", of(line.impedance))]),
+        ("line_abcd", [("", of(line_abcd.impedance))]),
+        ("line_closed", [("", of(line_closed.impedance))]),
+        ("line_closed: B.48 as printed", [("", of(line_closed.impedance, as_printed="B.48"))]),
+        ("line_closed: uniform", [("", of(line_closed.uniform))]),
+        ("line_closed: R and C in series", [("", of(line_closed.series))]),
+        ("stack: one film", [("", of(_stack))]),
+        ("line_ladder", [(f"{n} cells, ", of(line_ladder.impedance, cells=n)) for n in _LADDERS]),
+        ("sheet", [(f"{n} cells, ", of(_sheet, cells=n)) for n in _GRIDS]),
+        ("line_tip", [(f"{n} pieces, ", of(_tip, pieces=n, profile=standard.profile)) for n in pieces]),
     ]
-    for model, work, cells, kind in models:
-        for number in cells:
-            try:
-                point = _point(name, model, partial(work, **{kind: number}), f"{number} {kind}, ")
-            except OutOfRange:
-                break  # current reaches less deep than a cell
-            yield point
-            if point.seconds * 10 > budget_s:
-                break
+    return list(climbed(name, ladders, judge, budget_s))
 
 
 def why_not_applicable(name: str) -> dict[str, str]:
@@ -187,13 +170,3 @@ def _tip(line: PressedLine, pieces: int, profile: str) -> Any:
         p["length_m"], p["width_m"], (profile, pieces), np.asarray(p["force_n"]), np.asarray(middle), contact
     )
     return line_tip.impedance(track, tip, law, p["frequency_hz"])
-
-
-def _point(name: str, model: str, work: Model, said: str = "") -> Point:
-    standard = STANDARD[name]
-    known = np.array(list(standard.known.values()))
-    found, seconds = timed(lambda: work(standard.line()))
-    whole = float(np.max(abs(found - known) / abs(known)))
-    real = float(np.max(abs(found.real - known.real) / abs(known.real)))
-    words = f"{said}abs(Z) off by {whole:.2g}, Re Z by {real:.2g}"
-    return Point(name, model, max(whole, real, DIGITS), seconds, words)

@@ -2,15 +2,26 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sensorgen.core.errors import OutOfRange
 
 _QUICK_S = 0.3  # runs shorter than this are repeated, and the median counts
 _REPEATS = 5
 _AGAIN_S = 1.0  # a first run shorter than this is repeated, in case it had to import
 
+_DEARER = 10.0  # how many times longer the next level may take than the last one
+
 DIGITS = 2.0**-53  # no error is less than this
+
+Level = tuple[str, Callable[[], Any]]  # words, and work that gives a value, or None where there is none
+Ladder = tuple[str, Iterable[Level]]  # a model, and its levels from coarse to fine
+Judge = Callable[[Any], tuple[float, str]]  # from a value to its error and words
 
 
 @dataclass(frozen=True)
@@ -66,6 +77,44 @@ def timed(work: Callable[[], Any]) -> tuple[Any, float]:
         found = work()
         taken.append(time.process_time() - start)
     return found, sorted(taken)[(len(taken) - 1) // 2]
+
+
+def climbed(scene: str, ladders: Iterable[Ladder], judge: Judge, budget_s: float) -> Iterator[Point]:
+    """Points of models, each from coarse to fine until the next level would take too long.
+
+    Parameters
+    ----------
+    scene : str
+        Its name.
+    ladders : iterable of Ladder
+        Models and their levels; one that raises OutOfRange ends its ladder.
+    judge : Judge
+        Compares a value with the reference.
+    budget_s : float
+        A finer level is not tried where that would take longer, estimated as ten times the last one [s].
+    """
+    for model, levels in ladders:
+        for said, work in levels:
+            try:
+                value, seconds = timed(work)
+            except OutOfRange:
+                break
+            if value is not None:
+                error, words = judge(value)
+                yield Point(scene, model, error, seconds, said + words)
+            if _DEARER * seconds > budget_s:
+                break
+
+
+def relative(known: ArrayLike, known_to: float, words: str = "off by {:+.3g} at most") -> Judge:
+    """Judge by the relative difference that is largest; no error is less than that of the reference."""
+
+    def judge(value: Any) -> tuple[float, str]:
+        off = np.atleast_1d(np.asarray(value) / np.asarray(known) - 1)
+        worst = float(off[np.argmax(np.abs(off))])
+        return max(abs(worst), known_to), words.format(worst)
+
+    return judge
 
 
 def with_front(found: Sequence[Point]) -> list[Point]:

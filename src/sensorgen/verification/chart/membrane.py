@@ -4,12 +4,12 @@ A panel 48 mm long, 44 mm high where it is clamped and 16 mm where it is sheared
 small strain. Compared with the mean displacement of the sheared edge, by mixed elements of order 6 in another program.
 """
 
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.verification.chart.measured import Point, timed
+from sensorgen.verification.chart.measured import Point, climbed, relative
 
 ASKED = "how far the sheared edge of a membrane moves"
 STANDARD: dict[str, float] = {"Cook's membrane": 0.077181}
@@ -30,16 +30,9 @@ def points(name: str, budget_s: float) -> list[Point]:
     budget_s : float
         A finer mesh is not tried where that would take longer, estimated as ten times the last one [s].
     """
-    found: list[Point] = []
-    for cells in _CELLS:
-        work: Callable[[], float] = lambda cells=cells: edge(cells)  # type: ignore[misc]  # noqa: E731
-        way, seconds = timed(work)
-        off = way / STANDARD[name] - 1
-        said = f"{cells} x {cells} cells of two triangles, off by {off:+.3g}"
-        found.append(Point(name, "press2d: its elements", max(abs(off), _KNOWN_TO), seconds, said))
-        if 10 * seconds > budget_s:
-            break
-    return found
+    levels = [(f"{n} x {n} cells of two triangles, ", partial(edge, n)) for n in _CELLS]
+    judge = relative(STANDARD[name], _KNOWN_TO, "off by {:+.3g}")
+    return list(climbed(name, [("press2d: its elements", levels)], judge, budget_s))
 
 
 def why_not_applicable(_: str) -> dict[str, str]:

@@ -3,7 +3,7 @@
 Their truths are transfer matrices of 60 digits, conformal maps, resistors in a row, and another program's network.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from math import log, pi
@@ -16,13 +16,12 @@ from sensorgen.models import conduction, line, sheet, stack, traxels
 from sensorgen.models.sheet import Sheet
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.network.nodes import Lines
-from sensorgen.verification.chart.measured import DIGITS, Point, timed
+from sensorgen.verification.chart.measured import DIGITS, Level, Point, climbed
 from sensorgen.verification.chart.rectilinear import plate
 
 ASKED = "what a network of tracks, sheets or lines conducts"
 
 Values = NDArray[Any]
-Works = list[tuple[str, Callable[[], Values]]]
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class Standard:
 
     known: Values
     known_to: float
-    models: dict[str, Works]
+    models: dict[str, list[Level]]
 
 
 _TRACKS, _FILMS = (23e3, 67e3, 23e3), (7e-10, 3.5e-10)  # [ohm/m], [F/m]
@@ -69,14 +68,21 @@ _LINE_MM, _LAYER_MM, _ACROSS = 0.42, 0.1, 12
 
 def two_films() -> Standard:
     """Two films with a track in common, pressed in their middle; off the diagonal what one film shows of the other."""
-    return Standard(_STACK, DIGITS, {"stack": [("", _stacked)], "line: each film alone": [("", _alone)]})
+    tracks, films = _sections()
+    together = partial(stack.impedance, tracks, [list(section.T) for section in films], _LENGTHS_M)
+    return Standard(_STACK, DIGITS, {"stack": [("", together)], "line: each film alone": [("", _alone)]})
 
 
 def front_edge() -> Standard:
     """A sheet of 100 x 70 mm between two stretches of one edge: its rectangle as a half plane."""
-    port = [tuple(_SHEET.edge("top", "front", *_STRETCHES_M[k : k + 2]) for k in (0, 2))]
-    works: Works = [(f"{n} cells, ", partial(_between, port, n)) for n in _GRIDS]
-    return Standard(np.array([_SQUARES]), 1e-15, {"sheet": works})
+    port: list[Any] = [tuple(_SHEET.edge("top", "front", *_STRETCHES_M[k : k + 2]) for k in (0, 2))]
+
+    def between(cells: int) -> Values:
+        z = sheet.impedance(_SHEET, port, 0.0, cells=cells)[0, 0, 0]
+        return np.array([z.real / _SHEET.sheet_resistance_ohm[0]])
+
+    levels: list[Level] = [(f"{n} cells, ", partial(between, n)) for n in _GRIDS]
+    return Standard(np.array([_SQUARES]), 1e-15, {"sheet": levels})
 
 
 def stepped() -> Standard:
@@ -84,7 +90,7 @@ def stepped() -> Standard:
     k = _THIN_MM / _THICK_MM
     step = ((k * k + 1) / k * log((1 + k) / (1 - k)) - 2 * log(4 * k / (1 - k * k))) / pi
     known = _STEPS * (_STEP_MM * (1 / _THIN_MM + 1 / _THICK_MM) / 2 + step)
-    works: Works = [(f"width {width:g} asked, ", partial(_comb, width)) for width in _WIDTHS]
+    works: list[Level] = [(f"width {width:g} asked, ", partial(_comb, width)) for width in _WIDTHS]
     return Standard(np.array([known]), DIGITS, {"conduction": works})
 
 
@@ -97,8 +103,13 @@ def lines_across() -> Standard:
 
 def electrode() -> Standard:
     """Three layers of 100 x 10 mm, across, along and across, in two walls; contacts of 1e-4 ohm m2."""
+
+    def printed() -> Values:
+        lines = plate(100.0, 10.0, _LINE_MM, _LAYER_MM, (90, 180, 90))
+        return np.array([traxels.resistance(lines, _RHO_OHM_M, 1e-4, (-48.9e-3, 48.9e-3), 3e-6).ratio])
+
     return Standard(
-        np.array([1.422]), 0.05, {"traxels": [("", _electrode)], "traxels: as a solid": [("", lambda: np.ones(1))]}
+        np.array([1.422]), 0.05, {"traxels": [("", printed)], "traxels: as a solid": [("", lambda: np.ones(1))]}
     )
 
 
@@ -121,7 +132,14 @@ def points(name: str, budget_s: float) -> list[Point]:
     budget_s : float
         A finer grid is not tried where that would take longer, estimated as ten times the last one [s].
     """
-    return list(_points(name, STANDARD[name](), budget_s))
+    standard = STANDARD[name]()
+
+    def judge(found: Values) -> tuple[float, str]:
+        pairs = [(part(found), part(standard.known)) for part in (np.asarray, np.real)]
+        off = max(float(np.max(abs(ours - known) / abs(known))) for ours, known in pairs)
+        return max(off, standard.known_to), f"off by {off:.3g} at most"
+
+    return list(climbed(name, standard.models.items(), judge, budget_s))
 
 
 def why_not_applicable(_: str) -> dict[str, str]:
@@ -130,29 +148,10 @@ def why_not_applicable(_: str) -> dict[str, str]:
     return {"stack": other, "sheet": other, "conduction": other, "traxels": other, "line": other}
 
 
-def _points(name: str, standard: Standard, budget_s: float) -> Iterator[Point]:
-    for model, works in standard.models.items():
-        for said, work in works:
-            found, seconds = timed(work)
-            off = max(_off(part(found), part(standard.known)) for part in (np.asarray, np.real))
-            yield Point(name, model, max(off, standard.known_to), seconds, f"{said}off by {off:.3g} at most")
-            if 10 * seconds > budget_s:
-                break
-
-
-def _off(found: Values, known: Values) -> float:
-    return float(np.max(abs(found - known) / abs(known)))
-
-
 def _sections() -> tuple[list[list[float]], Values]:
     """Tracks of each section, and its films' admittances, tone by tone [S/m]."""
     free = 2j * np.pi * np.array(_TONES_HZ)[:, None] * np.array(_FILMS)
     return [list(_TRACKS)] * 3, np.stack([free, free * _PRESSED, free])
-
-
-def _stacked() -> Values:
-    tracks, films = _sections()
-    return stack.impedance(tracks, [list(section.T) for section in films], _LENGTHS_M)
 
 
 def _alone() -> Values:
@@ -164,11 +163,6 @@ def _alone() -> Values:
         lengths = [np.asarray(length) for length in _LENGTHS_M]
         found[:, k, k] = line.cascade(loop, list(films[:, :, k]), lengths, "open")
     return found
-
-
-def _between(port: list[Any], cells: int) -> Values:
-    z = sheet.impedance(_SHEET, port, 0.0, cells=cells)[0, 0, 0]
-    return np.array([z.real / _SHEET.sheet_resistance_ohm[0]])
 
 
 def _comb(width: float) -> Values:
@@ -190,8 +184,3 @@ def _across() -> Values:
     span, area = (0.0, float(x[-1])), high * 2 * reach
     found = [traxels.resistance(lines, _RHO_OHM_M, contact, span, area).ratio for contact in _CONTACTS_OHM_M2]
     return (1 + (_ACROSS - 1) * np.array(found)) / _ACROSS
-
-
-def _electrode() -> Values:
-    lines = plate(100.0, 10.0, _LINE_MM, _LAYER_MM, (90, 180, 90))
-    return np.array([traxels.resistance(lines, _RHO_OHM_M, 1e-4, (-48.9e-3, 48.9e-3), 3e-6).ratio])

@@ -3,7 +3,7 @@
 The error is the largest one over the loads, of the displacement of the top, or of the rise of the capacitance.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,7 +18,7 @@ from sensorgen.models import compression, fem2d, press2d, press3d, springs, thes
 from sensorgen.models.press2d import Elastic, Fineness
 from sensorgen.scene.scene import Fill, Scene
 from sensorgen.solvers.contact.mesh import netgen
-from sensorgen.verification.chart.measured import Point, timed
+from sensorgen.verification.chart.measured import Ladder, Level, Point, climbed, relative
 
 Real = NDArray[np.float64]
 
@@ -94,10 +94,9 @@ def points(name: str, budget_s: float) -> list[Point]:
     """
     film, what = STANDARD[name]
     known = CELLS[film]
-    found = _down(known, budget_s) if what == _DOWN else _rise(known, budget_s)
     expected = known.down_um if what == _DOWN else known.rise_pf_per_m
-    floor = known.known_to[what != _DOWN]
-    return [_point(name, model, said, value, expected, floor, seconds) for model, said, value, seconds in found]
+    judge = relative(expected, known.known_to[what != _DOWN], "off by {:+.2%} at most")
+    return list(climbed(name, _down(known) if what == _DOWN else _rise(known), judge, budget_s))
 
 
 def why_not_applicable(name: str) -> dict[str, str]:
@@ -109,43 +108,34 @@ def why_not_applicable(name: str) -> dict[str, str]:
     return said | {"springs": "it has a displacement and no capacitance"}
 
 
-Found = Iterator[tuple[str, str, Real, float]]
-
-
-def _down(known: Known, budget_s: float) -> Found:
+def _down(known: Known) -> Iterator[Ladder]:
     """Displacement of the top by each model, in um."""
-    for name, law in _laws(known).items():
-        value, seconds = timed(lambda law=law: law.capacitive_strain(known.stress_pa())[0] * known.height_m())  # type: ignore[misc]
-        yield f"compression: {name}", "", 1e6 * value, seconds
+    for law in _laws(known):
+        yield f"compression: {law.name}", [("", partial(_by_law, known, law, rise=False))]
     plane = {name: s.youngs_modulus_pa / (1 - s.poisson_ratio**2) for name, s in _SOLIDS.items()}
-    value, seconds = timed(lambda: springs.displacement_m(_scene(known), plane, list(known.stress_pa())))
-    yield "springs", "", 1e6 * value, seconds
-    for said, pressed, seconds in _pressed(known, budget_s):
-        yield "press2d", said, 1e6 * pressed.displacement_m[1:], seconds
+    yield "springs", [("", lambda: 1e6 * springs.displacement_m(_scene(known), plane, list(known.stress_pa())))]
+    yield "press2d", _levels(known, None)
 
 
-def _rise(known: Known, budget_s: float) -> Found:
+def _rise(known: Known) -> Iterator[Ladder]:
     """Rise of the capacitance by each model, in pF/m."""
-    for name, law in _laws(known).items():
-        value, seconds = timed(lambda law=law: 1 / (1 - law.capacitive_strain(known.stress_pa())[0]) - 1)  # type: ignore[misc]
-        yield f"compression: {name}", "", known.rest_pf_per_m * value, seconds
-    by_hand = {"thesis_swept: formula 3.35": _swept_formula, "thesis_swept: field": _swept_field}
+    for law in _laws(known):
+        yield f"compression: {law.name}", [("", partial(_by_law, known, law, rise=True))]
+    by_hand = {"formula 3.35": lambda q: thesis_cells.triangles_f_per_m2(q, _EPS["x60"]), "field": _field_f_per_m2}
     for name, work in by_hand.items():
-        value, seconds = timed(partial(work, known))
-        yield name, "displacement given, ", 1e12 * (value[1:] - value[0]), seconds
-    for said, pressed, seconds in _pressed(known, budget_s, _EPS):
-        if None in pressed.capacitance_f_per_m2:
-            continue  # too coarse for a field
-        per_area = np.array([c.middle() for c in pressed.capacitance_f_per_m2 if c])
-        rise = (per_area - per_area[0])[1:] * known.params().period_mm * M_PER_MM
-        yield "press2d", said, 1e12 * rise, seconds
+        yield f"thesis_swept: {name}", [("displacement given, ", partial(_swept, known, work))]
+    yield "press2d", _levels(known, _EPS)
 
 
-def _laws(known: Known) -> dict[str, compression.Plate]:
+def _laws(known: Known) -> tuple[compression.Plate, ...]:
     """The film as a plate; the solved curves of :mod:`sensorgen.models.compression` are the reference here."""
     modulus = _SOLIDS["x60"].youngs_modulus_pa
-    laws = compression.unconfined(modulus), compression.bonded(modulus, _WIDTH_M, known.film_mm * M_PER_MM)
-    return {law.name: law for law in laws}
+    return compression.unconfined(modulus), compression.bonded(modulus, _WIDTH_M, known.film_mm * M_PER_MM)
+
+
+def _by_law(known: Known, law: compression.Plate, *, rise: bool) -> Real:
+    strain = law.capacitive_strain(known.stress_pa())[0]
+    return np.asarray(known.rest_pf_per_m * (1 / (1 - strain) - 1) if rise else 1e6 * strain * known.height_m())
 
 
 def _scene(known: Known) -> Scene:
@@ -161,43 +151,35 @@ def has_mesher() -> bool:
     return True
 
 
-def _pressed(
-    known: Known, budget_s: float, permittivity: dict[str, float] | None = None
-) -> Iterator[tuple[str, press2d.Pressed, float]]:
-    """Finite elements from coarse to fine, where the whole load was reached."""
-    cell = press2d.cell(_scene(known), known.params().period_mm)
-    stress = [0.0, *known.stress_pa()]
-    for mesh in _MESHES if has_mesher() else ():
-        found, seconds = timed(lambda mesh=mesh: press2d.press(cell, _SOLIDS, stress, permittivity, fineness=mesh))  # type: ignore[misc]
-        if found.converged_pa == stress[-1]:
-            yield f"triangles of {1e3 * mesh.apex_mm:g} µm at the apex, ", found, seconds
-        if 10 * seconds > budget_s:
-            return
+def _levels(known: Known, permittivity: dict[str, float] | None) -> list[Level]:
+    """Finite elements from coarse to fine."""
+    return [
+        (f"triangles of {1e3 * mesh.apex_mm:g} µm at the apex, ", partial(_pressed, known, permittivity, mesh))
+        for mesh in _MESHES if has_mesher()
+    ]  # fmt: skip
+
+
+def _pressed(known: Known, permittivity: dict[str, float] | None, mesh: Fineness) -> Real | None:
+    """Displacement [um], or with permittivities the rise [pF/m]; None where not the whole load was reached."""
+    cell, stress = press2d.cell(_scene(known), known.params().period_mm), [0.0, *known.stress_pa()]
+    found = press2d.press(cell, _SOLIDS, stress, permittivity, fineness=mesh)
+    if found.converged_pa != stress[-1]:
+        return None
+    if permittivity is None:
+        return 1e6 * found.displacement_m[1:]
+    if None in found.capacitance_f_per_m2:
+        return None  # too coarse for a field
+    per_area = np.array([c.middle() for c in found.capacitance_f_per_m2 if c])
+    return np.asarray(1e12 * (per_area - per_area[0])[1:] * known.params().period_mm * M_PER_MM)
 
 
 def _swept(known: Known, work: Callable[[tri.Params], float]) -> Real:
-    """Per depth of a period, at rest and at each displacement, of sizes that are changed by hand [F/m]."""
-    presses: Sequence[float] = (0.0, *(um * 1e-3 for um in known.down_um))
-    sizes = [thesis_swept.swept(known.params(), press) for press in presses]
-    return np.array([work(q) * q.period_mm * M_PER_MM for q in sizes])
-
-
-def _swept_formula(known: Known) -> Real:
-    return _swept(known, lambda q: thesis_cells.triangles_f_per_m2(q, _EPS["x60"]))
-
-
-def _swept_field(known: Known) -> Real:
-    return _swept(known, _field_f_per_m2)
+    """Rise per depth of a period of sizes that are changed by hand to each displacement, in pF/m."""
+    sizes = [thesis_swept.swept(known.params(), um * 1e-3) for um in (0.0, *known.down_um)]
+    value = np.array([work(q) * q.period_mm * M_PER_MM for q in sizes])
+    return np.asarray(1e12 * (value[1:] - value[0]))
 
 
 def _field_f_per_m2(p: tri.Params) -> float:
     scene = tri.scene(tri.Params(**{**vars(p), "length_mm": p.period_mm, "width_mm": 1.0}), Fill())
     return fem2d.capacitance(scene, _EPS, 1e-4).middle() / (p.period_mm * M_PER_MM**2)
-
-
-def _point(
-    scene: str, model: str, said: str, value: Real, expected: Sequence[float], floor: float, seconds: float
-) -> Point:
-    off = value / np.array(expected) - 1
-    worst = off[np.argmax(np.abs(off))]
-    return Point(scene, model, max(float(abs(worst)), floor), seconds, f"{said}off by {worst:+.2%} at most")

@@ -5,7 +5,6 @@ the larger one
 of force, as a share of it, and position, as a share of the sensor's length.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 
@@ -16,7 +15,7 @@ from sensorgen.models import compression, line, line_fit
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.inverse import Estimator
 from sensorgen.verification.chart import lines
-from sensorgen.verification.chart.measured import DIGITS, Point, timed
+from sensorgen.verification.chart.measured import DIGITS, Ladder, Point, climbed
 
 ASKED = "force and position from an impedance"
 _LINE = lines.STANDARD["line, seven tones"]
@@ -30,20 +29,40 @@ STANDARD = {"inversion of a load": (_LINE.force_n, lines.PLATE["left_m"] + _TIP_
 Press = tuple[float, float]
 
 
-def points(name: str, _: float) -> list[Point]:
+def points(name: str, budget_s: float) -> list[Point]:
     """Measure every inversion; what is prepared once for a sensor is not in its time.
 
     Parameters
     ----------
     name : str
         Of ``STANDARD``.
+    budget_s : float
+        Of no effect: each inversion is asked once [s].
     """
-    ways: dict[str, Callable[[], Press]] = {
-        **{f"line_fit: {form}": partial(_by_fit, form) for form in line_fit.FORMS},
-        "line_fit: C.5 as printed": _as_printed,
-        "invert: seven tones": _sought,
-    }
-    return [_point(name, model, *timed(work)) for model, work in ways.items()]
+    force, position = STANDARD[name]
+
+    def judge(found: Press) -> tuple[float, str]:
+        off = abs(found[0] / force - 1), abs(found[1] - position) / _LENGTH_M
+        return max(*off, DIGITS), f"{found[0]:.6g} N at {1e3 * found[1]:.6g} mm"
+
+    def by_fit(form: str) -> Press:
+        found = _fitted(form).presses(*line_fit.series(_FIT_HZ, _READING[[_FIT]]))
+        return float(found.force_n[0]), float(found.choice(_LENGTH_M)[0])
+
+    def as_printed() -> Press:
+        c, fit = line_fit.series(_FIT_HZ, _READING[[_FIT]])[0], _fitted("printed")
+        return float(fit.force_n(c)[0]), float(fit.printed_position_m(c)[0])
+
+    def sought() -> Press:
+        found = _estimator().one(_READING)
+        return found.force_n, found.position_m
+
+    ladders: list[Ladder] = [
+        *((f"line_fit: {form}", [("", partial(by_fit, form))]) for form in line_fit.FORMS),
+        ("line_fit: C.5 as printed", [("", as_printed)]),
+        ("invert: seven tones", [("", sought)]),
+    ]
+    return list(climbed(name, ladders, judge, budget_s))
 
 
 def why_not_applicable(_: str) -> dict[str, str]:
@@ -59,36 +78,10 @@ def _fitted(form: str) -> line_fit.LineFit:
     return line_fit.fit(force, x + _TIP_M / 2, *line_fit.series(_FIT_HZ, z), form)
 
 
-def _by_fit(form: str) -> Press:
-    found = _fitted(form).presses(*line_fit.series(_FIT_HZ, _READING[[_FIT]]))
-    return float(found.force_n[0]), float(found.choice(_LENGTH_M)[0])
-
-
-def _as_printed() -> Press:
-    capacitance, _ = line_fit.series(_FIT_HZ, _READING[[_FIT]])
-    fit = _fitted("printed")
-    return float(fit.force_n(capacitance)[0]), float(fit.printed_position_m(capacitance)[0])
-
-
 @cache
 def _estimator() -> Estimator:
     p = lines.PLATE
     film = EPS0_F_PER_M * p["eps_r"] * p["width_m"] / p["film_m"]
-    high, rho = (
-        (p["top_thickness_m"], p["bottom_thickness_m"]),
-        (p["top_resistivity_ohm_m"], p["bottom_resistivity_ohm_m"]),
-    )
+    high, rho = ((p[f"top_{of}"], p[f"bottom_{of}"]) for of in ("thickness_m", "resistivity_ohm_m"))
     law = compression.unconfined(p["modulus_pa"])
     return Estimator(Sensor(_LENGTH_M, p["width_m"], high, rho, film, law, _TIP_M), _TONES)
-
-
-def _sought() -> Press:
-    found = _estimator().one(_READING)
-    return found.force_n, found.position_m
-
-
-def _point(scene: str, model: str, found: Press, seconds: float) -> Point:
-    force, position = STANDARD[scene]
-    off = abs(found[0] / force - 1), abs(found[1] - position) / _LENGTH_M
-    said = f"{found[0]:.6g} N at {1e3 * found[1]:.6g} mm"
-    return Point(scene, model, max(*off, DIGITS), seconds, said)

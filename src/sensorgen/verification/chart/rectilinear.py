@@ -46,43 +46,27 @@ def plate(
 
 
 def _paths(size: NDArray[np.float64], line: float, degrees: float, walls: int) -> Iterator[Path]:
+    """Walls, and lines a width apart within them, joined along a side where two ends lie on the same one."""
     for k in range(walls):
         x, y = size / 2 - (k + 0.5) * line
         yield [np.array(p) for p in ((x, y), (-x, y), (-x, -y), (x, -y), (x, y))]
-    inset = (walls + 0.5 - OVERLAP) * line if walls else line / 2
-    yield from _infill(size / 2 - inset, line, radians(degrees))
-
-
-def _infill(half: NDArray[np.float64], line: float, angle: float) -> Iterator[Path]:
-    """Lines a width apart through a rectangle, joined along its sides where two ends lie on the same one."""
+    half = size / 2 - ((walls + 0.5 - OVERLAP) * line if walls else line / 2)
+    angle = radians(degrees)
     way, across = np.array([cos(angle), sin(angle)]), np.array([-sin(angle), cos(angle)])
     reach = float(np.abs(across) @ half)
     count = int(2 * reach / line + 1 + 1e-9)
     path: Path = []
     for k in range(count):
-        ends = _through(half, way, across * ((k - (count - 1) / 2) * line))
-        if ends is None:
+        at = across * ((k - (count - 1) / 2) * line)
+        with np.errstate(divide="ignore"):  # along a side
+            ends = np.sort([(-half - at) / way, (half - at) / way], axis=0)[:, np.abs(way) > 1e-12]
+        low, high = ends[0].max(), ends[1].min()
+        if high - low <= 1e-6:  # it only touches a corner
             continue
-        first, last = ends if k % 2 == 0 else ends[::-1]
-        if path and not _same_side(path[-1], first, half):
+        first, last = (at + low * way, at + high * way) if k % 2 == 0 else (at + high * way, at + low * way)
+        if path and not (np.isclose(np.abs(first), half, atol=1e-9) & np.isclose(path[-1], first, atol=1e-9)).any():
             yield path
             path = []
         path += [first, last]
     if path:
         yield path
-
-
-def _through(half: NDArray[np.float64], way: NDArray[np.float64], at: NDArray[np.float64]) -> Path | None:
-    """Where a line enters and leaves a rectangle; None where it only touches a corner."""
-    low, high = -np.inf, np.inf
-    for axis in (0, 1):
-        if abs(way[axis]) > 1e-12:
-            a, b = sorted(((-half[axis] - at[axis]) / way[axis], (half[axis] - at[axis]) / way[axis]))
-            low, high = max(low, a), min(high, b)
-    return [at + low * way, at + high * way] if high - low > 1e-6 else None
-
-
-def _same_side(a: NDArray[np.float64], b: NDArray[np.float64], half: NDArray[np.float64]) -> bool:
-    """Whether two places lie on one side of a rectangle, and apart."""
-    on = np.isclose(np.abs(a), half, atol=1e-9) & np.isclose(a, b, atol=1e-9)
-    return bool(on.any())

@@ -13,12 +13,13 @@ from sensorgen.models import press2d, pressure
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.scene.scene import Body, Prism, Scene, box
 from sensorgen.solvers.contact.cell import Cell
-from sensorgen.verification.chart.measured import DIGITS, Point, timed
+from sensorgen.verification.chart.measured import DIGITS, Ladder, Point, climbed, relative
 from sensorgen.verification.chart.presses import has_mesher
 
 ASKED = "how wide a round body touches"
 _RADIUS_MM, _HALF_MM, _DEEP_MM, _FLAT_MM = 1.0, 0.02, 10.0, 0.1
 _SOLIDS = {"soft": Elastic(6e6, 0.3), "stiff": Elastic(6e11, 0.3)}
+_PLANE_PA = 6e6 / (1 - 0.3**2)
 _SIDES_MM = (8e-3, 4e-3, 2e-3)  # where it touches
 
 STANDARD = {"cylinder on a flat": 2 * _HALF_MM * M_PER_MM}  # length of the contact [m]
@@ -34,14 +35,9 @@ def points(name: str, budget_s: float) -> list[Point]:
     budget_s : float
         A finer mesh is not tried where that would take longer, estimated as ten times the last one [s].
     """
-    length, seconds = timed(_formula)
-    found = [_point(name, "pressure: hertz", "", length, seconds)]
-    for side in _SIDES_MM if has_mesher() else ():
-        length, seconds = timed(partial(_solved, side))
-        found.append(_point(name, "press2d", f"sides of {1e3 * side:g} µm, ", length, seconds))
-        if 10 * seconds > budget_s:
-            break
-    return found
+    levels = [(f"sides of {1e3 * side:g} µm, ", partial(_solved, side)) for side in _SIDES_MM if has_mesher()]
+    ladders: list[Ladder] = [("pressure: hertz", [("", _formula)]), ("press2d", levels)]
+    return list(climbed(name, ladders, relative(STANDARD[name], DIGITS, "off by {:+.3g}"), budget_s))
 
 
 def why_not_applicable(_: str) -> dict[str, str]:
@@ -51,18 +47,13 @@ def why_not_applicable(_: str) -> dict[str, str]:
             "springs": no_film, "compression": no_film}  # fmt: skip
 
 
-def _plane_pa() -> float:
-    soft = _SOLIDS["soft"]
-    return soft.youngs_modulus_pa / (1 - soft.poisson_ratio**2)
-
-
 def _load_n_per_m() -> float:
     """That makes a contact of the standard's length, by Hertz."""
-    return pi * _plane_pa() * (_HALF_MM * M_PER_MM) ** 2 / (4 * _RADIUS_MM * M_PER_MM)
+    return pi * _PLANE_PA * (_HALF_MM * M_PER_MM) ** 2 / (4 * _RADIUS_MM * M_PER_MM)
 
 
 def _formula() -> float:
-    length, _ = pressure.hertz(_RADIUS_MM * M_PER_MM, _plane_pa()).length_m(np.asarray(_load_n_per_m()), 1.0)
+    length, _ = pressure.hertz(_RADIUS_MM * M_PER_MM, _PLANE_PA).length_m(np.asarray(_load_n_per_m()), 1.0)
     return float(length)
 
 
@@ -94,8 +85,3 @@ def _cylinder(side_mm: float) -> Cell:
         Body("cylinder", "soft", (Prism("y", tuple(map(tuple, outline.tolist())), 0.0, _DEEP_MM),)),
     )
     return press2d.cell(Scene(bodies, (2 * middle, _DEEP_MM, top)), 2 * middle)
-
-
-def _point(scene: str, model: str, said: str, length: float, seconds: float) -> Point:
-    off = length / STANDARD[scene] - 1
-    return Point(scene, model, max(abs(off), DIGITS), seconds, f"{said}off by {off:+.3g}")

@@ -10,7 +10,7 @@ from pydantic import Field
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput
 from sensorgen.core.records import Strict, checked
-from sensorgen.verification.thesis.verdicts import EXACT, Expected
+from sensorgen.verification.thesis.verdicts import EXACT
 
 CHAPTERS = ("2", "3", "4", "5", "6", "7", "B", "C", "D")
 Kind = Literal["equation", "figure", "table"]
@@ -30,10 +30,12 @@ class Item(Strict):
         Module and function in ``checks/`` that computes it, or "".
     given : dict
         Arguments of that function: mostly the thesis's own values.
-    tolerance, off, within, erratum, because
-        As of :class:`sensorgen.verification.thesis.verdicts.Expected`.
-    why_tolerance : str
-        Why a larger tolerance than rounding is right.
+    tolerance, why_tolerance : float, str
+        Relative distance up to which the thesis and we agree [-]; why a larger one than rounding is right.
+    erratum, because : str
+        What is misprinted; why a difference is no misprint. Or "".
+    off, within : dict of str to float, float
+        By part, how far the thesis then is from ours, and the tolerance of that [-].
     lost, uncovered : str
         Why it cannot be reproduced; why nothing here covers it. What a check then gives is shown, not judged.
     """
@@ -50,10 +52,6 @@ class Item(Strict):
     because: Text = ""
     lost: Text = ""
     uncovered: Text = ""
-
-    def expected(self) -> Expected:
-        """Its announced verdict."""
-        return Expected(self.tolerance, self.erratum, self.because, self.off, self.within)
 
 
 class Chapter(Strict):

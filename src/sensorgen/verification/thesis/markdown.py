@@ -36,22 +36,21 @@ def words(rows: Sequence[Row]) -> list[str]:
 
 
 def _lines(rows: Sequence[Row]) -> Iterator[str]:
-    yield "# The thesis, reproduced"
-    yield ""
-    yield "Written by `sensorgen thesis`; a test holds the two together."
-    yield ""
-    yield ABOUT
-    yield ""
+    yield from ("# The thesis, reproduced", "", "Written by `sensorgen thesis`; a test holds the two together.", "")
+    yield from (ABOUT, "")
     yield from (f"- **{word}**: {VERDICTS[word]}" for word in words(rows))
     yield ""
-    yield from _summary(rows)
+    yield f"| | {' | '.join(f'{kind}s' for kind in KINDS)} | all |"
+    yield f"|---|{'---|' * (len(KINDS) + 1)}"
+    for word, counts in counted(rows):
+        yield f"| {word or 'all'} | {' | '.join(map(str, counts))} |"
     for name in CHAPTERS:
-        yield ""
-        yield f"## {heading(name)}"
-        yield ""
+        yield from ("", f"## {heading(name)}", "")
         yield "| number | what it says | thesis | ours | verdict | erratum |"
         yield "|---|---|---|---|---|---|"
-        yield from (_row(row) for row in rows if row.chapter == name)
+        for row in rows:
+            if row.chapter == name:
+                yield f"| {' | '.join(_cells(row))} |"
 
 
 def heading(name: str) -> str:
@@ -66,29 +65,12 @@ def counted(rows: Sequence[Row]) -> Iterator[tuple[str, list[int]]]:
         yield word, [*(found[kind] for kind in KINDS), sum(found.values())]
 
 
-def _summary(rows: Sequence[Row]) -> Iterator[str]:
-    yield f"| | {' | '.join(f'{kind}s' for kind in KINDS)} | all |"
-    yield f"|---|{'---|' * (len(KINDS) + 1)}"
-    for word, counts in counted(rows):
-        yield f"| {word or 'all'} | {' | '.join(map(str, counts))} |"
-
-
-def _row(row: Row) -> str:
-    item = row.item
-    cells = (
-        row.name(),
-        item.says,
-        "; ".join(shown.thesis(row.parts, item.tolerance)),
-        "; ".join(shown.ours(row.parts, item.tolerance)),
-        verdict(row),
-        item.erratum,
-    )
-    return f"| {' | '.join(map(_cell, cells))} |"
-
-
-def _cell(text: str) -> str:
+def _cells(row: Row) -> Iterator[str]:
     """Without what Markdown would take for a new cell, or for HTML."""
-    return text.replace("|", "&#124;").replace("<", "&lt;")
+    parts, item = row.parts, row.item
+    values = "; ".join(shown.thesis(parts, item.tolerance)), "; ".join(shown.ours(parts, item.tolerance))
+    for text in (row.name(), item.says, *values, verdict(row), item.erratum):
+        yield text.replace("|", "&#124;").replace("<", "&lt;")
 
 
 def verdict(row: Row) -> str:

@@ -59,11 +59,13 @@ def row(of_chapter: str, kind: Kind, item: Item) -> Row:
     elif item.uncovered:
         verdict = Verdict(NOT_COVERED, f"({item.uncovered})")
     else:
-        verdict = judged(item.expected(), parts)
+        verdict = judged(item, parts)
     return Row(of_chapter, kind, item, parts, verdict)
 
 
 def _computed(check: str, given: Mapping[str, Any]) -> list[Part]:
-    module, _, function = check.partition(".")
-    found: list[Part] = getattr(registry.load(checks, module), function)(**given)
+    name, _, check = check.partition(".")
+    module = registry.load(checks, name)
+    work = getattr(module, "EQUATIONS", {}).get(check) or getattr(module, check)
+    found: list[Part] = work(**given)
     return found

@@ -20,7 +20,12 @@ _PREFIXED = ("A", "C", "F", "Hz", "N", "Pa", "S", "V", "m", "ohm")  # units that
 
 def thesis(parts: Sequence[Part], tolerance: float) -> list[str]:
     """The thesis's values: those that differ, or all where they are few."""
-    return [_line(part, _printed(part)) for part in _chosen(parts, tolerance) if part.printed is not None]
+    found = []
+    for part in _chosen(parts, tolerance):
+        if part.printed is not None:
+            corrected = "" if part.corrected is None else f"; corrected {_number(part, part.corrected)}"
+            found.append(f"{part.name}: {_number(part, part.printed)}{corrected}")
+    return found
 
 
 def ours(parts: Sequence[Part], tolerance: float) -> list[str]:
@@ -28,23 +33,13 @@ def ours(parts: Sequence[Part], tolerance: float) -> list[str]:
     chosen = _chosen(parts, tolerance)
     more = len(parts) - len(chosen)
     rest = [f"{more} more values that agree"] if more else []
-    return [_line(part, _number(part, part.ours)) for part in chosen] + rest
+    return [f"{part.name}: {_number(part, part.ours)}" for part in chosen] + rest
 
 
 def _chosen(parts: Sequence[Part], tolerance: float) -> Sequence[Part]:
     if len(parts) <= _FEW:
         return parts
-    wrong = [part for part in parts if not abs(part.off()) <= tolerance]
-    return wrong or parts[:_FEW]
-
-
-def _line(part: Part, value: str) -> str:
-    return f"{part.name}: {value}"
-
-
-def _printed(part: Part) -> str:
-    corrected = "" if part.corrected is None else f"; corrected {_number(part, part.corrected)}"
-    return f"{_number(part, part.printed)}{corrected}" if part.printed is not None else ""
+    return [part for part in parts if not abs(part.off()) <= tolerance] or parts[:_FEW]
 
 
 def _number(part: Part, values: ArrayLike) -> str:
@@ -62,7 +57,9 @@ def number(values: ArrayLike, unit: str = "", scale: float = 0.0, digits: int = 
     if np.isnan(flat).all():
         return _NONE
     large = max((abs(v) for v in flat.tolist() if not np.isnan(v)), default=0.0)
-    power = _power(large if large > _NOISE * scale else 0.0, unit)
+    power = 0  # of ten, by which a unit is prefixed so that the largest value has one to three digits before its point
+    if unit.partition("/")[0] in _PREFIXED and large > _NOISE * scale:
+        power = max((p for p in _PREFIXES if large >= 10.0**p * (1 - _NOISE)), default=0)
     texts = [_one(value / 10.0**power, _NOISE * max(large, scale) / 10.0**power, digits) for value in flat.tolist()]
     end = f" {_PREFIXES[power]}{unit}" if unit else ""
     if len(texts) <= (_FEW if np.iscomplexobj(flat) else _FEW_REAL):
@@ -70,22 +67,11 @@ def number(values: ArrayLike, unit: str = "", scale: float = 0.0, digits: int = 
     return f"{texts[0]} {ELLIPSIS} {texts[-1]}{end} ({len(texts)} values)"
 
 
-def _power(large: float, unit: str) -> int:
-    """Of ten, by which a unit is prefixed so that the largest value has one to three digits before its point."""
-    if unit.partition("/")[0] not in _PREFIXED:
-        return 0
-    return max((p for p in _PREFIXES if large >= 10.0**p * (1 - _NOISE)), default=0)
-
-
 def _one(value: complex, noise: float, digits: int) -> str:
     if np.isnan(value):
         return _NONE
     real, imaginary = (0.0 if abs(v) <= noise else v for v in (value.real, value.imag))
+    shown = [f"{v:.{digits}g}".replace("-", MINUS) for v in (real, imaginary, abs(imaginary))]
     if not isinstance(value, complex) or not imaginary:
-        return _real(real, digits)
-    sign = MINUS if imaginary < 0 else "+"
-    return f"{_real(real, digits)} {sign} {_real(abs(imaginary), digits)}j" if real else f"{_real(imaginary, digits)}j"
-
-
-def _real(value: float, digits: int) -> str:
-    return f"{value:.{digits}g}".replace("-", MINUS)
+        return shown[0]
+    return f"{shown[0]} {MINUS if imaginary < 0 else '+'} {shown[2]}j" if real else f"{shown[1]}j"

@@ -1,12 +1,15 @@
 """What came of holding a number of the thesis against ours."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from math import floor, log10
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from sensorgen.verification.thesis.items import Item
 
 AGREES = "agrees"
 MISPRINT = "misprint confirmed"
@@ -72,29 +75,6 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Expected:
-    """Announced verdict of an item.
-
-    Attributes
-    ----------
-    tolerance : float
-        Up to which relative distance the thesis and we agree [-].
-    erratum, because : str
-        What is misprinted; why a difference is no misprint. Or "".
-    off : mapping of str to float
-        By part, how far the thesis then is from ours [-].
-    within : float
-        Tolerance [-].
-    """
-
-    tolerance: float = EXACT
-    erratum: str = ""
-    because: str = ""
-    off: Mapping[str, float] = field(default_factory=dict)
-    within: float = 0.0
-
-
-@dataclass(frozen=True)
 class Verdict:
     """One of ``WORDS``, and what it rests on."""
 
@@ -106,34 +86,29 @@ class Verdict:
         return f"{self.word}{self.why and ' '}{self.why}"
 
 
-def judged(expected: Expected, parts: Sequence[Part]) -> Verdict:
+def judged(item: "Item", parts: Sequence[Part]) -> Verdict:
     """The verdict over all parts of an item: the worst of them decides.
 
     Parameters
     ----------
-    expected : Expected
+    item : Item
         A misprint or a difference that is announced has to be found, and one that is found has to be announced.
     parts : sequence of Part
         What was computed.
     """
-    wrong = [part for part in parts if not abs(part.off()) <= expected.tolerance]
-    announced = any(part.corrected is not None for part in parts)
-    if not wrong and (announced or expected.off):
+    wrong = [part for part in parts if not abs(part.off()) <= item.tolerance]
+    if not wrong and (item.off or any(part.corrected is not None for part in parts)):
         return Verdict(UNEXPLAINED, "(what is announced as wrong agrees with ours)")
     if not wrong:
         return Verdict(AGREES, f"to {digits(max(abs(part.off()) for part in parts))}")
-    if all(part.mended() <= expected.tolerance for part in wrong) and expected.erratum:
+    if all(part.mended() <= item.tolerance for part in wrong) and item.erratum:
         return Verdict(MISPRINT, f"(corrected: to {digits(max(part.mended() for part in wrong))})")
-    if expected.because and all(_as_announced(expected, part) for part in wrong):
+    announced = all(abs(part.off() - item.off.get(part.name, np.nan)) <= item.within for part in wrong)
+    if item.because and announced:
         worst = max(wrong, key=lambda part: abs(part.off()))
-        return Verdict(DIFFERS, f"(the thesis has {share(worst.off())}), because {expected.because}")
+        return Verdict(DIFFERS, f"(the thesis has {share(worst.off())}), because {item.because}")
     named = ", ".join(f"{part.name} {share(part.off())}" for part in wrong)
     return Verdict(UNEXPLAINED, f"(off: {named})")
-
-
-def _as_announced(expected: Expected, part: Part) -> bool:
-    announced = expected.off.get(part.name)
-    return announced is not None and abs(part.off() - announced) <= expected.within
 
 
 def digits(off: float) -> str:

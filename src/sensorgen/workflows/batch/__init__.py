@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from sensorgen.checks.review import Review, Step, review
+from sensorgen.checks.review import Review, Step, lost, review
 from sensorgen.core import files as store
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput, OutOfRange, Unprintable
@@ -78,10 +78,14 @@ class Batch:
     findings: dict[str, list[Finding]]
 
     def errors(self, *, force: bool = False) -> bool:
-        """Whether a file for the printer has errors, or, unless ``force``, a layer of a body is not printed at all."""
+        """Whether a file for the printer has errors, or, unless ``force``, a layer of a body is not printed at all.
+
+        Without G-code, by the checks' estimate.
+        """
         plates = self.record.slicers.values()
-        lost = any(made.lost for plate in plates for made in plate.printed.values())
-        return any(plate.errors() for plate in plates) or (lost and not force)
+        estimated = [] if plates else [bool(lost(found)) for found in self.findings.values()]
+        missing = any([*estimated, *(made.lost for plate in plates for made in plate.printed.values())])
+        return any(plate.errors() for plate in plates) or (missing and not force)
 
     def to_json(self) -> str:
         """The folder, then the record."""

@@ -44,17 +44,12 @@ def _reactance(layers: Sequence[Layer]) -> float:
     return sum(t * M_PER_MM / (OMEGA * EPS0_F_PER_M * PERMITTIVITY[name] * area) for name, t in layers)
 
 
-def _cog(height_mm: float) -> float:
-    """Resistance of a cog by 2.9 [ohm]."""
-    return RHO_OHM_M * height_mm / (_WIDTH_MM * _DEPTH_MM * M_PER_MM)
-
-
 def rung(number: int) -> list[Part]:
-    """2.19 to 2.22: reactances added to a resistance as though they were real."""
+    """2.19 to 2.22: reactances added to a resistance, that of the cog by 2.9, as though they were real."""
     layers, cog_mm = _RUNGS[number]
-    ours = _cog(cog_mm) + 1 / (1j * OMEGA * piles_f([(_WIDTH_MM, layers)], _DEPTH_MM))
-    printed = complex(_cog(cog_mm) + _reactance(layers))
-    return [Part(f"Z_{number}", "ohm", ours, printed, _cog(cog_mm) - 1j * _reactance(layers))]
+    cog = RHO_OHM_M * cog_mm / (_WIDTH_MM * _DEPTH_MM * M_PER_MM)
+    ours = cog + 1 / (1j * OMEGA * piles_f([(_WIDTH_MM, layers)], _DEPTH_MM))
+    return [Part(f"Z_{number}", "ohm", ours, complex(cog + _reactance(layers)), cog - 1j * _reactance(layers))]
 
 
 def rungs() -> list[Part]:

@@ -34,35 +34,28 @@ def _pressed(
     return found
 
 
-def _moved_m(found: compressed.CompressionResult) -> float:
-    return float(found.displacement_um[-1]) * _M_PER_UM
+def _top(name: str, moved: compressed.CompressionResult, thesis_mm: float) -> Part:
+    """How far the top of a cell moves, against what the thesis has."""
+    ours = float(moved.displacement_um[-1]) * _M_PER_UM
+    return Part(name, "m", ours, thesis_mm * M_PER_MM, shown=_SHOWN)
 
 
-def triangles(displacement_mm: float, film_mm: float) -> list[Part]:
-    """6.5: the triangular cell, base and period held."""
-    found = _pressed("tri", parameters={"dielectric_mm": film_mm})
-    return [Part("displacement of the top at 100 kPa", "m", _moved_m(found), displacement_mm * M_PER_MM, shown=_SHOWN)]
-
-
-def triangles_free(displacement_mm: float, film_mm: float) -> list[Part]:
-    """6.8: the same on a base that slides, its period free to widen."""
-    found = _pressed("tri", parameters={"dielectric_mm": film_mm}, base="sliding", period="free")
-    return [Part("displacement of the top at 100 kPa", "m", _moved_m(found), displacement_mm * M_PER_MM, shown=_SHOWN)]
+def triangles(displacement_mm: float, film_mm: float, base: str = "bonded", period: str = "fixed") -> list[Part]:
+    """6.5: the triangular cell, base and period held; 6.8: on a base that slides, its period free to widen."""
+    found = _pressed("tri", parameters={"dielectric_mm": film_mm}, base=base, period=period)
+    return [_top("displacement of the top at 100 kPa", found, displacement_mm)]
 
 
 def rectangles(displacement_mm: float, film_mm: float) -> list[Part]:
     """6.9: the rectangular cell, in three dimensions, base and period held."""
     found = _pressed("rect", parameters={"dielectric_mm": film_mm})
-    return [Part("displacement of the top at 100 kPa", "m", _moved_m(found), displacement_mm * M_PER_MM, shown=_SHOWN)]
+    return [_top("displacement of the top at 100 kPa", found, displacement_mm)]
 
 
 def plates(two_mm: float, three_mm: float) -> list[Part]:
     """6.11: the plain plate, fixed at its sides so that only its bulk deforms."""
-    ours = _moved_m(_pressed("reference", parameters={}))
-    return [
-        Part("2D", "m", ours, two_mm * M_PER_MM, shown=_SHOWN),
-        Part("3D", "m", ours, three_mm * M_PER_MM, shown=_SHOWN),
-    ]
+    found = _pressed("reference", parameters={})
+    return [_top("2D", found, two_mm), _top("3D", found, three_mm)]
 
 
 def gain(rise_f: float, film_mm: float) -> list[Part]:

@@ -1,9 +1,19 @@
 """The rectangular cell: 3.36 to 3.54, figures 2.14, 3.5, 3.6 and 3.7, against columns and field solvers."""
 
+from dataclasses import replace
+
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design.shapes import rect
 from sensorgen.models import thesis_cells
-from sensorgen.verification.thesis.checks._columns import EPS_R, FILM_MM, SHOWN, Layer, exact_f_per_m2, pile_f_per_m2
+from sensorgen.verification.thesis.checks._columns import (
+    EPS_R,
+    FILM_MM,
+    SHOWN,
+    Layer,
+    exact_f_per_m2,
+    pile_f_per_m2,
+    sizes_of,
+)
 from sensorgen.verification.thesis.verdicts import Part
 
 _CELL = rect.Params(dielectric_mm=FILM_MM)
@@ -45,8 +55,8 @@ def in_series() -> list[Part]:
     ]
 
 
-def _printed_f() -> float:
-    """3.49, its widths those of the lower strips and its L a quarter of the period [F]."""
+def sixteen_columns() -> list[Part]:
+    """3.36: the sum over the lower strips, by 3.49, its widths those of these and its L a quarter of the period."""
     widths = {"air": 2 * _CELL.air_width_mm, "x60": _CELL.x60_width_mm, "etpu": _CELL.etpu_width_mm}
     counts = {"etpu": 1, "x60": 1, "air": 2}
     over = sum(
@@ -54,18 +64,14 @@ def _printed_f() -> float:
         for below, row in _PRINTED_MM.items()
         for above, thickness in row.items()
     )
-    return EPS0_F_PER_M * EPS_R * _CELL.period_mm / 4 * M_PER_MM * over
-
-
-def sixteen_columns() -> list[Part]:
-    """3.36: the sum over the lower strips."""
-    return [Part("C_eq", "F", thesis_cells.strips_f_per_m2(_CELL, EPS_R) * _AREA_M2, _printed_f())]
+    printed_f = EPS0_F_PER_M * EPS_R * _CELL.period_mm / 4 * M_PER_MM * over
+    return [Part("C_eq", "F", thesis_cells.strips_f_per_m2(_CELL, EPS_R) * _AREA_M2, printed_f)]
 
 
 def whole() -> list[Part]:
     """3.49: the formula, and its cell."""
-    exact = exact_f_per_m2("rect") * _AREA_M2
-    return [*sixteen_columns(), Part("of the exact cell", "F", exact, _printed_f(), shown=SHOWN)]
+    (columns,) = sixteen_columns()
+    return [columns, replace(columns, name="of the exact cell", ours=exact_f_per_m2("rect") * _AREA_M2, shown=SHOWN)]
 
 
 def _bulged() -> tuple[float, float]:
@@ -101,4 +107,4 @@ def bulging() -> list[Part]:
 
 def sizes(**said: float) -> list[Part]:
     """Figures 2.14 and 3.5: sizes as the text has them [mm]."""
-    return [Part(n.removesuffix("_mm").replace("_", " "), "mm", float(getattr(_CELL, n)), v) for n, v in said.items()]
+    return sizes_of(_CELL, said)

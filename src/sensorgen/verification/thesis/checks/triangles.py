@@ -1,5 +1,6 @@
 """The triangular cell: 3.9 to 3.35, figures 2.12, 3.4 and 6.7, against columns and field solvers."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,12 +18,14 @@ from sensorgen.verification.thesis.checks._columns import (
     Layer,
     exact_f_per_m2,
     pile_f_per_m2,
+    sizes_of,
 )
 from sensorgen.verification.thesis.verdicts import Part
 
 Real = NDArray[np.float64]
 
 _CELL = tri.Params(dielectric_mm=FILM_MM)
+_DESIGN = designs.make({"shape": "tri", "parameters": {"dielectric_mm": FILM_MM}})
 _QUARTER_MM = _CELL.period_mm / 4
 _APEX_MM = 3 * _QUARTER_MM  # of the first hanging dielectric in our scene
 _TAN_GAMMA, _TAN_THETA = _CELL.hang_height_mm / _QUARTER_MM, _CELL.lower_height_mm / _QUARTER_MM
@@ -72,8 +75,7 @@ _UNDER = {
 
 def _height_mm(body: str, x_mm: float, *, lowest: bool) -> float:
     """Height of a body's lower or upper face over the film in the cross-section of our scene [mm]."""
-    made = designs.make({"shape": "tri", "parameters": {"dielectric_mm": FILM_MM}})
-    cuts = (outline for prism in made.in_use.body(body).prisms for outline in prism.cut("x", x_mm))
+    cuts = (outline for prism in _DESIGN.in_use.body(body).prisms for outline in prism.cut("x", x_mm))
     z = [height for outline in cuts for _, height in outline]
     return (min(z) if lowest else max(z)) - _CELL.electrode_mm - FILM_MM
 
@@ -85,77 +87,75 @@ def _faces_mm() -> tuple[Real, Real]:
     return np.array(upper), np.array(lower)
 
 
-def upper_flank() -> list[Part]:
-    """3.10."""
-    return [Part("y1", "m", _faces_mm()[0] * M_PER_MM, _Y1_M)]
+def _logarithm(region: _Region, denominator: float) -> float:
+    """Capacitance of the flank with any denominator in the logarithm [F/m]."""
+    top = region.beta_m + region.alpha * _QUARTER_MM * M_PER_MM
+    return float(_DISPLACED / region.alpha * np.log(top / denominator))
 
 
-def lower_flank() -> list[Part]:
-    """3.11."""
-    return [Part("y2", "m", _faces_mm()[1] * M_PER_MM, _Y2_M)]
-
-
-def gap() -> list[Part]:
-    """3.20."""
-    upper, lower = _faces_mm()
-    return [Part("y1 - y2", "m", (upper - lower) * M_PER_MM, _X_MM * M_PER_MM * (_TAN_GAMMA - _TAN_THETA))]
+_SOLID, _COG = _UNDER["dielectric"], _UNDER["cog"]
+_FILM_M, _GAP_M = _Y2_M + _D_M, _Y1_M - _Y2_M  # X60 below the air, and the air, at the places
+EQUATIONS: dict[str, Callable[[], list[Part]]] = {
+    # 3.10, 3.11, 3.20: faces of the gap
+    "upper_flank": lambda: [Part("y1", "m", _faces_mm()[0] * M_PER_MM, _Y1_M)],
+    "lower_flank": lambda: [Part("y2", "m", _faces_mm()[1] * M_PER_MM, _Y2_M)],
+    "gap": lambda: [
+        Part("y1 - y2", "m", np.subtract(*_faces_mm()) * M_PER_MM, _X_MM * M_PER_MM * (_TAN_GAMMA - _TAN_THETA))
+    ],
+    # 3.12, 3.13: fields by thicknesses add up to the voltage; 3.14, 3.15; 3.16 to 3.18: per area, at 1 V
+    "voltage": lambda: [
+        Part("V", "V", _VOLT, _SOLID.displacement() * ((_T_M - _Y1_M + _FILM_M) / _DISPLACED + _GAP_M / EPS0_F_PER_M))
+    ],
+    "field_in_air": lambda: [
+        Part("E_air", "V/m", _SOLID.displacement() / EPS0_F_PER_M,
+             _VOLT * EPS_R / ((_T_M - _Y1_M) + EPS_R * _GAP_M + _FILM_M))
+    ],
+    "displacement": lambda: [
+        Part("D", "C/m2", _SOLID.displacement(), _DISPLACED * _VOLT / ((_T_M + _D_M) + (EPS_R - 1) * _GAP_M))
+    ],
+    # 3.25, with air as medium 2 and X60 as 3; 3.27 to 3.29
+    "voltage_under_cog": lambda: [
+        Part("V", "V", _VOLT, _COG.displacement() * (_GAP_M / EPS0_F_PER_M + _FILM_M / _DISPLACED))
+    ],
+    "displacement_under_cog": lambda: [
+        Part("D", "C/m2", _COG.displacement(), _DISPLACED * _VOLT / (EPS_R * _Y1_M + _D_M + (1 - EPS_R) * _Y2_M))
+    ],
+    # 3.23, 3.24; 3.33, 3.34: alpha stands for beta below the fraction
+    "logarithm_under_dielectric": lambda: [
+        Part("C_wd", "F/m", _SOLID.model_f_per_m(), _logarithm(_SOLID, _SOLID.beta_m))
+    ],
+    "logarithm_under_cog": lambda: [
+        Part("C_we", "F/m", _COG.model_f_per_m(), _logarithm(_COG, _COG.alpha), _logarithm(_COG, _COG.beta_m))
+    ],
+    # Figure 6.7: the geometry whose flanks are turned flatter, by our formula
+    "swept": lambda: [
+        Part("C/A, turned by 0, 0.1 and 0.2 rad", "F/m2",
+             [thesis_cells.triangles_f_per_m2(thesis_swept.turned(_CELL, angle), EPS_R) for angle in _TURNED_RAD])
+    ],
+}  # fmt: skip
 
 
 def continuity() -> list[Part]:
     """3.9: the field in air from that in X60, and from the voltage that the X60 leaves to the air."""
-    solid = _UNDER["dielectric"].displacement() / _DISPLACED
-    left = (_VOLT - solid * (_T_M - _Y1_M + _Y2_M + _D_M)) / (_Y1_M - _Y2_M)
-    return [Part("E in air", "V/m", left, EPS_R * solid)]
-
-
-def voltage() -> list[Part]:
-    """3.12, 3.13: fields by thicknesses add up to the voltage."""
-    d = _UNDER["dielectric"].displacement()
-    solid, air = d / _DISPLACED, d / EPS0_F_PER_M
-    return [Part("V", "V", _VOLT, solid * (_T_M - _Y1_M) + air * (_Y1_M - _Y2_M) + solid * (_Y2_M + _D_M))]
-
-
-def field_in_air() -> list[Part]:
-    """3.14, 3.15."""
-    printed = _VOLT * EPS_R / ((_T_M - _Y1_M) + EPS_R * (_Y1_M - _Y2_M) + (_Y2_M + _D_M))
-    return [Part("E_air", "V/m", _UNDER["dielectric"].displacement() / EPS0_F_PER_M, printed)]
-
-
-def displacement() -> list[Part]:
-    """3.16 to 3.18: displacement, charge and capacitance per area, at 1 V."""
-    printed = _DISPLACED * _VOLT / ((_T_M + _D_M) + (EPS_R - 1) * (_Y1_M - _Y2_M))
-    return [Part("D", "C/m2", _UNDER["dielectric"].displacement(), printed)]
-
-
-def voltage_under_cog() -> list[Part]:
-    """3.25, with air as medium 2 and X60 as 3."""
-    d = _UNDER["cog"].displacement()
-    return [Part("V", "V", _VOLT, d / EPS0_F_PER_M * (_Y1_M - _Y2_M) + d / _DISPLACED * (_Y2_M + _D_M))]
+    solid = _SOLID.displacement() / _DISPLACED
+    return [Part("E in air", "V/m", (_VOLT - solid * (_T_M - _Y1_M + _FILM_M)) / _GAP_M, EPS_R * solid)]
 
 
 def field_under_cog() -> list[Part]:
     """3.26: what 3.25 leaves for medium 2."""
-    d = _UNDER["cog"].displacement()
-    ours = (_VOLT - d / _DISPLACED * (_Y2_M + _D_M)) / (_Y1_M - _Y2_M)
+    d = _COG.displacement()
+    ours = (_VOLT - d / _DISPLACED * _FILM_M) / _GAP_M
     return [Part("E2", "V/m", ours, d / EPS0_F_PER_M / EPS_R, d / EPS0_F_PER_M)]
-
-
-def displacement_under_cog() -> list[Part]:
-    """3.27 to 3.29."""
-    printed = _DISPLACED * _VOLT / (EPS_R * _Y1_M + _D_M + (1 - EPS_R) * _Y2_M)
-    return [Part("D", "C/m2", _UNDER["cog"].displacement(), printed)]
 
 
 def alpha(under: str) -> list[Part]:
     """3.21, 3.30."""
-    region = _UNDER[under]
-    return [Part("alpha", "", region.reduced()[0], region.alpha)]
+    return [Part("alpha", "", _UNDER[under].reduced()[0], _UNDER[under].alpha)]
 
 
 def beta(under: str) -> list[Part]:
     """3.22, 3.31."""
-    region = _UNDER[under]
-    return [Part("beta", "m", region.reduced()[1], region.beta_m)]
+    return [Part("beta", "m", _UNDER[under].reduced()[1], _UNDER[under].beta_m)]
 
 
 def integral(under: str) -> list[Part]:
@@ -166,32 +166,12 @@ def integral(under: str) -> list[Part]:
     return [Part("C", "F/m", region.model_f_per_m(), float(np.sum(weights * columns_under) * width / 2))]
 
 
-def _logarithm(region: _Region, denominator: float) -> float:
-    """Capacitance with any denominator in the logarithm [F/m]."""
-    top = region.beta_m + region.alpha * _QUARTER_MM * M_PER_MM
-    return float(_DISPLACED / region.alpha * np.log(top / denominator))
-
-
-def logarithm_under_dielectric() -> list[Part]:
-    """3.23, 3.24."""
-    region = _UNDER["dielectric"]
-    return [Part("C_wd", "F/m", region.model_f_per_m(), _logarithm(region, region.beta_m))]
-
-
-def logarithm_under_cog() -> list[Part]:
-    """3.33, 3.34: alpha stands for beta below the fraction."""
-    region = _UNDER["cog"]
-    printed, corrected = (_logarithm(region, denominator) for denominator in (region.alpha, region.beta_m))
-    return [Part("C_we", "F/m", region.model_f_per_m(), printed, corrected)]
-
-
 def whole() -> list[Part]:
     """3.35: columns agree with columns; the field that leaves the flanks sideways is not in them."""
     half = _CELL.period_mm / 2 * M_PER_MM
     printed = sum(_logarithm(region, region.beta_m) for region in _UNDER.values())
-    made = designs.make({"shape": "tri", "parameters": {"dielectric_mm": FILM_MM}})
     area = _CELL.length_mm * _CELL.width_mm * M_PER_MM**2
-    ours = columns.capacitance(made.in_use, PERMITTIVITY).lower / area * half
+    ours = columns.capacitance(_DESIGN.in_use, PERMITTIVITY).lower / area * half
     both = thesis_cells.triangles_f_per_m2(_CELL, EPS_R) * half
     return [
         Part("C_tot of half a period, columns", "F/m", ours, printed),
@@ -200,13 +180,6 @@ def whole() -> list[Part]:
     ]
 
 
-def swept() -> list[Part]:
-    """Figure 6.7: the geometry whose flanks are turned flatter, by our formula."""
-    turned = [thesis_swept.turned(_CELL, angle) for angle in _TURNED_RAD]
-    found = [thesis_cells.triangles_f_per_m2(p, EPS_R) for p in turned]
-    return [Part("C/A, turned by 0, 0.1 and 0.2 rad", "F/m2", found)]
-
-
 def sizes(**said: float) -> list[Part]:
     """Figure 2.12: sizes as the text has them [mm]."""
-    return [Part(n.removesuffix("_mm").replace("_", " "), "mm", float(getattr(_CELL, n)), v) for n, v in said.items()]
+    return sizes_of(_CELL, said)

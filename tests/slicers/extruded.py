@@ -9,14 +9,7 @@ import numpy as np
 from sensorgen.export.gcode.files import Source
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.moves import NO_TOOL, Motion
-
-# What the slicers' ";TYPE:" comments call lines that are not part of a body, in lower case.
-NOT_MODEL = frozenset(
-    {
-        "skirt", "brim", "skirt/brim", "prime-tower", "prime tower", "prime pillar", "wipe tower", "custom",
-        "support", "support-interface", "support material", "support material interface",
-    }
-)  # fmt: skip
+from sensorgen.export.gcode.paths import NOT_MODEL
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,11 @@ Along one electrode, the other one floating, and between the electrodes at their
 
 .. math:: R_Y = R \left(\frac12 + \frac{\tanh(q/2)}{q}\right), \qquad R_Z = \frac{2 R}{q \tanh q}
 
-A film that leaks carries a part of the current over to the other electrode and back: R_Y falls to R/2.
+A film that leaks carries a part of the current over to the other electrode and back: R_Y falls to R/2. A small leak
+reads :math:`1/G`.
 """
 
+from collections.abc import Callable
 from math import inf, sqrt, tanh
 
 from sensorgen.core.errors import OutOfRange
@@ -30,8 +32,7 @@ def along_ohm(electrode_ohm: float, leak_s: float) -> float:
     >>> along_ohm(600.0, 0.0), round(along_ohm(600.0, 1e15), 3)
     (600.0, 300.0)
     """
-    q = sqrt(2 * electrode_ohm * leak_s)
-    return electrode_ohm * _along(q)
+    return electrode_ohm * _along(sqrt(2 * electrode_ohm * leak_s))
 
 
 def _along(q: float) -> float:
@@ -50,6 +51,34 @@ def across_ohm(electrode_ohm: float, leak_s: float) -> float:
         return inf
     q = sqrt(2 * electrode_ohm * leak_s)
     return 1 / leak_s if q < _SMALL else 2 * electrode_ohm / (q * tanh(q))
+
+
+def leak_s(rz_ohm: float, electrode_ohm: float) -> float:
+    """Leakage of the whole film by a reading between electrodes of known resistance [S].
+
+    Parameters
+    ----------
+    rz_ohm : float
+        Resistance between the electrodes, inf for an overload [ohm].
+    electrode_ohm : float
+        R of one electrode, end to end [ohm].
+
+    Raises
+    ------
+    OutOfRange
+        Readings below 0.
+
+    Examples
+    --------
+    >>> round(1 / leak_s(1e6, 600.0))  # far above the electrodes: the leakage alone, less two thirds of one
+    999600
+    """
+    if rz_ohm < 0 or electrode_ohm < 0:
+        raise OutOfRange(f"readings of {electrode_ohm:g} and {rz_ohm:g} ohm; expected numbers from 0 on")
+    line = 2 * electrode_ohm
+    if rz_ohm in (0, inf) or line == 0 or rz_ohm / line > 1e7:
+        return inf if rz_ohm == 0 else 1 / rz_ohm
+    return _root(lambda q: line / (q * tanh(q)), rz_ohm) ** 2 / line
 
 
 def electrode_and_leak(along: float, across: float) -> tuple[float, float]:
@@ -75,11 +104,14 @@ def electrode_and_leak(along: float, across: float) -> tuple[float, float]:
         raise OutOfRange(f"readings of {along:g} and {across:g} ohm; expected numbers above 0")
     if across == inf:
         return along, 0.0
+    q = _root(lambda q: 2 / (q * tanh(q)) / _along(q), across / along)
+    electrode = along / _along(q)
+    return electrode, q**2 / (2 * electrode)
+
+
+def _root(falling: Callable[[float], float], value: float) -> float:
+    """Where a function of q falls to a value, by halving in the logarithm."""
     low, high = _SMALL, _LARGE
     while high / low > 1 + 1e-15 and low < (middle := sqrt(low * high)) < high:
-        if 2 / (middle * tanh(middle)) / _along(middle) > across / along:
-            low = middle
-        else:
-            high = middle
-    electrode = along / _along(low)
-    return electrode, low**2 / (2 * electrode)
+        low, high = (middle, high) if falling(middle) > value else (low, middle)
+    return low

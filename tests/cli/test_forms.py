@@ -1,0 +1,42 @@
+"""One renderer: each prediction as text, JSON, CSV and Markdown, on the terminal or in a file, of the same result."""
+
+import csv
+import io
+import json
+
+import pytest
+
+pytestmark = pytest.mark.usefixtures("shared_cache")
+COMMANDS = {
+    "cell": ("cell", "reference"),
+    "formula": ("cell", "rect", "--model", "thesis-3.49"),
+    "cells": ("cell", "reference", "--sweep", "eps_x60=2,4", "--jobs", "1"),
+    "compress": ("compress", "reference", "--model", "springs", "--stress", "10,20"),
+    "predict": ("predict", "reference", "--force", "0:6:3", "--position", "50"),
+    "sheet": ("sheet", "reference", "--size", "60x60", "--contacts", "one-edge", "--frequencies", "100kHz"),
+    "stack": ("stack", "double"),
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_all_forms(run, tmp_path, name):
+    words = COMMANDS[name]
+    text, markdown = run(*words), run(*words, "--markdown")
+    assert (text.code, markdown.code) == (0, 0)
+    assert max(map(len, text.out.splitlines())) <= 80
+    assert "\n|" in markdown.out or "\n- " in markdown.out
+    assert json.loads(run(*words, "--json").out)
+    head, *rows = csv.reader(io.StringIO(run(*words, "--csv").out))
+    assert rows
+    assert {len(row) for row in rows} == {len(head)}
+    assert all(head)
+    said = run(*words, "--csv", "-o", "table.csv")
+    assert (said.code, said.out) == (0, "table.csv\n")
+    assert next(csv.reader(io.StringIO((tmp_path / "table.csv").read_text()))) == head
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_one_form_at_a_time(run, name):
+    said = run(*COMMANDS[name], "--json", "--markdown")
+    assert (said.code, said.out) == (2, "")
+    assert "--json and --markdown at once; expected one of them" in said.line
