@@ -41,7 +41,7 @@ def test_every_way_to_write_the_same_table(take, log, text):
 
 def test_columns_can_be_named(take, log):
     done = take("what,R1,R2,who\n23 triX,650,40,me\n", specimen="what", y="r1", z="R2")
-    assert done.lines() == ["1 of 1 rows logged", "columns left out: who"]
+    assert list(done.document()) == ["1 of 1 rows logged", "columns left out: who"]
     assert log.readings()[0].z_ohm == (40.0,)
 
 
