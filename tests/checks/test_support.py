@@ -18,7 +18,7 @@ def errors(**data):
 @pytest.mark.parametrize("quality", ["fine", "extrafine"])
 @pytest.mark.parametrize("orientation", ["as-drawn", "upside-down"])
 @pytest.mark.parametrize("film_mm", [0.1, 0.2])
-@pytest.mark.parametrize("shape", list(catalogue.shapes()))
+@pytest.mark.parametrize("shape", list(catalogue.shapes().entries))
 def test_with_support_every_shape_prints_either_way(shape, film_mm, orientation, quality):
     films = [f.name for f in fields(registry.load(shapes, shape).Params) if f.name.endswith("dielectric_mm")]
     given = {"parameters": {**dict.fromkeys(films, film_mm), "length_mm": 12}, "materials": {"support": "bvoh"}}

@@ -120,4 +120,4 @@ def test_a_build_is_compensated(run, contents, tmp_path):
 
 
 def test_nothing_to_compensate(run):
-    assert "nothing to change" in run("build", "reference", "--size", "12x8", "--no-cad", "--compensate", "print").out
+    assert "nothing to change" in run("build", "reference", "--size", "12x8", "--no-cad", "--compensate", "print").err

@@ -23,7 +23,8 @@ def plan(tmp_path):
 
 def test_a_batch_and_its_verification(run, plan):
     said = run("batch", "plan.yaml", "--no-gcode")
-    assert said.code == 0, said.err
+    assert said.code == 1, said.err  # the tips of its cogs are not printed, by the estimate
+    assert run("batch", "plan.yaml", "--no-gcode", "--force").code == 0
     assert "plan: 2 specimens on diabase-h5, fine" in said.out
     assert "26 triX .2mm 2 fine" in said.out
     assert "[ ] Clean the nozzles of T3, T4" in said.out

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 from sensorgen import checks
 from sensorgen.core.display import Displayed
-from sensorgen.core.document import Part
-from sensorgen.core.findings import Finding, counted, counts, listed
+from sensorgen.core.document import Part, comma_separated
+from sensorgen.core.findings import Finding, counted, counts, listed, table
 from sensorgen.design import materials
 from sensorgen.design.design import Design, fields
 from sensorgen.design.tower import tower
@@ -156,6 +156,10 @@ class CheckReport:
         """The findings, then their number."""
         yield from listed(self.findings)
         yield f"{self.name}: {counted(self.counts)}"
+
+    def csv(self) -> Iterator[str]:
+        """The findings as a table."""
+        yield comma_separated(table(self.findings))
 
 
 def report(design: Design, held: Review) -> CheckReport:

@@ -70,7 +70,7 @@ def table(rows: Sequence[Row]) -> Table:
     layers = sorted(spans, reverse=True)
     return Table(
         "volumes", "printed over drawn volume (-n: missing parts, +n: merged parts)",
-        (Column("layer"), Column("height", "mm"), *map(Column, bodies)),
+        (Column("layer"), Column("height", "mm"), *(Column(body, right=True) for body in bodies)),
         tuple((n, spans[n], *(cells.get((n, body), "") for body in bodies)) for n in layers),
     )  # fmt: skip
 

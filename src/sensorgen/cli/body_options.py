@@ -67,7 +67,10 @@ def compensated(design: "Design", word: str | None, walls: str) -> "tuple[Design
         return design, []
     from sensorgen.asprinted.compensation import compensated as changed
 
-    return changed(design, walls, bake=word == "bake")
+    found, changes = changed(design, walls, bake=word == "bake")
+    if not changes:
+        click.echo(f"--compensate {word}: nothing to change, by the estimate for {walls} walls", err=True)
+    return found, changes
 
 
 def printed_of(design: "Design", slicer: str | None, walls: str | None) -> "Printed":

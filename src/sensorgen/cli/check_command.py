@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 OWN: list[click.Parameter] = [
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
-    *render.options("json", "markdown"),
+    *render.options(),
 ]
 
 

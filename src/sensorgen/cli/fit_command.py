@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import body_options, log_words, render
+from sensorgen.cli import body_options, log_words, render, show
 
 if TYPE_CHECKING:
     from sensorgen.analysis.fit import Fit
@@ -22,12 +22,12 @@ def _work(
     """
     from dataclasses import replace
 
-    from sensorgen.analysis.fit import fit, text
+    from sensorgen.analysis.fit import STEPS, fit, text
     from sensorgen.core import files as store
     from sensorgen.design.materials import own
 
-    with log_words.opened(file) as log:
-        made = fit(log, iteration, seed, body_options.body_of(drawn, slicer, walls))
+    with log_words.opened(file) as log, show.progress(STEPS) as step:
+        made = fit(log, iteration, seed, body_options.body_of(drawn, slicer, walls), step)
     if made.values and not dry_run:
         path = Path(output) if output else own.path(made.source)
         store.replace(path, text(made).encode())

@@ -1,9 +1,7 @@
 """``sensorgen invert``: force and position back from measured impedances."""
 
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import partial
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +18,6 @@ if TYPE_CHECKING:
     from sensorgen.design.design import Design
     from sensorgen.measure.readings import Readings
     from sensorgen.prediction.inverse import Estimator, Prior
-    from sensorgen.prediction.inverse.answers import Summary
 
 _NORMAL = re.compile(r"(force|position)=(.+?)(?:\+-|±)(.+)")
 
@@ -54,21 +51,34 @@ OWN: list[click.Parameter] = [
 
 
 def _work(design: "Design", *, measured: str, output: str | None, **how: Any) -> int:
-    """The rows go to the terminal or to a file; the summary to the terminal, beside rows to the standard error."""
+    """The rows go to the terminal, at once, or to a file that is there when it is whole; then the summary."""
     from sensorgen.measure.readings import readings
-    from sensorgen.prediction.inverse.answers import Summary
+    from sensorgen.prediction.inverse import answers
 
-    with readings(measured) as source:
+    live = measured == "-" and output is None
+    terminal = live or output == "-"
+    with readings(measured) as source, ExitStack() as stack:
         estimator, doubts = _estimator(design, source, **how)
-        summary = Summary(estimator, doubts)
-        live = measured == "-" and output is None
-        place = "-" if live else output
-        with _sink(place) as write:
-            for text in _answers(source, estimator, summary, live=live, written=place is not None):
-                write(text)
+        summary = answers.Summary(estimator, doubts)
+        file = stack.enter_context(store.replacing(Path(output))) if output and not terminal else None
+
+        def write(text: str) -> None:
+            if terminal:
+                print(text, end="", flush=True)
+            elif file:
+                file.write(text.encode())
+
+        step = stack.enter_context(show.progress(["reading"]))
+        write(answers.header(source.kept))
+        for block in source.blocks(1) if live else source.blocks():
+            found = estimator.batch(block.impedance_ohm)
+            summary.add(found)
+            step(f"{summary.samples} samples")
+            if terminal or file:
+                write(answers.rows(block.kept, found, prior=estimator.prior is not None))
     for piece in render.pieces(summary.result(), render.form()):
-        click.echo(piece, nl=False, err=place == "-")
-    if not render.form() and place != "-":
+        click.echo(piece, nl=False, err=terminal)
+    if not render.form() and not terminal:
         click.echo(output or "--output FILE.csv writes force and position of every sample")
     return 0
 
@@ -113,33 +123,6 @@ def _prior(text: str | None) -> "Prior | None":
         except BadInput as error:
             raise error.within("--prior") from None
     return Prior(found.get("force"), found.get("position"))
-
-
-def _answers(
-    source: "Readings", estimator: "Estimator", summary: "Summary", *, live: bool, written: bool
-) -> Iterator[str]:
-    """The answers as text, block by block; a stream's line by line. They are made only if they are written."""
-    from sensorgen.prediction.inverse import answers
-
-    if written:
-        yield answers.header(source.kept)
-    with show.progress(["reading"]) as step:
-        for block in source.blocks(1) if live else source.blocks():
-            found = estimator.batch(block.impedance_ohm)
-            summary.add(found)
-            step(f"{summary.samples} samples")
-            if written:
-                yield answers.rows(block.kept, found, prior=estimator.prior is not None)
-
-
-@contextmanager
-def _sink(output: str | None) -> Iterator[Callable[[str], object]]:
-    """What takes the rows, if there are any: the terminal, at once, or a file that is there when it is whole."""
-    if output is None or output == "-":
-        yield partial(print, end="", flush=True)
-        return
-    with store.replacing(Path(output)) as file:
-        yield lambda text: file.write(text.encode())
 
 
 command = DesignGroup(

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from sensorgen.core.document import Documented, Part
 
 _ABOUT = {"json": "Print as JSON.", "csv": "Print the table as CSV, all digits.", "markdown": "Print as Markdown."}
-_COLOURS = {"error": "red", "warning": "yellow", "info": "blue"}
+_COLOURS = {"error": "red", "warning": "yellow", "info": "blue", "CHANGE": "red", "PRINT": "green"}
 _FORM, _FILE = "sensorgen.form", "sensorgen.output"  # in the context's meta
 
 
@@ -107,15 +107,15 @@ def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> 
             raise BadInput("--csv: this result has no table; expected --json")
         return [document.comma_separated(tables[0])]
     shown = document.markdown if wanted else document.text
-    return (f"{_coloured(line)}\n" for line in shown([*before, *result.document()]))
+    lines = shown([*before, *result.document()])
+    terminal = sys.stdout is not None and sys.stdout.isatty() and not click.get_current_context().meta.get(_FILE)
+    return (f"{_coloured(line) if terminal and not wanted else line}\n" for line in lines)
 
 
 def _coloured(line: str) -> str:
-    """A line of a finding begins with its severity, in colour at a terminal."""
-    head, space, rest = line.partition(" ")
-    if head not in _COLOURS or form() or click.get_current_context().meta.get(_FILE) or not sys.stdout.isatty():
-        return line
-    return click.style(head, fg=_COLOURS[head], bold=head == "error") + space + rest
+    """A line whose first word says how severe it is, for a terminal."""
+    word = line.partition(" ")[0]
+    return click.style(word, fg=_COLOURS[word], bold=True) + line[len(word) :] if word in _COLOURS else line
 
 
 def verdict(*problems: str) -> int:

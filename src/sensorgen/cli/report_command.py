@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import log_words, show
+from sensorgen.cli import log_words, render, show
 from sensorgen.cli.words import OneOf
 from sensorgen.core.errors import BadInput
 
@@ -26,6 +26,7 @@ def _work(
     """
     from sensorgen.analysis.report import written
     from sensorgen.analysis.report.contents import STEPS, report
+    from sensorgen.core import document
     from sensorgen.core import files as store
 
     if show_it and (how != "html" or output == "-"):
@@ -40,7 +41,7 @@ def _work(
         return 0
     path = Path(output or f"report-{iteration}.{how}")
     store.replace(path, text.encode())
-    click.echo("\n".join((*made.headline, str(path))))
+    render.write(f"{line}\n" for line in document.text([*made.headline, str(path)]))
     if show_it:
         webbrowser.open(path.resolve().as_uri())
     return 0

@@ -21,9 +21,9 @@ def progress(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
         done = steps.index(name) if name in steps else done  # a part of a step moves the clock alone
         bar = "#" * (20 * done // max(1, len(steps) - 1))
         seconds = time.monotonic() - started
-        click.echo(f"\r[{bar:20}] {seconds:4.1f} s  {name:12}", nl=False, err=True)
+        click.echo(f"\r[{bar:20}] {seconds:4.1f} s  {name:24.24}", nl=False, err=True)
 
     try:
         yield step
     finally:
-        click.echo("\r" + " " * 50 + "\r", nl=False, err=True)
+        click.echo("\r" + " " * 60 + "\r", nl=False, err=True)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from sensorgen.core.document import Facts, Part
+from sensorgen.core.document import Column, Facts, Part, Table
 
 SEVERITIES = ("error", "warning", "info")
 
@@ -112,6 +112,16 @@ def listed(found: Iterable[Finding]) -> Iterator[Part]:
     heads = (("waived" if f.waiver else f.severity, f) for f in found)
     if rows := tuple(row for head, f in heads for row in ((head, f.place), ("", f.text))):
         yield Facts(rows)
+
+
+def table(found: Iterable[Finding]) -> Table:
+    """Findings as a table."""
+    heads = ("severity", "rule", "body", "places", "finding", "advice")
+    columns = (*map(Column, heads), *(Column(name, hidden=True) for name in ("layer", "last_layer", "waiver")))
+    rows = (
+        (f.severity, f.rule, f.body, f.count, f.message, f.advice, f.layer, f.last_layer, f.waiver) for f in found
+    )  # fmt: skip
+    return Table("findings", "", columns, tuple(rows))
 
 
 def counts(found: Sequence[Finding]) -> dict[str, int]:

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from sensorgen.checks.review import Review
-from sensorgen.core import display, document
+from sensorgen.core import display, document, findings
 from sensorgen.design.design import Design
 from sensorgen.prediction.results import Prediction
 
@@ -13,9 +13,7 @@ if TYPE_CHECKING:
 
 @display.html.register(Review)
 def _(found: Review) -> str:
-    heads = ("severity", "rule", "body", "places", "finding", "advice")
-    rows = tuple((f.severity, f.rule, f.body, f.count, f.message, f.advice) for f in found.findings)
-    return document.html([document.Table("findings", "", tuple(map(document.Column, heads)), rows)])
+    return document.html([findings.table(found.findings)])
 
 
 @display.html.register(Design)

@@ -1,6 +1,6 @@
 """The fit of an iteration: specimens held back, values from the others, errors before and after on those held back."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from hashlib import sha256
 from math import isfinite, log, nan, sqrt
 
@@ -19,10 +19,14 @@ from sensorgen.prediction import bodies
 
 HELD_BACK = 0.25  # of the specimens
 SEED = 23
+STEPS = ("readings", "recordings", "values", "errors")
 _ACROSS = Untold("resistivity_ohm_m across", "nothing was measured across the electrodes: R_Y and Re Z run along them")
 
 
-def fit(log: Log, iteration: int, seed: int = SEED, body_of: BodyOf = bodies.default_body) -> Fit:
+def fit(
+    log: Log, iteration: int, seed: int = SEED, body_of: BodyOf = bodies.default_body,
+    step: Callable[[str], None] = lambda _: None,
+) -> Fit:  # fmt: skip
     """Fit material values to the readings and recordings of an iteration.
 
     Parameters
@@ -35,14 +39,18 @@ def fit(log: Log, iteration: int, seed: int = SEED, body_of: BodyOf = bodies.def
         Of the split between specimens that are fitted to and specimens that are held back.
     body_of : callable
         Makes the body of a design that the readings are of.
+    step : callable
+        Called with each of ``STEPS``, and with the name of each design to predict, before it is done.
 
     Raises
     ------
     BadInput
         Nothing of that iteration in the log that a fit could use.
     """
-    found = of_iteration(log, iteration, body_of=body_of)
+    step("readings")
+    found = of_iteration(log, iteration, step, body_of)
     left_out = list(found.left_out)
+    step("recordings")
     recorded = list(runs(log, iteration, left_out))
     usable = _usable(found)
     names = sorted({row.reading.specimen for row, _ in usable} | {run.entry.specimen for run in recorded})
@@ -52,11 +60,13 @@ def fit(log: Log, iteration: int, seed: int = SEED, body_of: BodyOf = bodies.def
             "expected some to fit to: sensorgen log list shows what there is"
         )
     kept_back = held_back(names, seed)
+    step("values")
     values, untold = _fitted(
         [allowed for row, allowed in usable if row.reading.specimen not in kept_back],
         _of_runs([run for run in recorded if run.entry.specimen not in kept_back], found, left_out),
         next(iter(found.bodies.values())).design, seed,
     )  # fmt: skip
+    step("errors")
     errors = [
         *_reading_errors([row for row, _ in usable if row.reading.specimen in kept_back], found, values),
         *_run_errors([run for run in recorded if run.entry.specimen in kept_back], found, values),
