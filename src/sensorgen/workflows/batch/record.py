@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from sensorgen.checks.volumes import Row
 from sensorgen.core import files as store
@@ -26,6 +26,11 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
 RECORD = "batch.json"
+_COLUMNS = (
+    Column("no.", key="order"), Column("specimen"), Column("design"), Column("x", "mm", key="x_mm"),
+    Column("y", "mm", key="y_mm"), Column("R", "ohm", key="resistance_ohm", si=True),
+    Column("C", "F", key="capacitance_f", si=True),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -234,28 +239,16 @@ class Record:
     def document(self) -> Iterator[Part]:
         """Specimens, checklist, and what the slicers made."""
         yield f"{self.batch}: {len(self.specimens)} specimens on {self.printer}, {self.quality}"
-        yield Table.of("specimens", "", [
-            _Place(s.order, name, s.design, *s.centre_mm, *_expected(self.predictions[s.design_id]))
+        rows = (
+            (s.order, name, s.design, *s.centre_mm, *_expected(self.predictions[s.design_id]))
             for name, s in self.specimens.items()
-        ])  # fmt: skip
+        )
+        yield Table("specimens", "", _COLUMNS, tuple(rows))
         yield ""
         yield "checklist"
         yield from (f"  [ ] {line}" for line in self.checklist)
         for slicer, plate in self.slicers.items():
             yield from ("", *plate.in_short(slicer))
-
-
-@dataclass(frozen=True)
-class _Place:
-    """A line of the table of specimens."""
-
-    order: Annotated[int, Column("no.")]
-    specimen: Annotated[str, Column("specimen")]
-    design: Annotated[str, Column("design")]
-    x_mm: Annotated[float, Column("x", "mm")]
-    y_mm: Annotated[float, Column("y", "mm")]
-    resistance_ohm: Annotated[float | None, Column("R", "ohm", si=True)]
-    capacitance_f: Annotated[float | None, Column("C", "F", si=True)]
 
 
 def _expected(found: Prediction) -> tuple[float | None, float | None]:
