@@ -4,8 +4,8 @@
 sensorgen made. Each entry point has one adapter below: where an output's form changes, its adapter does, and no test.
 
 At commit 0645a80 these differed, for tri with a film of 0.2 mm: capacitance by build, log, report and fit (48.7 to
-81.1 pF) from predict, cell and batch (64.2 pF) and from the print (61.5 pF); gap by check (0.3 mm) from predict (0.2 mm);
-errors and exit code by build (none, 0) from slice (two, 1); resistance by all (without cogs) from the solved electrodes.
+81.1 pF) from predict, cell and batch (64.2 pF) and from the print (61.5 pF); gap by check (0.3 mm) from predict
+(0.2 mm); errors and exit code by build (none, 0) from slice (two, 1); resistance by all from the solved electrodes.
 """
 
 import contextlib

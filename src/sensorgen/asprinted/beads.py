@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from sensorgen.checks.estimate import ROUND
 from sensorgen.core.arrays import Mask, Real, Whole
@@ -105,17 +104,12 @@ def beads(design: Design, paths: Paths, centre_mm: Point | None = None) -> Beads
             each = next(each for each in near if mine.keys() & each.regions.keys())
             shown = {name: region for name, region in each.regions.items() if name in mine}
             numbers = np.array([mine[name] for name in shown])
-            body[rows] = numbers[0] if len(shown) == 1 else numbers[_nearest(list(shown.values()), middle[rows])]
+            pieces = [parts(region) for region in shown.values()]
+            tree = shapely.STRtree([piece for each in pieces for piece in each])
+            owners = np.repeat(numbers, [len(each) for each in pieces])
+            body[rows] = owners[tree.nearest(shapely.points(middle[rows]))] if len(shown) > 1 else numbers[0]
     columns = (*ends, width, height, volume, layer, body, found.tool, found.number)
     return Beads(*(c[here] for c in columns))
-
-
-def _nearest(regions: Sequence[Region], places_mm: Real) -> NDArray[np.intp]:
-    """Which region is nearest to each place."""
-    places = shapely.points(places_mm)
-    found = [parts(region) for region in regions]
-    tree = shapely.STRtree([part for each in found for part in each])
-    return np.asarray(np.repeat(np.arange(len(found)), [len(each) for each in found])[tree.nearest(places)])
 
 
 def layers(

@@ -4,7 +4,6 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
-from sensorgen.asprinted.printed import body, drawn_gap_mm
 from sensorgen.checks.widths import GAP_CLOSES
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import SensorgenError
@@ -75,6 +74,8 @@ def compensated(design: Design, walls: str = "arachne", *, bake: bool = False) -
     for name, value, why in _steps(now):
         changes.append(Change(name, getattr(now.params, name), value, why))
         now = _with(now, **{name: value})
+    from sensorgen.asprinted.printed import drawn_gap_mm  # a design without changes loads no print
+
     asked, before = drawn_gap_mm(now), _printed_gap_mm(now, walls)
     now, moved = _gap_kept(now, asked, before, walls)
     after = _printed_gap_mm(now, walls)
@@ -137,6 +138,8 @@ def _printed_gap_mm(design: Design, walls: str) -> float:
     enough = _ENOUGH * float(getattr(design.params, "period_mm", 1.0))
     sides = {name: min(getattr(design.params, name), max(enough, 1.0)) for name in ("length_mm", "width_mm")}
     few = _with(design, **sides)
+    from sensorgen.asprinted.printed import body
+
     return body(few, walls=walls).gap_mm[0]
 
 

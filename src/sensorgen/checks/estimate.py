@@ -82,20 +82,18 @@ def layers(scene: Scene, printer: Printer, quality: Quality, walls: str = "arach
 
 
 def _printed(layer: LayerRegions, scene: Scene, printer: Printer, wide: Rule) -> dict[str, Region]:
+    """What the walls make of one layer; a place that two bodies swell into goes to the one that is printed first."""
     length, width, _ = scene.size_mm
     regions: dict[str, Region] = {}
     # Electrodes first and support last, as their tools are.
     for body in sorted(scene.bodies, key=lambda b: (b.is_support(), not b.terminal)):
         if body.name in layer.regions:
-            widened = shapely.clip_by_rect(
-                _widened(layer, body.name, length * width, printer, wide), 0.0, 0.0, length, width
-            )
-            others = shapely.get_parts(list(regions.values()))
-            met = np.unique(shapely.STRtree(others).query(widened, predicate="intersects")[1])
-            found = united(widened)
-            regions[body.name] = cleaned(
-                shapely.difference(found, shapely.union_all(others[met])) if met.size else found
-            )
+            swollen = _widened(layer, body.name, length * width, printer, wide)
+            inside = shapely.clip_by_rect(swollen, 0.0, 0.0, length, width)
+            found, others = united(inside), shapely.get_parts(list(regions.values()))
+            met = np.unique(shapely.STRtree(others).query(inside, predicate="intersects")[1])
+            free = shapely.difference(found, shapely.union_all(others[met])) if met.size else found
+            regions[body.name] = cleaned(free)
     return regions
 
 

@@ -8,7 +8,7 @@ import click
 
 from sensorgen.cli import bench_hysteresis, bench_live, bench_sets, bench_show, render
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import Values, one
+from sensorgen.cli.words import Png, Values, one
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput, OutOfRange
 
@@ -41,7 +41,7 @@ PLAN: list[click.Parameter] = [
         ["--seed"], type=int, default=0, show_default=True, help="Of the random numbers: the same, the same plan."
     ),
     click.Option(["--output", "-o"], metavar="FILE", help="CSV file to write; the terminal if not given."),
-    click.Option(["--picture"], metavar="FILE.png", help="Draw the plan."),
+    click.Option(["--picture"], type=Png(), metavar="FILE.png", help="Draw the plan."),
     *render.options("json", "markdown", file=False),
 ]  # fmt: skip
 
@@ -70,8 +70,6 @@ def _work(
     if picture:
         from sensorgen.analysis.plots import recordings
 
-        if not picture.lower().endswith(".png"):
-            raise BadInput(f"--picture {picture}: expected a file that ends in .png")
         store.replace(Path(picture), recordings.schedule(list(made.steps), made.seconds))
     table = "".join(render.pieces(made, "csv"))
     if output:

@@ -7,6 +7,7 @@ import click
 
 from sensorgen.cli import bench_opened, render
 from sensorgen.cli.log_words import made
+from sensorgen.cli.words import Png
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -40,8 +41,6 @@ def _drawn(worked: "Processed", ways: "dict[float, Hysteresis]", name: str, plot
     from sensorgen.analysis.plots import recordings, static
     from sensorgen.core import files as store
 
-    if not plot.lower().endswith(".png"):
-        raise BadInput(f"--plot {plot}: expected a file that ends in .png")
     store.replace(Path(plot), static.png(recordings.hysteresis(ways, worked.recording.tones_hz, name)))
     return plot
 
@@ -55,6 +54,6 @@ command = made(
         ["--threshold", "threshold_n"], type=click.FloatRange(0, min_open=True), default=0.2, show_default=True,
         metavar="N", help="Force from which on the tip presses.",
     ),
-    click.Option(["--plot"], metavar="FILE.png", help="Draw the ways up and down over the force."),
+    click.Option(["--plot"], type=Png(), metavar="FILE.png", help="Draw the ways up and down over the force."),
     *render.options("json", "markdown"),
 )  # fmt: skip

@@ -8,6 +8,7 @@ import click
 
 from sensorgen.cli import bench_opened, render
 from sensorgen.cli.log_words import made
+from sensorgen.cli.words import Png
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
 
@@ -86,8 +87,6 @@ def _drawn(sets: "Mapping[str, Pairs]", tones_hz: "Real", plot: str | None, *, t
     from sensorgen.analysis.plots import recordings
     from sensorgen.core import files as store
 
-    if not plot.lower().endswith(".png"):
-        raise BadInput(f"--plot {plot}: expected a file that ends in .png")
     store.replace(Path(plot), recordings.normalised_differences(sets, tones_hz, together=together))
     return [plot]
 
@@ -99,6 +98,6 @@ command = made(
     click.Option(["--together"], is_flag=True, help="One scale for all, so that sizes compare."),
     *bench_opened.options(),
     click.Option(["--output", "-o"], metavar="FILE.csv", help="Write a row per press, on its scale."),
-    click.Option(["--plot"], metavar="FILE.png", help="Draw them over the force, tone by tone."),
+    click.Option(["--plot"], type=Png(), metavar="FILE.png", help="Draw them over the force, tone by tone."),
     *render.options("json", "markdown", file=False),
 )  # fmt: skip

@@ -9,7 +9,7 @@ import click
 from sensorgen.cli import body_options, options, render, settings, sweeps
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.options import option
-from sensorgen.cli.words import OneOf, Values
+from sensorgen.cli.words import OneOf, Png, Values
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
 
@@ -40,7 +40,7 @@ OWN: list[click.Parameter] = [
     options.explain(), *body_options.body_options(),
     options.flag("--check-mesh", "Solve on a finer mesh too, and compare."),
     options.no_cache(), *sweeps.options(),
-    option("--plot", None, "Draw displacement and capacitance over stress.", metavar="FILE.png"),
+    option("--plot", Png(), "Draw displacement and capacitance over stress.", metavar="FILE.png"),
     *render.options(),
 ]  # fmt: skip
 
@@ -59,12 +59,6 @@ def _work(
         raise BadInput("--explain without --accuracy: there is no plan; expected an accuracy, as --accuracy 1e-2")
     if plot and sweep:
         raise BadInput("--plot draws one design; expected --csv or --json with --sweep")
-    if plot and not plot.lower().endswith(".png"):
-        raise BadInput(f"--plot {plot}: expected a file that ends in .png")
-    if plot:
-        from sensorgen.analysis.plots.libraries import needed
-
-        needed("matplotlib")  # before the long work
     asked = compression.Asked(
         compression.stresses_kpa(stress), compression.BoundaryConditions(**boundary), model or "", accuracy or inf,
         check_mesh=check_mesh, keep=not no_cache,

@@ -96,6 +96,21 @@ class Pad(click.ParamType):  # type: ignore[type-arg]
             raise error.within(f"--pad {value!r}") from None
 
 
+class Png(click.ParamType):  # type: ignore[type-arg]
+    """A picture to draw; where it could not be made, that is said before the work."""
+
+    name = "FILE.png"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:  # noqa: ARG002
+        """Take a file that ends in .png; raise MissingValue where Matplotlib is not installed."""
+        if not value.lower().endswith(".png"):
+            raise BadInput(f"{_said(param)} {value}: expected a file that ends in .png")
+        from sensorgen.analysis.plots.libraries import needed
+
+        needed("matplotlib")
+        return str(value)
+
+
 def one(option: str, values: Sequence[float]) -> float:
     """The only one of the numbers that an option was given."""
     if len(values) != 1:

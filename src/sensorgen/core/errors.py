@@ -1,7 +1,8 @@
 """What went wrong, in words that tell the user what to do."""
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, Self
 
 
@@ -13,6 +14,21 @@ class SensorgenError(Exception):
         if where:
             self.args = (f"{where}: {self}",)
         return self
+
+
+@contextmanager
+def within(where: str) -> Iterator[None]:
+    """Lead the message of an error that is raised inside by the file or key that it is about.
+
+    >>> with within("design.yaml"):
+    ...     raise SensorgenError("no such shape")
+    Traceback (most recent call last):
+    sensorgen.core.errors.SensorgenError: design.yaml: no such shape
+    """
+    try:
+        yield
+    except SensorgenError as error:
+        raise error.within(where) from None
 
 
 class OutOfRange(SensorgenError):
@@ -43,14 +59,14 @@ class NotInstalled(MissingValue):
 
 
 class Unprintable(SensorgenError):
-    """A design whose checks found errors; ``findings`` holds all of them."""
+    """A design whose checks found errors: ``findings`` holds all that they found, the ``stopping`` ones first."""
 
-    def __init__(self, findings: Sequence[Any]) -> None:
-        """Take the findings (see :class:`sensorgen.core.findings.Finding`)."""
-        self.findings = list(findings)
-        open_ones = [f for f in self.findings if not f.waiver]
-        first = f"{open_ones[0].rule}, {open_ones[0].message}" if open_ones else "the checks found errors"
-        super().__init__(f"{first}; nothing was written (--force writes the files anyway)")
+    def __init__(self, findings: Sequence[Any], stopping: Sequence[Any]) -> None:
+        """Take the findings (see :class:`sensorgen.core.findings.Finding`), and those for which nothing is written."""
+        self.stopping = list(stopping)
+        self.findings = [*self.stopping, *(f for f in findings if f not in self.stopping)]
+        first = self.stopping[0]
+        super().__init__(f"{first.rule}, {first.message}; nothing was written (--force writes the files anyway)")
 
 
 class Unwritable(SensorgenError):

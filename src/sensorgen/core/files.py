@@ -13,7 +13,7 @@ from secrets import token_hex
 from types import FrameType
 from typing import Any, BinaryIO
 
-from sensorgen.core.errors import Unwritable
+from sensorgen.core.errors import BadInput, Unwritable
 
 MANIFEST = "manifest.json"
 _OURS: set[str] = set()  # parts of this process: an earlier process may have had the same number
@@ -41,6 +41,21 @@ def staging(folder: Path) -> Iterator[Path]:
     finally:
         with _undisturbed():
             shutil.rmtree(stage, ignore_errors=True)
+
+
+@contextmanager
+def reading(path: Path | str) -> Iterator[None]:
+    """Read a file inside.
+
+    Raises
+    ------
+    BadInput
+        It is missing or cannot be read.
+    """
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
 
 
 def unwritable(path: Path, error: OSError) -> Unwritable:

@@ -84,20 +84,27 @@ class Refused:
         Of the design or the plan.
     findings : tuple of Finding
         All of them.
+    stopping : int
+        How many of them, the first ones, are why.
     folder, gcode : None
         Nothing was written.
     """
 
     name: str
     findings: tuple[Finding, ...]
+    stopping: int
     folder: None = None
     gcode: None = None
 
     def document(self) -> Iterator[Part]:
-        """The verdict, and the findings."""
-        yield f"CHANGE  {self.name}"
+        """The verdict, and the findings that matter most of those that are why."""
+        shown = most_severe(self.findings[: self.stopping], 3)
+        yield f"CHANGE  {self.name}: {counted(counts(self.findings))}"
         yield ""
-        yield from listed(self.findings)
+        yield from listed(shown)
+        if len(self.findings) > len(shown):
+            yield ""
+            yield "all of them: sensorgen check"
 
 
 def listed(found: Iterable[Finding]) -> Iterator[Part]:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput
+from sensorgen.core.files import reading
 
 BLOCK_ROWS = 1 << 14
 LONGEST_LINE = 1 << 18
@@ -215,10 +216,8 @@ def opened(path: Path | str, columns: Mapping[str, str] = SAME_NAMES) -> Iterato
         return
     if Path(path).is_dir():
         raise BadInput(f"{path} is a folder; expected a CSV file")
-    try:
+    with reading(path):
         file = Path(path).open(encoding="utf-8-sig", errors="surrogateescape", newline="\n")  # noqa: SIM115 - below
-    except (OSError, ValueError) as error:
-        raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
     with file:
         yield Table(str(path), file, columns)
 

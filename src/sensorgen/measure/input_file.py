@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from sensorgen.core.errors import BadInput
+from sensorgen.core.files import reading
 
 _HEAD = 2056  # bytes: HDF5 may begin at 2048
 _FOREIGN = {
@@ -40,7 +41,7 @@ def checked_head(path: Path, most_bytes: int, expected: str, *, foreign: bool = 
     BadInput
         A folder, a device, a missing, empty or large file, or one of a foreign format.
     """
-    try:
+    with reading(path):
         if path.exists() and not path.is_file():
             raise BadInput(f"{str(path)!r} is {'a folder' if path.is_dir() else 'no file'}; expected {expected}")
         size = path.stat().st_size
@@ -48,8 +49,6 @@ def checked_head(path: Path, most_bytes: int, expected: str, *, foreign: bool = 
             raise BadInput(f"{str(path)!r}: {size} bytes; expected at most {most_bytes}: split it")
         with path.open("rb") as file:
             head = file.read(_HEAD)
-    except (OSError, ValueError) as error:
-        raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
     if not head:
         raise BadInput(f"{str(path)!r} is empty; expected {expected}")
     for first, what in _FOREIGN.items():

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core import units
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, within
 from sensorgen.measure import csv_table
 from sensorgen.measure.csv_table import BLOCK_ROWS, SAME_NAMES, Table, listed
 
@@ -68,10 +68,8 @@ class Readings:
         for name in beside:
             if names.count(name) > 1:
                 raise table.error(1, f"{names.count(name)} columns are {name}; expected one")
-        try:
+        with within(f"{table.name}, row 1"):
             self._re, self._im = _impedance_columns(names)
-        except BadInput as error:
-            raise error.within(f"{table.name}, row 1") from None
         others = [at for at in range(len(names)) if at not in {*self._re.values(), *self._im.values()}]
         self._beside = [at for at in others if names[at] in beside]
         self._others = [at for at in others if names[at] not in beside]
@@ -116,10 +114,8 @@ def _impedance_columns(names: Sequence[str]) -> tuple[dict[float, int], dict[flo
     parts: dict[str, dict[float, int]] = {"re": {}, "im": {}}
     for at, name in enumerate(names):
         if match := _IMPEDANCE.fullmatch(name):
-            try:
+            with within(f"column {name}"):
                 part, frequency = parts[match[1].lower()], units.frequency_hz(match[2])
-            except BadInput as error:
-                raise error.within(f"column {name}") from None
             if not frequency > 0:
                 raise BadInput(f"column {name}: expected a frequency above 0 Hz")
             if frequency in part:

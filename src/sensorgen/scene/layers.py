@@ -159,22 +159,20 @@ def scene_of(layers: Sequence[LayerRegions], like: Scene) -> Scene:
 
     Rectilinear regions become boxes, regions with holes are cut through their holes.
     """
-    bodies = (replace(body, prisms=tuple(_prisms(layers, body))) for body in like.bodies)
+    bodies = []
+    for body in like.bodies:
+        growing: dict[Outline, tuple[float, float]] = {}
+        found = []
+        for layer in layers:
+            for outline in outlines(layer.region(body.name)):
+                bottom, top = growing.get(outline, (layer.bottom_mm, layer.bottom_mm))
+                if top < layer.bottom_mm - SLIVER_MM:
+                    found.append(_prism(outline, bottom, top))
+                    bottom = layer.bottom_mm
+                growing[outline] = (bottom, layer.top_mm)
+        found += [_prism(outline, *span) for outline, span in growing.items()]
+        bodies.append(replace(body, prisms=tuple(sorted(found, key=lambda p: (p.start_mm, p.outline)))))
     return Scene(tuple(bodies), (*like.size_mm[:2], layers[-1].top_mm if layers else 0.0))
-
-
-def _prisms(layers: Sequence[LayerRegions], body: Body) -> list[Prism]:
-    growing: dict[Outline, tuple[float, float]] = {}
-    found = []
-    for layer in layers:
-        for outline in outlines(layer.region(body.name)):
-            bottom, top = growing.get(outline, (layer.bottom_mm, layer.bottom_mm))
-            if top < layer.bottom_mm - SLIVER_MM:
-                found.append(_prism(outline, bottom, top))
-                bottom = layer.bottom_mm
-            growing[outline] = (bottom, layer.top_mm)
-    found += [_prism(outline, *span) for outline, span in growing.items()]
-    return sorted(found, key=lambda p: (p.start_mm, p.outline))
 
 
 def _prism(outline: Outline, bottom_mm: float, top_mm: float) -> Prism:

@@ -139,7 +139,7 @@ def build(
             kernel = stack.enter_context(CadProcess())  # its import runs beside everything below
         held = review(design, step)
         if held.errors(strict) and not force:
-            raise Unprintable(held.findings)
+            raise Unprintable(held.findings, held.errors(strict))
         held = held.with_meshes(design)
         stage = stack.enter_context(store.staging(folder))
         step_file = stage / f"{design.name}.step"

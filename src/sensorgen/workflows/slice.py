@@ -136,7 +136,7 @@ def slice_design(
     step("checks")
     held = review(design, walls=WALLS.get(slicer, "arachne"))
     if held.errors(strict) and not force:
-        raise Unprintable(held.findings)
+        raise Unprintable(held.findings, held.errors(strict))
     target = out / design.name / f"{design.name}.{slicer}.gcode"
     with tempfile.TemporaryDirectory() as stage:
         made = sliced([alone(design)], slicer, Path(stage), program=program, time_limit_s=time_limit_s, step=step)

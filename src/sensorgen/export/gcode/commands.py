@@ -108,7 +108,7 @@ class _Simulation:
             self.homed |= {axis for axis in AXES if event.command.has(axis) or not event.command.has(AXES)}
         self.levelled |= code in self.control.levels
         if code in self.control.ends:
-            self.ended = " ".join([code, *(f"{a}{b}" for a, b in event.command.words)])
+            self.ended = str(event.command)
         self.stopped = code if code in STOPS else self.stopped
         self.effects.obey(event)
         judge(event.command, event.number, self.found)
@@ -157,8 +157,8 @@ class _Simulation:
             advice = "leave it out, or add it to the printer's file (control: macros)"
             self.found.error("macro", event.number, message, advice)
         meant_mm = self.control.tool_offsets_mm.get(self.tool, 0.0)
-        given_mm = [command.number(letter) for letter in "SZ" if command.has(letter)] if code == "M290" else []
-        if given_mm[:1] not in ([], [None]) and (given_mm[0] != meant_mm or command.number("R") != 0):
+        given_mm = next((command.number(letter) for letter in "SZ" if code == "M290" and command.has(letter)), None)
+        if given_mm is not None and (given_mm != meant_mm or command.number("R") != 0):
             message = f"M290 shifts all heights; the printer's file says {meant_mm:g} mm for tool {self.tool}"
             self.found.warning("height", event.number, message, f"write M290 S{meant_mm:g} R0, or leave it out")
 

@@ -93,7 +93,7 @@ class Effects:
         if neutral and command.number("L") != 20:  # L20 offsets so that the nozzle is there
             self.held.pop(key, None)
         else:
-            self.held[key] = event.number, f"lines are printed {effect.says} ({_text(command)})"
+            self.held[key] = event.number, f"lines are printed {effect.says} ({str(command)[:60]})"
 
     def printing(self) -> None:
         """Report what is wrong with lines printed now, each once."""
@@ -138,12 +138,8 @@ def judge(command: Command, number: int, found: Findings) -> None:
         rule, severity, message, advice = _WRONG[code]
         found.append(Found(rule, severity, number, f"{code} {message}", advice))
     elif code == "M220" and command.number("S") not in (None, 100.0):
-        message = f"{_text(command)} changes all speeds; the check goes by the feeds (F)"
+        message = f"{str(command)[:60]} changes all speeds; the check goes by the feeds (F)"
         found.warning("speed", number, message, "let the slicer set the speeds")
     elif code[0] == "T" and command.number("P") is not None:
-        message = f"{_text(command)} leaves macros of the tool change out"
+        message = f"{str(command)[:60]} leaves macros of the tool change out"
         found.warning("tool-change", number, message, "leave P out")
-
-
-def _text(command: Command) -> str:
-    return " ".join([command.code, *(letter + text[:20] for letter, text in command.words)])

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from sensorgen.core.errors import BadInput
+from sensorgen.core.files import reading
 
 _MAGIC = {
     b"GCDE": "binary G-code of Prusa's; export it as plain text (in PrusaSlicer: Preferences, Supports binary G-code)",
@@ -39,10 +40,8 @@ def text_of(source: Source) -> bytes:
         return _one_end(source)
     if not isinstance(source, Path):
         return b"".join(_one_end(line.encode("utf-8", "surrogateescape") or b"\n") for line in source)
-    try:
+    with reading(source):
         text = source.read_bytes()
-    except OSError as error:
-        raise BadInput(f"cannot read {str(source)!r}: {error.strerror or error}") from None
     _refuse(source, text[:_PEEK])
     return _one_end(text)
 

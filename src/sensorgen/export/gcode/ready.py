@@ -141,7 +141,7 @@ class _Writer:
             code, semicolon, remark = line.rstrip("\r\n").partition(";")
             gap = code[len(code.rstrip()) :]
             texts = (
-                text for c, new in zip(said.commands, made, strict=True) for text in (_text(c) if new is None else new)
+                text for c, new in zip(said.commands, made, strict=True) for text in ([str(c)] if new is None else new)
             )
             for place, text in enumerate(texts):
                 yield f"{text}{gap}{semicolon}{remark}\n" if place == 0 and semicolon else f"{text}\n"
@@ -170,7 +170,7 @@ class _Writer:
         if code in ("G10", "M568"):
             return self._tool_settings(command)
         if code == "M106" and fan is not None and not command.has("P"):
-            return _text(Command("M106", (("P", str(fan)), *command.words)))
+            return [str(Command("M106", (("P", str(fan)), *command.words)))]
         if code == "M107" and fan is not None:
             return [f"M106 P{fan} S0"]
         if code == "M82" and self.control.relative_e:
@@ -179,7 +179,7 @@ class _Writer:
 
     def _change(self, command: Command) -> Sequence[str]:
         self.tool = _own(self.machine, float(command.code[1:]))
-        texts = [_text(Command(f"T{self.tool}", command.words))[0]]
+        texts = [str(Command(f"T{self.tool}", command.words))]
         if self.control.names_tools:
             texts.append(f"M116 P{self.tool}")
         offset_mm = self.control.tool_offsets_mm.get(self.tool, 0.0)
@@ -203,7 +203,7 @@ class _Writer:
         settings = [self._settings(tool, command.number("S"), command.number("R"))]
         if command.code == "M568" and command.has("A"):
             state = Command("M568", tuple(word for word in command.words if word[0] not in "SR"))
-            settings += self._of_tool(state) or _text(state)
+            settings += self._of_tool(state) or [str(state)]
         return settings
 
     def _temperature(self, command: Command) -> Sequence[str] | None:
@@ -237,8 +237,4 @@ class _Writer:
         if index is None or _own(self.machine, index) == index:
             return None
         own = str(_own(self.machine, index))
-        return _text(Command(command.code, tuple((n, own if n == letter else t) for n, t in command.words)))
-
-
-def _text(command: Command) -> list[str]:
-    return [" ".join([command.code, *(f"{letter}{text}" for letter, text in command.words)])]
+        return [str(Command(command.code, tuple((n, own if n == letter else t) for n, t in command.words)))]

@@ -44,6 +44,9 @@ class Command:
     code: str
     words: tuple[tuple[str, str], ...] = ()
 
+    def __str__(self) -> str:
+        return " ".join([self.code, *(letter + text for letter, text in self.words)])
+
     def text(self, letter: str) -> str | None:
         """Text of a word, or None where the command has no such word."""
         return next((text for name, text in self.words if name == letter), None)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
-from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.core.records import Strict, checked
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design, of_resolved
@@ -62,14 +62,12 @@ def rows(path: Path, file: RawFile) -> Iterator[Entry]:
         Not the record of a batch; with the file's name, and the key.
     """
     data = _json(path)
-    try:
+    with within(str(path)):
         record = checked(_Record, data)
         yield file
         yield Batch(uid=file.uid, batch=record.batch or path.absolute().parent.name, file=file.uid)
         pieces = (row for name, piece in record.specimens.items() for row in _piece(file.uid, name, piece, record))
         yield from dict.fromkeys(pieces)  # copies of one design share a prediction
-    except BadInput as error:
-        raise error.within(str(path)) from None
 
 
 def _piece(batch: str, name: str, piece: _Piece, record: _Record) -> Iterator[Entry]:

@@ -20,6 +20,10 @@ _MAGIC = b"SQLite format 3\0"
 _ID = slice(68, 72)  # of the header: PRAGMA application_id
 _FORMAT = slice(18, 20)  # of the header: versions to write and to read
 _WAL = bytes((2, 2))
+_PRAGMAS = (
+    "trusted_schema = OFF", "cell_size_check = ON", "foreign_keys = ON", "recursive_triggers = ON",
+    "journal_mode = WAL", "synchronous = FULL",
+)  # fmt: skip
 _BUSY = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
 _UNWRITABLE = (
     sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM,
@@ -49,8 +53,14 @@ def connect(path: Path, *, create: bool) -> sqlite3.Connection:
                 raise BadInput(f"no log at {str(path)!r}: log something first, or name another with --log")
             _create(path)
         _check_header(path)
-        connection = _open(path)
+        own = {"effective_ids": True} if os.access in os.supports_effective_ids else {}
+        # without write permission and without a write-ahead log beside it, the file cannot change while it is read
+        writable = os.access(path.parent, os.W_OK, **own) or Path(f"{path}-wal").exists()
+        uri = f"{path.absolute().as_uri()}?{'mode=rw' if writable else 'immutable=1'}"
+        connection = sqlite3.connect(uri, uri=True, timeout=WAIT_S, isolation_level=None)
         try:
+            for pragma in _PRAGMAS:
+                connection.execute(f"PRAGMA {pragma}")
             _migrate(connection, path)
             _check_tables(connection, path)
         except BaseException:
@@ -123,24 +133,6 @@ def _check_header(path: Path) -> None:
         raise BadInput(f"{str(path)!r} is no SQLite file; expected a log, as sensorgen log writes it")
     if struct.unpack(">I", header[_ID]) != (APPLICATION_ID,):
         raise BadInput(f"{str(path)!r} is another program's database; expected a log, as sensorgen log writes it")
-
-
-def _open(path: Path) -> sqlite3.Connection:
-    own = {"effective_ids": True} if os.access in os.supports_effective_ids else {}
-    # without write permission and without a write-ahead log beside it, the file cannot change while it is read
-    writable = os.access(path.parent, os.W_OK, **own) or Path(f"{path}-wal").exists()
-    uri = f"{path.absolute().as_uri()}?{'mode=rw' if writable else 'immutable=1'}"
-    connection = sqlite3.connect(uri, uri=True, timeout=WAIT_S, isolation_level=None)
-    try:
-        for pragma in (
-            "trusted_schema = OFF", "cell_size_check = ON", "foreign_keys = ON", "recursive_triggers = ON",
-            "journal_mode = WAL", "synchronous = FULL",
-        ):  # fmt: skip
-            connection.execute(f"PRAGMA {pragma}")
-    except BaseException:
-        connection.close()
-        raise
-    return connection
 
 
 def _create(path: Path) -> None:

@@ -13,7 +13,7 @@ from hashlib import file_digest
 from pathlib import Path
 
 from sensorgen.core.errors import BadInput, Unwritable
-from sensorgen.core.files import part_of, remove_stale_parts, sync_folder
+from sensorgen.core.files import part_of, reading, remove_stale_parts, sync_folder
 from sensorgen.measure.log.entries import RawFile
 
 CHANGED = "changed while it was read: log it when it is complete"
@@ -87,12 +87,10 @@ def raw_file(path: Path) -> RawFile:
     BadInput
         The file cannot be read.
     """
-    try:
+    with reading(path):
         if path.exists() and not path.is_file():
             raise BadInput(f"{str(path)!r} is no file; expected a recording")
         return RawFile(uid=_digest(path), name=path.name, size=path.stat().st_size)
-    except (OSError, ValueError) as error:
-        raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
 
 
 def faults(folder: Path, files: Iterator[RawFile]) -> Iterator[str]:

@@ -5,7 +5,7 @@ import re
 import uuid
 from functools import lru_cache
 
-from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.design import specimen_name
 from sensorgen.design.design import Design
 from sensorgen.measure.log import resistances
@@ -98,10 +98,8 @@ def resistance(axis: str, text: str, *, mega: bool = False) -> Resistances:
     BadInput
         Not a resistance; the message names the axis.
     """
-    try:
+    with within(f"resistance in {axis.upper()}"):
         return resistances.parse(text, mega=mega)
-    except BadInput as error:
-        raise error.within(f"resistance in {axis.upper()}") from None
 
 
 def design_fields(written: str) -> tuple[str, str]:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 
-from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
+from sensorgen.core.errors import BadInput, UnknownName, within
 from sensorgen.core.records import shown
 from sensorgen.measure import csv_table
 from sensorgen.measure.csv_table import Table
@@ -102,7 +102,7 @@ def _row(
     content = json.dumps(list(cells.values()))
     seen[content] += 1
     baked = cells["baked"].casefold()
-    try:
+    with within(f"{table.name}, row {number}"):
         if baked not in _TRUTH:
             raise BadInput(f"column baked: {shown(cells['baked'])}; expected yes, no or nothing")
         return reading(
@@ -110,8 +110,6 @@ def _row(
             measured_at=cells["measured_at"], source=source, source_row=number - 1,
             uid=sha256(f"{seen[content]} {content}".encode()).hexdigest()[:32],
         )  # fmt: skip
-    except SensorgenError as error:
-        raise error.within(f"{table.name}, row {number}") from None
 
 
 def thesis() -> list[Reading]:

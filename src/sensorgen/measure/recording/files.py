@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.core.errors import BadInput, within
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.recording import hdf, matfive, table, tiepie
 from sensorgen.measure.recording.matfive import MOST_BYTES
@@ -50,13 +50,11 @@ def read_all(path: Path | str, columns: Mapping[str, str] | None = None) -> tupl
     try:
         if file_format == "CSV":
             return (table.recording(path, columns or {}),)
-        try:
+        with within(str(path)):
             if file_format == "MATLAB 5":
                 tree = matfive.variables(path.read_bytes(), tiepie.WANTED)
             else:
                 tree = hdf.variables(path, tiepie.WANTED)
             return tiepie.recordings(tree, Source(path.name, file_format))
-        except SensorgenError as error:
-            raise error.within(str(path)) from None
     except OSError as error:
         raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None

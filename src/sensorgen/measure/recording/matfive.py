@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, within
 
 MOST_BYTES = 1 << 31  # of a file, and of what it unpacks to
 _HEADER = 128
@@ -64,14 +64,12 @@ def variables(content: bytes, wanted: Collection[str]) -> dict[str, Any]:
         array = _unpacked(element, order) if packed else element
         if array.type != _MATRIX:
             raise _damaged(f"an array was expected, not data of type {array.type}", element.offset)
-        try:
+        with within(f"inside the packed array at byte {element.offset}" if packed else ""):
             pieces = list(islice(_elements(array.data, order, array.offset), 3))
             named = len(pieces) == 3 and pieces[2].type in _TEXTS  # some classes store their name elsewhere
             name = _text(pieces[2], order) if named else ""
             if name in wanted:
                 values[name] = _Array(array, order).value()
-        except BadInput as error:
-            raise error.within(f"inside the packed array at byte {element.offset}" if packed else "") from None
     return values
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, within
 from sensorgen.measure.readings import readings
 from sensorgen.measure.recording import clock
 from sensorgen.measure.recording.samples import Recording, Source, blank, sifted
@@ -35,10 +35,8 @@ def recording(path: Path, columns: Mapping[str, str]) -> Recording:
     beside = dict(zip(file.numbers, np.concatenate([block.numbers for block in blocks]).T, strict=True))
     if TIME not in beside and STAMP not in beside:
         raise BadInput(f"{path}: no column {TIME} and none {STAMP} (seconds since 1970); name it with a map of columns")
-    try:
+    with within(str(path)):
         rebuilt = clock.rebuilt(len(impedance), beside.get(TIME), beside.get(STAMP))
-    except BadInput as error:
-        raise error.within(str(path)) from None
     marks = blank(len(impedance)) | rebuilt.marks | sifted(impedance)
     if CLIPPED in beside:
         marks["clipped"] = beside[CLIPPED] == 1

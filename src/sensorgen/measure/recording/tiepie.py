@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, within
 from sensorgen.measure.recording import clock
 from sensorgen.measure.recording.samples import Bools, Complex, Real, Recording, Source, blank, sifted
 
@@ -130,10 +130,8 @@ def _recording(
     incomplete = max(lengths) - count
     notes = (f"{incomplete} incomplete samples at the end: the run was interrupted",) if incomplete else ()
     z, time, stamps = z[:count], time[:count], None if stamps is None else stamps[:count]
-    try:
+    with within(f"impedance_time of {name}"):
         rebuilt = clock.rebuilt(count, time, stamps)
-    except BadInput as error:
-        raise error.within(f"impedance_time of {name}") from None
     rate, bandwidth = clock.rate_hz(rebuilt.time_s), _number(settings, "bandwidth")
     marks = blank(count) | rebuilt.marks | sifted(z) | {"clipped": clipped[:count]}
     if bandwidth > 0 and np.isfinite(rate):  # until the demodulator's filter has settled

@@ -163,20 +163,11 @@ def filtered(recording: Recording, cutoff_hz: float = CUTOFF_HZ) -> tuple[Real, 
     if len(time) < 2:
         raise OutOfRange(f"{len(time)} valid samples; expected two or more to filter")
     rate = recording.source.rate_hz
-    grid, values = evenly(time, z, rate)
+    grid, values = time, z
+    if np.abs(np.diff(time) * rate - 1).max() >= _EVEN:
+        grid = np.arange(time[0], time[-1] + 0.5 / rate, 1 / rate)
+        values = np.column_stack([np.interp(grid, time, column) for column in z.T])
     smooth = offline(values, rate, cutoff_hz)
     before = np.clip(np.searchsorted(time, grid, side="right") - 1, 0, len(time) - 2)
     smooth[(time[before + 1] - time[before]) * cutoff_hz > _LONGEST_GAP] = np.nan
     return grid, smooth
-
-
-def evenly(time_s: Real, values: Complex, rate_hz: float) -> tuple[Real, Complex]:
-    """Values on even steps: unchanged where the steps are even, else interpolated linearly."""
-    steps = np.diff(time_s) * rate_hz
-    if np.abs(steps - 1).max() < _EVEN:
-        return time_s, values
-    grid = np.arange(time_s[0], time_s[-1] + 0.5 / rate_hz, 1 / rate_hz)
-    even = np.empty((len(grid), values.shape[1]), np.complex128)
-    for j in range(values.shape[1]):
-        even[:, j] = np.interp(grid, time_s, values[:, j])
-    return grid, even

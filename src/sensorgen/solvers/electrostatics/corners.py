@@ -1,7 +1,7 @@
 """How singular the field is at each corner: u grows as r^lambda, and lambda below 1 means an infinite field."""
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from functools import cache, lru_cache
 from itertools import pairwise
 from math import ceil, log
@@ -150,7 +150,15 @@ class _Splitter:
         triangles: list[Triangle] = []
         regions: list[tuple[str, float]] = []
         for corners, region in zip(self.mesh.triangles, self.mesh.regions, strict=True):
-            new = list(self._parts(corners))
+            tips: list[Triangle] = []
+            hub: list[int] = []
+            for k, corner in enumerate(corners):
+                before, after = corners[k - 1], corners[k - 2]
+                left, right = self._around(corner, before), self._around(corner, after)
+                hub += [*left, *([] if corner in self.tipped else [corner]), *right[::-1]]
+                if corner in self.tipped:
+                    tips.append((corner, right[-1], left[-1]))
+            new = [*tips, *fan(np.array([self.points[n] for n in hub]), hub)]
             triangles += new
             regions += [region] * len(new)
         terminals: dict[Edge, str] = {}
@@ -171,13 +179,3 @@ class _Splitter:
         """Points around a corner on its edge to another one, the outermost first."""
         edge = (min(corner, other), max(corner, other))
         return self.on_edge[edge][edge.index(corner)]
-
-    def _parts(self, corners: Triangle) -> Iterator[Triangle]:
-        hub: list[int] = []
-        for k, corner in enumerate(corners):
-            before, after = corners[k - 1], corners[k - 2]
-            left, right = self._around(corner, before), self._around(corner, after)
-            hub += [*left, *([] if corner in self.tipped else [corner]), *right[::-1]]
-            if corner in self.tipped:
-                yield corner, right[-1], left[-1]
-        yield from fan(np.array([self.points[n] for n in hub]), hub)

@@ -237,7 +237,10 @@ def network(
     """Merge nodes under contacts and on perfectly conducting sheets, and number what is left."""
     count = 2 * len(axes[0].lines_m) * len(axes[1].lines_m)
     joined = np.arange(count)
-    places = {contact: _nodes(axes, contact) for contact in contacts}
+    places = {}
+    for contact in contacts:
+        x, y = axes[0].nodes(*contact.x_m), axes[1].nodes(*contact.y_m)
+        places[contact] = 2 * (x[:, None] * len(axes[1].lines_m) + y).ravel() + SIDES.index(contact.side)
     for nodes in places.values():
         joined[nodes] = nodes[0]
     for side, ohm in enumerate(sheet.sheet_resistance_ohm):
@@ -258,8 +261,3 @@ def network(
             drive[unknown[places[contact][0]], p] += sign
             crossing[p] += sign * (contact.side == SIDES[0])
     return Network(unknown[of.ends], slice(of.ends.shape[1] - count // 2, None), drive[:-1], crossing)
-
-
-def _nodes(axes: tuple[Axis, Axis], contact: Contact) -> Index:
-    x, y = axes[0].nodes(*contact.x_m), axes[1].nodes(*contact.y_m)
-    return np.asarray(2 * (x[:, None] * len(axes[1].lines_m) + y).ravel() + SIDES.index(contact.side))

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from sensorgen.core import yamlfile
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import within
 from sensorgen.core.records import Strict, checked
 from sensorgen.verification.thesis.verdicts import EXACT
 
@@ -73,7 +73,5 @@ def chapter(name: str) -> Chapter:
     """Read a chapter of ``CHAPTERS``."""
     file = f"chapters/{name}.yaml"
     data = yamlfile.parse((resources.files("sensorgen.verification.thesis") / file).read_text("utf-8"), file)
-    try:
+    with within(file):
         return checked(Chapter, data)
-    except BadInput as error:
-        raise error.within(file) from None

@@ -207,7 +207,9 @@ def make(
 def _refuse_unprintable(found: Arranged, held: Mapping[str, Review], *, force: bool, strict: bool) -> None:
     wrong = [key for key in held if held[key].errors(strict)]
     if wrong and not force:
-        raise Unprintable([f for key in wrong for f in held[key].findings]).within(found.designs[wrong[0]].name)
+        every = [f for key in wrong for f in held[key].findings]
+        stopping = [f for key in wrong for f in held[key].errors(strict)]
+        raise Unprintable(every, stopping).within(found.designs[wrong[0]].name)
 
 
 def _files(found: Arranged) -> Iterator[tuple[str, bytes]]:

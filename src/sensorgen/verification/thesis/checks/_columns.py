@@ -1,7 +1,6 @@
 """Columns of layers between two electrodes, as our model of columns has them; and cells as field solvers have them."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from sensorgen.core.errors import MissingValue
 from sensorgen.core.units import M_PER_MM
@@ -10,7 +9,6 @@ from sensorgen.design.values import permittivities
 from sensorgen.models import columns
 from sensorgen.prediction import capacitance as planner
 from sensorgen.scene.scene import Body, Scene, box
-from sensorgen.verification.thesis.verdicts import Part
 
 EPS_R = 4.68
 PERMITTIVITY = {"x60": EPS_R, "air": 1.0}  # the thesis takes air for vacuum
@@ -66,8 +64,3 @@ def exact_f_per_m2(shape: str) -> float:
         raise MissingValue(f"no model here meets a tolerance of {_ACCURACY:g}: {'; '.join(found.refused)}")
     area = made.params.length_mm * made.params.width_mm * M_PER_MM**2
     return (found.capacitance_f.lower + found.capacitance_f.upper) / 2 / area
-
-
-def sizes_of(params: Any, said: Mapping[str, float]) -> list[Part]:
-    """Sizes of a shape by default, against those that the text has [mm]."""
-    return [Part(n.removesuffix("_mm").replace("_", " "), "mm", float(getattr(params, n)), v) for n, v in said.items()]

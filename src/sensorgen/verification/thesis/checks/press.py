@@ -40,15 +40,9 @@ def _top(name: str, moved: compressed.CompressionResult, thesis_mm: float) -> Pa
     return Part(name, "m", ours, thesis_mm * M_PER_MM, shown=_SHOWN)
 
 
-def triangles(displacement_mm: float, film_mm: float, base: str = "bonded", period: str = "fixed") -> list[Part]:
-    """6.5: the triangular cell, base and period held; 6.8: on a base that slides, its period free to widen."""
-    found = _pressed("tri", parameters={"dielectric_mm": film_mm}, base=base, period=period)
-    return [_top("displacement of the top at 100 kPa", found, displacement_mm)]
-
-
-def rectangles(displacement_mm: float, film_mm: float) -> list[Part]:
-    """6.9: the rectangular cell, in three dimensions, base and period held."""
-    found = _pressed("rect", parameters={"dielectric_mm": film_mm})
+def top(shape: str, displacement_mm: float, film_mm: float, base: str = "bonded", period: str = "fixed") -> list[Part]:
+    """6.5: triangular cell; 6.8: on a base that slides, its period free to widen; 6.9: the rectangular one, in 3D."""
+    found = _pressed(shape, parameters={"dielectric_mm": film_mm}, base=base, period=period)
     return [_top("displacement of the top at 100 kPa", found, displacement_mm)]
 
 

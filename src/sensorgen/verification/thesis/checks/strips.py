@@ -12,7 +12,6 @@ from sensorgen.verification.thesis.checks._columns import (
     Layer,
     exact_f_per_m2,
     pile_f_per_m2,
-    sizes_of,
 )
 from sensorgen.verification.thesis.verdicts import Part
 
@@ -29,19 +28,14 @@ _PRINTED_MM = {
 }
 
 
-def column(below: str, above: str) -> list[Part]:
-    """3.39 to 3.41, 3.43 to 3.45, 3.47: one column, per area."""
-    layers: list[Layer] = [("x60", _D)]
-    if below != "etpu":
-        layers.append((below, _T2))
-        layers += [(above, _T1)] if above != "etpu" else []
-    printed = EPS0_F_PER_M * EPS_R / (_PRINTED_MM[below][above] * M_PER_MM)
-    return [Part(f"{above} over {below}", "F/m2", pile_f_per_m2(layers), printed)]
-
-
-def columns_over(below: str) -> list[Part]:
-    """3.42, 3.46, 3.48: all columns over one kind of lower strip."""
-    return [part for above in _PRINTED_MM[below] for part in column(below, above)]
+def columns(below: str, above: str = "") -> list[Part]:
+    """3.39 to 3.48: one column over a kind of lower strip, or all, per area."""
+    found = []
+    for name in [above] if above else _PRINTED_MM[below]:
+        over: list[Layer] = [(below, _T2), *([(name, _T1)] if name != "etpu" else [])] if below != "etpu" else []
+        printed = EPS0_F_PER_M * EPS_R / (_PRINTED_MM[below][name] * M_PER_MM)
+        found.append(Part(f"{name} over {below}", "F/m2", pile_f_per_m2([("x60", _D), *over]), printed))
+    return found
 
 
 def in_series() -> list[Part]:
@@ -70,8 +64,8 @@ def sixteen_columns() -> list[Part]:
 
 def whole() -> list[Part]:
     """3.49: the formula, and its cell."""
-    (columns,) = sixteen_columns()
-    return [columns, replace(columns, name="of the exact cell", ours=exact_f_per_m2("rect") * _AREA_M2, shown=SHOWN)]
+    (summed,) = sixteen_columns()
+    return [summed, replace(summed, name="of the exact cell", ours=exact_f_per_m2("rect") * _AREA_M2, shown=SHOWN)]
 
 
 def _bulged() -> tuple[float, float]:
@@ -103,8 +97,3 @@ def bulging() -> list[Part]:
     """3.54: what it adds to a cell that nothing presses."""
     ours, printed = (thesis_cells.bulging_f_per_m2(_CELL, EPS_R, 0.0, printed=way) for way in (False, True))
     return [Part("C_r at rest", "F/m2", ours, printed)]
-
-
-def sizes(**said: float) -> list[Part]:
-    """Figures 2.14 and 3.5: sizes as the text has them [mm]."""
-    return sizes_of(_CELL, said)

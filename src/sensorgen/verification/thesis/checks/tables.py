@@ -4,9 +4,11 @@ import numpy as np
 
 from sensorgen.core.errors import MissingValue
 from sensorgen.core.units import M_PER_MM
+from sensorgen.design import design as designs
 from sensorgen.design import materials, printer
 from sensorgen.design.shapes import reference
 from sensorgen.prediction.query import TIP_M, TONES_HZ
+from sensorgen.verification.thesis.checks._columns import FILM_MM
 from sensorgen.verification.thesis.verdicts import Part
 
 _UNITS = {"_pa": "Pa", "_kg_m3": "kg/m3", "_c": "°C", "_percent": "%"}  # by the ending of a quantity
@@ -67,6 +69,12 @@ def plate(sizes: Printed, relative_permittivity: list[float], tones_hz: list[flo
         Part("tones", "Hz", TONES_HZ, tones_hz),
         *of_source("thesis-3.1", **said),
     ]  # fmt: skip
+
+
+def cell(shape: str, **said: float) -> list[Part]:
+    """Figures 2.12, 2.14 and 3.5: sizes of a cell as the text has them [mm]."""
+    params = designs.make({"shape": shape, "parameters": {"dielectric_mm": FILM_MM}}).params
+    return [Part(n.removesuffix("_mm").replace("_", " "), "mm", float(getattr(params, n)), v) for n, v in said.items()]
 
 
 def tones(frequency_hz: list[float], corrected_hz: list[float]) -> list[Part]:

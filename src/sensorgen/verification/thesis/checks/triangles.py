@@ -18,7 +18,6 @@ from sensorgen.verification.thesis.checks._columns import (
     Layer,
     exact_f_per_m2,
     pile_f_per_m2,
-    sizes_of,
 )
 from sensorgen.verification.thesis.verdicts import Part
 
@@ -178,8 +177,3 @@ def whole() -> list[Part]:
         Part("by our formula", "F/m", both, printed),
         Part("of the exact cell", "F/m", exact_f_per_m2("tri") * half, printed, shown=SHOWN),
     ]
-
-
-def sizes(**said: float) -> list[Part]:
-    """Figure 2.12: sizes as the text has them [mm]."""
-    return sizes_of(_CELL, said)
