@@ -20,7 +20,7 @@ from sensorgen.workflows.batch import tab
 from sensorgen.workflows.batch.layout import Plate
 from sensorgen.workflows.batch.pieces import Piece, tools
 from sensorgen.workflows.batch.plan import Plan
-from sensorgen.workflows.batch.record import PrintedDesign, SlicedPlate, UnreadDesign
+from sensorgen.workflows.batch.record import PrintedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes
 
 
@@ -89,7 +89,7 @@ def gcode(
     )  # fmt: skip
 
 
-def _printed(piece: Placed, made: Sliced, content: bytes) -> PrintedDesign | UnreadDesign:
+def _printed(piece: Placed, made: Sliced, content: bytes) -> PrintedDesign:
     """The print of a specimen, from the G-code of its plate."""
     design, source = piece.design, f"{made.slicer} {made.version}"
     try:
@@ -98,4 +98,4 @@ def _printed(piece: Placed, made: Sliced, content: bytes) -> PrintedDesign | Unr
         layers, findings = tuple(printed.rows()), tuple(printed.findings())
         return PrintedDesign(piece.name, design.name, timeless(evaluate(body)), layers, findings)
     except SensorgenError as error:
-        return UnreadDesign(piece.name, design.name, str(error))
+        return PrintedDesign(piece.name, design.name, reason=str(error))

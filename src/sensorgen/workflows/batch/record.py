@@ -91,19 +91,22 @@ class PrintedDesign:
     ----------
     specimen, design : str
         Name of the specimen that was read, and of its design.
-    prediction : Prediction
-        What it should measure.
+    prediction : Prediction or None
+        Its prediction; None if the print cannot be read.
     layers : tuple of Row
         Printed over drawn volume.
     findings : tuple of Finding
         Rule 7.
+    reason : str
+        Why the print cannot be read, or "".
     """
 
     specimen: str
     design: str
-    prediction: Prediction
-    layers: tuple[Row, ...]
-    findings: tuple[Finding, ...]
+    prediction: Prediction | None = None  # no union of two types for read and unread: JSON would lose infinities
+    layers: tuple[Row, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    reason: str = ""
 
     @property
     def lost(self) -> int:
@@ -112,8 +115,10 @@ class PrintedDesign:
 
     @property
     def words(self) -> str:
-        """Gap, resistance and capacitance."""
+        """Gap, resistance and capacitance; or the reason."""
         found = self.prediction
+        if found is None:
+            return self.reason
         gaps = [f"{p.gap.value * 1e3:g} mm" for p in (found, found.drawn) if p and p.gap]
         gap = f"electrode gap {gaps[0]} (drawn {gaps[1]}), " if len(gaps) > 1 else ""
         lost = f"; {self.lost} layers of bodies are not printed at all" if self.lost else ""
@@ -121,23 +126,6 @@ class PrintedDesign:
         if resistance is None or capacitance is None:
             return f"{gap}no prediction{lost}"
         return f"{gap}R {si(resistance, 'ohm')}, C {si(capacitance, 'F')}{lost}"
-
-
-@dataclass(frozen=True)
-class UnreadDesign:
-    """A design whose print cannot be read from the G-code, with the reason."""
-
-    specimen: str
-    design: str
-    reason: str
-    findings: tuple[Finding, ...] = ()
-
-    lost = 0
-
-    @property
-    def words(self) -> str:
-        """The reason."""
-        return self.reason
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +138,7 @@ class SlicedPlate(Checked):
         Of the slicer.
     gcode, raw, profile : str
         Files for the printer, of the slicer itself, and with its settings.
-    printed : dict of str to PrintedDesign or UnreadDesign
+    printed : dict of str to PrintedDesign
         The print of each design, by its identity.
     """
 
@@ -158,7 +146,7 @@ class SlicedPlate(Checked):
     gcode: str
     raw: str
     profile: str
-    printed: dict[str, PrintedDesign | UnreadDesign]
+    printed: dict[str, PrintedDesign]
 
     def in_short(self, slicer: str) -> Iterator[str]:
         """Time, filament, findings and prints."""
