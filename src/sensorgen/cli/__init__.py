@@ -69,6 +69,7 @@ class _Lazy(click.Group):
         command: click.Command = importlib.import_module(
             f"sensorgen.{_PACKAGE.get(name, 'cli')}.{name}_command"
         ).command
+        command.short_help = next(commands[name] for commands in SECTIONS.values() if name in commands)
         return command
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -94,5 +94,4 @@ command = _PlanGroup(
     docs/batch.md has an example of a plan.
     """,
     epilog="PLAN.yaml --help lists the options.",
-    short_help="Put several sensors on one plate, with a record.",
 )

@@ -46,7 +46,7 @@ PLAN: list[click.Parameter] = [
 ]  # fmt: skip
 
 
-@click.group("bench", short_help="Plan a run of loads, and evaluate its recording.")
+@click.group("bench")
 def command() -> None:
     """Plans for the rig that presses sensors, and its recordings."""
 

@@ -40,5 +40,4 @@ def _work(
 command = DesignGroup(
     _work, OWN, name="build",
     help="Write everything that a design's print needs: 3MF, STEP, profiles, drawing, prediction.",
-    short_help="Write all that a print needs: 3MF, STEP, profiles, drawing.",
 )  # fmt: skip

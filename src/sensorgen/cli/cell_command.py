@@ -69,5 +69,4 @@ command = DesignGroup(
     _work, OWN, name="cell",
     help="Certified bounds of the capacitance per area, by the least expensive model within the accuracy. Exit code 1 "
     "where none reaches it.",
-    short_help="Capacitance between certified bounds.",
 )  # fmt: skip

@@ -86,5 +86,4 @@ command = DesignGroup(
     _work, OWN, name="compress",
     help="Press a cell: displacement and capacitance over stress, by finite elements with contact; of a cross-section "
     "in plane strain, of boxes in 3D. Exit code 1 where a check says that the answer is not to be trusted.",
-    short_help="Displacement and capacitance under stress.",
 )  # fmt: skip

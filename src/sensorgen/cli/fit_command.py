@@ -47,7 +47,7 @@ def _taken(made: "Fit") -> str:
 
 
 command = click.Command(
-    "fit", callback=_work, help=_work.__doc__, short_help="Fit material values to what was measured.",
+    "fit", callback=_work, help=_work.__doc__,
     params=[
         click.Option(["--iteration"], type=click.IntRange(0), required=True, help="Of the design."),
         log_words.where(),

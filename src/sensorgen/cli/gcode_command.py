@@ -47,7 +47,7 @@ def _loaded(words: tuple[str, ...], tools: tuple[int, ...]) -> dict[int, str]:
 
 
 command = click.Group(
-    "gcode", help="Check G-code, whoever has sliced it.", short_help="Check G-code before the printer does.",
+    "gcode", help="Check G-code, whoever has sliced it.",
     commands=[
         click.Command(
             "check", callback=_check, help=_check.__doc__,

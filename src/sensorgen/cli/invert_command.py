@@ -129,5 +129,4 @@ command = DesignGroup(
     _work, OWN, name="invert",
     help="Force and position behind the impedances in MEASURED.csv ('-' reads the standard input): one row per sample, "
     "columns re_ohm_1.1kHz and im_ohm_1.1kHz for every tone.",
-    short_help="Force and position from measured impedances.",
 )  # fmt: skip

@@ -21,5 +21,5 @@ def _list(kind: str) -> None:
 
 command = click.Command(
     "list", params=[click.Argument(["kind"], type=OneOf(KINDS)), *render.options("json", "markdown")], callback=_list,
-    help=_list.__doc__, short_help="List shapes, materials, printers, qualities, models or sources.",
+    help=_list.__doc__,
 )  # fmt: skip

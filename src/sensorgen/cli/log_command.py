@@ -20,7 +20,7 @@ class _Group(click.Group):
         return super().resolve_command(ctx, args)
 
 
-@click.group("log", cls=_Group, short_help="Log of readings, recordings, prints and predictions.")
+@click.group("log", cls=_Group)
 def command() -> None:
     """Log of readings, recordings, prints and predictions.
 

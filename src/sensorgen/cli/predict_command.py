@@ -111,5 +111,4 @@ command = DesignGroup(
     help="Predict the print beside the drawing: gap, capacitance, electrode resistance, sensitivity, resolution and "
     "impedance, each with its range; with --force, --position, --csv or --plot, R and X over force, position and "
     "frequency.",
-    short_help="Predict capacitance, resistance and impedance, loaded or not.",
 )  # fmt: skip

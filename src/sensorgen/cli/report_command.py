@@ -59,7 +59,7 @@ def _draw(made: "Report", folder: Path) -> None:
 
 
 command = click.Command(
-    "report", callback=_work, help=_work.__doc__, short_help="Compare predictions and measurements, as one page.",
+    "report", callback=_work, help=_work.__doc__,
     params=[
         click.Option(["--iteration"], type=click.IntRange(0), required=True, help="Of the design."),
         log_words.where(),

@@ -22,7 +22,6 @@ def _schema(of: str) -> None:
 
 command = click.Command(
     "schema", callback=_schema, help=_schema.__doc__,
-    short_help="Print the JSON schema of a design file or of prediction.json.",
     params=[
         click.Argument(["of"], type=click.Choice(["design", "prediction"]), default="design"), render.options()[-1]
     ],

@@ -69,5 +69,4 @@ def _work(
 command = DesignGroup(
     _work, OWN, name="sheet",
     help="Bounds on force and place of a press in two dimensions, for the usual sets of contacts.",
-    short_help="Which contacts and frequencies locate a load in two dimensions.",
 )  # fmt: skip

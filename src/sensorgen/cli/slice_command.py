@@ -54,5 +54,4 @@ def _work(
 command = DesignGroup(
     _work, OWN, name="slice",
     help="Slice a design with a real slicer, and write G-code that the printer takes as it is.",
-    short_help="Write printer-ready G-code, by a real slicer.",
 )  # fmt: skip

@@ -53,5 +53,4 @@ def _work(
 command = DesignGroup(
     _work, OWN, name="stack",
     help="What a double sensor tells that a single one does not, and what a touch does, with isolation and without.",
-    short_help="Double sensor, and isolation against touch.",
 )  # fmt: skip

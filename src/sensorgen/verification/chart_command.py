@@ -12,7 +12,7 @@ from sensorgen.core.errors import UnknownName
 FILES = ("chart.csv", "chart.png", "chart.html")
 
 
-@click.command("chart", short_help="Draw time against error of every model.")
+@click.command("chart")
 @click.option("--scene", multiple=True, metavar="NAME", help="A standard scene, as 'tri, 0.1 mm'; all if not given.")
 @click.option(
     "--budget", type=Ratio(), default="60", show_default=True, metavar="SECONDS", help="Leave out what takes longer."

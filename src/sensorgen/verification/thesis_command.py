@@ -13,7 +13,7 @@ from sensorgen.cli.words import OneOf
 FORMATS = ("html", "md", "json")
 
 
-@click.command("thesis", short_help="Hold every number of the thesis against ours.")
+@click.command("thesis")
 @click.option(
     "--output", "-o", default="out/thesis", show_default=True, metavar="DIR", help="Folder of thesis.html and the like."
 )
