@@ -201,7 +201,9 @@ def test_the_record_says_what_is_printed_of_each_design(small, slicer):
         assert predicted["resistance"][end]["value"] == pytest.approx(drawn["value"], rel=0.1)
     # PrusaSlicer drops the tips of the cogs, one layer of 0.1 mm; Cura fills them with thin lines.
     assert tips["gap"]["value"] == pytest.approx(3e-4 if slicer == "prusa" else 2e-4)
-    assert small.lost() == 2
+    assert sum(p.lost for plate in small.record.slicers.values() for p in plate.printed.values()) == 2
+    assert small.errors()
+    assert not small.errors(force=True)
 
 
 def test_a_slicer_that_fails_leaves_nothing_and_says_why(tmp_path, monkeypatch):
@@ -250,7 +252,7 @@ def test_faults_of_the_gcode_are_on_record_and_in_the_exit_code(tmp_path, monkey
     batch = made(tmp_path, SMALL.replace("[prusa, cura]", "[prusa]"))
     found = read(batch.folder)["slicers"]["prusa"]["findings"]
     assert any(f["severity"] == "error" and "900" in f["message"] for f in found)
-    assert batch.gcode_errors() == sum(f["severity"] == "error" for f in found)
+    assert batch.errors(force=True)
     assert not differences(batch.folder)
 
 

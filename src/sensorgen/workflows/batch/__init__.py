@@ -21,7 +21,7 @@ from sensorgen.workflows.batch import picture, printing, record, sheet, tab
 from sensorgen.workflows.batch.layout import Plate, Room, Size, column, packed, room
 from sensorgen.workflows.batch.pieces import Piece, pieces, shuffled, tools
 from sensorgen.workflows.batch.plan import Plan, load
-from sensorgen.workflows.batch.record import PrintedDesign, Record, ResolvedDesign, SlicedPlate
+from sensorgen.workflows.batch.record import Record, ResolvedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes, versions
 
 STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "as printed", "record", "done")
@@ -229,7 +229,7 @@ def _record(
     plan, first = found.plan, found.pieces[0].design
     loaded = record.tools(plan, found.tools)
     for plate in reversed(sliced.values()):
-        predicted |= {key: made.prediction for key, made in plate.printed.items() if isinstance(made, PrintedDesign)}
+        predicted |= {key: made.prediction for key, made in plate.printed.items() if made.prediction}
     return Record(
         batch=plan.name, iteration=plan.iteration, seed=plan.seed, printer=first.machine.name,
         quality=first.layers.name, layout=plan.layout, tower=found.room.kept, tools=loaded,

@@ -5,17 +5,22 @@ from dataclasses import asdict
 from pathlib import Path
 from shutil import rmtree
 
+from sensorgen.asprinted import printed as asprinted
 from sensorgen.checks.review import Step
 from sensorgen.core import files as store
+from sensorgen.core.errors import SensorgenError
 from sensorgen.export import slicing
 from sensorgen.export.gcode.check import check
 from sensorgen.export.slicers import curaengine
-from sensorgen.export.slicing import Placed
-from sensorgen.workflows.batch import printed, tab
+from sensorgen.export.slicing import Placed, Sliced
+from sensorgen.prediction import bodies
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.results import timeless
+from sensorgen.workflows.batch import tab
 from sensorgen.workflows.batch.layout import Plate
 from sensorgen.workflows.batch.pieces import Piece, tools
 from sensorgen.workflows.batch.plan import Plan
-from sensorgen.workflows.batch.record import SlicedPlate
+from sensorgen.workflows.batch.record import PrintedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes
 
 
@@ -74,7 +79,23 @@ def gcode(
     loaded = tools(piece.design for piece in found)
     checked = check(ready, machine, loaded, others_empty=True)
     step("as printed")
+    firsts: dict[str, Placed] = {}
+    for piece in found:
+        firsts.setdefault(piece.design.id(), piece)  # it stands for its copies, which the same slicer cuts alike
+    content = ready.read_bytes()
     return SlicedPlate(
         **vars(checked), version=made.version, gcode=ready.name, raw=f"{slicer}/raw.gcode",
-        profile=f"{slicer}/{settings}", printed=printed.of_designs(found, made, ready.read_bytes()),
+        profile=f"{slicer}/{settings}", printed={key: _printed(piece, made, content) for key, piece in firsts.items()},
     )  # fmt: skip
+
+
+def _printed(piece: Placed, made: Sliced, content: bytes) -> PrintedDesign:
+    """The print of a specimen, from the G-code of its plate."""
+    design, source = piece.design, f"{made.slicer} {made.version}"
+    try:
+        printed = asprinted.body(design, made.lines, slicer=source, centre_mm=piece.sensor_mm())
+        body = bodies.sliced(design, lambda: printed, source, content + piece.name.encode())
+        layers, findings = tuple(printed.rows()), tuple(printed.findings())
+        return PrintedDesign(piece.name, design.name, timeless(evaluate(body)), layers, findings)
+    except SensorgenError as error:
+        return PrintedDesign(piece.name, design.name, reason=str(error))

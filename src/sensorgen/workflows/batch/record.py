@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from sensorgen.checks.volumes import Row
 from sensorgen.core import files as store
@@ -26,6 +26,11 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
 RECORD = "batch.json"
+_COLUMNS = (
+    Column("no.", key="order"), Column("specimen"), Column("design"), Column("x", "mm", key="x_mm"),
+    Column("y", "mm", key="y_mm"), Column("R", "ohm", key="resistance_ohm", si=True),
+    Column("C", "F", key="capacitance_f", si=True),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -86,19 +91,22 @@ class PrintedDesign:
     ----------
     specimen, design : str
         Name of the specimen that was read, and of its design.
-    prediction : Prediction
-        What it should measure.
+    prediction : Prediction or None
+        Its prediction; None if the print cannot be read.
     layers : tuple of Row
         Printed over drawn volume.
     findings : tuple of Finding
         Rule 7.
+    reason : str
+        Why the print cannot be read, or "".
     """
 
     specimen: str
     design: str
-    prediction: Prediction
-    layers: tuple[Row, ...]
-    findings: tuple[Finding, ...]
+    prediction: Prediction | None = None  # no union of two types for read and unread: JSON would lose infinities
+    layers: tuple[Row, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    reason: str = ""
 
     @property
     def lost(self) -> int:
@@ -107,8 +115,10 @@ class PrintedDesign:
 
     @property
     def words(self) -> str:
-        """Gap, resistance and capacitance."""
+        """Gap, resistance and capacitance; or the reason."""
         found = self.prediction
+        if found is None:
+            return self.reason
         gaps = [f"{p.gap.value * 1e3:g} mm" for p in (found, found.drawn) if p and p.gap]
         gap = f"electrode gap {gaps[0]} (drawn {gaps[1]}), " if len(gaps) > 1 else ""
         lost = f"; {self.lost} layers of bodies are not printed at all" if self.lost else ""
@@ -116,23 +126,6 @@ class PrintedDesign:
         if resistance is None or capacitance is None:
             return f"{gap}no prediction{lost}"
         return f"{gap}R {si(resistance, 'ohm')}, C {si(capacitance, 'F')}{lost}"
-
-
-@dataclass(frozen=True)
-class UnreadDesign:
-    """A design whose print cannot be read from the G-code, with the reason."""
-
-    specimen: str
-    design: str
-    reason: str
-    findings: tuple[Finding, ...] = ()
-
-    lost = 0
-
-    @property
-    def words(self) -> str:
-        """The reason."""
-        return self.reason
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +138,7 @@ class SlicedPlate(Checked):
         Of the slicer.
     gcode, raw, profile : str
         Files for the printer, of the slicer itself, and with its settings.
-    printed : dict of str to PrintedDesign or UnreadDesign
+    printed : dict of str to PrintedDesign
         The print of each design, by its identity.
     """
 
@@ -153,7 +146,7 @@ class SlicedPlate(Checked):
     gcode: str
     raw: str
     profile: str
-    printed: dict[str, PrintedDesign | UnreadDesign]
+    printed: dict[str, PrintedDesign]
 
     def in_short(self, slicer: str) -> Iterator[str]:
         """Time, filament, findings and prints."""
@@ -234,28 +227,16 @@ class Record:
     def document(self) -> Iterator[Part]:
         """Specimens, checklist, and what the slicers made."""
         yield f"{self.batch}: {len(self.specimens)} specimens on {self.printer}, {self.quality}"
-        yield Table.of("specimens", "", [
-            _Place(s.order, name, s.design, *s.centre_mm, *_expected(self.predictions[s.design_id]))
+        rows = (
+            (s.order, name, s.design, *s.centre_mm, *_expected(self.predictions[s.design_id]))
             for name, s in self.specimens.items()
-        ])  # fmt: skip
+        )
+        yield Table("specimens", "", _COLUMNS, tuple(rows))
         yield ""
         yield "checklist"
         yield from (f"  [ ] {line}" for line in self.checklist)
         for slicer, plate in self.slicers.items():
             yield from ("", *plate.in_short(slicer))
-
-
-@dataclass(frozen=True)
-class _Place:
-    """A line of the table of specimens."""
-
-    order: Annotated[int, Column("no.")]
-    specimen: Annotated[str, Column("specimen")]
-    design: Annotated[str, Column("design")]
-    x_mm: Annotated[float, Column("x", "mm")]
-    y_mm: Annotated[float, Column("y", "mm")]
-    resistance_ohm: Annotated[float | None, Column("R", "ohm", si=True)]
-    capacitance_f: Annotated[float | None, Column("C", "F", si=True)]
 
 
 def _expected(found: Prediction) -> tuple[float | None, float | None]:
