@@ -43,6 +43,7 @@ def test_what_a_line_says(text, expected):
         ("X5 Y3", "stands before any command"),
         ("G", "is no command"),
         ("Gnan", "is no command"),
+        ("G" + 400 * "1", "is no command"),
         ("G1 X5 §", "means nothing"),
         ('M98 P"tprime3.g', "does not end"),
         ("N3 T1*57", "checksum 57 is wrong"),

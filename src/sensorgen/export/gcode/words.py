@@ -136,9 +136,9 @@ def _take(commands: list[tuple[str, list[tuple[str, str]]]], letter: str, value:
     if letter == "N" and not commands:
         return []
     if letter in "GM" or (letter == "T" and not commands):
-        if not _NUMBER.fullmatch(value):
-            return [f"{letter}{value!s} is no command"]
-        number = float(value)
+        number = float(value) if _NUMBER.fullmatch(value) else math.inf
+        if math.isinf(number):
+            return [f"{letter}{value[:20]} is no command"]
         commands.append((f"{letter}{int(number)}" if number == int(number) else f"{letter}{value}", []))
         return []
     if not commands:
