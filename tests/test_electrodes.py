@@ -75,7 +75,7 @@ def test_printed_steps_of_a_tooth_by_hand():
 def test_the_fit_divides_by_the_same_geometry():
     for along in "xy":
         body, rho = estimated(design(along=along)), {"top": 0.07, "bottom": 0.2}
-        low, high = _per_resistivity(design(along=along))
+        low, high = _per_resistivity(body)
         per = {end: r.value / rho[end] for end, r in electrode_resistance(body).items()}
         assert low <= per["top"] < per["bottom"] <= high
         assert low > 0.9 * per["top"]

@@ -216,13 +216,13 @@ def fit(asked):
 
 def invert(asked):
     """The sensor that ``invert`` searches."""
-    from sensorgen.cli.body_options import body_of
+    from sensorgen.prediction import bodies
     from sensorgen.prediction.planning import sensor_model
 
     return Answer(
         *(
-            _of_sensor(asked, lambda design, drawn=drawn: sensor_model(body_of(drawn, None, None)(design))[0])
-            for drawn in (False, True)
+            _of_sensor(asked, lambda design, of=of: sensor_model(of(design))[0])
+            for of in (bodies.default_body, bodies.drawn)
         )
     )
 

@@ -8,7 +8,6 @@ import pytest
 from drawn_sensor import sensor_of
 from line_cases import TONES, exact
 
-from sensorgen.cli.sheet_command import _press
 from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design import materials
@@ -25,6 +24,7 @@ from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.grid import check_presses
 from sensorgen.prediction.inverse.forward import Forward, Scalar
 from sensorgen.prediction.query import Load, Query
+from sensorgen.prediction.sheet_study import _press
 
 K = 2e-6  # 1/Pa: 12 % at 60 kPa
 PLATE = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), EPS0_F_PER_M * 4.68 * 0.01 / 6e-4, compression.unconfined(6e6))

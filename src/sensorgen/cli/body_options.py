@@ -1,7 +1,6 @@
-"""Options that say which body a command means: the print (by default), its slicer or walls, or the drawing."""
+"""Options that say which body a command means: the print (by default), its G-code, slicer or walls, or the drawing."""
 
 import tempfile
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,39 +16,54 @@ from sensorgen.export.slicers import SLICERS
 if TYPE_CHECKING:
     from sensorgen.asprinted.compensation import Change
     from sensorgen.asprinted.printed import Printed
-    from sensorgen.design.body import Body
+    from sensorgen.design.body import Body, BodyOf
     from sensorgen.design.design import Design
+
+_BODY = "sensorgen.body"  # in the context's meta: the option that was given, and its value
 
 
 def body_options() -> list[click.Parameter]:
-    """``--drawn``, ``--slicer`` and ``--walls``."""
+    """``--drawn``, ``--gcode``, ``--slicer`` and ``--walls``; :func:`body_of` obeys them."""
     return [
-        click.Option(["--drawn"], is_flag=True, help="The drawing, in place of the print."),
         click.Option(
-            ["--slicer"], type=OneOf(SLICERS),
-            help="Slice now for the print; if not given, the G-code in out/NAME, else an estimate from the layers.",
+            ["--drawn"], is_flag=True, expose_value=False, callback=_choose, help="The drawing, in place of the print.",
         ),
         click.Option(
-            ["--walls"], type=OneOf(WALLS),
+            ["--gcode"], metavar="FILE", expose_value=False, callback=_choose,
+            help="The print by this file, whoever has sliced it; if not given, the G-code in out/NAME, else an "
+            "estimate from the layers.",
+        ),
+        click.Option(
+            ["--slicer"], type=OneOf(SLICERS), expose_value=False, callback=_choose, help="Slice now for the print.",
+        ),
+        click.Option(
+            ["--walls"], type=OneOf(WALLS), expose_value=False, callback=_choose,
             help="Estimate the print for these walls alone; for all of them if not given, Arachne's as the best value.",
         ),
     ]  # fmt: skip
 
 
-def body_of(drawn: bool, slicer: str | None, walls: str | None) -> "Callable[[Design], Body]":
-    """Makes the body of a design that the options ask for; raises BadInput for two of them at once."""
-    given = [name for name, value in (("--drawn", drawn), ("--slicer", slicer), ("--walls", walls)) if value]
-    if len(given) > 1:
-        raise BadInput(f"{' and '.join(given)} at once; expected one of them")
+def _choose(ctx: click.Context, param: click.Parameter, value: str | bool | None) -> None:
+    if value:
+        option = param.opts[0]
+        if other := ctx.meta.get(_BODY):
+            raise BadInput(f"{other[0]} and {option} at once; expected one of them")
+        ctx.meta[_BODY] = option, value
+
+
+def body_of() -> "BodyOf":
+    """Makes the body of a design that the options ask for."""
     from sensorgen.prediction import bodies
 
-    if drawn:
-        return bodies.drawn
-    if slicer:
-        return partial(_sliced, slicer)
-    if walls:
-        return partial(bodies.estimated, walls=walls)
-    return bodies.default_body
+    option, value = click.get_current_context().meta.get(_BODY, ("", ""))
+    ways: dict[str, BodyOf] = {
+        "": bodies.default_body,
+        "--drawn": bodies.drawn,
+        "--gcode": partial(bodies.from_gcode, file=value),
+        "--slicer": partial(_sliced, value),
+        "--walls": partial(bodies.estimated, walls=value),
+    }
+    return ways[option]
 
 
 def compensate_option() -> click.Option:
@@ -73,13 +87,17 @@ def compensated(design: "Design", word: str | None, walls: str) -> "tuple[Design
     return found, changes
 
 
-def printed_of(design: "Design", slicer: str | None, walls: str | None) -> "Printed":
-    """The print of a design, with its layers: sliced now, or estimated."""
+def printed_of(design: "Design") -> "Printed | None":
+    """The print of a design, with its layers, as the options ask for: estimated if not told; None for the drawing."""
     from sensorgen.asprinted.printed import body
+    from sensorgen.prediction.bodies import registered
 
-    if slicer and walls:
-        raise BadInput("--slicer and --walls at once; expected one: the slicer's profile says what walls it makes")
-    return _slice(slicer, design)[0] if slicer else body(design, walls=walls or "arachne")
+    option, value = click.get_current_context().meta.get(_BODY, ("--walls", "arachne"))
+    if option == "--drawn":
+        return None
+    if option == "--gcode":
+        return registered(design, Path(value))
+    return _slice(value, design)[0] if option == "--slicer" else body(design, walls=value)
 
 
 def _sliced(slicer: str, design: "Design") -> "Body":

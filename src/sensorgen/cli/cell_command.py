@@ -34,15 +34,15 @@ OWN: list[click.Parameter] = [
 
 def _work(
     design: "Design", *, accuracy: float | None, model: str, frequency: tuple[float, ...] | None,
-    press_mm: tuple[float, ...] | None, explain: bool, no_cache: bool, drawn: bool, slicer: str | None,
-    walls: str | None, sweep: str | None, jobs: int | None,
+    press_mm: tuple[float, ...] | None, explain: bool, no_cache: bool,
+    sweep: str | None, jobs: int | None,
 ) -> int:  # fmt: skip
     from sensorgen.prediction import capacitance_answer as cell
 
     options.refuse_explain(explain, many=bool(sweep))
     asked = cell.Asked(accuracy, model, not no_cache, one("--frequency", frequency) if frequency else None)
     key, points = settings.sweep(sweep, design) if sweep else ("", [("", design)])
-    of = body_options.body_of(drawn, slicer, walls)
+    of = body_options.body_of()
     found: Any
     if model.startswith(FORMULA):
         from sensorgen.prediction import thesis_formulas as formulas

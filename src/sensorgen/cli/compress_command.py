@@ -47,7 +47,7 @@ OWN: list[click.Parameter] = [
 
 def _work(
     design: "Design", *, stress: tuple[float, ...], model: str | None, accuracy: float | None, explain: bool,
-    check_mesh: bool, no_cache: bool, drawn: bool, slicer: str | None, walls: str | None, sweep: str | None,
+    check_mesh: bool, no_cache: bool, sweep: str | None,
     jobs: int | None, plot: str | None, **boundary: str,
 ) -> int:  # fmt: skip
     from sensorgen.prediction import compression
@@ -63,7 +63,7 @@ def _work(
         compression.stresses_kpa(stress), compression.BoundaryConditions(**boundary), model or "", accuracy or inf,
         check_mesh=check_mesh, keep=not no_cache,
     )  # fmt: skip
-    of = body_options.body_of(drawn, slicer, walls)
+    of = body_options.body_of()
     found: Any
     if sweep:
         key, designs = settings.sweep(sweep, design)

@@ -21,13 +21,13 @@ OWN: list[click.Parameter] = [
 ]
 
 
-def _work(design: "Design", *, output: str | None, drawn: bool, slicer: str | None, walls: str | None) -> int:
+def _work(design: "Design", *, output: str | None) -> int:
     from sensorgen.checks.review import STEPS, draw, review
     from sensorgen.core import files as store
 
     if output and output != "-" and Path(output).suffix.lower() not in ("", ".svg"):
         raise BadInput(f"--output {output}: the drawing is SVG; expected a name that ends in .svg, or - to print it")
-    made = None if drawn else body_options.printed_of(design, slicer, walls)
+    made = body_options.printed_of(design)
     with show.progress(STEPS) as step:
         held = review(design, step)
     if made:

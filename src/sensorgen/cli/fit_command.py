@@ -11,10 +11,7 @@ if TYPE_CHECKING:
     from sensorgen.analysis.fit import Fit
 
 
-def _work(
-    iteration: int, file: str | None, output: str | None, seed: int, drawn: bool, slicer: str | None, walls: str | None,
-    *, dry_run: bool,
-) -> None:  # fmt: skip
+def _work(iteration: int, file: str | None, output: str | None, seed: int, *, dry_run: bool) -> None:
     """Fit material values to what was measured, and keep them as a source.
 
     A design takes them where it names the source, as in etpu@fit-23. A quarter of the specimens is held back, to
@@ -27,7 +24,7 @@ def _work(
     from sensorgen.design.materials import own
 
     with log_words.opened(file) as log, show.progress(STEPS) as step:
-        made = fit(log, iteration, seed, body_options.body_of(drawn, slicer, walls), step)
+        made = fit(log, iteration, seed, body_options.body_of(), step)
     if made.values and not dry_run:
         path = Path(output) if output else own.path(made.source)
         store.replace(path, text(made).encode())

@@ -92,7 +92,6 @@ def _estimator(
     force_limit_n: tuple[float, ...] | None,
     tip_mm: float,
     compression: str | None,
-    **body: Any,
 ) -> "tuple[Estimator, tuple[str, ...]]":
     """The estimator for this design, and what to doubt about its sensor."""
     from sensorgen.prediction.inverse import FORCE_LIMIT_N, Estimator
@@ -100,7 +99,7 @@ def _estimator(
     from sensorgen.prediction.query import Query, Tip
 
     query = Query(tip=Tip(tip_mm * units.M_PER_MM), law=compression or "")
-    model = sensor_model(body_options.body_of(**body)(design), query)[0]
+    model = sensor_model(body_options.body_of()(design), query)[0]
     limit = one("--force-limit", force_limit_n) if force_limit_n else FORCE_LIMIT_N
     return Estimator(model.sensor, source.frequency_hz, noise, _prior(prior), limit), model.doubts
 

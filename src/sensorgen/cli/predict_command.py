@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sensorgen.design.design import Design
     from sensorgen.prediction.loaded import Loaded
 
-_WORK = ("cell, compression and line",)
+_WORK = ("cell, press, line",)
 
 OWN: list[click.Parameter] = [
     option(
@@ -57,14 +57,13 @@ OWN: list[click.Parameter] = [
 def _work(
     design: "Design", *, frequency_hz: Sequence[float] | None, force_n: Sequence[float] | None,
     position_mm: Sequence[float] | None, tip_mm: float | None, radius_mm: float | None, compression: str | None,
-    profile: str, accuracy: float | None, noise: float, explain: bool, drawn: bool, slicer: str | None,
-    walls: str | None, plot: str | None,
+    profile: str, accuracy: float | None, noise: float, explain: bool, plot: str | None,
 ) -> int:  # fmt: skip
     if plot:
         render.refuse_beside("--plot")
     options.refuse_explain(explain, many=bool(plot))
     proper("--noise", noise)
-    body = body_options.body_of(drawn, slicer, walls)(design)
+    body = body_options.body_of()(design)
     from sensorgen.prediction.evaluate import evaluate
     from sensorgen.prediction.query import DEFAULT, TIP_M, Query, Tip
     from sensorgen.prediction.results import Prediction

@@ -44,8 +44,10 @@ def _to(ctx: click.Context, param: click.Parameter, given: str | None) -> None: 
 
 
 def form() -> str:
-    """What was asked for: "json", "csv", "markdown", or "" for text."""
-    return str(click.get_current_context().meta.get(_FORM, ""))
+    """What was asked for, or what the file's name ends in: "json", "csv", "markdown"; "" for text."""
+    meta = click.get_current_context().meta
+    suffix = Path(meta.get(_FILE) or "").suffix
+    return str(meta.get(_FORM, {".json": "json", ".csv": "csv", ".md": "markdown"}.get(suffix, "")))
 
 
 def refuse_beside(option: str) -> None:

@@ -39,7 +39,6 @@ OWN: list[click.Parameter] = [
 def _work(
     design: "Design", *, contacts: str | None, pads: "tuple[Rectangle, ...]", frequency_hz: tuple[float, ...] | None,
     force_n: tuple[float, ...], tip_mm: tuple[float, ...], noise: float, compression: str | None, plot: Path | None,
-    drawn: bool, slicer: str | None, walls: str | None,
 ) -> int:  # fmt: skip
     from sensorgen.prediction.planning import sensor_model
     from sensorgen.prediction.query import TONES_HZ, Query
@@ -47,7 +46,7 @@ def _work(
 
     force, tip_m = one("--force", force_n), one("--tip", tip_mm) * units.M_PER_MM
     proper("--noise", noise)
-    model = sensor_model(body_options.body_of(drawn, slicer, walls)(design), Query(law=compression or ""))[0]
+    model = sensor_model(body_options.body_of()(design), Query(law=compression or ""))[0]
     wanted, places = contacts or ("" if pads else "all"), PLACES**2
     names = [*(["pads"] if pads else []), *(name for name in SETS if wanted in (name, "all"))]
     with show.progress([f"{name} {k + 1}/{places}" for name in names for k in range(places)]) as step:

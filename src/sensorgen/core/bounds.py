@@ -1,7 +1,9 @@
 """A number known to lie between two others, or near one."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import isinf, prod
+from math import ceil, floor, isinf, log10, prod
+from typing import Literal
 
 from sensorgen.core.units import prefix
 
@@ -64,6 +66,8 @@ class Bounds:
         With what the sources of material values differ by alone [unit].
     certified : bool
         Whether the model's interval is a proven bound; else an estimate.
+    open : str
+        "lower" or "upper" where a value beyond that end is possible, by how much is unknown; "" if none is.
     """
 
     value: float
@@ -74,6 +78,7 @@ class Bounds:
     print: Interval
     material: Interval
     certified: bool = False
+    open: Literal["", "lower", "upper"] = ""
 
     @classmethod
     def of(
@@ -85,24 +90,25 @@ class Bounds:
         print: Interval | None = None,  # noqa: A002 - the field's own word
         material: Interval | None = None,
         certified: bool = False,
+        open: Literal["", "lower", "upper"] = "",  # noqa: A002 - the field's own word
     ) -> "Bounds":
         """A positive quantity whose relative errors multiply; what is not given adds none."""
         exact = Interval(value, value)
         parts = (model or exact, print or exact, material or exact)
         lower = value * prod(min(part.lower / value, 1.0) for part in parts) if value else 0.0
         upper = value * prod(max(part.upper / value, 1.0) for part in parts) if value else 0.0
-        return cls(value, lower, upper, unit, *parts, certified)
+        return cls(value, lower, upper, unit, *parts, certified, open)
 
     def times(self, factor: float, unit: str) -> "Bounds":
         """The quantity scaled by a positive factor, in another unit."""
         parts = (self.model.times(factor), self.print.times(factor), self.material.times(factor))
         ends = (factor * self.value, factor * self.lower, factor * self.upper)
-        return Bounds(*ends, unit, *parts, self.certified)
+        return Bounds(*ends, unit, *parts, self.certified, self.open)
 
     def words(self) -> str:
         """Best value, and the range in the same unit; lengths in mm.
 
-        A quantity without an upper bound has two digits and no range.
+        The ends are rounded outwards. A quantity without an upper bound has two digits and no range.
 
         >>> Bounds.of(6.15e-11, "F", print=Interval(3.6e-11, 9.5e-11)).words(), Bounds.of(2e-4, "m").words()
         ('61.5 pF (36 to 95)', '0.2 mm')
@@ -113,5 +119,18 @@ class Bounds:
             return f"{value:.2g} {name}{self.unit} (error unknown)"
         if f"{low:.2g}" == f"{high:.2g}":
             return f"{value:.4g} {name}{self.unit}"
-        ends = (f"{float(f'{end:.2g}'):g}" for end in (low, high))
-        return f"{value:.3g} {name}{self.unit} ({' to '.join(ends)})"
+        least = "<" * (self.open == "lower") + _outwards(low, floor)
+        most = ">" * (self.open == "upper") + _outwards(high, ceil)
+        return f"{value:.3g} {name}{self.unit} ({least} to {most})"
+
+
+def _outwards(value: float, whole: Callable[[float], int]) -> str:
+    """Two digits of a positive number, rounded down or up.
+
+    >>> _outwards(1.97, floor), _outwards(80.1, ceil), _outwards(12000.0, ceil)
+    ('1.9', '81', '12000')
+    """
+    if not value > 0:
+        return f"{value:g}"
+    step = 10.0 ** (floor(log10(value)) - 1)
+    return f"{float(f'{whole(round(value / step, 6)) * step:.3g}'):g}"

@@ -141,9 +141,13 @@ def counted(counts: Mapping[str, int]) -> str:
 
 
 def most_severe(found: Sequence[Finding], count: int) -> list[Finding]:
-    """The first findings that matter: each rule and advice once, with all its places, the severe first."""
+    """The first findings that matter: each rule and advice once, with all bodies and places, the severe first."""
     merged: dict[tuple[str, str, str], Finding] = {}
     for f in sorted((f for f in found if not f.waiver), key=lambda f: SEVERITIES.index(f.severity)):
         key = (f.severity, f.rule, f.advice)
-        merged[key] = replace(merged[key], count=merged[key].count + f.count) if key in merged else f
+        if key in merged:
+            one = merged[key]
+            bodies = dict.fromkeys([*one.body.split(", "), f.body])
+            f = replace(one, body=", ".join(bodies), count=one.count + f.count, layer=None, last_layer=None)
+        merged[key] = f
     return list(merged.values())[:count]

@@ -101,7 +101,7 @@ def _solved(
     longest = _STICKING_STEP if boundary.contact == "stick" else _STEP
     found, run = solve(mesh, [solids[m] for m in materials], stress_pa, boundary, longest, SOURCE, step)
     if not cell.mirrored:
-        said = "mirrors stand at both ends of the period, though it is not its own mirror image"
+        said = "solved as if each period were followed by its mirror image: the cell is not symmetric"
         found = replace(found, doubts=(said, *found.doubts))
     return found, run
 

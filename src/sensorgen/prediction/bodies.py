@@ -7,6 +7,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sensorgen.core.errors import BadInput
+from sensorgen.core.files import reading
 from sensorgen.design.body import DRAWN, Body, Cells
 from sensorgen.design.design import Design
 from sensorgen.design.walls import WALLS
@@ -77,6 +79,38 @@ def sliced(design: Design, printed: "Callable[[], Printed]", source: str, conten
 
 def _sliced_cells(printed: "Callable[[], Printed]", source: str) -> Cells:
     return _printed_cells({source: printed()})
+
+
+def from_gcode(design: Design, file: str | Path) -> Body:
+    """The body by a file of G-code that somebody has sliced.
+
+    Parameters
+    ----------
+    design : Design
+        That was sliced.
+    file : str or Path
+        The file; where on the bed, and whether turned by 90 degrees, is found out.
+
+    Raises
+    ------
+    BadInput
+        No such file; when the cells are needed, as :func:`sensorgen.asprinted.registration.placed`.
+    """
+    path = Path(file)
+    with reading(path):
+        content = path.read_bytes()
+    return sliced(design, partial(registered, design, path), path.name, content)
+
+
+def registered(design: Design, path: Path) -> "Printed":
+    """What a file of G-code prints of a design; parameters and errors as of :func:`from_gcode`."""
+    from sensorgen.asprinted import printed, registration
+
+    try:
+        found = registration.placed(design, path)
+        return printed.body(design, found.paths, slicer=path.name, centre_mm=found.centre_mm)
+    except BadInput as error:
+        raise error.within(str(path)) from None
 
 
 def default_body(design: Design, folder: Path | None = None) -> Body:

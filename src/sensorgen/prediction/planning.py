@@ -21,9 +21,6 @@ from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
 
 ACCURACY = 1e-2  # of abs(Z), where none is asked for: material data are not that accurate
-PATIENCE_S = (
-    10.0  # a compression model that is expected to take longer is run only where an accuracy or it is asked for
-)
 SECTIONS = (4, 8, 16, 32, 64, 128, 256)  # that a tip whose pressure is not uniform may be cut into
 _NAMES = {f"line, {n} section{'s' * (n > 1)}": n for n in (1, *SECTIONS)}
 _RICHARDSON = 4 / 3  # of what halving a section changes, where errors fall by four

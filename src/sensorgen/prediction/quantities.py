@@ -182,11 +182,21 @@ def _sensitivity(model: SensorModel, load: Load, others: Sequence[Sensor | None]
         strain = float(law.capacitive_strain(np.asarray(pressure_pa))[0])
         return strain / (1 - strain) / pressure_pa * _PA_PER_KPA
 
-    value = of(model.law.compression)
+    value, moduli = of(model.law.compression), _moduli(model)
     return Bounds.of(
-        value, "1/kPa", model=_span(value, of, model.law.others), material=_span(value, of, _moduli(model)),
+        value, "1/kPa", model=_span(value, of, model.law.others), material=_span(value, of, moduli),
         print=_range([value, *(of(sensor.compression) if sensor else nan for sensor in others)]),
+        open="upper" if any(_is_beyond(of, law) for law in moduli) else "",
     )  # fmt: skip
+
+
+def _is_beyond(of: Callable[[Compression], float], law: Compression) -> bool:
+    """Whether the pressure is more than a law, of softer material, is known for."""
+    try:
+        of(law)
+    except OutOfRange:
+        return True
+    return False
 
 
 def _resolution(
@@ -204,9 +214,8 @@ def _resolution(
     own, law = errors(model.sensor), model.law
     by_law = [errors(replace(model.sensor, compression=other)) for other in law.others] if law.bounded else [(nan, nan)]
     by_print = [errors(sensor) for sensor in others]
-    by_material = [
-        [errors(sensor) for sensor in ends.sensors] for ends in material_ends(model, ReferenceLoad(model.sensor, load))
-    ]
+    values = list(material_ends(model, ReferenceLoad(model.sensor, load)))
+    by_material = [[errors(sensor) for sensor in ends.sensors] for ends in values]
 
     def bounds(which: int, unit: str) -> Bounds | None:
         value = own[which]
@@ -219,7 +228,12 @@ def _resolution(
         material = [spread_of(ends) for ends in by_material]
         lower, upper = (value * prod(getattr(m, end) / value for m in material) for end in ("lower", "upper"))
         return Bounds.of(
-            value, unit, model=spread_of(by_law), print=spread_of(by_print), material=Interval(lower, upper)
+            value,
+            unit,
+            model=spread_of(by_law),
+            print=spread_of(by_print),
+            material=Interval(lower, upper),
+            open="lower" if any(ends.at_least for ends in values) else "",  # softer: more is resolved
         )
 
     return replace(found, force_resolution=bounds(0, "N"), position_resolution=bounds(1, "m"))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import inf, prod
 
 from sensorgen.core.bounds import Bounds, Interval
-from sensorgen.design.body import Body
+from sensorgen.design.body import Body, Cells
 from sensorgen.design.design import Design
 from sensorgen.design.values import MaterialValue, permittivities, resistivities
 from sensorgen.prediction.capacitance import Answer, Unpredictable, capacitance, default_width
@@ -67,20 +67,26 @@ def rest_state(body: Body, width: float | None = None) -> RestState:
     wanted = inf if rough else min(width or inf, default_width(scene))
     answer = capacitance(scene, eps, wanted).times(cells.count)
     c = answer.capacitance_f
-    found, doubts = [c.middle()], []
+    found, doubts, unbounded = [c.middle()], [], False
     for other in () if rough else others:
         try:
             found.append(capacitance(other, eps, wanted).capacitance_f.middle() * cells.count)
         except Unpredictable as error:
-            rule = next(name for name, cell in cells.scenes.items() if cell == other)
+            unbounded = unbounded or cells.gap_mm.get(_rule(cells, other)) == 0
+            rule = _rule(cells, other)
             doubts.append(f"printed by the rule {rule!r} it has no capacitance: {error}")
     bounds = Bounds.of(
         c.middle(), "F", model=c, print=Interval(min(found), max(found)), certified=True,
+        open="upper" if unbounded else "",
         material=Interval(c.middle(), c.middle()) if rough else _permittivity_range(body.design, scene, c.middle()),
     )  # fmt: skip
     ends = (rho["top"].value, rho["bottom"].value)
     resistance = electrode_resistance(body)
     return RestState(answer, bounds, resistance, ends, (*values, *rho.values()), tuple(doubts))
+
+
+def _rule(cells: Cells, scene: Scene) -> str:
+    return next(name for name, cell in cells.scenes.items() if cell == scene)
 
 
 def _permittivity_range(design: Design, scene: Scene, middle: float) -> Interval:

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from math import inf
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,19 +10,18 @@ from numpy.typing import ArrayLike
 from sensorgen.analysis.comparison import Comparison, of_iteration
 from sensorgen.analysis.fit import Fit
 from sensorgen.analysis.fit import fit as fit_values
-from sensorgen.asprinted import printed
 from sensorgen.checks.review import Review, review
 from sensorgen.core.errors import BadInput
 from sensorgen.design import design as designs
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
-from sensorgen.export.gcode import paths
 from sensorgen.measure.log import Log
 from sensorgen.prediction import bodies, compression, evaluate
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
-from sensorgen.prediction.loaded import loaded
+from sensorgen.prediction.loaded import Loaded, loaded
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import FLAT, NOISE, TONES_HZ, Query, Tip
+from sensorgen.prediction.results import Prediction
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.workflows import build as builds
 from sensorgen.workflows import display as display
@@ -82,7 +80,7 @@ def predict(
     what: Design | Body, *, force_n: Sequence[float] = (), position_mm: Sequence[float] = (),
     frequency_hz: Sequence[float] = TONES_HZ, accuracy: float | None = None, law: str = "", tip: Tip = FLAT,
     noise: float = NOISE,
-) -> Any:  # fmt: skip
+) -> Prediction | Loaded:  # fmt: skip
     """What a sensor should measure: of the print, with the drawing beside it.
 
     Parameters
@@ -158,14 +156,14 @@ def as_printed(design: Design, gcode: str | Path | None = None, *, walls: str = 
     design : Design
         What is printed.
     gcode : str or Path, optional
-        Printer-ready G-code of this design, alone in the middle of the bed; estimated if not given.
+        A file that somebody has sliced from this design, anywhere on the bed; estimated if not given.
     walls : str
         For an estimate: "arachne", "classic", "cura" or "cura-gaps" alone; all of them if not given.
 
     Raises
     ------
     BadInput
-        The file prints nothing at the design's place.
+        The file is no G-code, or prints no piece of the design's size with its tools.
 
     Examples
     --------
@@ -175,16 +173,7 @@ def as_printed(design: Design, gcode: str | Path | None = None, *, walls: str = 
     design = _named(design)
     if gcode is None:
         return bodies.estimated(design, walls)
-    file = Path(gcode)
-    try:
-        content = file.read_bytes()
-    except OSError as error:
-        raise BadInput(f"cannot read {str(file)!r}: {error.strerror or error}") from None
-
-    def read() -> printed.Printed:
-        return printed.body(design, paths.read(file, design.machine), slicer=file.name)
-
-    return bodies.sliced(design, read, file.name, content)
+    return bodies.from_gcode(design, gcode)
 
 
 def build(design: Design, out: str | Path = "out", *, cad: bool = True, force: bool = False) -> Built:
@@ -259,6 +248,8 @@ def fit(log: Log, iteration: int) -> Fit:
 
 def _named(design: Design) -> Design:
     """A design as :func:`sensorgen.design.design.make` completes it, also where it was constructed by hand."""
+    if not isinstance(design, Design):
+        raise BadInput(f"{design!r:.60}: expected a Design or a Body, as Design(shape='tri') or load('mine.yaml')")
     return design if design.name else designs.make(design.model_dump(exclude_defaults=True, mode="json"))
 
 

@@ -82,7 +82,7 @@ class Printed(Checked):
     def document(self) -> Iterator[Part]:
         """Findings about design, file and print, and what the file takes."""
         yield from compensation.document(self.compensated)
-        yield f"{self.name}: {counted(counts(self.design_findings))} (sensorgen check shows them)"
+        yield f"{self.name}, drawn: {counted(counts(self.design_findings))} (sensorgen check shows them)"
         yield from super().document()
         yield volumes.table(self.printed.layers)
         yield from listed(self.printed.findings)

@@ -15,8 +15,6 @@ from sensorgen.scene.unit_cell import Cell
 Edge = tuple[int, int]
 Triangle = tuple[int, int, int]
 
-TERMINALS = ("bottom", "top")
-
 
 @dataclass(frozen=True)
 class Triangles:

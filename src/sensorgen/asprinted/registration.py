@@ -1,0 +1,118 @@
+"""Where a file of G-code prints a design: by its tools and its size, wherever it stands on the bed."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sensorgen.core.arrays import Real, Whole
+from sensorgen.core.errors import BadInput
+from sensorgen.design.design import Design
+from sensorgen.export.gcode.files import Source
+from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.paths import Paths, paths_of
+from sensorgen.scene.scene import Point
+
+APART_MM = 1.5  # pieces on a plate are further apart; lines of one piece are nearer
+WITHIN_MM = 0.8  # by which a piece may be larger or smaller than the design: walls and seams
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """The lines of a file in the design's own directions.
+
+    Attributes
+    ----------
+    paths : Paths
+        All of them, with the printer's own tool numbers.
+    centre_mm : (float, float)
+        Middle of the design's first piece [mm].
+    copies : int
+        Pieces of the design's size in the file.
+    """
+
+    paths: Paths
+    centre_mm: Point
+    copies: int
+
+
+def placed(design: Design, source: Source) -> Placed:
+    """Find a design in a file of G-code.
+
+    Parameters
+    ----------
+    design : Design
+        That was sliced, by whatever slicer.
+    source : Path, bytes or iterable of str
+        The file, alone or with others on a plate, as it is or turned by 90 degrees.
+
+    Raises
+    ------
+    BadInput
+        No G-code, other tools than the design's, or no piece of its size; with the sizes that there are.
+    """
+    paths = _of_tools(design, source)
+    model = paths.model()
+    mine = np.isin(model.tool, _tools(design))
+    low, high = (of(model.start_mm[mine, :2], model.end_mm[mine, :2]) for of in (np.minimum, np.maximum))
+    boxes = [
+        np.array([low[rows].min(0), high[rows].max(0)]) for rows in _pieces(low, high, np.arange(len(low)))
+    ]  # fmt: skip
+    size = np.array(design.printed.size_mm[:2]) - design.machine.line_mm()  # lines run half a line inside
+    for turned in (False, True):
+        wanted = size[::-1] if turned else size
+        found = [box for box in boxes if (abs(box[1] - box[0] - wanted) < WITHIN_MM).all()]
+        if found:
+            x, y = (float(v) for v in found[0].mean(0))
+            return Placed(_turned(paths), (y, -x), len(found)) if turned else Placed(paths, (x, y), len(found))
+    line = design.machine.line_mm()
+    there = "; ".join(
+        f"{w + line:.4g} x {h + line:.4g} mm at x {x:.4g}, y {y:.4g}"
+        for (w, h), (x, y) in sorted({(tuple(b[1] - b[0]), tuple(b.mean(0))) for b in boxes})[:3]
+    )
+    length, width, _ = design.printed.size_mm
+    raise BadInput(
+        f"no piece of {length:g} x {width:g} mm, as {design.name}, in this G-code; it prints {there}: was it sliced "
+        "from this design, straight or turned by 90 degrees?"
+    )
+
+
+def _tools(design: Design) -> list[int]:
+    return sorted({design.tool(body.material) for body in design.printed.bodies})
+
+
+def _of_tools(design: Design, source: Source) -> Paths:
+    """The file's lines, its tools counted as the printer does, or from 0 as a slicer's own file does."""
+    motion, wanted = follow(source, design.machine.control.prime_macro), set(_tools(design))
+    used: set[int] = set()
+    for numbering in ("printer", "slicer"):
+        paths = paths_of(motion, design.machine, numbering)
+        there = set(paths.model().tool.tolist())
+        if wanted <= there:
+            return paths
+        used |= there
+    raise BadInput(
+        f"tools {sorted(used)} print in this G-code; expected {sorted(wanted)}, those of {design.name}: --tool "
+        "MATERIAL=NUMBER says which tool has a material"
+    )
+
+
+def _pieces(low: Real, high: Real, rows: Whole) -> Iterator[Whole]:
+    """Lines that are no further apart than ``APART_MM``, along x and along y in turn."""
+    for axis in (0, 1):
+        order = rows[np.argsort(low[rows, axis], kind="stable")]
+        reach = np.maximum.accumulate(high[order, axis])
+        cuts = np.flatnonzero(low[order[1:], axis] > reach[:-1] + APART_MM) + 1
+        if len(cuts):
+            for part in np.split(order, cuts):
+                yield from _pieces(low, high, part)
+            return
+    yield rows
+
+
+def _turned(paths: Paths) -> Paths:
+    """The lines turned by -90 degrees about the origin: x becomes -y."""
+    turn: Sequence[Real] = [
+        np.column_stack([p[:, 1], -p[:, 0], p[:, 2]]) for p in (paths.start_mm, paths.end_mm)
+    ]  # fmt: skip
+    return replace(paths, start_mm=turn[0], end_mm=turn[1])

@@ -1,0 +1,95 @@
+"""A design is found in G-code of anybody: raw or ready, moved, turned, among others; or it is said what is there."""
+
+import math
+import re
+import shutil
+
+import pytest
+
+from sensorgen.asprinted.registration import placed
+from sensorgen.core.errors import BadInput
+from sensorgen.export import slicing
+from sensorgen.export.slicing import Placed
+from sensorgen.prediction.bodies import from_gcode
+from sensorgen.prediction.rest_state import rest_state
+
+from .conftest import small
+
+WORD = re.compile(r"\b([XY])(-?[\d.]+)")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The design in the middle of the bed, its raw and its ready file."""
+    if shutil.which("prusa-slicer") is None:
+        pytest.skip("prusa-slicer is not installed")
+    design = small()
+    return design, slicing.sliced([slicing.alone(design)], "prusa", tmp_path_factory.mktemp("alone"))
+
+
+def capacitance_f(design, file):
+    return rest_state(from_gcode(design, file)).capacitance.value
+
+
+def changed(text, place):
+    """G-code with every place in plan put elsewhere; moves along one axis get both, as a turn needs."""
+    x = y = 0.0
+    lines = []
+    for line in text.splitlines():
+        words = dict(WORD.findall(line.partition(";")[0])) if re.match(r"G[01]\b", line) else {}
+        if words:
+            x, y = float(words.get("X", x)), float(words.get("Y", y))
+            rest = " ".join(WORD.sub("", line).split()[1:])
+            u, v = place(x, y)
+            line = f"{line[:2]} X{u:.3f} Y{v:.3f} {rest}"
+        lines.append(line)
+    return "\n".join(lines) + "\n"
+
+
+def test_raw_and_ready_files_are_one_print(made):
+    design, done = made
+    assert placed(design, done.ready).copies == 1
+    assert capacitance_f(design, done.raw) == pytest.approx(capacitance_f(design, done.ready), rel=1e-9, abs=0)
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        lambda x, y: (x + 37.3, y - 21.2),
+        lambda x, y: (-y, x),
+        lambda x, y: (-y + 40, x - 15),
+    ],
+    ids=["moved", "turned", "both"],
+)
+def test_it_is_found_wherever_it_stands(made, place, tmp_path):
+    design, done = made
+    file = tmp_path / "elsewhere.gcode"
+    file.write_text(changed(done.raw.read_text("utf-8"), place), "utf-8")
+    assert capacitance_f(design, file) == pytest.approx(capacitance_f(design, done.raw), rel=2e-3, abs=0)
+
+
+def test_each_of_a_plate_is_found(made, tmp_path):
+    design, done = made
+    other = small(parameters={"dielectric_mm": 0.3, "length_mm": 16.0})
+    x, y = design.machine.bed_centre_mm()
+    pieces = [Placed(design, (x - 20, y + 5), "a"), Placed(other, (x + 20, y), "b"), Placed(design, (x, y - 30), "c")]
+    plate = slicing.sliced(pieces, "prusa", tmp_path)
+    found = placed(design, plate.raw)
+    assert found.copies == 2
+    assert math.dist(found.centre_mm, (x - 20, y + 5)) < 0.3 or math.dist(found.centre_mm, (x, y - 30)) < 0.3
+    assert capacitance_f(design, plate.raw) == pytest.approx(capacitance_f(design, done.raw), rel=2e-3, abs=0)
+    alone = capacitance_f(other, plate.raw)
+    assert alone < capacitance_f(design, plate.raw) * 16 / 12, "its film is thicker"
+
+
+def test_what_is_not_the_design_is_said(made, tmp_path):
+    design, done = made
+    with pytest.raises(BadInput, match=r"no piece of 20 x 8 mm.*it prints 12(\.\d+)? x 8(\.\d+)? mm at x"):
+        placed(small(parameters={"length_mm": 20.0}), done.raw)
+    with pytest.raises(BadInput, match=r"tools \[.*\] print in this G-code; expected \[.*5.*\]"):
+        placed(small(tools={"x60": 5}), done.raw)
+    with pytest.raises(BadInput, match="cannot read"):
+        from_gcode(design, tmp_path / "missing.gcode")
+    (tmp_path / "no.gcode").write_bytes(bytes(range(256)))
+    with pytest.raises(BadInput, match="expected G-code"):
+        _ = from_gcode(design, tmp_path / "no.gcode").cells
