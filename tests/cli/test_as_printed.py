@@ -121,3 +121,17 @@ def test_a_build_is_compensated(run, contents, tmp_path):
 
 def test_nothing_to_compensate(run):
     assert "nothing to change" in run("build", "reference", "--size", "12x8", "--no-cad", "--compensate", "print").err
+
+
+def test_the_print_by_any_file(run, program, tmp_path):
+    program("prusa-slicer", "prusa-slicer")
+    words = [*SMALL, "--dielectric", "0.1"]
+    assert run("slice", *words, "--out", str(tmp_path / "elsewhere")).code == 1  # tips are lost
+    (file,) = (tmp_path / "elsewhere").rglob("*.gcode")
+    found, sliced = (predicted(run, *words, *how) for how in (("--gcode", str(file)), ("--slicer", "prusa")))
+    assert found["body"] == f"printed, {file.name}"
+    assert found["capacitance"]["value"] == pytest.approx(sliced["capacitance"]["value"], rel=1e-5, abs=0)
+    both = run("predict", *words, "--gcode", str(file), "--drawn")
+    assert (both.code, both.line) == (2, "sensorgen: --gcode and --drawn at once; expected one of them")
+    missing = run("predict", *words, "--gcode", "none.gcode")
+    assert (missing.code, missing.line) == (2, "sensorgen: cannot read 'none.gcode': No such file or directory")
