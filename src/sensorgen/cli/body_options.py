@@ -88,7 +88,7 @@ def compensated(design: "Design", word: str | None, walls: str) -> "tuple[Design
 
 
 def printed_of(design: "Design") -> "Printed | None":
-    """The print of a design, with its layers, as the options ask for: an estimate without options; None for the drawing."""
+    """The print of a design, with its layers, by the options; an estimate without any; None for the drawing."""
     from sensorgen.asprinted.printed import body
     from sensorgen.prediction.bodies import registered
 
