@@ -112,7 +112,7 @@ def test_axes_that_are_not_named(run):
 
 def test_without_a_load(run):
     said = run("predict", "reference", "--drawn")
-    assert "capacitance          69.1 pF (69 to 93)\ntop electrode        2.33 kohm (2.3 to 28)" in said.out
+    assert "capacitance          69.1 pF (69 to 94)\ntop electrode        2.33 kohm (2.3 to 28)" in said.out
     found = json.loads(run("predict", "reference", "--json", "--frequencies", "1kHz,1MHz").out)
     assert [row["frequency_hz"] for row in found["impedance"]] == [1e3, 1e6]
     assert "1 MHz" in run("predict", "reference", "--frequencies", "1MHz").out

@@ -134,7 +134,7 @@ def test_a_cell_without_mirrors_stands_between_mirrors():
     )
     found = press2d.press(press2d.cell(Scene(bodies, (4.0, 10.0, 1.0)), 2.0), SOLIDS, [0.0, 1e4], EPS, fineness=QUICK)
     assert found.faults == ()
-    assert "mirrors" in found.doubts[0]
+    assert "mirror image" in found.doubts[0]
 
 
 def test_a_peak_between_the_same_bodies_stays_and_a_line_that_runs_on_is_one():
