@@ -46,7 +46,7 @@ def why_not_applicable(scene: Scene) -> str | None:
         _triangles(scene)
     except ValueError as error:
         return str(error)
-    return fem.third_electrode(scene)
+    return fem.unmirrored(scene)
 
 
 def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:
