@@ -228,7 +228,9 @@ def _cell(scene: Scene) -> _Cell:
         {body: translate(shapely.clip_by_rect(r, *window), -x.low_mm, -y.low_mm) for body, r in own.items()}
         for *_, own in slabs
     ]
-    if any(sum(r.area for r in own.values()) > shapely.union_all(list(own.values())).area + _OVERLAP_MM2 for own in inside):
+    if any(
+        sum(r.area for r in own.values()) > shapely.union_all(list(own.values())).area + _OVERLAP_MM2 for own in inside
+    ):
         raise ValueError("outlines overlap in plan")
     return _numbered([*levels.tolist()], inside, x, y)
 
@@ -252,7 +254,9 @@ def _numbered(levels_mm: list[float], inside: list[dict[Body, Region]], x: Repea
     every = np.concatenate([shapely.transform(plans, lambda p, to=to: p + to) for to in images])
     one, other = shapely.STRtree(every).query(every, predicate="dwithin", distance=SLIVER_MM) % max(count, 1)
     near = abs(slab[one] - slab[other]) < 2
-    _, label = connected_components(coo_array((np.ones(near.sum()), (one[near], other[near])), (count, count)), directed=False)
+    _, label = connected_components(
+        coo_array((np.ones(near.sum()), (one[near], other[near])), (count, count)), directed=False
+    )
     numbers: dict[int, int] = {}
     for end, name in ((BOTTOM, "bottom"), (TOP, "top")):
         for k in np.flatnonzero([terminal == name for _, terminal, _ in pieces]):
@@ -270,7 +274,10 @@ def _numbered(levels_mm: list[float], inside: list[dict[Body, Region]], x: Repea
     names = [*sorted({b.material for own in inside[low : high + 1] for b in own if not b.terminal} - {"air"}), "air"]
     regions = []
     for k in range(low, high + 1):
-        here = {kind: shapely.union_all(plans[(slab == k) & (kinds == kind)]) for kind in np.unique(kinds[slab == k]).tolist()}
+        here = {
+            kind: shapely.union_all(plans[(slab == k) & (kinds == kind)])
+            for kind in np.unique(kinds[slab == k]).tolist()
+        }
         for body, region in inside[k].items():
             if not body.terminal and body.material != "air" and not region.is_empty:
                 kind = conductors + names.index(body.material)

@@ -21,7 +21,9 @@ from sensorgen.solvers.electrostatics.bounds import Energies, Unsolved
 BOTTOM, TOP = 0, 1  # numbers of the electrodes among conductors
 
 _BALANCE = 1e-8  # relative: by which energy and the charges of both electrodes may differ
-_DIRECT = 60_000  # unknowns up to which a system is factorised
+_DIRECT = 150_000  # unknowns up to which a system is factorised
+_RESIDUAL = 1e-11
+_ITERATIONS = 2000
 _SAME_MM = 1e-9
 _SET = 0.01
 _MITRE = 2.0  # of lines beside outlines, in their distance
@@ -113,7 +115,9 @@ def plan(cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> Plan:
     lines = [sides, *edges]
     for far in beside_mm:
         near = _beyond(ends, cell, 2 * far)
-        beside = shapely.buffer(shapely.line_merge(near), far, join_style="mitre", mitre_limit=_MITRE, cap_style="flat", quad_segs=2)
+        beside = shapely.buffer(
+            shapely.line_merge(near), far, join_style="mitre", mitre_limit=_MITRE, cap_style="flat", quad_segs=2
+        )
         outline = shapely.boundary(shapely.set_precision(shapely.simplify(beside, far / 10), far / 10))
         lines.append(shapely.difference(shapely.clip_by_rect(outline, 0.0, 0.0, x, y), sides))
     for axis, places in enumerate(cell.cuts_mm):
@@ -149,7 +153,10 @@ def _beyond(lines: Any, cell: Layers, far_mm: float) -> Any:
             shift = along * (way * size if cell.periodic[axis] else (1 + way) * size)
             copies.append(shapely.transform(lines, lambda p, s=shift, t=turn: p @ t + s))
         lines = shapely.union_all(copies)
-        low, high = -far_mm * along - 1e6 * (1 - along), np.array([size, size]) * along + far_mm * along + 1e6 * (1 - along)
+        low, high = (
+            -far_mm * along - 1e6 * (1 - along),
+            np.array([size, size]) * along + far_mm * along + 1e6 * (1 - along),
+        )
         lines = shapely.clip_by_rect(lines, *low, *high)
     return lines
 
@@ -253,7 +260,10 @@ class Mesh:
         # Corners of the cell come first: where sides repeat, NGSolve turns edges by the numbers of their ends, and maps a
         # corner to its images in an order of its own.
         used = np.unique(prisms)
-        at_side = [np.minimum(abs(p), abs(p - size)) < _SAME_MM for p, size in zip(flat.points_mm.T, self.cell.size_mm, strict=True)]
+        at_side = [
+            np.minimum(abs(p), abs(p - size)) < _SAME_MM
+            for p, size in zip(flat.points_mm.T, self.cell.size_mm, strict=True)
+        ]
         used = used[np.argsort(~(at_side[0] & at_side[1])[used % count], kind="stable")]
         number = np.full(count * len(self.heights_mm), -1)
         number[used] = np.arange(len(used))
@@ -374,9 +384,13 @@ def solved(mesh: Mesh, order: int, weight: Real) -> Energies:
     lower, found = _balanced(form, lambda f: f.components[2], cell.conductors)
     field = found.components[0]
     energy = ng.Integrate(field * field / eps, space, order=2 * order)
-    charges = [-ng.Integrate(one.components[2] * (field * normal) * ng.dx(element_boundary=True), space)
-               for one in _indicators(below, lambda f: f.components[2], cell.conductors)]
-    wrong = max(abs(energy - lower), abs(charges[TOP] - lower), abs(charges[BOTTOM] + lower), *map(abs, charges[2:]), 0.0)
+    charges = [
+        -ng.Integrate(one.components[2] * (field * normal) * ng.dx(element_boundary=True), space)
+        for one in _indicators(below, lambda f: f.components[2], cell.conductors)
+    ]
+    wrong = max(
+        abs(energy - lower), abs(charges[TOP] - lower), abs(charges[BOTTOM] + lower), *map(abs, charges[2:]), 0.0
+    )
     if not wrong < _BALANCE * lower:
         raise Unsolved(f"energy and charges differ by {wrong / lower:.1g}: triangles too slender for doubles")
     return Energies(lower, upper, part, facet.ndof, moved / upper)
@@ -400,13 +414,19 @@ def _balanced(form: Any, part: Any, conductors: int) -> tuple[float, Any]:
 
     space = form.space
     free = space.FreeDofs(True)
+    direct = sum(free) <= _DIRECT
     with ng.TaskManager():
+        coarse = None if direct else ng.Preconditioner(form, "bddc")
         form.Assemble()
-        inverse = form.mat.Inverse(free, "sparsecholesky")
+        inverse = (
+            form.mat.Inverse(free, "sparsecholesky")
+            if direct
+            else ng.CGSolver(form.mat, coarse.mat, tol=_RESIDUAL, maxiter=_ITERATIONS)
+        )
         found = _indicators(space, part, conductors)[TOP:]
         rest = found[0].vec.CreateVector()
         for f in found:
-            for _ in range(2):
+            for _ in range(2 if direct else 1):
                 rest.data = form.mat * f.vec
                 f.vec.data -= inverse * rest
         images = []
