@@ -1,6 +1,6 @@
 """The repeating cell of a plan: the part of some regions that mirrors or shifts along x and y make into the whole.
 
-Unlike :mod:`sensorgen.scene.unit_cell` it reads polygons of any direction: posts have mirrors, strips at 45 degrees have
+Unlike :mod:`sensorgen.scene.unit_cell` it reads polygons of any direction: posts have mirrors, strips at 45 degrees
 shifts only. A pattern without either is continued by its own mirror image.
 """
 
@@ -97,7 +97,7 @@ def _is_plain(region: Region, size_mm: Sequence[float], axis: int) -> bool:
 
 
 def _crossings(looks: Sequence[Region], axis: int, whole: float, wide: float) -> list[tuple[Real, Real]]:
-    """Where lines along the axis enter and leave each region, in order, and a number for which and whether it enters."""
+    """Where lines along the axis cross outlines, in order, and a number for which region's, and whether it is entered."""
     found = []
     for share in _CUTS:
         ends = np.array([[-1.0, share * wide], [whole + 1.0, share * wide]])

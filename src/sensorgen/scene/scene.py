@@ -109,8 +109,8 @@ class Body:
     prisms : tuple of Prism
         They do not overlap. Boxes that share a face are one solid; other prisms touch at most along edges.
     terminal : str
-        "top", "middle" or "bottom" where it is connected to an electrode's contact, ``FLOATING`` for a conductor that is
-        connected to none, else "".
+        "top", "middle" or "bottom" where it is connected to an electrode's contact, ``FLOATING`` for a conductor that
+        is connected to none, else "".
     """
 
     name: str

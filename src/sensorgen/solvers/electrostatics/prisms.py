@@ -25,6 +25,7 @@ _DIRECT = 150_000  # unknowns up to which a system is factorised
 _RESIDUAL = 1e-11
 _ITERATIONS = 2000
 _SAME_MM = 1e-9
+_FAR = 1e12  # beyond all lines
 _SET = 0.01
 _MITRE = 2.0  # of lines beside outlines, in their distance
 
@@ -104,86 +105,83 @@ def plan(cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> Plan:
     Unsolved
         The triangles do not fill the cell.
     """
-    x, y = cell.size_mm
-    sides = shapely.box(0.0, 0.0, x, y).exterior
-    edges = shapely.boundary([region for layer in cell.regions for region in layer.values()])
-    metal = [
-        shapely.union_all([region for kind, region in layer.items() if kind < cell.conductors], grid_size=grid_mm)
+    # In whole numbers of the grid's pitch, of which each side of the cell has some
+    count = np.rint(np.array(cell.size_mm) / grid_mm).clip(1)
+    pitch = np.array(cell.size_mm) / count
+    layers = [
+        {kind: shapely.transform(region, lambda p: p / pitch) for kind, region in layer.items()}
         for layer in cell.regions
     ]
-    ends = shapely.difference(shapely.union_all(shapely.boundary(metal), grid_size=grid_mm), sides)
+    x, y = count.tolist()
+    sides = shapely.box(0.0, 0.0, x, y).exterior
+    edges = shapely.boundary([region for layer in layers for region in layer.values()])
+    metal = [
+        shapely.union_all([region for kind, region in layer.items() if kind < cell.conductors], grid_size=1)
+        for layer in layers
+    ]
+    ends = shapely.difference(shapely.union_all(shapely.boundary(metal), grid_size=1), sides)
     lines = [sides, *edges]
-    for far in beside_mm:
-        near = _beyond(ends, cell, 2 * far)
-        beside = shapely.buffer(
-            shapely.line_merge(near), far, join_style="mitre", mitre_limit=_MITRE, cap_style="flat", quad_segs=2
-        )
-        outline = shapely.boundary(shapely.set_precision(shapely.simplify(beside, far / 10), far / 10))
+    for far in np.array(beside_mm) / grid_mm:
+        near = shapely.line_merge(_beyond(ends, (x, y), cell.periodic, 2 * far))
+        beside = shapely.buffer(near, far, join_style="mitre", mitre_limit=_MITRE, cap_style="flat", quad_segs=2)
+        outline = shapely.boundary(shapely.set_precision(shapely.simplify(beside, far / 10), max(far / 10, 1.0)))
         lines.append(shapely.difference(shapely.clip_by_rect(outline, 0.0, 0.0, x, y), sides))
     for axis, places in enumerate(cell.cuts_mm):
-        for at in places:
-            ends = ((at, 0.0), (at, y)) if axis == 0 else ((0.0, at), (x, at))
-            lines.append(shapely.LineString(ends))
-    noded = shapely.union_all(lines, grid_size=grid_mm)
+        for at in np.rint(np.array(places) / pitch[axis]).tolist():
+            lines.append(shapely.LineString(((at, 0.0), (at, y)) if axis == 0 else ((0.0, at), (x, at))))
+    noded = shapely.union_all(lines, grid_size=1)
     if any(cell.periodic):
-        noded = shapely.union_all([noded, _repeated(noded, cell)], grid_size=grid_mm)
+        noded = shapely.union_all([noded, _repeated(noded, (x, y), cell.periodic)], grid_size=1)
     faces = shapely.get_parts(shapely.polygonize([noded]))
     pieces, of_face = shapely.get_parts(shapely.constrained_delaunay_triangles(faces), return_index=True)
-    corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
-    whole = np.rint(corners / grid_mm).astype(np.int64)
-    points, triangles = np.unique(whole.reshape(-1, 2), axis=0, return_inverse=True)
+    corners = np.rint(shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
+    points, triangles = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
     triangles = triangles.reshape(-1, 3)
-    at = points * grid_mm
-    (ax, ay), (bx, by) = (at[triangles[:, k]].T - at[triangles[:, 0]].T for k in (1, 2))
-    area = ax * by - ay * bx
+    one, two = (points[triangles[:, k]] - points[triangles[:, 0]] for k in (1, 2))
+    area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
     triangles = np.where((area > 0)[:, None], triangles, triangles[:, ::-1])
-    if abs(np.abs(area).sum() / 2 - x * y) > 10 * grid_mm * (x + y) or not np.abs(area).min() > 0:
+    if np.abs(area).sum() != 2 * x * y or not area.all():
         raise Unsolved("the triangles of the plan do not fill it: outlines nearer than the grid; report this scene")
-    return Plan(at, triangles, _filled(cell, faces)[:, of_face])
+    return Plan(points * pitch, triangles, _filled(layers, faces, cell)[:, of_face])
 
 
-def _beyond(lines: Any, cell: Layers, far_mm: float) -> Any:
+def _beyond(lines: Any, size: Sequence[float], periodic: Sequence[bool], far: float) -> Any:
     """Lines continued beyond the sides of a cell, by a distance."""
-    for axis, size in enumerate(cell.size_mm):
+    for axis in (0, 1):
         turn, along = np.eye(2), np.eye(2)[axis]
-        if not cell.periodic[axis]:
+        if not periodic[axis]:
             turn[axis, axis] = -1.0
         copies = [lines]
         for way in (-1, 1):
-            shift = along * (way * size if cell.periodic[axis] else (1 + way) * size)
-            copies.append(shapely.transform(lines, lambda p, s=shift, t=turn: p @ t + s))
-        lines = shapely.union_all(copies)
-        low, high = (
-            -far_mm * along - 1e6 * (1 - along),
-            np.array([size, size]) * along + far_mm * along + 1e6 * (1 - along),
-        )
-        lines = shapely.clip_by_rect(lines, *low, *high)
+            shift = along * size[axis] * (way if periodic[axis] else 1 + way)
+            copies.append(shapely.transform(lines, lambda p, shift=shift, turn=turn: p @ turn + shift))
+        low, high = np.full(2, -_FAR), np.full(2, _FAR)
+        low[axis], high[axis] = -far, size[axis] + far
+        lines = shapely.clip_by_rect(shapely.union_all(copies), *low, *high)
     return lines
 
 
-def _repeated(noded: Any, cell: Layers) -> Any:
-    """Corners on one side of a cell as short ticks on the other, so that both have the same."""
-    x, y = cell.size_mm
+def _repeated(noded: Any, size: Sequence[float], periodic: Sequence[bool]) -> Any:
+    """The sides of a cell with the corners of the opposite ones, and one in the middle."""
     points = shapely.get_coordinates(noded)
-    ticks = []
-    for axis, (size, other) in enumerate(((x, y), (y, x))):
-        if cell.periodic[axis]:
-            side = points[np.minimum(abs(points[:, axis]), abs(points[:, axis] - size)) < _SAME_MM]
-            along = np.unique(np.append(side[:, 1 - axis], [0.0, other / 2, other]))
-            for at in (0.0, size):
-                line = np.column_stack([np.full(len(along), at), along])
-                ticks.append(shapely.linestrings(line if axis == 0 else line[:, ::-1]))
-    return shapely.multilinestrings(ticks)
+    lines = []
+    for axis in np.flatnonzero(periodic):
+        side = points[(points[:, axis] == 0) | (points[:, axis] == size[axis])]
+        other = size[1 - axis]
+        along = np.unique(np.append(side[:, 1 - axis], [0.0, other // 2, other]))
+        for at in (0.0, size[axis]):
+            line = np.column_stack([np.full(len(along), at), along])
+            lines.append(shapely.linestrings(line if axis == 0 else line[:, ::-1]))
+    return shapely.multilinestrings(lines)
 
 
-def _filled(cell: Layers, faces: Any) -> Whole:
+def _filled(layers: Sequence[dict[int, Any]], faces: Any, cell: Layers) -> Whole:
     """What fills each face in every layer, by a place inside it."""
     inside = shapely.point_on_surface(faces)
-    found = np.full((len(cell.regions), len(faces)), cell.conductors + len(cell.permittivity) - 1)
-    for row, layer in zip(found, cell.regions, strict=True):
+    found = np.full((len(layers), len(faces)), cell.conductors + len(cell.permittivity) - 1)
+    for row, layer in zip(found, layers, strict=True):
         for kind, region in layer.items():
-            parts = shapely.get_parts(region)
-            row[shapely.STRtree(parts).query(inside, predicate="within")[0]] = kind
+            row[shapely.STRtree(shapely.get_parts(region)).query(inside, predicate="within")[0]] = kind
     return found
 
 
@@ -257,14 +255,11 @@ class Mesh:
         layer, which = np.nonzero(self.free)
         low = flat.triangles[which] + (layer * count)[:, None]
         prisms, kinds = np.concatenate([low, low + count], axis=1), self.fill[self.free]
-        # Corners of the cell come first: where sides repeat, NGSolve turns edges by the numbers of their ends, and maps a
-        # corner to its images in an order of its own.
+        # Corners of the cell come first: where sides repeat, NGSolve turns edges by the numbers of their ends, and maps
+        # a corner to its images in an order of its own.
         used = np.unique(prisms)
-        at_side = [
-            np.minimum(abs(p), abs(p - size)) < _SAME_MM
-            for p, size in zip(flat.points_mm.T, self.cell.size_mm, strict=True)
-        ]
-        used = used[np.argsort(~(at_side[0] & at_side[1])[used % count], kind="stable")]
+        sides = np.minimum(flat.points_mm, abs(flat.points_mm - self.cell.size_mm)) < _SAME_MM
+        used = used[np.argsort(~sides.all(1)[used % count], kind="stable")]
         number = np.full(count * len(self.heights_mm), -1)
         number[used] = np.arange(len(used))
         prisms = number[prisms]
@@ -302,7 +297,7 @@ class Mesh:
         for k in range(first):
             layer, which = np.nonzero(metal == k)
             ring = np.column_stack([a[which], b[which], b[which], a[which]]) + (layer * count)[:, None]
-            found.append((k, ring + [0, 0, count, count]))
+            found.append((k, ring + np.array([0, 0, count, count])))
         return [(k, faces) for k, faces in found if len(faces)]
 
     def _neighbours(self) -> Whole:
