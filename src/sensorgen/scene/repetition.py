@@ -97,7 +97,7 @@ def _is_plain(region: Region, size_mm: Sequence[float], axis: int) -> bool:
 
 
 def _crossings(looks: Sequence[Region], axis: int, whole: float, wide: float) -> list[tuple[Real, Real]]:
-    """Where lines along the axis cross outlines, in order, and a number for which region's, and whether it is entered."""
+    """Where lines along the axis cross outlines, in order, and a number for which, and whether it is entered."""
     found = []
     for share in _CUTS:
         ends = np.array([[-1.0, share * wide], [whole + 1.0, share * wide]])

@@ -127,8 +127,10 @@ def plan(cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> Plan:
         outline = shapely.boundary(shapely.set_precision(shapely.simplify(beside, far / 10), max(far / 10, 1.0)))
         lines.append(shapely.difference(shapely.clip_by_rect(outline, 0.0, 0.0, x, y), sides))
     for axis, places in enumerate(cell.cuts_mm):
-        for at in np.rint(np.array(places) / pitch[axis]).tolist():
-            lines.append(shapely.LineString(((at, 0.0), (at, y)) if axis == 0 else ((0.0, at), (x, at))))
+        lines += [
+            shapely.LineString(((at, 0.0), (at, y)) if axis == 0 else ((0.0, at), (x, at)))
+            for at in np.rint(np.array(places) / pitch[axis]).tolist()
+        ]
     noded = shapely.union_all(lines, grid_size=1)
     if any(cell.periodic):
         noded = shapely.union_all([noded, _repeated(noded, (x, y), cell.periodic)], grid_size=1)
