@@ -1,10 +1,10 @@
 """Two resistor networks on voxels, one on each side of the capacitance, written apart from sensorgen's solvers.
 
-Nodes at the corners, a resistor along every edge: each voxel gives a quarter of its conductance to each of its four edges
-along an axis. That is the energy of trilinear potentials with the trapezoid rule across, which is never below the exact
-one: an upper bound. Nodes in the middle, resistors through the faces: the energy of fluxes that are straight in each
-voxel, with the trapezoid rule along, never below the exact one: a lower bound. Voxels that a conductor touches are taken
-for conductor above, those that it fills below.
+Nodes at the corners, a resistor along every edge: each voxel gives a quarter of its conductance to each of its four
+edges along an axis. That is the energy of trilinear potentials with the trapezoid rule across, which is never below the
+exact one: an upper bound. Nodes in the middle, resistors through the faces: the energy of fluxes that are straight in
+each voxel, with the trapezoid rule along, never below the exact one: a lower bound. Voxels that a conductor touches are
+taken for conductor above, those that it fills below.
 """
 
 import numpy as np
@@ -48,7 +48,9 @@ def upper(eps, metal, h):
         ones.append(low.ravel())
         others.append(np.delete(number, 0, axis).ravel())
         conductances.append(total[tuple(cut)].ravel())
-    return solved(number.size, (np.concatenate(ones), np.concatenate(others)), np.concatenate(conductances), held.ravel())
+    return solved(
+        number.size, (np.concatenate(ones), np.concatenate(others)), np.concatenate(conductances), held.ravel()
+    )
 
 
 def lower(eps, metal, h):

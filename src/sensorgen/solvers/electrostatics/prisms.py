@@ -240,9 +240,27 @@ class Mesh:
         return int(self.free.sum() * (order * (order + 1) / 2 + 1.5 * order**2))
 
     @cached_property
+    def meshed(self) -> Mask:
+        """Prisms of the mesh (h - 1, t): those, and conductors across a side that repeats from one of them.
+
+        NGSolve wants both faces of a pair: where a cut through beads meets a conductor on one side only, the conductor
+        is meshed too, with all its faces held.
+        """
+        found, (near, far, _, _) = self.free.copy(), self._seams.T
+        while (more := found[:, near] & ~found[:, far]).any():
+            layer, which = np.nonzero(more)
+            found[layer, far[which]] = True
+        return found
+
+    @cached_property
+    def _kinds(self) -> Whole:
+        """What the prisms are made of; conductors that are meshed, of the first dielectric."""
+        return np.where(self.free, self.fill, self.cell.conductors)
+
+    @cached_property
     def owner(self) -> Whole:
         """Triangle of each prism, in the order of the elements of NGSolve."""
-        which, kinds = np.nonzero(self.free)[1], self.fill[self.free]
+        which, kinds = np.nonzero(self.meshed)[1], self._kinds[self.meshed]
         return np.asarray(which[np.argsort(kinds, kind="stable")])
 
     @cached_property
@@ -254,9 +272,9 @@ class Mesh:
         except ImportError:
             raise NotInstalled("layers of polygons need NGSolve: pip install 'sensorgen[fem]'") from None
         flat, count = self.plan, len(self.plan.points_mm)
-        layer, which = np.nonzero(self.free)
+        layer, which = np.nonzero(self.meshed)
         low = flat.triangles[which] + (layer * count)[:, None]
-        prisms, kinds = np.concatenate([low, low + count], axis=1), self.fill[self.free]
+        prisms, kinds = np.concatenate([low, low + count], axis=1), self._kinds[self.meshed]
         # Corners of the cell come first: where sides repeat, NGSolve turns edges by the numbers of their ends, and maps
         # a corner to its images in an order of its own.
         used = np.unique(prisms)
@@ -294,30 +312,48 @@ class Mesh:
             for k in range(first):
                 layer, which = np.nonzero(metal == k)
                 found.append((k, flat.triangles[which] + ((layer + 1) * count)[:, None]))
-        near, far, a, b = self._neighbours().T
+        near, far, a, b = np.concatenate([self._neighbours, self._seams]).T
         metal = np.where(self.free[:, near], self.fill[:, far], first)
+        held = self.meshed & ~self.free
+        metal = np.where(held[:, near], self.fill[:, near], metal)
         for k in range(first):
             layer, which = np.nonzero(metal == k)
             ring = np.column_stack([a[which], b[which], b[which], a[which]]) + (layer * count)[:, None]
             found.append((k, ring + np.array([0, 0, count, count])))
-        return [(k, faces) for k, faces in found if len(faces)]
+            layer, which = np.nonzero(held & (self.fill == k))
+            found += [(k, flat.triangles[which] + ((layer + up) * count)[:, None]) for up in (0, 1)]
+        alike = {(k, faces.shape[1]) for k, faces in found}
+        return [
+            (k, _distinct(np.concatenate([f for one, f in found if (one, f.shape[1]) == (k, corners)])))
+            for k, corners in sorted(alike)
+        ]
 
+    @cached_property
     def _neighbours(self) -> Whole:
-        """Triangles with a neighbour (n, 4): itself, the other, and the two points of its own edge."""
-        t, at = self.plan.triangles, self.plan.points_mm
-        edges = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
-        owner = np.tile(np.arange(len(t)), 3)
-        order = np.lexsort(edges.T)
-        edges, owner = edges[order], owner[order]
+        """Triangles with a neighbour (n, 4): itself, the other, and the two points of their edge."""
+        edges, owner = self._edges
         same = np.flatnonzero((edges[1:] == edges[:-1]).all(1))
-        found = [np.column_stack([owner[same + k], owner[same + 1 - k], edges[same]]) for k in (0, 1)]
-        for axis in (0, 1):
-            if self.cell.periodic[axis]:
-                sides = [(abs(at[edges, axis] - end) < _SAME_MM).all(1) for end in (0.0, self.cell.size_mm[axis])]
-                rising = [np.flatnonzero(s)[np.argsort(at[edges[s], 1 - axis].sum(1))] for s in sides]
-                for here, there in (rising, rising[::-1]):
-                    found.append(np.column_stack([owner[here], owner[there], edges[here]]))
+        return np.concatenate([np.column_stack([owner[same + k], owner[same + 1 - k], edges[same]]) for k in (0, 1)])
+
+    @cached_property
+    def _seams(self) -> Whole:
+        """The same of those that are neighbours across sides that repeat, with the points of its own edge."""
+        (edges, owner), at = self._edges, self.plan.points_mm
+        found = [np.zeros((0, 4), np.int64)]
+        for axis in np.flatnonzero(self.cell.periodic):
+            sides = [(abs(at[edges, axis] - end) < _SAME_MM).all(1) for end in (0.0, self.cell.size_mm[axis])]
+            rising = [np.flatnonzero(s)[np.argsort(at[edges[s], 1 - axis].sum(1))] for s in sides]
+            for here, there in (rising, rising[::-1]):
+                found.append(np.column_stack([owner[here], owner[there], edges[here]]))
         return np.concatenate(found)
+
+    @cached_property
+    def _edges(self) -> tuple[Whole, Whole]:
+        """Edges of all triangles (n, 2) in order, and the triangle of each."""
+        t = self.plan.triangles
+        edges = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
+        order = np.lexsort(edges.T)
+        return edges[order], np.tile(np.arange(len(t)), 3)[order]
 
     def _opposite(self, axis: int, used: Whole, count: int) -> list[tuple[int, int]]:
         """Points on one side, and those on the other, where both are meshed."""
@@ -330,6 +366,11 @@ class Mesh:
         pairs = [(low + k * count, high + k * count) for k in range(len(self.heights_mm))]
         every = np.concatenate([np.column_stack(pair) for pair in pairs])
         return [(int(a), int(b)) for a, b in every[there[every].all(1)]]
+
+
+def _distinct(faces: Whole) -> Whole:
+    """Faces, each once."""
+    return faces[np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]]
 
 
 def solved(mesh: Mesh, order: int, weight: Real) -> Energies:
