@@ -20,7 +20,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.walls import WALLS
 from sensorgen.export.gcode.paths import Paths
-from sensorgen.scene.connections import Connected, Short, connected_layers
+from sensorgen.scene.connections import Connected, connected_layers
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.layers import LayerRegions, drawn, scene_of
 from sensorgen.scene.scene import FLOATING, Body, Point, Scene, rectangle
@@ -89,10 +89,9 @@ class Printed:
         bodies, conducts = self.design.printed.bodies, self.design.conducts
         return {name: connected_layers(layers, bodies, conducts) for name, layers in self.layers.items()}
 
-    @property
-    def shorts(self) -> tuple[Short, ...]:
-        """Where electrodes touch, by the first convention."""
-        return next(iter(self._connected.values())).shorts
+    def remarks(self) -> dict[str, tuple[str, ...]]:
+        """By every convention, where electrodes touch, and how many pieces of conductor float."""
+        return {name: found.remarks() for name, found in self._connected.items()}
 
     @property
     def cell(self) -> Cell:
@@ -115,8 +114,16 @@ class Printed:
         return volumes.rows(scene, self.first, extruded)
 
     def findings(self) -> list[Finding]:
-        """Rule 7, with the design's waivers."""
-        return self.design.waived(volumes.findings(self.rows(), self.design.printed))
+        """Rule 7, and rule 1 where electrodes touch by the first convention; with the design's waivers."""
+        shorts = [
+            Finding(
+                "1-short", "error", " / ".join(dict.fromkeys(short.bodies)), f"as printed, {short.words()}: a short",
+                "use other walls or line widths, or draw them further apart", 0.0, place_mm=short.place_mm,
+                layer=next(k for k, layer in enumerate(self.first, 1) if layer.top_mm > short.place_mm[2]),
+            )
+            for short in next(iter(self._connected.values())).shorts
+        ]  # fmt: skip
+        return self.design.waived([*volumes.findings(self.rows(), self.design.printed), *shorts])
 
 
 def body(
@@ -173,8 +180,7 @@ def rule7(design: Design, paths: Paths, centre_mm: Point | None = None) -> tuple
     """
     lines = beads(design, paths, centre_mm)
     made = Printed(design, "printed", {"vol": printed_layers(design, lines)}, lines)
-    rows = made.rows()
-    return rows, design.waived(volumes.findings(rows, design.printed))
+    return made.rows(), made.findings()
 
 
 def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body], plan: Window) -> Cell:

@@ -158,11 +158,12 @@ def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
     """Cells by every rule: of walls for estimates, of bead widths for a tool path."""
     from sensorgen.scene.sections import sections
 
-    cells = {
-        rule if len(printed.cells) == 1 else name: cell
-        for rule, printed in prints.items()
-        for name, cell in printed.cells.items()
-    }
+    cells, remarks = {}, {}
+    for rule, printed in prints.items():
+        said = printed.remarks()
+        for name, cell in printed.cells.items():
+            key = rule if len(printed.cells) == 1 else name
+            cells[key], remarks[key] = cell, said[name]
     first, (printed, *_) = next(iter(cells.values())), prints.values()
     period = None
     if getattr(printed.design.params, "period_mm", None) is not None:
@@ -171,7 +172,7 @@ def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
         except ValueError:  # no constant cross-section
             period = first.scene.size_mm[0]
     scenes = {name: cell.scene for name, cell in cells.items()}
-    return Cells(scenes, first.count, period, partial(_printed_gaps, scenes), printed.lines)
+    return Cells(scenes, first.count, period, partial(_printed_gaps, scenes), printed.lines, remarks)
 
 
 def _printed_gaps(scenes: "Mapping[str, Scene]") -> dict[str, float]:

@@ -53,8 +53,8 @@ class _Pieces:
         meet = (low[one] < high[other] + SLIVER_MM) & (low[other] < high[one] + SLIVER_MM) & (one < other)
         return np.stack([one[meet], other[meet]])
 
-    def terminals(self) -> tuple[list[str], list[tuple[int, int]]]:
-        """Terminal of each piece, and pairs of pieces that short two of them."""
+    def terminals(self) -> tuple[list[str], list[tuple[int, int]], int]:
+        """Terminal of each piece, pairs of pieces that short two of them, and how many connected pieces float."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -71,7 +71,7 @@ class _Pieces:
             for own, piece in zip(drawn.tolist(), label.tolist(), strict=True)
         ]
         shorts = [(i, j) for i, j in pairs.T.tolist() if found[i] != found[j]]
-        return found, shorts
+        return found, shorts, len(set(label.tolist()) - held.keys())
 
 
 @dataclass(frozen=True)
@@ -86,11 +86,21 @@ class Connected:
         All bodies, those pieces among them.
     shorts : tuple of Short
         Where electrodes touch, one for each pair of bodies.
+    floating : int
+        Connected pieces of conductor that touch no electrode.
     """
 
     layers: tuple[LayerRegions, ...]
     bodies: tuple[Body, ...]
     shorts: tuple[Short, ...]
+    floating: int = 0
+
+    def remarks(self) -> tuple[str, ...]:
+        """What differs from two electrodes apart, in words."""
+        one = "a piece of conductor touches no electrode"
+        many = f"{self.floating} pieces of conductor touch no electrode"
+        said = [] if not self.floating else [f"{one if self.floating == 1 else many}: solved as floating"]
+        return (*(f"short: {short.words()}" for short in self.shorts), *said)
 
 
 def connected_layers(layers: Sequence[LayerRegions], bodies: Sequence[Body], conducts: Conducts) -> Connected:
@@ -117,7 +127,7 @@ def connected_layers(layers: Sequence[LayerRegions], bodies: Sequence[Body], con
         return Connected(tuple(layers), tuple(bodies), ())
     spans = np.array([(layers[number].bottom_mm, layers[number].top_mm) for number, _, _ in pieces])
     found = _Pieces([body for _, body, _ in pieces], np.array([part for *_, part in pieces]), spans)
-    terminals, pairs = found.terminals()
+    terminals, pairs, floating = found.terminals()
     renamed: dict[tuple[str, str], Body] = {}
     regions: list[dict[str, list[shapely.Polygon]]] = [{} for _ in layers]
     for (number, body, part), terminal in zip(pieces, terminals, strict=True):
@@ -131,7 +141,7 @@ def connected_layers(layers: Sequence[LayerRegions], bodies: Sequence[Body], con
         for layer, here in zip(layers, regions, strict=True)
     ]
     others = [own for (name, terminal), own in renamed.items() if named[name].terminal != terminal]
-    return Connected(tuple(made), (*bodies, *others), tuple(_shorts(found, pairs)))
+    return Connected(tuple(made), (*bodies, *others), tuple(_shorts(found, pairs)), floating)
 
 
 def _as(body: Body, terminal: str) -> Body:
@@ -163,7 +173,7 @@ def connected_scene(scene: Scene, conducts: Conducts) -> Scene:
         return scene
     outlines = np.array([shapely.Polygon(_outline(p, axis)) for _, p in prisms])
     spans = np.array([p.span(axis) for _, p in prisms])
-    terminals, _ = _Pieces([b for b, _ in prisms], outlines, spans).terminals()
+    terminals, *_ = _Pieces([b for b, _ in prisms], outlines, spans).terminals()
     if all(body.terminal == terminal for (body, _), terminal in zip(prisms, terminals, strict=True)):
         return scene
     made: dict[str, tuple[Body, list[Prism]]] = {}
