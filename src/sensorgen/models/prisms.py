@@ -190,7 +190,7 @@ class _Cell:
         found = np.ones(len(middle))
         for at, side in zip(middle.T, (self.x, self.y), strict=True):
             found *= side.shares[np.searchsorted(side.places_mm[1:-1] - side.low_mm, at)]
-        return found - self.x.shares.min() * self.y.shares.min()
+        return np.asarray(found - self.x.shares.min() * self.y.shares.min())
 
 
 @lru_cache(maxsize=8)
@@ -259,8 +259,8 @@ def _numbered(levels_mm: list[float], inside: list[dict[Body, Region]], x: Repea
     )
     numbers: dict[int, int] = {}
     for end, name in ((BOTTOM, "bottom"), (TOP, "top")):
-        for k in np.flatnonzero([terminal == name for _, terminal, _ in pieces]):
-            if numbers.setdefault(int(label[k]), end) != end:
+        for piece in {int(label[k]) for k, (_, terminal, _) in enumerate(pieces) if terminal == name}:
+            if numbers.setdefault(piece, end) != end:
                 raise ValueError("the electrodes touch: the capacitance grows without bound")
     for piece in label.tolist():
         numbers.setdefault(piece, len({*numbers.values(), BOTTOM, TOP}))

@@ -25,7 +25,7 @@ _DIRECT = 150_000  # unknowns up to which a system is factorised
 _RESIDUAL = 1e-11
 _ITERATIONS = 2000
 _SAME_MM = 1e-9
-_FAR = 1e12  # beyond all lines
+_FAR = 1e9  # beyond all lines
 _SET = 0.01
 _MITRE = 2.0  # of lines beside outlines, in their distance
 
@@ -119,11 +119,13 @@ def plan(cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> Plan:
         shapely.union_all([region for kind, region in layer.items() if kind < cell.conductors], grid_size=1)
         for layer in layers
     ]
-    ends = shapely.difference(shapely.union_all(shapely.boundary(metal), grid_size=1), sides)
     lines = [sides, *edges]
     for far in np.array(beside_mm) / grid_mm:
-        near = shapely.line_merge(_beyond(ends, (x, y), cell.periodic, 2 * far))
-        beside = shapely.buffer(near, far, join_style="mitre", mitre_limit=_MITRE, cap_style="flat", quad_segs=2)
+        near = [_beyond(shapely.simplify(region, far / 5), (x, y), cell.periodic, 2 * far) for region in metal]
+        wide, narrow = (
+            shapely.buffer(near, way * far, join_style="mitre", mitre_limit=_MITRE, quad_segs=2) for way in (1, -1)
+        )
+        beside = shapely.union_all(shapely.difference(wide, narrow))
         outline = shapely.boundary(shapely.set_precision(shapely.simplify(beside, far / 10), max(far / 10, 1.0)))
         lines.append(shapely.difference(shapely.clip_by_rect(outline, 0.0, 0.0, x, y), sides))
     for axis, places in enumerate(cell.cuts_mm):
@@ -147,27 +149,27 @@ def plan(cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> Plan:
     return Plan(points * pitch, triangles, _filled(layers, faces, cell)[:, of_face])
 
 
-def _beyond(lines: Any, size: Sequence[float], periodic: Sequence[bool], far: float) -> Any:
-    """Lines continued beyond the sides of a cell, by a distance."""
+def _beyond(region: Any, size: Sequence[float], periodic: Sequence[bool], far: float) -> Any:
+    """A region continued beyond the sides of a cell, by a distance."""
     for axis in (0, 1):
         turn, along = np.eye(2), np.eye(2)[axis]
         if not periodic[axis]:
             turn[axis, axis] = -1.0
-        copies = [lines]
+        copies = [region]
         for way in (-1, 1):
             shift = along * size[axis] * (way if periodic[axis] else 1 + way)
-            copies.append(shapely.transform(lines, lambda p, shift=shift, turn=turn: p @ turn + shift))
+            copies.append(shapely.transform(region, lambda p, shift=shift, turn=turn: p @ turn + shift))
         low, high = np.full(2, -_FAR), np.full(2, _FAR)
         low[axis], high[axis] = -far, size[axis] + far
-        lines = shapely.clip_by_rect(shapely.union_all(copies), *low, *high)
-    return lines
+        region = shapely.clip_by_rect(shapely.union_all(copies), *low, *high)
+    return region
 
 
 def _repeated(noded: Any, size: Sequence[float], periodic: Sequence[bool]) -> Any:
     """The sides of a cell with the corners of the opposite ones, and one in the middle."""
     points = shapely.get_coordinates(noded)
     lines = []
-    for axis in np.flatnonzero(periodic):
+    for axis in (axis for axis in (0, 1) if periodic[axis]):
         side = points[(points[:, axis] == 0) | (points[:, axis] == size[axis])]
         other = size[1 - axis]
         along = np.unique(np.append(side[:, 1 - axis], [0.0, other // 2, other]))
@@ -278,8 +280,8 @@ class Mesh:
         # Corners of the cell come first: where sides repeat, NGSolve turns edges by the numbers of their ends, and maps
         # a corner to its images in an order of its own.
         used = np.unique(prisms)
-        sides = np.minimum(flat.points_mm, abs(flat.points_mm - self.cell.size_mm)) < _SAME_MM
-        used = used[np.argsort(~sides.all(1)[used % count], kind="stable")]
+        off = np.minimum(flat.points_mm, abs(flat.points_mm - self.cell.size_mm)).max(axis=1)
+        used = used[np.argsort(off[used % count] > _SAME_MM, kind="stable")]
         number = np.full(count * len(self.heights_mm), -1)
         number[used] = np.arange(len(used))
         prisms = number[prisms]
@@ -452,19 +454,19 @@ def _balanced(form: Any, part: Any, conductors: int) -> tuple[float, Any]:
 
     space = form.space
     free = space.FreeDofs(True)
-    direct = sum(free) <= _DIRECT
     with ng.TaskManager():
-        coarse = None if direct else ng.Preconditioner(form, "bddc")
-        form.Assemble()
-        inverse = (
-            form.mat.Inverse(free, "sparsecholesky")
-            if direct
-            else ng.CGSolver(form.mat, coarse.mat, tol=_RESIDUAL, maxiter=_ITERATIONS)
-        )
+        direct = sum(free) <= _DIRECT
+        if not direct:
+            coarse = ng.Preconditioner(form, "bddc")
+            form.Assemble()
+            inverse = ng.CGSolver(form.mat, coarse.mat, tol=_RESIDUAL, maxiter=_ITERATIONS)
+        else:
+            form.Assemble()
+            inverse = form.mat.Inverse(free, "sparsecholesky")
         found = _indicators(space, part, conductors)[TOP:]
         rest = found[0].vec.CreateVector()
         for f in found:
-            for _ in range(2 if direct else 1):
+            for _ in range(1 + direct):
                 rest.data = form.mat * f.vec
                 f.vec.data -= inverse * rest
         images = []
