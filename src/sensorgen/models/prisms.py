@@ -13,13 +13,12 @@ from itertools import pairwise, product
 
 import numpy as np
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from shapely.affinity import translate
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, parts
 from sensorgen.scene.raster import raster
 from sensorgen.scene.repetition import Repeat, repeat
@@ -254,9 +253,7 @@ def _numbered(levels_mm: list[float], inside: list[dict[Body, Region]], x: Repea
     every = np.concatenate([shapely.transform(plans, lambda p, to=to: p + to) for to in images])
     one, other = shapely.STRtree(every).query(every, predicate="dwithin", distance=SLIVER_MM) % max(count, 1)
     near = abs(slab[one] - slab[other]) < 2
-    _, label = connected_components(
-        coo_array((np.ones(near.sum()), (one[near], other[near])), (count, count)), directed=False
-    )
+    label = groups(count, one[near], other[near])
     numbers: dict[int, int] = {}
     for end, name in ((BOTTOM, "bottom"), (TOP, "top")):
         for piece in {int(label[k]) for k, (_, terminal, _) in enumerate(pieces) if terminal == name}:

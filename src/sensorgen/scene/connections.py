@@ -38,6 +38,23 @@ class Short:
         return f"{' and '.join(dict.fromkeys(self.bodies))} touch at x {x:.3g}, y {y:.3g}, z {z:.3g} mm"
 
 
+def groups(count: int, one: Whole, other: Whole) -> Whole:
+    """Number of the connected group of each of ``count`` things, of which some pairs are joined.
+
+    >>> groups(4, np.array([0, 3]), np.array([3, 1])).tolist()
+    [0, 0, 1, 0]
+    """
+    label = np.arange(count)
+    while True:
+        low, found = np.minimum(label[one], label[other]), label.copy()
+        np.minimum.at(found, one, low)
+        np.minimum.at(found, other, low)
+        found = found[found]
+        if (found == label).all():
+            return np.unique(label, return_inverse=True)[1]
+        label = found
+
+
 @dataclass(frozen=True, eq=False)
 class _Pieces:
     """Conducting pieces: what each is of, its outline, and what it spans square to that [mm]."""
@@ -55,11 +72,8 @@ class _Pieces:
 
     def terminals(self) -> tuple[list[str], list[tuple[int, int]], int]:
         """Terminal of each piece, pairs of pieces that short two of them, and how many connected pieces float."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        count, pairs = len(self.bodies), self.touching()
-        _, label = connected_components(coo_array((np.ones(len(pairs[0])), pairs), (count, count)), directed=False)
+        pairs = self.touching()
+        label = groups(len(self.bodies), *pairs)
         drawn = np.array([body.terminal for body in self.bodies])
         volume = shapely.area(self.outlines) * np.diff(self.spans_mm)[:, 0]
         held: dict[int, list[str]] = {}
