@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
-from sensorgen.asprinted import compensation
-from sensorgen.asprinted.compensation import Change
 from sensorgen.asprinted.printed import rule7
 from sensorgen.checks import volumes
 from sensorgen.checks.review import review
@@ -22,6 +20,8 @@ from sensorgen.design.design import Design
 from sensorgen.export.gcode.check import Checked, check
 from sensorgen.export.slicers import TIME_LIMIT_S, WALLS
 from sensorgen.export.slicing import Step, alone, sliced
+from sensorgen.workflows import compensation
+from sensorgen.workflows.compensation import Change
 
 
 @dataclass(frozen=True)
