@@ -53,6 +53,7 @@ class Control(Strict):
     preheat_s: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     tool_offsets_mm: dict[Annotated[int, Field(strict=False)], Finite] = Field(default={})  # baby steps per tool, M290
     firmware_retraction: bool = False  # G10 and G11 instead of moves of E
+    commands: dict[str, Line | None] = Field(default={})  # that a print may send, beside its firmware's; null: not
 
 
 class Printer(Strict):

@@ -92,7 +92,6 @@ def check(
     """
     motion = follow(source, machine.control.prime_macro)
     loads = dict(loaded or {})
-    found = [*limits.check(motion, machine), *commands.check(motion, machine)]
-    if others_empty:
-        found += limits.check_loaded(motion, loads)
+    found = [*limits.check(motion, machine), *commands.check(motion, machine, loads)]
+    found += limits.check_loaded(motion, machine, loads, others_empty=others_empty)
     return Checked(**vars(report(motion, machine, loads)), findings=merged(found))
