@@ -71,9 +71,10 @@ def placed(design: Design, source: Source) -> Placed:
         for (w, h), (x, y) in sorted({(tuple(b[1] - b[0]), tuple(b.mean(0))) for b in boxes})[:3]
     )
     length, width, _ = design.printed.size_mm
+    off = min((abs(box[1] - box[0] - wanted).max() for box in boxes for wanted in (size, size[::-1])), default=np.nan)
     raise BadInput(
-        f"no piece of {length:g} x {width:g} mm, as {design.name}, in this G-code; it prints {there}: was it sliced "
-        "from this design, straight or turned by 90 degrees?"
+        f"no piece of {length:g} x {width:g} mm, as {design.name}, in this G-code; it prints {there}, off by {off:.3g} "
+        "mm at least: was it sliced from this design, straight or turned by 90 degrees?"
     )
 
 

@@ -65,7 +65,8 @@ def check_loaded(motion: Motion, machine: Printer, loaded: Mapping[int, str], *,
         fastest = float(flow_mm3_s[wrong].max(initial=0.0))
         yield from _found(
             motion, wrong, "melt", "error",
-            f"tool {tool} prints {fastest:.3g} mm3/s of {name}; it melts {most:g} mm3/s", "print slower or thinner lines",
+            f"tool {tool} prints {fastest:.3g} mm3/s of {name}; it melts {most:g} mm3/s",
+            "print slower or thinner lines",
         )  # fmt: skip
 
 
