@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import groupby, pairwise
+from functools import lru_cache
+from itertools import groupby, zip_longest
 
 import numpy as np
 import shapely
@@ -141,6 +142,7 @@ def _heights(design: Design, paths: Paths, piece: Mask) -> Iterator[Found]:
         yield Found("layers", "error", int(back[0]), message, "print layer by layer", len(back))
 
 
+@lru_cache(maxsize=256)
 def _wide(region: Region, width_mm: float) -> Region:
     """The parts of a region that are at least so wide."""
     half = 0.49 * width_mm
@@ -233,16 +235,12 @@ def _purged(design: Design, paths: Paths, changes: Sequence[Change], piece: Mask
     """Between taking a tool and its first line of the piece, it fills its nozzle elsewhere."""
     volume = paths.volume_mm3(design.machine.filament_mm)
     missing: dict[int, list[tuple[int, float]]] = {}
-    taken = [a for a, b in pairwise([*changes, None]) if b is None or b.tool != a.tool]  # the last of equal ones
-    last = NO_TOOL
-    for change, after in pairwise([*taken, None]):
-        if change is None or change.tool in (last, NO_TOOL):
-            continue
-        last = change.tool
+    taken = [change for k, change in enumerate(changes) if k == 0 or change.tool != changes[k - 1].tool]
+    for change, after in zip_longest(taken, taken[1:]):
         end = math.inf if after is None else after.number
         rows = np.flatnonzero((paths.number > change.number) & (paths.number < end))
         own = rows[piece[rows]]
-        if not len(own) or change.macro:  # a macro that takes a tool primes it
+        if not len(own) or change.macro or change.tool == NO_TOOL:  # a macro that takes a tool primes it
             continue
         given = float(volume[rows[rows < own[0]]].sum())
         if given < PURGED_MM3:

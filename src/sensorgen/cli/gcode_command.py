@@ -79,8 +79,8 @@ command = click.Group(
                 ),
                 click.Option(
                     ["--material", "materials"], multiple=True, metavar="TOOL=NAME",
-                    help="What a tool prints, for its mass, temperatures and melt rate; the printer's usual material, for "
-                    "the mass alone, if not given.",
+                    help="What a tool prints, for mass, temperatures and melt rate; if not given, the printer's usual "
+                    "material, for the mass alone.",
                 ),
                 click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
                 *render.options(),
