@@ -269,4 +269,4 @@ def _beside(paths: Paths, ends: list[Real], size_mm: Sequence[float], stray: Mas
         number, count = _line(paths.number, stray)
         x, y = paths.end_mm[stray][0, :2]
         message = f"lines that belong to no body are printed at x {x:g}, y {y:g} mm"
-        yield Found("clear", "error", number, message, "leave them out, or let them be a skirt or a tower", count)
+        yield Found("clear", "error", number, message, "leave them out, or print them as skirt or tower", count)

@@ -85,15 +85,14 @@ def _tools(design: Design) -> list[int]:
 def _of_tools(design: Design, source: Source) -> Paths:
     """The file's lines, its tools counted as the printer does, or from 0 as a slicer's own file does."""
     motion, wanted = follow(source, design.machine.control.prime_macro), set(_tools(design))
-    used: set[int] = set()
+    used: list[set[int]] = []
     for numbering in ("printer", "slicer"):
         paths = paths_of(motion, design.machine, numbering)
-        there = set(paths.model().tool.tolist())
-        if wanted <= there:
+        used.append(set(paths.model().tool.tolist()))
+        if wanted <= used[-1]:
             return paths
-        used |= there
     raise BadInput(
-        f"tools {sorted(used)} print in this G-code; expected {sorted(wanted)}, those of {design.name}: --tool "
+        f"tools {sorted(used[0])} print in this G-code; expected {sorted(wanted)}, those of {design.name}: --tool "
         "MATERIAL=NUMBER says which tool has a material"
     )
 

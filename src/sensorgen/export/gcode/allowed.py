@@ -38,7 +38,7 @@ class Allowed:
 
 @dataclass(frozen=True)
 class Commands:
-    """Commands that a printer takes in a print, and what is known of others, by their code; ``T`` for all tools."""
+    """Commands that a printer takes in a print, and why others are refused, by their code; ``T`` for all tools."""
 
     allowed: Mapping[str, Allowed]
     refused: Mapping[str, str]

@@ -160,7 +160,7 @@ def _speed(motion: Motion, machine: Printer) -> Iterator[Found]:
 
 def _purge(motion: Motion, machine: Printer) -> Iterator[Found]:
     """Filament that is pushed at one place, or drawn back in all, stays within what was seen to work."""
-    most, count = machine.control.longest_purge_mm, len(motion.rows)
+    control, count = machine.control, len(motion.rows)
     tools = motion.tools.column(count, NO_TOOL)
     rests = motion.across_mm == 0
     rests[1:] &= tools[1:] == tools[:-1]  # each tool counts by itself
@@ -172,9 +172,11 @@ def _purge(motion: Motion, machine: Printer) -> Iterator[Found]:
         rows = tools == tool
         given = np.cumsum(motion.filament_mm[rows])
         back[rows] = np.maximum.accumulate(np.maximum(given, 0.0)) - given
-    for mm, what, advice in (
-        (at_once, "pushed at one place", "purge in shorter pieces; left-over absolute E looks like this too"),
-        (back, "drawn back", "push it forward before it is drawn back again: beyond this it leaves the hot end"),
+    shorter = "purge in shorter pieces; left-over absolute E looks like this too"
+    forward = "push it forward before it is drawn back again: beyond this it leaves the hot end"
+    for mm, most, what, advice in (
+        (at_once, control.longest_purge_mm, "pushed at one place", shorter),
+        (back, control.longest_retraction_mm, "drawn back", forward),
     ):
         wrong = mm > most + HAIR_MM
         value = float(mm.max(initial=0.0))
