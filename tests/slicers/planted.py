@@ -120,6 +120,31 @@ def without(where: Callable[[Lines], range], *, printed_only: bool = False) -> E
     return edit
 
 
+def shifted(tool: int, x: float) -> Edit:
+    """Shift all places of a tool in the sensor."""
+
+    def edit(lines: Lines) -> Lines:
+        hand, new = 0, []
+        for line in lines:
+            hand = int(line[1]) if re.match(r"T[0-9]", line) else hand
+            near = hand == tool and line.startswith("G1")
+            new.append(re.sub(r"X(-?[0-9.]+)", lambda m: f"X{float(m[1]) + x:.3f}", line) if near else line)
+        return new
+
+    return edit
+
+
+def strip(lines: Lines) -> Lines:
+    """Leave out what is printed of one of five strips."""
+    new = list(lines)
+    for k in of_tool(3, 2)(lines):
+        found = re.search(r"X(-?[0-9.]+)", lines[k])
+        if found and -0.9 < float(found[1]) < -0.1 and _printed(lines[k]):
+            new[k] = re.sub(r" E\S+", "", lines[k])
+    assert new != lines
+    return new
+
+
 def of_kind(kind: str, change: Callable[[str], str | None]) -> Edit:
     """Change the printed lines of a kind, or leave them out."""
 
@@ -267,6 +292,8 @@ GEOMETRY = (
     Fault("twelve pushes of 14 mm", amid(*["G1 E14 F2400"] * 12), "purge"),
     Fault("one push of 40 mm", amid("G1 E40 F2400"), "purge"),
     Fault("infill left out", of_kind("Solid infill", lambda _: None), "volume"),
+    Fault("one tool's places shifted by 0.3 mm", shifted(4, 0.3), "place"),
+    Fault("one strip left out", strip, "volume"),
     Fault("walls left out", of_kind("External perimeter", lambda _: None), "volume"),
     Fault("no purge at all", of_kind("Wipe tower", lambda _: None), "purge"),
     Fault("no purge of one tool", lambda lines: of_kind_of(lines, of_tool(4, 0)), "purge"),

@@ -18,7 +18,7 @@ from sensorgen.export.gcode.found import Found
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.moves import NO_TOOL, Change
 from sensorgen.export.gcode.paths import NOT_MODEL, Paths
-from sensorgen.scene.layers import LayerRegions, Region, drawn
+from sensorgen.scene.layers import LayerRegions, Region, drawn, narrow_mm, parts
 from sensorgen.scene.scene import Point
 
 LEVEL_MM = 0.005  # a line this far from the top of a layer lies in none; G-code has three decimals
@@ -27,6 +27,8 @@ LINES_WIDE = 4.0  # parts as wide as this are filled evenly; of narrower ones sl
 EVEN, UNEVEN = (0.85, 1.15), (0.6, 2.0)  # printed over drawn volume of wide parts, and of others at least a line wide
 WIDEST = 2.0  # lines, of one printed line
 THINNEST, LONG_MM = 0.25, 2.0  # a line is thin that is thinner, in lines, and longer
+SOME_OF_A_PART = 0.4  # of its volume; less is no print of it
+SHIFTED = 0.35  # lines, by which a tool's middle may be off; walls and seams make 0.1
 SOME_THIN = 0.6  # share of a tool's length that may be thin
 FOREIGN = 0.05  # share of a tool's volume in a layer that may lie where its material is not drawn
 PURGED_MM3 = PRIME_MM3 / 3  # that fill the nozzle after a change of tools; towers take PRIME_MM3
@@ -69,6 +71,8 @@ def check(
         *_heights(design, paths, piece),
         *_tools(design, lines, layers),
         *_volumes(design, lines, layers),
+        *_parts(design, lines, layers),
+        *_shifts(design, lines, layers),
         *_widths(design, lines),
         *_purged(design, paths, changes, piece),
         *_beside(paths, ends, design.printed.size_mm, model & ~inside & alone, waste),
@@ -111,7 +115,7 @@ def _heights(design: Design, paths: Paths, piece: Mask) -> Iterator[Found]:
         number, count = _line(paths.number, pushed & (z == lowest))
         message = f"the lowest line lies at Z {lowest:g} mm; the first layer of {design.name} is {first_mm:g} mm"
         yield Found("first-layer", "error", number, message, "set the first layer's height, and no offset of Z", count)
-    near = np.abs(z[:, None] - tops).argmin(1)
+    near = np.searchsorted((tops[1:] + tops[:-1]) / 2, z)  # the layer whose top is nearest
     slanted = np.abs(paths.start_mm[:, 2] - z) > LEVEL_MM
     between = piece & ((np.abs(z - tops[near]) > LEVEL_MM) | slanted)
     if between.any():
@@ -186,15 +190,15 @@ def _volumes(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> It
         wrong: list[tuple[int, float, float, float]] = []
         areas: dict[Region, tuple[float, float, float]] = {}
         for k, layer in enumerate(layers):
-            parts = []
+            samples = []
             for region in {each[k].region(body.name) for each in around}:
                 if region not in areas:
                     areas[region] = region.area, _wide(region, line).area, _wide(region, LINES_WIDE * line).area
-                parts.append(areas[region])
-            low = min(EVEN[0] * wide * dense + UNEVEN[0] * (lined - wide) * dense for _, lined, wide in parts)
-            high = max(EVEN[1] * wide + UNEVEN[1] * (all_ - wide) for all_, _, wide in parts)
+                samples.append(areas[region])
+            low = min(EVEN[0] * wide * dense + UNEVEN[0] * (lined - wide) * dense for _, lined, wide in samples)
+            high = max(EVEN[1] * wide + UNEVEN[1] * (all_ - wide) for all_, _, wide in samples)
             spare = 2 * line * line * layer.height_mm  # ends of a line or two, and what a neighbour laps over
-            spare += UNEVEN[1] * line * layer.height_mm * max(all_ > 0 and all_ - lined for all_, lined, _ in parts)
+            spare += UNEVEN[1] * line * layer.height_mm * max(all_ > 0 and all_ - lined for all_, lined, _ in samples)
             given = printed[k, n]
             if not low * layer.height_mm - spare <= given <= high * layer.height_mm + spare:
                 wrong.append((k, given, low * layer.height_mm, high * layer.height_mm))
@@ -208,6 +212,49 @@ def _volumes(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> It
             message = f"{body.name} takes {given:.3g} mm3 in {where}; drawn are {low:.3g} to {high:.3g} mm3"
             advice = "lower the flow" if above else "slice again: lines are missing, too thin, or of another tool"
             yield Found("volume", "error", number, message, advice, len(rows))
+
+
+def _parts(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iterator[Found]:
+    """Every part of a body that is at least a line wide is printed."""
+    for n, body in enumerate(design.printed.bodies):
+        infill = design.infill.get(body.material)
+        dense = (100.0 if infill is None or infill.percent is None else infill.percent) / 100
+        missing = []
+        for k, layer in enumerate(layers):
+            region, rows = layer.region(body.name), np.flatnonzero((lines.layer == k) & (lines.body == n))
+            plan = parts(region)
+            others = (parts(_sampled(design, off)[k].region(body.name)) for off in (NEAR_MIDDLE, -NEAR_MIDDLE))
+            if len(plan) < 2 or not len(rows) or any(len(other) != len(plan) for other in others):
+                continue  # or a slicer may see another plan
+            owner = shapely.STRtree(plan).nearest(shapely.points((lines.start_mm + lines.end_mm)[rows] / 2))
+            volume = np.bincount(owner, lines.volume_mm3[rows], len(plan))
+            least = SOME_OF_A_PART * dense * layer.height_mm * shapely.area(plan)
+            lost = np.flatnonzero((narrow_mm(plan) >= design.machine.line_mm()) & (volume < least))
+            missing += (
+                [(k, len(lost), len(plan), plan[lost[0]].centroid, int(lines.number[rows[0]]))] if len(lost) else []
+            )
+        if missing:
+            k, count, of, at, number = missing[0]
+            message = (
+                f"{count} of {of} parts of {body.name} in layer {k + 1} are not printed, the first at x {at.x:.3g}, "
+            )
+            message += f"y {at.y:.3g} mm from the corner"
+            yield Found("volume", "error", number, message, "slice again: lines are missing", len(missing))
+
+
+def _shifts(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iterator[Found]:
+    """Each tool prints at its place in the piece: it spans what is drawn of its material."""
+    for tool in np.unique(lines.tool).tolist():
+        mine = [body.name for body in design.printed.bodies if design.tool(body.material) == tool]
+        rows = lines.tool == tool
+        plan = [layers[k].region(name) for k in np.unique(lines.layer[rows]).tolist() for name in mine]
+        x0, y0, x1, y1 = shapely.total_bounds(plan)
+        ends = np.concatenate([lines.start_mm[rows], lines.end_mm[rows]])
+        shift = (ends.min(0) + ends.max(0)) / 2 - [(x0 + x1) / 2, (y0 + y1) / 2]
+        if np.abs(shift).max() > SHIFTED * design.machine.line_mm():
+            message = f"what tool {tool} prints is shifted by x {shift[0]:.2g}, y {shift[1]:.2g} mm against the drawing"
+            number = int(lines.number[rows][0])
+            yield Found("place", "error", number, message, "slice without offsets of tools, or set them on the printer")
 
 
 def _widths(design: Design, lines: Beads) -> Iterator[Found]:
