@@ -3,6 +3,11 @@
 import json
 
 import pytest
+from filled import filled
+
+from sensorgen.design.design import make
+from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.ready import ready
 
 GOOD = """G90
 M83
@@ -109,6 +114,20 @@ def test_marks_and_ends_of_lines_change_nothing(run, file, content):
     before = run("gcode", "check", path).out
     path.write_bytes(content.encode())
     assert run("gcode", "check", path).out == before
+
+
+def test_a_file_is_held_against_its_design(run, tmp_path):
+    sensor = make({"shape": "tri", "parameters": {"dielectric_mm": 0.2, "length_mm": 4.0, "width_mm": 4.0}})
+    (tmp_path / "d.yaml").write_text("shape: tri\nparameters: {dielectric_mm: 0.2, length_mm: 4.0, width_mm: 4.0}\n")
+    for name, layers in (("good.g", None), ("cut.g", [1, 2, 3, 4, 5, 6])):
+        text = filled(sensor, layers).encode()
+        (tmp_path / name).write_bytes(b"".join(ready(text, follow(text), sensor.machine)))
+    said = run("gcode", "check", "good.g", "--design", "d.yaml", "--json")
+    assert (said.code, json.loads(said.out)["findings"], json.loads(said.out)["design"]) == (0, [], "d")
+    assert run("gcode", "check", "cut.g").code == 0
+    said = run("gcode", "check", "cut.g", "--design", "d.yaml")
+    assert (said.code, said.err) == (1, "")
+    assert "layer 8 to 13 of 13 is missing: nothing of d is printed up to Z 1.3 mm" in said.words
 
 
 def test_a_number_of_400_digits_is_a_finding(run, file):

@@ -145,6 +145,20 @@ def strip(lines: Lines) -> Lines:
     return new
 
 
+def of_model(where: Callable[[Lines], range]) -> Edit:
+    """Leave out the sensor's printed lines, those near the middle of the bed; the tower stays."""
+
+    def edit(lines: Lines) -> Lines:
+        part, new, near = where(lines), [], True
+        for k, line in enumerate(lines):
+            found = re.search(r"X(-?[0-9.]+)", line) if line.startswith("G1") else None
+            near = abs(float(found[1])) < 10 if found else near
+            new += [] if k in part and near and _printed(line) else [line]
+        return new
+
+    return edit
+
+
 def of_kind(kind: str, change: Callable[[str], str | None]) -> Edit:
     """Change the printed lines of a kind, or leave them out."""
 
@@ -255,6 +269,7 @@ GEOMETRY = (
     Fault("0.003 mm too low", scaled("Z", 1.0, shift=-0.003), "argued: below what the printer places"),
     Fault("one layer 0.05 mm too low", scaled("Z", 1.0, layer(7), -0.05), "layers"),
     Fault("one layer left out", without(layer(6)), "layers"),
+    Fault("a layer of parts under a line wide left out", of_model(layer(7)), "warns: layers"),
     Fault("the first layer left out", without(layer(1), printed_only=True), "first-layer layers"),
     Fault("the last layer left out", cut(0.999), "layers"),
     Fault("three layers left out", without(lambda lines: range(layer(5)(lines).start, layer(7)(lines).stop)), "layers"),

@@ -105,7 +105,7 @@ def _line(number: Whole, rows: Mask) -> tuple[int, int]:
 
 
 def _heights(design: Design, paths: Paths, piece: Mask) -> Iterator[Found]:
-    """The first layer is as high as the design's, every line lies in a layer, and no layer is missing."""
+    """The first layer is as high as the design's, and every line lies in a layer, in order."""
     tops = np.array(design.layers.boundaries_mm(design.printed.size_mm[2]))[1:]
     first_mm, layer_mm = design.layers.first_layer_mm, design.layers.layer_mm
     z = paths.end_mm[:, 2]
@@ -125,25 +125,36 @@ def _heights(design: Design, paths: Paths, piece: Mask) -> Iterator[Found]:
             f"lines at Z {worst:g} mm lie in no layer of {design.name}: {first_mm:g} mm, then every {layer_mm:g} mm"
         )
         yield Found("layers", "error", number, message, "slice with this design's layers", count)
-    there = np.zeros(len(tops), bool)
-    there[near[piece & ~between]] = True
-    wide = [any(_wide(region, design.machine.line_mm()).area > 0 for region in layer.regions.values())
-            for layer in _sampled(design, 0.0)]  # fmt: skip
-    absent = np.flatnonzero(~there & np.array(wide))
-    for _, group in groupby(enumerate(absent.tolist()), key=lambda pair: pair[1] - pair[0]):
-        layers = [layer for _, layer in group]
-        after = paths.number[piece & (near < layers[0])]
-        which = f"layer {layers[0] + 1}" + (f" to {layers[-1] + 1}" if len(layers) > 1 else "")
-        message = (
-            f"{which} of {len(tops)} is missing: nothing of {design.name} is printed up to Z {tops[layers[-1]]:g} mm"
-        )
-        advice = "slice again; the file was cut, or layers were removed"
-        yield Found("layers", "error", int(after.max(initial=1)), message, advice, len(layers))
     order = near[piece & ~between]
     if (np.diff(order) < 0).any():
         back = paths.number[piece & ~between][1:][np.diff(order) < 0]
         message = f"a layer of {design.name} is printed after one that lies higher"
         yield Found("layers", "error", int(back[0]), message, "print layer by layer", len(back))
+    yield from _missing(design, paths, piece & ~between, near, tops)
+
+
+def _missing(design: Design, paths: Paths, rows: Mask, near: Whole, tops: Real) -> Iterator[Found]:
+    """No layer is without a line; ``near`` is the layer of each line, and ``rows`` are those that lie in one."""
+    there = np.zeros(len(tops), bool)
+    there[near[rows]] = True
+    drawn_there = [list(layer.regions.values()) for layer in _sampled(design, 0.0)]
+    wide = np.array([any(_wide(r, design.machine.line_mm()).area > 0 for r in regions) for regions in drawn_there])
+    narrow = ~wide & np.array([bool(regions) for regions in drawn_there])
+    for absent, severity, advice in (
+        (~there & wide, "error", "slice again; the file was cut, or layers were removed"),
+        (
+            ~there & narrow,
+            "warning",
+            "its parts are narrower than a line, and some walls leave them out: look at the layer",
+        ),
+    ):
+        for _, group in groupby(enumerate(np.flatnonzero(absent).tolist()), key=lambda pair: pair[1] - pair[0]):
+            layers = [layer for _, layer in group]
+            after = paths.number[rows & (near < layers[0])]
+            which = f"layer {layers[0] + 1}" + (f" to {layers[-1] + 1}" if len(layers) > 1 else "")
+            what = f"nothing of {design.name} is printed up to Z {tops[layers[-1]]:g} mm"
+            message = f"{which} of {len(tops)} is missing: {what}"
+            yield Found("layers", severity, int(after.max(initial=1)), message, advice, len(layers))
 
 
 @lru_cache(maxsize=256)
