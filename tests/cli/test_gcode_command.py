@@ -116,6 +116,15 @@ def test_marks_and_ends_of_lines_change_nothing(run, file, content):
     assert run("gcode", "check", path).out == before
 
 
+@pytest.mark.parametrize("form", [[], ["--json"], ["--markdown"]])
+def test_bytes_that_are_no_text_can_be_shown(run, file, form):
+    path = file()
+    path.write_bytes(path.read_bytes().replace(b"G28\n", b'M98 P"\xff"\nG1 U\xfe X1\n;TYPE:\xff\nG28\n'))
+    said = run("gcode", "check", path, *form)
+    assert (said.code, said.err) == (1, "")
+    assert "udcff" in said.out
+
+
 def test_a_file_is_held_against_its_design(run, tmp_path):
     sensor = make({"shape": "tri", "parameters": {"dielectric_mm": 0.2, "length_mm": 4.0, "width_mm": 4.0}})
     (tmp_path / "d.yaml").write_text("shape: tri\nparameters: {dielectric_mm: 0.2, length_mm: 4.0, width_mm: 4.0}\n")

@@ -6,6 +6,7 @@ from pathlib import Path
 from filled import filled
 
 from sensorgen.asprinted import agreement
+from sensorgen.core import document
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design import design
 from sensorgen.export.gcode.check import check
@@ -21,6 +22,7 @@ PIECES = (
     b"{", b'"', b"(", b"*7", b";LAYER:-9999999999\n", b";LAYER_CHANGE\n", b";HEIGHT:1e999\n", b";TYPE:\xc3\xa9\n",
     b"G2 X1 Y1 I1 J1 E1\n", b"G3 R0\n", b"G28\n", b"M0\n", b"G10 P3 Snan\n", b"G4 P1e99\n", b"M98 P\"tprime9.g\"\n",
     b"Z1e9 ", b"X-0.0000000001 ", b"E-99999 ", b"F0 ",
+    b"M98 P\"\xff\"\n", b" U\xfe ",
 )  # fmt: skip
 SWAPS = (
     (b"X", b"Y"), (b"G1", b"G2"), (b".", b""), (b"T3", b"T4"), (b"E", b"E-"), (b"\n", b"\r\n"), (b" ", b""),
@@ -76,4 +78,6 @@ def outcome(content: bytes, path: Path) -> str:
         if "\n" in str(error) or not str(error):
             raise ValueError(f"not one line: {error}") from error
         return "unreadable"
+    document.to_json(found)
+    list(document.text(found.document()))
     return "refused" if found.errors() else "passed"
