@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
-from sensorgen.asprinted import agreement, compensation
-from sensorgen.asprinted.compensation import Change
+from sensorgen.asprinted import agreement
 from sensorgen.asprinted.printed import rule7
 from sensorgen.checks import volumes
 from sensorgen.checks.review import review
@@ -24,6 +23,8 @@ from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.paths import paths_of
 from sensorgen.export.slicers import TIME_LIMIT_S, WALLS
 from sensorgen.export.slicing import Step, alone, sliced
+from sensorgen.workflows import compensation
+from sensorgen.workflows.compensation import Change
 
 
 @dataclass(frozen=True)
