@@ -30,6 +30,29 @@ def _check(file: str, printer: str, materials: tuple[str, ...], *, strict: bool)
     return 1 if found.errors(strict) else 0
 
 
+def _drags(file: str, design: str | None, printer: str) -> int:
+    """Measure where the nozzle travels over what another tool has printed, in the order of printing.
+
+    Travel in contact can draw a conductor over a dielectric. Counted are the centre of the nozzle in contact with
+    another material, and up to 0.12 mm above it; and lines during which the nozzle's face touches another material.
+    With a design also the insulation that would be left to the other electrode if such a strand conducted. sensorgen
+    slice lifts the nozzle over such places.
+    """
+    from pathlib import Path
+
+    if design:
+        from sensorgen.asprinted import strands
+        from sensorgen.design.design import load
+
+        render.deliver(strands.drags(load(Path(design)), Path(file)))
+    else:
+        from sensorgen.design.printer import load_printer
+        from sensorgen.export.gcode import drags
+
+        render.deliver(drags.drags(Path(file), load_printer(printer)))
+    return 0
+
+
 def _loaded(words: tuple[str, ...], tools: tuple[int, ...]) -> dict[int, str]:
     """Material of each tool that was named."""
     from sensorgen.cli.settings import pairs
@@ -65,6 +88,19 @@ command = click.Group(
                 click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
                 *render.options(),
             ],
-        )
+        ),
+        click.Command(
+            "drags", callback=_drags, help=_drags.__doc__,
+            short_help="Measure travel over what another tool has printed.",
+            params=[
+                click.Argument(["file"], metavar="FILE"),
+                click.Option(["--design"], metavar="FILE", help="The design that the file prints, as YAML."),
+                click.Option(
+                    ["--printer"], default="diabase-h5", show_default=True, metavar="NAME",
+                    shell_complete=completed(_printers), help="A printer that is listed, or a YAML file.",
+                ),
+                *render.options(),
+            ],
+        ),
     ],
 )  # fmt: skip

@@ -20,6 +20,7 @@ from sensorgen.core.findings import Finding, counted, counts, listed
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.check import Checked, check
+from sensorgen.export.gcode.drags import Lifting
 from sensorgen.export.slicers import TIME_LIMIT_S, WALLS
 from sensorgen.export.slicing import Step, alone, sliced
 
@@ -58,6 +59,8 @@ class Printed(Checked):
         What the checks of the design found.
     printed : Volumes
         Volumes as printed.
+    lifting : Lifting
+        Travel over other tools' material before and after lifts.
     compensated : tuple of Change
         How the design differs from the one that was asked for.
     """
@@ -72,6 +75,7 @@ class Printed(Checked):
     quality: str
     design_findings: tuple[Finding, ...]
     printed: Volumes
+    lifting: Lifting
     compensated: tuple[Change, ...] = ()
 
     @property
@@ -86,6 +90,7 @@ class Printed(Checked):
         yield from super().document()
         yield volumes.table(self.printed.layers)
         yield from listed(self.printed.findings)
+        yield from self.lifting.document()
         yield f"{self.gcode}: {self.slicer.name} {self.slicer.version}; {counted(self.counts())}"
 
 
@@ -148,7 +153,7 @@ def slice_design(
         **vars(checked), name=design.name, design=design.id(), gcode=target.name, sha256=sha256(content).hexdigest(),
         slicer=Slicer(made.slicer, made.version), sensorgen=__version__, printer=design.machine.name,
         quality=design.layers.name, design_findings=tuple(held.sliced().findings),
-        printed=Volumes(tuple(layers), tuple(findings)), compensated=tuple(compensated),
+        printed=Volumes(tuple(layers), tuple(findings)), lifting=made.lifting, compensated=tuple(compensated),
     )  # fmt: skip
     store.replace(target, content)
     store.replace(target.with_name(f"{target.name}.json"), document.to_json(result).encode())
