@@ -53,6 +53,34 @@ def _drags(file: str, design: str | None, printer: str) -> int:
     return 0
 
 
+def _pinholes(file: str, design: str, log: str | None, pictures: str | None) -> int:
+    """Search the film of a print for through-holes, and estimate the probability that a print is shorted.
+
+    Lines are taken as round at their sides, at the width of the file and 5 and 10 % less. The probability has an
+    interval, stated assumptions, and the verdicts of the log on prints of the same shape and film; without any it is a
+    prior, no yield.
+    """
+    from pathlib import Path
+
+    from sensorgen.analysis.shorts import risk
+    from sensorgen.cli import log_words
+    from sensorgen.core import files as store
+    from sensorgen.design.design import load
+
+    if log:
+        with log_words.opened(log) as opened:
+            found, figure = risk(load(Path(design)), Path(file), opened)
+    else:
+        found, figure = risk(load(Path(design)), Path(file))
+    if pictures:
+        from sensorgen.analysis.plots.static import files
+
+        for name, content in files(figure):
+            store.replace(Path(pictures) / name, content)
+    render.deliver(found)
+    return 0
+
+
 def _loaded(words: tuple[str, ...], tools: tuple[int, ...]) -> dict[int, str]:
     """Material of each tool that was named."""
     from sensorgen.cli.settings import pairs
@@ -99,6 +127,17 @@ command = click.Group(
                     ["--printer"], default="diabase-h5", show_default=True, metavar="NAME",
                     shell_complete=completed(_printers), help="A printer that is listed, or a YAML file.",
                 ),
+                *render.options(),
+            ],
+        ),
+        click.Command(
+            "pinholes", callback=_pinholes, help=_pinholes.__doc__,
+            short_help="Search a film for through-holes; probability of a short.",
+            params=[
+                click.Argument(["file"], metavar="FILE"),
+                click.Option(["--design"], metavar="FILE", required=True, help="The design, as YAML."),
+                click.Option(["--log"], metavar="FILE", help="The log with verdicts of earlier prints."),
+                click.Option(["--figures", "pictures"], metavar="FOLDER", help="Write a plan there, PNG and SVG."),
                 *render.options(),
             ],
         ),

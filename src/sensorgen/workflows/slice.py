@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
-from sensorgen.asprinted import compensation
+from sensorgen.asprinted import compensation, pinholes
 from sensorgen.asprinted.compensation import Change
 from sensorgen.asprinted.printed import rule7
 from sensorgen.checks import volumes
@@ -149,6 +149,8 @@ def slice_design(
         loaded = {design.tool(name): name for name in design.used()}
         checked = check(made.ready, design.machine, loaded, others_empty=True)
         layers, findings = rule7(design, made.lines)
+        films = pinholes.pinholes(design, made.lines, widths=(1.0,), most_layers=pinholes.MOST_LAYERS)
+        findings += design.waived([*pinholes.findings(films)])
     result = Printed(
         **vars(checked), name=design.name, design=design.id(), gcode=target.name, sha256=sha256(content).hexdigest(),
         slicer=Slicer(made.slicer, made.version), sensorgen=__version__, printer=design.machine.name,
