@@ -41,7 +41,7 @@ def _work(
 
     if not 0 < time_limit_s < float("inf"):
         raise OutOfRange(f"--time-limit {time_limit_s:g}; expected seconds above 0")
-    design, changes = body_options.compensated(design, compensate, WALLS[slicer])
+    design, changes = body_options.compensated(design, compensate, WALLS[slicer], slicer, program)
     with render.refused(design.name), show.progress(("checks", *STEPS)) as step:
         made = slice_design(
             design, Path(out), slicer, program=program, time_limit_s=time_limit_s, force=force, strict=strict,

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
-from sensorgen.asprinted import compensation, pinholes
-from sensorgen.asprinted.compensation import Change
+from sensorgen.asprinted import pinholes
 from sensorgen.asprinted.printed import rule7
 from sensorgen.checks import volumes
 from sensorgen.checks.review import review
@@ -23,6 +22,8 @@ from sensorgen.export.gcode.check import Checked, check
 from sensorgen.export.gcode.drags import Lifting
 from sensorgen.export.slicers import TIME_LIMIT_S, WALLS
 from sensorgen.export.slicing import Step, alone, sliced
+from sensorgen.workflows import compensation
+from sensorgen.workflows.compensation import Change
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ _PIECE_MM = 2.5  # moves are cut to this for the search of what they meet
 _LEVEL_MM = 1e-3  # tops closer than this are one level
 _ROUNDING_MM = 1e-6
 _BLOCK = 10_000  # pieces that are looked at together
-_TREES = 16  # that are held at once
+_TREES = 5  # that are held at once
 
 _Met = tuple[Whole, Whole, Real, Real]
 _Trees = Callable[["_Level"], shapely.STRtree]
