@@ -12,6 +12,7 @@ from sensorgen.core import files as store
 from sensorgen.core.errors import BadInput, SlicerFailed, UnknownName
 from sensorgen.design.design import Design
 from sensorgen.export import threemf
+from sensorgen.export.gcode.drags import Lifting, lift
 from sensorgen.export.gcode.files import text_of
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.paths import Paths, paths_of
@@ -62,13 +63,15 @@ class Sliced:
     Attributes
     ----------
     raw, ready : Path
-        The slicer's own G-code, and that for the printer.
+        The slicer's own G-code, and that for the printer, the nozzle lifted over other tools' material.
     lines : Paths
         What is printed, by the lines of ``raw`` and the printer's own tool numbers.
     slicer : str
         ``prusa`` or ``cura``.
     version : str
         Version that the slicer gives itself.
+    lifting : Lifting
+        What the lifts have changed.
     seconds, own_seconds : float
         Time that the slicer took, and that everything around it took [s].
     """
@@ -78,6 +81,7 @@ class Sliced:
     lines: Paths
     slicer: str
     version: str
+    lifting: Lifting
     seconds: float
     own_seconds: float
 
@@ -144,8 +148,9 @@ def sliced(
     version = _version(text, slicer)
     step("G-code")
     motion = follow(text)
+    lifted, lifting = lift(b"".join(ready(text, motion, machine)), machine)
     with store.replacing(made) as file:
-        file.writelines(ready(text, motion, machine))
+        file.write(lifted)
     end = machine.end_gcode.strip().rpartition("\n")[2].strip().encode()
     placeholder = set(b"{[") & set(end)  # that the slicer fills in
     if end and not placeholder and end not in map(bytes.strip, text[-_TAIL:].splitlines()):
@@ -155,7 +160,7 @@ def sliced(
         )
     lines = paths_of(motion, machine, "slicer")
     step("done")
-    return Sliced(raw, made, lines, slicer, version, seconds, time.perf_counter() - started - seconds)
+    return Sliced(raw, made, lines, slicer, version, lifting, seconds, time.perf_counter() - started - seconds)
 
 
 def check(pieces: Sequence[Placed]) -> None:
