@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sensorgen.asprinted.beads import beads, layers
-from sensorgen.asprinted.printed import body, cell, electrode_lines, gap_mm, rule7
+from sensorgen.asprinted.printed import body, cell, electrode_lines, gap_mm, nominal
 from sensorgen.asprinted.window import window
 from sensorgen.checks.review import review
 from sensorgen.core.errors import BadInput, UnknownName
@@ -48,7 +48,7 @@ def per_period(variant, layers_of):
 def test_volumes_per_layer_are_those_found_by_hand(real, walls):
     variant, lines, version = real(walls)
     assert version.startswith(REFERENCE["slicers"]["cura" if walls.startswith("cura") else "prusa"])
-    rows, _ = rule7(variant, lines)
+    rows = nominal(variant, lines).rows()
     found = {(r.bottom_mm, r.top_mm): r.ratio for r in rows if r.body == COG}
     for layer, ratio in zip(REFERENCE["layers_mm"], REFERENCE["printed_over_exact"][walls], strict=True):
         if ratio is not None:
@@ -138,12 +138,12 @@ def test_every_variant_is_read_back(printed, slicer, variant):
 
 def test_lost_layers_are_errors_and_can_be_waived(real):
     variant, lines, _ = real("classic")
-    _, found = rule7(variant, lines)
+    found = nominal(variant, lines).findings()
     lost = [f for f in found if f.severity == "error"]
     assert [(f.layer, f.last_layer) for f in lost if f.body == COG] == [(5, 6)]
     assert (7, 8) in {(f.layer, f.last_layer) for f in found if f.severity == "warning" and f.body == COG}  # too full
     waived = small(waivers=[{"rule": "7", "reason": "the gap is known to be larger"}])
-    assert all(f.waiver for f in rule7(waived, lines)[1])
+    assert all(f.waiver for f in nominal(waived, lines).findings())
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_check_reports_the_errors_of_slice_before_slicing(real, walls, variant):
     def errors(findings):
         return {(f.body, f.layer, f.last_layer, f.message) for f in findings if (f.rule, f.severity) == LOST}
 
-    expected = errors(rule7(variant, lines)[1])
+    expected = errors(nominal(variant, lines).findings())
     assert errors(review(variant, walls=walls).findings) == expected
     assert bool(expected) == (variant.shape == "tri" and walls != "cura-gaps")
 
@@ -204,7 +204,8 @@ def test_g_code_of_another_place_or_piece(real):
     variant, lines, _ = real()
     with pytest.raises(BadInput, match="was it sliced from this design"):
         body(variant, lines, centre_mm=(100.0, 50.0))
-    rows, found = rule7(variant, lines, (100.0, 50.0))
+    made = nominal(variant, lines, centre_mm=(100.0, 50.0))
+    rows, found = made.rows(), made.findings()
     assert all(row.printed_mm3 == 0 for row in rows)
     assert {f.severity for f in found} == {"error", "warning"}
 
@@ -228,7 +229,7 @@ def test_resistance_of_the_sliced_electrode(real, degrees):
 
 def test_sparse_infill_thins_the_film_and_not_what_is_walls_alone(real):
     full, sparse = (
-        {(r.body, r.layer): r.ratio for r in rule7(v, real("arachne", v)[1])[0]}
+        {(r.body, r.layer): r.ratio for r in nominal(v, real("arachne", v)[1]).rows()}
         for v in (small(), small(infill={"x60": {"percent": 50}}))
     )
     assert sparse["film_and_lower", 4] < 0.85 * full["film_and_lower", 4]

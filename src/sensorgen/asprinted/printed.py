@@ -173,17 +173,17 @@ def body(
     return Printed(design, f"printed, {slicer or 'from G-code'}", found, lines)
 
 
-def rule7(design: Design, paths: "Paths", centre_mm: Point | None = None) -> tuple[list[Row], list[Finding]]:
-    """Printed against drawn volume per body and layer of a slicer's G-code, and what rule 7 says, waivers applied.
+def nominal(design: Design, paths: "Paths", slicer: str = "", centre_mm: Point | None = None) -> Printed:
+    """A slicer's G-code by the first convention alone: for its volumes and layers, sooner than :func:`body`.
 
     Parameters
     ----------
-    design, paths, centre_mm : Design, Paths, (float, float)
+    design, paths, slicer, centre_mm : Design, Paths, str, (float, float)
         As of :func:`body`; here a file that prints nothing of the design is no error.
     """
-    lines = beads(design, paths, centre_mm)
-    made = Printed(design, "printed", {"vol": printed_layers(design, lines)}, lines)
-    return made.rows(), made.findings()
+    lines, first = beads(design, paths, centre_mm), CONVENTIONS[0]
+    provenance = f"printed, {slicer or 'from G-code'}"
+    return Printed(design, provenance, {first: printed_layers(design, lines, first)}, lines)
 
 
 def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body], plan: Window) -> Cell:

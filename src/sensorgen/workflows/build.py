@@ -177,7 +177,7 @@ def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> I
     step("drawing")
     printed = estimate(design)
     yield f"{name}.svg", draw(design, held, printed.scene, printed.provenance).encode()
-    yield f"{name}.layers.html", layers.of_print(printed).encode()
+    yield f"{name}.layers.html", layers.of_print(printed, held.findings).encode()
     yield "check.json", document.to_json(report(design, held)).encode()
     yield "prediction.json", json_bytes(json.loads(to_json(predicted)))
     yield "design.json", json_bytes(design.model_dump(mode="json"))

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
+from sensorgen.analysis.plots import layers as pages
 from sensorgen.asprinted import agreement, pinholes
-from sensorgen.asprinted.printed import rule7
+from sensorgen.asprinted.printed import nominal
 from sensorgen.checks import volumes
 from sensorgen.checks.review import review
 from sensorgen.checks.volumes import Row
@@ -161,9 +162,11 @@ def slice_design(
         checked = check_motion(motion, machine, loaded, others_empty=True)
         lines = paths_of(motion, machine)
         checked = checked.with_more(agreement.check(design, lines, motion.changes, machine.bed_centre_mm(), alone=True))
-        layers, findings = rule7(design, made.lines)
+        printed = nominal(design, made.lines, f"{made.slicer} {made.version}")
+        layers, findings = printed.rows(), printed.findings()
         films = pinholes.pinholes(design, made.lines, widths=(1.0,), most_layers=pinholes.MOST_LAYERS)
         findings += design.waived([*pinholes.findings(films)])
+        page = pages.of_print(printed, findings) if printed.lines and len(printed.lines.number) else ""
     stopped, stem = bool(checked.errors(strict)), f"{design.name}.{slicer}"
     names, others = (f"{stem}.gcode", f"{stem}.gcode.json"), (f"{stem}.refused.gcode", f"{stem}.refused.json")
     names, others = (others, names) if stopped else (names, others)
@@ -177,6 +180,8 @@ def slice_design(
     folder = out / design.name
     store.replace(folder / names[0], content)
     store.replace(folder / names[1], document.to_json(result).encode())
+    if page:
+        store.replace(folder / f"{stem}.layers.html", page.encode())
     for old in others:
         (folder / old).unlink(missing_ok=True)
     return replace(result, gcode=str(folder / names[0]))

@@ -1,5 +1,6 @@
 """A page that shows a print layer by layer: what each body covers, with the layer below it faint, and marked places."""
 
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -8,8 +9,10 @@ import numpy as np
 import shapely
 
 from sensorgen.analysis.plots.pages import render
+from sensorgen.core.findings import SEVERITIES, Finding
 from sensorgen.design import materials
 from sensorgen.scene.layers import LayerRegions, Region, parts
+from sensorgen.scene.scene import SLIVER_MM
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
@@ -74,21 +77,28 @@ def page(
     )  # fmt: skip
 
 
-def of_print(printed: "Printed", marks: Sequence[Mark] = ()) -> str:
+def of_print(printed: "Printed", findings: Sequence[Finding] = ()) -> str:
     """The page of a print, each body with its material and tool.
 
     Parameters
     ----------
     printed : Printed
         Estimated, or by G-code.
-    marks : sequence of Mark
-        As of :func:`page`.
+    findings : sequence of Finding
+        Marked where they have a place, the errors first.
     """
     design, colours = printed.design, {}
     for body in design.printed.bodies:
         material = materials.load(body.material)
         words = f"{body.name.replace('_', ' ')}, {material.title}, tool {design.tool(body.material)}"
         colours[body.name] = (words, material.colour)
+    placed = sorted((f for f in findings if f.place_mm), key=lambda f: SEVERITIES.index(f.severity))
+    tops = [layer.top_mm for layer in printed.first]
+    marks = []
+    for f in placed:
+        x, y, z = f.place_mm or (0.0, 0.0, 0.0)
+        number = f.layer - 1 if f.layer else min(bisect_right(tops, z + SLIVER_MM), len(tops) - 1)
+        marks.append(Mark(number, (x, y), f"{f.severity}: {f.message}"))
     return page(design.name, printed.first, colours, [printed.provenance], marks)
 
 
