@@ -15,7 +15,7 @@ from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SlicerFail
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names
 from sensorgen.design.tower import MARGIN_MM, tower
-from sensorgen.export.slicers import cura, curaengine, prusa
+from sensorgen.export.slicers import cura, curaengine, prusa, versions
 from sensorgen.export.slicers.loads import Load, recipes
 from sensorgen.export.slicers.run import run
 
@@ -250,6 +250,50 @@ def test_profiles_are_the_same_each_time_and_without_leftovers(printer, quality)
     settings = curaengine.engine_settings(printer, quality, loads)
     told = [settings.common, *settings.tools.values(), *settings.unused.values()]
     assert not any("$" in value for each in told for value in each.values())
+
+
+# --- versions ---------------------------------------------------------------------------------------------
+
+
+def test_a_version_renames_drops_adds_and_translates():
+    change = versions.Change(
+        title="2",
+        source="here",
+        dropped=("a",),
+        renamed={"b": "c"},
+        values={"b": {"False": "x"}},
+        added={"t": "e = 5\n"},
+    )
+    text = "# a = 1\n[values]\na = 1\nb = False\nbb = False\nd = {{ b }}\n"
+    assert change.adapted("t", text) == "# a = 1\n[values]\nc = x\nbb = False\nd = {{ b }}\ne = 5\n"
+    assert change.adapted("another", "b = True\n") == "c = True\n"
+
+
+@pytest.mark.parametrize("slicer", ["prusa", "cura"])
+def test_what_a_version_drops_or_renames_is_there_before(slicer):
+    names = (
+        ("profile.ini",) if slicer == "prusa" else ("quality_global.inst.cfg", "quality_tool.inst.cfg", "engine.ini")
+    )
+    before: tuple[int, ...] = ()
+    for version, change in versions.changes(slicer).items():
+        old = [line.partition(" =") for name in names for line in versions.template(slicer, before, name).splitlines()]
+        new = "\n".join(versions.template(slicer, version, name) for name in names)
+        assert {*change.dropped, *change.renamed, *change.values} <= {key for key, equal, _ in old if equal}
+        assert not any(f"\n{key} =" in new for key in (*change.dropped, *change.renamed))
+        assert set(change.added) <= set(names)
+        before = version
+
+
+def test_the_profile_is_that_of_the_version():
+    keys = {
+        version: ini(prusa.profile(DIABASE, FINE, usual(DIABASE), versions.parse(version)))
+        for version in ("2.5.2", "2.6.0", "2.7.4", "2.8.1", "2.9.2", "3.0")
+    }
+    assert keys["2.5.2"] == ini(prusa.profile(DIABASE, FINE, usual(DIABASE)))
+    assert [v for v, k in keys.items() if "wipe_tower_x" in k] == ["2.5.2", "2.6.0", "2.7.4", "2.8.1"]
+    assert [v for v, k in keys.items() if "wiping_volumes_extruders" in k] == ["2.5.2", "2.6.0"]
+    assert [k.get("ensure_vertical_shell_thickness") for k in keys.values()] == ["0", *[None] * 3, *["disabled"] * 2]
+    assert keys["3.0"] == keys["2.9.2"]
 
 
 # --- tower ------------------------------------------------------------------------------------------------

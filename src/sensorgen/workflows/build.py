@@ -21,6 +21,7 @@ from sensorgen.core.findings import Finding, counted, counts, listed, most_sever
 from sensorgen.core.version import __version__
 from sensorgen.design import materials, printer
 from sensorgen.design.design import Design
+from sensorgen.design.tower import tower
 from sensorgen.export import threemf
 from sensorgen.export.slicers import cura, prusa
 from sensorgen.export.slicers.loads import loads
@@ -162,12 +163,12 @@ def build(
 
 
 def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> Iterator[tuple[str, bytes]]:
-    name = design.name
+    name, primed = design.name, tower(design.machine, design.layers, len(design.used()))
     step("3MF")
     for family in threemf.FAMILIES:
         yield (
             f"{name}.{family}.3mf",
-            threemf.content(family, name, parts_of(design, held.meshes), _centre_mm(design, family)),
+            threemf.content(family, name, parts_of(design, held.meshes), _centre_mm(design, family), primed),
         )
     step("profiles")
     for path, text in profiles(design).items():

@@ -34,7 +34,7 @@ class Slicer:
 
 @dataclass(frozen=True)
 class Volumes:
-    """Printed over exact volume per body and layer, and what rule 7 says of it."""
+    """Printed over exact volume per body and layer, and findings of rule 7 and of the slicer's profile."""
 
     layers: tuple[Row, ...]
     findings: tuple[Finding, ...]
@@ -148,7 +148,7 @@ def slice_design(
         **vars(checked), name=design.name, design=design.id(), gcode=target.name, sha256=sha256(content).hexdigest(),
         slicer=Slicer(made.slicer, made.version), sensorgen=__version__, printer=design.machine.name,
         quality=design.layers.name, design_findings=tuple(held.sliced().findings),
-        printed=Volumes(tuple(layers), tuple(findings)), compensated=tuple(compensated),
+        printed=Volumes(tuple(layers), (*made.findings, *findings)), compensated=tuple(compensated),
     )  # fmt: skip
     store.replace(target, content)
     store.replace(target.with_name(f"{target.name}.json"), document.to_json(result).encode())

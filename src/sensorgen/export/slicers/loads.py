@@ -3,12 +3,14 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.design.design import Design, Infill
 from sensorgen.design.materials import Material
-from sensorgen.design.printer import Printer, Quality, folder
+from sensorgen.design.printer import Printer, Quality
+from sensorgen.export.slicers.versions import Version, template
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -159,13 +161,13 @@ def by_hand(material: Material) -> list[str]:
     return found
 
 
-def templates(slicer: str, **filters: Callable[..., str]) -> "Environment":
-    """The profile templates of a slicer; ``n`` writes numbers."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+def templates(slicer: str, version: Version, **filters: Callable[..., str]) -> "Environment":
+    """The profile templates of a slicer, adapted to its version; ``n`` writes numbers."""
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     made = Environment(  # noqa: S701 - plain text; XML and JSON are escaped by filters
-        loader=FileSystemLoader(folder() / slicer), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-        keep_trailing_newline=True,
+        loader=FunctionLoader(partial(template, slicer, version)), undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     made.filters |= {"n": number, **filters}
     return made

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.design.tower import PRIME_MM3, tower
+from sensorgen.export.slicers import PROGRAMS
 from sensorgen.export.slicers.loads import Load, Recipe, by_hand, number, recipe, recipes, templates
 from sensorgen.export.slicers.run import USUAL, Runner, find, run
+from sensorgen.export.slicers.versions import Version
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -22,7 +24,7 @@ _SPEEDS = (
 )  # fmt: skip
 
 
-def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> str:
+def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load], version: Version = ()) -> str:
     """Text of the ``.ini`` file that ``prusa-slicer --load`` takes.
 
     PrusaSlicer keeps speeds, walls and infill per body, not per tool. Where the loads disagree, this file
@@ -35,6 +37,8 @@ def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> st
         What prints, and in which layers.
     loads : mapping
         Load under the printer's own tool number [-].
+    version : tuple of int
+        PrusaSlicer's version; the oldest that is supported when not given.
 
     Raises
     ------
@@ -43,7 +47,7 @@ def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> st
     """
     used = recipes(printer, quality, loads)
     tools = [used.get(i) for i in range(len(printer.tool_numbers))]
-    return _templates().get_template("profile.ini").render(
+    return _templates(version).get_template("profile.ini").render(
         printer=printer, quality=quality, used=used, tools=tools, tower=tower(printer, quality, len(used)),
         flavour=FLAVOURS[printer.gcode_flavour], densest=max(used.values(), key=lambda r: r.infill_percent),
         line_area_mm2=_line_area_mm2(printer, quality), prime_mm3=PRIME_MM3,
@@ -52,7 +56,7 @@ def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> st
 
 
 @cache
-def _templates() -> "Environment":
+def _templates(version: Version) -> "Environment":
     def row(values: Iterable[float], per: float = 1) -> str:
         return ",".join(number(value / per) for value in values)
 
@@ -67,7 +71,7 @@ def _templates() -> "Environment":
             return "no material on this tool in the design: it stays cold"
         return ". ".join([f"{r.material.title}: {r.material.about}", *by_hand(r.material)])
 
-    return templates("prusa", row=row, escaped=escaped, texts=texts, note=note, pattern=_pattern)
+    return templates("prusa", version, row=row, escaped=escaped, texts=texts, note=note, pattern=_pattern)
 
 
 def volume_settings(printer: Printer, quality: Quality, tool: int, load: Load) -> dict[str, str]:
@@ -109,7 +113,7 @@ def slice_3mf(threemf: Path, profile: Path, gcode: Path, runner: Runner = USUAL)
     SlicerFailed
         PrusaSlicer is not installed, refuses, or cannot read one of the files.
     """
-    program = find("prusa-slicer", "prusa-slicer", runner.program)
+    program = find(*PROGRAMS["prusa"], runner.program)
     for path in (threemf, profile):
         if not path.is_file():  # PrusaSlicer would take a missing profile for an empty one
             raise SlicerFailed(f"nothing to slice: there is no file {path}")
@@ -117,6 +121,12 @@ def slice_3mf(threemf: Path, profile: Path, gcode: Path, runner: Runner = USUAL)
     strict = ["--config-compatibility", "disable"]
     command = [program, "--export-gcode", "--dont-arrange", *strict, "--load", str(profile)]
     run([*command, "--output", str(gcode), str(threemf)], gcode, runner=runner)
+
+
+def settings(text: str) -> dict[str, str]:
+    """Settings of a profile, or of what PrusaSlicer writes of them at the end of its G-code."""
+    lines = (line.removeprefix("; ").partition(" =") for line in text.splitlines() if not line.startswith("#"))
+    return {key: value.strip() for key, equal, value in lines if equal and " " not in key}
 
 
 def _line_area_mm2(printer: Printer, quality: Quality) -> float:

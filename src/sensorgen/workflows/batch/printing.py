@@ -95,7 +95,7 @@ def _printed(piece: Placed, made: Sliced, content: bytes) -> PrintedDesign:
     try:
         printed = asprinted.body(design, made.lines, slicer=source, centre_mm=piece.sensor_mm())
         body = bodies.sliced(design, lambda: printed, source, content + piece.name.encode())
-        layers, findings = tuple(printed.rows()), tuple(printed.findings())
+        layers, findings = tuple(printed.rows()), (*made.findings, *printed.findings())
         return PrintedDesign(piece.name, design.name, timeless(evaluate(body)), layers, findings)
     except SensorgenError as error:
         return PrintedDesign(piece.name, design.name, reason=str(error))
