@@ -289,9 +289,9 @@ def _four_digits(bounds):
 
 
 def _ohm(ends):
-    """Of each electrode, of both, and of any of them without the spread of material values."""
+    """Of each electrode, of both, and of any of them."""
     value = {end: bounds["value"] for end, bounds in ends.items()}
-    known = [bounds[of][end] for bounds in ends.values() for of in ("model", "print") for end in ("lower", "upper")]
+    known = [bounds[end] for bounds in ends.values() for end in ("lower", "upper")]
     return {**value, "both": sum(value.values()), "from": min(known), "to": max(known)}
 
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 import json
-from math import inf, log
+from math import inf, log, sqrt
 
 import numpy as np
 import pytest
@@ -68,13 +68,14 @@ def test_limits_of_a_leak():
             electrode_and_leak(*bad)
 
 
-def test_a_plain_electrode_has_its_own_resistance_for_both_bounds():
-    """rho L / (H W), by hand; top 0.07, bottom 0.2 ohm m."""
+def test_a_plain_electrode_has_its_own_resistance_and_the_spread_of_the_sources():
+    """rho L / (H W), by hand; top 0.07, bottom 0.2 ohm m, of which a source has 1.2 S/m."""
     design = make({"shape": "reference"})
     p = design.params
     squares = p.length_mm / (p.electrode_mm * p.width_mm) * 1e3
     found = predicted(default_body(design)).ry_ohm
-    assert (found.lower, found.upper) == (pytest.approx(0.07 * squares), pytest.approx(0.2 * squares))
+    assert (found.lower, found.upper) == (pytest.approx(0.07 * squares), pytest.approx(squares / 1.2))
+    assert found.value == pytest.approx(sqrt(0.07 * 0.2) * squares)
 
 
 def test_the_earliest_stored_prediction_is_taken_as_it_was(tmp_path):
@@ -89,7 +90,7 @@ def test_the_earliest_stored_prediction_is_taken_as_it_was(tmp_path):
     assert row.predicted.ry_ohm.upper == 3000.0
     assert row.predicted.stored_at
     assert row.predicted.provenance.startswith("stored ")
-    assert row.residual == pytest.approx(log(650 / row.predicted.ry_ohm.middle()))
+    assert row.residual == pytest.approx(log(650 / sqrt(1000.0 * 3000.0)))
     afterwards = predicted(default_body(make({"shape": "reference"})))
     assert not afterwards.stored_at
     assert "made afterwards" in afterwards.provenance

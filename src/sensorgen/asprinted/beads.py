@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -10,9 +11,11 @@ from sensorgen.checks.estimate import ROUND
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import UnknownName
 from sensorgen.design.design import Design
-from sensorgen.export.gcode.paths import Paths
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, parts
 from sensorgen.scene.scene import SLIVER_MM, Point
+
+if TYPE_CHECKING:
+    from sensorgen.export.gcode.paths import Paths
 
 CONVENTIONS = ("vol", "deposit", "stadium")
 FULL = 0.95  # a plate of which this share is filled has no holes but between rounded lines
@@ -66,7 +69,7 @@ class Beads:
         return Beads(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
-def beads(design: Design, paths: Paths, centre_mm: Point | None = None) -> Beads:
+def beads(design: Design, paths: "Paths", centre_mm: Point | None = None) -> Beads:
     """The lines that print a design, each given to the body that it belongs to.
 
     Parameters

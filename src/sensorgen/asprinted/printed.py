@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -19,11 +20,13 @@ from sensorgen.core.findings import Finding
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.walls import WALLS
-from sensorgen.export.gcode.paths import Paths
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.layers import LayerRegions, drawn, scene_of
 from sensorgen.scene.scene import Point, Scene, rectangle
-from sensorgen.solvers.network.nodes import Lines
+
+if TYPE_CHECKING:
+    from sensorgen.export.gcode.paths import Paths
+    from sensorgen.solvers.network.nodes import Lines
 
 _JOINED_MM = 1e-4
 
@@ -109,7 +112,7 @@ class Printed:
 
 def body(
     design: Design,
-    paths: Paths | None = None,
+    paths: "Paths | None" = None,
     *,
     walls: str = "arachne",
     slicer: str = "",
@@ -151,7 +154,7 @@ def body(
     return Printed(design, f"printed, {slicer or 'from G-code'}", found, lines)
 
 
-def rule7(design: Design, paths: Paths, centre_mm: Point | None = None) -> tuple[list[Row], list[Finding]]:
+def rule7(design: Design, paths: "Paths", centre_mm: Point | None = None) -> tuple[list[Row], list[Finding]]:
     """Printed against drawn volume per body and layer of a slicer's G-code, and what rule 7 says, waivers applied.
 
     Parameters
@@ -210,7 +213,7 @@ def drawn_gap_mm(design: Design) -> float:
     return round(validity.electrode_gap_mm(scene, {b.name: meshes.mesh(b) for b in scene.bodies}), 9)
 
 
-def electrode_lines(design: Design, lines: Beads, end: str) -> Lines:
+def electrode_lines(design: Design, lines: Beads, end: str) -> "Lines":
     """The extruded lines of one electrode as a network, its middle at the origin: for studies of contact resistance.
 
     Parameters
@@ -227,6 +230,8 @@ def electrode_lines(design: Design, lines: Beads, end: str) -> Lines:
     OutOfRange
         None of it is printed.
     """
+    from sensorgen.solvers.network.nodes import Lines
+
     mine = [k for k, body in enumerate(design.printed.bodies) if body.terminal == end]
     found = lines.of(np.isin(lines.body, mine))
     if not len(found.number):

@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import geometric_mean
 
-from sensorgen.core.bounds import Interval
+from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.version import __version__
 from sensorgen.design.body import Body
 from sensorgen.measure import log
@@ -34,17 +35,21 @@ class Predicted:
     version: str
 
     @property
-    def ry_ohm(self) -> Interval | None:
-        """Along one electrode [ohm]: from the better to the worse one, as the readings do not say which was measured.
+    def ry_ohm(self) -> Bounds | None:
+        """Along one electrode [ohm]: the geometric mean of all, as the readings do not say which was measured.
 
-        The spread of material values is left out; None where no resistance is predicted.
+        The range is that of the best and the worst, with the errors of models, print and materials; None where no
+        resistance is predicted.
         """
-        found = [
-            end
-            for r in self.prediction.resistance.values()
-            for end in (r.model.lower, r.model.upper, r.print.lower, r.print.upper)
-        ]
-        return Interval(min(found), max(found)) if found else None
+        ends = self.prediction.resistance.values()
+        if not ends:
+            return None
+        low, high = min(r.lower for r in ends), max(r.upper for r in ends)
+        model, by_print, material = (
+            Interval(min(part.lower for part in of), max(part.upper for part in of))
+            for of in zip(*((r.model, r.print, r.material) for r in ends), strict=True)
+        )
+        return Bounds(geometric_mean(r.value for r in ends), low, high, "ohm", model, by_print, material)
 
     @property
     def capacitance_f(self) -> Interval | None:

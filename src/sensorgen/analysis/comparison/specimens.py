@@ -38,7 +38,7 @@ class Compared:
     def residual(self) -> float:
         """Ln of the least R_Y over the predicted value [-]; nan where one is missing."""
         ry, expected = self.verdict.ry_ohm, self.predicted.ry_ohm if self.predicted else None
-        return log(ry / expected.middle()) if expected and isfinite(ry) and ry > 0 else nan
+        return log(ry / expected.value) if expected and isfinite(ry) and ry > 0 else nan
 
     @property
     def inside(self) -> bool | None:

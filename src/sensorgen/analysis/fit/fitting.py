@@ -149,7 +149,7 @@ def _reading_errors(rows: Sequence[Compared], found: Comparison, values: Sequenc
     residuals = []
     for row in rows:
         expected = after[row.predicted.design] if row.predicted else None
-        residuals.append(log(row.verdict.ry_ohm / expected.middle()) if expected else nan)
+        residuals.append(log(row.verdict.ry_ohm / expected.value) if expected else nan)
     return [Error("R_Y", len(rows), _rms([row.residual for row in rows]), _rms(residuals))]
 
 

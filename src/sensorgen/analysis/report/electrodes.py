@@ -37,7 +37,7 @@ class ReadingRow:
         float, Column("highest reading", "ohm", "the highest of several readings along an electrode")
     ]
     lower_ohm: Annotated[float, Column("predicted from", "ohm", "lower bound")]
-    predicted_ohm: Annotated[float, Column("predicted", "ohm", "middle of the interval")]
+    predicted_ohm: Annotated[float, Column("predicted", "ohm", "most likely value")]
     upper_ohm: Annotated[float, Column("predicted to", "ohm", "upper bound")]
     ratio: Annotated[float, Column("measured / predicted")]
     within: Annotated[str, Column("within interval", "", "whether a reading lies between the bounds")]
@@ -67,7 +67,7 @@ def readings(found: Comparison) -> Table:
     for row in sorted(found.rows, key=lambda row: -abs(row.residual) if isfinite(row.residual) else 1.0):
         r, v = row.reading, row.verdict
         expected = row.predicted.ry_ohm if row.predicted else None
-        bounds = (expected.lower, expected.middle(), expected.upper) if expected else (nan, nan, nan)
+        bounds = (expected.lower, expected.value, expected.upper) if expected else (nan, nan, nan)
         rows.append(ReadingRow(
             r.number, r.specimen, row.predicted.design if row.predicted else "", v.ry_ohm,
             max(row.evidence.ry_ohm, default=nan), *bounds, exp(row.residual),
@@ -150,7 +150,7 @@ def _names(rows: Sequence[Compared]) -> tuple[str, ...]:
 def _ratios(rows: Sequence[Compared], left_out: str) -> Figure:
     names, values = _names(rows), [exp(row.residual) for row in rows]
     bounds = [row.predicted.ry_ohm if row.predicted else None for row in rows]
-    low, high = ([getattr(b, end) / b.middle() if b else 1.0 for b in bounds] for end in ("lower", "upper"))
+    low, high = ([getattr(b, end) / b.value if b else 1.0 for b in bounds] for end in ("lower", "upper"))
     curves = [Curve("ranges", "predicted interval", [1.0] * len(rows), names, low, high, colour=GREY)]
     for word in dict.fromkeys(row.verdict.word for row in rows):
         here = [k for k, row in enumerate(rows) if row.verdict.word == word]
@@ -161,7 +161,7 @@ def _ratios(rows: Sequence[Compared], left_out: str) -> Figure:
     panel = Panel(tuple(curves), Axis("measured / predicted", log=True), Axis(names=names))
     inside = sum(bool(row.inside) for row in rows)
     alt = (
-        f"{len(rows)} readings over the middle of their prediction, on a logarithmic axis; {inside} lie within the "
+        f"{len(rows)} readings over their predicted value, on a logarithmic axis; {inside} lie within the "
         f"predicted interval.{left_out}"
     )
     return Figure("residuals", "Electrode resistance: measured / predicted", alt, {"": (panel,)})
@@ -172,7 +172,7 @@ def _resistances(rows: Sequence[Compared]) -> Figure:
     bounds = [row.predicted.ry_ohm for row in rows if row.predicted and row.predicted.ry_ohm]
     least, most = [min(r.evidence.ry_ohm) for r in rows], [max(r.evidence.ry_ohm) for r in rows]
     curves = (
-        Curve("ranges", "predicted interval", [b.middle() for b in bounds], names, [b.lower for b in bounds],
+        Curve("ranges", "predicted interval", [b.value for b in bounds], names, [b.lower for b in bounds],
               [b.upper for b in bounds], colour=GREY),
         Curve("points", "measured, with the spread of its readings", least, names, least, most),
     )  # fmt: skip

@@ -106,7 +106,7 @@ def _resistances(found: Comparison) -> Iterator[Kind]:
         return min(across_ohm(ohm, value if parameter == LEAK else 0.0), INTACT_OHM)
 
     rows = usable(found)
-    middles = [row.predicted.ry_ohm.middle() for row in rows if row.predicted and row.predicted.ry_ohm]
+    middles = [row.predicted.ry_ohm.value for row in rows if row.predicted and row.predicted.ry_ohm]
     if rows:
         measured = np.log([row.verdict.ry_ohm for row in rows]).astype(complex)
         yield Kind("electrode resistance", measured, _of_electrodes(middles, along))
