@@ -83,6 +83,12 @@ def changes(slicer: str) -> dict[Version, Change]:
     return dict(sorted(found.items()))
 
 
+def folders(slicer: str) -> dict[str, Version]:
+    """Folder of a slicer's profiles to the version that they are for: the oldest, and the newest beside it."""
+    *_, newest = changes(slicer)
+    return {slicer: (), f"{slicer}-{newest[0]}.{newest[1]}": newest}
+
+
 def template(slicer: str, version: Version, name: str) -> str:
     """Text of a template of a slicer, adapted to its version."""
     text = (folder() / slicer / name).read_text("utf-8")
