@@ -11,11 +11,12 @@ from xml.etree import ElementTree
 import extruded
 import pytest
 
+from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SlicerFailed, UnknownName
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names
 from sensorgen.design.tower import MARGIN_MM, tower
-from sensorgen.export.slicers import cura, curaengine, prusa, versions
+from sensorgen.export.slicers import cura, curaengine, orca, prusa, versions
 from sensorgen.export.slicers.loads import Load, recipes
 from sensorgen.export.slicers.run import run
 
@@ -294,6 +295,51 @@ def test_the_profile_is_that_of_the_version():
     assert [v for v, k in keys.items() if "wiping_volumes_extruders" in k] == ["2.5.2", "2.6.0"]
     assert [k.get("ensure_vertical_shell_thickness") for k in keys.values()] == ["0", *[None] * 3, *["disabled"] * 2]
     assert keys["3.0"] == keys["2.9.2"]
+
+
+# --- Orca -------------------------------------------------------------------------------------------------
+
+
+def presets(printer, **dielectric):
+    found = orca.profiles(printer, FINE, usual(printer, **dielectric))
+    return {path: json.loads(text) for path, text in found.items()}
+
+
+@both_printers
+def test_orca_has_every_key_and_texts_alone(printer):
+    known = {key: set(names.split()) for key, names in yamlfile.read(Path(__file__).parent / "orca_keys.yaml").items()}
+    known["machine"] |= known["tools"]
+    kinds = []
+    for path, preset in presets(printer, infill_percent=80.0, infill_pattern="gyroid").items():
+        kinds.append(preset["type"])
+        assert path == f"{preset['type']}/{preset['name']}.json"
+        assert preset.keys() <= known["preset"] | known[preset["type"]], path
+        for key, value in preset.items():
+            entries = value if isinstance(value, list) else [value]
+            assert all(isinstance(entry, str) for entry in entries), key
+            if key in known["tools"]:
+                assert len(value) == len(printer.tool_numbers), key
+            elif preset["type"] == "filament" and key not in known["preset"] | {"compatible_printers"}:
+                assert len(value) == 1, key
+    assert kinds == ["machine", "process", "filament", "filament"]
+
+
+def test_orca_presets_belong_together_and_say_what_prusaslicers_profile_says():
+    machine, process, *filaments = presets(DIABASE).values()
+    same = ini(prusa.profile(DIABASE, FINE, usual(DIABASE)))
+    assert all(each["compatible_printers"] == [machine["name"]] for each in (process, *filaments))
+    assert ",".join(machine["printable_area"]) == same["bed_shape"]
+    assert machine["machine_start_gcode"].replace("\n", "\\n") == same["start_gcode"]
+    assert ",".join(machine["retract_length_toolchange"]) == same["retract_length_toolchange"]
+    assert process["wall_loops"] == same["perimeters"]
+    assert process["outer_wall_line_width"] == same["external_perimeter_extrusion_width"]
+    assert process["prime_tower_width"] == same["wipe_tower_width"]
+    assert process["min_bead_width"] == same["min_bead_width"]
+    assert [each["nozzle_temperature"][0] for each in filaments] == same["temperature"].split(",")[2:4]
+    assert [each["hot_plate_temp"][0] for each in filaments] == same["bed_temperature"].split(",")[2:4]
+    assert [each["filament_max_volumetric_speed"][0] for each in filaments] == (
+        same["filament_max_volumetric_speed"].split(",")[2:4]
+    )
 
 
 # --- tower ------------------------------------------------------------------------------------------------

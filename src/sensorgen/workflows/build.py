@@ -23,7 +23,7 @@ from sensorgen.design import materials, printer
 from sensorgen.design.design import Design
 from sensorgen.design.tower import tower
 from sensorgen.export import threemf
-from sensorgen.export.slicers import cura, prusa
+from sensorgen.export.slicers import cura, orca, prusa
 from sensorgen.export.slicers.loads import loads
 from sensorgen.export.slicers.versions import folders
 from sensorgen.export.threemf.part import parts_of
@@ -192,7 +192,7 @@ def _await(job: "Future[None]", step: Step) -> None:
 
 
 def profiles(design: Design) -> dict[str, str]:
-    """Slicer profiles, by file name: PrusaSlicer and Cura, for every quality that ships and the design's own."""
+    """Slicer profiles, by file name: PrusaSlicer, Cura and Orca, for every quality that ships and the design's own."""
     found, machine = loads(design), design.machine
     texts: dict[str, str] = {}
     # The design's own quality comes last: Cura's machine definition, one for all, then starts with it.
@@ -203,6 +203,8 @@ def profiles(design: Design) -> dict[str, str]:
         for at, since in folders("cura").items():
             own = cura.profiles(machine, quality, found, since)
             texts |= {f"profiles/{at}/{path}": text for path, text in own.items()}
+        own = orca.profiles(machine, quality, found)
+        texts |= {f"profiles/orca/{path}": text for path, text in own.items()}
     return texts
 
 

@@ -15,7 +15,7 @@ from sensorgen.export.slicers.versions import Version, template
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-PATTERNS = ("rectilinear", "grid", "concentric", "honeycomb", "triangles")
+PATTERNS = ("rectilinear", "grid", "concentric", "honeycomb", "triangles", "gyroid")
 RETRACTION_SPEED_MM_S = 40.0  # PrusaSlicer's default; slower where the printer's extruder is
 
 
@@ -171,6 +171,16 @@ def templates(slicer: str, version: Version, **filters: Callable[..., str]) -> "
     )  # fmt: skip
     made.filters |= {"n": number, **filters}
     return made
+
+
+def line_area_mm2(printer: Printer, quality: Quality) -> float:
+    """Cross-section of a line at its highest [mm2]: a rectangle with round sides.
+
+    Times the speed it is the flow that keeps the tower, whose speed PrusaSlicer sets itself, as slow as
+    the material asks.
+    """
+    height_mm = max(quality.layer_mm, quality.first_layer_mm)
+    return height_mm * (printer.line_mm() - height_mm * (1 - math.pi / 4))
 
 
 def number(value: float) -> str:

@@ -1,6 +1,5 @@
 """PrusaSlicer: one profile for all tools of a printer, and its command line."""
 
-import math
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
@@ -10,7 +9,7 @@ from sensorgen.core.errors import SlicerFailed
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.design.tower import PRIME_MM3, tower
 from sensorgen.export.slicers import PROGRAMS
-from sensorgen.export.slicers.loads import Load, Recipe, by_hand, number, recipe, recipes, templates
+from sensorgen.export.slicers.loads import Load, Recipe, by_hand, line_area_mm2, number, recipe, recipes, templates
 from sensorgen.export.slicers.run import USUAL, Runner, find, run
 from sensorgen.export.slicers.versions import Version
 
@@ -50,7 +49,7 @@ def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load], versi
     return _templates(version).get_template("profile.ini").render(
         printer=printer, quality=quality, used=used, tools=tools, tower=tower(printer, quality, len(used)),
         flavour=FLAVOURS[printer.gcode_flavour], densest=max(used.values(), key=lambda r: r.infill_percent),
-        line_area_mm2=_line_area_mm2(printer, quality), prime_mm3=PRIME_MM3,
+        line_area_mm2=line_area_mm2(printer, quality), prime_mm3=PRIME_MM3,
         per_tool=lambda entry, times=1: ",".join([str(entry)] * times * len(tools)),
     )  # fmt: skip
 
@@ -127,16 +126,6 @@ def settings(text: str) -> dict[str, str]:
     """Settings of a profile, or of what PrusaSlicer writes of them at the end of its G-code."""
     lines = (line.removeprefix("; ").partition(" =") for line in text.splitlines() if not line.startswith("#"))
     return {key: value.strip() for key, equal, value in lines if equal and " " not in key}
-
-
-def _line_area_mm2(printer: Printer, quality: Quality) -> float:
-    """Cross-section of a line at its highest [mm2]: a rectangle with round sides.
-
-    Times the speed it is the flow that keeps the tower, whose speed PrusaSlicer sets itself, as slow as
-    the material asks.
-    """
-    height_mm = max(quality.layer_mm, quality.first_layer_mm)
-    return height_mm * (printer.line_mm() - height_mm * (1 - math.pi / 4))
 
 
 def _pattern(r: Recipe) -> str:

@@ -40,8 +40,6 @@ class Change(Strict):
         Old name of a setting to its old values and what they are called now.
     added : mapping of str to str
         Template to further lines at its end, for settings that are new.
-    walls : str
-        The rules of its walls, where they differ from the slicer's others; see ``design.walls``.
     """
 
     title: str
@@ -50,7 +48,6 @@ class Change(Strict):
     renamed: dict[str, str] = Field(default={})
     values: dict[str, dict[str, str]] = Field(default={})
     added: dict[str, str] = Field(default={})
-    walls: str = ""
 
     def adapted(self, name: str, text: str) -> str:
         """The text of the template ``name``, its settings those of this version."""
@@ -96,11 +93,6 @@ def template(slicer: str, version: Version, name: str) -> str:
         if since <= version:
             text = change.adapted(name, text)
     return text
-
-
-def walls(slicer: str, version: Version, usual: str) -> str:
-    """The rules of a version's walls, ``usual`` where its file names none."""
-    return next((c.walls for v, c in reversed(changes(slicer).items()) if v <= version and c.walls), usual)
 
 
 def parse(text: str) -> Version:
