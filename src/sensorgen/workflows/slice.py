@@ -19,8 +19,9 @@ from sensorgen.core.errors import Unprintable
 from sensorgen.core.findings import Finding, counted, counts, listed
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
+from sensorgen.design.walls import rule
 from sensorgen.export.gcode.check import Checked, check
-from sensorgen.export.slicers import TIME_LIMIT_S, WALLS
+from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 from sensorgen.export.slicing import Step, alone, sliced
 
 
@@ -134,7 +135,7 @@ def slice_design(
         The place cannot be written to, or the disk is full.
     """
     step("checks")
-    held = review(design, walls=WALLS.get(slicer, "arachne"))
+    held = review(design, walls=rule(slicer, design.walls) if slicer in SLICERS else "")
     if held.errors(strict) and not force:
         raise Unprintable(held.findings, held.errors(strict))
     target = out / design.name / f"{design.name}.{slicer}.gcode"

@@ -14,15 +14,17 @@ from typing import TYPE_CHECKING, Any
 from sensorgen.core.errors import MissingValue, OutOfRange
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.design.tower import PRIME_MM3, tower
-from sensorgen.export.slicers.loads import Load, Recipe, by_hand, number, recipes, templates
+from sensorgen.export.slicers.loads import Load, Recipe, by_hand, number, overlaid, recipes, templates
 from sensorgen.export.slicers.versions import Version
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
 FLAVOURS = {"reprapfirmware": "RepRap (RepRap)", "marlin": "RepRap (Marlin/Sprinter)"}
-PATTERNS = {"rectilinear": "lines", "grid": "grid", "concentric": "concentric", "triangles": "triangles"}
-DIRECTIONS = {"lines": 1, "grid": 2, "concentric": 1, "triangles": 3}  # of lines in one layer
+PATTERNS = {
+    "rectilinear": "lines", "grid": "grid", "concentric": "concentric", "triangles": "triangles", "gyroid": "gyroid",
+}  # fmt: skip
+DIRECTIONS = {"lines": 1, "grid": 2, "concentric": 1, "triangles": 3, "gyroid": 1}  # of lines in one layer
 
 
 def profiles(printer: Printer, quality: Quality, loads: Mapping[int, Load], version: Version = ()) -> dict[str, str]:
@@ -50,6 +52,7 @@ def profiles(printer: Printer, quality: Quality, loads: Mapping[int, Load], vers
     """
     used = recipes(printer, quality, loads)
     own, trains = f"quality/{printer.name}/{printer.name}_{quality.name}", range(len(printer.tool_numbers))
+    options = next(iter(loads.values())).profile
     shared, fill = context(printer, quality, used), partial(filled, version)
     files = {
         f"definitions/{printer.name}.def.json": fill(
@@ -62,7 +65,8 @@ def profiles(printer: Printer, quality: Quality, loads: Mapping[int, Load], vers
         files[f"extruders/{extruder_id(printer, index)}.def.json"] = fill("extruder.def.json", shared, index=index)
     for r in used.values():
         files[f"materials/{material_id(r)}.xml.fdm_material"] = fill("material.xml.fdm_material", shared, r=r)
-        files[f"{own}_{material_id(r)}.inst.cfg"] = fill("quality_tool.inst.cfg", shared, r=r)
+        text = fill("quality_tool.inst.cfg", shared, r=r, walls=options.walls or "arachne")
+        files[f"{own}_{material_id(r)}.inst.cfg"] = overlaid(text, options.texts("cura"))
     return files
 
 

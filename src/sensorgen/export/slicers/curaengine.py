@@ -62,15 +62,16 @@ def engine_settings(
     own = f"quality/{printer.name}/{printer.name}_{quality.name}"
     shared, tools = cura.context(printer, quality, used), {}
     of_all: dict[str, str] = {}
+    own_settings = next(iter(loads.values())).profile.texts("cura")
     for index, r in used.items():
         profile = _sections(files[f"{own}_{cura.material_id(r)}.inst.cfg"])["values"]
         engine = _sections(cura.filled(version, "engine.ini", shared, r=r))
         of_all = of_all or engine["all"]
-        tools[index] = profile | engine["tool"] | {"extruder_nr": str(index)}
+        tools[index] = profile | engine["tool"] | {"extruder_nr": str(index)} | own_settings
     return EngineSettings(
         printer=printer.name,
         files={path: text for path, text in files.items() if path.startswith(("definitions/", "extruders/"))},
-        common=_sections(files[f"{own}_global.inst.cfg"])["values"] | of_all,
+        common=_sections(files[f"{own}_global.inst.cfg"])["values"] | of_all | own_settings,
         tools=tools,
         unused={i: {"prime_tower_min_volume": "0"} for i in range(len(printer.tool_numbers)) if i not in used},
     )

@@ -6,7 +6,7 @@ tower is in no preset: it belongs to the project, and is to be set by hand.
 
 import json
 from collections.abc import Iterable, Mapping
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 from sensorgen.design.printer import Printer, Quality
@@ -37,24 +37,34 @@ def profiles(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> d
         See :func:`sensorgen.export.slicers.loads.recipes`.
     """
     used, machine = recipes(printer, quality, loads), f"sensorgen {printer.name}"
-    tools = [used.get(i) for i in range(len(printer.tool_numbers))]
+    tools, options = [used.get(i) for i in range(len(printer.tool_numbers))], next(iter(loads.values())).profile
+    own = options.texts("orca")
 
-    def filled(template: str, name: str, r: Recipe | None = None) -> str:
+    def preset(template: str, name: str, r: Recipe | None = None) -> dict[str, str | list[str]]:
         text = _templates().get_template(template).render(
             printer=printer, quality=quality, used=used, tools=tools, machine=machine, name=name, r=r, version=VERSION,
             flavour=FLAVOURS[printer.gcode_flavour], densest=max(used.values(), key=lambda each: each.infill_percent),
-            tower=tower(printer, quality, len(used)), prime_mm3=PRIME_MM3,
-            line_area_mm2=line_area_mm2(printer, quality), per_tool=lambda entry: _texts([entry] * len(tools)),
+            tower=tower(printer, quality, len(used)), prime_mm3=PRIME_MM3, options=options,
+            line_area_mm2=partial(line_area_mm2, quality), per_tool=lambda entry: _texts([entry] * len(tools)),
         )  # fmt: skip
-        return json.dumps(json.loads(text), indent=4, ensure_ascii=False) + "\n"
+        found: dict[str, str | list[str]] = json.loads(text)
+        for key in found.keys() & own.keys():
+            old = found[key]
+            found[key] = [own[key]] * len(old) if isinstance(old, list) else own[key]
+        return found
 
     process = f"{machine} {quality.name}"
-    found = {f"machine/{machine}.json": filled("machine.json", machine)}
-    found[f"process/{process}.json"] = filled("process.json", process)
+    made = {
+        f"machine/{machine}.json": preset("machine.json", machine),
+        f"process/{process}.json": preset("process.json", process),
+    }
     for index, r in used.items():
         name = f"{machine} T{printer.tool_numbers[index]} {r.label}"
-        found[f"filament/{name}.json"] = filled("filament.json", name, r)
-    return found
+        made[f"filament/{name}.json"] = preset("filament.json", name, r)
+    # What stands in none of them is taken for a setting of the process.
+    known = {key for each in made.values() for key in each}
+    made[f"process/{process}.json"] |= {key: own[key] for key in sorted(own.keys() - known)}
+    return {path: json.dumps(each, indent=4, ensure_ascii=False) + "\n" for path, each in made.items()}
 
 
 @cache

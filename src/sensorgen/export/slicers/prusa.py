@@ -1,7 +1,7 @@
 """PrusaSlicer: one profile for all tools of a printer, and its command line."""
 
 from collections.abc import Iterable, Mapping
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,7 +9,17 @@ from sensorgen.core.errors import SlicerFailed
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.design.tower import PRIME_MM3, tower
 from sensorgen.export.slicers import PROGRAMS
-from sensorgen.export.slicers.loads import Load, Recipe, by_hand, line_area_mm2, number, recipe, recipes, templates
+from sensorgen.export.slicers.loads import (
+    Load,
+    Recipe,
+    by_hand,
+    line_area_mm2,
+    number,
+    overlaid,
+    recipe,
+    recipes,
+    templates,
+)
 from sensorgen.export.slicers.run import USUAL, Runner, find, run
 from sensorgen.export.slicers.versions import Version
 
@@ -20,6 +30,11 @@ FLAVOURS = {"reprapfirmware": "reprapfirmware", "marlin": "marlin2"}
 _SPEEDS = (
     "perimeter_speed", "external_perimeter_speed", "small_perimeter_speed", "infill_speed", "solid_infill_speed",
     "top_solid_infill_speed", "gap_fill_speed", "bridge_speed",
+)  # fmt: skip
+
+_WIDTHS = (
+    "perimeter_extrusion_width", "external_perimeter_extrusion_width", "infill_extrusion_width",
+    "solid_infill_extrusion_width", "top_infill_extrusion_width",
 )  # fmt: skip
 
 
@@ -46,12 +61,14 @@ def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load], versi
     """
     used = recipes(printer, quality, loads)
     tools = [used.get(i) for i in range(len(printer.tool_numbers))]
-    return _templates(version).get_template("profile.ini").render(
+    options = next(iter(loads.values())).profile
+    text = _templates(version).get_template("profile.ini").render(
         printer=printer, quality=quality, used=used, tools=tools, tower=tower(printer, quality, len(used)),
         flavour=FLAVOURS[printer.gcode_flavour], densest=max(used.values(), key=lambda r: r.infill_percent),
-        line_area_mm2=line_area_mm2(printer, quality), prime_mm3=PRIME_MM3,
+        line_area_mm2=partial(line_area_mm2, quality), prime_mm3=PRIME_MM3, options=options,
         per_tool=lambda entry, times=1: ",".join([str(entry)] * times * len(tools)),
     )  # fmt: skip
+    return overlaid(text, options.texts("prusa"))
 
 
 @cache
@@ -90,7 +107,12 @@ def volume_settings(printer: Printer, quality: Quality, tool: int, load: Load) -
     """
     r = recipe(printer, quality, tool, load)
     own = {"fill_density": f"{number(r.infill_percent)}%", "fill_pattern": _pattern(r), "perimeters": str(r.wall_lines)}
-    return own | dict.fromkeys(_SPEEDS, number(r.speed_mm_s))
+    own |= dict.fromkeys(_SPEEDS, number(r.speed_mm_s))
+    if load.material.name in load.profile.line_mm:
+        own |= dict.fromkeys(_WIDTHS, number(r.line_mm))
+    if r.infill_angle_deg is not None:
+        own["fill_angle"] = number(r.infill_angle_deg)
+    return {key: value for key, value in own.items() if key not in load.profile.texts("prusa")}
 
 
 def slice_3mf(threemf: Path, profile: Path, gcode: Path, runner: Runner = USUAL) -> None:

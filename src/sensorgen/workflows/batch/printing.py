@@ -11,7 +11,7 @@ from sensorgen.core import files as store
 from sensorgen.core.errors import SensorgenError
 from sensorgen.export import slicing
 from sensorgen.export.gcode.check import check
-from sensorgen.export.slicers import curaengine
+from sensorgen.export.slicers import curaengine, versions
 from sensorgen.export.slicing import Placed, Sliced
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
@@ -73,7 +73,9 @@ def gcode(
         (inside / settings).replace(own / settings)
     else:
         settings = "settings.json"
-        engine = curaengine.engine_settings(machine, found[0].design.layers, slicing.plate_loads(found))
+        engine = curaengine.engine_settings(
+            machine, found[0].design.layers, slicing.plate_loads(found), versions.parse(made.version)
+        )
         store.write(own, {settings: json_bytes(asdict(engine))})
     rmtree(inside)  # what is left are the bodies again, as the slicer took them
     loaded = tools(piece.design for piece in found)
