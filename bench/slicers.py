@@ -18,7 +18,7 @@ from sensorgen.design import design
 from sensorgen.export.gcode.check import check
 from sensorgen.export.slicing import alone, sliced
 from sensorgen.prediction import bodies
-from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.rest_state import rest_state
 
 RESULTS = Path(__file__).parent / "results"
 DESIGNS = Path(__file__).parents[1] / "designs"
@@ -55,34 +55,41 @@ def printed(variant, slicer, program):
         "accepted": not checked.errors(strict=True), "findings": [f.message for f in checked.findings],
     }  # fmt: skip
     try:
-        found = evaluate(bodies.sliced(variant, lambda: body(variant, made.lines, slicer=source), source, content))
+        found = rest_state(bodies.sliced(variant, lambda: body(variant, made.lines, slicer=source), source, content))
     except SensorgenError as error:
         return row | {"reason": str(error)[:200]}
-    ends = {name: (r.lower, r.value, r.upper) for name, r in found.resistance.items()}
+    of_print = [found.capacitance.value, found.capacitance.print.lower, found.capacitance.print.upper]
     return row | {
-        "capacitance_pf": found.capacitance.value * 1e12,
-        "resistance_ohm": ends,
-        "gap_mm": found.gap.value * 1e3,
+        "capacitance_pf": [c * 1e12 for c in of_print],
+        "resistance_ohm": {end: r.value for end, r in found.resistance.items()},
     }
 
 
 def main():
     rows, programs = {}, [(slicer, str(NEWER / name) if name else "") for slicer, name in PROGRAMS]
     for variant in variants():
-        started = time.perf_counter()
+        started = time.process_time()
         rows[variant.name] = [printed(variant, *at) for at in programs]
-        print(f"{variant.name}: {time.perf_counter() - started:.0f} s", file=sys.stderr)
-    (RESULTS / "slicers.json").write_text(json.dumps(rows, indent=1) + "\n", "utf-8")
+        print(f"{variant.name}: {time.process_time() - started:.0f} s", file=sys.stderr)
+        (RESULTS / "slicers.json").write_text(json.dumps(rows, indent=1) + "\n", "utf-8")
+        (RESULTS / "slicers.md").write_text(table(rows), "utf-8")
+
+
+def table(rows):
+    """The results as Markdown."""
     titles = [row["slicer"] for row in next(iter(rows.values()))]
     lines = [
         "# Slicers beside each other\n",
-        "C between the electrodes [pF]; R of the top and the bottom electrode, end to end [ohm]; electrode gap [mm]; from "
-        "each slicer's G-code of 12 x 10 mm, `!` where `gcode check` refuses it.\n",
-        "| design | " + " | ".join(titles) + " |", "|---" * (len(titles) + 1) + "|",
-    ]  # fmt: skip
-    for name, found in rows.items():
-        lines.append(f"| {name} | " + " | ".join(map(cell, found)) + " |")
-    (RESULTS / "slicers.md").write_text("\n".join(lines) + "\n", "utf-8")
+        "From each slicer's G-code of 12 x 10 mm: C between the electrodes [pF], in brackets the range over the widths "
+        "that a bead can have; R of the top electrode, end to end [ohm]. `!`: refused by `gcode check`.\n",
+        "OrcaSlicer, Bambu Studio and SuperSlicer are in no distribution, PyPI or npm, and were not run.\n",
+        "| design | " + " | ".join(titles) + " |",
+        "|---" * (len(titles) + 1) + "|",
+    ]
+    return (
+        "\n".join([*lines, *(f"| {name} | " + " | ".join(map(cell, each)) + " |" for name, each in rows.items())])
+        + "\n"
+    )
 
 
 def cell(row):
@@ -90,8 +97,8 @@ def cell(row):
     mark = "" if row.get("accepted") else "! "
     if "capacitance_pf" not in row:
         return f"{mark}{row.get('refused') or row.get('reason')}"
-    ends = ", ".join(f"{middle:.3g}" for _, middle, _ in row["resistance_ohm"].values())
-    return f"{mark}{row['capacitance_pf']:.3f}; {ends}; {row['gap_mm']:g}"
+    value, lower, upper = row["capacitance_pf"]
+    return f"{mark}{value:.3f} ({lower:.3f} to {upper:.3f}); {row['resistance_ohm']['top']:.4g}"
 
 
 if __name__ == "__main__":

@@ -313,7 +313,7 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
     try:
         if isinstance(data, Mapping) and "shape" not in data:
             raise BadInput(f"shape is missing; expected {', '.join(registry.names(shapes))}")
-        design = checked(Design, with_own(data, Path(where).parent))
+        design = checked(Design, with_own(dict(data), Path(where).parent) if isinstance(data, Mapping) else data)
         _check_names(design)
     except SensorgenError as error:
         raise error.within(where) from None

@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -48,12 +48,12 @@ class Profile(Strict):
         return {key: str(value) for key, value in self.settings.get(slicer, {}).items()}
 
 
-def with_own(data: object, folder: Path) -> object:
+def with_own(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     """A design's data with the content of its own settings files in place of their names.
 
     Parameters
     ----------
-    data : object
+    data : dict
         Of a design, not validated yet; returned as it is where the validation is to refuse it.
     folder : Path
         What the names are relative to.
@@ -63,8 +63,8 @@ def with_own(data: object, folder: Path) -> object:
     BadInput
         A file cannot be read, or holds no settings.
     """
-    profile = data.get("profile") if isinstance(data, Mapping) else None
-    if not (isinstance(data, Mapping) and isinstance(profile, Mapping)):
+    profile = data.get("profile")
+    if not isinstance(profile, Mapping):
         return data
     own, inline = profile.get("own", {}), profile.get("settings", {})
     if not (isinstance(own, Mapping) and isinstance(inline, Mapping)):
