@@ -103,3 +103,24 @@ def test_two_sensors_stand_where_they_were_placed(slicer, newer_program, tmp_pat
     ends = paths.read(made.ready, one.machine).model().end_mm
     for side, middle in ((ends[ends[:, 0] < 0], (-40, 10)), (ends[ends[:, 0] > 0], (30, -20))):
         assert (side.min(axis=0) + side.max(axis=0))[:2] / 2 == pytest.approx(middle, abs=0.05)
+
+
+def test_options_of_the_design_reach_the_print(newer_program, tmp_path):
+    infill = {"x60": {"percent": 40.0, "pattern": "gyroid"}}
+    profile = {
+        "walls": "classic",
+        "wall_lines": {"x60": 1},
+        "line_mm": {"x60": 0.5},
+        "settings": {"prusa": {"nonsense": 1}},
+    }
+    variant = small("23/trix-d0.2.yaml", infill=infill, profile=profile)
+    made = sliced([alone(variant)], "prusa", tmp_path, program=newer_program("prusa-slicer"))
+    assert check(made.ready, variant.machine).errors(strict=True) == []
+    used = prusa.settings(made.raw.read_text())
+    assert used["perimeter_generator"] == "classic"
+    assert ["nonsense" in f.message for f in made.findings] == [True]
+    lines = paths.read(made.ready, variant.machine).model()
+    walls = np.char.find(np.array(lines.kinds)[lines.kind], "perimeter") >= 0
+    widths = {tool: np.median(lines.width_mm[walls & (lines.tool == tool)]) for tool in (3, 4)}
+    assert widths == {3: pytest.approx(0.44), 4: pytest.approx(0.5)}
+    assert volumes(made, variant)[4] < 0.9
