@@ -109,12 +109,12 @@ def test_the_drawing_has_printed_outlines_and_rule_7(run):
 
 
 def test_a_build_is_compensated(run, contents, tmp_path):
-    said = run("build", *SMALL, "--dielectric", "0.2", "--no-cad", "--compensate", "print")
+    said = run("build", *SMALL, "--dielectric", "0.2", "--no-cad", "--compensate", "print", "--force")
     assert said.code in (0, 1)
-    assert "dielectric_mm                  0.2 -> 0.1" in said.out
+    assert "hang_height_mm                 0.5 -> 0.6: gap and capacitance" in said.out
     assert "0.3 -> 0.2: 0.2 mm asked" in said.out
-    assert any("d0.1" in name for name in contents(tmp_path / "out"))
-    found = json.loads(run("build", *SMALL, "--no-cad", "--compensate", "bake", "--json").out)
+    assert any("hang-height0.6" in name for name in contents(tmp_path / "out"))
+    found = json.loads(run("build", "reference", "--size", "12x8", "--no-cad", "--compensate", "bake", "--json").out)
     assert found["compensated"][0]["what"] == "shrinkage"
     assert (found["compensated"][0]["before"], found["compensated"][0]["after"]) == (0.0, 0.2)
 

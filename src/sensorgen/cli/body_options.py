@@ -14,10 +14,10 @@ from sensorgen.design.walls import WALLS
 from sensorgen.export.slicers import SLICERS
 
 if TYPE_CHECKING:
-    from sensorgen.asprinted.compensation import Change
     from sensorgen.asprinted.printed import Printed
     from sensorgen.design.body import Body, BodyOf
     from sensorgen.design.design import Design
+    from sensorgen.workflows.compensation import Change
 
 _BODY = "sensorgen.body"  # in the context's meta: the option that was given, and its value
 
@@ -70,18 +70,22 @@ def compensate_option() -> click.Option:
     """``--compensate``, for commands that make files."""
     return click.Option(
         ["--compensate"], type=OneOf(("print", "bake")),
-        help="Change the design so that what is asked for comes out: whole layers, widths of a line, the electrode "
-        "gap; with bake also larger by the 20 % that the bake takes off.",
+        help="Change the design so that what is asked for comes out: whole layers, widths of a line, electrode gap and "
+        "capacitance; with bake also larger by the 20 % that the bake takes off.",
     )  # fmt: skip
 
 
-def compensated(design: "Design", word: str | None, walls: str) -> "tuple[Design, list[Change]]":
-    """The design to print, and what was changed."""
+def compensated(
+    design: "Design", word: str | None, walls: str, slicer: str = "", program: str = ""
+) -> "tuple[Design, list[Change]]":
+    """The design to print, and what was changed; by a real slicer's prints where one is named, else by the estimate."""
     if word is None:
         return design, []
-    from sensorgen.asprinted.compensation import compensated as changed
+    from sensorgen.workflows.compensation import compensated as changed
 
-    found, changes = changed(design, walls, bake=word == "bake")
+    sliced = partial(_sliced, slicer, program=program) if slicer else None
+    with show.progress(("designs",)) as step:
+        found, changes = changed(design, walls, bake=word == "bake", sliced=sliced, step=step)
     if not changes:
         click.echo(f"--compensate {word}: nothing to change, by the estimate for {walls} walls", err=True)
     return found, changes
@@ -100,20 +104,20 @@ def printed_of(design: "Design") -> "Printed | None":
     return _slice(value, design)[0] if option == "--slicer" else body(design, walls=value)
 
 
-def _sliced(slicer: str, design: "Design") -> "Body":
+def _sliced(slicer: str, design: "Design", program: str = "") -> "Body":
     from sensorgen.prediction import bodies
 
-    printed, source, content = _slice(slicer, design)
+    printed, source, content = _slice(slicer, design, program)
     return bodies.sliced(design, lambda: printed, source, content)
 
 
-def _slice(slicer: str, design: "Design") -> "tuple[Printed, str, bytes]":
+def _slice(slicer: str, design: "Design", program: str = "") -> "tuple[Printed, str, bytes]":
     """What a real slicer prints, its name and version, and its G-code."""
     from sensorgen.asprinted.printed import body
     from sensorgen.export import slicing
 
     with tempfile.TemporaryDirectory() as folder, show.progress(slicing.STEPS) as step:
-        made = slicing.sliced([slicing.alone(design)], slicer, Path(folder), step=step)
+        made = slicing.sliced([slicing.alone(design)], slicer, Path(folder), program=program, step=step)
         content = made.ready.read_bytes()
     source = f"{made.slicer} {made.version}"
     return body(design, made.lines, slicer=source), source, content

@@ -42,7 +42,8 @@ def _work(
 
     if not 0 < time_limit_s < float("inf"):
         raise OutOfRange(f"--time-limit {time_limit_s:g}; expected seconds above 0")
-    design, changes = body_options.compensated(design, compensate, rule(slicer, design.walls))
+    walls = rule(slicer, design.walls)
+    design, changes = body_options.compensated(design, compensate, walls, slicer, program)
     with render.refused(design.name), show.progress(("checks", *STEPS)) as step:
         made = slice_design(
             design, Path(out), slicer, program=program, time_limit_s=time_limit_s, force=force, strict=strict,

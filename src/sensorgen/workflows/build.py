@@ -10,8 +10,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, ClassVar
 
-from sensorgen.asprinted import compensation
-from sensorgen.asprinted.compensation import Change
 from sensorgen.checks.review import Review, Step, draw, report, review
 from sensorgen.core import document
 from sensorgen.core import files as store
@@ -30,6 +28,8 @@ from sensorgen.export.threemf.part import parts_of
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless, to_json
+from sensorgen.workflows import compensation
+from sensorgen.workflows.compensation import Change
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
 LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")

@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
-from sensorgen.asprinted import compensation
-from sensorgen.asprinted.compensation import Change
 from sensorgen.asprinted.printed import rule7
 from sensorgen.checks import volumes
 from sensorgen.checks.review import review
@@ -23,6 +21,8 @@ from sensorgen.design.walls import rule
 from sensorgen.export.gcode.check import Checked, check
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 from sensorgen.export.slicing import Step, alone, sliced
+from sensorgen.workflows import compensation
+from sensorgen.workflows.compensation import Change
 
 
 @dataclass(frozen=True)
