@@ -21,10 +21,10 @@ def main() -> None:
     """Write the table."""
     lines = [
         "# Compensation, measured by real slices", "",
-        "Asked for: gap and capacitance of the drawing. Errors of the capacitance as printed, PrusaSlicer 2.5.0 (Arachne) and "
-        "CuraEngine 4.13.0 (filling outline gaps), 100 x 10 mm.", "",
-        "| design | slicer | asked gap [mm] | asked [pF] | gap before | error before | gap after | error after | slices | "
-        "changes | processor [s] |", "|---|---|---|---|---|---|---|---|---|---|---|",
+        "Asked for: gap and capacitance of the drawing. Errors of the capacitance as printed, PrusaSlicer 2.5.0 "
+        "(Arachne) and CuraEngine 4.13.0 (filling outline gaps), 100 x 10 mm.", "",
+        "| design | slicer | asked gap [mm] | asked [pF] | gap before | error before | gap after | error after "
+        "| slices | changes | processor [s] |", "|---|---|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
     for along, film, quality in CASES:
         for slicer in ("prusa", "cura"):
@@ -50,7 +50,7 @@ def row(along: str, film: float, quality: str, slicer: str) -> str:
     head = f"| tri{along.upper()} {film:g} {quality} | {slicer} | {asked.gap_mm:g} | {asked.capacitance_pf:.4g} | "
     head += f"{before.gap_mm:g} | {before.capacitance_pf / asked.capacitance_pf - 1:+.1%} | "
     try:
-        made, changes = compensated(design, WALLS[slicer], sliced=sliced)
+        _, changes = compensated(design, WALLS[slicer], sliced=sliced)
     except SensorgenError as error:
         return head + f"refused | | {len(seen)} | {error} | {time.process_time() - start:.1f} |"
     after = found(seen[-1])

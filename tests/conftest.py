@@ -24,7 +24,9 @@ def _cache(monkeypatch, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def _session_cache(tmp_path_factory):
-    return tmp_path_factory.mktemp("session-cache")
+    """Of all test processes: below each has a folder of its own."""
+    base = tmp_path_factory.getbasetemp()
+    return (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "session-cache"
 
 
 @pytest.fixture

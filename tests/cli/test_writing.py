@@ -13,6 +13,7 @@ import pytest
 
 BUILD = ("build", "tri", "--no-cad", "--force", "--name", "x")  # forced, as the print of tri loses its tips
 OLD, NEW = ("--period", "2"), ("--period", "2.5")
+pytestmark = pytest.mark.usefixtures("shared_cache")  # what is written counts, not how it is found
 
 
 @pytest.fixture(scope="module")
