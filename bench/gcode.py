@@ -33,12 +33,12 @@ TAIL = "G10 P3 S0 R0\nG10 P4 S0 R0\nG28\nM0 H1\n"
 CHECK = """
 import json, resource, sys, time
 from pathlib import Path
-from sensorgen.gcode.check import check
-from sensorgen.printer import load_printer
+from sensorgen.export.gcode.check import check
+from sensorgen.design.printer import load_printer
 machine = load_printer("diabase-h5")
 start = time.process_time()
 result = check(Path(sys.argv[1]), machine)
-print(json.dumps({"lines": result.report.lines, "seconds": time.process_time() - start, "errors": len(result.errors()),
+print(json.dumps({"lines": result.lines, "seconds": time.process_time() - start, "errors": len(result.errors()),
     "mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024}))
 """
 

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from filled import filled
 
 from sensorgen.core.errors import BadInput, SlicerFailed, UnknownName, Unwritable
 from sensorgen.design.design import make
@@ -219,14 +220,38 @@ def test_a_place_that_cannot_be_written_to(tmp_path):
         sliced([alone(SMALL)], "prusa", tmp_path / "file" / "x")
 
 
-def test_a_design_gets_its_file_and_what_was_found(slicer, tmp_path):
-    slicer(WRITES)
-    made = slice_design(SMALL, tmp_path / "out", "prusa", force=True)
-    again = slice_design(SMALL, tmp_path / "out", "prusa", force=True)
-    folder = tmp_path / "out" / SMALL.name
-    assert sorted(p.name for p in folder.iterdir()) == [f"{SMALL.name}.prusa.gcode", f"{SMALL.name}.prusa.gcode.json"]
+@pytest.fixture
+def copies(slicer, tmp_path):
+    """A slicer whose file is the text that it is given."""
+
+    def write(text):
+        (tmp_path / "text").write_text(text)
+        slicer(f"import shutil; shutil.copy({str(tmp_path / 'text')!r}, out)")
+
+    return write
+
+
+def test_a_design_gets_its_file_and_what_was_found(copies, tmp_path):
+    copies(filled(OTHER))
+    made = slice_design(OTHER, tmp_path / "out", "prusa", force=True)
+    again = slice_design(OTHER, tmp_path / "out", "prusa", force=True)
+    folder = tmp_path / "out" / OTHER.name
+    assert sorted(p.name for p in folder.iterdir()) == [f"{OTHER.name}.prusa.gcode", f"{OTHER.name}.prusa.gcode.json"]
     content = Path(made.gcode).read_bytes()
     assert made.sha256 == again.sha256 == sha256(content).hexdigest()
     assert content.endswith(b"M0 H1\n")
-    assert not made.errors()
-    assert made.tools[0].material == "etpu"
+    assert (made.findings, made.refused, made.tools[0].material) == ((), False, "etpu")
+
+
+def test_the_usual_name_is_that_of_the_last_file_which_passed(copies, tmp_path):
+    def names(text):
+        copies(text)
+        made = slice_design(OTHER, tmp_path / "out", "prusa", force=True)
+        files = sorted(p.name.removeprefix(f"{OTHER.name}.prusa.") for p in (tmp_path / "out" / OTHER.name).iterdir())
+        assert (Path(made.gcode).name in {f"{OTHER.name}.prusa.{name}" for name in files}, made.refused) == (
+            True, "refused" in files[0] or "refused" in files[-1])  # fmt: skip
+        return files
+
+    good, refused = ["gcode", "gcode.json"], ["refused.gcode", "refused.json"]
+    cut = filled(OTHER, layers=[1, 2, 3, 4, 8, 9, 10, 11, 12, 13])
+    assert [names(text) for text in (filled(OTHER), cut, cut, filled(OTHER))] == [good, refused, refused, good]

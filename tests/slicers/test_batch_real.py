@@ -250,8 +250,10 @@ def test_faults_of_the_gcode_are_on_record_and_in_the_exit_code(tmp_path, monkey
     script = 'while [ "$1" != --output ]; do shift; done\n' + "".join(f"echo '{line}' >> \"$2\"\n" for line in lines)
     stand_in(tmp_path, monkeypatch, script)
     batch = made(tmp_path, SMALL.replace("[prusa, cura]", "[prusa]"))
-    found = read(batch.folder)["slicers"]["prusa"]["findings"]
-    assert any(f["severity"] == "error" and "900" in f["message"] for f in found)
+    plate = read(batch.folder)["slicers"]["prusa"]
+    assert any(f["severity"] == "error" and "900" in f["message"] for f in plate["findings"])
+    assert plate["gcode"] == "plan.prusa.refused.gcode"
+    assert [path.name for path in batch.folder.glob("*.gcode")] == [plate["gcode"]]
     assert batch.errors(force=True)
     assert not differences(batch.folder)
 

@@ -71,9 +71,10 @@ def placed(design: Design, source: Source) -> Placed:
         for (w, h), (x, y) in sorted({(tuple(b[1] - b[0]), tuple(b.mean(0))) for b in boxes})[:3]
     )
     length, width, _ = design.printed.size_mm
+    off = min((abs(box[1] - box[0] - wanted).max() for box in boxes for wanted in (size, size[::-1])), default=np.nan)
     raise BadInput(
-        f"no piece of {length:g} x {width:g} mm, as {design.name}, in this G-code; it prints {there}: was it sliced "
-        "from this design, straight or turned by 90 degrees?"
+        f"no piece of {length:g} x {width:g} mm, as {design.name}, in this G-code; it prints {there}, off by {off:.3g} "
+        "mm at least: was it sliced from this design, straight or turned by 90 degrees?"
     )
 
 
@@ -84,15 +85,14 @@ def _tools(design: Design) -> list[int]:
 def _of_tools(design: Design, source: Source) -> Paths:
     """The file's lines, its tools counted as the printer does, or from 0 as a slicer's own file does."""
     motion, wanted = follow(source, design.machine.control.prime_macro), set(_tools(design))
-    used: set[int] = set()
+    used: list[set[int]] = []
     for numbering in ("printer", "slicer"):
         paths = paths_of(motion, design.machine, numbering)
-        there = set(paths.model().tool.tolist())
-        if wanted <= there:
+        used.append(set(paths.model().tool.tolist()))
+        if wanted <= used[-1]:
             return paths
-        used |= there
     raise BadInput(
-        f"tools {sorted(used)} print in this G-code; expected {sorted(wanted)}, those of {design.name}: --tool "
+        f"tools {sorted(used[0])} print in this G-code; expected {sorted(wanted)}, those of {design.name}: --tool "
         "MATERIAL=NUMBER says which tool has a material"
     )
 

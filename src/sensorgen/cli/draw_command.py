@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 
 OWN: list[click.Parameter] = [
     click.Option(
-        ["--output", "-o"], metavar="FILE", help="SVG file to write; NAME.svg here if not given, - for the terminal."
+        ["--output", "-o"],
+        metavar="FILE",
+        help="SVG file of the section, or HTML page of the print layer by layer; NAME.svg here if not given, - for the "
+        "terminal.",
     ),
     *body_options.body_options(),
 ]
@@ -25,9 +28,20 @@ def _work(design: "Design", *, output: str | None) -> int:
     from sensorgen.checks.review import STEPS, draw, review
     from sensorgen.core import files as store
 
-    if output and output != "-" and Path(output).suffix.lower() not in ("", ".svg"):
-        raise BadInput(f"--output {output}: the drawing is SVG; expected a name that ends in .svg, or - to print it")
+    if output and output != "-" and Path(output).suffix.lower() not in ("", ".svg", ".html"):
+        raise BadInput(
+            f"--output {output}: the drawing is SVG, or a page of layers; expected a name in .svg or .html, or - "
+            "to print the SVG"
+        )
     made = body_options.printed_of(design)
+    if output and output.lower().endswith(".html"):
+        from sensorgen.analysis.plots import layers
+
+        if made is None:
+            raise BadInput(f"--output {output}: layers are those of a print; expected it without --drawn")
+        store.replace(Path(output), layers.of_print(made).encode())
+        click.echo(output)
+        return 0
     with show.progress(STEPS) as step:
         held = review(design, step)
     if made:
@@ -42,4 +56,9 @@ def _work(design: "Design", *, output: str | None) -> int:
     return 0
 
 
-command = DesignGroup(_work, OWN, name="draw", help="Draw the cross-section, its layers and findings, as SVG.")
+command = DesignGroup(
+    _work,
+    OWN,
+    name="draw",
+    help="Draw the cross-section, its layers and findings, as SVG; or the print layer by layer, as a page.",
+)

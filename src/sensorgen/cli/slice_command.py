@@ -26,7 +26,7 @@ OWN: list[click.Parameter] = [
         help="End the slicer after this time.",
     ),
     click.Option(["--out"], default="out", show_default=True, metavar="DIR", help="Folder for the designs' folders."),
-    click.Option(["--force"], is_flag=True, help="Slice even if checks report errors."),
+    click.Option(["--force"], is_flag=True, help="Slice even if checks of the design report errors."),
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
     body_options.compensate_option(),
     *render.options("json", "markdown"),
@@ -50,10 +50,12 @@ def _work(
             compensated=changes, step=step,
         )  # fmt: skip
     render.deliver(made)
-    return 1 if made.errors() or (made.lost and not force) else 0
+    return 1 if made.refused or (made.lost and not force) else 0
 
 
 command = DesignGroup(
     _work, OWN, name="slice",
-    help="Slice a design with a real slicer, and write G-code that the printer takes as it is.",
+    help="Slice a design with a real slicer, and write G-code that the printer takes as it is.\n\n"
+    "The file is checked, also against the design. One with errors is written as NAME.SLICER.refused.gcode, whatever "
+    "--force says, and an earlier NAME.SLICER.gcode is removed: a file of that name has always passed.",
 )  # fmt: skip

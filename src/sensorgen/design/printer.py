@@ -49,11 +49,13 @@ class Control(Strict):
     levels: Annotated[tuple[Line, ...], Field(strict=False)] = ()
     ends: Annotated[tuple[Line, ...], Field(strict=False)] = ()  # commands whose macro switches the heaters off
     coldest_c: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 150.0
-    longest_purge_mm: Positive = 100.0
+    longest_purge_mm: Positive = 100.0  # of filament, at one place
+    longest_retraction_mm: Positive = 100.0  # in all; beyond it filament leaves the hot end
     standby_c: Positive | None = None  # of a tool that waits; None: as hot as when it prints
     preheat_s: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     tool_offsets_mm: dict[Annotated[int, Field(strict=False)], Finite] = Field(default={})  # baby steps per tool, M290
     firmware_retraction: bool = False  # G10 and G11 instead of moves of E
+    commands: dict[str, Line | None] = Field(default={})  # that a print may send, beside its firmware's; null: not
 
 
 class Printer(Strict):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
+from sensorgen.asprinted import agreement
 from sensorgen.asprinted.printed import rule7
 from sensorgen.checks import volumes
 from sensorgen.checks.review import review
@@ -18,7 +19,9 @@ from sensorgen.core.findings import Finding, counted, counts, listed
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
 from sensorgen.design.walls import rule
-from sensorgen.export.gcode.check import Checked, check
+from sensorgen.export.gcode.check import Checked, check_motion
+from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.paths import paths_of
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 from sensorgen.export.slicing import Step, alone, sliced
 from sensorgen.workflows import compensation
@@ -51,6 +54,8 @@ class Printed(Checked):
         Name and identity of the design.
     gcode, sha256 : str
         The file for the printer, and its SHA-256.
+    refused : bool
+        Whether the check of the G-code found errors.
     slicer : Slicer
         Who sliced it.
     sensorgen, printer, quality : str
@@ -66,6 +71,7 @@ class Printed(Checked):
     name: str
     design: str
     gcode: str
+    refused: bool
     sha256: str
     slicer: Slicer
     sensorgen: str
@@ -87,7 +93,8 @@ class Printed(Checked):
         yield from super().document()
         yield volumes.table(self.printed.layers)
         yield from listed(self.printed.findings)
-        yield f"{self.gcode}: {self.slicer.name} {self.slicer.version}; {counted(self.counts())}"
+        verdict = "refused; " if self.refused else ""
+        yield f"{self.gcode}: {verdict}{self.slicer.name} {self.slicer.version}; {counted(self.counts())}"
 
 
 def slice_design(
@@ -104,6 +111,10 @@ def slice_design(
 ) -> Printed:
     """Write ``out/<name>/<name>.<slicer>.gcode``, and beside it ``.json`` with what was found and made.
 
+    A file in which the check finds errors, on its own or against the design, gets the name
+    ``<name>.<slicer>.refused.gcode``. Either takes the place of both that an earlier run has left: what has the usual
+    name is always the last one sliced, and passed.
+
     Parameters
     ----------
     design : Design
@@ -117,7 +128,7 @@ def slice_design(
     time_limit_s : float
         How long the slicer may take [s].
     force : bool
-        Slice even if checks report errors.
+        Slice even if checks of the design report errors; those of the G-code refuse it none the less.
     strict : bool
         Take warnings for errors.
     compensated : sequence of Change
@@ -138,19 +149,27 @@ def slice_design(
     held = review(design, walls=rule(slicer, design.walls) if slicer in SLICERS else "")
     if held.errors(strict) and not force:
         raise Unprintable(held.findings, held.errors(strict))
-    target = out / design.name / f"{design.name}.{slicer}.gcode"
     with tempfile.TemporaryDirectory() as stage:
         made = sliced([alone(design)], slicer, Path(stage), program=program, time_limit_s=time_limit_s, step=step)
         content = made.ready.read_bytes()
-        loaded = {design.tool(name): name for name in design.used()}
-        checked = check(made.ready, design.machine, loaded, others_empty=True)
+        loaded, machine = {design.tool(name): name for name in design.used()}, design.machine
+        motion = follow(made.ready, machine.control.prime_macro)
+        checked = check_motion(motion, machine, loaded, others_empty=True)
+        lines = paths_of(motion, machine)
+        checked = checked.with_more(agreement.check(design, lines, motion.changes, machine.bed_centre_mm(), alone=True))
         layers, findings = rule7(design, made.lines)
+    stopped, stem = bool(checked.errors(strict)), f"{design.name}.{slicer}"
+    names, others = (f"{stem}.gcode", f"{stem}.gcode.json"), (f"{stem}.refused.gcode", f"{stem}.refused.json")
+    names, others = (others, names) if stopped else (names, others)
     result = Printed(
-        **vars(checked), name=design.name, design=design.id(), gcode=target.name, sha256=sha256(content).hexdigest(),
-        slicer=Slicer(made.slicer, made.version), sensorgen=__version__, printer=design.machine.name,
-        quality=design.layers.name, design_findings=tuple(held.sliced().findings),
+        **vars(checked), name=design.name, design=design.id(), gcode=names[0], refused=stopped,
+        sha256=sha256(content).hexdigest(), slicer=Slicer(made.slicer, made.version), sensorgen=__version__,
+        printer=design.machine.name, quality=design.layers.name, design_findings=tuple(held.sliced().findings),
         printed=Volumes(tuple(layers), (*made.findings, *findings)), compensated=tuple(compensated),
     )  # fmt: skip
-    store.replace(target, content)
-    store.replace(target.with_name(f"{target.name}.json"), document.to_json(result).encode())
-    return replace(result, gcode=str(target))
+    folder = out / design.name
+    store.replace(folder / names[0], content)
+    store.replace(folder / names[1], document.to_json(result).encode())
+    for old in others:
+        (folder / old).unlink(missing_ok=True)
+    return replace(result, gcode=str(folder / names[0]))

@@ -112,6 +112,26 @@ class Material(Strict):
             )
         return chosen[0]
 
+    def print_range(self, quantity: str, around: float) -> tuple[float, float]:
+        """Lowest and highest that the sources advise for printing.
+
+        Parameters
+        ----------
+        quantity : str
+            As in ``print`` of the material's file.
+        around : float
+            Half the range of a source that gives no range, in the unit of the quantity.
+
+        Returns
+        -------
+        (float, float)
+            Its ends; everything where no source gives the quantity.
+        """
+        values = self.print.get(quantity, [])
+        low = [v.value - around if v.low is None else min(v.low, v.value) for v in values]
+        high = [v.value + around if v.high is None else max(v.high, v.value) for v in values]
+        return min(low, default=-inf), max(high, default=inf)
+
 
 def names() -> list[str]:
     """Names of the materials that ship with sensorgen."""

@@ -1,15 +1,18 @@
 """Check of a G-code file on a simulated printer: faults, time, filament."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Self
 
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.findings import SEVERITIES, counted
+from sensorgen.design import materials
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import commands, limits
 from sensorgen.export.gcode.files import Source
 from sensorgen.export.gcode.found import Found, merged
 from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.moves import Motion
 from sensorgen.export.gcode.report import Report, report
 
 
@@ -30,6 +33,10 @@ class Checked(Report):
         bad = SEVERITIES[: 2 if strict else 1]
         return [f for f in self.findings if f.severity in bad]
 
+    def with_more(self, found: Iterable[Found]) -> Self:
+        """The same with further findings."""
+        return replace(self, findings=merged([*self.findings, *found]))
+
     def counts(self) -> dict[str, int]:
         """How many findings there are of each severity [-]."""
         return {severity: sum(f.severity == severity for f in self.findings) for severity in SEVERITIES}
@@ -47,10 +54,11 @@ class Checked(Report):
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedFile(Checked):
-    """A checked file by its name, and the printer's."""
+    """A checked file by its name, the printer's, and that of the design that it was checked against, or ""."""
 
     file: str
     printer: str
+    design: str = ""
 
     def document(self) -> Iterator[Part]:
         """Findings, what the file takes, and how many findings there are."""
@@ -90,9 +98,14 @@ def check(
     >>> found[0].rule, found[0].line, found[0].message
     ('tool', 4, 'tool 9 gets a temperature; diabase-h5 has 1, 2, 3, 4, 5')
     """
-    motion = follow(source, machine.control.prime_macro)
-    loads = dict(loaded or {})
-    found = [*limits.check(motion, machine), *commands.check(motion, machine)]
-    if others_empty:
-        found += limits.check_loaded(motion, loads)
-    return Checked(**vars(report(motion, machine, loads)), findings=merged(found))
+    return check_motion(follow(source, machine.control.prime_macro), machine, loaded, others_empty=others_empty)
+
+
+def check_motion(
+    motion: Motion, machine: Printer, loaded: Mapping[int, str] | None = None, *, others_empty: bool = False
+) -> Checked:
+    """Check a file that was followed; see :func:`check`."""
+    loads = {tool: name for tool, name in (loaded or {}).items() if name in materials.names()}
+    found = [*limits.check(motion, machine), *commands.check(motion, machine, loads)]
+    found += limits.check_loaded(motion, machine, loads, others_empty=others_empty)
+    return Checked(**vars(report(motion, machine, dict(loaded or {}))), findings=merged(found))

@@ -1,10 +1,12 @@
 """What the commands of a file ask of the machine, one after the other: tools, heat, homing, modes, fans, macros."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.design.printer import Printer
-from sensorgen.export.gcode.effects import STOPS, Effects, judge
+from sensorgen.export.gcode import allowed
 from sensorgen.export.gcode.found import Findings, Found
 from sensorgen.export.gcode.heat import Heaters
 from sensorgen.export.gcode.moves import NO_TOOL, Change, Event, Motion
@@ -12,9 +14,10 @@ from sensorgen.export.gcode.reading import macro_name
 from sensorgen.export.gcode.remarks import PRUSA
 
 AXES = "XYZ"
+PAUSES = ("M25", "M226", "M600", "M601")
 
 
-def check(motion: Motion, machine: Printer) -> Findings:
+def check(motion: Motion, machine: Printer, loaded: Mapping[int, str]) -> Findings:
     """Findings of all rules on commands, and on what is printed between them.
 
     Parameters
@@ -23,8 +26,10 @@ def check(motion: Motion, machine: Printer) -> Findings:
         The file.
     machine : Printer
         Who is to print it.
+    loaded : mapping of int to str
+        Material of each tool, as far as it is known.
     """
-    simulation = _Simulation(motion, machine)
+    simulation = _Simulation(motion, machine, loaded)
     for event in motion.events:
         simulation.until(event.row)
         simulation.obey(event)
@@ -36,21 +41,22 @@ def check(motion: Motion, machine: Printer) -> Findings:
 class _Simulation:
     """The machine between two moves."""
 
-    def __init__(self, motion: Motion, machine: Printer) -> None:
+    def __init__(self, motion: Motion, machine: Printer, loaded: Mapping[int, str]) -> None:
         self.motion, self.machine, self.control, self.found = motion, machine, machine.control, Findings()
         self.pushes = np.flatnonzero(motion.filament_mm != 0)
         self.prints = np.flatnonzero(motion.extruded_mm > 0)
+        self.lines = np.flatnonzero((motion.extruded_mm > 0) & (motion.across_mm > 0))
         self.travels = np.flatnonzero(motion.length_mm > 0)
         self.changes = {change.number: change for change in motion.changes}
         start = machine.tool_at_start()
         self.tool = NO_TOOL if start is None else start
         self.last: Change | None = None
-        self.heaters, self.effects = Heaters(machine, self.found), Effects(self.found)
+        self.heaters = Heaters(machine, loaded, self.found)
         self.homed: set[str] = set()
         self.levelled = not self.control.levels
         self.relative, self.absolute_e = False, True
         self.row = 0
-        self.ended = self.stopped = ""
+        self.ended, self.end_line = "", 0
         self.seen: set[str] = set()
 
     def until(self, row: int) -> None:
@@ -61,6 +67,8 @@ class _Simulation:
             self._pushing(pushed)
         if printed:
             self._printing(printed)
+        if line := self._first(self.lines, first, row):
+            self.heaters.check_printing(self.tool, line)
         if moved and self.homed != set(AXES):
             self.found.warning("home", moved, "a move comes before all axes are homed", "home first")
         if moved and self.ended:
@@ -91,11 +99,10 @@ class _Simulation:
         if not self.levelled:
             advice = f"level first ({' or '.join(self.control.levels)})"
             error("level", number, "the file prints before the bed is levelled", advice)
-        self.effects.printing()
         if self.relative:
             error("relative", number, "the file prints in relative coordinates (G91)", "write G90 before it")
-        if ended := self.ended or self.stopped:
-            message = f"lines after {ended} are never printed: it ends the print"
+        if self.ended:
+            message = f"lines after {self.ended} are never printed: it ends the print"
             error("end", number, message, "end the print after its last line")
 
     def obey(self, event: Event) -> None:
@@ -107,11 +114,11 @@ class _Simulation:
         if code in self.control.homes:
             self.homed |= {axis for axis in AXES if event.command.has(axis) or not event.command.has(AXES)}
         self.levelled |= code in self.control.levels
-        if code in self.control.ends:
-            self.ended = str(event.command)
-        self.stopped = code if code in STOPS else self.stopped
-        self.effects.obey(event)
-        judge(event.command, event.number, self.found)
+        if code in self.control.ends and not self.ended:
+            self.ended, self.end_line = str(event.command), event.number
+        if code in PAUSES:
+            message = f"{code} waits until somebody goes on"
+            self.found.append(Found("pause", "info", event.number, message, "be there, or leave it out"))
         self.heaters.obey(event, self.tool)
         self._modes(event)
         self._machine(event)
@@ -120,7 +127,7 @@ class _Simulation:
         if change.tool != NO_TOOL:
             self.heaters.check_tool(change.number, change.tool, "is taken")
         last, self.last, self.tool = self.last, change, change.tool
-        self.heaters.take(change.tool)
+        self.heaters.take(change.tool, waits=change.macro)
         twice = last and (last.tool, last.macro) == (change.tool, not change.macro) and last.number != change.number
         if last and twice and not self._first(self.prints, last.row, change.row):
             message = f"tool {change.tool} is taken twice, by T and by its macro: the macro takes it itself"
@@ -136,13 +143,8 @@ class _Simulation:
                 self.found.error("absolute-e", event.number, "M82 makes E absolute", advice)
         elif code in ("G90", "G91"):
             self.relative = code == "G91"
-        elif code == "G92" and (command.has(AXES) or not command.has("E")):
-            message = "G92 names the place anew; limits are checked in the new coordinates"
-            self.found.warning("place", event.number, message, "leave it out")
         elif code in ("M18", "M84") and not command.has("S"):  # the axes may drift; S only sets when that happens
             self.homed -= {axis for axis in AXES if command.has(axis) or not command.has(f"{AXES}E")}
-        elif code == "M561":
-            self.levelled = not self.control.levels
 
     def _machine(self, event: Event) -> None:
         """Fans, macros, and M290, which shifts all heights as for a tool whose nozzle stands higher than others."""
@@ -164,6 +166,9 @@ class _Simulation:
 
     def end(self) -> None:
         """Judge the file as a whole."""
+        lines = (int(self.lines[0]), int(self.lines[-1])) if len(self.lines) else (len(self.motion.rows), 0)
+        reached = (e for e in (*self.motion.events, *self.motion.odd) if e.number <= (self.end_line or e.number))
+        allowed.check(reached, self.machine, lines, self.found)
         last, error, warning = max(1, self.motion.lines), self.found.error, self.found.warning
         if self.relative:
             error("relative", last, "the file ends in relative coordinates (G91)", "write G90 after the last G91")

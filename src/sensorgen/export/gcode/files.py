@@ -1,5 +1,6 @@
 """Files of G-code from strangers: opened as text, or refused with the reason."""
 
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -10,8 +11,12 @@ _MAGIC = {
     b"GCDE": "binary G-code of Prusa's; export it as plain text (in PrusaSlicer: Preferences, Supports binary G-code)",
     b"PK\x03\x04": "a zip archive, perhaps a 3MF; take the .gcode file out of it",
     b"\x1f\x8b": "packed by gzip; unpack it",
+    b"\xff\xfe": "text as UTF-16; save it as UTF-8",
+    b"\xfe\xff": "text as UTF-16; save it as UTF-8",
 }
+_MARK = b"\xef\xbb\xbf"  # of UTF-8, which some editors write first
 _PEEK = 1 << 16
+_COMMAND = re.compile(rb"^[ \t]*(?:N[0-9]+[ \t]*)?[GMT]-?[0-9]", re.MULTILINE | re.IGNORECASE)
 
 
 Source = Path | bytes | Iterable[str]
@@ -43,7 +48,11 @@ def text_of(source: Source) -> bytes:
     with reading(source):
         text = source.read_bytes()
     _refuse(source, text[:_PEEK])
-    return _one_end(text)
+    text = _one_end(text.removeprefix(_MARK))
+    if not _COMMAND.search(text):
+        first = text.strip().partition(b"\n")[0].decode("utf-8", "replace")
+        raise BadInput(f"{str(source)!r} is no G-code: no line has a command; the first says {first[:60]!r}")
+    return text
 
 
 def _one_end(text: bytes) -> bytes:

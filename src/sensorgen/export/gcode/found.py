@@ -47,9 +47,13 @@ class Findings(list[Found]):
 
 
 def merged(found: Iterable[Found]) -> tuple[Found, ...]:
-    """Findings of the same words as one, which has the first line; the severe first, and then by line."""
+    """Findings of the same words as one, which has the first line; the severe first, and then by line.
+
+    Bytes of the file that are no UTF-8 are written out, so that any text can hold them.
+    """
     kept: dict[tuple[str, str, str], Found] = {}
-    for f in found:
+    for given in found:
+        f = replace(given, message=given.message.encode("utf-8", "backslashreplace").decode())
         key = (f.rule, f.severity, f.message)
         old = kept.get(key)
         kept[key] = f if old is None else replace(old, count=old.count + f.count)

@@ -1,36 +1,47 @@
 """Temperatures set for the heaters of a printer, and their limits."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan, nan
 
+from sensorgen.design import materials
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode.found import Findings
 from sensorgen.export.gcode.moves import Event
 
+WITHIN_C = 15.0  # slicers raise a temperature by less after the first layer without waiting
+BED_WITHIN_C = 15.0  # sources that give the bed one temperature differ by as much: 60 to 75 C for the same TPU
 _NAMED = {"G10": "is set", "M116": "is waited for", "M568": "gets a state"}  # what happens to a tool that P names
 
 
 @dataclass
 class Heat:
-    """Settings of a tool: temperatures while printing and waiting [C], and whether it is on."""
+    """Settings of a tool: temperatures while printing and waiting [C], whether it is on, and what was waited for."""
 
     active_c: float = 0.0
     standby_c: float = 0.0
     on: bool = True
+    awaited_c: float = 0.0  # no hotter than this it is known to be
+    rested: bool = False  # in the turret at its standby temperature, and not waited for since
 
 
 class Heaters:
     """All heaters of a printer, cold at first, while its file is followed."""
 
-    def __init__(self, machine: Printer, found: Findings) -> None:
-        """Take the list that findings go to."""
+    def __init__(self, machine: Printer, loaded: Mapping[int, str], found: Findings) -> None:
+        """Take the material of each tool, as far as it is known, and the list that findings go to."""
         self.machine, self.found = machine, found
+        self.materials = {tool: materials.load(name) for tool, name in loaded.items()}
         self.tools = {tool: Heat() for tool in machine.tool_numbers}
+        self.bed = Heat()
 
-    def take(self, tool: int) -> None:
-        """A tool is taken: its heater goes on, also where it was switched off before."""
+    def take(self, tool: int, *, waits: bool) -> None:
+        """A tool is taken, by a macro that ``waits`` for its heat or not; it goes on, also where it was off before."""
         if tool in self.tools:
-            self.tools[tool].on = True
+            heat = self.tools[tool]
+            heat.on, heat.rested = True, self.machine.control.names_tools and heat.standby_c < heat.active_c
+            if waits:
+                _wait(heat)
 
     def hot(self) -> list[int]:
         """Tools that are heated."""
@@ -44,11 +55,43 @@ class Heaters:
             message = f"tool {tool} moves filament at {given_c:g} C; below {coldest_c:g} C it is cold"
             self.found.error("cold", number, message, f"heat it before (G10 P{tool} S..)")
 
+    def check_printing(self, tool: int, number: int) -> None:
+        """Whether the tool that prints a line, and the bed, suit its material and have been waited for."""
+        self._check_material(tool, number)
+        heat, advice = self.tools.get(tool), f"wait for it before (M116 P{tool})"
+        if heat and heat.active_c > heat.awaited_c + WITHIN_C:
+            message = f"tool {tool} prints without waiting for its {heat.active_c:g} C"
+            self.found.error("wait", number, message, advice)
+        elif heat and heat.rested:
+            message = f"tool {tool} prints at {heat.active_c:g} C straight from standby ({heat.standby_c:g} C)"
+            self.found.warning("wait", number, message, f"{advice}, if the macros of the tool change do not")
+        if self.bed.active_c > self.bed.awaited_c + WITHIN_C:
+            message = f"lines are printed without waiting for the bed's {self.bed.active_c:g} C"
+            self.found.error("wait", number, message, "wait for it before (M190)")
+
+    def _check_material(self, tool: int, number: int) -> None:
+        material, heat = self.materials.get(tool), self.tools.get(tool)
+        if material is None or heat is None:
+            return
+        for what, given_c, quantity, command in (
+            (f"tool {tool}", heat.active_c if heat.on else 0.0, "nozzle_temperature_c", f"G10 P{tool} S"),
+            ("the bed", self.bed.active_c, "bed_temperature_c", "M190 S"),
+        ):
+            low_c, high_c = material.print_range(quantity, BED_WITHIN_C if what == "the bed" else WITHIN_C)
+            if not low_c <= given_c <= high_c:
+                message = f"{what} is at {given_c:g} C for {material.name}; its sources give {low_c:g} to {high_c:g} C"
+                self.found.error("material", number, message, f"set it in this range ({command}..)")
+
     def obey(self, event: Event, in_hand: int) -> None:
         """Follow a command that sets a temperature or names a tool by P; G10 with L does neither."""
         command, code = event.command, event.command.code
         if code in ("M140", "M190"):
             self._check_hot(event, "the bed", self.machine.max_bed_c)
+            given_c = command.number("S" if command.has("S") else "R")
+            self.bed.active_c = self.bed.active_c if given_c is None or isnan(given_c) else given_c
+            self.bed.awaited_c = min(self.bed.awaited_c, self.bed.active_c)
+            if code == "M190":
+                _wait(self.bed)
         elif code in ("M104", "M109"):
             self._set(event, "T", in_hand)
         elif code in _NAMED and not (code == "G10" and command.has("L")):
@@ -59,6 +102,10 @@ class Heaters:
             heat = self.tools.get(_tool(event, "P", in_hand))  # type: ignore[call-overload]
             if heat and code == "M568" and command.has("A"):  # off, standby or on
                 heat.on = command.number("A") != 0
+            if code == "M116":
+                every = [*self.tools.values(), self.bed]
+                for one in ([heat] if heat else []) if command.has("P") else every:
+                    _wait(one)
 
     def _set(self, event: Event, letter: str, in_hand: int) -> None:
         """Set a tool's temperatures: of the one that ``letter`` names, or else the one in hand."""
@@ -73,6 +120,9 @@ class Heaters:
             heat, active_c, standby_c = self.tools[int(tool)], command.number("S"), command.number("R")
             heat.active_c = heat.active_c if active_c is None or isnan(active_c) else active_c
             heat.standby_c = heat.standby_c if standby_c is None or isnan(standby_c) else standby_c
+            heat.awaited_c = min(heat.awaited_c, heat.active_c)
+            if command.code == "M109":
+                _wait(heat)
             heat.on |= command.code in ("M104", "M109")  # G10 and M568 S leave on or off what is
 
     def check_tool(self, number: int, tool: float, what: str) -> None:
@@ -87,6 +137,10 @@ class Heaters:
             if value_c is not None and not value_c <= most_c:
                 message = f"{what} is set to {value_c:g} C; the limit is {most_c:g} C"
                 self.found.error("temperature", event.number, message, "print cooler")
+
+
+def _wait(heat: Heat) -> None:
+    heat.awaited_c, heat.rested = heat.active_c, False
 
 
 def _tool(event: Event, letter: str, in_hand: int) -> float:

@@ -1,11 +1,13 @@
 """What the moves of a file ask of the axes: each rule looks at all moves at once."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.design import materials
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode.found import Found
 from sensorgen.export.gcode.moves import NO_TOOL, Motion
@@ -33,23 +35,39 @@ def check(motion: Motion, machine: Printer) -> Iterator[Found]:
         yield from rule(motion, machine)
 
 
-def check_loaded(motion: Motion, loaded: Mapping[int, str]) -> Iterator[Found]:
-    """Refuse lines of tools on which there is nothing.
+def check_loaded(motion: Motion, machine: Printer, loaded: Mapping[int, str], *, others_empty: bool) -> Iterator[Found]:
+    """Lines that suit no material of their tool: melted faster than it can be, or of a tool on which there is nothing.
 
     Parameters
     ----------
     motion : Motion
         The file.
+    machine : Printer
+        Who is to print it.
     loaded : mapping of int to str
         Material of each tool that has one.
+    others_empty : bool
+        Whether nothing is on the other tools.
     """
     tools = motion.tools.column(len(motion.rows), NO_TOOL)
-    for tool in np.setdiff1d(tools[motion.extruded_mm > 0], [NO_TOOL, *loaded]).astype(int).tolist():
-        number = int(motion.number[np.flatnonzero((tools == tool) & (motion.extruded_mm > 0))[0]])
+    if others_empty:
         known = ", ".join(f"{name} on {one}" for one, name in loaded.items())
-        yield Found(
-            "tool", "error", number, f"tool {tool} prints, and nothing is on it; loaded are {known}", "use another tool"
-        )
+        for tool in np.setdiff1d(tools[motion.extruded_mm > 0], [NO_TOOL, *loaded]).astype(int).tolist():
+            message = f"tool {tool} prints, and nothing is on it; loaded are {known}"
+            rows = (tools == tool) & (motion.extruded_mm > 0)
+            yield Found("tool", "error", int(motion.number[rows][0]), message, "use another tool")
+    lines = (motion.extruded_mm > 0) & (motion.across_mm > 0)
+    area_mm2 = motion.extruded_mm * (math.pi / 4 * machine.filament_mm**2) / np.where(lines, motion.length_mm, 1.0)
+    flow_mm3_s = np.where(lines, area_mm2 * motion.feed_mm_min / MM_MIN, 0.0)
+    for tool, name in loaded.items():
+        most = materials.load(name).print_range("max_flow_mm3_s", 0.0)[1]
+        wrong = (tools == tool) & (flow_mm3_s > most * (1 + 1e-6))
+        fastest = float(flow_mm3_s[wrong].max(initial=0.0))
+        yield from _found(
+            motion, wrong, "melt", "error",
+            f"tool {tool} prints {fastest:.3g} mm3/s of {name}; it melts {most:g} mm3/s",
+            "print slower or thinner lines",
+        )  # fmt: skip
 
 
 def _found(motion: Motion, wrong: Mask, rule: str, severity: str, message: str, advice: str) -> Iterator[Found]:
@@ -123,14 +141,14 @@ def _speed(motion: Motion, machine: Printer) -> Iterator[Found]:
     way = np.hypot(across, up)
     rate = feed / np.where(way > 0, way, np.maximum(filament, 1e-12))
     limits = machine.max_speed_mm_s
-    extrudes = motion.extruded_mm > 0
+    prints = (motion.extruded_mm > 0) & (across > 0)  # filament that is pushed with Z alone makes good for a retraction
     axes = (("X and Y", across, limits.xy), ("Z", up, limits.z), ("E", filament, limits.extruder))
     for name, length, limit in axes:
         fast = rate * length
         over = fast > limit * (1 + 1e-6)
         for rows, severity, what, then in (
-            (over & extrudes, "error", "a line is printed", "it was sliced for another speed"),
-            (over & ~extrudes, "warning", "a move without printing goes", "the firmware slows it down"),
+            (over & prints, "error", "a line is printed", "it was sliced for another speed"),
+            (over & ~prints, "warning", "a move without printing goes", "the firmware slows it down"),
         ):
             most = float(fast[rows].max()) * MM_MIN if rows.any() else 0.0
             yield from _found(
@@ -141,15 +159,29 @@ def _speed(motion: Motion, machine: Printer) -> Iterator[Found]:
 
 
 def _purge(motion: Motion, machine: Printer) -> Iterator[Found]:
-    """Filament that is pushed on the spot stays within what was seen to work."""
-    most = machine.control.longest_purge_mm
-    pushed = np.where(motion.across_mm > 0, 0.0, np.abs(motion.filament_mm))
-    wrong = pushed > most + HAIR_MM
-    value = float(pushed.max()) if wrong.any() else 0.0
-    yield from _found(
-        motion, wrong, "purge", "error", f"{value:g} mm of filament are moved on the spot; the limit is {most:g} mm",
-        "purge in shorter pieces; left-over absolute E looks like this too",
-    )  # fmt: skip
+    """Filament that is pushed at one place, or drawn back in all, stays within what was seen to work."""
+    control, count = machine.control, len(motion.rows)
+    tools = motion.tools.column(count, NO_TOOL)
+    rests = motion.across_mm == 0
+    rests[1:] &= tools[1:] == tools[:-1]  # each tool counts by itself
+    pushed = np.cumsum(np.where(rests, motion.filament_mm, 0.0))
+    last = np.maximum.accumulate(np.where(rests, -1, np.arange(count)))
+    at_once = pushed - np.where(last >= 0, pushed[last], 0.0)
+    back = np.zeros(count)
+    for tool in np.unique(tools):
+        rows = tools == tool
+        given = np.cumsum(motion.filament_mm[rows])
+        back[rows] = np.maximum.accumulate(np.maximum(given, 0.0)) - given
+    shorter = "purge in shorter pieces; left-over absolute E looks like this too"
+    forward = "push it forward before it is drawn back again: beyond this it leaves the hot end"
+    for mm, most, what, advice in (
+        (at_once, control.longest_purge_mm, "pushed at one place", shorter),
+        (back, control.longest_retraction_mm, "drawn back", forward),
+    ):
+        wrong = mm > most + HAIR_MM
+        value = float(mm.max(initial=0.0))
+        message = f"{value:g} mm of filament are {what}; the limit is {most:g} mm"
+        yield from _found(motion, wrong, "purge", "error", message, advice)
 
 
 def _read(motion: Motion, _: Printer) -> Iterator[Found]:

@@ -59,14 +59,21 @@ class _Steps:
         far = ~np.all([np.abs(rows[:, k]) < MOST_MM for k in range(9)], axis=0)
         rows[far, :9] = np.clip(rows[far, :9], -MOST_MM, MOST_MM)
         faults = [Fault(int(number), "a number beyond all measure") for number in rows[far, 9][:1]]
-        back = self.moves & (self.code < 2) & ~np.isnan(self.words["R"])
-        faults += [Fault(n >> SHIFT, "R of G0 or G1 goes by a stored place") for n in self.place[back].tolist()]
+        straight = self.moves & (self.code < 2)
+        for letters, what in (
+            ("R", "R of G0 or G1 goes by a stored place"),
+            ("IJ", "I or J stands in a straight move"),
+        ):
+            given = straight & np.any([~np.isnan(self.words[letter]) for letter in letters], axis=0)
+            faults += [Fault(n >> SHIFT, what) for n in self.place[given].tolist()]
         arcs, wrong = self._arcs(rows)
-        before = iter(self._rows([*(place for place, _ in said.events), *(place for place, _, _ in said.changes)]))
-        events = [Event(next(before), place >> SHIFT, command) for place, command in said.events]
+        told = [*said.events, *said.odd]
+        before = iter(self._rows([*(place for place, _ in told), *(place for place, _, _ in said.changes)]))
+        events = [Event(next(before), place >> SHIFT, command) for place, command in told]
         changes = [Change(next(before), place >> SHIFT, tool, macro) for place, tool, macro in said.changes]
         return Motion(
-            rows, arcs, events, changes, self._track(said.tools), tuple(said.kinds), self._track(said.kind),
+            rows, arcs, events[: len(said.events)], events[len(said.events) :], changes, self._track(said.tools),
+            tuple(said.kinds), self._track(said.kind),
             self._track(said.width_mm), self._track(said.height_mm), self._track(said.layer),
             self._track(said.absolute_e), sorted([*said.faults, *faults, *wrong], key=lambda fault: fault.number),
             said.lines, said.maker,

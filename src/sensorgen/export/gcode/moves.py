@@ -71,6 +71,8 @@ class Motion:
         Moves that do not go straight.
     events : sequence of Event
         All other commands.
+    odd : sequence of Event
+        Moves that have words of their own, as those of further axes; they are among the moves too.
     changes : sequence of Change
         Tools in the order in which they are taken, also the same again; ``NO_TOOL`` where one is put down.
     tools : Track
@@ -92,6 +94,7 @@ class Motion:
     rows: Floats
     arcs: Arcs
     events: Sequence[Event]
+    odd: Sequence[Event]
     changes: Sequence[Change]
     tools: Track
     kinds: tuple[str, ...]

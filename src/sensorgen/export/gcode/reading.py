@@ -45,6 +45,8 @@ class Reading:
     ----------
     events : list of (int, Command)
         Places and commands that are no moves.
+    odd : list of (int, Command)
+        Places of moves with other words than ``columns.WORDS``, as those of further axes, and the moves.
     changes : list of (int, int, bool)
         Place, tool and whether a macro takes it.
     faults : list of Fault
@@ -64,6 +66,7 @@ class Reading:
     def __init__(self, text: bytes, prime_macro: str = "") -> None:
         """Read a text, each line of which ends with a line feed; ``prime_macro`` as for ``follow``."""
         self.events: list[tuple[int, Command]] = []
+        self.odd: list[tuple[int, Command]] = []
         self.changes: list[tuple[int, int, bool]] = []
         self.faults: list[Fault] = []
         self.scale, self.relative, self.absolute_e, self.level = Holding(), Holding(), Holding(), Holding()
@@ -160,6 +163,8 @@ class Reading:
         """Add a row for a move, or for a command that names the place anew."""
         if command.code in _MOVES:
             numbers = [self._number(command, letter, place) for letter in columns.WORDS]
+            if any(letter not in columns.WORDS for letter, _ in command.words):
+                self.odd.append((place, command))
             if command.has("H") and command.number("H") != 0:
                 self._fault(place, f"H{command.text('H')} of {command.code}: an axis goes until it meets something")
         elif command.code == "G92":

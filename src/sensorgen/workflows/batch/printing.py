@@ -5,12 +5,15 @@ from dataclasses import asdict
 from pathlib import Path
 from shutil import rmtree
 
+from sensorgen.asprinted import agreement
 from sensorgen.asprinted import printed as asprinted
 from sensorgen.checks.review import Step
 from sensorgen.core import files as store
 from sensorgen.core.errors import SensorgenError
 from sensorgen.export import slicing
-from sensorgen.export.gcode.check import check
+from sensorgen.export.gcode.check import check_motion
+from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.paths import paths_of
 from sensorgen.export.slicers import curaengine, versions
 from sensorgen.export.slicing import Placed, Sliced
 from sensorgen.prediction import bodies
@@ -49,7 +52,7 @@ def gcode(
     Parameters
     ----------
     name : str
-        Of the batch; ``<name>.<slicer>.gcode`` is for the printer.
+        Of the batch; ``<name>.<slicer>.gcode`` is for the printer, ``<name>.<slicer>.refused.gcode`` has errors.
     found : sequence of Placed
         The specimens.
     slicer : str
@@ -79,7 +82,12 @@ def gcode(
         store.write(own, {settings: json_bytes(asdict(engine))})
     rmtree(inside)  # what is left are the bodies again, as the slicer took them
     loaded = tools(piece.design for piece in found)
-    checked = check(ready, machine, loaded, others_empty=True)
+    motion = follow(ready, machine.control.prime_macro)
+    lines, checked = paths_of(motion, machine), check_motion(motion, machine, loaded, others_empty=True)
+    for piece in found:
+        checked = checked.with_more(agreement.check(piece.design, lines, motion.changes, piece.sensor_mm()))
+    if checked.errors():
+        ready = ready.replace(ready.with_suffix(".refused.gcode"))
     step("as printed")
     firsts: dict[str, Placed] = {}
     for piece in found:

@@ -1,0 +1,330 @@
+"""G-code against the design that it prints: heights, tools, volumes, widths of lines, purging, and what is beside."""
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from itertools import groupby, zip_longest
+
+import numpy as np
+import shapely
+
+from sensorgen.asprinted.beads import Beads, beads
+from sensorgen.asprinted.registration import placed
+from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.design.design import Design
+from sensorgen.design.tower import PRIME_MM3
+from sensorgen.export.gcode.files import Source
+from sensorgen.export.gcode.found import Found
+from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.moves import NO_TOOL, Change
+from sensorgen.export.gcode.paths import NOT_MODEL, Paths
+from sensorgen.scene.layers import LayerRegions, Region, drawn, narrow_mm, parts
+from sensorgen.scene.scene import Point
+
+LEVEL_MM = 0.005  # a line this far from the top of a layer lies in none; G-code has three decimals
+NEAR_MIDDLE = 0.1  # of a layer: slicers may sample a face this near to mid-height on either side
+LINES_WIDE = 4.0  # parts as wide as this are filled evenly; of narrower ones slicers print whole lines
+EVEN, UNEVEN = (0.85, 1.15), (0.6, 2.0)  # printed over drawn volume of wide parts, and of others at least a line wide
+WIDEST = 2.0  # lines, of one printed line
+THINNEST, LONG_MM = 0.25, 2.0  # a line is thin that is thinner, in lines, and longer
+SOME_OF_A_PART = 0.4  # of its volume; less is no print of it
+SHIFTED = 0.35  # lines, by which a tool's middle may be off; walls and seams make 0.1
+SOME_THIN = 0.6  # share of a tool's length that may be thin
+FOREIGN = 0.05  # share of a tool's volume in a layer that may lie where its material is not drawn
+PURGED_MM3 = PRIME_MM3 / 3  # that fill the nozzle after a change of tools; towers take PRIME_MM3
+_SUPPORT = "support"
+
+
+def check(
+    design: Design, paths: Paths, changes: Sequence[Change], centre_mm: Point, *, alone: bool = False
+) -> list[Found]:
+    """What disagrees with the design, as findings about lines of the file.
+
+    Parameters
+    ----------
+    design : Design
+        That is to be printed.
+    paths : Paths
+        Lines of the file, with the printer's own tool numbers, in the design's own directions.
+    changes : sequence of Change
+        Tools in the order in which they are taken.
+    centre_mm : (float, float)
+        Middle of the piece on the bed [mm].
+    alone : bool
+        Whether the file prints nothing else.
+    """
+    corner = np.array(centre_mm) - np.array(design.printed.size_mm[:2]) / 2
+    ends = [p[:, :2] - corner for p in (paths.start_mm, paths.end_mm)]
+    inside = ((ends[0] + ends[1]) / 2 > -design.machine.line_mm() / 4).all(1)
+    inside &= ((ends[0] + ends[1]) / 2 < np.array(design.printed.size_mm[:2]) + design.machine.line_mm() / 4).all(1)
+    waste = np.array([kind in NOT_MODEL for kind in paths.kinds])[paths.kind]
+    model = ~waste & (paths.length_mm() > 0)
+    piece = model & inside
+    if not piece.any():
+        way = ends[1][model] if model.any() else np.array([[np.nan, np.nan]])
+        off = np.maximum(-way, way - np.array(design.printed.size_mm[:2])).clip(0.0)
+        message = f"nothing is printed at the place of {design.name}; the nearest line is "
+        message += f"{float(np.hypot(*off.T).min()):.3g} mm away" if model.any() else "not there at all"
+        return [Found("place", "error", 1, message, "slice this design")]
+    lines, layers = beads(design, paths, centre_mm), _sampled(design, 0.0)
+    return [
+        *_heights(design, paths, piece),
+        *_tools(design, lines, layers),
+        *_volumes(design, lines, layers),
+        *_parts(design, lines, layers),
+        *_shifts(design, lines, layers),
+        *_widths(design, lines),
+        *_purged(design, paths, changes, piece),
+        *_beside(paths, ends, design.printed.size_mm, model & ~inside & alone, waste),
+    ]
+
+
+def check_file(design: Design, source: Source) -> list[Found]:
+    """The same for a file that prints the design at any place, alone or with others.
+
+    Raises
+    ------
+    BadInput
+        No G-code, or it does not print this design; see :func:`sensorgen.asprinted.registration.placed`.
+    """
+    place = placed(design, source)
+    return check(design, place.paths, follow(source, design.machine.control.prime_macro).changes, place.centre_mm)
+
+
+def _sampled(design: Design, off: float) -> tuple[LayerRegions, ...]:
+    """The layers, sampled ``off`` layers above mid-height."""
+    scene = design.printed
+    shift = off * design.layers.layer_mm
+    return drawn(scene, [z + shift for z in design.layers.boundaries_mm(scene.size_mm[2])])
+
+
+def _line(number: Whole, rows: Mask) -> tuple[int, int]:
+    """First line of the file among some rows, and how many there are."""
+    lines = np.unique(number[rows])
+    return int(lines[0]), len(lines)
+
+
+def _heights(design: Design, paths: Paths, piece: Mask) -> Iterator[Found]:
+    """The first layer is as high as the design's, and every line lies in a layer, in order."""
+    tops = np.array(design.layers.boundaries_mm(design.printed.size_mm[2]))[1:]
+    first_mm, layer_mm = design.layers.first_layer_mm, design.layers.layer_mm
+    z = paths.end_mm[:, 2]
+    pushed = paths.length_mm() > 0
+    lowest = float(z[pushed].min())
+    if abs(lowest - first_mm) > LEVEL_MM:
+        number, count = _line(paths.number, pushed & (z == lowest))
+        message = f"the lowest line lies at Z {lowest:g} mm; the first layer of {design.name} is {first_mm:g} mm"
+        yield Found("first-layer", "error", number, message, "set the first layer's height, and no offset of Z", count)
+    near = np.searchsorted((tops[1:] + tops[:-1]) / 2, z)  # the layer whose top is nearest
+    slanted = np.abs(paths.start_mm[:, 2] - z) > LEVEL_MM
+    between = piece & ((np.abs(z - tops[near]) > LEVEL_MM) | slanted)
+    if between.any():
+        number, count = _line(paths.number, between)
+        worst = float(z[between][0])
+        message = (
+            f"lines at Z {worst:g} mm lie in no layer of {design.name}: {first_mm:g} mm, then every {layer_mm:g} mm"
+        )
+        yield Found("layers", "error", number, message, "slice with this design's layers", count)
+    order = near[piece & ~between]
+    if (np.diff(order) < 0).any():
+        back = paths.number[piece & ~between][1:][np.diff(order) < 0]
+        message = f"a layer of {design.name} is printed after one that lies higher"
+        yield Found("layers", "error", int(back[0]), message, "print layer by layer", len(back))
+    yield from _missing(design, paths, piece & ~between, near, tops)
+
+
+def _missing(design: Design, paths: Paths, rows: Mask, near: Whole, tops: Real) -> Iterator[Found]:
+    """No layer is without a line; ``near`` is the layer of each line, and ``rows`` are those that lie in one."""
+    there = np.zeros(len(tops), bool)
+    there[near[rows]] = True
+    drawn_there = [list(layer.regions.values()) for layer in _sampled(design, 0.0)]
+    wide = np.array([any(_wide(r, design.machine.line_mm()).area > 0 for r in regions) for regions in drawn_there])
+    narrow = ~wide & np.array([bool(regions) for regions in drawn_there])
+    for absent, severity, advice in (
+        (~there & wide, "error", "slice again; the file was cut, or layers were removed"),
+        (
+            ~there & narrow,
+            "warning",
+            "its parts are narrower than a line, and some walls leave them out: look at the layer",
+        ),
+    ):
+        for _, group in groupby(enumerate(np.flatnonzero(absent).tolist()), key=lambda pair: pair[1] - pair[0]):
+            layers = [layer for _, layer in group]
+            after = paths.number[rows & (near < layers[0])]
+            which = f"layer {layers[0] + 1}" + (f" to {layers[-1] + 1}" if len(layers) > 1 else "")
+            what = f"nothing of {design.name} is printed up to Z {tops[layers[-1]]:g} mm"
+            message = f"{which} of {len(tops)} is missing: {what}"
+            yield Found("layers", severity, int(after.max(initial=1)), message, advice, len(layers))
+
+
+@lru_cache(maxsize=256)
+def _wide(region: Region, width_mm: float) -> Region:
+    """The parts of a region that are at least so wide."""
+    half = 0.49 * width_mm
+    return region.buffer(-half, join_style="mitre").buffer(half, join_style="mitre")
+
+
+def _tools(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iterator[Found]:
+    """Each tool prints where its material is drawn."""
+    found: dict[int, list[tuple[int, float, int]]] = {}
+    middle = shapely.points((lines.start_mm + lines.end_mm) / 2)
+    around = [layers, _sampled(design, NEAR_MIDDLE), _sampled(design, -NEAR_MIDDLE)]
+    names = {design.tool(body.material): body.material for body in design.printed.bodies}
+    for tool in names:
+        mine = [body.name for body in design.printed.bodies if design.tool(body.material) == tool]
+        for k in np.unique(lines.layer[lines.tool == tool]).tolist():
+            rows = np.flatnonzero((lines.tool == tool) & (lines.layer == k))
+            region = shapely.union_all([each[k].region(name) for each in around for name in mine])
+            shapely.prepare(region)
+            away = rows[~shapely.dwithin(middle[rows], region, design.machine.line_mm())]
+            share = float(lines.volume_mm3[away].sum() / lines.volume_mm3[rows].sum())
+            if share > FOREIGN:
+                found.setdefault(tool, []).append((k, share, int(lines.number[away][0])))
+    for tool, wrong in found.items():
+        layer, share, number = max(wrong, key=lambda each: each[1])
+        message = (
+            f"tool {tool} prints {share:.0%} of its lines of layer {layer + 1} where no {names[tool]} is drawn; "
+            f"{design.name} has {names[tool]} on tool {tool}"
+        )
+        yield Found("material", "error", number, message, "put each material on its tool (--tool)", len(wrong))
+
+
+def _volumes(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iterator[Found]:
+    """Each body takes about its volume in each layer; slicers are free with parts under a few lines wide."""
+    line, bodies = design.machine.line_mm(), design.printed.bodies
+    around = [layers, _sampled(design, NEAR_MIDDLE), _sampled(design, -NEAR_MIDDLE)]
+    printed = np.zeros((len(layers), len(bodies)))
+    np.add.at(printed, (lines.layer, lines.body), lines.volume_mm3)
+    for n, body in enumerate(bodies):
+        infill = design.infill.get(body.material)
+        dense = (100.0 if infill is None or infill.percent is None else infill.percent) / 100
+        wrong: list[tuple[int, float, float, float]] = []
+        areas: dict[Region, tuple[float, float, float]] = {}
+        for k, layer in enumerate(layers):
+            samples = []
+            for region in {each[k].region(body.name) for each in around}:
+                if region not in areas:
+                    areas[region] = region.area, _wide(region, line).area, _wide(region, LINES_WIDE * line).area
+                samples.append(areas[region])
+            low = min(EVEN[0] * wide * dense + UNEVEN[0] * (lined - wide) * dense for _, lined, wide in samples)
+            high = max(EVEN[1] * wide + UNEVEN[1] * (all_ - wide) for all_, _, wide in samples)
+            spare = 2 * line * line * layer.height_mm  # ends of a line or two, and what a neighbour laps over
+            spare += UNEVEN[1] * line * layer.height_mm * max(all_ > 0 and all_ - lined for all_, lined, _ in samples)
+            given = printed[k, n]
+            if not low * layer.height_mm - spare <= given <= high * layer.height_mm + spare:
+                wrong.append((k, given, low * layer.height_mm, high * layer.height_mm))
+        for (_, above), group in groupby(enumerate(wrong), key=lambda p: (p[1][0] - p[0], p[1][1] > p[1][3])):
+            rows = [row for _, row in group]
+            first, last = rows[0][0], rows[-1][0]
+            mine = (lines.body == n) & (lines.layer >= first) & (lines.layer <= last)
+            number = _line(lines.number, mine)[0] if mine.any() else 1
+            where = f"layer {first + 1}" + (f" to {last + 1}" if last > first else "")
+            given, low, high = (sum(row[column] for row in rows) for column in (1, 2, 3))
+            message = f"{body.name} takes {given:.3g} mm3 in {where}; drawn are {low:.3g} to {high:.3g} mm3"
+            advice = "lower the flow" if above else "slice again: lines are missing, too thin, or of another tool"
+            yield Found("volume", "error", number, message, advice, len(rows))
+
+
+def _parts(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iterator[Found]:
+    """Every part of a body that is at least a line wide is printed."""
+    for n, body in enumerate(design.printed.bodies):
+        infill = design.infill.get(body.material)
+        dense = (100.0 if infill is None or infill.percent is None else infill.percent) / 100
+        missing = []
+        for k, layer in enumerate(layers):
+            region, rows = layer.region(body.name), np.flatnonzero((lines.layer == k) & (lines.body == n))
+            plan = parts(region)
+            others = (parts(_sampled(design, off)[k].region(body.name)) for off in (NEAR_MIDDLE, -NEAR_MIDDLE))
+            if len(plan) < 2 or not len(rows) or any(len(other) != len(plan) for other in others):
+                continue  # or a slicer may see another plan
+            owner = shapely.STRtree(plan).nearest(shapely.points((lines.start_mm + lines.end_mm)[rows] / 2))
+            volume = np.bincount(owner, lines.volume_mm3[rows], len(plan))
+            least = SOME_OF_A_PART * dense * layer.height_mm * shapely.area(plan)
+            lost = np.flatnonzero((narrow_mm(plan) >= design.machine.line_mm()) & (volume < least))
+            missing += (
+                [(k, len(lost), len(plan), plan[lost[0]].centroid, int(lines.number[rows[0]]))] if len(lost) else []
+            )
+        if missing:
+            k, count, of, at, number = missing[0]
+            message = (
+                f"{count} of {of} parts of {body.name} in layer {k + 1} are not printed, the first at x {at.x:.3g}, "
+            )
+            message += f"y {at.y:.3g} mm from the corner"
+            yield Found("volume", "error", number, message, "slice again: lines are missing", len(missing))
+
+
+def _shifts(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iterator[Found]:
+    """Each tool prints at its place in the piece: it spans what is drawn of its material."""
+    for tool in np.unique(lines.tool).tolist():
+        mine = [body.name for body in design.printed.bodies if design.tool(body.material) == tool]
+        rows = lines.tool == tool
+        plan = [layers[k].region(name) for k in np.unique(lines.layer[rows]).tolist() for name in mine]
+        x0, y0, x1, y1 = shapely.total_bounds(plan)
+        ends = np.concatenate([lines.start_mm[rows], lines.end_mm[rows]])
+        shift = (ends.min(0) + ends.max(0)) / 2 - [(x0 + x1) / 2, (y0 + y1) / 2]
+        if np.abs(shift).max() > SHIFTED * design.machine.line_mm():
+            message = f"what tool {tool} prints is shifted by x {shift[0]:.2g}, y {shift[1]:.2g} mm against the drawing"
+            number = int(lines.number[rows][0])
+            yield Found("place", "error", number, message, "slice without offsets of tools, or set them on the printer")
+
+
+def _widths(design: Design, lines: Beads) -> Iterator[Found]:
+    """No line is far wider than the nozzle lays, or far thinner."""
+    line = design.machine.line_mm()
+    length = np.hypot(*(lines.end_mm - lines.start_mm).T)
+    thin = (lines.width_mm < THINNEST * line) & (length > LONG_MM)
+    for tool in np.unique(lines.tool):  # a slicer fills a gap with a thin line now and then
+        mine = lines.tool == tool
+        thin[mine] &= length[thin & mine].sum() > SOME_THIN * length[mine].sum()
+    for wrong, what, worst in (
+        ((lines.width_mm > WIDEST * line) & (length > line), "wide", np.max),
+        (thin, "thin", np.min),
+    ):
+        if wrong.any():
+            number, count = _line(lines.number, wrong)
+            width = float(worst(lines.width_mm[wrong]))
+            message = (
+                f"a line is {width:.2g} mm {what}; lines of a {design.machine.nozzle_mm:g} mm nozzle are {line:g} mm"
+            )
+            yield Found("width", "error", number, message, "check E, the filament's diameter and the flow", count)
+
+
+def _purged(design: Design, paths: Paths, changes: Sequence[Change], piece: Mask) -> Iterator[Found]:
+    """Between taking a tool and its first line of the piece, it fills its nozzle elsewhere."""
+    volume = paths.volume_mm3(design.machine.filament_mm)
+    missing: dict[int, list[tuple[int, float]]] = {}
+    taken = [change for k, change in enumerate(changes) if k == 0 or change.tool != changes[k - 1].tool]
+    for change, after in zip_longest(taken, taken[1:]):
+        end = math.inf if after is None else after.number
+        rows = np.flatnonzero((paths.number > change.number) & (paths.number < end))
+        own = rows[piece[rows]]
+        if not len(own) or change.macro or change.tool == NO_TOOL:  # a macro that takes a tool primes it
+            continue
+        given = float(volume[rows[rows < own[0]]].sum())
+        if given < PURGED_MM3:
+            missing.setdefault(change.tool, []).append((int(paths.number[own[0]]), given))
+    for tool, found in missing.items():
+        number, given = min(found)
+        message = (
+            f"tool {tool} prints {given:.3g} mm3 elsewhere before its first line; {PURGED_MM3:g} mm3 fill its nozzle"
+        )
+        yield Found("purge", "error", number, message, "use a prime tower", len(found))
+
+
+def _beside(paths: Paths, ends: list[Real], size_mm: Sequence[float], stray: Mask, waste: Mask) -> Iterator[Found]:
+    """Tower and skirt keep clear of the piece, and nothing else is printed beside it."""
+    support = np.array([kind.startswith(_SUPPORT) for kind in paths.kinds])[paths.kind]
+    low, high = np.minimum(*ends), np.maximum(*ends)
+    near = waste & ~support & (paths.length_mm() > 0) & (high > 0).all(1) & (low < np.array(size_mm[:2])).all(1)
+    rows = np.flatnonzero(near)
+    ways = shapely.linestrings(np.stack([ends[0][rows], ends[1][rows]], axis=1))
+    near[rows] = shapely.intersects(ways, shapely.box(0.0, 0.0, size_mm[0], size_mm[1]))
+    if near.any():
+        number, count = _line(paths.number, near)
+        kinds = ", ".join(sorted({paths.kinds[kind] for kind in paths.kind[near].tolist()}))
+        yield Found("clear", "error", number, f"lines of {kinds} cross the sensor", "move them away from it", count)
+    if stray.any():
+        number, count = _line(paths.number, stray)
+        x, y = paths.end_mm[stray][0, :2]
+        message = f"lines that belong to no body are printed at x {x:g}, y {y:g} mm"
+        yield Found("clear", "error", number, message, "leave them out, or print them as skirt or tower", count)

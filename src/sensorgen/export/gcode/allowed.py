@@ -1,0 +1,130 @@
+"""Commands that a print may send to a printer: a list for its firmware, which the printer's own file may change."""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from math import inf, isnan
+
+from sensorgen.core import yamlfile
+from sensorgen.core.errors import BadInput
+from sensorgen.design.printer import Printer, folder
+from sensorgen.export.gcode.found import Findings
+from sensorgen.export.gcode.moves import Event
+
+ANY = "*"
+_NUMBER = "-?[0-9]+(?:[.][0-9]+)?"
+_WORD = re.compile(f"([A-Z])(?:({_NUMBER})(?:[.][.]({_NUMBER}))?)?")
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """What a command may say.
+
+    Attributes
+    ----------
+    text : str
+        Its words as the list has them.
+    words : mapping of str to (float, float), or None
+        Range of each word; None for any words.
+    outside : bool
+        Whether it belongs before the first printed line or after the last.
+    """
+
+    text: str
+    words: Mapping[str, tuple[float, float]] | None
+    outside: bool
+
+
+@dataclass(frozen=True)
+class Commands:
+    """Commands that a printer takes in a print, and why others are refused, by their code; ``T`` for all tools."""
+
+    allowed: Mapping[str, Allowed]
+    refused: Mapping[str, str]
+
+
+def commands(machine: Printer) -> Commands:
+    """The list of a printer: that of its firmware, changed by its own file.
+
+    Raises
+    ------
+    BadInput
+        The printer's file has words that cannot be read.
+    """
+    found = dict(_of_firmware(machine.gcode_flavour).allowed)
+    for code, text in machine.control.commands.items():
+        if text is None:
+            found.pop(code, None)
+        else:
+            found[code] = _allowed(code, text, outside=code in found and found[code].outside)
+    return Commands(found, _of_firmware(machine.gcode_flavour).refused)
+
+
+@cache
+def _of_firmware(flavour: str) -> Commands:
+    data = yamlfile.read(folder() / "commands" / f"{flavour}.yaml")
+    return Commands(
+        {
+            code: _allowed(code, text, outside=place == "outside")
+            for place in ("anywhere", "outside")
+            for code, text in data[place].items()
+        },
+        data["refused"],
+    )
+
+
+def _allowed(code: str, text: str, *, outside: bool) -> Allowed:
+    """An entry of the list.
+
+    >>> _allowed("G4", "S0..60 P", outside=False).words
+    {'S': (0.0, 60.0), 'P': (-inf, inf)}
+    """
+    words = {}
+    for word in text.replace(ANY, "").split():
+        found = _WORD.fullmatch(word)
+        if found is None:
+            raise BadInput(f"control.commands.{code}: {word!r}; expected a letter with a number or a range, as S0..255")
+        letter, low, high = found.groups()
+        words[letter] = (float(low), float(high or low)) if low else (-inf, inf)
+    return Allowed(text, None if ANY in text else words, outside)
+
+
+def check(events: Iterable[Event], machine: Printer, printed: tuple[int, int], found: Findings) -> None:
+    """Refuse commands, words and values that are not on a printer's list, each with its line.
+
+    Parameters
+    ----------
+    events : iterable of Event
+        Commands, and moves with other words than those of places, filament, feed and arcs.
+    machine : Printer
+        Who is to print.
+    printed : (int, int)
+        Moves before the first printed line, and before the last [-].
+    found : Findings
+        Grows.
+    """
+    known, name = commands(machine), machine.name
+    first, last = printed
+    for event in events:
+        command = event.command
+        code, shown = "T" if command.code[0] == "T" else command.code, str(command)[:60]
+        entry = known.allowed.get(code)
+        if entry is None:
+            why = known.refused.get(code)
+            message = f"{code} {why}" if why else f"{name} has no {code} in its list of commands"
+            advice = "leave it out, or add it to the printer's file (control: commands)"
+            found.error("command", event.number, message, advice)
+            continue
+        if entry.outside and first < event.row <= last:
+            message = f"{shown} stands between printed lines"
+            found.error("command", event.number, message, "move it before the first printed line or after the last")
+        for letter, _ in command.words if entry.words is not None else ():
+            value = command.number(letter)
+            low, high = (entry.words or {}).get(letter, (inf, -inf))
+            if letter and low > high:
+                takes = f"takes {entry.text}" if entry.text else "takes no words"
+                found.error("command", event.number, f"{letter} in {shown}: {code} {takes} on {name}", "leave it out")
+            elif (low, high) != (-inf, inf) and not (value is not None and not isnan(value) and low <= value <= high):
+                expected = f"{letter}{low:g}" if low == high else f"{letter}{low:g} to {high:g}"
+                found.error("command", event.number, f"{shown}: expected {expected}", "keep to this range")
