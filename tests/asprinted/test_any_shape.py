@@ -1,6 +1,8 @@
 """Round posts and strips at 45 degrees: layers of any shape, estimated and from lines, as scenes."""
 
+import shutil
 from math import cos, pi, sin
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +12,13 @@ from sensorgen.asprinted import window
 from sensorgen.asprinted.beads import Beads, layers
 from sensorgen.asprinted.printed import gap_mm
 from sensorgen.checks import estimate
+from sensorgen.design import shapes
+from sensorgen.design.design import make
 from sensorgen.design.printer import load_printer, load_quality
-from sensorgen.scene.layers import drawn, scene_of
+from sensorgen.export import slicing
+from sensorgen.models import prisms
+from sensorgen.prediction.bodies import from_gcode
+from sensorgen.scene.layers import drawn, outlines, scene_of
 from sensorgen.scene.scene import Body, Prism, Scene, box, rounded
 
 PRINTER, FINE = load_printer("diabase-h5"), load_quality("fine")
@@ -54,6 +61,16 @@ def test_a_pattern_without_mirrors_is_solved_as_a_whole():
     slanted = sensor([((x, 0.0), (x + 1, 0.0), (x + 4, 3.0), (x + 3, 3.0)) for x in steps])
     found = window.window(drawn(slanted, FINE.boundaries_mm(1.2)), slanted)
     assert found.sides_mm() == (SIZE, SIZE)
+    assert found.repeats == (False, False)
+
+
+def test_a_pattern_of_slanted_strips_repeats_by_shifts():
+    strips = [((x, 0.0), (x + 1, 0.0), (x + 1 + SIZE, SIZE), (x + SIZE, SIZE)) for x in np.arange(-SIZE, SIZE, PERIOD)]
+    plan = shapely.clip_by_rect(shapely.union_all([shapely.Polygon(o) for o in strips]), 0, 0, SIZE, SIZE)
+    slanted = sensor(list(outlines(plan)))
+    found = window.window(drawn(slanted, FINE.boundaries_mm(1.2)), slanted)
+    assert found.sides_mm() == pytest.approx((PERIOD, PERIOD))
+    assert found.repeats == (True, True)
 
 
 def test_the_estimate_of_a_post_is_a_rounding_narrower():
@@ -100,3 +117,24 @@ def test_rings_of_lines_make_a_round_post(convention, more):
     found = layers(Sliced, lines, convention)[6].region("pattern")
     assert found.area == pytest.approx(pi * (0.8 + more) ** 2, rel=0.01)
     assert shapely.get_num_interior_rings(shapely.get_parts(found)).sum() == 0
+
+
+@pytest.mark.parametrize(("pattern", "slicer"), [("posts", "cura"), ("slanted", "prusa")])
+def test_a_shape_of_ones_own_is_sliced_and_read(pattern, slicer, monkeypatch, tmp_path):
+    """The capacitance by the lines of a real slicer is that of the drawing but for a rounding, and has both bounds."""
+    if shutil.which({"prusa": "prusa-slicer", "cura": "CuraEngine"}[slicer]) is None:
+        pytest.skip(f"{slicer} is not installed")
+    pytest.importorskip("ngsolve")
+    monkeypatch.setattr(shapes, "__path__", [str(Path(__file__).parent / "shapes")])
+    given = {"length_mm": 9.0, "width_mm": 9.0, "pattern": pattern}
+    own = {"posts": {"period_mm": 3.0}, "slanted": {"period_mm": 2.0, "across_mm": 1.0}}[pattern]
+    design = make({"shape": "pillars", "parameters": given | own})
+    made = slicing.sliced([slicing.alone(design)], slicer, tmp_path)
+    printed = from_gcode(design, made.raw)
+    scene, eps = printed.cells.first(), {"x60": 4.68, "air": 1.00059}
+    assert scene.repeats == ((pattern == "slanted"),) * 2
+    found = prisms.capacitance(scene, eps, 1e-2)
+    assert found.width() < 1e-2
+    meant = prisms.capacitance(design.in_use, eps, 0.1)
+    assert found.middle() * printed.cells.count == pytest.approx(meant.middle(), rel=0.06)
+    assert not any(printed.cells.remarks.values())

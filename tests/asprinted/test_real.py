@@ -30,7 +30,7 @@ FEET = 4  # layer of the feet on the film, from 0
 
 
 def cell_of(variant, layers_of):
-    return cell(variant, layers_of, window(plan_of(variant), variant.printed))
+    return cell(variant, layers_of, variant.printed.bodies, window(plan_of(variant), variant.printed))
 
 
 def plan_of(variant):

@@ -20,9 +20,10 @@ from sensorgen.core.findings import Finding
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.walls import WALLS
+from sensorgen.scene.connections import Connected, connected_layers
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.layers import LayerRegions, drawn, scene_of
-from sensorgen.scene.scene import Point, Scene, rectangle
+from sensorgen.scene.scene import FLOATING, Body, Point, Scene, rectangle
 
 if TYPE_CHECKING:
     from sensorgen.export.gcode.paths import Paths
@@ -83,7 +84,17 @@ class Printed:
         """The unit cell by every convention."""
         scene = self.design.printed
         plan = window(drawn(scene, self.design.layers.boundaries_mm(scene.size_mm[2])), scene)
-        return {name: cell(self.design, layers, plan) for name, layers in self.layers.items()}
+        return {name: cell(self.design, found.layers, found.bodies, plan) for name, found in self._connected.items()}
+
+    @cached_property
+    def _connected(self) -> dict[str, Connected]:
+        """The layers by every convention, each conductor at the terminal that it touches."""
+        bodies, conducts = self.design.printed.bodies, self.design.conducts
+        return {name: connected_layers(layers, bodies, conducts) for name, layers in self.layers.items()}
+
+    def remarks(self) -> dict[str, tuple[str, ...]]:
+        """By every convention, where electrodes touch, and how many pieces of conductor float."""
+        return {name: found.remarks() for name, found in self._connected.items()}
 
     @property
     def cell(self) -> Cell:
@@ -106,8 +117,16 @@ class Printed:
         return volumes.rows(scene, self.first, extruded)
 
     def findings(self) -> list[Finding]:
-        """Rule 7, with the design's waivers."""
-        return self.design.waived(volumes.findings(self.rows(), self.design.printed))
+        """Rule 7, and rule 1 where electrodes touch by the first convention; with the design's waivers."""
+        shorts = [
+            Finding(
+                "1-short", "error", " / ".join(dict.fromkeys(short.bodies)), f"as printed, {short.words()}: a short",
+                "use other walls or line widths, or draw them further apart", 0.0, place_mm=short.place_mm,
+                layer=next(k for k, layer in enumerate(self.first, 1) if layer.top_mm > short.place_mm[2]),
+            )
+            for short in next(iter(self._connected.values())).shorts
+        ]  # fmt: skip
+        return self.design.waived([*volumes.findings(self.rows(), self.design.printed), *shorts])
 
 
 def body(
@@ -164,11 +183,10 @@ def rule7(design: Design, paths: "Paths", centre_mm: Point | None = None) -> tup
     """
     lines = beads(design, paths, centre_mm)
     made = Printed(design, "printed", {"vol": printed_layers(design, lines)}, lines)
-    rows = made.rows()
-    return rows, design.waived(volumes.findings(rows, design.printed))
+    return made.rows(), made.findings()
 
 
-def cell(design: Design, layers: Sequence[LayerRegions], plan: Window) -> Cell:
+def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body], plan: Window) -> Cell:
     """The unit cell of printed layers.
 
     Parameters
@@ -177,14 +195,18 @@ def cell(design: Design, layers: Sequence[LayerRegions], plan: Window) -> Cell:
         As drawn.
     layers : sequence of LayerRegions
         Its whole print.
+    bodies : sequence of Body
+        Whose regions they hold.
     plan : Window
         The drawing's.
     """
     scene = design.printed
     inside = cut(layers, plan)
-    if all(side < whole for side, whole in zip(plan.sides_mm(), scene.size_mm[:2], strict=True)):
+    crossed = all(side < whole for side, whole in zip(plan.sides_mm(), scene.size_mm[:2], strict=True))
+    if crossed and not any(plan.repeats):
         inside = evened(inside, plan)
-    found = scene_of(inside, replace(scene, size_mm=(*plan.sides_mm(), scene.size_mm[2])))
+    like = replace(scene, bodies=tuple(bodies), size_mm=(*plan.sides_mm(), scene.size_mm[2]), repeats=plan.repeats)
+    found = scene_of(inside, like)
     if design.orientation == "upside-down":
         found = found.turned_over()
     kept = replace(found, bodies=tuple(b for b in found.bodies if not b.is_support()))
@@ -195,7 +217,7 @@ def cell(design: Design, layers: Sequence[LayerRegions], plan: Window) -> Cell:
 def gap_mm(scene: Scene) -> float:
     """Smallest distance of two electrodes in a scene of upright prisms; infinite where there are no two [mm]."""
     plans, spans = defaultdict[str, list[shapely.Polygon]](list), defaultdict[str, list[Point]](list)
-    for end, p in ((body.terminal, p) for body in scene.bodies if body.terminal for p in body.prisms):
+    for end, p in ((b.terminal, p) for b in scene.bodies if b.terminal not in ("", FLOATING) for p in b.prisms):
         plan = p.outline if p.axis == "z" else rectangle(*p.span("x"), *p.span("y"))
         plans[end].append(shapely.Polygon(plan))
         spans[end].append(p.span("z"))

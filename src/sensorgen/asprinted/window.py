@@ -13,20 +13,29 @@ import shapely
 from shapely.affinity import translate
 
 from sensorgen.core.arrays import Real
-from sensorgen.scene.layers import LayerRegions, Region, cleaned, outlines, parts
-from sensorgen.scene.scene import SLIVER_MM, Body, Point, Scene, rectangle
-from sensorgen.scene.sections import Section
-from sensorgen.scene.unit_cell import Band, Slice, cell, mirrored
+from sensorgen.scene.layers import LayerRegions, Region, cleaned, parts
+from sensorgen.scene.repetition import repeat
+from sensorgen.scene.scene import SLIVER_MM, Point, Scene
+from sensorgen.scene.unit_cell import Band, Slice, mirrored
 
 ROUNDED_MM = 2e-3  # edges nearer than this are one: G-code has three decimals
 
 
 @dataclass(frozen=True)
 class Window:
-    """A rectangle in plan [mm]."""
+    """A rectangle in plan [mm].
+
+    Attributes
+    ----------
+    x_mm, y_mm : (float, float)
+        Its sides [mm].
+    repeats : (bool, bool)
+        Whether the pattern goes on by shifts along x and y; else by mirrors.
+    """
 
     x_mm: Point
     y_mm: Point
+    repeats: tuple[bool, bool] = (False, False)
 
     def sides_mm(self) -> Point:
         """Its lengths along x and y [mm]."""
@@ -52,11 +61,14 @@ def window(layers: Sequence[LayerRegions], scene: Scene) -> Window:
         The drawing.
     """
     conducting = {body.name for body in scene.bodies if body.terminal}
-    x, y = (_period(layers, conducting, scene.size_mm, axis) for axis in (0, 1))
-    return Window(x, y)
+    (x, one), (y, other) = (_period(layers, conducting, scene.size_mm, axis) for axis in (0, 1))
+    return Window(x, y, (one, other))
 
 
-def _period(layers: Sequence[LayerRegions], conducting: set[str], size_mm: Sequence[float], axis: int) -> Point:
+def _period(
+    layers: Sequence[LayerRegions], conducting: set[str], size_mm: Sequence[float], axis: int
+) -> tuple[Point, bool]:
+    """A period along an axis, and whether it repeats by shifts."""
     end, wide = size_mm[axis], size_mm[1 - axis]
     patterned = [layer for layer in layers if layer.along != "xy"[axis]]
     if all(layer.along for layer in patterned):
@@ -72,14 +84,16 @@ def _period(layers: Sequence[LayerRegions], conducting: set[str], size_mm: Seque
         ]
         strips = [Slice(a, b, band) for (a, b), band in zip(pairwise(places.tolist()), bands, strict=True)]
         piece = mirrored(strips).slices
+        low, width, shifts = piece[0].left_mm, piece[-1].right_mm - piece[0].left_mm, False
     else:
-        piece = cell(_stacked(patterned, axis, end, wide), (len(patterned) + 1) * (wide + 1.0)).slices
-    low, width = piece[0].left_mm, piece[-1].right_mm - piece[0].left_mm
+        found = repeat([region for layer in patterned for region in layer.regions.values()], size_mm, axis)
+        low, shifts = found.low_mm, found.shifts
+        width = (found.high_mm - low) / (2 if shifts else 1)
     middle = int((end / 2 - low) // width)
     starts = [low + k * width for k in range(middle - 3, middle + 3)]
     inside = [s for s in starts if s > -SLIVER_MM and s + 2 * width < end + SLIVER_MM]
     if not inside:
-        return 0.0, end
+        return (0.0, end), False
     conductors = [layer.region(name) for layer in patterned for name in conducting]
 
     def crossed(at: float) -> int:
@@ -87,19 +101,7 @@ def _period(layers: Sequence[LayerRegions], conducting: set[str], size_mm: Seque
         return int(shapely.intersects(conductors, shapely.box(*(strip if axis == 0 else np.roll(strip, 1)))).sum())
 
     start = min(inside, key=lambda s: (crossed(s), abs(s + width - end / 2)))
-    return start, start + 2 * width
-
-
-def _stacked(layers: Sequence[LayerRegions], axis: int, end: float, wide: float) -> Section:
-    """Patterned layers beside each other as one section, whose mirrors are those of all of them."""
-    looks = {tuple(layer.regions.items()): layer for layer in layers}
-    regions = [(Body("", "edge", ()), rectangle(0.0, end, 0.0, 0.5))]
-    for number, layer in enumerate(looks.values()):
-        for name, region in layer.regions.items():
-            body = Body(name, name, ())
-            up = 1.0 + number * (wide + 1.0)
-            regions += [(body, tuple((p[axis], p[1 - axis] + up) for p in o)) for o in outlines(region)]
-    return Section("xy"[axis], wide, 0.0, tuple(regions))
+    return (start, start + 2 * width), shifts
 
 
 def cut(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:

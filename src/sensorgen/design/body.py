@@ -1,7 +1,7 @@
 """A body: what there is of a sensor, as drawn or as printed, in one type."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
 from typing import Any, Literal
@@ -29,6 +29,8 @@ class Cells:
         Finds ``gap_mm``, when it is first needed.
     tracks : object or None
         Extruded lines, where a tool path is known.
+    remarks : mapping of str to tuple of str
+        Where electrodes touch, and which conductors float, by the same rules.
     """
 
     scenes: Mapping[str, Scene]
@@ -36,6 +38,7 @@ class Cells:
     period_mm: float | None
     gaps: Callable[[], Mapping[str, float]]
     tracks: Any = None
+    remarks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @cached_property
     def gap_mm(self) -> Mapping[str, float]:

@@ -139,6 +139,10 @@ class Design(Strict):
         sources = sorted({source for material, _, source in slots if material == name and source})
         return material_files.load(name, sources).with_values(self.material_values.get(name, {}))
 
+    def conducts(self, name: str) -> bool:
+        """Whether a material does."""
+        return self.material(name).conductor
+
     def slot(self, part: str) -> tuple[material_files.Material, str]:
         """Material of a part, and the source to take its values from."""
         name, _, source = (getattr(self.materials, part) or "").partition("@")

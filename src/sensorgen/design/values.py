@@ -35,10 +35,15 @@ def material_value(material: Material, source: str, quantity: str) -> MaterialVa
     return MaterialValue(material.name, quantity, value.value, value.source)
 
 
+def dielectrics(design: Design) -> set[str]:
+    """Names of the materials in the sensor that do not conduct."""
+    return {b.material for b in design.in_use.bodies if not b.terminal and not design.conducts(b.material)}
+
+
 def permittivities(design: Design) -> list[MaterialValue]:
     """Relative permittivity of every dielectric in the sensor, and of air; raises MissingValue."""
     used = design.used() | {"air": ""}
-    names = {body.material for body in design.in_use.bodies if not body.terminal} | {"air"}
+    names = dielectrics(design) | {"air"}
     return [material_value(design.material(name), used[name], "relative_permittivity") for name in sorted(names)]
 
 

@@ -20,6 +20,7 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.overlay import Part, parts
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import ROUNDING_MM, Column, Layer, sections
+from sensorgen.solvers.electrostatics.bounds import third_conductor
 from sensorgen.solvers.electrostatics.linear import energy as straight
 
 SOURCE = "Thesis 3.2.1 and 3.2.2, Eqs. 3.10 to 3.49, corrected; Dirichlet's and Thomson's principles"
@@ -33,8 +34,8 @@ _JUMP = 1e-9  # a potential is continuous when its two sides differ by less, of 
 
 def why_not_applicable(scene: Scene) -> str | None:
     """Why the model does not apply to a scene, or None."""
-    if len({body.terminal for body in scene.bodies} - {""}) > 2:
-        return "more than two electrodes: use sensorgen stack"
+    if reason := third_conductor(scene):
+        return reason
     try:
         gaps = [_gap(column) for part in parts(scene) for column in _distinct(part).values()]
     except ValueError as error:

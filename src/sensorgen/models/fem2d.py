@@ -42,11 +42,13 @@ _STALLED = 0.7  # a step that leaves more of the width than this gains nothing
 
 def why_not_applicable(scene: Scene) -> str | None:
     """Why the model does not apply to a scene, or None."""
+    if reason := fem.unmirrored(scene):
+        return reason
     try:
         _triangles(scene)
     except ValueError as error:
         return str(error)
-    return fem.third_electrode(scene)
+    return None
 
 
 def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:

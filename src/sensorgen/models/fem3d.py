@@ -29,7 +29,7 @@ _MOST_BRICKS = 2500  # of one rung: more would take hours
 
 def why_not_applicable(scene: Scene) -> str | None:
     """Why the model does not apply to a scene, or None."""
-    if reason := fem.third_electrode(scene):
+    if reason := fem.unmirrored(scene):
         return reason
     try:
         coarse = grid(scene)

@@ -27,8 +27,11 @@ def drawn(design: Design) -> Body:
 
 
 def _drawn_cells(design: Design) -> Cells:
+    from sensorgen.scene.connections import connected_scene
+
     period = getattr(design.params, "period_mm", None)
-    return Cells({DRAWN: design.in_use}, 1.0, period, partial(_drawn_gap, design))
+    scene = connected_scene(design.in_use, design.conducts)
+    return Cells({DRAWN: scene}, 1.0, period, partial(_drawn_gap, design))
 
 
 def _drawn_gap(design: Design) -> dict[str, float]:
@@ -156,17 +159,21 @@ def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
     """Cells by every rule: of walls for estimates, of bead widths for a tool path."""
     from sensorgen.scene.sections import sections
 
-    cells = {
-        rule if len(printed.cells) == 1 else name: cell
-        for rule, printed in prints.items()
-        for name, cell in printed.cells.items()
-    }
+    cells, remarks = {}, {}
+    for rule, printed in prints.items():
+        said = printed.remarks()
+        for name, cell in printed.cells.items():
+            key = rule if len(printed.cells) == 1 else name
+            cells[key], remarks[key] = cell, said[name]
     first, (printed, *_) = next(iter(cells.values())), prints.values()
     period = None
     if getattr(printed.design.params, "period_mm", None) is not None:
-        period = first.scene.size_mm["xy".index(sections(first.scene)[0].across)]
+        try:
+            period = first.scene.size_mm["xy".index(sections(first.scene)[0].across)]
+        except ValueError:  # no constant cross-section
+            period = first.scene.size_mm[0]
     scenes = {name: cell.scene for name, cell in cells.items()}
-    return Cells(scenes, first.count, period, partial(_printed_gaps, scenes), printed.lines)
+    return Cells(scenes, first.count, period, partial(_printed_gaps, scenes), printed.lines, remarks)
 
 
 def _printed_gaps(scenes: "Mapping[str, Scene]") -> dict[str, float]:

@@ -18,7 +18,7 @@ from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.models import capacitance_models
 from sensorgen.prediction.cost_model import expected
 from sensorgen.prediction.plan import Candidate
-from sensorgen.scene.scene import Scene
+from sensorgen.scene.scene import FLOATING, Scene
 from sensorgen.scene.sections import overlap, sections
 
 PLANE, SPATIAL = 1e-3, 1e-2  # relative width of a capacitance's bounds where none is asked for: a cross-section, 3D
@@ -37,6 +37,8 @@ class Contradiction(SensorgenError):
 
 def default_width(scene: Scene) -> float:
     """Relative width of a capacitance's bounds where none is asked for [-]."""
+    if any(body.terminal == FLOATING for body in scene.bodies):
+        return SPATIAL
     try:
         return PLANE if len(sections(scene)) == 1 else SPATIAL
     except ValueError:  # no constant cross-section

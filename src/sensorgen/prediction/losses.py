@@ -8,7 +8,7 @@ from sensorgen.core.errors import BadInput, MissingValue
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.materials import FILM_LEAK, SET
-from sensorgen.design.values import MaterialValue, permittivities
+from sensorgen.design.values import MaterialValue, dielectrics, permittivities
 from sensorgen.prediction.capacitance import capacitance
 
 LOSSES = ("loss_tangent", "resistivity_ohm_m")
@@ -24,11 +24,11 @@ def set_losses(design: Design) -> list[MaterialValue]:
     No source gives a loss tangent, and the one resistivity that a source prints is a slip: what the user does not set
     is taken for lossless.
     """
-    dielectrics = {body.material for body in design.in_use.bodies if not body.terminal} | {"air"}
+    names = dielectrics(design) | {"air"}
     return [
         MaterialValue(name, quantity, values[quantity], SET)
         for name, values in sorted(design.material_values.items())
-        if name in dielectrics
+        if name in names
         for quantity in LOSSES
         if quantity in values
     ]

@@ -65,9 +65,13 @@ def rest_state(body: Body, width: float | None = None) -> RestState:
     scene, *others = dict.fromkeys(cells.scenes.values())
     rough = width == inf
     wanted = inf if rough else min(width or inf, default_width(scene))
-    answer = capacitance(scene, eps, wanted).times(cells.count)
+    said = cells.remarks.get(next(iter(cells.scenes)), ())
+    try:
+        answer = capacitance(scene, eps, wanted).times(cells.count)
+    except Unpredictable as error:
+        raise Unpredictable("; ".join((*said, str(error)))) from None
     c = answer.capacitance_f
-    found, doubts, unbounded = [c.middle()], [], False
+    found, doubts, unbounded = [c.middle()], list(said), False
     for other in () if rough else others:
         try:
             found.append(capacitance(other, eps, wanted).capacitance_f.middle() * cells.count)

@@ -172,7 +172,8 @@ def scene_of(layers: Sequence[LayerRegions], like: Scene) -> Scene:
                 growing[outline] = (bottom, layer.top_mm)
         found += [_prism(outline, *span) for outline, span in growing.items()]
         bodies.append(replace(body, prisms=tuple(sorted(found, key=lambda p: (p.start_mm, p.outline)))))
-    return Scene(tuple(bodies), (*like.size_mm[:2], layers[-1].top_mm if layers else 0.0))
+    size = (*like.size_mm[:2], layers[-1].top_mm if layers else 0.0)
+    return replace(like, bodies=tuple(bodies), size_mm=size)
 
 
 def _prism(outline: Outline, bottom_mm: float, top_mm: float) -> Prism:

@@ -16,6 +16,7 @@ Outline = tuple[Point, ...]
 AXES = "xyz"
 PLANE = {"x": ("y", "z"), "y": ("x", "z"), "z": ("x", "y")}  # the two axes of an outline, by prism axis
 SLIVER_MM = 1e-6  # a nanometre: narrower pieces are rounding, not geometry, and the CAD kernel refuses them from 1e-7
+FLOATING = "floating"  # terminal of a conductor that no contact reaches
 _TOLD = 5  # corners of an outline that an error shows
 
 
@@ -108,7 +109,8 @@ class Body:
     prisms : tuple of Prism
         They do not overlap. Boxes that share a face are one solid; other prisms touch at most along edges.
     terminal : str
-        "top", "middle" or "bottom" where it is connected to an electrode's contact, else "".
+        "top", "middle" or "bottom" where it is connected to an electrode's contact, ``FLOATING`` for a conductor that
+        is connected to none, else "".
     """
 
     name: str
@@ -135,10 +137,13 @@ class Scene:
         From bottom to top; those that no prism fills, as in a sensor shorter than its pattern, are left out.
     size_mm : (float, float, float)
         Edges of the enclosing box, whose corner is the origin [mm].
+    repeats : (bool, bool)
+        Whether it is one period of a pattern that goes on by shifts along x and y; else its sides are mirrors, or ends.
     """
 
     bodies: tuple[Body, ...]
     size_mm: tuple[float, float, float]
+    repeats: tuple[bool, bool] = (False, False)
 
     def __post_init__(self) -> None:
         """Leave out empty bodies."""
@@ -159,7 +164,7 @@ class Scene:
 
     def _mapped(self, change: Callable[[Prism], Prism], size_mm: tuple[float, float, float]) -> "Scene":
         bodies = tuple(replace(b, prisms=tuple(change(p) for p in b.prisms)) for b in self.bodies)
-        return Scene(bodies, size_mm)
+        return replace(self, bodies=bodies, size_mm=size_mm)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.errors import OutOfRange, SensorgenError
-from sensorgen.scene.scene import Scene
+from sensorgen.scene.scene import FLOATING, Scene
 
 
 class CrossedBounds(SensorgenError):
@@ -50,11 +50,21 @@ class Energies:
     rounding: float = 0.0
 
 
-def third_electrode(scene: Scene) -> str | None:
+def third_conductor(scene: Scene) -> str | None:
     """Why bounds between two terminals do not apply to a scene of more, or None."""
-    if {body.terminal for body in scene.bodies} - {"", "top", "bottom"}:
+    terminals = {body.terminal for body in scene.bodies} - {"", "top", "bottom"}
+    if terminals == {FLOATING}:
+        return "a conductor floats: the model prisms solves it"
+    if terminals:
         return "more than two electrodes: use sensorgen stack"
     return None
+
+
+def unmirrored(scene: Scene) -> str | None:
+    """Why bounds between mirrors do not apply to a scene, or None."""
+    if any(scene.repeats):
+        return "the pattern repeats by shifts, not by mirrors: the model prisms solves it"
+    return third_conductor(scene)
 
 
 def check(permittivity: Mapping[str, complex], width: float) -> None:

@@ -1,0 +1,300 @@
+"""Finite elements on prisms of polygons: bounds for layers of any shape, with conductors that float.
+
+The part of a scene between its mirrors, or one period of it, is solved by
+:mod:`sensorgen.solvers.electrostatics.prisms` on finer and finer meshes. Needs NGSolve. See docs/cells.md.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.util import find_spec
+from itertools import pairwise, product
+
+import numpy as np
+import shapely
+from shapely.affinity import translate
+
+from sensorgen.core.arrays import Real
+from sensorgen.core.bounds import Interval
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.scene.connections import groups
+from sensorgen.scene.layers import Region, parts
+from sensorgen.scene.raster import raster
+from sensorgen.scene.repetition import Repeat, repeat
+from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Prism, Scene, rectangle
+from sensorgen.solvers.electrostatics import bounds as fem
+from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, Layers, Mesh, solved
+
+SOURCE = "Dirichlet's and Thomson's principles; prisms of triangles, H1 and hybrid H(div) by NGSolve"
+COST = 3
+
+WIDTH = 1e-2  # of the interval unless given
+
+_RUNGS = (  # distances of lines from outlines, in electrode gaps; order of the potential; width that it often reaches
+    ((2.0, 0.5), 2, 2.5e-2),
+    ((2.0, 0.5), 3, 1e-2),
+    ((1.5, 0.3), 3, 5e-3),
+    ((2.0, 0.5, 0.12), 3, 2.5e-3),
+    ((2.0, 0.5, 0.12), 4, 1e-3),
+)
+_GRIDS_MM = (1e-6, 1e-4, 1e-3)  # to which corners are rounded: coarser ones where outlines nearly coincide
+_SLENDER_MM = 1e-4  # height of a triangle below which a coarser grid is better
+_COVERS = 0.99  # of the plan, by an electrode's layers together: between round beads there may be holes
+_OVERLAP_MM2 = 1e-6
+_MOST = 1_500_000  # unknowns of a rung: more would take too long
+
+
+def why_not_applicable(scene: Scene) -> str | None:
+    """Why the model does not apply to a scene, or None."""
+    if {body.terminal for body in scene.bodies} - {"", "top", "bottom", FLOATING}:
+        return "more than two electrodes: use sensorgen stack"
+    if find_spec("ngsolve") is None:
+        return "NGSolve is not installed: pip install 'sensorgen[fem]'"
+    try:
+        cell = _cell(scene)
+    except ValueError as error:
+        return str(error)
+    return "the electrodes touch: the capacitance grows without bound" if cell.gap_mm <= SLIVER_MM else None
+
+
+@dataclass(frozen=True)
+class Step:
+    """One mesh on the way to an accuracy.
+
+    Attributes
+    ----------
+    order : int
+        Of the potential's polynomials.
+    elements, unknowns : int
+        Prisms, and the unknowns that they couple.
+    interval : Interval
+        Capacitance of the whole sensor [F].
+    """
+
+    order: int
+    elements: int
+    unknowns: int
+    interval: Interval
+
+
+def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:
+    """Bounds of the capacitance between the terminals, fringes at the sensor's edge left out.
+
+    Parameters
+    ----------
+    scene : Scene
+        As drawn or printed, for which :func:`why_not_applicable` is None.
+    permittivity : mapping of str to float
+        Relative permittivity of each material that does not conduct, and of "air", above 0 [-].
+    width : float
+        Relative width of the interval; wider where the finest mesh is reached [-].
+
+    Returns
+    -------
+    Interval
+        Capacitance of the whole sensor [F].
+
+    Raises
+    ------
+    OutOfRange
+        A permittivity is not above 0, or the width is.
+    KeyError
+        A material between the electrodes has no permittivity.
+    ValueError
+        The model does not apply to the scene.
+    Unsolved
+        Outlines too near each other for doubles, or too many of them.
+    CrossedBounds
+        The lower bound lies above the upper one: a fault of the solver.
+
+    Notes
+    -----
+    Corners are rounded to a grid of 1e-6 mm, or of 1e-4 or 1e-3 mm where outlines nearly coincide, as those of beads
+    do. The bounds are moved outwards by what the rounding of the conductors' outlines does, to first order.
+    """
+    fem.check(permittivity, width)
+    return min((step.interval for step in steps(scene, permittivity, width)), key=Interval.width)
+
+
+def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[Step]:
+    """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
+    cell = _cell(scene)
+    layers = cell.layers([permittivity[name] for name in cell.dielectrics])
+    first = sum(reach > 2 * width for *_, reach in _RUNGS[:-1])
+    failed = None
+    for factors, order, _ in _RUNGS[first:]:
+        beside = [factor * cell.gap_mm for factor in factors]
+        for grid_mm in _GRIDS_MM:
+            mesh = Mesh.of(layers, beside, grid_mm)
+            if mesh.plan.slenderness_mm() > _SLENDER_MM:
+                break
+        if mesh.unknowns(order) > _MOST:
+            failed = fem.Unsolved(f"{mesh.unknowns(order)} unknowns; at most {_MOST} are solved")
+            break
+        try:
+            found = solved(mesh, order, cell.shares(mesh))
+        except fem.Unsolved as error:
+            failed = error
+            continue
+        interval = fem.whole(found, np.outer(cell.x.shares, cell.y.shares).ravel().tolist())
+        failed = None
+        yield Step(order, int(mesh.free.sum()), found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
+        if interval.width() <= width:
+            return
+    if failed:
+        raise failed
+
+
+@dataclass(frozen=True)
+class _Cell:
+    """The repeating cell of a scene, as layers of regions.
+
+    Attributes
+    ----------
+    x, y : Repeat
+        Its sides.
+    heights_mm : tuple of float
+        Planes between layers [mm].
+    regions : list of dict of int to Region
+        What fills each layer: conductors from 0, then dielectrics; air is left out.
+    conductors : int
+        How many there are.
+    dielectrics : list of str
+        Their materials, air last.
+    gap_mm : float
+        Smallest distance of two conductors [mm].
+    """
+
+    x: Repeat
+    y: Repeat
+    heights_mm: tuple[float, ...]
+    regions: list[dict[int, Region]]
+    conductors: int
+    dielectrics: list[str]
+    gap_mm: float
+
+    def layers(self, permittivity: Sequence[float]) -> Layers:
+        """For the solver."""
+        size = (self.x.high_mm - self.x.low_mm, self.y.high_mm - self.y.low_mm)
+        cuts = tuple((side.places_mm[1:-1] - side.low_mm).tolist() for side in (self.x, self.y))
+        shifts = self.x.shifts, self.y.shifts
+        return Layers(
+            size, np.array(self.heights_mm), self.regions, self.conductors, permittivity, shifts, (cuts[0], cuts[1])
+        )
+
+    def shares(self, mesh: Mesh) -> np.ndarray:
+        """How often each triangle of a mesh occurs in the sensor, beyond the least (t,)."""
+        middle = mesh.plan.points_mm[mesh.plan.triangles].mean(1)
+        found = np.ones(len(middle))
+        for at, side in zip(middle.T, (self.x, self.y), strict=True):
+            found *= side.shares[np.searchsorted(side.places_mm[1:-1] - side.low_mm, at)]
+        return np.asarray(found - self.x.shares.min() * self.y.shares.min())
+
+
+@lru_cache(maxsize=8)
+def _cell(scene: Scene) -> _Cell:
+    """The cell of a scene; raises ValueError where it is none of upright prisms between two electrodes."""
+    slanted = next((b for b in scene.bodies for p in b.prisms if p.axis != "z" and not p.is_box()), None)
+    if slanted:
+        raise ValueError(f"{slanted.name} is slanted in elevation: its layers are no prisms")
+    levels = np.unique(np.array([z for b in scene.bodies for p in b.prisms for z in p.span("z")]).round(9))
+    levels = levels[np.append(True, np.diff(levels) > SLIVER_MM)]
+    slabs = []
+    for low, high in pairwise(levels.tolist()):
+        middle = (low + high) / 2
+        outlines: dict[Body, list[shapely.Polygon]] = defaultdict(list)
+        for body in scene.bodies:
+            for p in body.prisms:
+                if p.span("z")[0] < middle < p.span("z")[1]:
+                    outlines[body].append(shapely.Polygon(_plan(p)))
+        slabs.append((low, high, {body: shapely.union_all(own) for body, own in outlines.items()}))
+    patterned = [region for *_, own in slabs for region in own.values()]
+    if any(scene.repeats) or not all(p.is_box() for body in scene.bodies for p in body.prisms):
+        x, y = (
+            Repeat.of(0.0, scene.size_mm[axis], True, scene.size_mm[axis])
+            if scene.repeats[axis]
+            else repeat(patterned, scene.size_mm, axis)
+            for axis in (0, 1)
+        )
+    else:  # the mirrors of :mod:`sensorgen.models.fem3d`
+        bodies = list(scene.bodies)
+        boxes = raster(scene, bodies.index, len(bodies), [(0.0, size) for size in scene.size_mm])
+        x = _mirrored(boxes.planes_mm[0], boxes.shares[:, 0])
+        y = _mirrored(boxes.planes_mm[1], boxes.shares[0] / boxes.shares[0, 0])
+    window = (x.low_mm, y.low_mm, x.high_mm, y.high_mm)
+    inside = [
+        {body: translate(shapely.clip_by_rect(r, *window), -x.low_mm, -y.low_mm) for body, r in own.items()}
+        for *_, own in slabs
+    ]
+    if any(
+        sum(r.area for r in own.values()) > shapely.union_all(list(own.values())).area + _OVERLAP_MM2 for own in inside
+    ):
+        raise ValueError("outlines overlap in plan")
+    return _numbered([*levels.tolist()], inside, x, y)
+
+
+def _mirrored(planes: Real, shares: Real) -> Repeat:
+    """The sides of a cell between mirrors, by the planes of its boxes and how often what lies between them occurs."""
+    change = np.flatnonzero(np.diff(shares)) + 1
+    places = planes[[0, *change, len(shares)]]
+    return Repeat(float(places[0]), float(places[-1]), False, places, shares[[0, *change]])
+
+
+def _numbered(levels_mm: list[float], inside: list[dict[Body, Region]], x: Repeat, y: Repeat) -> _Cell:
+    """A cell with a number for each conductor, those that touch one, and each dielectric."""
+    pieces = [(k, body.terminal, part) for k, own in enumerate(inside) for body, region in own.items() if body.terminal
+              for part in parts(region)]  # fmt: skip
+    plans = np.array([part for *_, part in pieces])
+    slab, count = np.array([k for k, *_ in pieces]), len(pieces)
+    sizes = (x.high_mm - x.low_mm, y.high_mm - y.low_mm)
+    images = [(0.0, 0.0), *((sizes[0], 0.0),) * x.shifts, *((0.0, sizes[1]),) * y.shifts]
+    images += [sizes] * (x.shifts and y.shifts)
+    every = np.concatenate([shapely.transform(plans, lambda p, to=to: p + to) for to in images])
+    one, other = shapely.STRtree(every).query(every, predicate="dwithin", distance=SLIVER_MM) % max(count, 1)
+    near = abs(slab[one] - slab[other]) < 2
+    label = groups(count, one[near], other[near])
+    numbers: dict[int, int] = {}
+    for end, name in ((BOTTOM, "bottom"), (TOP, "top")):
+        for piece in {int(label[k]) for k, (_, terminal, _) in enumerate(pieces) if terminal == name}:
+            if numbers.setdefault(piece, end) != end:
+                raise ValueError("the electrodes touch: the capacitance grows without bound")
+    for piece in label.tolist():
+        numbers.setdefault(piece, len({*numbers.values(), BOTTOM, TOP}))
+    conductors = len({*numbers.values(), BOTTOM, TOP})
+    kinds = np.array([numbers[piece] for piece in label.tolist()])
+    for end, name in ((BOTTOM, "bottom"), (TOP, "top")):
+        cover = shapely.union_all(plans[kinds == end]).area if (kinds == end).any() else 0.0
+        if cover < _COVERS * sizes[0] * sizes[1]:
+            raise ValueError(f"the {name} electrode does not cover the whole sensor")
+    low, high = int(slab[kinds == BOTTOM].min()), int(slab[kinds == TOP].max())
+    names = [*sorted({b.material for own in inside[low : high + 1] for b in own if not b.terminal} - {"air"}), "air"]
+    regions = []
+    for k in range(low, high + 1):
+        here = {
+            kind: shapely.union_all(plans[(slab == k) & (kinds == kind)])
+            for kind in np.unique(kinds[slab == k]).tolist()
+        }
+        for body, region in inside[k].items():
+            if not body.terminal and body.material != "air" and not region.is_empty:
+                kind = conductors + names.index(body.material)
+                here[kind] = shapely.union_all([here.get(kind, region), region])
+        regions.append(here)
+    heights = tuple(levels_mm[low : high + 2])
+    return _Cell(x, y, heights, regions, conductors, names, _gap_mm(regions, heights, conductors))
+
+
+def _gap_mm(regions: Sequence[dict[int, Region]], heights_mm: Sequence[float], conductors: int) -> float:
+    """Smallest distance of an electrode from another conductor [mm]."""
+    spans = list(pairwise(heights_mm))
+    found = np.inf
+    for (i, one), (j, other) in product(enumerate(regions), repeat=2):
+        apart = max(spans[i][0] - spans[j][1], spans[j][0] - spans[i][1], 0.0)
+        for end in {BOTTOM, TOP} & one.keys() if apart < found else ():
+            for kind in (k for k in other if k < conductors and k != end):
+                found = min(found, float(np.hypot(shapely.distance(one[end], other[kind]), apart)))
+    return found
+
+
+def _plan(prism: Prism) -> Sequence[tuple[float, float]]:
+    return prism.outline if prism.axis == "z" else rectangle(*prism.span("x"), *prism.span("y"))

@@ -1,0 +1,207 @@
+"""Which conductors belong to an electrode: those that touch it, whatever they are called; others float.
+
+An electrode is the largest connected piece of the bodies that are drawn with its terminal. Pieces that share a face, an
+edge or a corner touch.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from sensorgen.core.arrays import Real, Whole
+from sensorgen.scene.layers import LayerRegions, parts
+from sensorgen.scene.scene import FLOATING, PLANE, SLIVER_MM, Body, Prism, Scene, rectangle
+
+Conducts = Callable[[str], bool]  # whether a material, by its name, does
+
+
+@dataclass(frozen=True)
+class Short:
+    """Where two electrodes touch.
+
+    Attributes
+    ----------
+    bodies : (str, str)
+        Names of what touches.
+    place_mm : (float, float, float)
+        Middle of where they do, x, y and z [mm].
+    """
+
+    bodies: tuple[str, str]
+    place_mm: tuple[float, float, float]
+
+    def words(self) -> str:
+        """What touches, and where."""
+        x, y, z = self.place_mm
+        return f"{' and '.join(dict.fromkeys(self.bodies))} touch at x {x:.3g}, y {y:.3g}, z {z:.3g} mm"
+
+
+def groups(count: int, one: Whole, other: Whole) -> Whole:
+    """Number of the connected group of each of ``count`` things, of which some pairs are joined.
+
+    >>> groups(4, np.array([0, 3]), np.array([3, 1])).tolist()
+    [0, 0, 1, 0]
+    """
+    label = np.arange(count)
+    while True:
+        low, found = np.minimum(label[one], label[other]), label.copy()
+        np.minimum.at(found, one, low)
+        np.minimum.at(found, other, low)
+        found = found[found]
+        if (found == label).all():
+            return np.unique(label, return_inverse=True)[1]
+        label = found
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Conducting pieces: what each is of, its outline, and what it spans square to that [mm]."""
+
+    bodies: list[Body]
+    outlines: np.ndarray
+    spans_mm: Real
+
+    def touching(self) -> Whole:
+        """Pairs of pieces (2, n) that touch."""
+        one, other = shapely.STRtree(self.outlines).query(self.outlines, predicate="dwithin", distance=SLIVER_MM)
+        low, high = self.spans_mm.T
+        meet = (low[one] < high[other] + SLIVER_MM) & (low[other] < high[one] + SLIVER_MM) & (one < other)
+        return np.stack([one[meet], other[meet]])
+
+    def terminals(self) -> tuple[list[str], list[tuple[int, int]], int]:
+        """Terminal of each piece, pairs of pieces that short two of them, and how many connected pieces float."""
+        pairs = self.touching()
+        label = groups(len(self.bodies), *pairs)
+        drawn = np.array([body.terminal for body in self.bodies])
+        volume = shapely.area(self.outlines) * np.diff(self.spans_mm)[:, 0]
+        held: dict[int, list[str]] = {}
+        for terminal in sorted({*drawn.tolist()} - {"", FLOATING}):
+            sizes = np.bincount(label[drawn == terminal], volume[drawn == terminal])
+            held.setdefault(int(sizes.argmax()), []).append(terminal)
+        found = [
+            own if own in (here := held.get(piece, [FLOATING])) else here[0]
+            for own, piece in zip(drawn.tolist(), label.tolist(), strict=True)
+        ]
+        shorts = [(i, j) for i, j in pairs.T.tolist() if found[i] != found[j]]
+        return found, shorts, len(set(label.tolist()) - held.keys())
+
+
+@dataclass(frozen=True)
+class Connected:
+    """Layers of which every conductor has the terminal that it touches.
+
+    Attributes
+    ----------
+    layers : tuple of LayerRegions
+        With the pieces that have another terminal than their body under a name of their own.
+    bodies : tuple of Body
+        All bodies, those pieces among them.
+    shorts : tuple of Short
+        Where electrodes touch, one for each pair of bodies.
+    floating : int
+        Connected pieces of conductor that touch no electrode.
+    """
+
+    layers: tuple[LayerRegions, ...]
+    bodies: tuple[Body, ...]
+    shorts: tuple[Short, ...]
+    floating: int = 0
+
+    def remarks(self) -> tuple[str, ...]:
+        """What differs from two electrodes apart, in words."""
+        one = "a piece of conductor touches no electrode"
+        many = f"{self.floating} pieces of conductor touch no electrode"
+        said = [] if not self.floating else [f"{one if self.floating == 1 else many}: solved as floating"]
+        return (*(f"short: {short.words()}" for short in self.shorts), *said)
+
+
+def connected_layers(layers: Sequence[LayerRegions], bodies: Sequence[Body], conducts: Conducts) -> Connected:
+    """Terminals of the conducting pieces of some layers.
+
+    Parameters
+    ----------
+    layers : sequence of LayerRegions
+        From below.
+    bodies : sequence of Body
+        Whose regions they are, by name.
+    conducts : callable
+        Whether a material does.
+    """
+    named = {body.name: body for body in bodies if body.terminal or conducts(body.material)}
+    pieces = [
+        (number, named[name], part)
+        for number, layer in enumerate(layers)
+        for name, region in layer.regions.items()
+        if name in named
+        for part in parts(region)
+    ]
+    if not pieces:
+        return Connected(tuple(layers), tuple(bodies), ())
+    spans = np.array([(layers[number].bottom_mm, layers[number].top_mm) for number, _, _ in pieces])
+    found = _Pieces([body for _, body, _ in pieces], np.array([part for *_, part in pieces]), spans)
+    terminals, pairs, floating = found.terminals()
+    renamed: dict[tuple[str, str], Body] = {}
+    regions: list[dict[str, list[shapely.Polygon]]] = [{} for _ in layers]
+    for (number, body, part), terminal in zip(pieces, terminals, strict=True):
+        own = renamed.setdefault((body.name, terminal), _as(body, terminal))
+        regions[number].setdefault(own.name, []).append(part)
+    made = [
+        layer.mapped(
+            {name: region for name, region in layer.regions.items() if name not in named}
+            | {name: shapely.multipolygons(own) if len(own) > 1 else own[0] for name, own in here.items()}
+        )
+        for layer, here in zip(layers, regions, strict=True)
+    ]
+    others = [own for (name, terminal), own in renamed.items() if named[name].terminal != terminal]
+    return Connected(tuple(made), (*bodies, *others), tuple(_shorts(found, pairs)), floating)
+
+
+def _as(body: Body, terminal: str) -> Body:
+    """A piece of a body at a terminal, under a name of its own where that is not the body's."""
+    return body if body.terminal == terminal else replace(body, name=f"{body.name}, {terminal}", terminal=terminal)
+
+
+def _shorts(pieces: _Pieces, pairs: Sequence[tuple[int, int]]) -> Iterator[Short]:
+    seen = set()
+    for i, j in pairs:
+        names = (pieces.bodies[i].name, pieces.bodies[j].name)
+        if names not in seen:
+            seen.add(names)
+            at = shapely.shortest_line(pieces.outlines[i], pieces.outlines[j]).centroid
+            shared = shapely.intersection(pieces.outlines[i], pieces.outlines[j])
+            at = at if shared.is_empty else shared.representative_point()
+            low = float(max(pieces.spans_mm[i][0], pieces.spans_mm[j][0]))
+            yield Short(names, (float(at.x), float(at.y), low))
+
+
+def connected_scene(scene: Scene, conducts: Conducts) -> Scene:
+    """A scene of which every conductor has the terminal that it touches; itself where nothing changes.
+
+    Prisms along different axes, neither of them a box, are left as they are.
+    """
+    prisms = [(b, p) for b in scene.bodies if b.terminal or conducts(b.material) for p in b.prisms]
+    axis = next((n for n in "zyx" if all(p.axis == n or p.is_box() for _, p in prisms)), None)
+    if axis is None or not prisms:
+        return scene
+    outlines = np.array([shapely.Polygon(_outline(p, axis)) for _, p in prisms])
+    spans = np.array([p.span(axis) for _, p in prisms])
+    terminals, *_ = _Pieces([b for b, _ in prisms], outlines, spans).terminals()
+    if all(body.terminal == terminal for (body, _), terminal in zip(prisms, terminals, strict=True)):
+        return scene
+    made: dict[str, tuple[Body, list[Prism]]] = {}
+    given = iter(terminals)
+    for body in scene.bodies:
+        for prism in body.prisms:
+            own = _as(body, next(given)) if body.terminal or conducts(body.material) else body
+            made.setdefault(own.name, (own, []))[1].append(prism)
+    return replace(scene, bodies=tuple(replace(body, prisms=tuple(own)) for body, own in made.values()))
+
+
+def _outline(prism: Prism, axis: str) -> Sequence[tuple[float, float]]:
+    """A prism seen along an axis."""
+    if prism.axis == axis:
+        return prism.outline
+    first, second = PLANE[axis]
+    return rectangle(*prism.span(first), *prism.span(second))

@@ -1,0 +1,148 @@
+"""The repeating cell of a plan: the part of some regions that mirrors or shifts along x and y make into the whole.
+
+Unlike :mod:`sensorgen.scene.unit_cell` it reads polygons of any direction: posts have mirrors, strips at 45 degrees
+shifts only. A pattern without either is continued by its own mirror image.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.affinity import scale, translate
+
+from sensorgen.core.arrays import Real
+from sensorgen.scene.layers import Region
+
+_CUTS = (0.137, 0.311, 0.523, 0.741, 0.887)  # of the width: lines along which repetition is looked for first
+_SAME_MM = 1e-6  # places nearer than this are one
+_SAME = 1e-6  # share of the area by which a repeated pattern may differ: what rounding does to slanted edges
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """What of a plan repeats along one axis.
+
+    Attributes
+    ----------
+    low_mm, high_mm : float
+        The cell [mm].
+    shifts : bool
+        Whether it repeats by shifts; else its ends are mirrors.
+    places_mm : (n + 1,) array
+        Ends of the parts of the cell that occur equally often, from low to high [mm].
+    shares : (n,) array
+        How often each occurs in the whole [-].
+    """
+
+    low_mm: float
+    high_mm: float
+    shifts: bool
+    places_mm: Real
+    shares: Real
+
+    @classmethod
+    def of(cls, low_mm: float, high_mm: float, shifts: bool, whole_mm: float) -> "Repeat":
+        """A cell of a whole that runs from 0."""
+        size = high_mm - low_mm
+        first = int(np.floor(-low_mm / size)) - 1
+        copies = np.arange(first, int(np.ceil((whole_mm - low_mm) / size)) + 1)
+        ends = (np.array([0.0, whole_mm])[:, None] - low_mm - copies * size).clip(0.0, size)
+        back = (copies % 2 == 1) & (not shifts)
+        low, high = np.where(back, size - ends[1], ends[0]), np.where(back, size - ends[0], ends[1])
+        places = np.unique(np.concatenate([low, high, [0.0, size]]).round(9))
+        places = places[np.append(True, np.diff(places) > _SAME_MM)]
+        places[-1] = size
+        middle = (places[:-1] + places[1:]) / 2
+        shares = ((low < middle[:, None]) & (middle[:, None] < high)).sum(1).astype(float)
+        return cls(low_mm, high_mm, shifts, places + low_mm, shares)
+
+
+def repeat(regions: Sequence[Region], size_mm: Sequence[float], axis: int) -> Repeat:
+    """The cell along an axis, 0 or 1, of regions that lie between 0 and a size; all of it where nothing repeats.
+
+    Two whole periods have to be there: one alone would not show that it repeats.
+    """
+    whole, wide = size_mm[axis], size_mm[1 - axis]
+    looks = [region for region in dict.fromkeys(regions) if not _is_plain(region, size_mm, axis)]
+    if not looks:
+        return Repeat.of(0.0, whole, False, whole)
+    lines = _crossings(looks, axis, whole, wide)
+    at, kind = max(lines, key=lambda line: len(line[0]))
+    firsts = [at[kind == k] for k in np.unique(kind)]
+    steps = np.unique(np.concatenate([own[1:] - own[0] for own in firsts]).round(9))
+    for period in steps[(steps > _SAME_MM) & (steps < whole / 2 + _SAME_MM)].tolist():
+        if all(_shifts(own, k, period, whole) for own, k in lines) and _is_shifted(looks, axis, period, size_mm):
+            break
+    else:
+        return Repeat.of(0.0, whole, False, whole)
+    near = at < at[0] + period + _SAME_MM
+    mirrors = np.unique((((at[near][:, None] + at[near]) / 2)[kind[near][:, None] != kind[near]]).round(9))
+    for mirror in mirrors.tolist():
+        if _is_mirrored(looks, axis, mirror, size_mm):
+            low = mirror % (period / 2)
+            return Repeat.of(low, low + period / 2, False, whole)
+    corners = np.unique(shapely.get_coordinates(looks)[:, axis] % period)  # no outline lies on the seam
+    gaps = np.diff(np.append(corners, corners[0] + period))
+    low = float((corners[gaps.argmax()] + gaps.max() / 2) % period)
+    return Repeat.of(low, low + period, True, whole)
+
+
+def _is_plain(region: Region, size_mm: Sequence[float], axis: int) -> bool:
+    """Whether a region does not change along an axis."""
+    slab = shapely.bounds(shapely.get_parts(region))
+    through = (slab[:, axis] < _SAME_MM) & (slab[:, axis + 2] > size_mm[axis] - _SAME_MM)
+    boxes = (slab[:, 2] - slab[:, 0]) * (slab[:, 3] - slab[:, 1])
+    return bool(through.all() and abs(boxes.sum() - region.area) < _SAME_MM)
+
+
+def _crossings(looks: Sequence[Region], axis: int, whole: float, wide: float) -> list[tuple[Real, Real]]:
+    """Where lines along the axis cross outlines, in order, and a number for which, and whether it is entered."""
+    found = []
+    for share in _CUTS:
+        ends = np.array([[-1.0, share * wide], [whole + 1.0, share * wide]])
+        line = shapely.linestrings(ends if axis == 0 else ends[:, ::-1])
+        at, kind = [], []
+        for number, region in enumerate(looks):
+            runs = shapely.bounds(shapely.get_parts(shapely.intersection(region, line)))
+            runs = runs[~np.isnan(runs[:, 0])]
+            for side in (0, 1):
+                at.append(runs[:, axis + 2 * side])
+                kind.append(np.full(len(runs), 2 * number + side))
+        every = np.concatenate(at)
+        inside = (every > _SAME_MM) & (every < whole - _SAME_MM)
+        order = np.argsort(every[inside], kind="stable")
+        found.append((every[inside][order], np.concatenate(kind)[inside][order]))
+    return found
+
+
+def _shifts(at: Real, kind: Real, period: float, whole: float) -> bool:
+    """Whether every crossing is one again a period further."""
+    for one in np.unique(kind):
+        own = at[kind == one]
+        here = own[own < whole - period - _SAME_MM] + period
+        if len(here) and abs(own[np.abs(own[:, None] - here).argmin(0)] - here).max() > 10 * _SAME_MM:
+            return False
+    return True
+
+
+def _is_shifted(looks: Sequence[Region], axis: int, period: float, size_mm: Sequence[float]) -> bool:
+    x, y = (period, 0.0) if axis == 0 else (0.0, period)
+    return all(
+        _are_same(translate(shapely.clip_by_rect(r, 0, 0, size_mm[0] - x, size_mm[1] - y), x, y),
+                  shapely.clip_by_rect(r, x, y, *size_mm[:2]))
+        for r in looks
+    )  # fmt: skip
+
+
+def _is_mirrored(looks: Sequence[Region], axis: int, at: float, size_mm: Sequence[float]) -> bool:
+    reach = min(at, size_mm[axis] - at)
+    low, high = [0.0, 0.0], list(size_mm[:2])
+    low[axis], high[axis] = at - reach, at + reach
+    ways = (-1.0, 1.0) if axis == 0 else (1.0, -1.0)
+    near = [shapely.clip_by_rect(r, *low, *high) for r in looks]
+    return all(_are_same(scale(r, *ways, origin=(at, at)), r) for r in near)
+
+
+def _are_same(one: Region, other: Region) -> bool:
+    return bool(shapely.symmetric_difference(one, other).area < _SAME * max(one.area, other.area, _SAME_MM))

@@ -1,0 +1,482 @@
+r"""Both bounds of a capacitance for layers of polygons: conforming prisms, H1 above and hybrid H(div) below.
+
+The outlines of all layers, with lines beside those of conductors, are overlaid on a snap grid and triangulated without
+further points; the triangles become prisms between planes that crowd where conductors end. A conductor at no terminal
+floats: its potential is the one at which its net charge is zero, for each bound by a Schur complement.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import shapely
+
+from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.core.errors import NotInstalled
+from sensorgen.solvers.electrostatics.bounds import Energies, Unsolved
+
+BOTTOM, TOP = 0, 1  # numbers of the electrodes among conductors
+
+_BALANCE = 1e-8  # relative: by which energy and the charges of both electrodes may differ
+_DIRECT = 150_000  # unknowns up to which a system is factorised
+_RESIDUAL = 1e-11
+_ITERATIONS = 2000
+_SAME_MM = 1e-9
+_FAR = 1e9  # beyond all lines
+_SET = 0.01
+_MITRE = 2.0  # of lines beside outlines, in their distance
+
+
+@dataclass(frozen=True)
+class Layers:
+    """A cell of layers, each of polygons.
+
+    Attributes
+    ----------
+    size_mm : (float, float)
+        Sides of the cell, whose corner is the origin [mm].
+    heights_mm : (n + 1,) array
+        Planes between layers [mm].
+    regions : sequence of n mappings of int to polygons
+        What fills each layer, by the number of a conductor, from 0, or of a dielectric, after those; the rest is
+        filled by the last dielectric.
+    conductors : int
+        How many there are: the bottom electrode, the top electrode, and those that float.
+    permittivity : sequence of float
+        Of each dielectric [-].
+    periodic : (bool, bool)
+        Whether the cell repeats along x and along y; else its sides are mirrors.
+    cuts_mm : (sequence of float, sequence of float)
+        Where else along x and y outlines are cut, as by the end of a sensor [mm].
+    """
+
+    size_mm: tuple[float, float]
+    heights_mm: Real
+    regions: Sequence[dict[int, Any]]
+    conductors: int
+    permittivity: Sequence[float]
+    periodic: tuple[bool, bool] = (False, False)
+    cuts_mm: tuple[Sequence[float], Sequence[float]] = ((), ())
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Triangles in plan, and what fills each in every layer.
+
+    Attributes
+    ----------
+    points_mm : (p, 2) array
+        Corners [mm].
+    triangles : (t, 3) array of int
+        Counter-clockwise.
+    fill : (layers, t) array of int
+        Number of the conductor or dielectric.
+    """
+
+    points_mm: Real
+    triangles: Whole
+    fill: Whole
+
+    def slenderness_mm(self) -> float:
+        """Smallest height of a triangle [mm]."""
+        corners = self.points_mm[self.triangles]
+        sides = np.roll(corners, -1, axis=1) - corners
+        area = abs(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0])
+        return float((area / np.hypot(*sides.T).max(0)).min())
+
+
+def plan(cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> Plan:
+    """Overlay of a cell's outlines, triangulated.
+
+    Parameters
+    ----------
+    cell : Layers
+        Of polygons.
+    beside_mm : sequence of float
+        Distances of further lines from the outlines of conductors [mm].
+    grid_mm : float
+        All corners are rounded to its multiples [mm].
+
+    Raises
+    ------
+    Unsolved
+        The triangles do not fill the cell.
+    """
+    # In whole numbers of the grid's pitch, of which each side of the cell has some
+    count = np.rint(np.array(cell.size_mm) / grid_mm).clip(1)
+    pitch = np.array(cell.size_mm) / count
+    layers = [
+        {kind: shapely.transform(region, lambda p: p / pitch) for kind, region in layer.items()}
+        for layer in cell.regions
+    ]
+    x, y = count.tolist()
+    sides = shapely.box(0.0, 0.0, x, y).exterior
+    edges = shapely.boundary([region for layer in layers for region in layer.values()])
+    metal = [
+        shapely.union_all([region for kind, region in layer.items() if kind < cell.conductors], grid_size=1)
+        for layer in layers
+    ]
+    lines = [sides, *edges]
+    for far in np.array(beside_mm) / grid_mm:
+        near = [_beyond(shapely.simplify(region, far / 5), (x, y), cell.periodic, 2 * far) for region in metal]
+        wide, narrow = (
+            shapely.buffer(near, way * far, join_style="mitre", mitre_limit=_MITRE, quad_segs=2) for way in (1, -1)
+        )
+        beside = shapely.union_all(shapely.difference(wide, narrow))
+        outline = shapely.boundary(shapely.set_precision(shapely.simplify(beside, far / 10), max(far / 10, 1.0)))
+        lines.append(shapely.difference(shapely.clip_by_rect(outline, 0.0, 0.0, x, y), sides))
+    for axis, places in enumerate(cell.cuts_mm):
+        lines += [
+            shapely.LineString(((at, 0.0), (at, y)) if axis == 0 else ((0.0, at), (x, at)))
+            for at in np.rint(np.array(places) / pitch[axis]).tolist()
+        ]
+    noded = shapely.union_all(lines, grid_size=1)
+    if any(cell.periodic):
+        noded = shapely.union_all([noded, _repeated(noded, (x, y), cell.periodic)], grid_size=1)
+    faces = shapely.get_parts(shapely.polygonize([noded]))
+    pieces, of_face = shapely.get_parts(shapely.constrained_delaunay_triangles(faces), return_index=True)
+    corners = np.rint(shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
+    points, triangles = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
+    triangles = triangles.reshape(-1, 3)
+    one, two = (points[triangles[:, k]] - points[triangles[:, 0]] for k in (1, 2))
+    area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    triangles = np.where((area > 0)[:, None], triangles, triangles[:, ::-1])
+    if np.abs(area).sum() != 2 * x * y or not area.all():
+        raise Unsolved("the triangles of the plan do not fill it: outlines nearer than the grid; report this scene")
+    return Plan(points * pitch, triangles, _filled(layers, faces, cell)[:, of_face])
+
+
+def _beyond(region: Any, size: Sequence[float], periodic: Sequence[bool], far: float) -> Any:
+    """A region continued beyond the sides of a cell, by a distance."""
+    for axis in (0, 1):
+        turn, along = np.eye(2), np.eye(2)[axis]
+        if not periodic[axis]:
+            turn[axis, axis] = -1.0
+        copies = [region]
+        for way in (-1, 1):
+            shift = along * size[axis] * (way if periodic[axis] else 1 + way)
+            copies.append(shapely.transform(region, lambda p, shift=shift, turn=turn: p @ turn + shift))
+        low, high = np.full(2, -_FAR), np.full(2, _FAR)
+        low[axis], high[axis] = -far, size[axis] + far
+        region = shapely.clip_by_rect(shapely.union_all(copies), *low, *high)
+    return region
+
+
+def _repeated(noded: Any, size: Sequence[float], periodic: Sequence[bool]) -> Any:
+    """The sides of a cell with the corners of the opposite ones, and one in the middle."""
+    points = shapely.get_coordinates(noded)
+    lines = []
+    for axis in (axis for axis in (0, 1) if periodic[axis]):
+        side = points[(points[:, axis] == 0) | (points[:, axis] == size[axis])]
+        other = size[1 - axis]
+        along = np.unique(np.append(side[:, 1 - axis], [0.0, other // 2, other]))
+        for at in (0.0, size[axis]):
+            line = np.column_stack([np.full(len(along), at), along])
+            lines.append(shapely.linestrings(line if axis == 0 else line[:, ::-1]))
+    return shapely.multilinestrings(lines)
+
+
+def _filled(layers: Sequence[dict[int, Any]], faces: Any, cell: Layers) -> Whole:
+    """What fills each face in every layer, by a place inside it."""
+    inside = shapely.point_on_surface(faces)
+    found = np.full((len(layers), len(faces)), cell.conductors + len(cell.permittivity) - 1)
+    for row, layer in zip(found, layers, strict=True):
+        for kind, region in layer.items():
+            row[shapely.STRtree(shapely.get_parts(region)).query(inside, predicate="within")[0]] = kind
+    return found
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Prisms between a cell's conductors.
+
+    Attributes
+    ----------
+    cell : Layers
+        That is meshed.
+    plan : Plan
+        Its triangles.
+    heights_mm : (h,) array
+        Planes [mm].
+    fill : (h - 1, t) array
+        Of each prism; conductors among them.
+    grid_mm : float
+        That corners are rounded to [mm].
+    """
+
+    cell: Layers
+    plan: Plan
+    heights_mm: Real
+    fill: Whole
+    grid_mm: float
+
+    @classmethod
+    def of(cls, cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> "Mesh":
+        """The prisms of a cell; parameters and errors as of :func:`plan`.
+
+        Planes as far from each level at which a conductor ends within the cell as the lines are from its outlines.
+        """
+        flat = plan(cell, beside_mm, grid_mm)
+        metal = np.where(flat.fill < cell.conductors, flat.fill, -1)
+        padded = np.concatenate([metal[:1], metal, metal[-1:]])
+        ends = [bool(len(np.unique(pair, axis=1).T) > 1 and (pair[0] != pair[1]).any()) for pair in pairwise(padded)]
+        heights, owner = [cell.heights_mm[:1]], []
+        for k, (low, high) in enumerate(pairwise(cell.heights_mm.tolist())):
+            far = np.array([d for d in beside_mm if d < 0.45 * (high - low)])
+            inner = np.concatenate([low + far * ends[k], high - far * ends[k + 1], [high]])
+            inner = np.unique(inner[inner > low].round(12))
+            heights.append(inner)
+            owner += [k] * len(inner)
+        return cls(cell, flat, np.concatenate(heights), flat.fill[owner], grid_mm)
+
+    @cached_property
+    def free(self) -> Mask:
+        """Prisms that are no conductor (h - 1, t)."""
+        return np.asarray(self.fill >= self.cell.conductors)
+
+    def unknowns(self, order: int) -> int:
+        """About how many a flux couples at an order of the potential."""
+        return int(self.free.sum() * (order * (order + 1) / 2 + 1.5 * order**2))
+
+    @cached_property
+    def meshed(self) -> Mask:
+        """Prisms of the mesh (h - 1, t): those, and conductors across a side that repeats from one of them.
+
+        NGSolve wants both faces of a pair: where a cut through beads meets a conductor on one side only, the conductor
+        is meshed too, with all its faces held.
+        """
+        found, (near, far, _, _) = self.free.copy(), self._seams.T
+        while (more := found[:, near] & ~found[:, far]).any():
+            layer, which = np.nonzero(more)
+            found[layer, far[which]] = True
+        return found
+
+    @cached_property
+    def _kinds(self) -> Whole:
+        """What the prisms are made of; conductors that are meshed, of the first dielectric."""
+        return np.where(self.free, self.fill, self.cell.conductors)
+
+    @cached_property
+    def owner(self) -> Whole:
+        """Triangle of each prism, in the order of the elements of NGSolve."""
+        which, kinds = np.nonzero(self.meshed)[1], self._kinds[self.meshed]
+        return np.asarray(which[np.argsort(kinds, kind="stable")])
+
+    @cached_property
+    def netgen(self) -> Any:
+        """The mesh of NGSolve; materials are numbered as the dielectrics, boundaries as the conductors."""
+        try:
+            import netgen.meshing as netgen
+            import ngsolve
+        except ImportError:
+            raise NotInstalled("layers of polygons need NGSolve: pip install 'sensorgen[fem]'") from None
+        flat, count = self.plan, len(self.plan.points_mm)
+        layer, which = np.nonzero(self.meshed)
+        low = flat.triangles[which] + (layer * count)[:, None]
+        prisms, kinds = np.concatenate([low, low + count], axis=1), self._kinds[self.meshed]
+        # Corners of the cell come first: where sides repeat, NGSolve turns edges by the numbers of their ends, and maps
+        # a corner to its images in an order of its own.
+        used = np.unique(prisms)
+        off = np.minimum(flat.points_mm, abs(flat.points_mm - self.cell.size_mm)).max(axis=1)
+        used = used[np.argsort(off[used % count] > _SAME_MM, kind="stable")]
+        number = np.full(count * len(self.heights_mm), -1)
+        number[used] = np.arange(len(used))
+        prisms = number[prisms]
+        made = netgen.Mesh(3)
+        made.AddPoints(np.column_stack([flat.points_mm[used % count], self.heights_mm[used // count]]))
+        for k in range(self.cell.conductors):
+            made.Add(netgen.FaceDescriptor(surfnr=k + 1, domin=1, domout=0, bc=k + 1))
+            made.SetBCName(k, f"c{k}")
+        for k in range(len(self.cell.permittivity)):
+            own = prisms[kinds == self.cell.conductors + k]
+            made.AddElements(dim=3, index=k + 1, data=np.ascontiguousarray(own, dtype=np.int32), base=0)
+            made.SetMaterial(k + 1, f"d{k}")
+        for k, faces in self._surfaces():
+            made.AddElements(dim=2, index=k + 1, data=np.ascontiguousarray(number[faces], dtype=np.int32), base=0)
+        for axis in (0, 1):
+            if self.cell.periodic[axis]:
+                for a, b in self._opposite(axis, used, count):
+                    made.AddPointIdentification(
+                        netgen.PointId(int(number[a]) + 1), netgen.PointId(int(number[b]) + 1),
+                        identnr=axis + 1, type=2,
+                    )  # fmt: skip
+        return ngsolve.Mesh(made)
+
+    def _surfaces(self) -> list[tuple[int, Whole]]:
+        """Triangles and quadrilaterals at which prisms meet each conductor."""
+        flat, count, first = self.plan, len(self.plan.points_mm), self.cell.conductors
+        found = []
+        for up, down in ((self.fill[1:], self.fill[:-1]), (self.fill[:-1], self.fill[1:])):
+            metal = np.where((up >= first) & (down < first), down, first)
+            for k in range(first):
+                layer, which = np.nonzero(metal == k)
+                found.append((k, flat.triangles[which] + ((layer + 1) * count)[:, None]))
+        near, far, a, b = np.concatenate([self._neighbours, self._seams]).T
+        metal = np.where(self.free[:, near], self.fill[:, far], first)
+        held = self.meshed & ~self.free
+        metal = np.where(held[:, near], self.fill[:, near], metal)
+        for k in range(first):
+            layer, which = np.nonzero(metal == k)
+            ring = np.column_stack([a[which], b[which], b[which], a[which]]) + (layer * count)[:, None]
+            found.append((k, ring + np.array([0, 0, count, count])))
+            layer, which = np.nonzero(held & (self.fill == k))
+            found += [(k, flat.triangles[which] + ((layer + up) * count)[:, None]) for up in (0, 1)]
+        alike = {(k, faces.shape[1]) for k, faces in found}
+        return [
+            (k, _distinct(np.concatenate([f for one, f in found if (one, f.shape[1]) == (k, corners)])))
+            for k, corners in sorted(alike)
+        ]
+
+    @cached_property
+    def _neighbours(self) -> Whole:
+        """Triangles with a neighbour (n, 4): itself, the other, and the two points of their edge."""
+        edges, owner = self._edges
+        same = np.flatnonzero((edges[1:] == edges[:-1]).all(1))
+        return np.concatenate([np.column_stack([owner[same + k], owner[same + 1 - k], edges[same]]) for k in (0, 1)])
+
+    @cached_property
+    def _seams(self) -> Whole:
+        """The same of those that are neighbours across sides that repeat, with the points of its own edge."""
+        (edges, owner), at = self._edges, self.plan.points_mm
+        found = [np.zeros((0, 4), np.int64)]
+        for axis in np.flatnonzero(self.cell.periodic):
+            sides = [(abs(at[edges, axis] - end) < _SAME_MM).all(1) for end in (0.0, self.cell.size_mm[axis])]
+            rising = [np.flatnonzero(s)[np.argsort(at[edges[s], 1 - axis].sum(1))] for s in sides]
+            for here, there in (rising, rising[::-1]):
+                found.append(np.column_stack([owner[here], owner[there], edges[here]]))
+        return np.concatenate(found)
+
+    @cached_property
+    def _edges(self) -> tuple[Whole, Whole]:
+        """Edges of all triangles (n, 2) in order, and the triangle of each."""
+        t = self.plan.triangles
+        edges = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
+        order = np.lexsort(edges.T)
+        return edges[order], np.tile(np.arange(len(t)), 3)[order]
+
+    def _opposite(self, axis: int, used: Whole, count: int) -> list[tuple[int, int]]:
+        """Points on one side, and those on the other, where both are meshed."""
+        at, size = self.plan.points_mm, self.cell.size_mm[axis]
+        low, high = (np.flatnonzero(abs(at[:, axis] - end) < _SAME_MM) for end in (0.0, size))
+        low, high = (side[np.argsort(at[side, 1 - axis])] for side in (low, high))
+        if len(low) != len(high) or abs(at[low, 1 - axis] - at[high, 1 - axis]).max() > _SAME_MM:
+            raise Unsolved("two sides of a repeating cell have different corners: report this scene")
+        there = np.isin(np.arange(count * len(self.heights_mm)), used)
+        pairs = [(low + k * count, high + k * count) for k in range(len(self.heights_mm))]
+        every = np.concatenate([np.column_stack(pair) for pair in pairs])
+        return [(int(a), int(b)) for a, b in every[there[every].all(1)]]
+
+
+def _distinct(faces: Whole) -> Whole:
+    """Faces, each once."""
+    return faces[np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]]
+
+
+def solved(mesh: Mesh, order: int, weight: Real) -> Energies:
+    """Both bounds over eps0 [mm], of a potential of an order and of a flux of one less.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Of a cell.
+    order : int
+        Of the potential's polynomials.
+    weight : (t,) array
+        Of each triangle in ``Energies.part``.
+
+    Raises
+    ------
+    Unsolved
+        Energy and charges of the flux differ: slivers spoil the system.
+    """
+    import ngsolve as ng
+
+    space, cell = mesh.netgen, mesh.cell
+    eps = space.MaterialCF({f"d{k}": value for k, value in enumerate(cell.permittivity)})
+    held = "|".join(f"c{k}" for k in range(cell.conductors))
+    repeats = any(cell.periodic)
+
+    plain = ng.H1(space, order=order, dirichlet=held)
+    above = ng.Periodic(plain) if repeats else plain
+    u, v = above.TnT()
+    form = ng.BilinearForm(eps * ng.grad(u) * ng.grad(v) * ng.dx, symmetric=True, condense=True)
+    upper, potential = _balanced(form, lambda f: f, cell.conductors)
+    density = eps * ng.grad(potential) * ng.grad(potential)
+    # What the grid may have moved the conductors' upright faces by, to first order
+    normal = ng.specialcf.normal(3)
+    upright = ng.BoundaryFromVolumeCF(density) * (1 - normal[2] * normal[2])
+    moved = mesh.grid_mm / 2**0.5 * ng.Integrate(upright, space, ng.BND, order=2 * order)
+    part = 0.0
+    if weight.any():
+        energies = ng.Integrate(density, space, order=2 * order, element_wise=True).NumPy()
+        part = float(energies @ weight[mesh.owner])
+
+    plain = ng.FacetFESpace(space, order=order - 1, dirichlet=held)
+    facet = ng.Periodic(plain) if repeats else plain
+    below = ng.HDiv(space, order=order - 1, discontinuous=True, hodivfree=True) * ng.L2(space, order=0) * facet
+    (d, q, w), (e, r, z) = below.TnT()
+    form = ng.BilinearForm(below, symmetric=True, condense=True)
+    form += -(d * e / eps - q * ng.div(e) - r * ng.div(d)) * ng.dx
+    form += -(w * (e * normal) + z * (d * normal)) * ng.dx(element_boundary=True)
+    lower, found = _balanced(form, lambda f: f.components[2], cell.conductors)
+    field = found.components[0]
+    energy = ng.Integrate(field * field / eps, space, order=2 * order)
+    charges = [
+        -ng.Integrate(one.components[2] * (field * normal) * ng.dx(element_boundary=True), space)
+        for one in _indicators(below, lambda f: f.components[2], cell.conductors)
+    ]
+    wrong = max(
+        abs(energy - lower), abs(charges[TOP] - lower), abs(charges[BOTTOM] + lower), *map(abs, charges[2:]), 0.0
+    )
+    if not wrong < _BALANCE * lower:
+        raise Unsolved(f"energy and charges differ by {wrong / lower:.1g}: triangles too slender for doubles")
+    return Energies(lower, upper, part, facet.ndof, moved / upper)
+
+
+def _indicators(space: Any, part: Any, conductors: int) -> list[Any]:
+    """Functions that are 1 on one conductor each."""
+    import ngsolve as ng
+
+    mesh, found = space.mesh, [ng.GridFunction(space) for _ in range(conductors)]
+    for k, one in enumerate(found):
+        part(one).Set(ng.CF(1), definedon=mesh.Boundaries(f"c{k}"))
+        values = one.vec.FV().NumPy()
+        values[:] = values > _SET  # a constant is 1 in lowest order; where sides repeat, Set averages over too many
+    return found
+
+
+def _balanced(form: Any, part: Any, conductors: int) -> tuple[float, Any]:
+    """Energy and function with 1 V on the top electrode, 0 V on the bottom one and no net charge on the others."""
+    import ngsolve as ng
+
+    space = form.space
+    free = space.FreeDofs(True)
+    with ng.TaskManager():
+        direct = sum(free) <= _DIRECT
+        if not direct:
+            coarse = ng.Preconditioner(form, "bddc")
+            form.Assemble()
+            inverse = ng.CGSolver(form.mat, coarse.mat, tol=_RESIDUAL, maxiter=_ITERATIONS)
+        else:
+            form.Assemble()
+            inverse = form.mat.Inverse(free, "sparsecholesky")
+        found = _indicators(space, part, conductors)[TOP:]
+        rest = found[0].vec.CreateVector()
+        for f in found:
+            for _ in range(1 + direct):
+                rest.data = form.mat * f.vec
+                f.vec.data -= inverse * rest
+        images = []
+        for f in found:
+            rest.data = form.mat * f.vec
+            images.append(rest.Copy())
+        energy = np.array([[ng.InnerProduct(f.vec, image) for image in images] for f in found])
+        share = np.append(1.0, -np.linalg.solve(energy[1:, 1:], energy[1:, 0]))
+        best = ng.GridFunction(space)
+        for c, f in zip(share.tolist(), found, strict=True):
+            best.vec.data += c * f.vec
+        best.vec.data += form.harmonic_extension * best.vec
+    return float(share @ energy @ share), best
