@@ -14,7 +14,8 @@ LINES = 30  # of the first screen
 PICTURES = {"trix-d0.2": ["tri", "--drawn"]}
 PAGES = (
     [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"],
-    ["slice"], ["slice", "tri"], ["gcode"], ["gcode", "check"], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
+    ["slice"], ["slice", "tri"], ["gcode"], ["gcode", "check"], ["gcode", "drags"],
+    ["gcode", "pinholes"], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
     ["predict"], ["predict", "tri"], ["cell"], ["cell", "tri"], ["chart"], ["compress"], ["compress", "tri"],
     ["invert"], ["sheet"], ["stack"],
     ["bench"], ["bench", "plan"], ["bench", "plan", "tri"], ["bench", "show"],

@@ -13,6 +13,7 @@ from sensorgen.core import yamlfile
 from sensorgen.design import design
 from sensorgen.export.gcode import paths
 from sensorgen.export.gcode.check import check
+from sensorgen.export.gcode.drags import lift
 from sensorgen.export.gcode.files import text_of
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.slicing import Placed, alone, sliced
@@ -69,11 +70,13 @@ def test_each_variant_passes_the_printers_check(name, orientation, quality, slic
 def test_what_the_rewriting_leaves_alone(slicer, tmp_path):
     variant = small("23/trix-d0.1.yaml")
     made = sliced([alone(variant)], slicer, tmp_path)
-    before, after = follow(made.raw), follow(made.ready)
-    assert np.array_equal(before.rows[:, :9], after.rows[:, :9])
-    assert np.array_equal(
-        paths.paths_of(before, variant.machine, "slicer").tool, paths.paths_of(after, variant.machine).tool
-    )
+    before, after = paths.read(made.raw, variant.machine, "slicer"), paths.read(made.ready, variant.machine)
+    for column in ("start_mm", "end_mm", "filament_mm", "tool", "kind", "layer"):
+        assert np.array_equal(getattr(before, column), getattr(after, column)), column
+    texts = [text_of(path).splitlines() for path in (made.raw, made.ready)]
+    assert [texts[0][n - 1] for n in before.number] == [texts[1][n - 1] for n in after.number]
+    feeds = [follow(path).feed_mm_min[follow(path).extruded_mm > 0] for path in (made.raw, made.ready)]
+    assert feeds[0] == pytest.approx(feeds[1], abs=1e-3)
     comments = [
         [line for line in text_of(path).splitlines() if line.startswith(b";")] for path in (made.raw, made.ready)
     ]
@@ -99,7 +102,10 @@ def test_another_printer_keeps_its_words(slicer, tmp_path):
     variant = small("23/trix-d0.1.yaml", printer="prusa-xl5", tools={"etpu": 0, "x60": 1})
     made = sliced([alone(variant)], slicer, tmp_path)
     assert check(made.ready, variant.machine).errors() == []
-    assert made.ready.read_bytes() == made.raw.read_bytes()
+    lifted, lifting = lift(made.raw, variant.machine)
+    assert made.ready.read_bytes() == lifted
+    assert lifting.lifts > 0
+    assert lifting.after.contact_mm + lifting.after.near_mm == 0
     ends = paths.read(made.ready, variant.machine).model().end_mm[:, :2]
     assert (ends.min(axis=0) + ends.max(axis=0)) / 2 == pytest.approx(variant.machine.bed_centre_mm(), abs=0.05)
 

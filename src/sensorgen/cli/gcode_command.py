@@ -48,6 +48,57 @@ def _check(file: str, design: str | None, printer: str | None, materials: tuple[
     return 1 if found.errors(strict) else 0
 
 
+def _drags(file: str, design: str | None, printer: str) -> int:
+    """Measure where the nozzle travels over what another tool has printed, in the order of printing.
+
+    Travel in contact can draw a conductor over a dielectric. Counted are the centre of the nozzle in contact with
+    another material, and up to 0.12 mm above it; and lines during which the nozzle's face touches another material.
+    With a design also the insulation that would be left to the other electrode if such a strand conducted. sensorgen
+    slice lifts the nozzle over such places.
+    """
+    from pathlib import Path
+
+    if design:
+        from sensorgen.asprinted import strands
+        from sensorgen.design.design import load
+
+        render.deliver(strands.drags(load(Path(design)), Path(file)))
+    else:
+        from sensorgen.design.printer import load_printer
+        from sensorgen.export.gcode import drags
+
+        render.deliver(drags.drags(Path(file), load_printer(printer)))
+    return 0
+
+
+def _pinholes(file: str, design: str, log: str | None, pictures: str | None) -> int:
+    """Search the film of a print for through-holes, and estimate the probability that a print is shorted.
+
+    Lines are taken as round at their sides, at the width of the file and 5 and 10 % less. The probability has an
+    interval, stated assumptions, and the verdicts of the log on prints of the same shape and film; without any it is a
+    prior, no yield.
+    """
+    from pathlib import Path
+
+    from sensorgen.analysis.shorts import risk
+    from sensorgen.cli import log_words
+    from sensorgen.core import files as store
+    from sensorgen.design.design import load
+
+    if log:
+        with log_words.opened(log) as opened:
+            found, figure = risk(load(Path(design)), Path(file), opened)
+    else:
+        found, figure = risk(load(Path(design)), Path(file))
+    if pictures:
+        from sensorgen.analysis.plots.static import files
+
+        for name, content in files(figure):
+            store.replace(Path(pictures) / name, content)
+    render.deliver(found)
+    return 0
+
+
 def _loaded(words: tuple[str, ...], tools: tuple[int, ...]) -> dict[int, str]:
     """Material of each tool that was named."""
     from sensorgen.cli.settings import pairs
@@ -85,6 +136,30 @@ command = click.Group(
                 click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
                 *render.options(),
             ],
-        )
+        ),
+        click.Command(
+            "drags", callback=_drags, help=_drags.__doc__,
+            short_help="Measure travel over what another tool has printed.",
+            params=[
+                click.Argument(["file"], metavar="FILE"),
+                click.Option(["--design"], metavar="FILE", help="The design that the file prints, as YAML."),
+                click.Option(
+                    ["--printer"], default="diabase-h5", show_default=True, metavar="NAME",
+                    shell_complete=completed(_printers), help="A printer that is listed, or a YAML file.",
+                ),
+                *render.options(),
+            ],
+        ),
+        click.Command(
+            "pinholes", callback=_pinholes, help=_pinholes.__doc__,
+            short_help="Search a film for through-holes; probability of a short.",
+            params=[
+                click.Argument(["file"], metavar="FILE"),
+                click.Option(["--design"], metavar="FILE", required=True, help="The design, as YAML."),
+                click.Option(["--log"], metavar="FILE", help="The log with verdicts of earlier prints."),
+                click.Option(["--figures", "pictures"], metavar="FOLDER", help="Write a plan there, PNG and SVG."),
+                *render.options(),
+            ],
+        ),
     ],
 )  # fmt: skip

@@ -10,6 +10,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, ClassVar
 
+from sensorgen.analysis.plots import layers
+from sensorgen.asprinted.printed import body as estimate
 from sensorgen.checks.review import Review, Step, draw, report, review
 from sensorgen.core import document
 from sensorgen.core import files as store
@@ -175,7 +177,9 @@ def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> I
     for path, text in profiles(design).items():
         yield path, text.encode()
     step("drawing")
-    yield f"{name}.svg", draw(design, held).encode()
+    printed = estimate(design)
+    yield f"{name}.svg", draw(design, held, printed.scene, printed.provenance).encode()
+    yield f"{name}.layers.html", layers.of_print(printed).encode()
     yield "check.json", document.to_json(report(design, held)).encode()
     yield "prediction.json", json_bytes(json.loads(to_json(predicted)))
     yield "design.json", json_bytes(design.model_dump(mode="json"))

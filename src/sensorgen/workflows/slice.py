@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
-from sensorgen.asprinted import agreement
+from sensorgen.asprinted import agreement, pinholes
 from sensorgen.asprinted.printed import rule7
 from sensorgen.checks import volumes
 from sensorgen.checks.review import review
@@ -20,6 +20,7 @@ from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
 from sensorgen.design.walls import rule
 from sensorgen.export.gcode.check import Checked, check_motion
+from sensorgen.export.gcode.drags import Lifting
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.paths import paths_of
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
@@ -64,6 +65,8 @@ class Printed(Checked):
         What the checks of the design found.
     printed : Volumes
         Volumes as printed.
+    lifting : Lifting
+        Travel over other tools' material before and after lifts.
     compensated : tuple of Change
         How the design differs from the one that was asked for.
     """
@@ -79,6 +82,7 @@ class Printed(Checked):
     quality: str
     design_findings: tuple[Finding, ...]
     printed: Volumes
+    lifting: Lifting
     compensated: tuple[Change, ...] = ()
 
     @property
@@ -93,6 +97,7 @@ class Printed(Checked):
         yield from super().document()
         yield volumes.table(self.printed.layers)
         yield from listed(self.printed.findings)
+        yield from self.lifting.document()
         verdict = "refused; " if self.refused else ""
         yield f"{self.gcode}: {verdict}{self.slicer.name} {self.slicer.version}; {counted(self.counts())}"
 
@@ -158,6 +163,8 @@ def slice_design(
         lines = paths_of(motion, machine)
         checked = checked.with_more(agreement.check(design, lines, motion.changes, machine.bed_centre_mm(), alone=True))
         layers, findings = rule7(design, made.lines)
+        films = pinholes.pinholes(design, made.lines, widths=(1.0,), most_layers=pinholes.MOST_LAYERS)
+        findings += design.waived([*pinholes.findings(films)])
     stopped, stem = bool(checked.errors(strict)), f"{design.name}.{slicer}"
     names, others = (f"{stem}.gcode", f"{stem}.gcode.json"), (f"{stem}.refused.gcode", f"{stem}.refused.json")
     names, others = (others, names) if stopped else (names, others)
@@ -165,7 +172,8 @@ def slice_design(
         **vars(checked), name=design.name, design=design.id(), gcode=names[0], refused=stopped,
         sha256=sha256(content).hexdigest(), slicer=Slicer(made.slicer, made.version), sensorgen=__version__,
         printer=design.machine.name, quality=design.layers.name, design_findings=tuple(held.sliced().findings),
-        printed=Volumes(tuple(layers), (*made.findings, *findings)), compensated=tuple(compensated),
+        printed=Volumes(tuple(layers), (*made.findings, *findings)), lifting=made.lifting,
+        compensated=tuple(compensated),
     )  # fmt: skip
     folder = out / design.name
     store.replace(folder / names[0], content)

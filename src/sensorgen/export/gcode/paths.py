@@ -14,6 +14,7 @@ from sensorgen.export.gcode.moves import NO_TOOL, Motion
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Numbering = Literal["printer", "slicer"]
 
 # What the slicers' ";TYPE:" comments call lines that are not part of a body, in lower case.
 NOT_MODEL = frozenset(
@@ -88,7 +89,7 @@ class Paths:
         return self.chosen(bodies[self.kind] & (self.length_mm() > 0))
 
 
-def read(source: Source, machine: Printer, numbering: Literal["printer", "slicer"] = "printer") -> Paths:
+def read(source: Source, machine: Printer, numbering: Numbering = "printer") -> Paths:
     """Read the lines that a file prints.
 
     Parameters
@@ -115,15 +116,10 @@ def read(source: Source, machine: Printer, numbering: Literal["printer", "slicer
     return paths_of(follow(source, machine.control.prime_macro), machine, numbering)
 
 
-def paths_of(motion: Motion, machine: Printer, numbering: Literal["printer", "slicer"] = "printer") -> Paths:
+def paths_of(motion: Motion, machine: Printer, numbering: Numbering = "printer") -> Paths:
     """The lines that a followed file prints; see :func:`read`."""
     rows, start, end, share = _straight(motion, np.flatnonzero(motion.extruded_mm > 0))
-    count, own = len(motion.rows), np.array([*machine.tool_numbers, NO_TOOL])
-    tools = motion.tools.column(count, NO_TOOL)[rows].astype(np.int64)
-    if numbering == "slicer":  # one that the printer lacks stays negative
-        tools = own[np.where(tools < len(own) - 1, np.maximum(tools, 0), len(own) - 1)]
-    else:  # a file without any tool means the printer's first
-        tools = np.where(tools == NO_TOOL, own[0], tools)
+    count, tools = len(motion.rows), tools_of(motion, machine, numbering)[rows]
     if motion.layer.rows:
         layer = motion.layer.column(count, 0)[rows].astype(np.int64)
     else:
@@ -134,6 +130,15 @@ def paths_of(motion: Motion, machine: Printer, numbering: Literal["printer", "sl
         motion.height_mm.column(count)[rows], motion.width_mm.column(count)[rows], layer, motion.number[rows],
         motion.kinds,
     )  # fmt: skip
+
+
+def tools_of(motion: Motion, machine: Printer, numbering: Numbering = "printer") -> Integers:
+    """The printer's own number of the tool in each move; one that the printer lacks stays negative."""
+    own = np.array([*machine.tool_numbers, NO_TOOL])
+    tools = motion.tools.column(len(motion.rows), NO_TOOL).astype(np.int64)
+    if numbering == "slicer":
+        return own[np.where(tools < len(own) - 1, np.maximum(tools, 0), len(own) - 1)]
+    return np.where(tools == NO_TOOL, own[0], tools)  # a file without any tool means the printer's first
 
 
 def _straight(motion: Motion, rows: Integers) -> tuple[Integers, Floats, Floats, Floats]:

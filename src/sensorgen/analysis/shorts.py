@@ -1,0 +1,181 @@
+r"""Probability that a print of a design is shorted or leaking, from the holes of its film and from the log's verdicts.
+
+.. math:: P = 1 - (1 - r) \\, \\langle (1 - q)^N \\rangle
+
+N is the number of through-holes in the model of round lines, averaged over prints whose layers differ in width by up to
+5 % and are shifted by up to 0.05 mm; q, that a hole conducts; r, that a print is shorted by anything else. Nothing is
+known of q and r but what the log says: both have Jeffreys' prior, Beta(1/2, 1/2), and are updated by the prints of the
+same shape and film. Holes are taken to conduct independently of each other. Without prints the result is the prior.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from sensorgen.analysis.plots.figure import ORANGE, Axis, Curve, Figure, Map, Panel
+from sensorgen.asprinted.beads import beads
+from sensorgen.asprinted.pinholes import Film, Pinholes, draws, films, opened, pinholes, through
+from sensorgen.asprinted.registration import placed
+from sensorgen.core.document import Facts, Part
+from sensorgen.core.errors import BadInput
+from sensorgen.design.design import Design
+from sensorgen.export.gcode.files import Source
+from sensorgen.measure.log import Log
+from sensorgen.measure.signal.verdicts import ORDER
+
+CREDIBLE = 0.9  # share of the posterior inside the interval
+DRAWS = 16
+_GRID = 200  # values of q and of r, of equal prior probability
+_CELL_MM = 0.5  # of the picture
+_PICTURED = 0.95  # width of lines in the picture, of what the file says
+
+
+@dataclass(frozen=True)
+class Chance:
+    """A probability with its credible interval [-]."""
+
+    mean: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class FilmRisk(Pinholes):
+    """Holes of a print's films, and the probability of a short.
+
+    Attributes
+    ----------
+    holes_low, holes_high : float
+        Least and most through-holes of the drawn prints [-].
+    shorted, prints : int
+        Specimens of this shape and film in the log that are shorted or leaking, and all with both resistances [-].
+    prior, posterior : Chance
+        Before and after the log.
+    """
+
+    holes_low: float
+    holes_high: float
+    shorted: int
+    prints: int
+    prior: Chance
+    posterior: Chance
+
+    def document(self) -> Iterator[Part]:
+        """Table of holes, and the probability with its assumptions."""
+        yield from super().document()
+        said = (
+            f"{self.shorted} of {self.prints} prints of this shape and film in the log are shorted or leaking"
+            if self.prints else "no print of this shape and film: from the assumptions alone, not from prints"
+        )  # fmt: skip
+        assumed = (
+            f"{self.holes_low:g} to {self.holes_high:g} holes at widths within 5 % and layers within 0.05 mm; "
+            "each conducts with one unknown probability, independently; so does anything else"
+        )
+        before = _words(self.prior)
+        yield Facts((("P(short)", f"{_words(self.posterior)}; {said}"), ("before", before), ("assumed", assumed)))
+
+
+def _words(chance: Chance) -> str:
+    return f"{chance.mean:.2f}, {chance.low:.2f} to {chance.high:.2f} with {CREDIBLE:.0%} probability"
+
+
+def risk(design: Design, source: Source, log: Log | None = None) -> tuple[FilmRisk, Figure]:
+    """Holes of the films in a file of G-code, probability of a short, and a picture of where the films are open.
+
+    Parameters
+    ----------
+    design : Design
+        That was sliced.
+    source : Path, bytes or iterable of str
+        The G-code.
+    log : Log, optional
+        For the verdicts of earlier prints.
+
+    Raises
+    ------
+    BadInput
+        The file prints something else, or the design has no film between electrodes.
+    """
+    here = placed(design, source)
+    found = pinholes(design, here.paths, here.centre_mm)
+    thin = films(design, beads(design, here.paths, here.centre_mm))
+    if not thin:
+        raise BadInput(f"{design.name} has no film between electrodes; expected a dielectric from edge to edge")
+    counts = np.sum([draws(film, DRAWS) for film in thin], axis=0)
+    shorted, prints = verdicts(log, design) if log else (0, 0)
+    whole = FilmRisk(
+        **vars(found), holes_low=float(np.min(counts)), holes_high=float(np.max(counts)), shorted=shorted,
+        prints=prints, prior=chance(counts, 0, 0), posterior=chance(counts, shorted, prints),
+    )  # fmt: skip
+    return whole, picture(design.name, thin)
+
+
+def verdicts(log: Log, design: Design) -> tuple[int, int]:
+    """Specimens of a design's shape and film in a log that are shorted or leaking, and all with both resistances."""
+    film = design.parameters.get("dielectric_mm", getattr(design.params, "dielectric_mm", None))
+    last = {
+        r.specimen: (min(r.y_ohm), min(r.z_ohm))
+        for r in log.readings() if r.shape == design.shape and r.film_mm == film and r.y_ohm and r.z_ohm
+    }  # fmt: skip
+    return sum(z <= ORDER * y for y, z in last.values()), len(last)
+
+
+def chance(holes: Sequence[float] | NDArray[np.float64], shorted: int, prints: int) -> Chance:
+    """Posterior of the probability that a print is shorted.
+
+    Parameters
+    ----------
+    holes : sequence of float
+        Through-holes of possible prints [-].
+    shorted, prints : int
+        What was seen [-].
+
+    Examples
+    --------
+    Nothing is known before the first print:
+
+    >>> before = chance([0.0], 0, 0)
+    >>> round(before.mean, 3), round(before.low, 3), round(before.high, 3)
+    (0.5, 0.006, 0.994)
+    """
+    from scipy.special import betaincinv, xlog1py, xlogy
+
+    value = betaincinv(0.5, 0.5, (np.arange(_GRID) + 0.5) / _GRID)
+    none = np.mean([(1 - value) ** count for count in holes], axis=0)  # no hole conducts
+    probability = (1 - none[:, None] * (1 - value)[None, :]).ravel()
+    weight = xlogy(shorted, probability) + xlog1py(prints - shorted, -probability)
+    weight = np.exp(weight - weight.max())
+    order = np.argsort(probability)
+    below = np.cumsum(weight[order]) / weight.sum()
+    ends = (
+        float(probability[order][np.searchsorted(below, tail)]) for tail in ((1 - CREDIBLE) / 2, (1 + CREDIBLE) / 2)
+    )
+    return Chance(float((weight * probability).sum() / weight.sum()), *ends)
+
+
+def picture(name: str, thin: Sequence[Film]) -> Figure:
+    """Where films are weakest: what their layers leave open with lines a little narrower than the file says."""
+    panels = []
+    for film in thin:
+        layers = opened(film, [_PICTURED] * len(film.lines))
+        x0, y0, x1, y1 = film.plan.bounds
+        x, y = (np.arange(low, high, _CELL_MM) for low, high in ((x0, x1), (y0, y1)))
+        cells = shapely.box(*np.meshgrid(x, y), *np.meshgrid(x + _CELL_MM, y + _CELL_MM)).ravel()
+        pieces = shapely.get_parts(np.array(layers, object))
+        cell, piece = shapely.STRtree(pieces).query(cells, predicate="intersects")
+        area = shapely.area(shapely.intersection(cells[cell], pieces[piece]))
+        open_percent = 100 * np.bincount(cell, area, minlength=len(cells)) / (_CELL_MM**2 * len(layers))
+        content: list[Curve | Map] = [
+            Map(x + _CELL_MM / 2, y + _CELL_MM / 2, open_percent.reshape(len(y), len(x)), "open, mean of layers [%]")
+        ]
+        holes = [hole.representative_point() for hole in through(layers)]
+        if holes:
+            at = np.array([(p.x, p.y) for p in holes])
+            content.append(Curve("points", "through-hole", at[:, 0], at[:, 1], colour=ORANGE, symbol="circle-open"))
+        title = f"film from {film.span_mm[0]:g} to {film.span_mm[1]:g} mm, lines at {_PICTURED:.0%} of their width"
+        panels.append(Panel(tuple(content), Axis("x [mm]"), Axis("y [mm]"), title=title))
+    alt = "Plan of each film: share that its layers leave open, and circles where a way leads through"
+    return Figure("pinholes", name, alt, {"": tuple(panels)})

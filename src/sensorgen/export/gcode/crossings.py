@@ -1,0 +1,312 @@
+"""Where the nozzle passes over what other tools have printed before: while it travels, and while it prints.
+
+Every move is clipped against every earlier line that it may meet, as rectangles in plan whose width follows from the
+filament (Liang and Barsky, 1984, in the line's own directions); no raster of the bed.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+import shapely
+
+from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.design.printer import Printer
+from sensorgen.export.gcode.moves import Motion
+from sensorgen.export.gcode.paths import Numbering, paths_of, tools_of
+
+CONTACT_MM = 0.03  # a nozzle within this above a line touches it: less than the thinnest layer
+NEAR_MM = 0.12  # a nozzle within this above a line is one layer over it
+PITCH_MM = 0.05  # between the points of a travel that are looked at
+_RUB_PITCH_MM = 0.1  # as above, of a printed line
+FACE_MM = 0.5  # radius of the flat end of a nozzle: a guess, makers state none
+_PIECE_MM = 2.5  # moves are cut to this for the search of what they meet
+_LEVEL_MM = 1e-3  # tops closer than this are one level
+_ROUNDING_MM = 1e-6
+_BLOCK = 10_000  # pieces that are looked at together
+_TREES = 5  # that are held at once
+
+_Met = tuple[Whole, Whole, Real, Real]
+_Trees = Callable[["_Level"], shapely.STRtree]
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Printed lines of the bodies as rectangles in plan, half a width longer at both ends.
+
+    Attributes
+    ----------
+    start_mm, end_mm : (n, 2) array
+        In plan.
+    top_mm, width_mm : (n,) array
+        Height of the nozzle, and width that keeps the volume.
+    tool, number : (n,) array of int
+        The printer's own number of the tool, and the line of the file [-].
+    """
+
+    start_mm: Real
+    end_mm: Real
+    top_mm: Real
+    width_mm: Real
+    tool: Whole
+    number: Whole
+
+    def of(self, rows: Mask | Whole) -> "Lines":
+        """Some of the lines."""
+        return Lines(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Straight pieces of moves.
+
+    Attributes
+    ----------
+    row : (n,) array of int
+        Move of each piece [-].
+    start_mm, end_mm : (n, 3) array
+        Its ends.
+    tool, number : (n,) array of int
+        The printer's own number of the tool, and the line of the file [-].
+    """
+
+    row: Whole
+    start_mm: Real
+    end_mm: Real
+    tool: Whole
+    number: Whole
+
+    def of(self, rows: slice) -> "Pieces":
+        """Some of the pieces."""
+        return Pieces(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Points of moves that lie over lines of another tool, within ``NEAR_MM``.
+
+    Attributes
+    ----------
+    row : (n,) array of int
+        Move of each point [-].
+    place_mm : (n, 3) array
+        Where the nozzle is.
+    gap_mm : (n,) array
+        From the highest line there up to the nozzle; 0 in contact.
+    length_mm : (n,) array
+        Length of the move that the point stands for.
+    """
+
+    row: Whole
+    place_mm: Real
+    gap_mm: Real
+    length_mm: Real
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """What moves of a file pass over.
+
+    Attributes
+    ----------
+    travel : Points
+        Of moves that print nothing.
+    rubbing_mm : (m,) array
+        Length of every move that prints a line while the nozzle's face touches what another tool has printed.
+    tool : (m,) array of int
+        The printer's own number of the tool of every move [-].
+    """
+
+    travel: Points
+    rubbing_mm: Real
+    tool: Whole
+
+
+def crossings(motion: Motion, machine: Printer, numbering: Numbering = "printer") -> Crossings:
+    """Find where the nozzle passes over what another tool has printed before.
+
+    Parameters
+    ----------
+    motion : Motion
+        The file. Skirt, tower and support count for nothing where its comments name them.
+    machine : Printer
+        Whose G-code it is.
+    numbering : "printer" or "slicer"
+        Whether T counts as the printer does, or from 0.
+    """
+    lines, tool = printed_lines(motion, machine, numbering), tools_of(motion, machine, numbering)
+    moves = (motion.across_mm > 0) & (motion.rows[:, 5] < lines.top_mm.max(initial=0.0) + NEAR_MM)
+    travels = _cut(motion, tool, np.flatnonzero(moves & (motion.extruded_mm <= 0)))
+    prints = paths_of(motion, machine, numbering).model().number
+    body = np.isin(motion.number, prints) & moves & (motion.extruded_mm > 0)
+    rubs = _cut(motion, tool, np.flatnonzero(body))
+    rubbing = np.zeros(len(tool))
+    for points in _over(rubs, lines, CONTACT_MM, FACE_MM):
+        np.add.at(rubbing, points.row, points.length_mm)
+    nothing = Points(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+    over = [nothing, *_over(travels, lines, NEAR_MM, 0.0)]
+    travel = (np.concatenate([getattr(p, name) for p in over]) for name in Points.__dataclass_fields__)
+    return Crossings(Points(*travel), rubbing, tool)
+
+
+def printed_lines(motion: Motion, machine: Printer, numbering: Numbering) -> Lines:
+    """The lines of the bodies with their widths by volume."""
+    found = paths_of(motion, machine, numbering).model()
+    level = np.round(found.end_mm[:, 2] / _LEVEL_MM).astype(np.int64)
+    tops = np.unique(level)
+    rise = np.diff(tops, prepend=0)[np.searchsorted(tops, level)] * _LEVEL_MM
+    height = np.where(
+        np.isfinite(found.height_mm) & (found.height_mm > 0), found.height_mm, np.maximum(rise, _LEVEL_MM)
+    )
+    width = found.volume_mm3(machine.filament_mm) / (found.length_mm() * height)
+    return Lines(
+        found.start_mm[:, :2],
+        found.end_mm[:, :2],
+        np.asarray(level * _LEVEL_MM, float),
+        width,
+        found.tool,
+        found.number,
+    )
+
+
+def _cut(motion: Motion, tool: Whole, rows: Whole) -> Pieces:
+    """Moves as pieces of at most ``_PIECE_MM``; an arc as its chord."""
+    start, way = motion.start_mm[rows], motion.end_mm[rows] - motion.start_mm[rows]
+    which, low, high = _shares(_counts(way[:, :2]))
+    start, way = start[which], way[which]
+    first, last = (start + share[:, None] * way for share in (low, high))
+    return Pieces(rows[which], first, last, tool[rows][which], motion.number[rows][which])
+
+
+def _counts(way_mm: Real) -> Whole:
+    """How many pieces each way in plan is cut to."""
+    found: Whole = np.maximum(np.ceil(np.hypot(*way_mm.T) / _PIECE_MM), 1).astype(np.int64)
+    return found
+
+
+def _shares(count: Whole) -> tuple[Whole, Real, Real]:
+    """Of each piece, of some things cut to so many: the thing, and from which share of it to which."""
+    which = np.repeat(np.arange(len(count)), count)
+    step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+    return which, step / count[which], (step + 1) / count[which]
+
+
+def _over(pieces: Pieces, lines: Lines, within_mm: float, grown_mm: float) -> Iterator[Points]:
+    """Points of pieces over earlier lines of other tools, where no own line lies higher; many at once."""
+    levels, pitch_mm = _levels(lines), _RUB_PITCH_MM if grown_mm else PITCH_MM
+    tree = lru_cache(_TREES)(_Level.tree)  # a file goes up: those far below are never needed again
+    for first in range(0, len(pieces.row), _BLOCK):
+        block = pieces.of(slice(first, first + _BLOCK))
+        met = [*_meetings(block, levels, tree, within_mm, grown_mm)]
+        if met:
+            yield _points(block, lines, within_mm, pitch_mm, *(np.concatenate(c) for c in zip(*met, strict=True)))
+
+
+def _points(
+    pieces: Pieces, lines: Lines, within_mm: float, pitch_mm: float, piece: Whole, line: Whole, low: Real, high: Real
+) -> Points:
+    """Points of pieces at which the highest of the lines met is of another tool."""
+    foreign = lines.tool[line] != pieces.tool[piece]
+    mine = np.unique(piece[foreign])  # pieces that need points
+    kept = np.isin(piece, mine)
+    piece, line, low, high, foreign = piece[kept], line[kept], low[kept], high[kept], foreign[kept]
+    start, way = pieces.start_mm[mine], (pieces.end_mm - pieces.start_mm)[mine]
+    length = np.hypot(*way[:, :2].T)
+    count = np.maximum(np.ceil(length / pitch_mm), 1).astype(np.int64)
+    first = np.cumsum(count) - count
+    place = np.searchsorted(mine, piece)
+    # the points whose middle lies in [low, high]
+    begin, end = (np.ceil(np.clip(s, 0, 1) * count[place] - 0.5).astype(np.int64) for s in (low, high))
+    key = np.round(lines.top_mm[line] / _LEVEL_MM).astype(np.int64) * 2 + foreign
+    order = np.argsort(key, kind="stable")  # the highest is written last, of equals that of another tool
+    span = (end - begin)[order]
+    point = np.repeat((first[place] + begin)[order] - (np.cumsum(span) - span), span) + np.arange(span.sum())
+    top = np.full(count.sum(), -2, np.int64)
+    top[point] = np.repeat(key[order], span)
+    which = np.repeat(np.arange(len(mine)), count)
+    share = (np.arange(len(which)) - first[which] + 0.5) / count[which]
+    at = start[which] + share[:, None] * way[which]
+    gap = at[:, 2] - (top // 2) * _LEVEL_MM
+    here = (top % 2 == 1) & (gap <= within_mm + _ROUNDING_MM)
+    which = which[here]
+    return Points(pieces.row[mine][which], at[here], gap[here], (length / count)[which])
+
+
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """Lines of one height and tool, cut to pieces; ``row`` of each in the lines of the file."""
+
+    row: Whole
+    lines: Lines
+
+    def tree(self) -> shapely.STRtree:
+        """All pieces by their places."""
+        return shapely.STRtree(shapely.linestrings(np.stack([self.lines.start_mm, self.lines.end_mm], axis=1)))
+
+    def met(self, tree: _Trees, pieces: Pieces, by: Whole, within_mm: float, grown_mm: float) -> _Met:
+        """Of some pieces those that meet a line that is printed before, that line, and from which share to which."""
+        lowest = np.minimum(pieces.start_mm[by, 2], pieces.end_mm[by, 2])
+        lowest -= self.lines.top_mm[0] + within_mm + _ROUNDING_MM
+        by = by[(lowest <= 0) & (pieces.number[by] > self.lines.number[0])]
+        if not len(by):
+            return by, by, by.astype(float), by.astype(float)
+        margin = self.lines.width_mm.max() + grown_mm
+        ends = np.stack([pieces.start_mm[by, :2], pieces.end_mm[by, :2]])
+        near, hit = tree(self).query(shapely.box(*(ends.min(0) - margin).T, *(ends.max(0) + margin).T))
+        piece = by[near]
+        before = self.lines.number[hit] < pieces.number[piece]
+        piece, hit = piece[before], hit[before]
+        low, high = _clipped(pieces, self.lines, piece, hit, grown_mm)
+        meets = high > low
+        return piece[meets], self.row[hit[meets]], low[meets], high[meets]
+
+
+def _levels(lines: Lines) -> dict[int, list[_Level]]:
+    """Lines by tool and height."""
+    count = _counts(lines.end_mm - lines.start_mm)
+    which, low, high = _shares(count)
+    way = (lines.end_mm - lines.start_mm)[which]
+    start = lines.start_mm[which]
+    cut = replace(lines.of(which), start_mm=start + low[:, None] * way, end_mm=start + high[:, None] * way)
+    found = {}
+    for tool in np.unique(cut.tool).tolist():
+        mine = np.flatnonzero(cut.tool == tool)
+        mine = mine[np.argsort(cut.top_mm[mine], kind="stable")]
+        first = np.flatnonzero(np.diff(cut.top_mm[mine])) + 1
+        found[tool] = [_Level(which[rows], cut.of(rows)) for rows in np.split(mine, first)]
+    return found
+
+
+def _meetings(
+    pieces: Pieces, levels: dict[int, list[_Level]], tree: _Trees, within_mm: float, grown_mm: float
+) -> Iterator[_Met]:
+    """Pairs of pieces and lines of other tools that they meet, and of own lines where these may lie higher."""
+    for tool in np.unique(pieces.tool).tolist():
+        by = np.flatnonzero(pieces.tool == tool)
+        foreign = [level for other, those in levels.items() if other != tool for level in those]
+        met = [level.met(tree, pieces, by, within_mm, grown_mm) for level in foreign]
+        yield from met
+        over = np.unique(np.concatenate([piece for piece, _, _, _ in met])) if met else by[:0]
+        if not grown_mm:
+            yield from (level.met(tree, pieces, over, within_mm, grown_mm) for level in levels.get(tool, []))
+
+
+def _clipped(pieces: Pieces, lines: Lines, piece: Whole, line: Whole, grown_mm: float) -> tuple[Real, Real]:
+    """Shares of pieces, from and to, that lie within lines."""
+    way = lines.end_mm[line] - lines.start_mm[line]
+    length, half = np.hypot(*way.T), lines.width_mm[line] / 2 + grown_mm
+    along = way / length[:, None]
+    aside = along[:, ::-1] * [-1, 1]
+    start = pieces.start_mm[piece, :2] - lines.start_mm[line]
+    step = (pieces.end_mm - pieces.start_mm)[piece, :2]
+    low, high = np.zeros(len(piece)), np.ones(len(piece))
+    for axis, least, most in ((along, -half, length + half), (aside, -half, half)):
+        at, speed = (start * axis).sum(1), (step * axis).sum(1)
+        still = np.abs(speed) < 1e-12
+        with np.errstate(divide="ignore", invalid="ignore"):
+            one, other = (least - at) / speed, (most - at) / speed
+        outside = still & ((at < least) | (at > most))
+        low = np.maximum(low, np.where(still, np.where(outside, 2.0, 0.0), np.minimum(one, other)))
+        high = np.minimum(high, np.where(still, 1.0, np.maximum(one, other)))
+    return low, high

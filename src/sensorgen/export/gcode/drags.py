@@ -1,0 +1,319 @@
+"""Travel of the nozzle over what other tools have printed, summed up; and lifts that take it out of a file.
+
+A nozzle that travels in contact with another material can draw its own over it: a conductor over a dielectric. The
+printed lines of a lifted file are those of the file, byte by byte and in order; where a travel passes over another
+material, the nozzle first rises by ``LIFT_MM``. Nothing here shows that such strands conduct, or that lifts raise the
+share of good prints.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.errors import BadInput
+from sensorgen.design.printer import Printer
+from sensorgen.export.gcode.crossings import CONTACT_MM, FACE_MM, NEAR_MM, Crossings, crossings
+from sensorgen.export.gcode.files import Source, text_of
+from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.moves import Motion
+from sensorgen.export.gcode.paths import Numbering
+from sensorgen.export.gcode.timing import seconds
+
+LIFT_MM = 0.2  # 0.4 mm took twice the time and left no less contact
+COUNTED_MM = 0.5  # a crossing is longer than this
+_RETRACTED = 0.5  # of a tool's usual retraction
+_PLAIN = re.compile(rb"\s*G0*[01] [^;(]*", re.IGNORECASE)  # without a second command in brackets or behind
+_Z = re.compile(rb"\s*Z\s*[-+.0-9]+", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class OfTool:
+    """Travel of one tool over what other tools have printed."""
+
+    tool: Annotated[int, Column("tool")]
+    contact_mm: Annotated[float, Column("contact", "mm", "travel in contact with another material")]
+    near_mm: Annotated[float, Column("near", "mm", f"travel up to {NEAR_MM:g} mm above it")]
+    crossings: Annotated[int, Column("crossings", "", f"travels with more than {COUNTED_MM:g} mm of both")]
+    unretracted: Annotated[int, Column("unretracted", "", "of these without retraction")]
+    rubbing_mm: Annotated[float, Column("rubbing", "mm", "lines printed while the nozzle's face touches it")]
+
+
+@dataclass(frozen=True)
+class OfLayer:
+    """Travel of one tool at one height."""
+
+    z_mm: Annotated[float, Column("z", "mm")]
+    tool: Annotated[int, Column("tool")]
+    contact_mm: Annotated[float, Column("contact", "mm")]
+    near_mm: Annotated[float, Column("near", "mm")]
+
+
+@dataclass(frozen=True)
+class Drags:
+    """Travel over foreign material in a file, in the order of printing.
+
+    Attributes
+    ----------
+    tools : tuple of OfTool
+        Every tool that moves over another's material.
+    layers : tuple of OfLayer
+        Travel alone, by height of the nozzle.
+    """
+
+    tools: tuple[OfTool, ...]
+    layers: tuple[OfLayer, ...]
+
+    @property
+    def contact_mm(self) -> float:
+        """Travel in contact, of all tools [mm]."""
+        return sum(t.contact_mm for t in self.tools)
+
+    @property
+    def near_mm(self) -> float:
+        """Travel near, of all tools [mm]."""
+        return sum(t.near_mm for t in self.tools)
+
+    def document(self) -> Iterator[Part]:
+        """Tables by tool and by layer."""
+        if not self.tools:
+            yield "No tool moves over what another has printed."
+            return
+        yield Table.of(
+            "tools", f"Over what other tools have printed; radius of the nozzle's face {FACE_MM:g} mm, assumed",
+            self.tools,
+        )  # fmt: skip
+        if self.layers:
+            yield Table.of("layers", "Travel by height of the nozzle", self.layers)
+
+
+@dataclass(frozen=True)
+class Lifting:
+    """What lifts have changed.
+
+    Attributes
+    ----------
+    before, after : Drags
+        Measured in the file as sliced, and as written.
+    lifts, retractions : int
+        Added [-].
+    added_s : float
+        Time that they take, without acceleration [s].
+    """
+
+    before: Drags
+    after: Drags
+    lifts: int
+    retractions: int
+    added_s: float
+
+    def document(self) -> Iterator[Part]:
+        """Before and after, in two lines."""
+        if not self.before.contact_mm + self.before.near_mm:
+            return
+        was, now = (f"{d.contact_mm:.1f} + {d.near_mm:.1f} mm" for d in (self.before, self.after))
+        rubs = "; ".join(f"tool {t.tool} {t.rubbing_mm:.0f} mm" for t in self.after.tools if t.rubbing_mm)
+        yield Facts(
+            (
+                ("travel", f"over another tool's material, contact + near: {was} as sliced, {now} as written"),
+                (
+                    "lifts", f"{self.lifts} of {LIFT_MM:g} mm with {self.retractions} more retractions, "
+                    f"+{self.added_s:.0f} s; lines unchanged"
+                ),
+                *([("rubbing", f"{rubs}: lines beside another material, which no lift changes")] if rubs else []),
+            )
+        )  # fmt: skip
+
+
+def drags(source: Source, machine: Printer) -> Drags:
+    """Measure the travel over foreign material in a file, whoever has sliced it.
+
+    Parameters
+    ----------
+    source : Path, bytes or iterable of str
+        The G-code, with the printer's own tool numbers.
+    machine : Printer
+        Who is to print it.
+
+    Raises
+    ------
+    BadInput
+        The file cannot be read, or is no G-code.
+
+    Examples
+    --------
+    >>> from sensorgen.design.printer import load_printer
+    >>> lines = ["M83", "T3", "G1 Z0.1", "G1 X10 E0.2", "T4", "G1 X5 Y-5", "G1 X5 Y5", "G1 X9 E.1"]
+    >>> [(t.tool, round(t.contact_mm, 2)) for t in drags(lines, load_printer("diabase-h5")).tools]
+    [(4, 0.5)]
+    """
+    motion = follow(source, machine.control.prime_macro)
+    return summed(motion, crossings(motion, machine), machine)
+
+
+def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> tuple[bytes, Lifting]:
+    """Lift the nozzle wherever it travels over foreign material; the file, and what was changed.
+
+    Parameters
+    ----------
+    source : Path, bytes or iterable of str
+        The G-code.
+    machine : Printer
+        Who is to print it.
+    numbering : "printer" or "slicer"
+        Whether T counts as the printer does, or from 0.
+
+    Raises
+    ------
+    BadInput
+        The file cannot be read, is no G-code, or has crossings and places that are relative or in inches.
+    """
+    text = text_of(source)
+    motion = follow(text, machine.control.prime_macro)
+    found, retracted = crossings(motion, machine, numbering), _retracted(motion, machine)
+    before = summed(motion, found, machine)
+    if not len(found.travel.row):
+        return text, Lifting(before, before, 0, 0, 0.0)
+    odd = next((e for e in motion.events if e.command.code in ("G91", "G20")), None)
+    if odd:
+        raise BadInput(
+            f"line {odd.number}: {odd.command.code}; travel is lifted in files with absolute places in mm alone: slice "
+            "with G90 and G21"
+        )
+    writer = _Lifts(text, motion, machine, found, retracted)
+    lifted = writer.text()
+    again = follow(lifted, machine.control.prime_macro)
+    after = summed(again, crossings(again, machine, numbering), machine)
+    took = [float(seconds(m, machine.max_speed_mm_s).sum()) for m in (motion, again)]
+    return lifted, Lifting(before, after, writer.lifts, writer.retractions, took[1] - took[0])
+
+
+def summed(motion: Motion, found: Crossings, machine: Printer) -> Drags:
+    """Sums by tool, and by tool and layer."""
+    points, count, retracted = found.travel, len(motion.rows), _retracted(motion, machine)
+    touches = points.gap_mm <= CONTACT_MM
+    contact, near = (
+        np.bincount(points.row[rows], points.length_mm[rows], minlength=count) for rows in (touches, ~touches)
+    )
+    # a crossing is all travel between two printed lines
+    stretch = np.cumsum(motion.extruded_mm > 0)
+    tools = []
+    for tool in np.unique(found.tool[(contact + near + found.rubbing_mm) > 0]).tolist():
+        mine = found.tool == tool
+        whole = np.bincount(stretch[mine], (contact + near)[mine]) > COUNTED_MM
+        bare = np.bincount(stretch[mine], ((contact + near) * ~retracted)[mine]) > COUNTED_MM
+        sums = [float(v[mine].sum()) for v in (contact, near, found.rubbing_mm)]
+        tools.append(OfTool(tool, sums[0], sums[1], int(whole.sum()), int(bare.sum()), sums[2]))
+    keys = np.column_stack([np.round(points.place_mm[:, 2], 2), found.tool[points.row]])
+    layers = []
+    for z, tool in np.unique(keys, axis=0).tolist():
+        here = (keys == (z, tool)).all(1)
+        lengths = [float(points.length_mm[here & rows].sum()) for rows in (touches, ~touches)]
+        layers.append(OfLayer(z, int(tool), *lengths))
+    return Drags(tuple(tools), tuple(layers))
+
+
+def _habits(motion: Motion) -> dict[float, tuple[float, float]]:
+    """Of each tool of the file: the length of its usual retraction [mm], and its feed [mm/min]."""
+    tools, found = motion.tools.column(len(motion.rows), -1.0), {}
+    drawn = (motion.filament_mm < 0) & (motion.across_mm == 0)
+    for tool in np.unique(tools[drawn]).tolist():
+        rows = np.flatnonzero(drawn & (tools == tool))
+        lengths, first, counts = np.unique(
+            np.round(-motion.filament_mm[rows], 4), return_index=True, return_counts=True
+        )
+        most = counts.argmax()
+        found[tool] = float(lengths[most]), float(motion.feed_mm_min[rows[first[most]]])
+    return found
+
+
+def _retracted(motion: Motion, machine: Printer) -> Mask:
+    """Whether the filament is drawn back while each move is made."""
+    count = len(motion.rows)
+    tools, found = motion.tools.column(count, -1.0), np.zeros(count, bool)
+    owed = motion.extruded_mm - motion.filament_mm
+    habits = _habits(motion)
+    for tool in np.unique(tools).tolist():
+        mine = tools == tool
+        found[mine] = np.cumsum(owed[mine]) > _RETRACTED * habits.get(tool, (np.inf, 0.0))[0]
+    if machine.control.firmware_retraction:  # G10 without temperatures or places, until G11
+        for event in motion.events:
+            if event.command.code == "G11" or (event.command.code == "G10" and not event.command.has("PSRLXYZ")):
+                found[event.row :] = event.command.code == "G10"
+    return found
+
+
+class _Lifts:
+    """A file in lines, and what is written between them."""
+
+    def __init__(self, text: bytes, motion: Motion, machine: Printer, found: Crossings, retracted: Mask) -> None:
+        self.lines, self.motion, self.machine, self.found = text.split(b"\n"), motion, machine, found
+        self.retracted, self.number = retracted, motion.number
+        self.habits, self.tools = _habits(motion), motion.tools.column(len(motion.rows), -1.0)
+        self.relative_e = motion.absolute_e.column(len(motion.rows), 1.0) == 0
+        self.lifts = self.retractions = 0
+
+    def text(self) -> bytes:
+        """The file with all lifts."""
+        before: dict[int, list[str]] = {}
+        after: dict[int, list[str]] = {}
+        top = np.full(len(self.number), -np.inf)
+        points = self.found.travel
+        np.maximum.at(top, points.row, points.place_mm[:, 2] - points.gap_mm)
+        self.over_mm = np.bincount(points.row, points.length_mm, minlength=len(self.number))
+        for first, last in self._groups(np.unique(points.row)):
+            self._lift(first, last, top, before, after)
+        made = []
+        for number, line in enumerate(self.lines, 1):
+            made += [*(text.encode() for text in before.get(number, ())), line]
+            made += [text.encode() for text in after.get(number, ())]
+        return b"\n".join(made)
+
+    def _groups(self, rows: Whole) -> Iterator[tuple[int, int]]:
+        """First and last of the moves that are made in one lift: nothing but travel lies between them."""
+        motion = self.motion
+        plain = (motion.across_mm > 0) & (motion.extruded_mm <= 0) & (motion.filament_mm <= 0)
+        broken = np.zeros(len(self.number) + 1, np.int64)  # by a command between two moves
+        broken[[*(e.row for e in motion.events), *(c.row for c in motion.changes)]] = 1
+        blocks = np.cumsum(broken[:-1] + ~plain + np.append(0, ~plain[:-1]))
+        for these in np.split(rows, np.flatnonzero(np.diff(blocks[rows])) + 1):
+            yield int(these[0]), int(these[-1])
+
+    def _lift(
+        self, first: int, last: int, top: Real, before: dict[int, list[str]], after: dict[int, list[str]]
+    ) -> None:
+        """Write a lift before the first of some moves, and the way down after the last; their own Z words go."""
+        numbers = self.number[first : last + 1].tolist()
+        if len(set(numbers)) < len(numbers) or not all(_PLAIN.match(self.lines[n - 1]) for n in numbers):
+            return  # more than one move in a line: reported as left
+        heights = self.motion.rows[first : last + 1, [2, 5]]
+        high = min(max(heights.max(), top[first : last + 1].max()) + LIFT_MM, self.machine.reach_mm().z[1])
+        z_feed, feed = 60 * self.machine.max_speed_mm_s.z, self.motion.feed_mm_min
+        length, speed = self.habits.get(self.tools[first], (0.0, 0.0))
+        draws = bool(length and not self.retracted[first] and self.relative_e[first])
+        draws &= bool(self.over_mm[first : last + 1].sum() > COUNTED_MM)
+        up = [f"G1 E-{_short(length)} F{_short(speed)}"] if draws else []
+        up.append(f"G1 Z{_short(high)} F{_short(z_feed)}")
+        if not self._has_feed(numbers[0]):
+            up.append(f"G1 F{_short(feed[first])}")
+        down = [f"G1 Z{_short(self.motion.rows[last, 5])} F{_short(z_feed)}"]
+        down += [f"G1 E{_short(length)} F{_short(speed)}"] if draws else []
+        if last + 1 < len(self.number) and not self._has_feed(int(self.number[last + 1])):
+            down.append(f"G1 F{_short(feed[last])}")
+        for number in numbers:
+            code, semicolon, remark = self.lines[number - 1].partition(b";")
+            self.lines[number - 1] = _Z.sub(b"", code) + semicolon + remark
+        before[numbers[0]], after[numbers[-1]] = up, down
+        self.lifts, self.retractions = self.lifts + 1, self.retractions + draws
+
+    def _has_feed(self, number: int) -> bool:
+        return b"F" in self.lines[number - 1].partition(b";")[0].upper()
+
+
+def _short(value: float) -> str:
+    """A number of G-code, with what it needs of four decimals."""
+    return f"{value:.4f}".rstrip("0").rstrip(".")
