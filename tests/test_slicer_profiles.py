@@ -11,11 +11,12 @@ from xml.etree import ElementTree
 import extruded
 import pytest
 
+from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SlicerFailed, UnknownName
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names
 from sensorgen.design.tower import MARGIN_MM, tower
-from sensorgen.export.slicers import cura, curaengine, prusa
+from sensorgen.export.slicers import cura, curaengine, orca, prusa, versions
 from sensorgen.export.slicers.loads import Load, recipes
 from sensorgen.export.slicers.run import run
 
@@ -250,6 +251,95 @@ def test_profiles_are_the_same_each_time_and_without_leftovers(printer, quality)
     settings = curaengine.engine_settings(printer, quality, loads)
     told = [settings.common, *settings.tools.values(), *settings.unused.values()]
     assert not any("$" in value for each in told for value in each.values())
+
+
+# --- versions ---------------------------------------------------------------------------------------------
+
+
+def test_a_version_renames_drops_adds_and_translates():
+    change = versions.Change(
+        title="2",
+        source="here",
+        dropped=("a",),
+        renamed={"b": "c"},
+        values={"b": {"False": "x"}},
+        added={"t": "e = 5\n"},
+    )
+    text = "# a = 1\n[values]\na = 1\nb = False\nbb = False\nd = {{ b }}\n"
+    assert change.adapted("t", text) == "# a = 1\n[values]\nc = x\nbb = False\nd = {{ b }}\ne = 5\n"
+    assert change.adapted("another", "b = True\n") == "c = True\n"
+
+
+@pytest.mark.parametrize("slicer", ["prusa", "cura"])
+def test_what_a_version_drops_or_renames_is_there_before(slicer):
+    names = (
+        ("profile.ini",) if slicer == "prusa" else ("quality_global.inst.cfg", "quality_tool.inst.cfg", "engine.ini")
+    )
+    before: tuple[int, ...] = ()
+    for version, change in versions.changes(slicer).items():
+        old = [line.partition(" =") for name in names for line in versions.template(slicer, before, name).splitlines()]
+        new = "\n".join(versions.template(slicer, version, name) for name in names)
+        assert {*change.dropped, *change.renamed, *change.values} <= {key for key, equal, _ in old if equal}
+        assert not any(f"\n{key} =" in new for key in (*change.dropped, *change.renamed))
+        assert set(change.added) <= set(names)
+        before = version
+
+
+def test_the_profile_is_that_of_the_version():
+    keys = {
+        version: ini(prusa.profile(DIABASE, FINE, usual(DIABASE), versions.parse(version)))
+        for version in ("2.5.2", "2.6.0", "2.7.4", "2.8.1", "2.9.2", "3.0")
+    }
+    assert keys["2.5.2"] == ini(prusa.profile(DIABASE, FINE, usual(DIABASE)))
+    assert [v for v, k in keys.items() if "wipe_tower_x" in k] == ["2.5.2", "2.6.0", "2.7.4", "2.8.1"]
+    assert [v for v, k in keys.items() if "wiping_volumes_extruders" in k] == ["2.5.2", "2.6.0"]
+    assert [k.get("ensure_vertical_shell_thickness") for k in keys.values()] == ["0", *[None] * 3, *["disabled"] * 2]
+    assert keys["3.0"] == keys["2.9.2"]
+
+
+# --- Orca -------------------------------------------------------------------------------------------------
+
+
+def presets(printer, **dielectric):
+    found = orca.profiles(printer, FINE, usual(printer, **dielectric))
+    return {path: json.loads(text) for path, text in found.items()}
+
+
+@both_printers
+def test_orca_has_every_key_and_texts_alone(printer):
+    known = {key: set(names.split()) for key, names in yamlfile.read(Path(__file__).parent / "orca_keys.yaml").items()}
+    known["machine"] |= known["tools"]
+    kinds = []
+    for path, preset in presets(printer, infill_percent=80.0, infill_pattern="gyroid").items():
+        kinds.append(preset["type"])
+        assert path == f"{preset['type']}/{preset['name']}.json"
+        assert preset.keys() <= known["preset"] | known[preset["type"]], path
+        for key, value in preset.items():
+            entries = value if isinstance(value, list) else [value]
+            assert all(isinstance(entry, str) for entry in entries), key
+            if key in known["tools"]:
+                assert len(value) == len(printer.tool_numbers), key
+            elif preset["type"] == "filament" and key not in known["preset"] | {"compatible_printers"}:
+                assert len(value) == 1, key
+    assert kinds == ["machine", "process", "filament", "filament"]
+
+
+def test_orca_presets_belong_together_and_say_what_prusaslicers_profile_says():
+    machine, process, *filaments = presets(DIABASE).values()
+    same = ini(prusa.profile(DIABASE, FINE, usual(DIABASE)))
+    assert all(each["compatible_printers"] == [machine["name"]] for each in (process, *filaments))
+    assert ",".join(machine["printable_area"]) == same["bed_shape"]
+    assert machine["machine_start_gcode"].replace("\n", "\\n") == same["start_gcode"]
+    assert ",".join(machine["retract_length_toolchange"]) == same["retract_length_toolchange"]
+    assert process["wall_loops"] == same["perimeters"]
+    assert process["outer_wall_line_width"] == same["external_perimeter_extrusion_width"]
+    assert process["prime_tower_width"] == same["wipe_tower_width"]
+    assert process["min_bead_width"] == same["min_bead_width"]
+    assert [each["nozzle_temperature"][0] for each in filaments] == same["temperature"].split(",")[2:4]
+    assert [each["hot_plate_temp"][0] for each in filaments] == same["bed_temperature"].split(",")[2:4]
+    assert [each["filament_max_volumetric_speed"][0] for each in filaments] == (
+        same["filament_max_volumetric_speed"].split(",")[2:4]
+    )
 
 
 # --- tower ------------------------------------------------------------------------------------------------

@@ -75,6 +75,8 @@ def test_a_plate_is_sliced_and_put_into_the_printers_words(slicer, tmp_path):
     assert made.seconds > 0
     with zipfile.ZipFile(tmp_path / "x" / "plate.3mf") as plate:
         config = plate.read("Metadata/Slic3r_PE_model.config").decode()
+        place = plate.read("Metadata/Prusa_Slicer_wipe_tower_information.xml").decode()
+    assert 'position_x="165" position_y="55" rotation_deg="0"' in place  # 20 mm wide, 10 mm from the edges
     assert config.count("<volume ") == len(SMALL.printed.bodies) + len(OTHER.printed.bodies)
     assert 'value="a bottom_electrode"' in config
     assert 'value="b bottom_electrode"' in config

@@ -18,7 +18,7 @@ from sensorgen.core.errors import SlicerFailed
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names
 from sensorgen.design.tower import tower
-from sensorgen.export.slicers import cura, curaengine, prusa
+from sensorgen.export.slicers import cura, curaengine, prusa, versions
 from sensorgen.export.slicers.loads import Load
 
 DIABASE = load_printer("diabase-h5")
@@ -27,6 +27,9 @@ both_printers = pytest.mark.parametrize(
     "printer", [load_printer(name) for name in printer_names()], ids=lambda p: p.name
 )
 both_qualities = pytest.mark.parametrize("quality", [load_quality(n) for n in quality_names()], ids=lambda q: q.name)
+
+prusa_versions = pytest.mark.parametrize("prusa_version", ["own", "newer"], indirect=True)
+cura_versions = pytest.mark.parametrize("cura_version", ["own", "newer"], indirect=True)
 
 # Slicers lay round-ended lines and push infill into the walls: a solid box comes out 1 to 2 % too full.
 SOLID = pytest.approx(1.0, abs=0.03)
@@ -142,10 +145,12 @@ def ignored(program: str, text: str, folder: Path) -> list[str]:
     return [key for key, value in ini(text).items() if kept.get(key) != value]
 
 
+@prusa_versions
 @both_printers
 @both_qualities
-def test_prusa_keeps_every_key(prusa_slicer, printer, quality, tmp_path):
-    assert ignored(prusa_slicer, prusa.profile(printer, quality, usual(printer)), tmp_path) == []
+def test_prusa_keeps_every_key(prusa_version, printer, quality, tmp_path):
+    version = versions.of_program("prusa", prusa_version)
+    assert ignored(prusa_version, prusa.profile(printer, quality, usual(printer), version), tmp_path) == []
 
 
 def test_prusa_planted_slip_is_found(prusa_slicer, tmp_path):
@@ -296,7 +301,7 @@ def test_cura_is_quoted_when_it_refuses(cura_engine, tmp_path):
 # --- Cura's own definitions -------------------------------------------------------------------------------
 
 
-def definition(name: str) -> dict[str, dict[str, object]]:
+def definition(name: str, program: str = "") -> dict[str, dict[str, object]]:
     """All settings of one of Cura's own definitions, flat."""
     flat: dict[str, dict[str, object]] = {}
 
@@ -306,7 +311,7 @@ def definition(name: str) -> dict[str, dict[str, object]]:
                 flat[key] = node
             walk(node.get("children", {}))
 
-    walk(json.loads((curaengine.resources() / "definitions" / f"{name}.def.json").read_text())["settings"])
+    walk(json.loads((curaengine.resources(program) / "definitions" / f"{name}.def.json").read_text())["settings"])
     return flat
 
 
@@ -316,10 +321,12 @@ def section(text: str, name: str) -> dict[str, str]:
     return dict(parser[name])
 
 
+@cura_versions
 @both_printers
-def test_cura_knows_every_key_and_option(cura_engine, printer):
-    of_printer, of_tool = definition("fdmprinter"), definition("fdmextruder")
-    files = cura.profiles(printer, FINE, usual(printer, infill_percent=80.0, infill_pattern="grid"))
+def test_cura_knows_every_key_and_option(cura_version, printer):
+    of_printer, of_tool = definition("fdmprinter", cura_version), definition("fdmextruder", cura_version)
+    version = versions.of_program("cura", cura_version)
+    files = cura.profiles(printer, FINE, usual(printer, infill_percent=80.0, infill_pattern="grid"), version)
     for path, text in files.items():
         if path.startswith("definitions/"):
             assert set(json.loads(text)["overrides"]) <= set(of_printer), path
@@ -328,17 +335,20 @@ def test_cura_knows_every_key_and_option(cura_engine, printer):
         elif path.startswith("quality/"):
             given = section(text, "values")
             assert set(given) <= set(of_printer), path
-            assert section(text, "metadata")["setting_version"] == "19"
+            assert section(text, "metadata")["setting_version"] == {4: "19", 5: "20"}[version[0]]
             for key, value in given.items():
                 assert value in of_printer[key].get("options", {value: ""}), (path, key)
-    settings = curaengine.engine_settings(printer, FINE, usual(printer))
-    for told in (settings.common, *settings.tools.values(), *settings.unused.values()):
-        assert set(told) <= set(of_printer) | set(of_tool)
+    settings = curaengine.engine_settings(printer, FINE, usual(printer), version)
+    assert curaengine.unknown(settings, cura_version) == set()
+    settings.common["no_such_setting"] = "1"
+    assert curaengine.unknown(settings, cura_version) == {"no_such_setting"}
 
 
-def test_cura_global_settings_stand_in_the_global_quality(cura_engine):
-    known = definition("fdmprinter")
-    for path, text in cura.profiles(DIABASE, FINE, usual(DIABASE)).items():
+@cura_versions
+def test_cura_global_settings_stand_in_the_global_quality(cura_version):
+    known = definition("fdmprinter", cura_version)
+    version = versions.of_program("cura", cura_version)
+    for path, text in cura.profiles(DIABASE, FINE, usual(DIABASE), version).items():
         if path.startswith("quality/"):
             per_tool = {known[key].get("settable_per_extruder", True) for key in section(text, "values")}
             assert per_tool == {not path.endswith("_global.inst.cfg")}, path
@@ -408,15 +418,16 @@ def plain(value):
         return value
 
 
+@cura_versions
 @both_printers
 @pytest.mark.parametrize(
     "infill", [{}, {"infill_percent": 80.0, "infill_pattern": "triangles"}], ids=["full", "triangles"]
 )
-def test_engine_is_told_what_the_window_would_work_out(cura_engine, printer, infill):
-    known = definition("fdmprinter")
+def test_engine_is_told_what_the_window_would_work_out(cura_version, printer, infill):
+    known, version = definition("fdmprinter", cura_version), versions.of_program("cura", cura_version)
     loads = usual(printer, **infill)
-    files = cura.profiles(printer, FINE, loads)
-    told = curaengine.engine_settings(printer, FINE, loads)
+    files = cura.profiles(printer, FINE, loads, version)
+    told = curaengine.engine_settings(printer, FINE, loads, version)
     machine = {
         k: v["default_value"] for k, v in json.loads(files[f"definitions/{printer.name}.def.json"])["overrides"].items()
     }

@@ -10,6 +10,7 @@ from sensorgen.core.findings import Finding, counted, counts, listed, table
 from sensorgen.design import materials
 from sensorgen.design.design import Design, fields
 from sensorgen.design.tower import tower
+from sensorgen.design.walls import rule
 from sensorgen.scene import drawing
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.geometry.mesh import Mesh
@@ -60,7 +61,7 @@ class Review(Displayed):
         return counts(self.findings)
 
 
-def review(design: Design, step: Step = lambda _: None, walls: str = "arachne") -> Review:
+def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Review:
     """Check a design as it lies on the bed.
 
     Whether bodies overlap is looked at last, and only when nothing else is wrong: it takes longest.
@@ -72,7 +73,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "arachne") 
     step : callable
         Called with the next step, for a progress display.
     walls : str
-        Of the slicer, one of :data:`sensorgen.checks.estimate.RULES`; those of PrusaSlicer's profile if not given.
+        Of the slicer, one of :data:`sensorgen.checks.estimate.RULES`; those that PrusaSlicer makes if not given.
 
     Raises
     ------
@@ -88,7 +89,9 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "arachne") 
     made = _meshes(design)
     step("checks")
     gap_mm = validity.electrode_gap_mm(scene, made)
-    found = checks.findings(scene, design.machine, design.layers, gap_mm, walls) + _crowding(design)
+    found = checks.findings(
+        scene, design.machine, design.layers, gap_mm, walls or rule("prusa", design.walls)
+    ) + _crowding(design)
     found = [_advised(f, list(fields(design.shape))) for f in found]
     if not any(f.severity == "error" and f.rule != LOST for f in found):
         step("validity")

@@ -96,7 +96,7 @@ def printed_of(design: "Design") -> "Printed | None":
     from sensorgen.asprinted.printed import body
     from sensorgen.prediction.bodies import registered
 
-    option, value = click.get_current_context().meta.get(_BODY, ("--walls", "arachne"))
+    option, value = click.get_current_context().meta.get(_BODY, ("--walls", design.walls))
     if option == "--drawn":
         return None
     if option == "--gcode":

@@ -28,7 +28,7 @@ def _work(
     from sensorgen.checks.review import lost
     from sensorgen.workflows.build import STEPS, DetailedBuild, build
 
-    design, changes = body_options.compensated(design, compensate, "arachne")
+    design, changes = body_options.compensated(design, compensate, design.walls)
     with render.refused(design.name), show.progress(STEPS) as step:
         built = build(
             design, Path(out), cad=not no_cad, force=force, strict=strict, compensated=changes, step=step

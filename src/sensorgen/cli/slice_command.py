@@ -9,7 +9,8 @@ from sensorgen.cli import body_options, render, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf
 from sensorgen.core.errors import OutOfRange
-from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S, WALLS
+from sensorgen.design.walls import rule
+from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
@@ -41,7 +42,8 @@ def _work(
 
     if not 0 < time_limit_s < float("inf"):
         raise OutOfRange(f"--time-limit {time_limit_s:g}; expected seconds above 0")
-    design, changes = body_options.compensated(design, compensate, WALLS[slicer], slicer, program)
+    walls = rule(slicer, design.walls)
+    design, changes = body_options.compensated(design, compensate, walls, slicer, program)
     with render.refused(design.name), show.progress(("checks", *STEPS)) as step:
         made = slice_design(
             design, Path(out), slicer, program=program, time_limit_s=time_limit_s, force=force, strict=strict,

@@ -24,14 +24,23 @@ def read(path: Path) -> dict[str, Any]:
     BadInput
         Unreadable, no regular file, over ``MAX_BYTES``, not UTF-8, or what :func:`parse` refuses.
     """
+    return parse(text(path), str(path))
+
+
+def text(path: Path) -> str:
+    """Text of a small file.
+
+    Raises
+    ------
+    BadInput
+        Unreadable, no regular file, over ``MAX_BYTES``, or not UTF-8.
+    """
     try:
-        content = _content(path)
-        text = content.decode("utf-8-sig")
+        return _content(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise BadInput(f"{path}: not UTF-8 at byte {error.start}: save it as UTF-8 text") from None
     except (OSError, ValueError) as error:
         raise BadInput(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
-    return parse(text, str(path))
 
 
 def _content(path: Path) -> bytes:

@@ -22,7 +22,8 @@ from sensorgen.core.version import __version__
 from sensorgen.design import materials as material_files
 from sensorgen.design import shapes
 from sensorgen.design.materials import own
-from sensorgen.design.printer import Printer, Quality, load_printer, load_quality
+from sensorgen.design.printer import Pattern, Printer, Quality, load_printer, load_quality
+from sensorgen.design.profile import Profile, with_own
 from sensorgen.scene.scene import Envelope, Fill, Scene
 
 MAX_CELLS = 50_000  # crossed strips of 330 x 330 mm have 27 225
@@ -56,7 +57,7 @@ class Infill(Strict):
     """How densely one material is printed."""
 
     percent: Annotated[float, Field(gt=0, le=100)] | None = None
-    pattern: Literal["rectilinear", "grid", "concentric", "honeycomb", "triangles"] | None = None
+    pattern: Pattern | None = None
 
 
 class Waiver(Strict):
@@ -103,6 +104,7 @@ class Design(Strict):
     shrinkage: Annotated[float, Field(ge=0, lt=0.9)] = Field(
         default=0.0, description="Share that the bake takes off in the plane; the print is made larger by it [-]."
     )
+    profile: Profile = Profile()
     waivers: tuple[Waiver, ...] = Field(default=(), strict=False)  # YAML has lists only
 
     @field_validator("name")
@@ -197,12 +199,21 @@ class Design(Strict):
             stuff[name] = self.material(name).model_dump() | {"source": source}
         return {
             "sensorgen": __version__,
-            **self.model_dump(exclude={"name", "parameters", "printer", "quality", "waivers"}),
+            **self.model_dump(exclude={"name", "parameters", "printer", "quality", "waivers"} | self._plain()),
             "parameters": dataclasses.asdict(self.params),
             "materials_values": stuff,
             "printer_values": self.machine.model_dump(),
             "quality_values": self.layers.model_dump(),
         }
+
+    def _plain(self) -> set[str]:
+        """Parts that have come later and are not used: without them the identities of older designs last."""
+        return set() if self.profile != Profile() else {"profile"}
+
+    @property
+    def walls(self) -> str:
+        """Walls of the print: arachne or classic."""
+        return self.profile.walls or "arachne"
 
     def id(self) -> str:
         """Hash of all resolved parameters, material values and the software's version; not of the design's name."""
@@ -306,7 +317,7 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
     try:
         if isinstance(data, Mapping) and "shape" not in data:
             raise BadInput(f"shape is missing; expected {', '.join(registry.names(shapes))}")
-        design = checked(Design, data)
+        design = checked(Design, with_own(dict(data), Path(where).parent) if isinstance(data, Mapping) else data)
         _check_names(design)
     except SensorgenError as error:
         raise error.within(where) from None
@@ -348,7 +359,7 @@ def _check_names(design: Design) -> None:
     _one_source_each(design)
     _soluble(design)
     _refuse_stacks(design)
-    for name in (*design.tools, *design.infill):
+    for name in (*design.tools, *design.infill, *design.profile.materials()):
         material_files.load(name)
     machine = design.machine
     for name, tool in design.tools.items():
@@ -421,7 +432,7 @@ def name_of(design: Design) -> str:
         parts.append("" if given == usual else _plain(Path(given).stem))
     if design.orientation != default.orientation:
         parts.append("upside-down")
-    said_if_set = {"material_values"} if design.material_values else set()
+    said_if_set = ({"material_values"} if design.material_values else set()) | ({"profile"} - design._plain())
     others = design.model_dump(include={"materials", "nozzle_mm", "tools", "infill", "shrinkage"} | said_if_set)
     if others != default.model_dump(include=set(others)):
         parts.append(_digest(others))

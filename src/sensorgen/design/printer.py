@@ -13,6 +13,7 @@ from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.records import Strict, checked
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Pattern = Literal["rectilinear", "grid", "concentric", "honeycomb", "triangles", "gyroid"]  # of infill
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 # Titles stand on one line of a slicer's profile.
 Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]*$", examples=["one line without control characters"])]
@@ -124,7 +125,7 @@ class Quality(Strict):
     source: Line
     layer_mm: Positive
     first_layer_mm: Positive
-    infill_pattern: Literal["rectilinear", "grid", "concentric", "honeycomb", "triangles"]
+    infill_pattern: Pattern
     travel_speed_mm_s: Positive
     bridge_warning_mm: Positive
     bridge_error_mm: Positive

@@ -10,16 +10,18 @@ import numpy as np
 
 from sensorgen.core import files as store
 from sensorgen.core.errors import BadInput, SlicerFailed, UnknownName
+from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
+from sensorgen.design.tower import tower
 from sensorgen.export import threemf
 from sensorgen.export.gcode.drags import Lifting, lift
 from sensorgen.export.gcode.files import text_of
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.paths import Paths, paths_of
 from sensorgen.export.gcode.ready import ready
-from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S, curaengine, prusa, stl
+from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, curaengine, prusa, stl, versions
 from sensorgen.export.slicers.loads import Load, loads
-from sensorgen.export.slicers.run import Runner
+from sensorgen.export.slicers.run import Runner, find
 from sensorgen.export.threemf.part import part_of, parts_of
 from sensorgen.scene.geometry import meshes
 from sensorgen.scene.scene import Body
@@ -74,6 +76,8 @@ class Sliced:
         What the lifts have changed.
     seconds, own_seconds : float
         Time that the slicer took, and that everything around it took [s].
+    findings : tuple of Finding
+        Settings that the slicer does not know.
     """
 
     raw: Path
@@ -84,6 +88,7 @@ class Sliced:
     lifting: Lifting
     seconds: float
     own_seconds: float
+    findings: tuple[Finding, ...]
 
 
 def alone(design: Design) -> Placed:
@@ -141,7 +146,7 @@ def sliced(
     step("files")
     runner = Runner(program, time_limit_s, lambda: step("slicing"))
     try:
-        seconds = _run(pieces, bodies, slicer, raw, runner, title)
+        seconds, not_known = _run(pieces, bodies, slicer, raw, runner, title)
     except OSError as error:
         raise store.unwritable(folder, error) from None
     text = text_of(raw)
@@ -160,7 +165,9 @@ def sliced(
         )
     lines = paths_of(motion, machine, "slicer")
     step("done")
-    return Sliced(raw, made, lines, slicer, version, lifting, seconds, time.perf_counter() - started - seconds)
+    own_seconds = time.perf_counter() - started - seconds
+    findings = versions.unknown(f"{TITLES[slicer]} {version}", not_known)
+    return Sliced(raw, made, lines, slicer, version, lifting, seconds, own_seconds, findings)
 
 
 def check(pieces: Sequence[Placed]) -> None:
@@ -223,7 +230,9 @@ def plate_parts(pieces: Sequence[Placed]) -> list[threemf.Part]:
 def plate_3mf(pieces: Sequence[Placed], family: str, title: str) -> bytes:
     """The 3MF of a plate for one family of slicers; see :func:`sensorgen.export.threemf.plate`."""
     check(pieces)
-    return threemf.plate(family, title, plate_parts(pieces), _corner_mm(pieces[0].design))
+    design = pieces[0].design
+    primed = tower(design.machine, design.layers, len(plate_loads(pieces)))
+    return threemf.plate(family, title, plate_parts(pieces), _corner_mm(design), primed)
 
 
 def _corner_mm(design: Design) -> tuple[float, float]:
@@ -234,26 +243,34 @@ def _corner_mm(design: Design) -> tuple[float, float]:
 
 def _run(
     pieces: Sequence[Placed], bodies: list[threemf.Part], slicer: str, raw: Path, runner: Runner, title: str
-) -> float:
-    """Write what the slicer reads beside its file, and run it; the answer is the time that it took [s]."""
+) -> tuple[float, set[str]]:
+    """Write what the slicer reads beside its file, and run it: its time [s], and the settings that it does not know."""
     design, all_loads, folder = pieces[0].design, plate_loads(pieces), raw.parent
+    program = find(*PROGRAMS[slicer], runner.program)
+    version = versions.of_program(slicer, program)
     folder.mkdir(parents=True, exist_ok=True)
     if slicer == "prusa":
         plate, profile = folder / "plate.3mf", folder / "profile.ini"
         named = title or " ".join(piece.name for piece in pieces)[:80]
-        plate.write_bytes(threemf.plate("prusa", named, bodies, _corner_mm(design)))
-        profile.write_text(prusa.profile(design.machine, design.layers, all_loads), "utf-8")
+        primed = tower(design.machine, design.layers, len(all_loads))
+        plate.write_bytes(threemf.plate("prusa", named, bodies, _corner_mm(design), primed))
+        text = prusa.profile(design.machine, design.layers, all_loads, version)
+        profile.write_text(text, "utf-8")
         before = time.perf_counter()
         prusa.slice_3mf(plate, profile, raw, runner)
+        seconds = time.perf_counter() - before
+        known = prusa.settings(text_of(raw)[-_TAIL:].decode("utf-8", "replace"))
+        not_known = prusa.settings(text).keys() - known.keys() if known else set()
     else:
-        settings = curaengine.engine_settings(design.machine, design.layers, all_loads)
+        settings = curaengine.engine_settings(design.machine, design.layers, all_loads, version)
         shift_mm = np.array([-c for c in design.machine.bed_centre_mm()] + [0.0])
         files = [(folder / f"{part.name}.stl", part) for part in bodies]
         for path, part in files:
             path.write_bytes(stl.content(part.mesh, shift_mm))
         before = time.perf_counter()
         curaengine.slice_bodies([(path, part.extruder) for path, part in files], settings, raw, runner)
-    return time.perf_counter() - before
+        seconds, not_known = time.perf_counter() - before, curaengine.unknown(settings, program)
+    return seconds, not_known
 
 
 def _version(text: bytes, slicer: str) -> str:

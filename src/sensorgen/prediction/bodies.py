@@ -12,6 +12,7 @@ from sensorgen.core.files import reading
 from sensorgen.design.body import DRAWN, Body, Cells
 from sensorgen.design.design import Design
 from sensorgen.design.walls import WALLS
+from sensorgen.design.walls import rules as wall_rules
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
@@ -47,9 +48,9 @@ def estimated(design: Design, walls: str = "") -> Body:
     design : Design
         What is printed.
     walls : str
-        One of ``WALLS`` alone; all of them, the first as the most likely, if not given.
+        One of ``WALLS`` alone; if not given, all that the design's walls can come out as, the likeliest first.
     """
-    rules = (walls,) if walls else tuple(WALLS)
+    rules = (walls,) if walls else wall_rules(design.profile.walls)
     said = f"printed, estimated ({WALLS.get(rules[0], rules[0])})"
     return Body(
         design, "estimated", said, _identity(design, "estimated", *rules), partial(_estimated_cells, design, rules)

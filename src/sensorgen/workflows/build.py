@@ -21,9 +21,11 @@ from sensorgen.core.findings import Finding, counted, counts, listed, most_sever
 from sensorgen.core.version import __version__
 from sensorgen.design import materials, printer
 from sensorgen.design.design import Design
+from sensorgen.design.tower import tower
 from sensorgen.export import threemf
-from sensorgen.export.slicers import cura, prusa
+from sensorgen.export.slicers import cura, orca, prusa
 from sensorgen.export.slicers.loads import loads
+from sensorgen.export.slicers.versions import folders
 from sensorgen.export.threemf.part import parts_of
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
@@ -164,12 +166,12 @@ def build(
 
 
 def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> Iterator[tuple[str, bytes]]:
-    name = design.name
+    name, primed = design.name, tower(design.machine, design.layers, len(design.used()))
     step("3MF")
     for family in threemf.FAMILIES:
         yield (
             f"{name}.{family}.3mf",
-            threemf.content(family, name, parts_of(design, held.meshes), _centre_mm(design, family)),
+            threemf.content(family, name, parts_of(design, held.meshes), _centre_mm(design, family), primed),
         )
     step("profiles")
     for path, text in profiles(design).items():
@@ -194,16 +196,19 @@ def _await(job: "Future[None]", step: Step) -> None:
 
 
 def profiles(design: Design) -> dict[str, str]:
-    """Slicer profiles, by file name: PrusaSlicer and Cura, for every quality that ships and the design's own."""
-    found = loads(design)
+    """Slicer profiles, by file name: PrusaSlicer, Cura and Orca, for every quality that ships and the design's own."""
+    found, machine = loads(design), design.machine
     texts: dict[str, str] = {}
     # The design's own quality comes last: Cura's machine definition, one for all, then starts with it.
     others = (printer.load_quality(name) for name in QUALITIES if name != design.layers.name)
     for quality in (*others, design.layers):
-        texts[f"profiles/prusa/{design.machine.name}-{quality.name}.ini"] = prusa.profile(
-            design.machine, quality, found
-        )
-        texts |= {f"profiles/cura/{path}": text for path, text in cura.profiles(design.machine, quality, found).items()}
+        for at, since in folders("prusa").items():
+            texts[f"profiles/{at}/{machine.name}-{quality.name}.ini"] = prusa.profile(machine, quality, found, since)
+        for at, since in folders("cura").items():
+            own = cura.profiles(machine, quality, found, since)
+            texts |= {f"profiles/{at}/{path}": text for path, text in own.items()}
+        own = orca.profiles(machine, quality, found)
+        texts |= {f"profiles/orca/{path}": text for path, text in own.items()}
     return texts
 
 

@@ -19,11 +19,12 @@ from sensorgen.core.errors import Unprintable
 from sensorgen.core.findings import Finding, counted, counts, listed
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
+from sensorgen.design.walls import rule
 from sensorgen.export.gcode.check import Checked, check_motion
 from sensorgen.export.gcode.drags import Lifting
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.paths import paths_of
-from sensorgen.export.slicers import TIME_LIMIT_S, WALLS
+from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 from sensorgen.export.slicing import Step, alone, sliced
 from sensorgen.workflows import compensation
 from sensorgen.workflows.compensation import Change
@@ -39,7 +40,7 @@ class Slicer:
 
 @dataclass(frozen=True)
 class Volumes:
-    """Printed over exact volume per body and layer, and what rule 7 says of it."""
+    """Printed over exact volume per body and layer, and findings of rule 7 and of the slicer's profile."""
 
     layers: tuple[Row, ...]
     findings: tuple[Finding, ...]
@@ -151,7 +152,7 @@ def slice_design(
         The place cannot be written to, or the disk is full.
     """
     step("checks")
-    held = review(design, walls=WALLS.get(slicer, "arachne"))
+    held = review(design, walls=rule(slicer, design.walls) if slicer in SLICERS else "")
     if held.errors(strict) and not force:
         raise Unprintable(held.findings, held.errors(strict))
     with tempfile.TemporaryDirectory() as stage:
@@ -174,7 +175,7 @@ def slice_design(
         **vars(checked), name=design.name, design=design.id(), gcode=names[0], refused=stopped,
         sha256=sha256(content).hexdigest(), slicer=Slicer(made.slicer, made.version), sensorgen=__version__,
         printer=design.machine.name, quality=design.layers.name, design_findings=tuple(held.sliced().findings),
-        printed=Volumes(tuple(layers), tuple(findings)), lifting=made.lifting,
+        printed=Volumes(tuple(layers), (*made.findings, *findings)), lifting=made.lifting,
         compensated=tuple(compensated),
     )  # fmt: skip
     folder = out / design.name

@@ -7,24 +7,27 @@ import json
 import re
 import uuid
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, partial
 from html import escape
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import MissingValue, OutOfRange
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.design.tower import PRIME_MM3, tower
-from sensorgen.export.slicers.loads import Load, Recipe, by_hand, number, recipes, templates
+from sensorgen.export.slicers.loads import Load, Recipe, by_hand, number, overlaid, recipes, templates
+from sensorgen.export.slicers.versions import Version
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
 FLAVOURS = {"reprapfirmware": "RepRap (RepRap)", "marlin": "RepRap (Marlin/Sprinter)"}
-PATTERNS = {"rectilinear": "lines", "grid": "grid", "concentric": "concentric", "triangles": "triangles"}
-DIRECTIONS = {"lines": 1, "grid": 2, "concentric": 1, "triangles": 3}  # of lines in one layer
+PATTERNS = {
+    "rectilinear": "lines", "grid": "grid", "concentric": "concentric", "triangles": "triangles", "gyroid": "gyroid",
+}  # fmt: skip
+DIRECTIONS = {"lines": 1, "grid": 2, "concentric": 1, "triangles": 3, "gyroid": 1}  # of lines in one layer
 
 
-def profiles(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> dict[str, str]:
+def profiles(printer: Printer, quality: Quality, loads: Mapping[int, Load], version: Version = ()) -> dict[str, str]:
     """Texts of Cura's files under their path in its resources folder.
 
     Parameters
@@ -33,6 +36,8 @@ def profiles(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> d
         What prints, and in which layers.
     loads : mapping
         Load under the printer's own tool number [-].
+    version : tuple of int
+        Cura's version; the oldest that is supported when not given.
 
     Returns
     -------
@@ -47,7 +52,8 @@ def profiles(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> d
     """
     used = recipes(printer, quality, loads)
     own, trains = f"quality/{printer.name}/{printer.name}_{quality.name}", range(len(printer.tool_numbers))
-    shared = context(printer, quality, used)
+    options = next(iter(loads.values())).profile
+    shared, fill = context(printer, quality, used), partial(filled, version)
     files = {
         f"definitions/{printer.name}.def.json": fill(
             "machine.def.json", shared, flavour=FLAVOURS[printer.gcode_flavour], first=next(iter(used.values())),
@@ -59,7 +65,8 @@ def profiles(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> d
         files[f"extruders/{extruder_id(printer, index)}.def.json"] = fill("extruder.def.json", shared, index=index)
     for r in used.values():
         files[f"materials/{material_id(r)}.xml.fdm_material"] = fill("material.xml.fdm_material", shared, r=r)
-        files[f"{own}_{material_id(r)}.inst.cfg"] = fill("quality_tool.inst.cfg", shared, r=r)
+        text = fill("quality_tool.inst.cfg", shared, r=r, walls=options.walls or "arachne")
+        files[f"{own}_{material_id(r)}.inst.cfg"] = overlaid(text, options.texts("cura"))
     return files
 
 
@@ -84,13 +91,13 @@ def context(printer: Printer, quality: Quality, used: Mapping[int, Recipe]) -> d
     }  # fmt: skip
 
 
-def fill(template: str, shared: Mapping[str, Any], **own: Any) -> str:
+def filled(version: Version, template: str, shared: Mapping[str, Any], **own: Any) -> str:
     """Text of a template in ``slicer_profiles/cura``, with what all templates show and with its own."""
-    return _templates().get_template(template).render(dict(shared), **own)
+    return _templates(version).get_template(template).render(dict(shared), **own)
 
 
 @cache
-def _templates() -> "Environment":
+def _templates(version: Version) -> "Environment":
     def guid(r: Recipe) -> str:
         return str(uuid.uuid5(uuid.NAMESPACE_URL, f"sensorgen/material/{material_id(r)}"))
 
@@ -102,8 +109,8 @@ def _templates() -> "Environment":
             return ""
 
     return templates(
-        "cura", material_id=material_id, guid=guid, density=density, pattern=_pattern, e=escape, tojson=json.dumps,
-        drying=lambda material: ". ".join(by_hand(material)) or "no source says how to dry it",
+        "cura", version, material_id=material_id, guid=guid, density=density, pattern=_pattern, e=escape,
+        tojson=json.dumps, drying=lambda material: ". ".join(by_hand(material)) or "no source says how to dry it",
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ the bed.
 """
 
 import configparser
+import json
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -15,9 +16,10 @@ from pathlib import Path
 
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design.printer import Printer, Quality
-from sensorgen.export.slicers import cura
+from sensorgen.export.slicers import PROGRAMS, cura
 from sensorgen.export.slicers.loads import Load, recipes
 from sensorgen.export.slicers.run import USUAL, Runner, find, run
+from sensorgen.export.slicers.versions import Version
 
 RESOURCES = (Path("/usr/share/cura/resources"), Path("/usr/local/share/cura/resources"))
 
@@ -36,7 +38,9 @@ class EngineSettings:
     unused: dict[int, dict[str, str]]
 
 
-def engine_settings(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> EngineSettings:
+def engine_settings(
+    printer: Printer, quality: Quality, loads: Mapping[int, Load], version: Version = ()
+) -> EngineSettings:
     """Settings for a run of the engine.
 
     Parameters
@@ -45,6 +49,8 @@ def engine_settings(printer: Printer, quality: Quality, loads: Mapping[int, Load
         What prints, and in which layers.
     loads : mapping
         Load under the printer's own tool number [-].
+    version : tuple of int
+        The engine's version; the oldest that is supported when not given.
 
     Raises
     ------
@@ -52,19 +58,20 @@ def engine_settings(printer: Printer, quality: Quality, loads: Mapping[int, Load
         See :func:`sensorgen.export.slicers.cura.profiles`.
     """
     used = recipes(printer, quality, loads)
-    files = cura.profiles(printer, quality, loads)
+    files = cura.profiles(printer, quality, loads, version)
     own = f"quality/{printer.name}/{printer.name}_{quality.name}"
     shared, tools = cura.context(printer, quality, used), {}
     of_all: dict[str, str] = {}
+    own_settings = next(iter(loads.values())).profile.texts("cura")
     for index, r in used.items():
         profile = _sections(files[f"{own}_{cura.material_id(r)}.inst.cfg"])["values"]
-        engine = _sections(cura.fill("engine.ini", shared, r=r))
+        engine = _sections(cura.filled(version, "engine.ini", shared, r=r))
         of_all = of_all or engine["all"]
-        tools[index] = profile | engine["tool"] | {"extruder_nr": str(index)}
+        tools[index] = profile | engine["tool"] | {"extruder_nr": str(index)} | own_settings
     return EngineSettings(
         printer=printer.name,
         files={path: text for path, text in files.items() if path.startswith(("definitions/", "extruders/"))},
-        common=_sections(files[f"{own}_global.inst.cfg"])["values"] | of_all,
+        common=_sections(files[f"{own}_global.inst.cfg"])["values"] | of_all | own_settings,
         tools=tools,
         unused={i: {"prime_tower_min_volume": "0"} for i in range(len(printer.tool_numbers)) if i not in used},
     )
@@ -93,7 +100,7 @@ def slice_bodies(
         CuraEngine or its definitions are not installed, a mesh is missing, or its tool has no load; or
         the engine refuses.
     """
-    program = find("CuraEngine", "cura-engine cura", runner.program)
+    program = find(*PROGRAMS["cura"], runner.program)
     for path, index in stls:
         if not path.is_file():
             raise SlicerFailed(f"nothing to slice: there is no file {path}")
@@ -112,22 +119,50 @@ def slice_bodies(
         for path, index in stls:
             command += [f"-e{index}", "-l", str(path), "-s", f"extruder_nr={index}"]
         command += ["-o", str(gcode)]
-        search = [str(base / kind) for base in (Path(here), resources()) for kind in ("definitions", "extruders")]
+        search = [
+            str(base / kind) for base in (Path(here), resources(program)) for kind in ("definitions", "extruders")
+        ]
         run(command, gcode, {"CURA_ENGINE_SEARCH_PATH": os.pathsep.join(search)}, runner)
 
 
-def resources() -> Path:
-    """Folder of Cura's own definitions, on which ours build.
+def resources(program: str = "") -> Path:
+    """Folder of Cura's own definitions, on which ours build; beside the engine, or else the system's.
+
+    Parameters
+    ----------
+    program : str
+        Path of the engine, as in ``PREFIX/bin``, which looks into ``PREFIX/share`` first.
 
     Raises
     ------
     SlicerFailed
         It is not where Cura's packages put it.
     """
-    for path in RESOURCES:
+    beside = [Path(program).parent.parent / "share/cura/resources"] if program else []
+    for path in [*beside, *RESOURCES]:
         if (path / "definitions" / "fdmprinter.def.json").is_file():
             return path
     raise SlicerFailed(f"Cura's definitions are not in {RESOURCES[0]}; on Debian: apt install cura")
+
+
+def unknown(settings: EngineSettings, program: str = "") -> set[str]:
+    """Settings that the definitions of the engine's version do not have.
+
+    Raises
+    ------
+    SlicerFailed
+        See :func:`resources`.
+    """
+    known: set[str] = set()
+    for name in ("fdmprinter", "fdmextruder"):
+        path = resources(program) / "definitions" / f"{name}.def.json"
+        nodes = [json.loads(path.read_text("utf-8"))["settings"]]
+        while nodes:
+            found = nodes.pop()
+            known |= found.keys()
+            nodes += [node["children"] for node in found.values() if "children" in node]
+    told = (settings.common, *settings.tools.values(), *settings.unused.values())
+    return {key for values in told for key in values} - known
 
 
 def _given(values: Mapping[str, str]) -> list[str]:

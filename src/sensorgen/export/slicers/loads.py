@@ -2,35 +2,42 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING, get_args
 
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.design.design import Design, Infill
 from sensorgen.design.materials import Material
-from sensorgen.design.printer import Printer, Quality, folder
+from sensorgen.design.printer import Pattern, Printer, Quality
+from sensorgen.design.profile import Profile
+from sensorgen.export.slicers.versions import Version, template
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-PATTERNS = ("rectilinear", "grid", "concentric", "honeycomb", "triangles")
+PATTERNS = get_args(Pattern)
 RETRACTION_SPEED_MM_S = 40.0  # PrusaSlicer's default; slower where the printer's extruder is
 
 
 @dataclass(frozen=True)
 class Load:
-    """What a tool prints: the material, the source of its numbers, and what the design overrides."""
+    """What a tool prints: the material, the source of its numbers, and what the design overrides.
+
+    ``profile`` is the design's, for all its tools.
+    """
 
     material: Material
     source: str = ""
     infill_percent: float | None = None
     infill_pattern: str | None = None
+    profile: Profile = field(default_factory=Profile)
 
 
 def load(design: Design, name: str) -> Load:
     """What the tool of a material prints for a design."""
     infill = design.infill.get(name, Infill())
-    return Load(design.material(name), design.used()[name], infill.percent, infill.pattern)
+    return Load(design.material(name), design.used()[name], infill.percent, infill.pattern, design.profile)
 
 
 def loads(design: Design) -> dict[int, Load]:
@@ -54,6 +61,8 @@ class Recipe:
     flow_percent: float
     retraction_mm: float
     retraction_speed_mm_s: float
+    line_mm: float
+    infill_angle_deg: float | None
 
     @property
     def label(self) -> str:
@@ -100,7 +109,7 @@ def recipe(printer: Printer, quality: Quality, tool: int, load: Load) -> Recipe:
             raise MissingValue(f"tool {tool}: {error}; {advice}") from None
         return _between(where, what, found, low, high)
 
-    walls = value("wall_lines", "walls [lines]", 1, 100)
+    walls = value("wall_lines", "walls [lines]", 1, 100, load.profile.wall_lines.get(load.material.name))
     if walls != round(walls):
         raise OutOfRange(f"{where}: walls [lines] is {walls:g}; expected a whole number")
     return Recipe(
@@ -116,6 +125,14 @@ def recipe(printer: Printer, quality: Quality, tool: int, load: Load) -> Recipe:
         flow_percent=value("flow_percent", "flow [%]", 10, 200),
         retraction_mm=value("retraction_mm", "retraction [mm]", 0, 20),
         retraction_speed_mm_s=min(RETRACTION_SPEED_MM_S, limits.extruder),
+        line_mm=_between(
+            where,
+            "line width [mm]",
+            load.profile.line_mm.get(load.material.name, printer.line_mm()),
+            0.5 * printer.nozzle_mm,
+            2 * printer.nozzle_mm,
+        ),
+        infill_angle_deg=load.profile.infill_angle_deg.get(load.material.name),
     )
 
 
@@ -145,10 +162,22 @@ def recipes(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> di
     _between(printer.name, "first layer height [mm]", quality.first_layer_mm, printer.min_layer_mm, printer.nozzle_mm)
     _between(quality.name, "travel speed [mm/s]", quality.travel_speed_mm_s, 1, printer.max_speed_mm_s.xy)
     made = {tool: recipe(printer, quality, tool, loads[tool]) for tool in sorted(loads)}
+    if any(load.profile != next(iter(loads.values())).profile for load in loads.values()):
+        raise BadInput("one plate, two slicer profiles: give all its designs the same 'profile'")
     if len({r.bed_c for r in made.values()}) > 1:
         each = ", ".join(f"{r.material.name} on tool {tool} {r.bed_c:g} C" for tool, r in made.items())
         raise BadInput(f"one bed, two temperatures: {each}; name sources that agree, or print without one of them")
     return {printer.slicer_index(tool): made[tool] for tool in sorted(made, key=printer.slicer_index)}
+
+
+def overlaid(text: str, settings: Mapping[str, str]) -> str:
+    """A profile's lines ``key = value`` with other values, in place or at the end."""
+    left = dict(settings)
+    lines = []
+    for line in text.splitlines():
+        key = line.partition(" =")[0]
+        lines.append(f"{key} = {left.pop(key)}" if key in left else line)
+    return "\n".join([*lines, *(f"{key} = {value}" for key, value in left.items())]) + "\n"
 
 
 def by_hand(material: Material) -> list[str]:
@@ -159,16 +188,26 @@ def by_hand(material: Material) -> list[str]:
     return found
 
 
-def templates(slicer: str, **filters: Callable[..., str]) -> "Environment":
-    """The profile templates of a slicer; ``n`` writes numbers."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+def templates(slicer: str, version: Version, **filters: Callable[..., str]) -> "Environment":
+    """The profile templates of a slicer, adapted to its version; ``n`` writes numbers."""
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     made = Environment(  # noqa: S701 - plain text; XML and JSON are escaped by filters
-        loader=FileSystemLoader(folder() / slicer), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-        keep_trailing_newline=True,
+        loader=FunctionLoader(partial(template, slicer, version)), undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     made.filters |= {"n": number, **filters}
     return made
+
+
+def line_area_mm2(quality: Quality, line_mm: float) -> float:
+    """Cross-section of a line at its highest [mm2]: a rectangle with round sides.
+
+    Times the speed it is the flow that keeps the tower, whose speed PrusaSlicer sets itself, as slow as
+    the material asks.
+    """
+    height_mm = max(quality.layer_mm, quality.first_layer_mm)
+    return height_mm * (line_mm - height_mm * (1 - math.pi / 4))
 
 
 def number(value: float) -> str:

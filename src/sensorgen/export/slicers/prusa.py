@@ -1,16 +1,27 @@
 """PrusaSlicer: one profile for all tools of a printer, and its command line."""
 
-import math
 from collections.abc import Iterable, Mapping
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.design.tower import PRIME_MM3, tower
-from sensorgen.export.slicers.loads import Load, Recipe, by_hand, number, recipe, recipes, templates
+from sensorgen.export.slicers import PROGRAMS
+from sensorgen.export.slicers.loads import (
+    Load,
+    Recipe,
+    by_hand,
+    line_area_mm2,
+    number,
+    overlaid,
+    recipe,
+    recipes,
+    templates,
+)
 from sensorgen.export.slicers.run import USUAL, Runner, find, run
+from sensorgen.export.slicers.versions import Version
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -21,8 +32,13 @@ _SPEEDS = (
     "top_solid_infill_speed", "gap_fill_speed", "bridge_speed",
 )  # fmt: skip
 
+_WIDTHS = (
+    "perimeter_extrusion_width", "external_perimeter_extrusion_width", "infill_extrusion_width",
+    "solid_infill_extrusion_width", "top_infill_extrusion_width",
+)  # fmt: skip
 
-def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> str:
+
+def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load], version: Version = ()) -> str:
     """Text of the ``.ini`` file that ``prusa-slicer --load`` takes.
 
     PrusaSlicer keeps speeds, walls and infill per body, not per tool. Where the loads disagree, this file
@@ -35,6 +51,8 @@ def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> st
         What prints, and in which layers.
     loads : mapping
         Load under the printer's own tool number [-].
+    version : tuple of int
+        PrusaSlicer's version; the oldest that is supported when not given.
 
     Raises
     ------
@@ -43,16 +61,18 @@ def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> st
     """
     used = recipes(printer, quality, loads)
     tools = [used.get(i) for i in range(len(printer.tool_numbers))]
-    return _templates().get_template("profile.ini").render(
+    options = next(iter(loads.values())).profile
+    text = _templates(version).get_template("profile.ini").render(
         printer=printer, quality=quality, used=used, tools=tools, tower=tower(printer, quality, len(used)),
         flavour=FLAVOURS[printer.gcode_flavour], densest=max(used.values(), key=lambda r: r.infill_percent),
-        line_area_mm2=_line_area_mm2(printer, quality), prime_mm3=PRIME_MM3,
+        line_area_mm2=partial(line_area_mm2, quality), prime_mm3=PRIME_MM3, options=options,
         per_tool=lambda entry, times=1: ",".join([str(entry)] * times * len(tools)),
     )  # fmt: skip
+    return overlaid(text, options.texts("prusa"))
 
 
 @cache
-def _templates() -> "Environment":
+def _templates(version: Version) -> "Environment":
     def row(values: Iterable[float], per: float = 1) -> str:
         return ",".join(number(value / per) for value in values)
 
@@ -67,7 +87,7 @@ def _templates() -> "Environment":
             return "no material on this tool in the design: it stays cold"
         return ". ".join([f"{r.material.title}: {r.material.about}", *by_hand(r.material)])
 
-    return templates("prusa", row=row, escaped=escaped, texts=texts, note=note, pattern=_pattern)
+    return templates("prusa", version, row=row, escaped=escaped, texts=texts, note=note, pattern=_pattern)
 
 
 def volume_settings(printer: Printer, quality: Quality, tool: int, load: Load) -> dict[str, str]:
@@ -87,7 +107,12 @@ def volume_settings(printer: Printer, quality: Quality, tool: int, load: Load) -
     """
     r = recipe(printer, quality, tool, load)
     own = {"fill_density": f"{number(r.infill_percent)}%", "fill_pattern": _pattern(r), "perimeters": str(r.wall_lines)}
-    return own | dict.fromkeys(_SPEEDS, number(r.speed_mm_s))
+    own |= dict.fromkeys(_SPEEDS, number(r.speed_mm_s))
+    if load.material.name in load.profile.line_mm:
+        own |= dict.fromkeys(_WIDTHS, number(r.line_mm))
+    if r.infill_angle_deg is not None:
+        own["fill_angle"] = number(r.infill_angle_deg)
+    return {key: value for key, value in own.items() if key not in load.profile.texts("prusa")}
 
 
 def slice_3mf(threemf: Path, profile: Path, gcode: Path, runner: Runner = USUAL) -> None:
@@ -109,7 +134,7 @@ def slice_3mf(threemf: Path, profile: Path, gcode: Path, runner: Runner = USUAL)
     SlicerFailed
         PrusaSlicer is not installed, refuses, or cannot read one of the files.
     """
-    program = find("prusa-slicer", "prusa-slicer", runner.program)
+    program = find(*PROGRAMS["prusa"], runner.program)
     for path in (threemf, profile):
         if not path.is_file():  # PrusaSlicer would take a missing profile for an empty one
             raise SlicerFailed(f"nothing to slice: there is no file {path}")
@@ -119,14 +144,10 @@ def slice_3mf(threemf: Path, profile: Path, gcode: Path, runner: Runner = USUAL)
     run([*command, "--output", str(gcode), str(threemf)], gcode, runner=runner)
 
 
-def _line_area_mm2(printer: Printer, quality: Quality) -> float:
-    """Cross-section of a line at its highest [mm2]: a rectangle with round sides.
-
-    Times the speed it is the flow that keeps the tower, whose speed PrusaSlicer sets itself, as slow as
-    the material asks.
-    """
-    height_mm = max(quality.layer_mm, quality.first_layer_mm)
-    return height_mm * (printer.line_mm() - height_mm * (1 - math.pi / 4))
+def settings(text: str) -> dict[str, str]:
+    """Settings of a profile, or of what PrusaSlicer writes of them at the end of its G-code."""
+    lines = (line.removeprefix("; ").partition(" =") for line in text.splitlines() if not line.startswith("#"))
+    return {key: value.strip() for key, equal, value in lines if equal and " " not in key}
 
 
 def _pattern(r: Recipe) -> str:

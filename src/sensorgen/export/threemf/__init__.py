@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.design.tower import Tower
 from sensorgen.export.threemf import archive, cura, orca, prusa
 from sensorgen.export.threemf.part import Part, check
 from sensorgen.export.threemf.plate import box_mm, placed
@@ -21,7 +22,9 @@ _WRITERS = {"prusa": prusa.files, "cura": cura.files, "orca": orca.files}
 FAMILIES = tuple(_WRITERS)
 
 
-def content(family: str, title: str, parts: Sequence[Part], centre_mm: tuple[float, float]) -> bytes:
+def content(
+    family: str, title: str, parts: Sequence[Part], centre_mm: tuple[float, float], tower: Tower | None = None
+) -> bytes:
     """The 3MF of some bodies for one family of slicers.
 
     Parameters
@@ -36,6 +39,8 @@ def content(family: str, title: str, parts: Sequence[Part], centre_mm: tuple[flo
         Where the middle of the sensor (of the box around all bodies) goes on the bed [mm], in the
         family's coordinates: of the bed for ``prusa`` and ``orca``, from its front left corner for
         ``cura``. The lowest point comes to stand on the bed.
+    tower : Tower, optional
+        The prime tower, in coordinates of the bed; PrusaSlicer reads its place here since 2.9.
 
     Returns
     -------
@@ -64,10 +69,13 @@ def content(family: str, title: str, parts: Sequence[Part], centre_mm: tuple[flo
     ordered = sorted(parts, key=lambda part: part.name)
     low, high = box_mm(parts)
     shift_mm = np.array([*centre_mm, 0.0]) - [*(low + high)[:2] / 2, low[2]]
-    return archive.pack(_WRITERS[family](title, ordered, shift_mm))
+    files = _WRITERS[family](title, ordered, shift_mm)
+    return archive.pack([*files, prusa.tower(tower)] if tower and family == "prusa" else files)
 
 
-def plate(family: str, title: str, parts: Sequence[Part], corner_mm: tuple[float, float]) -> bytes:
+def plate(
+    family: str, title: str, parts: Sequence[Part], corner_mm: tuple[float, float], tower: Tower | None = None
+) -> bytes:
     """The 3MF of a plate with several sensors, each body where it stands.
 
     Parameters
@@ -80,6 +88,8 @@ def plate(family: str, title: str, parts: Sequence[Part], corner_mm: tuple[float
         All bodies, made by :func:`placed` in the coordinates of the bed.
     corner_mm : (float, float)
         The front left corner of the bed in those coordinates [mm]: Cura counts from there.
+    tower : Tower, optional
+        See :func:`content`.
 
     Raises
     ------
@@ -91,4 +101,4 @@ def plate(family: str, title: str, parts: Sequence[Part], corner_mm: tuple[float
     low, high = box_mm(parts)
     middle_x, middle_y = (low + high)[:2] / 2
     x0, y0 = corner_mm if family == "cura" else (0.0, 0.0)
-    return content(family, title, parts, (float(middle_x - x0), float(middle_y - y0)))
+    return content(family, title, parts, (float(middle_x - x0), float(middle_y - y0)), tower)

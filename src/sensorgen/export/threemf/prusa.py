@@ -11,6 +11,8 @@ not know is dropped (both seen in 2.5.0). Who knows the printer must check befor
 Placement: ``centre_mm`` is in bed coordinates, those of ``bed_shape`` and of the G-code. For a bed whose
 origin is its centre that is (0, 0). The slicer keeps it with ``--dont-arrange`` only.
 
+Since 2.9 the place of the prime tower is no setting: it is in ``TOWER``, which older versions ignore.
+
 Reader: prusa3d/PrusaSlicer, ``src/libslic3r/Format/3mf.cpp``.
 """
 
@@ -19,10 +21,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.design.tower import Tower
 from sensorgen.export.threemf import core
 from sensorgen.export.threemf.part import Part, escaped
 
 CONFIG = "Metadata/Slic3r_PE_model.config"
+TOWER = "Metadata/Prusa_Slicer_wipe_tower_information.xml"
 
 _NAMESPACE = {"slic3rpe": "http://schemas.slic3r.org/3mf/2017/06"}
 _VERSION = {"slic3rpe:Version3mf": "1"}
@@ -32,6 +36,12 @@ def files(title: str, parts: Sequence[Part], shift_mm: NDArray[np.float64]) -> I
     """Path and text of each file; ``shift_mm`` leads from sensor to bed coordinates [mm]."""
     yield core.MODEL, core.model(title, _VERSION, _NAMESPACE, parts, _object(title, parts), shift_mm)
     yield CONFIG, _config(title, parts)
+
+
+def tower(place: Tower) -> tuple[str, Iterator[str]]:
+    """Path and text of the file that says where the prime tower stands."""
+    where = f'bed_idx="0" position_x="{place.x_mm:.9g}" position_y="{place.y_mm:.9g}" rotation_deg="0"'
+    return TOWER, iter([f'<?xml version="1.0" encoding="UTF-8"?>\n<wipe_tower_information {where}/>\n'])
 
 
 def _object(title: str, parts: Sequence[Part]) -> Iterator[str]:

@@ -14,6 +14,7 @@ from sensorgen.design import design as design_files
 from sensorgen.design import materials
 from sensorgen.design.design import Design, Slot
 from sensorgen.design.printer import Line
+from sensorgen.design.profile import with_own
 
 MOST = 1000  # specimens in one plan
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9._-]{0,58}[A-Za-z0-9])?$", examples=["26", "film-study"])]
@@ -39,7 +40,7 @@ class Item(Strict):
         path = folder / self.design
         if not path.exists():
             raise _unknown(self.design, path)
-        base = yamlfile.read(path)
+        base = with_own(yamlfile.read(path), path.parent)
         changes = {key: own for key in ("parameters", "materials") if (own := getattr(self, key))}
         if not changes:
             return {"name": path.stem} | base

@@ -14,7 +14,7 @@ from sensorgen.export import slicing
 from sensorgen.export.gcode.check import check_motion
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.paths import paths_of
-from sensorgen.export.slicers import curaengine
+from sensorgen.export.slicers import curaengine, versions
 from sensorgen.export.slicing import Placed, Sliced
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
@@ -76,7 +76,9 @@ def gcode(
         (inside / settings).replace(own / settings)
     else:
         settings = "settings.json"
-        engine = curaengine.engine_settings(machine, found[0].design.layers, slicing.plate_loads(found))
+        engine = curaengine.engine_settings(
+            machine, found[0].design.layers, slicing.plate_loads(found), versions.parse(made.version)
+        )
         store.write(own, {settings: json_bytes(asdict(engine))})
     rmtree(inside)  # what is left are the bodies again, as the slicer took them
     loaded = tools(piece.design for piece in found)
@@ -103,7 +105,7 @@ def _printed(piece: Placed, made: Sliced, content: bytes) -> PrintedDesign:
     try:
         printed = asprinted.body(design, made.lines, slicer=source, centre_mm=piece.sensor_mm())
         body = bodies.sliced(design, lambda: printed, source, content + piece.name.encode())
-        layers, findings = tuple(printed.rows()), tuple(printed.findings())
+        layers, findings = tuple(printed.rows()), (*made.findings, *printed.findings())
         return PrintedDesign(piece.name, design.name, timeless(evaluate(body)), layers, findings)
     except SensorgenError as error:
         return PrintedDesign(piece.name, design.name, reason=str(error))
