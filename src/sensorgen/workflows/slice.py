@@ -158,11 +158,7 @@ def slice_design(
     with tempfile.TemporaryDirectory() as stage:
         made = sliced([alone(design)], slicer, Path(stage), program=program, time_limit_s=time_limit_s, step=step)
         content = made.ready.read_bytes()
-        loaded, machine = {design.tool(name): name for name in design.used()}, design.machine
-        motion = follow(made.ready, machine.control.prime_macro)
-        checked = check_motion(motion, machine, loaded, others_empty=True)
-        lines = paths_of(motion, machine)
-        checked = checked.with_more(agreement.check(design, lines, motion.changes, machine.bed_centre_mm(), alone=True))
+        checked = _checked(design, made.ready)
         printed = nominal(design, made.lines, f"{made.slicer} {made.version}")
         layers, findings = printed.rows(), printed.findings()
         films = pinholes.pinholes(design, made.lines, widths=(1.0,), most_layers=pinholes.MOST_LAYERS)
@@ -186,3 +182,12 @@ def slice_design(
     for old in others:
         (folder / old).unlink(missing_ok=True)
     return replace(result, gcode=str(folder / names[0]))
+
+
+def _checked(design: Design, ready: Path) -> Checked:
+    """The file for the printer, on its own and against the design."""
+    machine = design.machine
+    motion = follow(ready, machine.control.prime_macro)
+    checked = check_motion(motion, machine, {design.tool(name): name for name in design.used()}, others_empty=True)
+    lines = paths_of(motion, machine)
+    return checked.with_more(agreement.check(design, lines, motion.changes, machine.bed_centre_mm(), alone=True))
