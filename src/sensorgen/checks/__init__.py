@@ -3,6 +3,7 @@
 Rule 7, printed against drawn volume, is estimated here; after slicing it is taken from the G-code.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from sensorgen.checks import bed, bridges, estimate, gap, grid, volumes, widths
@@ -12,7 +13,14 @@ from sensorgen.design.printer import Printer, Quality
 from sensorgen.scene.scene import Scene
 
 
-def findings(scene: Scene, printer: Printer, quality: Quality, gap_mm: float, walls: str = "arachne") -> list[Finding]:
+def findings(
+    scene: Scene,
+    printer: Printer,
+    quality: Quality,
+    gap_mm: float,
+    walls: str = "arachne",
+    laid: Mapping[str, estimate.Lines] | None = None,
+) -> list[Finding]:
     """All findings about a scene, the most severe first.
 
     Parameters
@@ -25,9 +33,11 @@ def findings(scene: Scene, printer: Printer, quality: Quality, gap_mm: float, wa
         Smallest distance of the electrodes, exact [mm].
     walls : str
         Of the slicer, one of :data:`sensorgen.checks.estimate.RULES`.
+    laid : mapping of str to Lines, optional
+        Material to its lines; solid ones of the printer's width if not given.
     """
     slices = Slices(scene, quality)
-    printed = volumes.findings(volumes.rows(scene, estimate.layers(scene, printer, quality, walls)), scene)
+    printed = volumes.findings(volumes.rows(scene, estimate.layers(scene, printer, quality, walls, laid)), scene)
     found = [
         *gap.check(slices, printer, quality, gap_mm),
         *grid.check(scene, slices.layers),

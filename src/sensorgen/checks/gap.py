@@ -40,7 +40,7 @@ def _film(
         )  # fmt: skip
         return
     printed_mm = round(slices.layers.printed_mm(place[2] + gap_mm) - slices.layers.printed_mm(place[2]), 9)
-    if gap_mm < layer / 2 - TOUCH_MM or printed_mm <= 0:
+    if gap_mm < layer / 2 + TOUCH_MM or printed_mm <= 0:
         yield Finding(
             "2-film", "error", names,
             f"the film of {gap_mm:g} mm may not be printed at all: a layer is {layer:g} mm",

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 from sensorgen.checks.slices import TOUCH_MM, Layers
 from sensorgen.core.findings import Finding
+from sensorgen.scene.layers import faces_mm
 from sensorgen.scene.scene import Body, Scene
 
 
@@ -16,7 +17,7 @@ def check(scene: Scene, layers: Layers) -> Iterator[Finding]:
 
 
 def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
-    levels = {z for p in body.prisms for z in (p.span("z") if p.axis == "z" else (round(z, 9) for _, z in p.outline))}
+    levels = faces_mm(body)
     off = sorted(z for z in levels if layers.off_grid_mm(z) > TOUCH_MM)
     if not off:
         return
@@ -24,6 +25,8 @@ def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
     thick, printed = high - low, layers.printed_mm(high) - layers.printed_mm(low)
     named = ", ".join(f"{z:g}" for z in off[:3]) + (" ..." if len(off) > 3 else "")
     effect = f"; it prints {printed:g} mm thick instead of {thick:g}" if abs(printed - thick) > TOUCH_MM else ""
+    if any(abs(z - mid) < TOUCH_MM for z in off for mid in layers.mids_mm):
+        effect += "; at mid-height of a layer the estimate guesses, as slicers did, that the body below takes it"
     yield Finding(
         "3-grid", "warning", body.name, f"faces at {named} mm lie between layer boundaries{effect}",
         f"move them to {', '.join(f'{layers.printed_mm(z):g}' for z in off[:3])} mm",
@@ -57,8 +60,8 @@ def _samples(body: Body, layers: Layers) -> Iterator[Finding]:
 
 
 def _within(z_mm: float, span: tuple[float, float]) -> bool:
-    """Whether a sample hits: one on a face between two bodies hits the upper one, as in ``Prism.cut``."""
-    return span[0] - TOUCH_MM < z_mm < span[1] - TOUCH_MM
+    """Whether a sample hits: one on a face between two bodies hits the lower one."""
+    return span[0] + TOUCH_MM < z_mm < span[1] + TOUCH_MM
 
 
 def _place(body: Body, z_mm: float) -> tuple[float, float, float]:

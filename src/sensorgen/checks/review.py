@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from sensorgen import checks
+from sensorgen.checks import estimate
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Part, comma_separated
 from sensorgen.core.findings import Finding, counted, counts, listed, table
@@ -90,7 +91,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Revi
     step("checks")
     gap_mm = validity.electrode_gap_mm(scene, made)
     found = checks.findings(
-        scene, design.machine, design.layers, gap_mm, walls or rule("prusa", design.walls)
+        scene, design.machine, design.layers, gap_mm, walls or rule("prusa", design.walls), estimate.lines(design)
     ) + _crowding(design)
     found = [_advised(f, list(fields(design.shape))) for f in found]
     if not any(f.severity == "error" and f.rule != LOST for f in found):

@@ -30,8 +30,8 @@ class Layers:
         return tuple(round((a + b) / 2, 12) for a, b in pairwise(self.boundaries_mm))
 
     def printed_mm(self, z_mm: float) -> float:
-        """Height at which a face drawn at ``z_mm`` comes out: the boundary after the last sample below it [mm]."""
-        return self.boundaries_mm[min(bisect_left(self.mids_mm, z_mm - TOUCH_MM), len(self))]
+        """Height at which a face drawn at ``z_mm`` comes out: the boundary after the last sample up to it [mm]."""
+        return self.boundaries_mm[min(bisect_left(self.mids_mm, z_mm + TOUCH_MM), len(self))]
 
     def off_grid_mm(self, z_mm: float) -> float:
         """Distance of a height from the nearest boundary [mm]."""

@@ -7,6 +7,7 @@ WALLS = {
     "classic": "PrusaSlicer, classic walls",
     "cura": "plain Cura",
     "cura-gaps": "Cura filling outline gaps",
+    "cura-5": "Cura 5",
 }
 
 
@@ -16,5 +17,8 @@ def rule(slicer: str, walls: str) -> str:
 
 
 def rules(walls: str | None) -> tuple[str, ...]:
-    """Those of ``WALLS`` that a design's walls can come out as, the likeliest first; all where it names none."""
-    return tuple(of[walls] for of in _RULES.values()) if walls else tuple(WALLS)
+    """Those of ``WALLS`` that a design's walls can come out as, the likeliest first; all where it names none.
+
+    Cura 5 prints every design by its own.
+    """
+    return (*(of[walls] for of in _RULES.values()), "cura-5") if walls else tuple(WALLS)

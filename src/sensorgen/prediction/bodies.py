@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from hashlib import sha256
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -59,8 +60,13 @@ def estimated(design: Design, walls: str = "") -> Body:
 
 def _estimated_cells(design: Design, rules: Sequence[str]) -> Cells:
     from sensorgen.asprinted import printed
+    from sensorgen.checks.estimate import SHIFTS, lines
 
-    return _printed_cells({rule: printed.body(design, walls=rule) for rule in rules})
+    prints = {rule: printed.body(design, walls=rule) for rule in rules}
+    if any(of.infill < 1 for of in lines(design).values()):
+        for shift, rule in product(SHIFTS, rules):
+            prints[f"{rule}, infill {shift[0]:g}/{shift[1]:g}"] = printed.body(design, walls=rule, shift=shift)
+    return _printed_cells(prints)
 
 
 def sliced(design: Design, printed: "Callable[[], Printed]", source: str, content: bytes) -> Body:

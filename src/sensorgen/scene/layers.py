@@ -16,6 +16,7 @@ from sensorgen.scene.scene import SLIVER_MM, Body, Outline, Prism, Scene, box, r
 
 Region: TypeAlias = Polygon | MultiPolygon
 EMPTY = MultiPolygon()
+_BELOW_MM = 1e-7  # of a face at mid-height, all slicers print the body below it
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ def narrow_mm(polygons: Sequence[Polygon] | NDArray[np.object_]) -> NDArray[np.f
 
 
 def drawn(scene: Scene, boundaries_mm: Sequence[float]) -> tuple[LayerRegions, ...]:
-    """Every layer of a scene as a slicer samples it, at mid-height.
+    """Every layer of a scene as a slicer samples it, at mid-height, or just below it where faces lie there.
 
     Parameters
     ----------
@@ -122,12 +123,19 @@ def drawn(scene: Scene, boundaries_mm: Sequence[float]) -> tuple[LayerRegions, .
 
 @lru_cache(maxsize=16)
 def _drawn(scene: Scene, boundaries_mm: tuple[float, ...]) -> tuple[LayerRegions, ...]:
-    layers = []
+    layers, faces = [], {rounded(z) for body in scene.bodies for z in faces_mm(body)}
     for bottom, top in pairwise(boundaries_mm):
-        found = {body.name: region_at(body, rounded((bottom + top) / 2)) for body in scene.bodies}
+        middle = rounded((bottom + top) / 2)
+        at = middle - _BELOW_MM if middle in faces else middle
+        found = {body.name: region_at(body, at) for body in scene.bodies}
         regions = {name: region for name, region in found.items() if not region.is_empty}
         layers.append(LayerRegions(bottom, top, regions, _along(regions, scene)))
     return tuple(layers)
+
+
+def faces_mm(body: Body) -> set[float]:
+    """Heights of a body's horizontal faces and edges [mm]."""
+    return {z for p in body.prisms for z in (p.span("z") if p.axis == "z" else (round(z, 9) for _, z in p.outline))}
 
 
 def region_at(body: Body, z_mm: float) -> Region:
