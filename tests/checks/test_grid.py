@@ -76,7 +76,7 @@ def test_a_part_on_a_sample_belongs_to_the_body_below_it(sensor, findings):
     (found,) = findings(scene, "4-", "upper")
     assert (found.severity, found.value_mm) == ("warning", 0.05)
     assert findings(scene, "9-") == []
-    assert "at mid-height of a layer the estimate guesses" in findings(scene, "3-", "patch")[0].message
+    assert "at mid-height of a layer: the estimate assumes" in findings(scene, "3-", "patch")[0].message
 
 
 def test_several_lost_parts_count(sensor, findings):

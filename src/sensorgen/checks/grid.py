@@ -26,7 +26,7 @@ def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
     named = ", ".join(f"{z:g}" for z in off[:3]) + (" ..." if len(off) > 3 else "")
     effect = f"; it prints {printed:g} mm thick instead of {thick:g}" if abs(printed - thick) > TOUCH_MM else ""
     if any(abs(z - mid) < TOUCH_MM for z in off for mid in layers.mids_mm):
-        effect += "; at mid-height of a layer the estimate guesses, as slicers did, that the body below takes it"
+        effect += "; at mid-height of a layer: the estimate assumes that the body below takes it, which is not certain"
     yield Finding(
         "3-grid", "warning", body.name, f"faces at {named} mm lie between layer boundaries{effect}",
         f"move them to {', '.join(f'{layers.printed_mm(z):g}' for z in off[:3])} mm",
