@@ -147,7 +147,7 @@ def test_one_plate_has_one_profile():
 
 def test_estimates_use_the_designs_walls():
     assert rules(None)[0] == "arachne"
-    assert rules("classic") == ("classic", "cura")
+    assert rules("classic") == ("classic", "cura", "cura-5")
     assert rule("cura", "arachne") == "cura-gaps"
     layers = estimate.layers(PLAIN.printed, PLAIN.machine, PLAIN.layers, "classic")
     assert layers
