@@ -154,4 +154,4 @@ def test_estimates_use_the_designs_walls():
     made = {walls: estimated(make(walls=walls)) for walls in ("arachne", "classic")}
     assert "Arachne" in made["arachne"].provenance
     assert "classic" in made["classic"].provenance
-    assert set(made["classic"].cells.scenes) == {"classic", "cura"}
+    assert set(made["classic"].cells.scenes) == {"classic", "cura", "cura-5"}
