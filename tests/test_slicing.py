@@ -236,7 +236,9 @@ def test_a_design_gets_its_file_and_what_was_found(copies, tmp_path):
     made = slice_design(OTHER, tmp_path / "out", "prusa", force=True)
     again = slice_design(OTHER, tmp_path / "out", "prusa", force=True)
     folder = tmp_path / "out" / OTHER.name
-    assert sorted(p.name for p in folder.iterdir()) == [f"{OTHER.name}.prusa.gcode", f"{OTHER.name}.prusa.gcode.json"]
+    assert sorted(p.name for p in folder.iterdir()) == [
+        f"{OTHER.name}.prusa.{end}" for end in ("gcode", "gcode.json", "layers.html")
+    ]
     content = Path(made.gcode).read_bytes()
     assert made.sha256 == again.sha256 == sha256(content).hexdigest()
     assert content.endswith(b"M0 H1\n")
@@ -252,6 +254,6 @@ def test_the_usual_name_is_that_of_the_last_file_which_passed(copies, tmp_path):
             True, "refused" in files[0] or "refused" in files[-1])  # fmt: skip
         return files
 
-    good, refused = ["gcode", "gcode.json"], ["refused.gcode", "refused.json"]
+    good, refused = ["gcode", "gcode.json", "layers.html"], ["layers.html", "refused.gcode", "refused.json"]
     cut = filled(OTHER, layers=[1, 2, 3, 4, 8, 9, 10, 11, 12, 13])
     assert [names(text) for text in (filled(OTHER), cut, cut, filled(OTHER))] == [good, refused, refused, good]

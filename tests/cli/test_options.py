@@ -103,6 +103,7 @@ quality: extrafine
 nozzle_mm: 0.25
 tools: {x60: 3}
 infill: {x60: {percent: 80, pattern: grid}}
+profile: {walls: classic}
 orientation: upside-down
 shrinkage: 0.02
 waivers:
@@ -195,7 +196,8 @@ def test_draw(run, tmp_path):
     assert drawn.startswith("<svg")
     refused = run("draw", "tri", "-o", "x.png")
     assert (refused.code, refused.line) == (
-        2, "sensorgen: --output x.png: the drawing is SVG; expected a name that ends in .svg, or - to print it"
+        2, "sensorgen: --output x.png: the drawing is SVG, or a page of layers; expected a name in .svg or .html, or - to "
+        "print the SVG",
     )  # fmt: skip
 
 

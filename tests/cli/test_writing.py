@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import time
@@ -135,7 +136,7 @@ def test_disk_full(run, disk, contents, both):
     """There is room for one build, but not for a second beside it."""
     place = disk(str(sum(map(len, both[0].values())) + 400_000))
     assert run(*BUILD, *OLD, "--out", place).code == 0
-    (place / "filler").write_bytes(bytes(300_000))
+    (place / "filler").write_bytes(bytes(shutil.disk_usage(place).free - 50_000))
     before = contents(place)
     said = run(*BUILD, *NEW, "--out", place)
     assert said.code == 2

@@ -28,10 +28,12 @@ def drawn(design: Design) -> Body:
 
 
 def _drawn_cells(design: Design) -> Cells:
-    from sensorgen.scene.connections import connected_scene
+    period, scene = getattr(design.params, "period_mm", None), design.in_use
+    prisms = [b.terminal for b in scene.bodies if b.terminal or design.conducts(b.material) for _ in b.prisms]
+    if "" in prisms or len(set(prisms)) < len(prisms):  # else each electrode is one piece
+        from sensorgen.scene.connections import connected_scene
 
-    period = getattr(design.params, "period_mm", None)
-    scene = connected_scene(design.in_use, design.conducts)
+        scene = connected_scene(scene, design.conducts)
     return Cells({DRAWN: scene}, 1.0, period, partial(_drawn_gap, design))
 
 
