@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
     from scipy.sparse.linalg import SuperLU
 
-    Sparse = csr_array[np.float64]
-
 _STRONG = 0.02  # links of this share of both nodes' own conductance join them; half of it on each coarser level
 _COARSEST = 2000  # unknowns that a sparse factor solves at once
 _LEVELS = 12
@@ -30,14 +28,14 @@ _MOST = 300  # iterations
 class _Level:
     """A matrix, its diagonal, the largest eigenvalue of both, and interpolation from the next level and back."""
 
-    matrix: "Sparse"
+    matrix: "csr_array[np.float64]"
     diagonal: Real
     largest: float
-    finer: "Sparse"
-    coarser: "Sparse"
+    finer: "csr_array[np.float64]"
+    coarser: "csr_array[np.float64]"
 
 
-def solve(matrix: "Sparse", side: Real) -> Real | None:
+def solve(matrix: "csr_array[np.float64]", side: Real) -> Real | None:
     """``matrix^-1 . side``, or None where iterations do not converge.
 
     Parameters
@@ -67,7 +65,7 @@ def solve(matrix: "Sparse", side: Real) -> Real | None:
     return None
 
 
-def _levels(matrix: "Sparse") -> tuple[list[_Level], "SuperLU"]:
+def _levels(matrix: "csr_array[np.float64]") -> tuple[list[_Level], "SuperLU"]:
     """All levels but the coarsest, and the factor of that."""
     from scipy.sparse import csr_array, diags_array
     from scipy.sparse.linalg import splu
@@ -96,7 +94,7 @@ def _levels(matrix: "Sparse") -> tuple[list[_Level], "SuperLU"]:
     return levels, splu(matrix.tocsc())
 
 
-def _groups(matrix: "Sparse", strong: float) -> Whole:
+def _groups(matrix: "csr_array[np.float64]", strong: float) -> Whole:
     """The aggregate of each unknown, from 0."""
     from scipy.sparse import csr_array
 
