@@ -245,6 +245,15 @@ class _Level:
     row: Whole
     lines: Lines
 
+    @classmethod
+    def of(cls, lines: Lines, rows: Whole) -> "_Level":
+        """Some lines, of one height and tool."""
+        whole = lines.of(rows)
+        which, low, high = _shares(_counts(whole.end_mm - whole.start_mm))
+        cut, way = whole.of(which), (whole.end_mm - whole.start_mm)[which]
+        start = cut.start_mm
+        return cls(rows[which], replace(cut, start_mm=start + low[:, None] * way, end_mm=start + high[:, None] * way))
+
     def tree(self) -> shapely.STRtree:
         """All pieces by their places."""
         return shapely.STRtree(shapely.linestrings(np.stack([self.lines.start_mm, self.lines.end_mm], axis=1)))
@@ -269,17 +278,12 @@ class _Level:
 
 def _levels(lines: Lines) -> dict[int, list[_Level]]:
     """Lines by tool and height."""
-    count = _counts(lines.end_mm - lines.start_mm)
-    which, low, high = _shares(count)
-    way = (lines.end_mm - lines.start_mm)[which]
-    start = lines.start_mm[which]
-    cut = replace(lines.of(which), start_mm=start + low[:, None] * way, end_mm=start + high[:, None] * way)
     found = {}
-    for tool in np.unique(cut.tool).tolist():
-        mine = np.flatnonzero(cut.tool == tool)
-        mine = mine[np.argsort(cut.top_mm[mine], kind="stable")]
-        first = np.flatnonzero(np.diff(cut.top_mm[mine])) + 1
-        found[tool] = [_Level(which[rows], cut.of(rows)) for rows in np.split(mine, first)]
+    for tool in np.unique(lines.tool).tolist():
+        mine = np.flatnonzero(lines.tool == tool)
+        mine = mine[np.argsort(lines.top_mm[mine], kind="stable")]
+        first = np.flatnonzero(np.diff(lines.top_mm[mine])) + 1
+        found[tool] = [_Level.of(lines, rows) for rows in np.split(mine, first)]
     return found
 
 
