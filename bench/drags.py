@@ -44,7 +44,7 @@ def unlifted(made, machine):
 
 
 def main():
-    rows, films = [HEAD], [FILMS]
+    rows, films = ["# Travel over other tools' material, and through-holes of films", "", HEAD], [FILMS]
     for name, data in VARIANTS.items():
         design = make(data)
         for slicer in (s for s, program in PROGRAMS.items() if shutil.which(program)):

@@ -1,8 +1,10 @@
 """Figures: described once as data, drawn as pictures or on a page for the browser."""
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
-from sensorgen.models.sensor import Sensor
+if TYPE_CHECKING:
+    from sensorgen.models.sensor import Sensor
 
 PAGE, IDENTIFIABILITY = "predict.html", "identifiability.png"
 STEPS = (
@@ -12,7 +14,7 @@ STEPS = (
 
 
 def files(
-    sensor: Sensor, frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float],
+    sensor: "Sensor", frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float],
     title: str = "",
 ) -> Iterator[tuple[str, bytes]]:  # fmt: skip
     """All pictures of a sensor under load, by file name, in the order of ``STEPS``.
