@@ -42,6 +42,13 @@ print(json.dumps({"lines": result.lines, "seconds": time.process_time() - start,
     "mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024}))
 """
 
+DRAGS = (
+    CHECK.replace("gcode.check import check", "gcode.drags import drags")
+    .replace("check(Path", "drags(Path")
+    .replace('"lines": result.lines', '"lines": Path(sys.argv[1]).read_bytes().count(b"\\n")')
+    .replace("len(result.errors())", "0")
+)
+
 
 def write(path, lines):
     """A print of two tools: layers of short lines, with a slicer's comments on every twelfth."""
@@ -71,10 +78,24 @@ def write_arcs(path, arcs):
         file.write(TAIL)
 
 
-def measured(path):
+def write_layers(path, lines):
+    """A print of two tools side by side in layers of 0.1 mm, each of 20 000 short lines to and fro."""
+    with path.open("w") as file:
+        file.write(HEAD)
+        for layer in range(1, lines // 20_000 + 1):
+            for tool in (3, 4):
+                y = 40 * (tool - 4)
+                file.write(f"T{tool}\n;LAYER_CHANGE\n;HEIGHT:0.1\nG1 Z{0.1 * layer:.3f} F3000\nG1 E-4.7 F2400\n")
+                file.write(f"G1 X-50 Y{y} F7200\nG1 E4.7 F2400\n;TYPE:Solid infill\n")
+                for row, k in ((row, k) for row in range(100) for k in range(100)):
+                    file.write(f"G1 X{-50 + (99 - k if row % 2 else k)} Y{y + 0.42 * row:.3f} E.0166\n")
+        file.write(TAIL)
+
+
+def measured(path, program=CHECK):
     runs = []
     for _ in range(RUNS):
-        done = subprocess.run([sys.executable, "-c", CHECK, path], capture_output=True, text=True, check=True)
+        done = subprocess.run([sys.executable, "-c", program, path], capture_output=True, text=True, check=True)
         runs.append(json.loads(done.stdout))
     assert not any(run["errors"] for run in runs)
     return {key: statistics.median(run[key] for run in runs) for key in ("lines", "seconds", "mb")}
@@ -107,7 +128,7 @@ def share(name, slicer):
     }  # fmt: skip
 
 
-def table(growth, arcs, shares):
+def table(growth, arcs, travel, shares):
     yield "# G-code\n"
     yield f"Processor times on {platform.machine()}, Python {platform.python_version()}; medians of {RUNS}.\n"
     yield "| lines | check [s] | us per line | peak memory [MB] |"
@@ -118,6 +139,9 @@ def table(growth, arcs, shares):
     for row in arcs:
         per_line = row["seconds"] / row["lines"] * 1e6
         yield f"| {row['lines']}, all wide arcs | {row['seconds']:.2f} | {per_line:.2f} | {row['mb']:.0f} |"
+    for row in travel:
+        per_line = row["seconds"] / row["lines"] * 1e6
+        yield f"| {row['lines']}, travel over foreign lines | {row['seconds']:.2f} | {per_line:.2f} | {row['mb']:.0f} |"
     yield f"\nTarget: 1 000 000 lines in {TARGET_S:g} s and {TARGET_MB:g} MB.\n"
     yield "| design | slicer | lines | slicer [s] | files and rewriting [s] | check [s] | rule 7 [s] | our share |"
     yield "|---|---|---|---|---|---|---|---|"
@@ -140,12 +164,14 @@ def main():
         for size in ARCS:
             write_arcs(path, size)
             arcs.append(measured(path))
+        write_layers(path, 1_000_000)
+        travel = [measured(path, DRAGS)]
     shares = [share(name, slicer) for name in DESIGNS for slicer in ("prusa", "cura")]
-    text = "\n".join(table(growth, arcs, shares))
+    text = "\n".join(table(growth, arcs, travel, shares))
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / "gcode.md").write_text(f"{text}\n", "utf-8")
     (RESULTS / "gcode.json").write_text(
-        json.dumps({"growth": growth, "arcs": arcs, "shares": shares}, indent=1) + "\n", "utf-8"
+        json.dumps({"growth": growth, "arcs": arcs, "travel": travel, "shares": shares}, indent=1) + "\n", "utf-8"
     )
     print(text)
 

@@ -6,6 +6,7 @@ from scipy.sparse import csr_array, diags_array
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.solvers.network import band as _traxel_band
+from sensorgen.solvers.network import multigrid
 
 
 def network(n, reach, seed=1):
@@ -30,11 +31,22 @@ def test_a_product_is_that_of_a_dense_solve(n, reach, stretch, monkeypatch):
     assert found == pytest.approx(one @ np.linalg.solve(matrix, other), rel=1e-10)
 
 
-def test_a_wide_band_has_the_same_product(monkeypatch):
-    matrix, (one, other) = network(200, 9)
-    monkeypatch.setattr(_traxel_band, "_WIDEST", 4)
+@pytest.mark.parametrize("most", [multigrid._MOST, 1])
+def test_a_wide_band_has_the_same_product(most, monkeypatch):
+    """By multigrid, and by a sparse factor where that takes too many iterations."""
+    matrix, (one, other) = network(600, 9)
+    monkeypatch.setattr(_traxel_band, "_MOST", 4)
+    monkeypatch.setattr(multigrid, "_COARSEST", 20)
+    monkeypatch.setattr(multigrid, "_MOST", most)
+    assert (multigrid.solve(csr_array(matrix), other) is None) == (most == 1)
     found = _traxel_band.product(csr_array(matrix), one, other)
-    assert found == pytest.approx(one @ np.linalg.solve(matrix, other), rel=1e-10)
+    assert found == pytest.approx(one @ np.linalg.solve(matrix, other), rel=1e-8)
+
+
+def test_a_wide_network_of_no_single_potential_is_refused(monkeypatch):
+    monkeypatch.setattr(_traxel_band, "_MOST", 0)
+    with pytest.raises(OutOfRange, match="hardly connected"):
+        _traxel_band.product(csr_array(np.array([[1.0, -1.0], [-1.0, 1.0]])), np.ones(2), np.ones(2))
 
 
 def test_nodes_on_their_own():

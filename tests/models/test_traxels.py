@@ -5,6 +5,7 @@ import pytest
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import traxels
+from sensorgen.solvers.network import band
 from sensorgen.solvers.network import links as links
 from sensorgen.solvers.network.nodes import Lines, Nodes
 from sensorgen.verification.chart.rectilinear import plate
@@ -160,3 +161,12 @@ def test_no_pieces_that_touch_are_overlooked(angles):
             if abs(lines.layer[a] - lines.layer[b]) <= 1 and (a, b) not in found:
                 gap = points[a][:, None] - points[b][None]
                 assert np.hypot(*gap.T).min() > 1.3 * W, (a, b)
+
+
+@pytest.mark.parametrize("contact", [0.0, 1e-6, 1e-3])
+def test_multigrid_finds_the_resistance_of_elimination(contact, monkeypatch):
+    """Wide crossed layers, of some 10 000 unknowns."""
+    lines = plate(30.0, 20.0, W * 1e3, H * 1e3, [0, 90, 45])
+    direct = ratio(lines, contact, (-14e-3, 14e-3), 3 * H * 20e-3)
+    monkeypatch.setattr(band, "_MOST", 0)
+    assert ratio(lines, contact, (-14e-3, 14e-3), 3 * H * 20e-3) == pytest.approx(direct, rel=1e-8)

@@ -137,15 +137,13 @@ def crossings(motion: Motion, machine: Printer, numbering: Numbering = "printer"
     """
     lines, tool = printed_lines(motion, machine, numbering), tools_of(motion, machine, numbering)
     moves = (motion.across_mm > 0) & (motion.rows[:, 5] < lines.top_mm.max(initial=0.0) + NEAR_MM)
-    travels = _cut(motion, tool, np.flatnonzero(moves & (motion.extruded_mm <= 0)))
-    prints = paths_of(motion, machine, numbering).model().number
-    body = np.isin(motion.number, prints) & moves & (motion.extruded_mm > 0)
-    rubs = _cut(motion, tool, np.flatnonzero(body))
+    travels = np.flatnonzero(moves & (motion.extruded_mm <= 0))
+    rubs = np.flatnonzero(moves & (motion.extruded_mm > 0) & np.isin(motion.number, lines.number))
     rubbing = np.zeros(len(tool))
-    for points in _over(rubs, lines, CONTACT_MM, FACE_MM):
+    for points in _over(_blocks(motion, tool, rubs), lines, CONTACT_MM, FACE_MM):
         np.add.at(rubbing, points.row, points.length_mm)
     nothing = Points(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
-    over = [nothing, *_over(travels, lines, NEAR_MM, 0.0)]
+    over = [nothing, *_over(_blocks(motion, tool, travels), lines, NEAR_MM, 0.0)]
     travel = (np.concatenate([getattr(p, name) for p in over]) for name in Points.__dataclass_fields__)
     return Crossings(Points(*travel), rubbing, tool)
 
@@ -179,6 +177,14 @@ def _cut(motion: Motion, tool: Whole, rows: Whole) -> Pieces:
     return Pieces(rows[which], first, last, tool[rows][which], motion.number[rows][which])
 
 
+def _blocks(motion: Motion, tool: Whole, rows: Whole) -> Iterator[Pieces]:
+    """Moves as pieces, some at a time: all at once would take more memory than the file."""
+    for first in range(0, len(rows), _BLOCK):
+        pieces = _cut(motion, tool, rows[first : first + _BLOCK])
+        for start in range(0, len(pieces.row), _BLOCK):
+            yield pieces.of(slice(start, start + _BLOCK))
+
+
 def _counts(way_mm: Real) -> Whole:
     """How many pieces each way in plan is cut to."""
     found: Whole = np.maximum(np.ceil(np.hypot(*way_mm.T) / _PIECE_MM), 1).astype(np.int64)
@@ -192,12 +198,11 @@ def _shares(count: Whole) -> tuple[Whole, Real, Real]:
     return which, step / count[which], (step + 1) / count[which]
 
 
-def _over(pieces: Pieces, lines: Lines, within_mm: float, grown_mm: float) -> Iterator[Points]:
+def _over(blocks: Iterator[Pieces], lines: Lines, within_mm: float, grown_mm: float) -> Iterator[Points]:
     """Points of pieces over earlier lines of other tools, where no own line lies higher; many at once."""
     levels, pitch_mm = _levels(lines), _RUB_PITCH_MM if grown_mm else PITCH_MM
     tree = lru_cache(_TREES)(_Level.tree)  # a file goes up: those far below are never needed again
-    for first in range(0, len(pieces.row), _BLOCK):
-        block = pieces.of(slice(first, first + _BLOCK))
+    for block in blocks:
         met = [*_meetings(block, levels, tree, within_mm, grown_mm)]
         if met:
             yield _points(block, lines, within_mm, pitch_mm, *(np.concatenate(c) for c in zip(*met, strict=True)))
@@ -240,6 +245,15 @@ class _Level:
     row: Whole
     lines: Lines
 
+    @classmethod
+    def of(cls, lines: Lines, rows: Whole) -> "_Level":
+        """Some lines, of one height and tool."""
+        whole = lines.of(rows)
+        which, low, high = _shares(_counts(whole.end_mm - whole.start_mm))
+        cut, way = whole.of(which), (whole.end_mm - whole.start_mm)[which]
+        start = cut.start_mm
+        return cls(rows[which], replace(cut, start_mm=start + low[:, None] * way, end_mm=start + high[:, None] * way))
+
     def tree(self) -> shapely.STRtree:
         """All pieces by their places."""
         return shapely.STRtree(shapely.linestrings(np.stack([self.lines.start_mm, self.lines.end_mm], axis=1)))
@@ -264,17 +278,12 @@ class _Level:
 
 def _levels(lines: Lines) -> dict[int, list[_Level]]:
     """Lines by tool and height."""
-    count = _counts(lines.end_mm - lines.start_mm)
-    which, low, high = _shares(count)
-    way = (lines.end_mm - lines.start_mm)[which]
-    start = lines.start_mm[which]
-    cut = replace(lines.of(which), start_mm=start + low[:, None] * way, end_mm=start + high[:, None] * way)
     found = {}
-    for tool in np.unique(cut.tool).tolist():
-        mine = np.flatnonzero(cut.tool == tool)
-        mine = mine[np.argsort(cut.top_mm[mine], kind="stable")]
-        first = np.flatnonzero(np.diff(cut.top_mm[mine])) + 1
-        found[tool] = [_Level(which[rows], cut.of(rows)) for rows in np.split(mine, first)]
+    for tool in np.unique(lines.tool).tolist():
+        mine = np.flatnonzero(lines.tool == tool)
+        mine = mine[np.argsort(lines.top_mm[mine], kind="stable")]
+        first = np.flatnonzero(np.diff(lines.top_mm[mine])) + 1
+        found[tool] = [_Level.of(lines, rows) for rows in np.split(mine, first)]
     return found
 
 

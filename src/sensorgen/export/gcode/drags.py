@@ -147,7 +147,7 @@ def drags(source: Source, machine: Printer) -> Drags:
     Examples
     --------
     >>> from sensorgen.design.printer import load_printer
-    >>> lines = ["M83", "T3", "G1 Z0.1", "G1 X10 E0.2", "T4", "G1 X5 Y-5", "G1 X5 Y5", "G1 X9 E.1"]
+    >>> lines = ["M83", "T3", "G1 Z0.1", "G1 X10 E0.2", "G1 Y-5", "T4", "G1 X5", "G1 Y5", "G1 X9 E.1"]
     >>> [(t.tool, round(t.contact_mm, 2)) for t in drags(lines, load_printer("diabase-h5")).tools]
     [(4, 0.5)]
     """

@@ -2,6 +2,7 @@
 
 An electrode is long and thin, so from one end to the other few of its nodes are neighbours of those before them. Only
 a current is wanted, no potential: forward elimination of two right-hand sides tells it, and what is done is let go.
+A wide electrode, of which the band is too, is left to multigrid.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -10,11 +11,13 @@ import numpy as np
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
+from sensorgen.solvers.network import multigrid
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-_WIDEST = 1500  # beyond, a sparse factor is quicker
+_HARDLY = "these lines are hardly connected: expected contacts that conduct as lines do, or not at all"
+_MOST = 1e10  # multiplications of an elimination; beyond, multigrid is quicker
 _STRETCH = 4096  # unknowns that are eliminated at once, or four times the band
 
 
@@ -58,18 +61,8 @@ def product(matrix: "csr_array[np.float64]", one: Real, other: Real) -> float:
     column = column[half]
     column, below, value = column, row[half] - column, matrix.data[half]
     wide = max(int(below.max()), 1)
-    if wide > _WIDEST:
-        # The product by a sparse factor of the whole matrix
-        from scipy.sparse.linalg import splu
-
-        solver = splu(  # columns one by one: so sparse a factor has no panels worth their room
-            matrix.tocsc(),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            panel_size=1,
-            options={"SymmetricMode": True},
-        )
-        return float(one @ solver.solve(other))
+    if len(order) * wide**2 > _MOST:
+        return _wide(matrix, one, other)
     step = max(4 * wide, _STRETCH)
     stretch = np.append(0, np.cumsum(np.bincount(column // step)))
     by_stretch = np.argsort((column // step).astype(np.int32), kind="stable")
@@ -83,6 +76,26 @@ def product(matrix: "csr_array[np.float64]", one: Real, other: Real) -> float:
     return total
 
 
+def _wide(matrix: "csr_array[np.float64]", one: Real, other: Real) -> float:
+    """The product by multigrid; by a sparse factor of the whole matrix where that does not converge."""
+    from scipy.sparse.linalg import splu
+
+    try:
+        found = multigrid.solve(matrix, other)
+        if found is None:
+            solver = splu(  # columns one by one: so sparse a factor has no panels worth their room
+                matrix.tocsc(),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                panel_size=1,
+                options={"SymmetricMode": True},
+            )
+            found = solver.solve(other)
+    except RuntimeError as error:  # exactly singular
+        raise OutOfRange(_HARDLY) from error
+    return float(one @ found)
+
+
 def _eliminated(band: Real, sides: Real, rest: _Rest) -> tuple[float, _Rest]:
     """One stretch: its part of the product, and what it leaves."""
     from scipy.linalg import solve_triangular
@@ -93,7 +106,7 @@ def _eliminated(band: Real, sides: Real, rest: _Rest) -> tuple[float, _Rest]:
     sides[:wide] += rest.sides[:count]
     factor, failed = dpbtrf(band, lower=1, overwrite_ab=1)
     if failed:
-        raise OutOfRange("these lines are hardly connected: expected contacts that conduct as lines do, or not at all")
+        raise OutOfRange(_HARDLY)
     solved, _ = dtbtrs(factor, sides, uplo="L")
     part = float(solved[:, 0] @ solved[:, 1])
     if count < wide:  # the last
