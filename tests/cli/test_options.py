@@ -196,8 +196,8 @@ def test_draw(run, tmp_path):
     assert drawn.startswith("<svg")
     refused = run("draw", "tri", "-o", "x.png")
     assert (refused.code, refused.line) == (
-        2, "sensorgen: --output x.png: the drawing is SVG, or a page of layers; expected a name in .svg or .html, or - to "
-        "print the SVG",
+        2, "sensorgen: --output x.png: the drawing is SVG, or a page of layers; expected a name in .svg or .html, or - "
+        "to print the SVG",
     )  # fmt: skip
 
 
