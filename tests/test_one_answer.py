@@ -234,7 +234,7 @@ def check(asked):
     gap = next((f for f in findings if f["rule"] == "2-printed-gap"), None)
     if gap:
         printed, drawn = (
-            float(re.search(of, gap["message"])[1]) for of in (r"([\d.]+) mm \(Arachne\)", r"([\d.]+) mm drawn")
+            float(re.search(of, gap["message"])[1]) for of in (r"([\d.]+) mm \(Arachne[,)]", r"([\d.]+) mm drawn")
         )
     else:
         printed = drawn = asked.answer(predict_drawn).drawn["gap"]["value"] * 1e3
