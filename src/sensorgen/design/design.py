@@ -196,13 +196,13 @@ class Design(Strict):
         """Everything that decides the sensor, with all defaults and the values of material and printer filled in."""
         stuff = {}
         for name, source in sorted(self.used().items()):
-            stuff[name] = self.material(name).model_dump() | {"source": source}
+            stuff[name] = self.material(name).model_dump(exclude=_LIMITS) | {"source": source}
         return {
             "sensorgen": __version__,
             **self.model_dump(exclude={"name", "parameters", "printer", "quality", "waivers"} | self._plain()),
             "parameters": dataclasses.asdict(self.params),
             "materials_values": stuff,
-            "printer_values": self.machine.model_dump(),
+            "printer_values": self.machine.model_dump(exclude=_LIMITS),
             "quality_values": self.layers.model_dump(),
         }
 
@@ -239,6 +239,10 @@ class Design(Strict):
             for w in self.waivers
             if not any(_covers(w, f) for f in findings)
         ]
+
+
+# What only the check of G-code reads: it decides no sensor.
+_LIMITS: dict[str, set[str]] = {"control": {"commands", "longest_retraction_mm"}, "print": {"max_flow_mm3_s"}}
 
 
 def _covers(waiver: Waiver, finding: Finding) -> bool:
