@@ -138,8 +138,8 @@ def chance(holes: Sequence[float] | NDArray[np.float64], shorted: int, prints: i
     Nothing is known before the first print:
 
     >>> before = chance([0.0], 0, 0)
-    >>> round(before.mean, 3), round(before.low, 3), round(before.high, 3)
-    (0.5, 0.006, 0.994)
+    >>> round(before.mean, 2), round(before.low, 2), round(before.high, 2)
+    (0.5, 0.01, 0.99)
     """
     from scipy.special import betaincinv, xlog1py, xlogy
 

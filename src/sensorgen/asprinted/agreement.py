@@ -255,9 +255,12 @@ def _parts(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iter
 
 def _shifts(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iterator[Found]:
     """Each tool prints at its place in the piece: it spans what is drawn of its material."""
-    for tool in np.unique(lines.tool).tolist():
+    size, beyond = np.array(design.printed.size_mm[:2]), design.machine.line_mm() / 4
+    both = np.stack([lines.start_mm, lines.end_mm])
+    own = ((both > -beyond) & (both < size + beyond)).all((0, 2))  # others run on into what touches the piece, as a tab
+    for tool in np.unique(lines.tool[own]).tolist():
         mine = [body.name for body in design.printed.bodies if design.tool(body.material) == tool]
-        rows = lines.tool == tool
+        rows = own & (lines.tool == tool)
         plan = [layers[k].region(name) for k in np.unique(lines.layer[rows]).tolist() for name in mine]
         x0, y0, x1, y1 = shapely.total_bounds(plan)
         ends = np.concatenate([lines.start_mm[rows], lines.end_mm[rows]])
