@@ -228,7 +228,7 @@ def test_a_batch_that_fails_leaves_the_earlier_one_as_it_was(tmp_path, monkeypat
 
 def test_a_slicer_that_hangs_is_ended(tmp_path, monkeypatch):
     said = tmp_path / "said"
-    stand_in(tmp_path, monkeypatch, f"echo 'still thinking'; touch {said}; sleep 600")
+    stand_in(tmp_path, monkeypatch, f'[ "$1" = --help ] || {{ echo "still thinking"; touch {said}; sleep 600; }}')
     monkeypatch.setattr(run, "time", SimpleNamespace(monotonic=lambda: 1.0 if said.exists() else 0.0))
     (tmp_path / "plan.yaml").write_text(SMALL, "utf-8")
     with pytest.raises(SlicerFailed, match=r"more than 0.3 s .*still thinking"):

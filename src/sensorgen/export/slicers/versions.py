@@ -6,6 +6,7 @@ applied to the templates in order, so that each has only what differs from the o
 
 import re
 import subprocess
+import tempfile
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
@@ -113,11 +114,15 @@ def of_program(slicer: str, program: str) -> Version:
 @cache
 def _said(slicer: str, program: str, _changed_ns: int) -> Version:
     word, pattern = _ASKED[slicer]
-    try:
-        run = subprocess.run([program, word], capture_output=True, stdin=subprocess.DEVNULL, timeout=_ANSWER_S)  # noqa: S603
-    except (OSError, subprocess.TimeoutExpired):
-        return ()
-    found = re.search(pattern, (run.stdout + run.stderr).decode("utf-8", "replace"))
+    with tempfile.TemporaryFile() as said:  # a pipe would be waited for as long as a child of its holds it open
+        try:
+            subprocess.run(  # noqa: S603
+                [program, word], stdout=said, stderr=said, stdin=subprocess.DEVNULL, timeout=_ANSWER_S, check=False
+            )
+        except (OSError, subprocess.TimeoutExpired):
+            return ()
+        said.seek(0)
+        found = re.search(pattern, said.read().decode("utf-8", "replace"))
     return parse(found[1]) if found else ()
 
 
