@@ -4,12 +4,12 @@ from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, log, nan
 
-from sensorgen.analysis.comparison.expected import Predicted, predicted
+from sensorgen.analysis.comparison.expected import Predicted, stored_or_made
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
 from sensorgen.design.specimen_name import Specimen, design_of, parse
-from sensorgen.measure.log import Log, Reading
+from sensorgen.measure.log import BenchRun, Log, Prediction, Reading, Withdrawal
 from sensorgen.measure.log.batches import designs as on_beds
 from sensorgen.measure.signal.verdicts import Evidence, Verdict, expected_from, verdict
 from sensorgen.prediction import bodies
@@ -97,7 +97,7 @@ def of_iteration(
     """
     readings = log.readings(iteration=iteration)
     left_out: list[tuple[str, str]] = [
-        (f"reading {old.number}, {old.specimen}", "a later reading corrects it") for old in _corrected(log, iteration)
+        (f"reading {old.number}, {old.specimen}", why) for old, why in _superseded(log, iteration)
     ]
     printed = {row.specimen: row.design_id for row in log.prints()}
     by_specimen = _by_specimen(log, iteration, printed, left_out)
@@ -107,11 +107,14 @@ def of_iteration(
     for specimen in by_specimen.keys() & printed.keys():
         ids[names[specimen]].add(printed[specimen])  # another version of sensorgen may have named it
     left_out += _other_designs(readings, set().union(*ids.values()))
+    every = [row for kind in (Reading, BenchRun) for row in log.entries(kind, superseded=True, iteration=iteration)]
     measured, found = {}, {}
     for name, design in designs.items():
         step(name)
         measured[name] = body_of(design)
-        found[name] = predicted(measured[name], [p for each in ids[name] for p in log.predictions(design_id=each)])
+        stored = [p for each in ids[name] for p in log.entries(Prediction, superseded=True, design_id=each)]
+        of_design = [row for row in every if names.get(row.specimen) == name]
+        found[name] = stored_or_made(measured[name], log, stored, of_design, left_out)
     evidence = [_evidence(reading, found.get(names.get(reading.specimen, ""))) for reading in readings]
     usual = {shape: expected_from([e for e in evidence if e.shape == shape]) for shape in {e.shape for e in evidence}}
     rows = []
@@ -121,10 +124,15 @@ def of_iteration(
     return Comparison(tuple(rows), measured, names, found, tuple(left_out + list(_unused(rows))))
 
 
-def _corrected(log: Log, iteration: int) -> Iterator[Reading]:
+def _superseded(log: Log, iteration: int) -> Iterator[tuple[Reading, str]]:
+    """Readings out of use, and why."""
     current = {r.number for r in log.readings(iteration=iteration)}
-    every = log.entries(Reading, superseded=True, iteration=iteration)
-    yield from (r for r in every if r.number not in current)
+    for row in log.entries(Reading, superseded=True, iteration=iteration):
+        if row.number not in current:
+            later = log.superseding(row)
+            reason = next((row.reason for row in later if isinstance(row, Withdrawal)), "")
+            both = f"; {len(later)} corrections of it, made on different machines, all count" if len(later) > 1 else ""
+            yield row, f"withdrawn: {reason}" if reason else f"a later reading corrects it{both}"
 
 
 def _by_specimen(
