@@ -123,4 +123,4 @@ def test_a_real_slicer_prints_gap_and_capacitance(printed, real):
     wanted = rest_state(drawn(asked)).capacitance.value
     assert rest_state(by_slicer(made)).capacitance.value == pytest.approx(wanted, rel=0.03)
     assert gap_mm(printed("arachne", asked)[1].cell.scene) == pytest.approx(0.3, abs=1e-9)
-    assert nominal(made, real("arachne", made)[1]).rows()
+    assert nominal(made, real("arachne", made)[1]).rows

@@ -54,7 +54,7 @@ def printing(text):
 
 def assert_lifted(lines, machine=DIABASE):
     text = "\n".join([*lines, ""]).encode()
-    made, lifting = lift(text, machine)
+    made, lifting, _ = lift(text, machine)
     before, after = printing(text), printing(made)
     assert before[0] == after[0]
     assert before[1] == pytest.approx(after[1], abs=1e-3)
@@ -171,7 +171,7 @@ def test_a_slow_z_axis_gets_its_own_feed():
 
 def test_a_file_of_one_tool_stays_as_it_is():
     text = "\n".join([*COMB, "G1 X10 Y-3", "G1 Y12", ""]).encode()
-    made, lifting = lift(text, DIABASE)
+    made, lifting, _ = lift(text, DIABASE)
     assert made == text
     assert (lifting.lifts, [*lifting.document()]) == (0, [])
 
@@ -184,7 +184,7 @@ def test_relative_places_and_inches_are_refused(mode):
 
 def test_lifts_are_no_new_findings():
     before = {f.rule for f in check(COMB + OVER, DIABASE).findings}
-    made, _ = lift(COMB + OVER, DIABASE)
+    made, _, _ = lift(COMB + OVER, DIABASE)
     assert {f.rule for f in check(made, DIABASE).findings} == before
 
 
@@ -192,7 +192,7 @@ def test_lifts_are_no_new_findings():
 def test_a_planted_crossing_is_found(number):
     """Of a lifted file, one lift left out at a time."""
     back = [f"G1 X{12 + number} Y-4 F7200", f"G1 X15 {e(3)} F1200", f"G1 X{14 - number} Y12 F7200", f"G1 X15 {e(1)}"]
-    made, lifting = lift([*COMB, *OVER, *back, *back], DIABASE)
+    made, lifting, _ = lift([*COMB, *OVER, *back, *back], DIABASE)
     assert lifting.lifts == 5
     lines = made.decode().splitlines()
     up = [k for k, line in enumerate(lines) if line == "G1 Z0.3 F3000"]
@@ -202,7 +202,7 @@ def test_a_planted_crossing_is_found(number):
 
 def test_a_planted_change_of_a_printing_line_is_found():
     text = "\n".join([*COMB, *OVER, ""]).encode()
-    made, _ = lift(text, DIABASE)
+    made, _, _ = lift(text, DIABASE)
     for old, new in ((rb"X20 E", b"X20.001 E"), (rb"F1200$", b"F1201"), (rb"(X15 E.*)", rb"\1 ;")):
         wrong = re.sub(old, new, made, count=1, flags=re.MULTILINE)
         assert wrong != made

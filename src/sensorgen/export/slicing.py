@@ -17,6 +17,7 @@ from sensorgen.export import threemf
 from sensorgen.export.gcode.drags import Lifting, lift
 from sensorgen.export.gcode.files import text_of
 from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.moves import Motion
 from sensorgen.export.gcode.paths import Paths, paths_of
 from sensorgen.export.gcode.ready import ready
 from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, curaengine, prusa, stl, versions
@@ -66,8 +67,10 @@ class Sliced:
     ----------
     raw, ready : Path
         The slicer's own G-code, and that for the printer, the nozzle lifted over other tools' material.
+    motion : Motion
+        ``ready``, followed.
     lines : Paths
-        What is printed, by the lines of ``raw`` and the printer's own tool numbers.
+        What ``ready`` prints.
     slicer : str
         ``prusa`` or ``cura``.
     version : str
@@ -82,6 +85,7 @@ class Sliced:
 
     raw: Path
     ready: Path
+    motion: Motion
     lines: Paths
     slicer: str
     version: str
@@ -153,7 +157,7 @@ def sliced(
     version = _version(text, slicer)
     step("G-code")
     motion = follow(text)
-    lifted, lifting = lift(b"".join(ready(text, motion, machine)), machine)
+    lifted, lifting, followed = lift(b"".join(ready(text, motion, machine)), machine)
     with store.replacing(made) as file:
         file.write(lifted)
     end = machine.end_gcode.strip().rpartition("\n")[2].strip().encode()
@@ -163,11 +167,11 @@ def sliced(
             f"the slicer's file is cut short: it lacks the printer's last line, {end.decode()!r}; "
             "see that the disk is not full, and slice again"
         )
-    lines = paths_of(motion, machine, "slicer")
+    lines = paths_of(followed, machine)
     step("done")
     own_seconds = time.perf_counter() - started - seconds
     findings = versions.unknown(f"{TITLES[slicer]} {version}", not_known)
-    return Sliced(raw, made, lines, slicer, version, lifting, seconds, own_seconds, findings)
+    return Sliced(raw, made, followed, lines, slicer, version, lifting, seconds, own_seconds, findings)
 
 
 def check(pieces: Sequence[Placed]) -> None:

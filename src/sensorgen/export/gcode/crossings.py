@@ -123,7 +123,9 @@ class Crossings:
     tool: Whole
 
 
-def crossings(motion: Motion, machine: Printer, numbering: Numbering = "printer") -> Crossings:
+def crossings(
+    motion: Motion, machine: Printer, numbering: Numbering = "printer", rubbing_mm: Real | None = None
+) -> Crossings:
     """Find where the nozzle passes over what another tool has printed before.
 
     Parameters
@@ -134,14 +136,19 @@ def crossings(motion: Motion, machine: Printer, numbering: Numbering = "printer"
         Whose G-code it is.
     numbering : "printer" or "slicer"
         Whether T counts as the printer does, or from 0.
+    rubbing_mm : (k,) array, optional
+        Of every move that extrudes, where it is known; measured if not given.
     """
     lines, tool = printed_lines(motion, machine, numbering), tools_of(motion, machine, numbering)
     moves = (motion.across_mm > 0) & (motion.rows[:, 5] < lines.top_mm.max(initial=0.0) + NEAR_MM)
     travels = np.flatnonzero(moves & (motion.extruded_mm <= 0))
     rubs = np.flatnonzero(moves & (motion.extruded_mm > 0) & np.isin(motion.number, lines.number))
     rubbing = np.zeros(len(tool))
-    for points in _over(_blocks(motion, tool, rubs), lines, CONTACT_MM, FACE_MM):
-        np.add.at(rubbing, points.row, points.length_mm)
+    if rubbing_mm is None:
+        for points in _over(_blocks(motion, tool, rubs), lines, CONTACT_MM, FACE_MM):
+            np.add.at(rubbing, points.row, points.length_mm)
+    else:
+        rubbing[motion.extruded_mm > 0] = rubbing_mm
     nothing = Points(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
     over = [nothing, *_over(_blocks(motion, tool, travels), lines, NEAR_MM, 0.0)]
     travel = (np.concatenate([getattr(p, name) for p in over]) for name in Points.__dataclass_fields__)

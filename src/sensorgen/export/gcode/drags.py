@@ -155,8 +155,8 @@ def drags(source: Source, machine: Printer) -> Drags:
     return summed(motion, crossings(motion, machine), machine)
 
 
-def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> tuple[bytes, Lifting]:
-    """Lift the nozzle wherever it travels over foreign material; the file, and what was changed.
+def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> tuple[bytes, Lifting, Motion]:
+    """Lift the nozzle wherever it travels over foreign material; the file, what was changed, and the file followed.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> 
     found, retracted = crossings(motion, machine, numbering), _retracted(motion, machine)
     before = summed(motion, found, machine)
     if not len(found.travel.row):
-        return text, Lifting(before, before, 0, 0, 0.0)
+        return text, Lifting(before, before, 0, 0, 0.0), motion
     odd = next((e for e in motion.events if e.command.code in ("G91", "G20")), None)
     if odd:
         raise BadInput(
@@ -187,9 +187,10 @@ def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> 
     writer = _Lifts(text, motion, machine, found, retracted)
     lifted = writer.text()
     again = follow(lifted, machine.control.prime_macro)
-    after = summed(again, crossings(again, machine, numbering), machine)
+    rubbing_mm = found.rubbing_mm[motion.extruded_mm > 0]  # its lines are the same, and in the same order
+    after = summed(again, crossings(again, machine, numbering, rubbing_mm), machine)
     took = [float(seconds(m, machine.max_speed_mm_s).sum()) for m in (motion, again)]
-    return lifted, Lifting(before, after, writer.lifts, writer.retractions, took[1] - took[0])
+    return lifted, Lifting(before, after, writer.lifts, writer.retractions, took[1] - took[0]), again
 
 
 def summed(motion: Motion, found: Crossings, machine: Printer) -> Drags:
