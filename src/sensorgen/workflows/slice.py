@@ -158,16 +158,17 @@ def slice_design(
         content = made.ready.read_bytes()
     machine, loaded = design.machine, {design.tool(name): name for name in design.used()}
     printed = nominal(design, made.lines, f"{made.slicer} {made.version}")
-    checked = check_motion(made.motion, machine, loaded, others_empty=True).with_more(
+    checked = check_motion(made.lifted.motion, machine, loaded, others_empty=True).with_more(
         agreement.check(
-            design, made.lines, made.motion.changes, machine.bed_centre_mm(), alone=True, lines=printed.lines
+            design, made.lines, made.lifted.motion.changes, machine.bed_centre_mm(), alone=True, lines=printed.lines
         )
     )
     layers, findings = printed.rows, printed.findings()
     if printed.lines and len(printed.lines.number):
         films = pinholes.of_lines(design, printed.lines, widths=(1.0,), most_layers=pinholes.MOST_LAYERS)
         findings += design.waived([*pinholes.findings(films)])
-        page = pages.of_print(printed, findings)
+        travel = {"as sliced": made.lifted.before, "as written": made.lifted.after}
+        page = pages.of_print(printed, findings, {when: found.stretches() for when, found in travel.items()})
     else:
         page = ""
     stopped, stem = bool(checked.errors(strict)), f"{design.name}.{slicer}"
@@ -177,7 +178,7 @@ def slice_design(
         **vars(checked), name=design.name, design=design.id(), gcode=names[0], refused=stopped,
         sha256=sha256(content).hexdigest(), slicer=Slicer(made.slicer, made.version), sensorgen=__version__,
         printer=design.machine.name, quality=design.layers.name, design_findings=tuple(held.sliced().findings),
-        printed=Volumes(tuple(layers), (*made.findings, *findings)), lifting=made.lifting,
+        printed=Volumes(tuple(layers), (*made.findings, *findings)), lifting=made.lifted.lifting,
         compensated=tuple(compensated),
     )  # fmt: skip
     folder = out / design.name

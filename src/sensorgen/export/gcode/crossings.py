@@ -105,6 +105,29 @@ class Points:
 
 
 @dataclass(frozen=True, eq=False)
+class Stretches:
+    """Straight stretches of travel over lines of another tool.
+
+    Attributes
+    ----------
+    start_mm, end_mm : (n, 3) array
+        First and last point of each.
+    length_mm : (n,) array
+        Length that its points stand for.
+    touches : (n,) array of bool
+        Whether the nozzle is in contact.
+    tool : (n,) array of int
+        The printer's own number of the tool [-].
+    """
+
+    start_mm: Real
+    end_mm: Real
+    length_mm: Real
+    touches: Mask
+    tool: Whole
+
+
+@dataclass(frozen=True, eq=False)
 class Crossings:
     """What moves of a file pass over.
 
@@ -121,6 +144,17 @@ class Crossings:
     travel: Points
     rubbing_mm: Real
     tool: Whole
+
+    def stretches(self) -> Stretches:
+        """The travel as straight stretches, in contact or near."""
+        points = self.travel
+        touches, place = points.gap_mm <= CONTACT_MM, points.place_mm
+        joined = (np.diff(points.row) == 0) & (touches[1:] == touches[:-1])
+        joined &= np.hypot(*np.diff(place[:, :2], axis=0).T) < 1.5 * PITCH_MM
+        first = np.flatnonzero(np.append(True, ~joined)[: len(place)])
+        last = np.append(first[1:], len(place))[: len(first)] - 1
+        length = np.diff(np.append(0.0, np.cumsum(points.length_mm)[last]))
+        return Stretches(place[first], place[last], length, touches[first], self.tool[points.row[first]])
 
 
 def crossings(

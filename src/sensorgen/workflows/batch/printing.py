@@ -80,10 +80,10 @@ def gcode(
         store.write(own, {settings: json_bytes(asdict(engine))})
     rmtree(inside)  # what is left are the bodies again, as the slicer took them
     loaded = tools(piece.design for piece in found)
-    checked = check_motion(made.motion, machine, loaded, others_empty=True)
+    checked = check_motion(made.lifted.motion, machine, loaded, others_empty=True)
     for piece in found:
         checked = checked.with_more(
-            agreement.check(piece.design, made.lines, made.motion.changes, piece.sensor_mm(), piece=piece.name)
+            agreement.check(piece.design, made.lines, made.lifted.motion.changes, piece.sensor_mm(), piece=piece.name)
         )
     if checked.errors():
         ready = ready.replace(ready.with_suffix(".refused.gcode"))
