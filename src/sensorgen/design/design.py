@@ -241,8 +241,10 @@ class Design(Strict):
 
 # Version 0.1.0 hashed its own number, and its identities last: the logs, labels and batches that name them stay valid.
 _FIRST = {"sensorgen": "0.1.0"}
-# What only the check of G-code reads: it decides no sensor.
-_LIMITS: dict[str, set[str]] = {"control": {"commands", "longest_retraction_mm"}, "print": {"max_flow_mm3_s"}}
+# What only the check of G-code reads, and how exact the printer is: neither decides a sensor.
+_LIMITS: dict[str, Any] = {
+    "control": {"commands", "longest_retraction_mm"}, "print": {"max_flow_mm3_s"}, "tool_height_error_mm": True
+}  # fmt: skip
 
 
 def _covers(waiver: Waiver, finding: Finding) -> bool:
