@@ -167,7 +167,7 @@ def _run_errors(recorded: Sequence[Run], found: Comparison, values: Sequence[Fit
             pair = [Movable(b).model.sensor for b in (body, with_values(body, values))]
         except SensorgenError:
             continue
-        f, measured = run.recording.tones_hz, np.log(run.rest_ohm)
+        f, measured = run.tones_hz, np.log(run.rest_ohm)
         for sensor, into in zip(pair, (before, after), strict=True):
             into.extend(np.abs(measured - at_rest(moved(sensor), f)).tolist())
     return [Error("Z at rest", len(before), _rms(before), _rms(after))] if before else []

@@ -146,7 +146,7 @@ def _modelled(known: Sequence[tuple[Run, Movable]], parameter: str, value: float
     """Ln Z of recordings at rest, or its change under load, with one parameter moved."""
     found = []
     for run, of in known:
-        sensor, f = moved(of.model.sensor, **_moves(of, parameter, value)), run.recording.tones_hz
+        sensor, f = moved(of.model.sensor, **_moves(of, parameter, value)), run.tones_hz
         if loaded and run.pairs is not None:
             stiffness = value if parameter == MODULUS else 1.0
             where = run.pairs.force_n, run.pairs.position_mm * M_PER_MM
