@@ -63,10 +63,8 @@ def matrix(name, shape, content, kind=6):
 
 def packed(body):
     """A packed array of a body that is given in pieces."""
-    packer, pieces = zlib.compressobj(9), []
-    for piece in body:
-        pieces.append(packer.compress(piece))
-    content = b"".join([*pieces, packer.flush()])
+    packer = zlib.compressobj(9)
+    content = b"".join([*map(packer.compress, body), packer.flush()])
     return struct.pack("<II", 15, len(content)) + content
 
 

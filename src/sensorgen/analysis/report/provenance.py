@@ -29,7 +29,7 @@ def origins(log: Log, found: Comparison) -> Table:
     """Versions, the log, raw files, designs with the predictions of each, and sources of material values."""
     with log.path.open("rb") as file:
         digest = file_digest(file, "sha256").hexdigest()
-    readings = Counter(r.reading.source for r in found.rows)
+    readings = Counter(r.reading.words.source for r in found.rows)
     rows = [
         Origin("program", "sensorgen", __version__), Origin("program", "Python", platform.python_version()),
         *(Origin("library", name, version(name)) for name in LIBRARIES),

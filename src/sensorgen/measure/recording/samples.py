@@ -31,7 +31,7 @@ MARKS = {
 HARMLESS = frozenset({"gap", "reversed stamp", "repeated stamp", "no stamp"})
 """Marks that leave a sample valid: the rebuilt clock corrects them."""
 
-MOST_VALUES = 1 << 22  # readings at one frequency, of all lock-ins, that are worked on at once: 71 min at 7 x 140 Hz
+MOST_VALUES = 1 << 22  # readings at one frequency, of all lock-ins, with time and marks, that are worked on at once
 MOST_TONES = 4096
 PAUSE_S = 600.0  # a longer one ends a part of a recording: filter and drift do not reach across
 _MOST_PARTS = 1000  # of a stretch
@@ -184,9 +184,9 @@ def stretches(count: int, tones: int) -> list[slice]:
     Examples
     --------
     >>> stretches(1_000_000, 7)
-    [slice(0, 500000, None), slice(500000, 1000000, None)]
+    [slice(0, 333333, None), slice(333333, 666666, None), slice(666666, 1000000, None)]
     """
-    pieces = max(1, -(-count * (tones + 1) // MOST_VALUES))
+    pieces = max(1, -(-count * (tones + 2) // MOST_VALUES))
     ends = [count * k // pieces for k in range(pieces + 1)]
     return [slice(a, b) for a, b in pairwise(ends)]
 

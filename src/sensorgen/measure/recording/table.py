@@ -45,7 +45,7 @@ def recordings(path: Path, columns: Mapping[str, str]) -> Iterator[tuple[Recordi
             raise BadInput(f"{path}: {message}")
         if len(file.frequency_hz) > MOST_TONES:
             raise BadInput(f"{path}: {len(file.frequency_hz)} frequencies; expected up to {MOST_TONES}")
-        most, held, count = MOST_VALUES // (len(file.frequency_hz) + 1), [], 0
+        most, held, count = MOST_VALUES // (len(file.frequency_hz) + 2), [], 0
         for block in file.blocks():
             held.append((block.impedance_ohm, block.numbers))
             count += len(block.rows)
