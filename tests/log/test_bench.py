@@ -113,7 +113,7 @@ def test_without_a_rig_and_twice(log, run_files):
         ("run.mat", b"", "run.mat"),
         ("run.mat", b"MATLAB 5.0 MAT-file" + b" " * 105 + b"\0\1IM" + b"\xff" * 99, "run.mat"),
         ("run.csv", b"a,b\n1,2\n", "run.csv"),
-        ("run.csv", b"re_ohm_1kHz,im_ohm_1kHz\n1,x\n", "run.csv, row 2"),
+        ("run.csv", b"time_s,re_ohm_1kHz,im_ohm_1kHz\n0,1,x\n", "run.csv, row 2"),
         ("run.pkl", b"\x80\x04cos\nsystem\n(S'touch pwned'\ntR.", "run.pkl"),
         ("run.zip", b"PK\x03\x04" + b"\0" * 99, "run.zip"),
     ],

@@ -83,7 +83,7 @@ def test_whoever_rewrites_the_whole_chain_is_found_by_an_anchor(full, path, tmp_
     assert verify.verified(full, tmp_path / "notes.txt").faults == ()
     head, rows = "", []
     for record in full.records():
-        content = record.content.replace("650", "600")
+        content = record.content.replace("650.0", "600.0")
         new = chain.made([head] if head else [], record.kind, record.version, record.logged_at, content)
         rows.append((new.id, head, content, record.id))
         head = new.id

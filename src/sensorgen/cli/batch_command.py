@@ -65,7 +65,7 @@ def _make(plan: str, *, out: str, no_gcode: bool, time_limit_s: float, force: bo
 def _verify(folder: str, file: str | None) -> int:
     """Hash every file of a batch's folder again, and say what differs from its record; exit code 1 if anything does.
 
-    The record itself is held against the log, if that has the batch.
+    The record itself is compared with the log, if that has the batch.
     """
     from sensorgen.workflows.batch.record import RECORD
     from sensorgen.workflows.sealed import batch_differences

@@ -1,4 +1,4 @@
-"""Sealed folders: what a folder's record says of its files, of itself and of other records, held against what is there.
+"""Sealed folders: what a folder's record says of its files, of itself and of other records, beside what is there.
 
 A build is recorded in ``manifest.json``, a batch in ``batch.json``, a sliced file in ``NAME.gcode.json``: each has the
 SHA-256 of its files and the identity of its design. Whoever rewrites a file and its record is found by the log.

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from statistics import geometric_mean
 
 from sensorgen.core.bounds import Bounds, Interval
@@ -43,7 +44,7 @@ class Predicted:
     before: bool | None = False
     order: str = ""
 
-    @property
+    @cached_property
     def ry_ohm(self) -> Bounds | None:
         """Along one electrode [ohm]: the geometric mean of all, as the readings do not say which was measured.
 
@@ -66,7 +67,7 @@ class Predicted:
         c = self.prediction.capacitance
         return Interval(c.lower, c.upper) if c else None
 
-    @property
+    @cached_property
     def touches(self) -> bool:
         """Whether the electrodes touch as drawn, so that the film is a short by design."""
         return (self.prediction.drawn or self.prediction).status == "short"

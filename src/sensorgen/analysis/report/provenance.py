@@ -27,7 +27,7 @@ class Origin:
 def origins(log: Log, found: Comparison) -> Table:
     """Versions, the log, raw files, designs with the predictions of each, and sources of material values."""
     records, head = log.head()
-    readings = Counter(r.reading.source for r in found.rows)
+    readings = Counter(r.reading.words.source for r in found.rows)
     rows = [
         Origin("program", "sensorgen", __version__), Origin("program", "Python", platform.python_version()),
         *(Origin("library", name, version(name)) for name in LIBRARIES),

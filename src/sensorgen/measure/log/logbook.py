@@ -240,6 +240,11 @@ class Log:
             return one < other
         return True if self._ancestry.before(key, its_key) else False if self._ancestry.before(its_key, key) else None
 
+    @property
+    def merged(self) -> bool:
+        """Whether several machines have written the log."""
+        return self._ancestry is not None
+
     @cached_property
     def _migrated(self) -> int:
         """Number of the record of a migration: rows before it are in the order of a clock."""
