@@ -107,6 +107,7 @@ class Printed:
         gaps = [gap_mm(cell.scene) for cell in self.cells.values()]
         return min(gaps), max(gaps)
 
+    @cached_property
     def rows(self) -> list[Row]:
         """Printed and drawn volume per body and layer."""
         lines, scene, extruded = self.lines, self.design.printed, None
@@ -126,7 +127,7 @@ class Printed:
             )
             for short in next(iter(self._connected.values())).shorts
         ]  # fmt: skip
-        return self.design.waived([*volumes.findings(self.rows(), self.design.printed), *shorts])
+        return self.design.waived([*volumes.findings(self.rows, self.design.printed), *shorts])
 
 
 def body(

@@ -129,6 +129,29 @@ class Lifting:
         )  # fmt: skip
 
 
+@dataclass(frozen=True, eq=False)
+class Lifted:
+    """A file with its lifts.
+
+    Attributes
+    ----------
+    text : bytes
+        The file.
+    motion : Motion
+        The same, followed.
+    before, after : Crossings
+        What its moves pass over, without the lifts and with them.
+    lifting : Lifting
+        Both summed up.
+    """
+
+    text: bytes
+    motion: Motion
+    before: Crossings
+    after: Crossings
+    lifting: Lifting
+
+
 def drags(source: Source, machine: Printer) -> Drags:
     """Measure the travel over foreign material in a file, whoever has sliced it.
 
@@ -155,8 +178,8 @@ def drags(source: Source, machine: Printer) -> Drags:
     return summed(motion, crossings(motion, machine), machine)
 
 
-def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> tuple[bytes, Lifting]:
-    """Lift the nozzle wherever it travels over foreign material; the file, and what was changed.
+def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> Lifted:
+    """Lift the nozzle wherever it travels over foreign material.
 
     Parameters
     ----------
@@ -177,7 +200,7 @@ def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> 
     found, retracted = crossings(motion, machine, numbering), _retracted(motion, machine)
     before = summed(motion, found, machine)
     if not len(found.travel.row):
-        return text, Lifting(before, before, 0, 0, 0.0)
+        return Lifted(text, motion, found, found, Lifting(before, before, 0, 0, 0.0))
     odd = next((e for e in motion.events if e.command.code in ("G91", "G20")), None)
     if odd:
         raise BadInput(
@@ -187,9 +210,12 @@ def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> 
     writer = _Lifts(text, motion, machine, found, retracted)
     lifted = writer.text()
     again = follow(lifted, machine.control.prime_macro)
-    after = summed(again, crossings(again, machine, numbering), machine)
+    rubbing_mm = found.rubbing_mm[motion.extruded_mm > 0]  # its lines are the same, and in the same order
+    left = crossings(again, machine, numbering, rubbing_mm)
     took = [float(seconds(m, machine.max_speed_mm_s).sum()) for m in (motion, again)]
-    return lifted, Lifting(before, after, writer.lifts, writer.retractions, took[1] - took[0])
+    after = summed(again, left, machine)
+    lifting = Lifting(before, after, writer.lifts, writer.retractions, took[1] - took[0])
+    return Lifted(lifted, again, found, left, lifting)
 
 
 def summed(motion: Motion, found: Crossings, machine: Printer) -> Drags:
