@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from sensorgen.measure.log import Log, importing, tables
-from sensorgen.measure.signal.verdicts import Evidence, expected_from, verdict
+from sensorgen.measure.signal.verdicts import Evidence, expected_from, least, verdict
 from sensorgen.measure.signal.yields import dependence, groups
 
 
@@ -19,8 +19,8 @@ def judged(tmp_path_factory):
             Evidence(f"row {r.source_row}", r.y_ohm, r.z_ohm, nan, r.shape, r.film_mm, remark(r))
             for r in log.readings()
         ]
-    expected = {shape: expected_from([e for e in made if e.shape == shape and e.remark != "not baked"])
-                for shape in ("tri", "rect")}  # fmt: skip
+    baked = [e for e in made if e.remark != "not baked"]
+    expected = {s: expected_from([v for e in baked if e.shape == s for v in least(e)]) for s in ("tri", "rect")}
     assert expected == {"tri": 670, "rect": 1050}
     made = [replace(e, expected_ohm=expected[e.shape]) for e in made]
     return [(e, verdict(e)) for e in made]

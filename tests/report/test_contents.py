@@ -204,7 +204,7 @@ def test_resistivity_explains_what_it_must(of_thesis):
 
 def test_it_says_that_predictions_were_made_afterwards(of_thesis, of_recorded):
     assert "made after the measurement" in " ".join(of_thesis.findings)
-    assert "1 of 1 predictions were stored" in " ".join(of_recorded.findings)
+    assert "1 of 1 predictions were stored before anything was measured" in " ".join(of_recorded.findings)
     assert any(row.which.startswith("stored 20") for row in table(of_recorded, "provenance").rows)
 
 
@@ -378,3 +378,42 @@ def test_recordings_that_are_gone_are_told(recorded, tmp_path):
         sum("recording" in row.what and "No such file or directory" in row.why for row in table(made, "left_out").rows)
         == 2
     )
+
+
+def test_a_bad_recording_is_told_and_the_others_are_reported(recorded, tmp_path, monkeypatch):
+    """Parts of a recording with a pause, one of them too short; and faults that nobody foresaw."""
+    import shutil
+
+    import numpy as np
+
+    from sensorgen.analysis.comparison import runs
+    from sensorgen.measure.log import bench
+
+    shutil.copy(recorded, tmp_path / "log.db")
+    shutil.copytree(f"{recorded}.files", tmp_path / "log.db.files")
+    time = np.arange(600) / 100
+    rows = [f"{t},{100 + k % 7},{-50 - k % 5}" for k, t in enumerate([*time, *(time + 7 * 86400), 9e6, 9e6 + 0.01])]
+    (tmp_path / "pause.csv").write_text("time_s,re_ohm_1kHz,im_ohm_1kHz\n" + "\n".join(rows) + "\n")
+    with Log(tmp_path / "log.db") as log:
+        bench.log_recording(log, "30 triX .1mm", tmp_path / "pause.csv")
+        made = report(log, 30)
+        names = [row.recording for row in table(made, "recordings").rows]
+        assert names[-2:] == ["30 triX .1mm, recording 3, part 1", "30 triX .1mm, recording 3, part 2"]
+        assert "after a pause of 604794 s" in table(made, "recordings").rows[-1].notes
+        said = [row.why for row in table(made, "left_out").rows if "recording 3, 30 triX .1mm, part 3" in row.what]
+        assert len(said) == 1
+        assert "2 valid samples" in said[0] or "2 readings" in said[0]
+        real, faults = runs.processed, {1: MemoryError(), 2: ZeroDivisionError("by 0"), 3: KeyError("x")}
+
+        def failing(one, *rest):
+            if one.source.part:
+                raise faults[one.source.part]
+            return real(one, *rest)
+
+        monkeypatch.setattr(runs, "processed", failing)
+        left_out = []
+        assert len(list(runs.runs(log, 30, left_out))) == 2
+    assert [why for _, why in left_out] == [
+        "not enough memory", "ZeroDivisionError: by 0; a fault of sensorgen, please report it",
+        "KeyError: 'x'; a fault of sensorgen, please report it",
+    ]  # fmt: skip

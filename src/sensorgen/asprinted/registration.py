@@ -82,7 +82,7 @@ def pieces(design: Design, motion: Motion) -> list[Placed]:
     ]  # fmt: skip
     size = np.array(design.printed.size_mm[:2]) - design.machine.line_mm()  # lines run half a line inside
     off = np.array([[abs(box[1] - box[0] - wanted).max() for wanted in (size, size[::-1])] for box in boxes])
-    fits = (off < WITHIN_MM).any(1) if boxes else []
+    fits: list[bool] = (off < WITHIN_MM).any(1).tolist() if boxes else []
     if not any(fits):
         line = design.machine.line_mm()
         there = "; ".join(

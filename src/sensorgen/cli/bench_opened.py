@@ -1,5 +1,6 @@
 """Recordings that the commands of ``sensorgen bench`` work with: files with the rig's log, or numbers of the log."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ def options() -> list[click.Parameter]:
     return [
         *recorded_columns(),
         click.Option(["--lockin"], type=click.IntRange(1), help="Which one, if the file has several."),
+        click.Option(["--part"], type=click.IntRange(1), help="Which one, if pauses divide it."),
         click.Option(
             ["--drift", "law"], metavar="LAW",
             help="Law that the drift follows, line, smooth, memory, wandering or memory+wandering; the one that "
@@ -30,7 +32,7 @@ def options() -> list[click.Parameter]:
 
 def worked_up(
     what: str, rig_file: str | None, *, columns: tuple[str, ...], rig_columns: tuple[str, ...], lockin: int | None,
-    law: str | None, keep_drift: bool, file: str | None, **how: Any,
+    part: int | None, law: str | None, keep_drift: bool, file: str | None, **how: Any,
 ) -> "tuple[Processed, RigLog | None]":  # fmt: skip
     """A recording with what pressed, freed of drift, cut into presses; and the rig's log, if there is one."""
     from sensorgen.measure import recording
@@ -38,7 +40,9 @@ def worked_up(
 
     if keep_drift and law:
         raise BadInput(f"--keep-drift and --drift {law} at once; expected one of them")
-    found, rig = _opened(what, rig_file, columns, rig_columns, file)
+    parts, rig = _opened(what, rig_file, columns, rig_columns, file)
+    found = _part(parts, part)
+    del parts  # with the part after it
     which = _chosen(found, lockin)
     beside = recording.joined_all(found, rig)[which] if rig else None
     return processed(found[which], beside, remove_drift=not keep_drift, law=law or "", **how), rig
@@ -46,13 +50,13 @@ def worked_up(
 
 def _opened(
     what: str, rig_file: str | None, columns: tuple[str, ...], rig_columns: tuple[str, ...], file: str | None
-) -> "tuple[tuple[Recording, ...], RigLog | None]":
-    """Recordings and the rig's log, from files or by their number in the log."""
+) -> "tuple[Iterator[tuple[Recording, ...]], RigLog | None]":
+    """Recordings, part after part, and the rig's log, from files or by their number in the log."""
     from sensorgen.measure import recording
     from sensorgen.measure.log import BenchRun, bench
 
     if not (what.isascii() and what.isdigit()) or Path(what).is_file():
-        read = recording.read_all(what, columns_of(columns, "--column"))
+        read = recording.parts(what, columns_of(columns, "--column"))
         return read, recording.rig(rig_file, columns_of(rig_columns, "--rig-column")) if rig_file else None
     if rig_file or columns or rig_columns:
         raise BadInput(f"recording {what} of the log has its rig's log and columns; expected no others beside it")
@@ -61,6 +65,23 @@ def _opened(
         if entry is None:
             raise BadInput(f"no recording {what} in {str(log.path)!r}; sensorgen log list shows their numbers")
         return bench.read_again(log, entry)
+
+
+def _part(parts: "Iterator[tuple[Recording, ...]]", which: int | None) -> "tuple[Recording, ...]":
+    """The part that was asked for, or the only one."""
+    count = 0
+    for count, found in enumerate(parts, 1):
+        if count == which:
+            return found
+        if which is None and count == 1:
+            only = found
+    if which is None and count > 1:
+        raise BadInput(
+            f"{count} parts, with pauses between them or too long for one; choose one with --part 1 to {count}"
+        )
+    if which is not None:
+        raise BadInput(f"--part {which}: expected 1{f' to {count}' if count > 1 else ', the only one'}")
+    return only
 
 
 def _chosen(found: "tuple[Recording, ...]", lockin: int | None) -> int:

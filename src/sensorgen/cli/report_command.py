@@ -24,7 +24,7 @@ def _work(
     One HTML file that needs no network, or Markdown, CSV or JSON with the same numbers. Prints the headline and the
     name of the file.
     """
-    from sensorgen.analysis.report import written
+    from sensorgen.analysis.report import pieces
     from sensorgen.analysis.report.contents import STEPS, report
     from sensorgen.core import document
     from sensorgen.core import files as store
@@ -33,14 +33,14 @@ def _work(
         raise BadInput("--open shows an HTML file; expected --format html and a file")
     with log_words.opened(file) as log, show.progress(STEPS) as step:
         made = report(log, iteration, step)
-        text = written(made, how)
     if pictures:
         _draw(made, Path(pictures))
     if output == "-":
-        click.echo(text, nl=False)
+        render.write(pieces(made, how))
         return 0
     path = Path(output or f"report-{iteration}.{how}")
-    store.replace(path, text.encode())
+    with store.replacing(path) as target:
+        target.writelines(piece.encode() for piece in pieces(made, how))
     render.write(f"{line}\n" for line in document.text([*made.headline, str(path)]))
     if show_it:
         webbrowser.open(path.resolve().as_uri())

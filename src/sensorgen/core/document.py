@@ -6,13 +6,14 @@ A result that a command prints or a notebook displays has a method ``document()`
 import csv
 import io
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from html import escape
 from math import isfinite, isinf, isnan
 from typing import Any, Protocol, Self, get_type_hints
 
+from sensorgen.core.lazy import Lazy
 from sensorgen.core.units import si
 
 Cell = str | float | int | None
@@ -86,17 +87,21 @@ class Table:
     key: str
     caption: str
     columns: tuple[Column, ...]
-    cells: tuple[tuple[Cell, ...], ...]
-    rows: tuple[Any, ...] = ()
+    cells: Sequence[tuple[Cell, ...]]
+    rows: Sequence[Any] = ()
 
     @classmethod
     def of(cls, key: str, caption: str, rows: Sequence[Any]) -> Self:
         """A table of dataclasses of one type, at least one; fields annotated with a ``Column`` are its columns."""
         hints = get_type_hints(type(rows[0]), include_extras=True)
         found = {f.name: c for f in fields(rows[0]) for c in getattr(hints[f.name], "__metadata__", ())[:1]}
-        values = ((getattr(row, name) for name in found) for row in rows)
-        cells = tuple(tuple(None if isinstance(v, float) and isnan(v) else v for v in row) for row in values)
-        return cls(key, caption, tuple(replace(c, key=name) for name, c in found.items()), cells, tuple(rows))
+
+        def cells(row: Any) -> tuple[Cell, ...]:
+            values = (getattr(row, name) for name in found)
+            return tuple(None if isinstance(v, float) and isnan(v) else v for v in values)
+
+        kept = rows if isinstance(rows, Lazy) else tuple(rows)
+        return cls(key, caption, tuple(replace(c, key=name) for name, c in found.items()), _each(kept, cells), kept)
 
     def beside(self, column: Column, values: Sequence[Cell]) -> "Table":
         """The table with one more column before the first."""
@@ -109,8 +114,13 @@ class Table:
             k for k, column in enumerate(self.columns)
             if not column.hidden and any(row[k] not in (None, "") for row in self.cells)
         ]  # fmt: skip
-        cells = tuple(tuple(row[k] for k in kept) for row in self.cells)
+        cells = _each(self.cells, lambda row: tuple(row[k] for k in kept))
         return replace(self, columns=tuple(self.columns[k] for k in kept), cells=cells)
+
+
+def _each(rows: Sequence[Any], change: Callable[[Any], tuple[Cell, ...]]) -> Sequence[tuple[Cell, ...]]:
+    """Every row changed: at once, or when it is read."""
+    return rows.map(change) if isinstance(rows, Lazy) else tuple(map(change, rows))
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,8 @@ from sensorgen.core.files import reading
 
 BLOCK_ROWS = 1 << 14
 LONGEST_LINE = 1 << 18
+_BLOCK_CHARACTERS = 1 << 21  # of a block: rows may be long
+_MOST_LINES = 200  # of one row, whose cells may have line feeds
 SAME_NAMES: Mapping[str, str] = {}
 
 
@@ -105,7 +107,7 @@ class Table:
             A row with too few or too many cells, a cell that is no finite number, bytes that are not UTF-8, or no rows.
         """
         empty = True
-        while batch := [(self._row, line) for line in islice(iter(self._line, ""), size)]:
+        while batch := list(self._batch(size)):
             last = batch[-1][1]
             if truncated and not last.endswith("\n") and last.count(self._separator) < len(self.names) - 1:
                 self.truncated = True
@@ -116,6 +118,15 @@ class Table:
                 yield self._block([row for row, _ in filled], [line for _, line in filled], numbers, text, dates)
         if empty:
             raise BadInput(f"{self.name}: no rows below the header")
+
+    def _batch(self, size: int) -> Iterator[tuple[int, str]]:
+        """Lines with their numbers, up to ``size``, and as many as memory should hold."""
+        characters = 0
+        for line in islice(iter(self._line, ""), size):
+            yield self._row, line
+            characters += len(line)
+            if characters > _BLOCK_CHARACTERS:
+                return
 
     def _line(self) -> str:
         line = self._file.readline(LONGEST_LINE)
@@ -169,9 +180,17 @@ class Table:
         BadInput
             As :meth:`blocks`.
         """
-        rows = csv.reader(iter(self._line, ""), delimiter=self._separator, strict=True)
+        begun = 0
+
+        def lines() -> Iterator[str]:
+            for line in iter(self._line, ""):
+                if self._row - begun > _MOST_LINES:
+                    raise self.error(begun, f"longer than {_MOST_LINES} lines; close every quotation mark")
+                yield line
+
+        rows = csv.reader(lines(), delimiter=self._separator, strict=True)
         while True:
-            row = self._row + 1
+            row = begun = self._row + 1
             try:
                 cells = next(rows)
             except StopIteration:

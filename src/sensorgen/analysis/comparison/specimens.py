@@ -1,35 +1,42 @@
 """Specimens of an iteration: readings, designs, predictions and verdicts, row by row; and what cannot be compared."""
 
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from array import array
+from collections import Counter
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import isfinite, log, nan
 
-from sensorgen.analysis.comparison.expected import Predicted, predicted
+from sensorgen.analysis.comparison.expected import Predicted, stored_or_made
+from sensorgen.analysis.comparison.measured import Measured, Readings, readings
 from sensorgen.core.errors import SensorgenError
+from sensorgen.core.lazy import Lazy
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
 from sensorgen.design.specimen_name import Specimen, design_of, parse
-from sensorgen.measure.log import Log, Reading
+from sensorgen.measure.log import BenchRun, Entry, Log, Prediction, Reading, Withdrawal
 from sensorgen.measure.log.batches import designs as on_beds
-from sensorgen.measure.signal.verdicts import Evidence, Verdict, expected_from, verdict
+from sensorgen.measure.signal.verdicts import Evidence, Verdict, expected_from, least, verdict
 from sensorgen.prediction import bodies
 
+_MOST_LEFT_OUT = 1000  # readings that are listed for one reason
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, slots=True)
 class Compared:
     """One reading beside what was predicted of its design.
 
     Attributes
     ----------
-    reading : Reading
-        As logged.
+    reading : Measured
+        What the log has of it.
     predicted : Predicted or None
         None where no design is known.
     evidence, verdict : Evidence, Verdict
         What the readings say by themselves; what an electrode should have is the median of its own shape.
     """
 
-    reading: Reading
+    reading: Measured
     predicted: Predicted | None
     evidence: Evidence
     verdict: Verdict
@@ -49,13 +56,13 @@ class Compared:
         return any(expected.lower <= value <= expected.upper for value in self.evidence.ry_ohm)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Comparison:
     """An iteration.
 
     Attributes
     ----------
-    rows : tuple of Compared
+    rows : Lazy of Compared
         One for each reading, in the order of the log.
     bodies : mapping of str to Body
         What was measured, by the design's name.
@@ -67,16 +74,16 @@ class Comparison:
         What could not be used, and why.
     """
 
-    rows: tuple[Compared, ...]
+    rows: Lazy[Compared]
     bodies: Mapping[str, Body]
     names: Mapping[str, str]
     predictions: Mapping[str, Predicted]
     left_out: tuple[tuple[str, str], ...]
 
-    @property
-    def last(self) -> tuple[Compared, ...]:
+    @cached_property
+    def last(self) -> Lazy[Compared]:
         """The last reading of each specimen: a yield counts specimens, however often one was measured."""
-        return tuple({row.reading.specimen: row for row in self.rows}.values())
+        return self.rows.at({row.reading.specimen: k for k, row in enumerate(self.rows)}.values())
 
 
 def of_iteration(
@@ -95,10 +102,8 @@ def of_iteration(
     body_of : callable
         Makes the body of a design.
     """
-    readings = log.readings(iteration=iteration)
-    left_out: list[tuple[str, str]] = [
-        (f"reading {old.number}, {old.specimen}", "a later reading corrects it") for old in _corrected(log, iteration)
-    ]
+    measured = readings(log.entries(Reading, iteration=iteration))
+    left_out = list(_superseded(log, iteration, measured))
     printed = {row.specimen: row.design_id for row in log.prints()}
     by_specimen = _by_specimen(log, iteration, printed, left_out)
     names = {specimen: design.name for specimen, design in by_specimen.items()}
@@ -106,25 +111,65 @@ def of_iteration(
     ids = {name: {design.id()} for name, design in designs.items()}
     for specimen in by_specimen.keys() & printed.keys():
         ids[names[specimen]].add(printed[specimen])  # another version of sensorgen may have named it
-    left_out += _other_designs(readings, set().union(*ids.values()))
-    measured, found = {}, {}
+    left_out += _other_designs(measured.designs, set().union(*ids.values()))
+    begun = _begun(log, iteration, names)
+    made, found = {}, {}
     for name, design in designs.items():
         step(name)
-        measured[name] = body_of(design)
-        found[name] = predicted(measured[name], [p for each in ids[name] for p in log.predictions(design_id=each)])
-    evidence = [_evidence(reading, found.get(names.get(reading.specimen, ""))) for reading in readings]
-    usual = {shape: expected_from([e for e in evidence if e.shape == shape]) for shape in {e.shape for e in evidence}}
-    rows = []
-    for reading, of in zip(readings, evidence, strict=True):
-        known = replace(of, expected_ohm=usual[of.shape])
-        rows.append(Compared(reading, found.get(names.get(reading.specimen, "")), known, verdict(known)))
-    return Comparison(tuple(rows), measured, names, found, tuple(left_out + list(_unused(rows))))
+        made[name] = body_of(design)
+        stored = [p for each in ids[name] for p in log.entries(Prediction, superseded=True, design_id=each)]
+        found[name] = stored_or_made(made[name], log, stored, begun.get(name, []), left_out)
+    by_shape: dict[str, array[float]] = {}
+    for reading in measured.rows:
+        by_shape.setdefault(reading.shape, array("d")).extend(least(_evidence(reading, None)))
+    usual = {shape: expected_from(values) for shape, values in by_shape.items()}
+
+    def compared(place: int) -> Compared:
+        reading = measured.rows[place]
+        of = found.get(names.get(reading.specimen, ""))
+        evidence = _evidence(reading, of, usual[reading.shape])
+        return Compared(reading, of, evidence, verdict(evidence))
+
+    rows = Lazy(compared, range(len(measured.rows)))
+    return Comparison(rows, made, names, found, (*left_out, *_first(_unused(rows))))
 
 
-def _corrected(log: Log, iteration: int) -> Iterator[Reading]:
-    current = {r.number for r in log.readings(iteration=iteration)}
-    every = log.entries(Reading, superseded=True, iteration=iteration)
-    yield from (r for r in every if r.number not in current)
+def _begun(log: Log, iteration: int, names: Mapping[str, str]) -> dict[str, list[Entry]]:
+    """The first reading and the first recording of each design; all of them where several machines wrote the log."""
+    found: dict[str, dict[object, Entry]] = {}
+    kinds: tuple[type[Reading | BenchRun], ...] = (Reading, BenchRun)
+    for kind in kinds:
+        for row in log.entries(kind, superseded=True, iteration=iteration):
+            if row.specimen in names:
+                found.setdefault(names[row.specimen], {}).setdefault((kind, row.number * log.merged), row)
+    return {name: list(rows.values()) for name, rows in found.items()}
+
+
+def _superseded(log: Log, iteration: int, measured: Readings) -> Iterator[tuple[str, str]]:
+    """Readings out of use, and why."""
+    current = (reading.number for reading in measured.rows)
+    now = next(current, 0)
+    for old in log.entries(Reading, superseded=True, iteration=iteration):  # both in the order of the log
+        if old.number == now:
+            now = next(current, 0)
+            continue
+        later = log.superseding(old)
+        reason = next((row.reason for row in later if isinstance(row, Withdrawal)), "")
+        both = f"; {len(later)} corrections of it, made on different machines, all count" if len(later) > 1 else ""
+        why = f"withdrawn: {reason}" if reason else f"a later reading corrects it{both}"
+        yield f"reading {old.number}, {old.specimen}", why
+
+
+def _first(left_out: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+    """What was left out, and the number of readings beyond those that anybody reads."""
+    more = Counter[str]()
+    for what, why in left_out:
+        more[why] += 1
+        if more[why] <= _MOST_LEFT_OUT:
+            yield what, why
+    for why, count in more.items():
+        if count > _MOST_LEFT_OUT:
+            yield f"{count - _MOST_LEFT_OUT} more readings", why
 
 
 def _by_specimen(
@@ -151,9 +196,9 @@ def _by_specimen(
     return found
 
 
-def _other_designs(readings: Sequence[Reading], known: Container[str]) -> list[tuple[str, str]]:
+def _other_designs(logged: Iterable[tuple[str, str]], known: Container[str]) -> list[tuple[str, str]]:
     """What the log says of designs that the names do not stand for."""
-    others = {(r.design, r.design_id) for r in readings if r.design_id and r.design_id not in known}
+    others = {(name, uid) for name, uid in logged if uid and uid not in known}
     return [
         (f"design {name} ({uid})", "the log names it for a specimen whose name stands for another design, or for this "
          "one in another version of sensorgen: drawn and predicted is what the name stands for now")
@@ -161,16 +206,14 @@ def _other_designs(readings: Sequence[Reading], known: Container[str]) -> list[t
     ]  # fmt: skip
 
 
-def _evidence(reading: Reading, of: Predicted | None) -> Evidence:
+def _evidence(reading: Measured, of: Predicted | None, expected_ohm: float = nan) -> Evidence:
     """Readings that a resistance can have; a slip below 0 is kept in the log, with a doubt."""
     ry, rz = (tuple(v for v in values if v >= 0) for values in (reading.y_ohm, reading.z_ohm))
-    return Evidence(
-        reading.specimen, ry, rz, nan, reading.shape, reading.film_mm, reading.remark,
-        of is not None and of.touches,
-    )  # fmt: skip
+    words, touches = reading.words, of is not None and of.touches
+    return Evidence(words.specimen, ry, rz, expected_ohm, words.shape, words.film_mm, words.remark, touches)
 
 
-def _unused(rows: Sequence[Compared]) -> Iterator[tuple[str, str]]:
+def _unused(rows: Iterable[Compared]) -> Iterator[tuple[str, str]]:
     for row in rows:
         name = f"reading {row.reading.number}, {row.reading.specimen}"
         if row.predicted is None:

@@ -1,20 +1,23 @@
 """The fit of an iteration: specimens held back, values from the others, errors before and after on those held back."""
 
-from collections.abc import Callable, Sequence
+from array import array
+from collections.abc import Callable, Container, Iterator, Sequence
 from hashlib import sha256
+from itertools import chain
 from math import isfinite, log, nan, sqrt
 
 import numpy as np
 
-from sensorgen.analysis.comparison import Compared, Comparison, of_iteration, predicted
+from sensorgen.analysis.comparison import Comparison, of_iteration, predicted
 from sensorgen.analysis.comparison.moved import Movable, at_rest, moved
 from sensorgen.analysis.comparison.runs import Run, runs
 from sensorgen.analysis.fit import resistance, tones
 from sensorgen.analysis.fit.results import Error, Fit, Fitted, Untold
+from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
-from sensorgen.measure.log import Log
+from sensorgen.measure.log import Log, Reading
 from sensorgen.prediction import bodies
 
 HELD_BACK = 0.25  # of the specimens
@@ -52,8 +55,8 @@ def fit(
     left_out = list(found.left_out)
     step("recordings")
     recorded = list(runs(log, iteration, left_out))
-    usable = _usable(found)
-    names = sorted({row.reading.specimen for row, _ in usable} | {run.entry.specimen for run in recorded})
+    usable = list(_usable(found))
+    names = sorted({specimen for specimen, _ in usable} | {run.entry.specimen for run in recorded})
     if not names:
         raise BadInput(
             f"no readings of sound electrodes and no recordings of iteration {iteration} in {str(log.path)!r}; "
@@ -62,25 +65,26 @@ def fit(
     kept_back = held_back(names, seed)
     step("values")
     values, untold = _fitted(
-        [allowed for row, allowed in usable if row.reading.specimen not in kept_back],
+        [allowed for specimen, allowed in usable if specimen not in kept_back],
         _of_runs([run for run in recorded if run.entry.specimen not in kept_back], found, left_out),
         next(iter(found.bodies.values())).design, seed,
     )  # fmt: skip
     step("errors")
     errors = [
-        *_reading_errors([row for row, _ in usable if row.reading.specimen in kept_back], found, values),
+        *_reading_errors({specimen for specimen, _ in usable} & kept_back, found, values),
         *_run_errors([run for run in recorded if run.entry.specimen in kept_back], found, values),
     ]
     return Fit(
         iteration, seed, tuple(values), tuple(untold), tuple(errors), len(names) - len(kept_back),
-        tuple(sorted(kept_back)), tuple(left_out), _fingerprint(found, recorded),
+        tuple(sorted(kept_back)), tuple(left_out), _fingerprint(log, iteration, recorded),
     )  # fmt: skip
 
 
-def _usable(found: Comparison) -> list[tuple[Compared, resistance.Allowed]]:
-    rows = [row for row in found.rows if row.predicted]
-    pairs = [(row, resistance.allowed(row, found.bodies[row.predicted.design])) for row in rows if row.predicted]
-    return [(row, allowed) for row, allowed in pairs if allowed]
+def _usable(found: Comparison) -> Iterator[tuple[str, resistance.Allowed]]:
+    """Specimens, and what each of their readings allows."""
+    for row in found.rows:
+        if row.predicted and (allowed := resistance.allowed(row, found.bodies[row.predicted.design])):
+            yield row.reading.specimen, allowed
 
 
 def held_back(names: Sequence[str], seed: int) -> frozenset[str]:
@@ -141,16 +145,19 @@ def with_values(body: Body, values: Sequence[Fitted]) -> Body:
     return body.with_values(own)
 
 
-def _reading_errors(rows: Sequence[Compared], found: Comparison, values: Sequence[Fitted]) -> list[Error]:
-    if not rows:
-        return []
-    names = {row.predicted.design for row in rows if row.predicted}
-    after = {name: predicted(with_values(found.bodies[name], values)).ry_ohm for name in names}
-    residuals = []
-    for row in rows:
-        expected = after[row.predicted.design] if row.predicted else None
+def _reading_errors(specimens: Container[str], found: Comparison, values: Sequence[Fitted]) -> list[Error]:
+    """Residuals of what a fit could have used of some specimens, before and after it."""
+    before, residuals, after = array("d"), array("d"), dict[str, Bounds | None]()
+    for row in found.rows:
+        of = row.predicted
+        if of is None or row.reading.specimen not in specimens or not resistance.usable(row):
+            continue
+        if of.design not in after:
+            after[of.design] = predicted(with_values(found.bodies[of.design], values)).ry_ohm
+        expected = after[of.design]
+        before.append(row.residual)
         residuals.append(log(row.verdict.ry_ohm / expected.value) if expected else nan)
-    return [Error("R_Y", len(rows), _rms([row.residual for row in rows]), _rms(residuals))]
+    return [Error("R_Y", len(before), _rms(before), _rms(residuals))] if before else []
 
 
 def _rms(values: Sequence[float]) -> float:
@@ -167,14 +174,18 @@ def _run_errors(recorded: Sequence[Run], found: Comparison, values: Sequence[Fit
             pair = [Movable(b).model.sensor for b in (body, with_values(body, values))]
         except SensorgenError:
             continue
-        f, measured = run.recording.tones_hz, np.log(run.rest_ohm)
+        f, measured = run.tones_hz, np.log(run.rest_ohm)
         for sensor, into in zip(pair, (before, after), strict=True):
             into.extend(np.abs(measured - at_rest(moved(sensor), f)).tolist())
     return [Error("Z at rest", len(before), _rms(before), _rms(after))] if before else []
 
 
-def _fingerprint(found: Comparison, recorded: Sequence[Run]) -> str:
+def _fingerprint(log: Log, iteration: int, recorded: Sequence[Run]) -> str:
     """SHA-256 of what was fitted to."""
-    lines = [f"{r.reading.uid} {r.reading.specimen} {r.reading.y_ohm} {r.reading.z_ohm}" for r in found.rows]
-    lines += [f"{run.entry.uid} {run.entry.file} {run.entry.rig_file}" for run in recorded]
-    return sha256("\n".join(lines).encode()).hexdigest()
+    digest, mark = sha256(), ""
+    readings = (f"{r.uid} {r.specimen} {r.y_ohm} {r.z_ohm}" for r in log.entries(Reading, iteration=iteration))
+    recordings = (f"{run.entry.uid} {run.entry.file} {run.entry.rig_file}" for run in recorded)
+    for line in chain(readings, recordings):
+        digest.update(f"{mark}{line}".encode())
+        mark = "\n"
+    return digest.hexdigest()

@@ -7,6 +7,7 @@ which it was is not recorded, so the range runs from R_Y as it was read to R_Y a
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import exp, isfinite, log
 
 import numpy as np
@@ -27,7 +28,7 @@ _DRAWS = 2000
 _PROPERTY = 10.0  # leaks that scatter by more than this factor about their median are no property of a material
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Allowed:
     """ln of the resistivities [ohm m] that a reading allows, and of the leak per area [S/m2]; nan where unknown."""
 
@@ -36,17 +37,23 @@ class Allowed:
     leak: float
 
 
+def usable(row: Compared) -> bool:
+    """Whether a reading is one of a sound electrode."""
+    return row.verdict.electrode == "sound" and isfinite(row.verdict.ry_ohm) and row.verdict.ry_ohm > 0
+
+
 def allowed(row: Compared, body: Body) -> Allowed | None:
     """What a reading allows; None where it is none of a sound electrode."""
-    ry, rz = row.verdict.ry_ohm, row.verdict.rz_ohm
-    if row.verdict.electrode != "sound" or not (isfinite(ry) and ry > 0):
+    if not usable(row):
         return None
+    ry, rz = row.verdict.ry_ohm, row.verdict.rz_ohm
     per, design = _per_resistivity(body), body.design
     highest, leak = electrode_and_leak(ry, rz) if rz > 0 else (ry, float("nan"))
     area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
     return Allowed(log(ry / per[1]), log(highest / per[0]), log(leak / area) if leak > 0 else float("nan"))
 
 
+@lru_cache(maxsize=64)
 def _per_resistivity(body: Body) -> tuple[float, float]:
     """Bounds of an electrode's resistance over its resistivity [1/m]."""
     rho = resistivities(body.design)
@@ -76,9 +83,17 @@ def resistivity(readings: Sequence[Allowed], material: str, seed: int) -> Fitted
 
 
 def _medians(values: Real, seed: int) -> Real:
-    """Medians of specimens drawn again and again (bootstrap), column by column."""
-    draws = np.random.default_rng(seed).integers(0, len(values), (_DRAWS, len(values)))
-    return np.asarray(np.median(values[draws], axis=1))
+    """Medians of n specimens drawn from n again and again (bootstrap), column by column.
+
+    Which of the sorted specimens is the median of a draw is drawn itself: the k-th of n even random numbers follows
+    a beta distribution, and the one after it is the least of the n - k that are larger.
+    """
+    count, rng = len(values), np.random.default_rng(seed)
+    lower = rng.beta((count + 1) // 2, count - (count + 1) // 2 + 1, _DRAWS)
+    upper = lower if count % 2 else lower + (1 - lower) * rng.beta(1, count // 2, _DRAWS)
+    ranks = [np.minimum((u * count).astype(np.intp), count - 1) for u in (lower, upper)]
+    ordered = np.sort(values, axis=0)
+    return np.asarray((ordered[ranks[0]] + ordered[ranks[1]]) / 2)
 
 
 def leak(readings: Sequence[Allowed], material: str, seed: int) -> Fitted | Untold:

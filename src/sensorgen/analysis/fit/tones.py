@@ -43,7 +43,7 @@ def of_run(run: Run, of: Movable) -> OfRun:
     """
     from scipy.optimize import least_squares
 
-    sensor, f = of.model.sensor, run.recording.tones_hz
+    sensor, f = of.model.sensor, run.tones_hz
     measured = np.log(run.rest_ohm)
     weight = 1 / np.maximum(np.abs(run.rest_error_ohm / run.rest_ohm), _FLOOR)
     scale = 2 * pi * float(f.min()) * sensor.capacitance_f()
@@ -78,7 +78,7 @@ def _errors(jacobian: Real, left: Real) -> Real:
 def _stiffness(run: Run, sensor: "object") -> tuple[float, float] | None:
     from scipy.optimize import least_squares
 
-    pairs, f = run.pairs, run.recording.tones_hz
+    pairs, f = run.pairs, run.tones_hz
     assert pairs is not None  # noqa: S101 - asked before
     moves = np.log(pairs.pressed_ohm / pairs.before_ohm)
     weight = 1 / np.maximum(np.abs(pairs.error_ohm / pairs.before_ohm), _FLOOR)

@@ -1,14 +1,21 @@
 """Predictions and measurements of an iteration, compared."""
 
+from collections.abc import Iterator
+
 from sensorgen.analysis.report.contents import Report, Section, report
 
 FORMATS = ("html", "md", "csv", "json")
 
-__all__ = ["FORMATS", "Report", "Section", "report", "written"]
+__all__ = ["FORMATS", "Report", "Section", "pieces", "report", "written"]
 
 
 def written(made: Report, how: str) -> str:
-    """A report as text.
+    """A report as text; parameters as :func:`pieces`."""
+    return "".join(pieces(made, how))
+
+
+def pieces(made: Report, how: str) -> Iterator[str]:
+    """A report as pieces of text, one after the other.
 
     Parameters
     ----------
@@ -19,4 +26,4 @@ def written(made: Report, how: str) -> str:
     """
     from sensorgen.analysis.report.formats import WRITERS
 
-    return WRITERS[how](made)
+    yield from WRITERS[how](made)

@@ -7,9 +7,12 @@ from math import exp, isfinite, nan
 from statistics import median
 from typing import Annotated
 
+import numpy as np
+
 from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.plots.figure import GREEN, GREY, ORANGE, PINK, SKY, YELLOW, Axis, Curve, Figure, Panel
 from sensorgen.core.document import Column, Table
+from sensorgen.core.lazy import Lazy
 from sensorgen.measure.signal.verdicts import WORDS
 
 VERDICT_COLOURS = dict(zip(WORDS, (PINK, ORANGE, YELLOW, SKY, GREEN, GREY), strict=True))
@@ -63,32 +66,39 @@ class VerdictRow:
 
 def readings(found: Comparison) -> Table:
     """A row for each reading, the largest deviation first."""
-    rows = []
-    for row in sorted(found.rows, key=lambda row: -abs(row.residual) if isfinite(row.residual) else 1.0):
+
+    def row_of(k: int) -> ReadingRow:
+        row = found.rows[k]
         r, v = row.reading, row.verdict
         expected = row.predicted.ry_ohm if row.predicted else None
         bounds = (expected.lower, expected.value, expected.upper) if expected else (nan, nan, nan)
-        rows.append(ReadingRow(
+        return ReadingRow(
             r.number, r.specimen, row.predicted.design if row.predicted else "", v.ry_ohm,
             max(row.evidence.ry_ohm, default=nan), *bounds, exp(row.residual),
             {None: "", True: "yes", False: "no"}[row.inside], v.rz_ohm, max(row.evidence.rz_ohm, default=nan), v.ratio,
             v.leak_s, v.word,
-        ))  # fmt: skip
+        )  # fmt: skip
+
+    off = np.array([-abs(row.residual) if isfinite(row.residual) else 1.0 for row in found.rows])
+    rows = Lazy(row_of, range(len(off))).at(np.argsort(off, kind="stable").tolist())
     return Table.of("readings", "Every reading and its prediction; the largest deviation first", rows)
 
 
 def reasons(found: Comparison) -> Table:
     """Verdicts with reasons, remarks and doubts, in the order of the log."""
-    rows = []
-    for row in found.rows:
-        r, (electrode, film) = row.reading, row.verdict.reasons
-        rows.append(VerdictRow(r.number, r.specimen, row.verdict.word, electrode, film, r.remark, "; ".join(r.doubts)))
-    return Table.of("verdicts", "Verdicts and their reasons", tuple(rows))
+
+    def row_of(k: int) -> VerdictRow:
+        row = found.rows[k]
+        r, words, (electrode, film) = row.reading, row.reading.words, row.verdict.reasons
+        doubts = "; ".join(words.doubts)
+        return VerdictRow(r.number, r.specimen, row.verdict.word, electrode, film, words.remark, doubts)
+
+    return Table.of("verdicts", "Verdicts and their reasons", Lazy(row_of, range(len(found.rows))))
 
 
-def usable(found: Comparison) -> list[Compared]:
+def usable(found: Comparison) -> Lazy[Compared]:
     """Rows with a prediction, and an electrode that is neither open nor so low that a prefix k was lost."""
-    return [r for r in found.rows if isfinite(r.residual) and r.verdict.electrode in ("sound", "dry joint")]
+    return found.rows.where(lambda r: isfinite(r.residual) and r.verdict.electrode in ("sound", "dry joint"))
 
 
 def headline(found: Comparison) -> Iterator[str]:
@@ -114,10 +124,17 @@ def headline(found: Comparison) -> Iterator[str]:
 
 def findings(found: Comparison) -> Iterator[str]:
     """When predictions were made, and which electrodes touch as drawn."""
-    made = sum(not p.stored_at for p in found.predictions.values())
-    if found.predictions:
-        late = f"; {made} made after the measurement" if made else ""
-        yield f"{len(found.predictions) - made} of {len(found.predictions)} predictions were stored in the log{late}."
+    every = list(found.predictions.values())
+    before = sum(bool(p.stored_at) and p.before is True for p in every)
+    late = {
+        "by the clocks of the log alone": sum(bool(p.stored_at) and p.before is None for p in every),
+        "stored after a measurement": sum(bool(p.stored_at) and p.before is False for p in every),
+        "made after the measurement": sum(not p.stored_at for p in every),
+    }
+    if every:
+        rest = "".join(f"; {count} {how}" for how, count in late.items() if count)
+        order = "stored before anything was measured, by the order of the log's records"
+        yield f"{before} of {len(every)} predictions were {order}{rest}."
     touching = Counter(r.predicted.design for r in found.rows if r.predicted and r.predicted.touches)
     if touching:
         names = ", ".join(f"{name} ({count})" for name, count in sorted(touching.items()))
@@ -126,11 +143,12 @@ def findings(found: Comparison) -> Iterator[str]:
 
 def figures(found: Comparison) -> tuple[Figure, ...]:
     """Measured over predicted, and both in ohm."""
-    known = [row for row in found.rows if isfinite(row.residual)]
-    every = sorted((row for row in known if row.verdict.electrode != "unknown"), key=lambda row: row.residual)
+    known = found.rows.where(lambda row: isfinite(row.residual))
+    some = known.where(lambda row: row.verdict.electrode != "unknown")
+    every = some.at(np.argsort([row.residual for row in some], kind="stable").tolist())
     if not every:
         return ()
-    rows = every if len(every) <= MOST_ROWS else every[: MOST_ROWS // 2] + every[-MOST_ROWS // 2 :]
+    rows = [*every] if len(every) <= MOST_ROWS else [*every[: MOST_ROWS // 2], *every[-MOST_ROWS // 2 :]]
     low, more = len(known) - len(every), len(every) - len(rows)
     left_out = f" Left out: {low} readings too low for an electrode." if low else ""
     left_out += f" Not drawn: {more} readings of moderate ratio." if more else ""

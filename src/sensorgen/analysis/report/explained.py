@@ -105,18 +105,22 @@ def _resistances(found: Comparison) -> Iterator[Kind]:
     def across(ohm: float, parameter: str, value: float) -> float:
         return min(across_ohm(ohm, value if parameter == LEAK else 0.0), INTACT_OHM)
 
-    rows = usable(found)
-    middles = [row.predicted.ry_ohm.value for row in rows if row.predicted and row.predicted.ry_ohm]
-    if rows:
-        measured = np.log([row.verdict.ry_ohm for row in rows]).astype(complex)
-        yield Kind("electrode resistance", measured, _of_electrodes(middles, along))
-    both = [k for k, row in enumerate(rows) if row.verdict.rz_ohm > 0 and not row.evidence.touching]
-    if both:
-        measured = np.log([min(rows[k].verdict.rz_ohm, INTACT_OHM) for k in both]).astype(complex)
-        yield Kind("film resistance", measured, _of_electrodes([middles[k] for k in both], across))
+    rows = (
+        (row.verdict.ry_ohm, row.verdict.rz_ohm, row.predicted.ry_ohm.value, not row.evidence.touching)
+        for row in usable(found) if row.predicted and row.predicted.ry_ohm
+    )  # fmt: skip
+    kind = np.dtype([("y", "f8"), ("z", "f8"), ("middle", "f8"), ("apart", "?")])
+    known = np.fromiter(rows, kind)
+    if len(known):
+        measured = np.log(known["y"]).astype(complex)
+        yield Kind("electrode resistance", measured, _of_electrodes(known["middle"], along))
+    both = known[(known["z"] > 0) & known["apart"]]
+    if len(both):
+        measured = np.log(np.minimum(both["z"], INTACT_OHM)).astype(complex)
+        yield Kind("film resistance", measured, _of_electrodes(both["middle"], across))
 
 
-def _of_electrodes(middles: Sequence[float], law: Callable[[float, str, float], float]) -> Model:
+def _of_electrodes(middles: Real, law: Callable[[float, str, float], float]) -> Model:
     """A law for all electrodes, evaluated once for those that are alike: many readings are of few designs."""
     distinct, of = np.unique(middles, return_inverse=True)
     return lambda parameter, value: np.log([complex(law(ohm, parameter, value)) for ohm in distinct.tolist()])[of]
@@ -146,7 +150,7 @@ def _modelled(known: Sequence[tuple[Run, Movable]], parameter: str, value: float
     """Ln Z of recordings at rest, or its change under load, with one parameter moved."""
     found = []
     for run, of in known:
-        sensor, f = moved(of.model.sensor, **_moves(of, parameter, value)), run.recording.tones_hz
+        sensor, f = moved(of.model.sensor, **_moves(of, parameter, value)), run.tones_hz
         if loaded and run.pairs is not None:
             stiffness = value if parameter == MODULUS else 1.0
             where = run.pairs.force_n, run.pairs.position_mm * M_PER_MM

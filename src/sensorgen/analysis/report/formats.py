@@ -4,6 +4,7 @@ import base64
 import csv
 import io
 import json
+from collections.abc import Iterator
 from typing import Any
 
 from sensorgen.analysis.plots.pages import render
@@ -14,44 +15,65 @@ from sensorgen.core.document import markdown as document
 MOST_ROWS = 2000  # of a table on the page: a browser has to lay out all of them
 
 
-def html(report: Report) -> str:
+def html(report: Report) -> Iterator[str]:
     """One page that needs nothing else."""
     encoded = {v.design: base64.b64encode(v.svg.encode()).decode() for s in report.sections for v in s.variants}
-    return render(
+    yield render(
         "sensorgen.analysis.report", "report.html", report.figures, title=report.title, report=report,
         drawings=encoded, shown=shown, exact=exact, most_rows=MOST_ROWS,
     )  # fmt: skip
 
 
-def markdown(report: Report) -> str:
+def markdown(report: Report) -> Iterator[str]:
     """Headings, sentences and tables."""
+    return (f"{line}\n" for line in _lines(report))
+
+
+def _lines(report: Report) -> Iterator[str]:
     lines = [f"# {safe(report.title)}", "", *(f"**{safe(text)}**  " for text in report.headline), ""]
-    lines += [f"- {safe(text)}" for text in report.findings]
+    yield from (*lines, *(f"- {safe(text)}" for text in report.findings))
     for section in report.sections:
-        lines += ["", f"## {safe(section.title)}", ""]
-        lines += [f"- {safe(v.design)} (design {v.design_id}): {safe(v.words)}" for v in section.variants]
-        lines += [*document(section.tables), *(line for note in section.notes for line in ("", safe(note)))]
-    return "\n".join([*lines, "", f"Made {report.made_at}."]) + "\n"
+        yield from ("", f"## {safe(section.title)}", "")
+        yield from (f"- {safe(v.design)} (design {v.design_id}): {safe(v.words)}" for v in section.variants)
+        yield from document(section.tables)
+        yield from (line for note in section.notes for line in ("", safe(note)))
+    yield from ("", f"Made {report.made_at}.")
 
 
-def comma_separated(report: Report) -> str:
+def comma_separated(report: Report) -> Iterator[str]:
     """Every cell of every table in a row of its own: table, row, column, unit, value."""
-    target = io.StringIO(newline="")
-    writer = csv.writer(target, lineterminator="\n")
-    writer.writerow(["table", "row", "column", "unit", "value"])
+    yield "table,row,column,unit,value\n"
     for table in report.tables:
         for number, row in enumerate(table.cells, 1):
-            for column, cell in zip(table.columns, row, strict=True):
-                writer.writerow([table.key, number, column.name, column.unit, spreadsheet(cell)])
-    return target.getvalue()
+            target = io.StringIO(newline="")
+            csv.writer(target, lineterminator="\n").writerows(
+                (table.key, number, column.name, column.unit, spreadsheet(cell))
+                for column, cell in zip(table.columns, row, strict=True)
+            )
+            yield target.getvalue()
 
 
-def as_json(report: Report) -> str:
+class _Listed(list[Any]):
+    """Rows that JSON's encoder reads one after the other."""
+
+    def __init__(self, rows: Iterator[Any], count: int) -> None:
+        super().__init__()
+        self._rows, self._count = rows, count
+
+    def __iter__(self) -> Iterator[Any]:
+        return self._rows
+
+    def __len__(self) -> int:
+        return self._count
+
+
+def as_json(report: Report) -> Iterator[str]:
     """Everything but the figures."""
 
     def of_table(t: Table) -> dict[str, Any]:
+        rows = _Listed(([*map(plain, row)] for row in t.cells), len(t.cells))
         columns = [{"name": c.name, "unit": c.unit, "about": c.about} for c in t.columns]
-        return {"key": t.key, "caption": t.caption, "columns": columns, "rows": [[*map(plain, row)] for row in t.cells]}
+        return {"key": t.key, "caption": t.caption, "columns": columns, "rows": rows}
 
     sections = [
         {
@@ -64,7 +86,8 @@ def as_json(report: Report) -> str:
         "title": report.title, "iteration": report.iteration, "made_at": report.made_at, "headline": report.headline,
         "findings": report.findings, "sections": sections,
     }  # fmt: skip
-    return json.dumps(told, ensure_ascii=False, indent=1, allow_nan=False) + "\n"
+    yield from json.JSONEncoder(ensure_ascii=False, indent=1, allow_nan=False).iterencode(told)
+    yield "\n"
 
 
 WRITERS = {"html": html, "md": markdown, "csv": comma_separated, "json": as_json}

@@ -68,7 +68,7 @@ def impedances(recorded: Sequence[Run], found: Comparison) -> Table:
         capacitance = [
             None if c is None else c / _F_PER_PF for c in _predicted(of.prediction.capacitance if of else None)
         ]
-        for f, z, error in zip(run.recording.tones_hz.tolist(), run.rest_ohm, run.rest_error_ohm, strict=True):
+        for f, z, error in zip(run.tones_hz.tolist(), run.rest_ohm, run.rest_error_ohm, strict=True):
             known = of.prediction.impedance if of else ()
             expected = next((e for e in known if abs(e.frequency_hz / f - 1) < _SAME), None)
             middle = complex(expected.re.value, expected.im.value) if expected else complex("nan")
@@ -91,9 +91,8 @@ def facts(recorded: Sequence[Run]) -> Table:
     """A row for each recording."""
     rows = (
         RecordingRow(
-            run.name, run.recording.source.file, run.recording.source.format, run.recording.source.program,
-            len(run.recording.time_s), int(run.recording.valid().sum()), float(run.recording.time_s[-1]),
-            run.recording.source.rate_hz, len(run.pairs.time_s) if run.pairs else 0, "; ".join(run.notes),
+            run.name, run.source.file, run.source.format, run.source.program, run.samples, run.valid, run.seconds,
+            run.source.rate_hz, len(run.pairs.time_s) if run.pairs else 0, "; ".join(run.notes),
         )
         for run in recorded
     )  # fmt: skip
@@ -135,10 +134,10 @@ def figures(recorded: Sequence[Run]) -> Iterator[Figure]:
     """Differences of all recordings on a scale of their own, then each recording over time and over loads."""
     yield from compared(recorded)
     for run in recorded:
-        key, valid = f"{run.entry.number}-{run.recording.source.lockin}", run.recording.valid()
+        part = f"-{run.source.part}" if run.source.part else ""
+        key = f"{run.entry.number}-{run.source.lockin}{part}"
         one = plots.Run(
-            run.name, run.recording.tones_hz, run.recording.time_s[valid], run.recording.impedance_ohm[valid],
-            run.time_s, run.filtered_ohm, run.pairs,
+            run.name, run.tones_hz, run.time_s, run.raw_ohm, run.filtered_s, run.filtered_ohm, run.pairs
         )  # fmt: skip
         yield plots.series(one, f"series-{key}")
         for part in plots.PARTS:
@@ -153,10 +152,10 @@ def compared(recorded: Sequence[Run]) -> Iterator[Figure]:
     loaded = [run for run in recorded if run.pairs is not None and len(run.pairs.time_s) > 1]
     if not loaded:
         return
-    tones_hz = loaded[0].recording.tones_hz
+    tones_hz = loaded[0].tones_hz
     alike = {
-        run.name: run.pairs for run in loaded if run.pairs is not None and len(run.recording.tones_hz) == len(tones_hz)
-        and np.allclose(run.recording.tones_hz, tones_hz, rtol=_SAME)
+        run.name: run.pairs for run in loaded if run.pairs is not None and len(run.tones_hz) == len(tones_hz)
+        and np.allclose(run.tones_hz, tones_hz, rtol=_SAME)
     }  # fmt: skip
     rest = len(loaded) - len(alike)
     yield plots.compared(

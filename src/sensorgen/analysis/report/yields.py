@@ -60,12 +60,12 @@ class YieldRow:
 
 def judged(found: Comparison, by: str) -> list[Group]:
     """Groups of one kind."""
-    return groups([(row.evidence, row.verdict) for row in found.last], BY[by])
+    return groups(((row.evidence, row.verdict) for row in found.last), BY[by])
 
 
 def everything(found: Comparison) -> Group:
     """All specimens as one group."""
-    return groups([(row.evidence, row.verdict) for row in found.last], lambda _: ())[0]
+    return groups(((row.evidence, row.verdict) for row in found.last), lambda _: ())[0]
 
 
 def headline(found: Comparison) -> Iterator[str]:
@@ -81,10 +81,10 @@ def headline(found: Comparison) -> Iterator[str]:
 
 def findings(found: Comparison) -> Iterator[str]:
     """Shorts and leaks of all sensors, and of groups."""
-    both = [row for row in found.last if row.verdict.same_order is not None]
+    both = found.last.where(lambda row: row.verdict.same_order is not None)
     if len(both) < 2:
         return
-    such, whole = [row for row in both if row.verdict.same_order], everything(found)
+    such, whole = both.where(lambda row: bool(row.verdict.same_order)), everything(found)
     design = sum(row.evidence.touching for row in such)
     implausible = sum(row.verdict.electrode != "sound" for row in such)
     of = ", ".join(
@@ -171,10 +171,10 @@ def figures(found: Comparison) -> tuple[Figure, ...]:
 
 
 def _ratios(found: Comparison) -> Iterator[Figure]:
-    rows = [r for r in found.rows if isfinite(r.verdict.ratio) and r.verdict.rz_ohm > 0]
-    if not rows:
+    known = found.rows.where(lambda r: isfinite(r.verdict.ratio) and r.verdict.rz_ohm > 0)
+    if not known:
         return
-    every, rows = len(rows), rows[:: -(-len(rows) // MOST_POINTS)]
+    every, rows = len(known), list(known[:: -(-len(known) // MOST_POINTS)])
     ends = [min(r.verdict.ry_ohm for r in rows) / 1.5, max(r.verdict.ry_ohm for r in rows) * 1.5]
     curves = [
         Curve("line", f"film = {factor:g} x electrode", ends, [factor * x for x in ends], colour=GREY, dash=dash)

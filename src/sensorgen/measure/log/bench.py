@@ -1,6 +1,6 @@
 """Log recordings of the bench with their files and a summary, and read them again."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
@@ -57,7 +57,7 @@ def log_recording(
         A name or a file that cannot be read. Nothing is logged or kept then.
     """
     from sensorgen.measure import recording as recordings
-    from sensorgen.measure.recording.matfive import MOST_BYTES
+    from sensorgen.measure.recording.spool import MOST_BYTES
 
     of = notes.specimen(specimen)
     paths = [recording, *([rig] if rig else [])]
@@ -65,7 +65,7 @@ def log_recording(
         checked_head(path, MOST_BYTES, "a recording")
     before = [files.raw_file(path) for path in paths]
     rig_log = recordings.rig(rig, rig_columns) if rig else None
-    summary = facts.summarised(recordings.read_all(recording, columns), dict(columns), rig_log, dict(rig_columns))
+    summary = facts.summarised(recordings.parts(recording, columns), dict(columns), rig_log, dict(rig_columns))
     kept = [files.keep(log.files, path) for path in paths]
     if kept != before:
         raise BadInput(f"{str(recording)!r} {files.CHANGED}")
@@ -79,7 +79,7 @@ def log_recording(
     return [row for row in log.add([*kept, run]) if isinstance(row, BenchRun)]
 
 
-def read_again(log: Log, run: BenchRun) -> "tuple[tuple[Recording, ...], RigLog | None]":
+def read_again(log: Log, run: BenchRun) -> "tuple[Iterator[tuple[Recording, ...]], RigLog | None]":
     """Read a logged recording from its raw files, with the column names that were logged.
 
     Parameters
@@ -91,8 +91,8 @@ def read_again(log: Log, run: BenchRun) -> "tuple[tuple[Recording, ...], RigLog 
 
     Returns
     -------
-    tuple of Recording, RigLog or None
-        Every lock-in; the rig's log if there is one.
+    iterator of tuple of Recording, RigLog or None
+        Every lock-in, part after part; the rig's log if there is one.
 
     Raises
     ------
@@ -102,5 +102,5 @@ def read_again(log: Log, run: BenchRun) -> "tuple[tuple[Recording, ...], RigLog 
     from sensorgen.measure import recording
 
     summary = facts.from_json(run.facts)
-    recordings = recording.read_all(log.raw(run.file), summary.columns)
-    return recordings, recording.rig(log.raw(run.rig_file), summary.rig_columns) if run.rig_file else None
+    parts = recording.parts(log.raw(run.file), summary.columns)
+    return parts, recording.rig(log.raw(run.rig_file), summary.rig_columns) if run.rig_file else None

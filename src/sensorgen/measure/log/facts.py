@@ -1,8 +1,8 @@
 """Summary of a recording as it was logged: samples, marks, frequencies and clocks; JSON in the field ``facts``."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
 
 if TYPE_CHECKING:
-    from sensorgen.measure.recording import Recording, RigLog
+    from sensorgen.measure.recording import Joined, Recording, RigLog
 
 
 @dataclass(frozen=True)
@@ -149,20 +149,48 @@ def _adapter() -> Any:
 
 
 def summarised(
-    recordings: "tuple[Recording, ...]", columns: dict[str, str], rig: "RigLog | None", rig_columns: dict[str, str]
+    parts: "Iterable[tuple[Recording, ...]]", columns: dict[str, str], rig: "RigLog | None", rig_columns: dict[str, str]
 ) -> Facts:
-    """Facts of recordings, joined with the rig's log if there is one."""
+    """Facts of recordings, part after part, joined with the rig's log if there is one.
+
+    Raises
+    ------
+    BadInput
+        No part can be joined with the rig's log.
+    """
     from sensorgen.measure.recording import joined_all
 
-    joined = joined_all(recordings, rig) if rig else ()
-    marked = [one.recording for one in joined] or recordings  # joining marks the rig's errors
-    beside = None
-    if rig:
-        first = joined[0]
-        numbers: dict[str, Any] = {name: _known(getattr(first, name)) for name in _CLOCK}
-        samples = first.recording.counts()["rig error"]
-        beside = Rig(**rig.counts(), samples=samples, clocks=first.clock_text(), notes=first.notes, **numbers)
-    return Facts(tuple(map(lockin, marked)), dict(columns), dict(rig_columns), beside)
+    lockins: dict[int, LockIn] = {}
+    beside, fault = None, None
+    for recordings in parts:
+        marked = recordings
+        if rig:
+            try:
+                joined = joined_all(recordings, rig)
+            except BadInput as error:
+                fault = fault or error
+            else:
+                marked = tuple(one.recording for one in joined)  # joining marks the rig's errors
+                beside = _with_rig(beside, joined[0], rig)
+        for one in map(lockin, marked):
+            lockins[one.lockin] = _longer(lockins[one.lockin], one) if one.lockin in lockins else one
+    if rig and beside is None and fault:
+        raise fault
+    return Facts(tuple(lockins.values()), dict(columns), dict(rig_columns), beside)
+
+
+def _longer(before: LockIn, part: LockIn) -> LockIn:
+    """Summary with one more part."""
+    counts = {name: count + part.counts[name] for name, count in before.counts.items()}
+    return replace(before, counts=counts, seconds=part.seconds, notes=(*before.notes, *part.notes))
+
+
+def _with_rig(before: Rig | None, first: "Joined", rig: "RigLog") -> Rig:
+    samples = first.recording.counts()["rig error"]
+    if before:
+        return replace(before, samples=before.samples + samples)
+    numbers: dict[str, Any] = {name: _known(getattr(first, name)) for name in _CLOCK}
+    return Rig(**rig.counts(), samples=samples, clocks=first.clock_text(), notes=first.notes, **numbers)
 
 
 def lockin(recording: "Recording") -> LockIn:

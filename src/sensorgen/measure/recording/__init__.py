@@ -1,10 +1,11 @@
 """Recordings of the bench: instrument files, their clocks and marks, and the rig's log joined with them."""
 
-from sensorgen.measure.recording.files import read, read_all
+from sensorgen.measure.recording.files import parts, read, read_all
 from sensorgen.measure.recording.join import Joined, joined, joined_all
 from sensorgen.measure.recording.rig import RigLog, rig
 from sensorgen.measure.recording.samples import MARKS, Clock, Recording, Source
 
 __all__ = [
-    "MARKS", "Clock", "Joined", "Recording", "RigLog", "Source", "joined", "joined_all", "read", "read_all", "rig",
+    "MARKS", "Clock", "Joined", "Recording", "RigLog", "Source", "joined", "joined_all", "parts", "read", "read_all",
+    "rig",
 ]  # fmt: skip

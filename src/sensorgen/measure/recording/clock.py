@@ -85,12 +85,6 @@ def rebuilt(count: int, time_s: Real | None, stamp_s: Real | None) -> Rebuilt:
     return Rebuilt(even, _fitted(even[first], first_stamp - set_back[first]), marks, notes)
 
 
-def rate_hz(time_s: Real) -> float:
-    """Sampling rate from the median step; nan where there is none [Hz]."""
-    step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
-    return 1 / step if step > 0 else float("nan")
-
-
 def _even(count: int, time_s: Real | None, stamp_s: Real | None) -> tuple[Real, tuple[str, ...]]:
     """Time of the instrument, or even steps where it does not rise or is missing; and a note on that."""
     if time_s is not None and np.isfinite(time_s).all() and (np.diff(time_s) > 0).all():

@@ -1,13 +1,14 @@
 """Recognise the format of a recording by its first bytes, whatever its name, and read it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 
 from sensorgen.core.errors import BadInput, within
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.recording import hdf, matfive, table, tiepie
-from sensorgen.measure.recording.matfive import MOST_BYTES
-from sensorgen.measure.recording.samples import Recording, Source
+from sensorgen.measure.recording.samples import Recording, Source, at_pauses, numbered
+from sensorgen.measure.recording.spool import MOST_BYTES, Spool
 
 _HDF = b"\x89HDF\r\n\x1a\n"
 _HDF_PLACES = (0, 512, 1024, 2048)
@@ -25,7 +26,23 @@ def read(path: Path | str, columns: Mapping[str, str] | None = None) -> Recordin
 
 
 def read_all(path: Path | str, columns: Mapping[str, str] | None = None) -> tuple[Recording, ...]:
-    """Read the recordings of all lock-ins in a file; the format is recognised by the file's first bytes.
+    """Read the recordings of all lock-ins in a file of one part; parameters, errors and formats as :func:`parts`.
+
+    Several parts, as after a pause, are refused as well.
+    """
+    first, *more = islice(parts(path, columns), 2)
+    if more:
+        raise BadInput(
+            f"{path}: several parts, with a pause between them or too long for one; expected one: read parts"
+        )
+    return first
+
+
+def parts(path: Path | str, columns: Mapping[str, str] | None = None) -> Iterator[tuple[Recording, ...]]:
+    """Read the recordings of all lock-ins in a file, part after part; the format is recognised by the first bytes.
+
+    A part ends at a pause, and where it is as long as memory should hold, so that a file of any length is read in
+    little memory: filters and laws of drift hold within a part.
 
     Parameters
     ----------
@@ -33,6 +50,11 @@ def read_all(path: Path | str, columns: Mapping[str, str] | None = None) -> tupl
         TiePieLCR's .mat (MATLAB 5, either byte order, or 7.3), an HDF5 file with the same variables, or CSV.
     columns : mapping of str to str, optional
         For CSV only: from the file's column names to sensorgen's, see :mod:`sensorgen.measure.recording.table`.
+
+    Yields
+    ------
+    tuple of Recording
+        Of each lock-in.
 
     Raises
     ------
@@ -47,14 +69,28 @@ def read_all(path: Path | str, columns: Mapping[str, str] | None = None) -> tupl
     file_format = "MATLAB 5" if matlab or head[126:128] in (b"IM", b"MI") else "CSV"
     if any(head[at : at + len(_HDF)] == _HDF for at in _HDF_PLACES):
         file_format = "MATLAB 7.3" if matlab else "HDF5"
+    spool = Spool()
+    stretches = table.recordings(path, columns or {}) if file_format == "CSV" else _stretches(path, file_format, spool)
     try:
-        if file_format == "CSV":
-            return (table.recording(path, columns or {}),)
-        with within(str(path)):
-            if file_format == "MATLAB 5":
-                tree = matfive.variables(path.read_bytes(), tiepie.WANTED)
-            else:
-                tree = hdf.variables(path, tiepie.WANTED)
-            return tiepie.recordings(tree, Source(path.name, file_format))
+        yield from numbered(_relieved(path, stretches, spool))
     except OSError as error:
         raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None
+
+
+def _stretches(path: Path, file_format: str, spool: Spool) -> Iterator[tuple[Recording, ...]]:
+    with within(str(path)):
+        if file_format == "MATLAB 5":
+            tree = matfive.variables(spool.file(path), tiepie.WANTED, spool)
+        else:
+            tree = hdf.variables(path, tiepie.WANTED, spool)
+        yield from tiepie.recordings(tree, Source(path.name, file_format))
+
+
+def _relieved(path: Path, stretches: Iterable[tuple[Recording, ...]], spool: Spool) -> Iterator[tuple[Recording, ...]]:
+    for stretch in stretches:
+        spool.relieve()
+        with within(str(path)):
+            cut = at_pauses(stretch)
+        del stretch
+        while cut:
+            yield cut.pop(0)

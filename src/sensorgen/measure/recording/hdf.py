@@ -1,25 +1,31 @@
 """Read HDF5 files, MATLAB's 7.3 among them, as the same lists, dicts and arrays as MATLAB 5 files.
 
-Only data in the file itself are read: links to other files are refused, and objects of other programs, which may be
-pickles, are not numbers. MATLAB's arrays get MATLAB's shape.
+Only data in the file itself are read, where they stand: links of any kind are refused, and objects of other programs,
+which may be pickles, are not numbers. MATLAB's arrays get MATLAB's shape.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sensorgen.core.errors import BadInput, MissingValue
-from sensorgen.measure.recording.matfive import MOST_BYTES
+from sensorgen.core.errors import BadInput, MissingValue, within
+from sensorgen.measure.recording.matfive import Split
+from sensorgen.measure.recording.spool import Spool
 
 _DEEPEST = 12
 _MOST_ITEMS = 2_000
+_MOST_TEXT = 1 << 20  # bytes
+_BLOCK = 1 << 20  # bytes of a dataset that are read at once
+_MOST_CHUNK = 1 << 26  # bytes: a packed dataset is unpacked by whole chunks
 _CLASS = "MATLAB_class"
 _BROKEN = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, OverflowError, MemoryError)
 
 
-def variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
+def variables(path: Path, wanted: Collection[str], spool: Spool) -> dict[str, Any]:
     """Read variables of a file.
 
     Parameters
@@ -28,22 +34,25 @@ def variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
         The file.
     wanted : collection of str
         Names of variables; others are skipped unread.
+    spool : Spool
+        Where large arrays are copied to.
 
     Raises
     ------
     MissingValue
         h5py is not installed.
     BadInput
-        A file that is damaged, links to other files, or has other data than numbers and text.
+        A file that is damaged, has links, has other data than numbers and text, or unpacks to more than memory and
+        disk should hold.
     """
     try:
         import h5py
     except ImportError:
         raise MissingValue("HDF5 and MATLAB 7.3 files need h5py: pip install h5py, or save with -v7") from None
     try:
-        with h5py.File(path, "r") as file:
-            reader = _Reader(file)
-            return {name: reader.member(file, name, 0) for name in wanted if name in file}
+        with h5py.File(path, "r", rdcc_nbytes=_MOST_CHUNK) as file:
+            reader = _Reader(file, spool)
+            return {name: reader.member(file, name, 0) for name in wanted if file.get(name, getlink=True)}
     except _BROKEN as error:
         reason = " ".join(str(error).split())[:200]
         raise BadInput(f"the HDF5 file is damaged or cut off: {reason}") from None
@@ -52,15 +61,16 @@ def variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
 class _Reader:
     """Groups and datasets of a file, up to a depth and a number of items."""
 
-    def __init__(self, file: Any) -> None:
+    def __init__(self, file: Any, spool: Spool) -> None:
         import h5py
 
-        self._h5, self._file, self._left = h5py, file, _MOST_ITEMS
+        self._h5, self._file, self._spool, self._left = h5py, file, spool, _MOST_ITEMS
+        self._known: dict[int, Any] = {}  # by address in the file: many references may lead to one dataset
 
     def member(self, group: Any, name: str, depth: int) -> Any:
         """Content of a member of a group."""
-        if isinstance(group.get(name, getlink=True), self._h5.ExternalLink):
-            raise BadInput(f"{group.name.rstrip('/')}/{name}: a link to another file; expected the data itself")
+        if not isinstance(group.get(name, getlink=True), self._h5.HardLink):  # a soft link may lead to an external one
+            raise BadInput(f"{group.name.rstrip('/')}/{name}: a link; expected the data itself")
         return self._item(group[name], depth)
 
     def _item(self, item: Any, depth: int) -> Any:
@@ -73,13 +83,19 @@ class _Reader:
             raise BadInput(f"{item.name}: neither a group nor a dataset")
         if item.is_virtual or item.external:
             raise BadInput(f"{item.name}: its data lie in another file; expected them in this one")
-        size = (item.size or 0) * item.dtype.itemsize
-        if size > MOST_BYTES:
-            raise BadInput(f"{item.name}: {size / 2**30:.3g} GB; expected up to {MOST_BYTES >> 30} GB")
+        if (place := self._h5.h5o.get_info(item.id).addr) in self._known:
+            return self._known[place]
+        with within(item.name):
+            self._spool.declare((item.size or 0) * item.dtype.itemsize, item.id.get_storage_size())
+        if item.chunks and prod(item.chunks) * item.dtype.itemsize > _MOST_CHUNK:
+            raise BadInput(f"{item.name}: chunks of {item.chunks} values; expected chunks up to {_MOST_CHUNK >> 20} MB")
         if self._refers(item):
+            if item.size > _MOST_ITEMS:
+                raise BadInput(f"{item.name}: {item.size} references; expected up to {_MOST_ITEMS}")
             # HDF5 has the axes the other way round: its rows one after the other are MATLAB's columns
             return [self._item(self._file[ref], depth + 1) for ref in np.asarray(item[()]).ravel() if ref]
-        return np.empty((0, 0)) if item.attrs.get("MATLAB_empty") else self._array(item)
+        self._known[place] = np.empty((0, 0)) if item.attrs.get("MATLAB_empty") else self._array(item)
+        return self._known[place]
 
     def _refers(self, item: Any) -> bool:
         return isinstance(item, self._h5.Dataset) and self._h5.check_ref_dtype(item.dtype) is self._h5.Reference
@@ -91,29 +107,59 @@ class _Reader:
         if members and all(self._refers(item) and _CLASS not in item.attrs for item in members):
             count = min(map(len, fields.values()))
             return [{name: values[i] for name, values in fields.items()} for i in range(count)]
-        for name, value in group.attrs.items():
+        for name in group.attrs:
             if not name.startswith("MATLAB_"):
+                if group.attrs.get_id(name).get_storage_size() > _MOST_TEXT:
+                    raise BadInput(f"{group.name}: attribute {name!r:.80} is larger than {_MOST_TEXT} bytes")
+                value = group.attrs[name]
                 text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
                 fields[name] = text if isinstance(text, str) else np.atleast_2d(np.asarray(text))
         return [fields]
 
     def _array(self, item: Any) -> Any:
         names = item.dtype.names
-        if names and {n.lower() for n in names} in ({"real", "imag"}, {"r", "i"}):
-            raw = item[()]
-            values = np.empty(raw.shape, np.complex128)
-            values.real, values.imag = (raw[n] for n in sorted(names, key=str.lower, reverse=True))
-        elif self._h5.check_string_dtype(item.dtype):
+        plain = names and all(item.dtype[name].kind in "iuf" for name in names)
+        if plain and {n.lower() for n in names} in ({"real", "imag"}, {"r", "i"}):
+            raw = self._numbers(item)
+            real, imag = (raw[n] for n in sorted(names, key=str.lower, reverse=True))
+            matlab = _CLASS in item.attrs
+            return Split(real.T, imag.T) if matlab else Split(real, imag)
+        if self._h5.check_string_dtype(item.dtype):
+            if item.size != 1 or item.dtype.itemsize > _MOST_TEXT:
+                raise BadInput(f"{item.name}: {item.size} texts; expected one text, or numbers")
             texts = np.asarray(item[()]).ravel()
-            if len(texts) != 1:
-                raise BadInput(f"{item.name}: {len(texts)} texts; expected one text, or numbers")
             return texts[0].decode("utf-8", "replace") if isinstance(texts[0], bytes) else str(texts[0])
-        elif item.dtype.kind in "iufcb":
-            values = np.asarray(item[()])
+        if item.dtype.kind in "iufcb":
+            values = self._numbers(item)
         else:
             raise BadInput(f"{item.name}: data of type {item.dtype}; expected numbers, complex numbers or text")
         if _CLASS not in item.attrs:
             return values
         if item.attrs[_CLASS] in (b"char", "char"):
+            if values.nbytes > _MOST_TEXT:
+                raise BadInput(f"{item.name}: a text of {values.nbytes} bytes; expected up to {_MOST_TEXT}")
             return "".join(chr(int(c)) if 0 <= c < 0xD800 else "\ufffd" for c in values.ravel())
         return values.T
+
+    def _numbers(self, item: Any) -> NDArray[Any]:
+        """Numbers of a dataset, read block by block."""
+        if item.ndim > 2:
+            raise BadInput(f"{item.name}: an array of {item.ndim} axes; expected up to 2")
+        if not item.size:
+            return np.empty(item.shape, item.dtype)
+        content = self._spool.held(np.ascontiguousarray(item[at]).tobytes() for at in _places(item))
+        return np.frombuffer(content, item.dtype).reshape(item.shape)
+
+
+def _places(item: Any) -> Iterator[tuple[Any, ...]]:
+    """Places in a dataset whose content, one after the other, is all of it: whole rows, or pieces of each row."""
+    if item.ndim == 0:
+        yield ()
+        return
+    row = item.dtype.itemsize * prod(item.shape[1:])
+    if row <= _BLOCK:
+        step = _BLOCK // row
+        yield from ((slice(at, at + step),) for at in range(0, item.shape[0], step))
+    else:
+        step = _BLOCK // item.dtype.itemsize
+        yield from ((k, slice(at, at + step)) for k in range(item.shape[0]) for at in range(0, item.shape[1], step))

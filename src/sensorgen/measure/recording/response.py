@@ -8,6 +8,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.measure.recording.samples import Complex, Real
 
 _GRID_S = 0.02
+_MOST_GRID = 1 << 21  # 11.6 h
 _NOISELESS = 1e-9  # of the spread: noise below it counts as none
 
 
@@ -29,18 +30,22 @@ def principal_component(impedance_ohm: Complex) -> Real:
     BadInput
         Readings without any change.
     """
-    channels = np.hstack([np.log(np.abs(impedance_ohm)), np.unwrap(np.angle(impedance_ohm), axis=0)])
-    noise = np.median(np.abs(np.diff(channels, axis=0)), axis=0)
-    spread = np.ptp(channels, axis=0)
-    changing = spread > 0
-    if not changing.any():
-        raise BadInput("the readings do not change: they show no presses")
-    channels = channels[:, changing] / np.where(noise > _NOISELESS * spread, noise, spread)[changing]
-    t = np.linspace(-1, 1, len(channels))
+    t = np.linspace(-1, 1, len(impedance_ohm))
     basis = np.column_stack([np.ones_like(t), t])
-    channels = channels - basis @ np.linalg.lstsq(basis, channels, rcond=None)[0]
-    directions = np.linalg.svd(channels.T @ channels)[2]
-    return np.asarray(channels @ directions[0])
+    found: list[Real] = []
+    for parts in ((np.log(np.abs(z)), np.unwrap(np.angle(z))) for z in impedance_ohm.T):  # one by one, to save memory
+        for channel in parts:
+            noise, spread = float(np.median(np.abs(np.diff(channel)))), float(np.ptp(channel))
+            if spread > 0:
+                channel = channel / (noise if noise > _NOISELESS * spread else spread)
+                found.append(channel - basis @ np.linalg.lstsq(basis, channel, rcond=None)[0])
+    if not found:
+        raise BadInput("the readings do not change: they show no presses")
+    directions = np.linalg.svd([[a @ b for b in found] for a in found])[2]
+    component = np.zeros_like(t)
+    for weight, channel in zip(directions[0], found, strict=True):
+        component += weight * channel
+    return component
 
 
 def relaxation(time_s: Real, force_n: Real, tau_s: float) -> Callable[[Real], Real]:
@@ -63,7 +68,8 @@ def relaxation(time_s: Real, force_n: Real, tau_s: float) -> Callable[[Real], Re
     known = np.isfinite(force_n)
     if not known.any():
         return np.zeros_like
-    grid = np.arange(time_s[0], time_s[-1] + _GRID_S, _GRID_S)
-    kept = np.exp(-_GRID_S / tau_s)
+    step = max(_GRID_S, float(time_s[-1] - time_s[0]) / _MOST_GRID)
+    grid = np.arange(time_s[0], time_s[-1] + step, step)
+    kept = np.exp(-step / tau_s)
     response = lfilter([(1 - kept) / 2] * 2, [1, -kept], np.interp(grid, time_s[known], force_n[known]))
     return lambda at_s: np.interp(at_s, grid, response)

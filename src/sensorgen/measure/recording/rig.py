@@ -10,10 +10,11 @@ from sensorgen.core.errors import BadInput
 from sensorgen.measure import csv_table
 from sensorgen.measure.csv_table import SAME_NAMES, Table, listed
 from sensorgen.measure.input_file import checked_head
-from sensorgen.measure.recording.matfive import MOST_BYTES
 from sensorgen.measure.recording.samples import Bools, Real
+from sensorgen.measure.recording.spool import MOST_BYTES
 
 _NEEDED = ("time_s", "set_force_n", "set_position_mm")
+_MOST_ROWS = 1 << 21  # 29 h at 20 rows/s
 _FORCE, _ERROR = "force_n", "error"
 _NO_ERROR = frozenset({"", "0", "0.0", "false", "no", "none", "ok"})
 
@@ -87,9 +88,13 @@ def _read(table: Table) -> RigLog:
             raise table.error(1, f"{message}available: {needed} is not there once")
     force, error = ([names.index(name)] if name in names else [] for name in (_FORCE, _ERROR))
     needed_columns = [names.index(name) for name in _NEEDED]
-    blocks = list(table.blocks([*needed_columns, *force], error, dates=needed_columns[:1], truncated=True))
-    values = np.concatenate([block.numbers for block in blocks])
-    reported = [bool(cells) and cells[0].strip().lower() not in _NO_ERROR for block in blocks for cells in block.text]
+    numbers, reported = [], []
+    for block in table.blocks([*needed_columns, *force], error, dates=needed_columns[:1], truncated=True):
+        numbers.append(block.numbers)
+        reported.append(np.array([bool(c) and c[0].strip().lower() not in _NO_ERROR for c in block.text]))
+        if block.rows[-1] > _MOST_ROWS:
+            raise table.error(block.rows[-1], f"more rows than expected, {_MOST_ROWS}; split the log of the rig")
+    values = np.concatenate(numbers)
     incomplete = ~np.isfinite(values[:, :3]).all(axis=1)
     late = ~(values[:, 0] > np.fmax.accumulate(np.concatenate([[-np.inf], values[:-1, 0]])))
     notes = ["the last row is incomplete: dropped"] if table.truncated else []
@@ -97,4 +102,4 @@ def _read(table: Table) -> RigLog:
         notes.append(f"{np.count_nonzero(late)} rows are not later than the rows before: taken as errors")
     time, set_force, position = values[:, :3].T
     measured = values[:, 3] if force else np.full(len(values), np.nan)
-    return RigLog(time, set_force, position, measured, np.array(reported) | late | incomplete, tuple(notes))
+    return RigLog(time, set_force, position, measured, np.concatenate(reported) | late | incomplete, tuple(notes))

@@ -1,10 +1,14 @@
 """A recording: impedance over time at several frequencies, with marks on single samples."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+
+from sensorgen.core.errors import BadInput
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -27,6 +31,11 @@ MARKS = {
 HARMLESS = frozenset({"gap", "reversed stamp", "repeated stamp", "no stamp"})
 """Marks that leave a sample valid: the rebuilt clock corrects them."""
 
+MOST_VALUES = 1 << 22  # readings at one frequency, of all lock-ins, with time and marks, that are worked on at once
+MOST_TONES = 4096
+PAUSE_S = 600.0  # a longer one ends a part of a recording: filter and drift do not reach across
+_MOST_PARTS = 1000  # of a stretch
+_FASTEST_HZ = 1e12  # beyond it a step is no step
 _LARGEST_OHM = 1e30  # beyond it arithmetic fails before physics does
 
 
@@ -94,6 +103,8 @@ class Source:
         Bandwidth of the demodulator; nan if unknown [Hz].
     notes : tuple of str
         Corrections that were made.
+    part : int
+        Number of the part of the file, from 1; 0 for all of it.
     """
 
     file: str
@@ -103,6 +114,7 @@ class Source:
     rate_hz: float = np.nan
     bandwidth_hz: float = np.nan
     notes: tuple[str, ...] = ()
+    part: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,3 +165,75 @@ class Recording:
             if name not in HARMLESS:
                 valid &= ~which
         return valid
+
+    def between(self, first: int, after: int) -> Self:
+        """Samples from one up to another, which share memory with these."""
+        at = slice(first, after)
+        marks = {name: which[at] for name, which in self.marks.items()}
+        return replace(self, time_s=self.time_s[at], impedance_ohm=self.impedance_ohm[at], marks=marks)
+
+
+def stretches(count: int, tones: int) -> list[slice]:
+    """Stretches of equal length, each of which can be worked on at once.
+
+    Parameters
+    ----------
+    count, tones : int
+        Samples, and frequencies of all lock-ins.
+
+    Examples
+    --------
+    >>> stretches(1_000_000, 7)
+    [slice(0, 333333, None), slice(333333, 666666, None), slice(666666, 1000000, None)]
+    """
+    pieces = max(1, -(-count * (tones + 2) // MOST_VALUES))
+    ends = [count * k // pieces for k in range(pieces + 1)]
+    return [slice(a, b) for a, b in pairwise(ends)]
+
+
+def at_pauses(recordings: tuple[Recording, ...]) -> list[tuple[Recording, ...]]:
+    """All lock-ins of one stretch, cut where any of them pauses for more than :data:`PAUSE_S`.
+
+    Raises
+    ------
+    BadInput
+        More pauses than any run has.
+    """
+    pauses = (time[np.flatnonzero(np.diff(time) > PAUSE_S)] for time in (one.time_s for one in recordings))
+    ends = np.unique(np.concatenate([*pauses]))  # times of the last samples before
+    if len(ends) >= _MOST_PARTS:
+        raise BadInput(f"{len(ends)} pauses of more than {PAUSE_S:g} s; expected a recording, its time in seconds")
+    parts = []
+    for begin, end in pairwise([-np.inf, *ends, np.inf]):
+        places = [np.searchsorted(one.time_s, (begin, end), side="right") for one in recordings]
+        parts.append(tuple(one.between(a, b) for one, (a, b) in zip(recordings, places, strict=True) if b > a))
+    return parts
+
+
+def numbered(parts: Iterable[tuple[Recording, ...]]) -> Iterator[tuple[Recording, ...]]:
+    """Parts of a file with their numbers, and with a remark where they begin; the only one has none."""
+    number, ended = 0, 0.0
+    following = iter(parts)
+    now = next(following, None)
+    while now is not None:
+        then = next(following, None)
+        number += 1
+        of = number if then or number > 1 else 0
+        yield tuple(replace(one, source=_source(one, of, ended)) for one in now)
+        ended, now = float(now[0].time_s[-1]), then
+
+
+def _source(one: Recording, part: int, ended_s: float) -> Source:
+    source, begin = one.source, float(one.time_s[0])
+    if part == 0:
+        return source
+    note = f"part {part}, from {begin:.6g} s to {float(one.time_s[-1]):.6g} s"
+    if part > 1 and begin - ended_s > PAUSE_S:
+        note += f", after a pause of {begin - ended_s:.6g} s"
+    return replace(source, rate_hz=rate_hz(one.time_s), notes=(note, *source.notes), part=part)
+
+
+def rate_hz(time_s: Real) -> float:
+    """Sampling rate from the median step; nan where there is none [Hz]."""
+    step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
+    return 1 / step if step > 1 / _FASTEST_HZ else float("nan")

@@ -4,27 +4,43 @@ Whether a variable is a scalar, a vector, a cell or a struct array depends on th
 on the program that wrote the file, so that everything is flattened first.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from math import ceil
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput, within
 from sensorgen.measure.recording import clock
-from sensorgen.measure.recording.samples import Bools, Complex, Real, Recording, Source, blank, sifted
+from sensorgen.measure.recording.matfive import Split
+from sensorgen.measure.recording.samples import (
+    MOST_TONES,
+    Bools,
+    Real,
+    Recording,
+    Source,
+    blank,
+    rate_hz,
+    sifted,
+    stretches,
+)
 
 WANTED = ("impedance_data", "impedance_time", "timestamps", "settings", "ref_offset", "sig_offset", "offset_time")
 _MARGIN = 0.99  # of a range, as in the program itself
 _START_UP = 1.6  # settling time of the demodulator times its bandwidth
 _EXPECTED = "expected a recording of TiePieLCR: impedance_data with lockin1, impedance_time and settings.dem_freqs"
 
+_MOST_MEANS = 1 << 20  # of an input's means; of more, the largest of several
+
 Tree = Mapping[str, Any]
+Vector = NDArray[Any]
+"""Numbers of any type as they are in the file, outside memory."""
 
 
-def recordings(tree: Tree, source: Source) -> tuple[Recording, ...]:
-    """Recordings of all lock-ins.
+def recordings(tree: Tree, source: Source) -> Iterator[tuple[Recording, ...]]:
+    """Recordings of all lock-ins, one stretch after the other.
 
     Parameters
     ----------
@@ -45,14 +61,17 @@ def recordings(tree: Tree, source: Source) -> tuple[Recording, ...]:
     if len(settings) != count:
         raise BadInput(f"settings: {len(settings)} structs for {count} lock-ins; expected one each")
     stamps = _vector(tree["timestamps"], "timestamps") if "timestamps" in tree else None
-    results: list[Recording] = []
-    for k, ((name, raw), own, time) in enumerate(zip(lockins.items(), settings, times, strict=True)):
-        clipped = _clipped(tree, k, count, time, own)
-        one = _recording(name, raw, own, time, stamps if k == 0 else None, clipped, source)
-        if results:  # only the first lock-in is stamped, and all begin together
-            one = replace(one, clock=results[0].clock)
-        results.append(one)
-    return tuple(results)
+    given = [
+        _LockIn.of(tree, k, count, name, raw, own, time, stamps if k == 0 else None)  # only the first is stamped
+        for k, ((name, raw), own, time) in enumerate(zip(lockins.items(), settings, times, strict=True))
+    ]
+    for at in stretches(max(one.count for one in given), sum(len(one.tones_hz) for one in given)):
+        results: list[Recording] = []
+        for lockin in given:
+            if at.start < lockin.count:
+                one = lockin.recording(at, source)
+                results.append(replace(one, clock=results[0].clock) if results else one)  # all begin together
+        yield tuple(results)
 
 
 def _lockins(tree: Tree) -> dict[str, Any]:
@@ -69,7 +88,7 @@ def _lockins(tree: Tree) -> dict[str, Any]:
 def _described(value: Any) -> str:
     if value is None:
         return "missing"
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray | Split):
         return f"numbers of shape {' x '.join(map(str, value.shape)) or '1'}"
     return f"a list of {len(value)}" if isinstance(value, list) else f"a {type(value).__name__}"
 
@@ -83,27 +102,37 @@ def _structs(value: Any) -> Iterator[Tree]:
             yield from _structs(member)
 
 
-def _vectors(tree: Tree, name: str, count: int) -> list[Real]:
+def _vectors(tree: Tree, name: str, count: int) -> list[Vector]:
     """One vector per lock-in: rows of a matrix, or members of a cell where their lengths differ."""
     value = tree.get(name)
     if isinstance(value, list):
         if len(value) != count:
             raise BadInput(f"{name}: {len(value)} vectors for {count} lock-ins; expected one each")
         return [_vector(member, name) for member in value]
-    if not isinstance(value, np.ndarray) or value.ndim > 2:
+    if not isinstance(value, np.ndarray | Split) or value.ndim > 2:
         raise BadInput(f"{name} is {_described(value)}; {_EXPECTED}")
     if count == 1:
         return [_vector(value, name)]
     if value.ndim != 2 or value.shape[0] != count:
         raise BadInput(f"{name} is {_described(value)}; expected a row for each of the {count} lock-ins")
-    return [_vector(row, name) for row in value]
+    return [_vector(row, name) for row in value.real]
 
 
-def _vector(value: Any, name: str) -> Real:
-    numeric = isinstance(value, np.ndarray) and value.dtype.kind in "iufcb"
+def _vector(value: Any, name: str) -> Vector:
+    """Numbers one after the other, as they are in the file."""
+    numeric = isinstance(value, np.ndarray | Split) and value.dtype.kind in "iufcb"
     if not numeric or value.size != max(value.shape, default=1):
         raise BadInput(f"{name} is {_described(value)}; expected numbers one after the other")
-    return np.ascontiguousarray(value.ravel().real, float)
+    found: Vector = value.real.reshape(-1)
+    return found
+
+
+def _few(value: Any, name: str) -> Real:
+    """A setting of some numbers."""
+    found = _vector(value, name)
+    if len(found) > MOST_TONES:
+        raise BadInput(f"{name}: {len(found)} numbers; expected up to {MOST_TONES}")
+    return np.asarray(found, float)
 
 
 def _number(settings: Tree, name: str) -> float:
@@ -114,72 +143,130 @@ def _number(settings: Tree, name: str) -> float:
     return float("nan")
 
 
-def _recording(
-    name: str, raw: Any, settings: Tree, time: Real, stamps: Real | None, clipped: Bools, source: Source
-) -> Recording:
-    if "dem_freqs" not in settings:
-        raise BadInput(f"settings of {name}: no dem_freqs, so that its frequencies are unknown")
-    tones = _vector(settings["dem_freqs"], "settings.dem_freqs")
-    if not len(tones) or not (np.isfinite(tones) & (tones > 0)).all():
-        raise BadInput(f"settings.dem_freqs of {name}: expected tones above 0 Hz")
-    z = _matrix(raw, name, len(tones))
-    lengths = [len(z), len(time), *([] if stamps is None else [len(stamps)])]
-    count = min(lengths)
-    if count == 0:
-        raise BadInput(f"impedance_data.{name}: no samples")
-    incomplete = max(lengths) - count
-    notes = (f"{incomplete} incomplete samples at the end: the run was interrupted",) if incomplete else ()
-    z, time, stamps = z[:count], time[:count], None if stamps is None else stamps[:count]
-    with within(f"impedance_time of {name}"):
-        rebuilt = clock.rebuilt(count, time, stamps)
-    rate, bandwidth = clock.rate_hz(rebuilt.time_s), _number(settings, "bandwidth")
-    marks = blank(count) | rebuilt.marks | sifted(z) | {"clipped": clipped[:count]}
-    if bandwidth > 0 and np.isfinite(rate):  # until the demodulator's filter has settled
-        marks["transient"][: ceil(_START_UP / bandwidth * rate)] = True
-    version = settings.get("version")
-    program = f"TiePieLCR {version[:40].strip()}" if isinstance(version, str) else "TiePieLCR"
-    source = replace(
-        source, lockin=int(name[6:]), program=program, bandwidth_hz=bandwidth, rate_hz=rate, notes=notes + rebuilt.notes
-    )
-    return Recording(rebuilt.time_s, tones, z, marks, rebuilt.clock, source)
+@dataclass(frozen=True, eq=False)
+class _LockIn:
+    """Variables of one lock-in, as they are in the file.
+
+    Attributes
+    ----------
+    name : str
+        As in "lockin1".
+    tones_hz : (m,) array
+        Frequencies [Hz].
+    parts : tuple of (n, m) arrays
+        Real part of the impedance, and the imaginary part if there is one [ohm].
+    time_s, stamp_s : (n,) array
+        Time, and stamps or None [s].
+    count, incomplete : int
+        Samples that are whole, and others at the end.
+    settings : Tree
+        Its settings.
+    clipping : callable
+        Whether an input was at the end of its range, from times [s].
+    """
+
+    name: str
+    tones_hz: Real
+    parts: tuple[Vector, ...]
+    time_s: Vector
+    stamp_s: Vector | None
+    count: int
+    incomplete: int
+    settings: Tree
+    clipping: Callable[[Real], Bools]
+
+    @classmethod
+    def of(
+        cls, tree: Tree, k: int, lockins: int, name: str, raw: Any, settings: Tree, time: Vector, stamps: Vector | None
+    ) -> Self:
+        """Lock-in ``k`` of a file."""
+        if "dem_freqs" not in settings:
+            raise BadInput(f"settings of {name}: no dem_freqs, so that its frequencies are unknown")
+        tones = _few(settings["dem_freqs"], "settings.dem_freqs")
+        if not len(tones) or not (np.isfinite(tones) & (tones > 0)).all():
+            raise BadInput(f"settings.dem_freqs of {name}: expected tones above 0 Hz")
+        parts = _matrix(raw, name, len(tones))
+        lengths = [len(parts[0]), len(time), *([] if stamps is None else [len(stamps)])]
+        if min(lengths) == 0:
+            raise BadInput(f"impedance_data.{name}: no samples")
+        clipping = _clipping(tree, k, lockins, settings)
+        return cls(
+            name, tones, parts, time, stamps, min(lengths), max(lengths) - min(lengths), settings, clipping
+        )  # fmt: skip
+
+    def recording(self, at: slice, source: Source) -> Recording:
+        """A stretch of it."""
+        at = slice(at.start, min(at.stop, self.count))
+        time, stamps = (None if v is None else np.array(v[at], float) for v in (self.time_s, self.stamp_s))
+        last = at.stop == self.count and self.incomplete
+        notes = (f"{self.incomplete} incomplete samples at the end: the run was interrupted",) if last else ()
+        z = np.zeros((at.stop - at.start, len(self.tones_hz)), np.complex128)
+        for half, part in zip((z.real, z.imag), self.parts, strict=False):
+            half[:] = part[at]
+        with within(f"impedance_time of {self.name}"):
+            rebuilt = clock.rebuilt(len(z), time, stamps)
+        rate, bandwidth = rate_hz(rebuilt.time_s), _number(self.settings, "bandwidth")
+        marks = blank(len(z)) | rebuilt.marks | sifted(z) | {"clipped": self.clipping(np.asarray(time))}
+        if at.start == 0 and bandwidth > 0 and np.isfinite(rate):  # until the demodulator's filter has settled
+            marks["transient"][: ceil(min(_START_UP / bandwidth * rate, len(z)))] = True
+        version = self.settings.get("version")
+        program = f"TiePieLCR {version[:40].strip()}" if isinstance(version, str) else "TiePieLCR"
+        source = replace(
+            source, lockin=int(self.name[6:]), program=program, bandwidth_hz=bandwidth, rate_hz=rate,
+            notes=notes + rebuilt.notes,
+        )  # fmt: skip
+        return Recording(rebuilt.time_s, self.tones_hz, z, marks, rebuilt.clock, source)
 
 
-def _matrix(raw: Any, name: str, tones: int) -> Complex:
-    """Impedance with a row per sample and a column per frequency; one frequency may be a row or a column."""
+def _matrix(raw: Any, name: str, tones: int) -> tuple[Vector, ...]:
+    """Parts of the impedance with a row per sample and a column per frequency; one frequency may be a row."""
     wrong = BadInput(f"impedance_data.{name} is {_described(raw)}; expected a column for each of its {tones} tones")
-    if not isinstance(raw, np.ndarray) or raw.dtype.kind not in "iufcb" or raw.ndim > 2:
+    if not isinstance(raw, np.ndarray | Split) or raw.dtype.kind not in "iufcb" or raw.ndim > 2:
         raise wrong
-    if tones == 1 and raw.size == max(raw.shape, default=1):
-        raw = raw.reshape(-1, 1)
-    if raw.ndim == 1 and raw.size == tones:
-        raw = raw.reshape(1, -1)
-    if raw.ndim != 2 or raw.shape[1] != tones:
+    shape = raw.shape
+    if tones == 1 and raw.size == max(shape, default=1):
+        shape = (raw.size, 1)
+    elif raw.ndim == 1 and raw.size == tones:
+        shape = (1, raw.size)
+    if len(shape) != 2 or shape[1] != tones:
         raise wrong
-    return np.array(raw, np.complex128, order="C")
+    return tuple(part.reshape(shape) for part in ((raw.real, raw.imag) if raw.dtype.kind == "c" else (raw.real,)))
 
 
-def _clipped(tree: Tree, k: int, count: int, time_s: Real, settings: Tree) -> Bools:
-    """Samples at which the mean of an input fills the input's range.
+def _clipping(tree: Tree, k: int, count: int, settings: Tree) -> Callable[[Real], Bools]:
+    """Times at which the mean of an input fills the input's range.
 
     The program detects clipping in its waveforms and displays it, but the file has only the means of the two inputs: a
     mean at the end of the range is clipping. Waveforms that clip symmetrically cannot be detected.
     """
-    clipped = np.zeros(len(time_s), bool)
     try:
         at = _vectors(tree, "offset_time", count)[k]
         means = [_vectors(tree, name, count)[k] for name in ("ref_offset", "sig_offset")]
-        ranges = _vector(settings["scope_range_list"], "scope_range_list")
-        reference, signal = ranges[_vector(settings["scope_ranges"], "scope_ranges").astype(int)]
-    except (BadInput, KeyError, IndexError, ValueError):  # the file lacks the means or the ranges
-        return clipped
+        ranges = _few(settings["scope_range_list"], "scope_range_list")
+        reference, signal = ranges[_few(settings["scope_ranges"], "scope_ranges").astype(int)]
+    except (BadInput, KeyError, IndexError, ValueError, TypeError):  # the file lacks the means or the ranges
+        return lambda time_s: np.zeros(len(time_s), bool)
     # the file has the reference as volts times its amplifier's amperes or coulombs per volt, and the signal as volts
     # over the gain before the input; the ranges are those of the inputs themselves
     amplifier, gain = _gain(settings, "reference_gain_list", "reference"), _gain(settings, "gain_list", "gain")
-    order = np.argsort(at, kind="stable")
-    for mean, limit in zip(means, (float(reference * amplifier), float(signal / gain)), strict=True):
-        if len(mean) == len(at) > 0:
-            clipped |= np.interp(time_s, at[order], np.abs(mean)[order]) >= _MARGIN * limit
+    each, limits = -(-len(at) // _MOST_MEANS) or 1, (float(reference * amplifier), float(signal / gain))
+    times = np.array(at[::each], float)
+    order = np.argsort(times, kind="stable")
+    curves = [(_largest(mean, each)[order], limit) for mean, limit in zip(means, limits, strict=True)
+              if len(mean) == len(at) > 0]  # fmt: skip
+
+    def clipped(time_s: Real) -> Bools:
+        over = [np.interp(time_s, times[order], mean) >= _MARGIN * limit for mean, limit in curves]
+        return np.asarray(np.any([np.zeros(len(time_s), bool), *over], axis=0))
+
     return clipped
+
+
+def _largest(mean: Vector, each: int) -> Real:
+    """Magnitude of a mean, the largest of so many one after the other."""
+    step = each * (_MOST_MEANS // 16)
+    pieces = (np.abs(np.asarray(mean[k : k + step], float)) for k in range(0, len(mean), step))
+    return np.concatenate([np.fmax.reduceat(piece, np.arange(0, len(piece), each)) for piece in pieces])
 
 
 def _gain(settings: Tree, listed: str, chosen: str) -> float:
@@ -187,6 +274,6 @@ def _gain(settings: Tree, listed: str, chosen: str) -> float:
     calibration = next(_structs(settings.get("calibration")), {})
     try:
         gain = abs(float(_vector(calibration[listed], listed)[int(_number(settings, chosen))]))
-    except (BadInput, KeyError, IndexError, ValueError):
+    except (BadInput, KeyError, IndexError, ValueError, OverflowError):
         return 1.0
     return gain if gain > 0 else 1.0

@@ -11,7 +11,7 @@ readings too.
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,7 @@ BY_TIME = ("line", "smooth", "wandering")
 """Laws that need no force."""
 
 _LEAST = 100
+_BLOCK = 1 << 14  # samples whose drift is removed at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +63,11 @@ class Drift:
 
     def removed(self, time_s: Real, impedance_ohm: Complex) -> Complex:
         """Readings without drift [ohm]."""
-        return np.asarray(impedance_ohm * np.exp(-self.at(time_s)))
+        found = np.empty_like(impedance_ohm)
+        for k in range(0, len(time_s), _BLOCK):
+            at = slice(k, k + _BLOCK)
+            found[at] = impedance_ohm[at] * np.exp(-self.at(time_s[at]))
+        return found
 
     def rest_ohm(self) -> Complex:
         """Impedance at rest at the first reading (m,) [ohm]."""
@@ -104,8 +109,10 @@ def fitted(
     rest = valid & ~_disturbed(time_s, force_n, settle_s)
     if np.count_nonzero(rest) < _LEAST:
         raise BadInput(f"{np.count_nonzero(rest)} readings at rest; expected {_LEAST} or more to fit a drift to")
-    z, start = impedance_ohm[rest], float(time_s[0])
-    bins = laws.binned(time_s[rest], np.log(np.abs(z)) + 1j * np.unwrap(np.angle(z), axis=0))
+    start = float(time_s[0])
+    columns = (column[rest] for column in impedance_ohm.T)  # one by one, to save memory
+    each = [laws.binned(time_s[rest], (np.log(np.abs(z)) + 1j * np.unwrap(np.angle(z)))[:, None]) for z in columns]
+    bins = replace(each[0], values=np.hstack([of.values for of in each]))
     seconds = max(float(time_s[-1]) - start, 1e-9)
     smooth = laws.explained(bins, (laws.smooth(start, seconds),))
     fits = {"line": laws.explained(bins, (laws.linear(start, seconds),)), "smooth": smooth}

@@ -122,15 +122,15 @@ def of_presses(worked: Processed, threshold_n: float = THRESHOLD_N) -> Ways:
         No press with loading and unloading.
     """
     one, valid = worked.recording, worked.recording.valid()
-    time, force, z = one.time_s[valid], worked.force_n[valid], one.impedance_ohm[valid]
-    clean = worked.drift.removed(time, z) if worked.drift else z
-    values = np.hstack([clean.real, clean.imag])
+    time, force = one.time_s[valid], worked.force_n[valid]
     ways: dict[float, Hysteresis] = {}
     left_out = []
     for press in by_force(time, force, threshold_n):
         during = (time >= press.start_s) & (time <= press.end_s)
+        z = one.impedance_ohm[np.flatnonzero(valid)[during]]
+        clean = worked.drift.removed(time[during], z) if worked.drift else z
         try:
-            ways[press.start_s] = hysteresis(force[during], values[during])
+            ways[press.start_s] = hysteresis(force[during], np.hstack([clean.real, clean.imag]))
         except BadInput as error:
             left_out.append(f"left out: press at {press.start_s:.6g} s: {error}")
     if not ways:

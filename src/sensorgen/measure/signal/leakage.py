@@ -15,6 +15,7 @@ from math import inf, sqrt, tanh
 from sensorgen.core.errors import OutOfRange
 
 _SMALL, _LARGE = 1e-12, 1e12  # of q: below, the film is tight; above, it is a short all along
+_STEPS, _ROUNDING = 50, 1e-15
 
 
 def along_ohm(electrode_ohm: float, leak_s: float) -> float:
@@ -78,7 +79,15 @@ def leak_s(rz_ohm: float, electrode_ohm: float) -> float:
     line = 2 * electrode_ohm
     if rz_ohm in (0, inf) or line == 0 or rz_ohm / line > 1e7:
         return inf if rz_ohm == 0 else 1 / rz_ohm
-    return _root(lambda q: line / (q * tanh(q)), rz_ohm) ** 2 / line
+    wanted = line / rz_ohm
+    q = sqrt(wanted) if wanted < 1 else wanted  # of q tanh q = wanted, by Newton's method
+    for _ in range(_STEPS):
+        t = tanh(q)
+        step = (q * t - wanted) / (t + q * (1 - t * t))
+        q -= step
+        if abs(step) <= _ROUNDING * q:
+            break
+    return q**2 / line
 
 
 def electrode_and_leak(along: float, across: float) -> tuple[float, float]:

@@ -21,6 +21,7 @@ _SETTLED = 3.0  # over the cut-off: settling time of the filter
 _END = 0.5  # over the cut-off: length of the ends that are extrapolated
 _LONGEST_GAP = 0.5  # over the cut-off: longer gaps are not interpolated
 _EVEN = 1e-3  # of a step: deviation of even samples
+_MOST_STEPS = 1 << 22  # even steps of a recording
 
 
 def sections(rate_hz: float, cutoff_hz: float = CUTOFF_HZ, order: int = ORDER) -> Real:
@@ -125,9 +126,11 @@ def offline(values: NDArray[Any], rate_hz: float, cutoff_hz: float = CUTOFF_HZ) 
     begin = 2 * _first(values[:fit]) - values[pad:0:-1]
     end = 2 * _first(values[: -fit - 1 : -1]) - values[-2 : -pad - 2 : -1]
     longer = np.concatenate([begin, values, end])
-    parts = [longer.real, longer.imag] if np.iscomplexobj(values) else [longer]
-    smooth = [np.asarray(sosfiltfilt(sos, part, axis=0, padlen=0))[pad : pad + len(values)] for part in parts]
-    return smooth[0] if len(smooth) == 1 else smooth[0] + 1j * smooth[1]
+    smooth = np.empty_like(values, dtype=longer.dtype)
+    parts = ((longer.real, smooth.real), (longer.imag, smooth.imag)) if np.iscomplexobj(values) else ((longer, smooth),)
+    for part, into in parts:
+        into[:] = np.asarray(sosfiltfilt(sos, part, axis=0, padlen=0))[pad : pad + len(values)]
+    return smooth
 
 
 def _first(values: NDArray[Any]) -> NDArray[Any]:
@@ -159,15 +162,20 @@ def filtered(recording: Recording, cutoff_hz: float = CUTOFF_HZ) -> tuple[Real, 
         As :func:`sections`; fewer than two valid samples.
     """
     valid = recording.valid()
-    time, z = recording.time_s[valid], recording.impedance_ohm[valid]
+    time = recording.time_s[valid]
     if len(time) < 2:
         raise OutOfRange(f"{len(time)} valid samples; expected two or more to filter")
     rate = recording.source.rate_hz
-    grid, values = time, z
-    if np.abs(np.diff(time) * rate - 1).max() >= _EVEN:
-        grid = np.arange(time[0], time[-1] + 0.5 / rate, 1 / rate)
-        values = np.column_stack([np.interp(grid, time, column) for column in z.T])
-    smooth = offline(values, rate, cutoff_hz)
+    sections(rate, cutoff_hz)
+    even = np.abs(np.diff(time) * rate - 1).max() < _EVEN
+    steps = (time[-1] - time[0]) * rate
+    if steps * len(recording.tones_hz) > _MOST_STEPS:
+        raise OutOfRange(f"{steps:.3g} even steps of {1 / rate:.3g} s for {len(time)} samples; expected fewer gaps")
+    grid = time if even else np.arange(time[0], time[-1] + 0.5 / rate, 1 / rate)
+    smooth = np.empty((len(grid), len(recording.tones_hz)), np.complex128)
+    for k, column in enumerate(recording.impedance_ohm.T):  # one by one, to save memory
+        values = column[valid] if even else np.interp(grid, time, column[valid])
+        smooth[:, k] = offline(values[:, None], rate, cutoff_hz)[:, 0]
     before = np.clip(np.searchsorted(time, grid, side="right") - 1, 0, len(time) - 2)
     smooth[(time[before + 1] - time[before]) * cutoff_hz > _LONGEST_GAP] = np.nan
     return grid, smooth

@@ -89,7 +89,9 @@ def processed(
     removed, pairs, z = None, None, one.impedance_ohm
     if remove_drift and spans:
         among = (law,) if law else drift.LAWS if rig else drift.BY_TIME
-        unit = np.any([(one.time_s >= a) & (one.time_s <= b) for a, b in spans], axis=0).astype(float)
+        unit = np.zeros(len(one.time_s))
+        for start, end in spans:
+            unit[np.searchsorted(one.time_s, start) : np.searchsorted(one.time_s, end, side="right")] = 1.0
         pressing = force if rig else unit  # 1 N, for laws of drift that need only the times of presses
         try:
             removed = drift.fitted(one.time_s, z, valid, pressing, among=tuple(among))

@@ -22,7 +22,7 @@ _DRY, _OPEN, _LOW = 3.0, 100.0, 0.1  # of the expected resistance
 _APART = 2.0  # factor between readings of one electrode beyond which the contact is bad
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Evidence:
     """Readings of one specimen.
 
@@ -52,7 +52,7 @@ class Evidence:
     touching: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Verdict:
     """A verdict with its numbers.
 
@@ -155,13 +155,17 @@ def _film(ry: float, rz: float, expected_ohm: float, intact_ohm: float) -> tuple
     )
 
 
-def expected_from(group: Sequence[Evidence]) -> float:
-    """Expected resistance of an electrode: median of a group's least readings [ohm]; nan of none.
+def expected_from(readings: Sequence[float]) -> float:
+    """Expected resistance of an electrode: median of specimens with the same electrodes; nan of none, or if it is 0.
 
     Parameters
     ----------
-    group : sequence of Evidence
-        Specimens with the same electrodes.
+    readings : sequence of float
+        Of each, the :func:`least` [ohm].
     """
-    readings = [min(of.ry_ohm) for of in group if of.ry_ohm and min(of.ry_ohm) < inf]
-    return median(readings) if readings else nan
+    return median(readings) or nan if readings else nan
+
+
+def least(of: Evidence) -> tuple[float, ...]:
+    """The least reading along an electrode, unless none is finite [ohm]."""
+    return (min(of.ry_ohm),) if of.ry_ohm and min(of.ry_ohm) < inf else ()

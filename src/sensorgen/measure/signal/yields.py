@@ -4,6 +4,7 @@ Intervals are those of Clopper and Pearson: they hold at least the stated confid
 specimens and yields near 0 or 1. Wilson's are narrower because they hold it only on average.
 """
 
+from array import array
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -113,17 +114,23 @@ def groups(
     order : float
         R_Z over R_Y up to which a specimen counts as shorted [-].
     """
-    members: dict[tuple[Hashable, ...], list[Judged]] = {}
-    for of, verdict in judged:
-        members.setdefault(by(of), []).append((of, verdict))
+    members: dict[tuple[Hashable, ...], tuple[Counter[tuple[str, bool, bool | None]], array[float]]] = {}
+    for of, v in judged:
+        counts, ratios = members.setdefault(by(of), (Counter(), array("d")))
+        counts[v.word, of.touching, None if isnan(v.ratio) else v.ratio <= order] += 1
+        if not isnan(v.ratio):
+            ratios.append(v.ratio)
     found = []
     for key in sorted(members, key=lambda key: [(k is None, str(k)) for k in key]):
-        words = Counter(v.word for _, v in members[key])
-        ratios = [v.ratio for _, v in members[key] if not isnan(v.ratio)]
-        open_ = [v for of, v in members[key] if not of.touching]
-        known = [v.word == "intact" for v in open_ if v.word != "unknown"]
-        both = [v.ratio <= order for v in open_ if not isnan(v.ratio)]
-        intact, shorted = (share(sum(such), len(such), confidence) for such in (known, both))
+        counts, ratios = members[key]
+        words, known, both = Counter[str](), Counter[bool](), Counter[bool]()
+        for (word, touching, low), count in counts.items():
+            words[word] += count
+            if not touching and word != "unknown":
+                known[word == "intact"] += count
+            if not touching and low is not None:
+                both[low] += count
+        intact, shorted = (share(such[True], such.total(), confidence) for such in (known, both))
         found.append(Group(key, intact, shorted, median(ratios) if ratios else nan, words))
     return found
 

@@ -1,0 +1,56 @@
+"""Sequences whose members are made when they are read, so that a million of them take little memory."""
+
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Generic, TypeVar, overload
+
+Member = TypeVar("Member")
+Other = TypeVar("Other")
+
+
+class Lazy(Sequence[Member], Generic[Member]):
+    """A sequence of members that are made anew each time they are read.
+
+    Parameters
+    ----------
+    make : callable
+        From a place to its member.
+    places : sequence of int
+        Places, in the order of the sequence.
+
+    Examples
+    --------
+    >>> squares = Lazy(lambda k: k * k, range(1000000))
+    >>> squares[-1], list(squares[:4]), list(squares.where(lambda n: n < 5))
+    (999998000001, [0, 1, 4, 9], [0, 1, 4])
+    """
+
+    def __init__(self, make: Callable[[int], Member], places: Sequence[int]) -> None:
+        self._make, self._places = make, places
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    @overload
+    def __getitem__(self, at: int) -> Member: ...
+    @overload
+    def __getitem__(self, at: slice) -> "Lazy[Member]": ...
+    def __getitem__(self, at: int | slice) -> "Member | Lazy[Member]":
+        if isinstance(at, slice):
+            return Lazy(self._make, self._places[at])
+        return self._make(self._places[at])
+
+    def __iter__(self) -> Iterator[Member]:
+        return map(self._make, self._places)
+
+    def map(self, change: "Callable[[Member], Other]") -> "Lazy[Other]":
+        """The same members, changed."""
+        return Lazy(lambda place: change(self._make(place)), self._places)
+
+    def where(self, wanted: Callable[[Member], bool]) -> "Lazy[Member]":
+        """The members of which something holds."""
+        return self.at(k for k, member in enumerate(self) if wanted(member))
+
+    def at(self, which: Iterable[int]) -> "Lazy[Member]":
+        """Some members, in that order."""
+        return Lazy(self._make, array("q", (self._places[k] for k in which)))
