@@ -197,6 +197,17 @@ def test_edges_that_rounding_parted_within_a_window_meet_in_their_middle():
     assert {edges(layer)[1] for layer in found} == {1.0005}
 
 
+def test_a_cell_that_rounding_made_lopsided_is_its_own_mirror_image():
+    given = [strips(0.0, 0.1, (0.25, 0.450363), (1.549638, 1.75)), strips(0.1, 0.2, (0.3, 1.7))]
+    plan = window.Window((0.0, 2.0), (0.0, 1.0))
+    found = window.evened(given, plan, 2e-3)
+    places = [shapely.bounds(part)[[0, 2]] for part in shapely.get_parts(found[0].region("a"))]
+    assert sorted(places[0]) == pytest.approx(sorted(2 - places[1]), abs=1e-12)
+    aside = [strips(0.0, 0.1, (0.25, 0.5), (1.54, 1.75))]
+    assert window.evened(aside, plan, 2e-3) == aside
+    assert window.evened(aside, plan) != aside
+
+
 def test_a_layer_that_is_lost_parts_what_is_above_from_what_is_below():
     like = Scene((Body("a", "x60", (box(0, 1, 0, 1, 0, 0.3),)),), (2.0, 1.0, 0.3))
     found = scene_of(

@@ -12,7 +12,7 @@ import shapely
 
 from sensorgen.asprinted.beads import CONVENTIONS, Beads, beads
 from sensorgen.asprinted.beads import layers as printed_layers
-from sensorgen.asprinted.window import Window, cut, evened, window
+from sensorgen.asprinted.window import ROUNDED_MM, Window, cut, evened, window
 from sensorgen.checks import estimate, volumes
 from sensorgen.checks.volumes import Row
 from sensorgen.core.errors import BadInput, OutOfRange
@@ -207,8 +207,8 @@ def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body],
     scene = design.printed
     inside = cut(layers, plan)
     crossed = all(side < whole for side, whole in zip(plan.sides_mm(), scene.size_mm[:2], strict=True))
-    if crossed and not any(plan.repeats):
-        inside = evened(inside, plan)
+    if not any(plan.repeats):
+        inside = evened(inside, plan) if crossed else evened(inside, plan, ROUNDED_MM)
     like = replace(scene, bodies=tuple(bodies), size_mm=(*plan.sides_mm(), scene.size_mm[2]), repeats=plan.repeats)
     found = scene_of(inside, like)
     if design.orientation == "upside-down":
