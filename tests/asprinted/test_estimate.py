@@ -140,7 +140,7 @@ def test_a_slanted_part_is_narrower_by_a_rounding_all_round():
 @pytest.mark.parametrize(("walls", "width", "printed"), [
     ("arachne", 0.11, 0.0), ("arachne", 0.2, 0.34), ("arachne", 0.7, 0.7 - 0.1 * (1 - pi / 4)), ("classic", 0.43, 0.0),
     ("cura", 0.43, 0.0), ("cura", 0.5, 0.44), ("cura", 0.7, 0.61), ("cura", 0.9, 0.9), ("cura-gaps", 0.03, 0.0),
-    ("cura-gaps", 0.05, 0.05), ("cura-5", 0.1, 0.0), ("cura-5", 0.11, 0.34), ("cura-5", 0.7, 0.7),
+    ("cura-gaps", 0.05, 0.05), ("cura-5", 0.105, 0.0), ("cura-5", 0.11, 0.34), ("cura-5", 0.7, 0.7),
 ])  # fmt: skip
 def test_a_strip_in_any_direction_is_as_wide_as_its_walls_print_it(walls, width, printed, turn):
     c, s = cos(turn), sin(turn)
@@ -257,3 +257,10 @@ def test_lines_of_the_design_decide_what_vanishes():
     wide = design.make({"shape": "reference", "profile": {"line_mm": {"x60": 0.6}}})
     assert layers(scene, wide.machine, wide.layers, "classic")[0].regions
     assert not layers(scene, wide.machine, wide.layers, "classic", lines(wide))[0].regions
+
+
+@pytest.mark.parametrize(("line", "printed"), [(0.39, True), (0.4, True), (0.41, False)])
+def test_cura_5_prints_a_quarter_of_a_line(line, printed):
+    """CuraEngine 5.0 prints tips of 0.1 mm with lines of 0.4 mm, and not with its usual ones of 0.44 mm."""
+    tip = Scene((Body("tip", "x60", (box(1, 1.1, 0, 6, 0, 0.1),)),), (6.0, 6.0, 0.1))
+    assert bool(layers(tip, tri().machine, tri().layers, "cura-5", {"x60": Lines(line)})[0].regions) is printed
