@@ -63,7 +63,7 @@ def content(
 
     Examples
     --------
-    >>> from sensorgen.scene.geometry.mesh import Mesh
+    >>> from sensorgen.scene.geometry.meshes import Mesh
     >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
     >>> sides = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], dtype=np.int32)
     >>> film = Part("film", "X60", "#cccccc", 1, Mesh(corners, sides))
