@@ -1,5 +1,7 @@
 """Printers and qualities: data that holds together, and faults in it named."""
 
+import re
+
 import pytest
 
 from sensorgen.core.errors import BadInput, UnknownName
@@ -109,3 +111,26 @@ def test_a_bad_printer_file_is_told_in_our_words(tmp_path, change, said):
     with pytest.raises(BadInput, match=said) as caught:
         printer.load_printer(str(path))
     assert str(caught.value).startswith(str(path))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("max_nozzle_c: 250.0", "max_nozzle_c: 600", "max_nozzle_c 600"),
+        ("max_bed_c: 120.0", "max_bed_c: 121", "max_bed_c 121"),
+        ("xy: 200.0", "xy: 2000", "max_speed_mm_s.xy 2000"),
+        ("coldest_c: 150.0", "coldest_c: 20", "control.coldest_c 20"),
+        ("    M106: P3", "    M997: P1\n    M106: P3", "commands M997"),
+    ],
+)
+def test_a_file_may_narrow_limits_but_not_widen_them_unasked(own, monkeypatch, old, new, said):
+    file = own(old, new)
+    monkeypatch.delenv(printer.TRUST, raising=False)
+    with pytest.raises(BadInput, match=f"{re.escape(said)}, more than any printer .*--trust-printer"):
+        printer.load_printer(file)
+    monkeypatch.setenv(printer.TRUST, "1")
+    printer.load_printer(file)
+
+
+def test_a_file_that_narrows_limits_is_taken(own):
+    assert printer.load_printer(own("max_nozzle_c: 250.0", "max_nozzle_c: 200")).max_nozzle_c == 200

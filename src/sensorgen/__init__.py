@@ -8,6 +8,15 @@ Names are imported when they are first used.
 69.06
 """
 
+import sys
+
+if (
+    sys.argv[:1] == ["-m"]
+    and not sys.flags.safe_path
+    and any(arg.split(".")[0] == "sensorgen" for arg in sys.orig_argv)
+):
+    del sys.path[0]  # `python -m sensorgen` puts the working folder first, whose random.py is not Python's
+
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

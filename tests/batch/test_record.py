@@ -219,3 +219,9 @@ def test_tabs_are_bodies_of_their_own_and_take_room(plan, tmp_path):
     with_tabs = make(plan("labels: {tab: true}\n" + plan().read_text("utf-8")), tmp_path / "out", gcode=False)
     sizes = {tuple(s["size_mm"]) for s in read(with_tabs.folder)["specimens"].values()}
     assert all(length > 30 for length, _ in sizes)
+
+
+def test_labels_have_the_head_of_the_log(plan, tmp_path):
+    """What was in the log before the print can be proven by a label on the specimen."""
+    folder = make(plan(), tmp_path / "out", gcode=False, log_head="0123456789abcdef" * 4).folder
+    assert folder.joinpath("labels.html").read_text("utf-8").count("<p>log 0123456789abcdef</p>") == 3

@@ -312,6 +312,12 @@ def test_hdf5_that_leads_elsewhere_is_refused(tmp_path):
         file["impedance_data"] = h5py.ExternalLink("secret.h5", "/z")
     with pytest.raises(BadInput, match="a link; expected the data"):
         read(tmp_path / "link.h5")
+    for name, end in (("soft.h5", "/z"), ("nowhere.h5", "/none")):
+        with h5py.File(tmp_path / name, "w") as file:
+            file["z"] = h5py.ExternalLink("secret.h5", "/z")
+            file["impedance_data"] = h5py.SoftLink(end)
+        with pytest.raises(BadInput, match="impedance_data: a link; expected the data"):
+            read(tmp_path / name)
     with h5py.File(tmp_path / "outside.h5", "w") as file:
         file.create_dataset("impedance_data", (4,), "f8", external=[(str(tmp_path / "secret.h5"), 0, 32)])
     with pytest.raises(BadInput, match="in another file"):

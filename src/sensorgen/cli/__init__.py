@@ -2,6 +2,7 @@
 
 import importlib
 import os
+import re
 import signal
 import sys
 from types import FrameType
@@ -51,6 +52,18 @@ WRONG_INPUT = 2
 FOUND_ERRORS = 1
 
 
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+
+
+def harmless(text: str) -> str:
+    r"""Text of strangers without characters that a terminal obeys, as colours, titles, and changes of direction.
+
+    >>> harmless("a\x1b]0;title\x07b\tc\n")
+    'a]0;titleb\tc\n'
+    """
+    return _CONTROL.sub("", text)
+
+
 class _Lazy(click.Group):
     """Commands that are imported when they are asked for: ``cli/NAME_command.py`` holds ``command``."""
 
@@ -92,13 +105,18 @@ class _Terminated(BaseException):
 
 @click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(__version__, prog_name="sensorgen")
-def cli() -> None:
+@click.option("--trust-printer", is_flag=True, help="Let printer files widen limits of hardware and G-code.")
+def cli(*, trust_printer: bool) -> None:
     """From one design to a printable elastomer sensor: geometry, checks, 3MF, profiles, prediction.
 
     \b
     sensorgen build tri --dielectric 0.2        a shape, with options
     sensorgen build designs/23/trix-d0.2.yaml   a design file
     """  # noqa: D301 - click reads the backspace
+    if trust_printer:
+        from sensorgen.design.printer import TRUST
+
+        os.environ[TRUST] = "1"
 
 
 def main() -> None:
@@ -148,6 +166,6 @@ def _silence() -> int:
 
 
 def _complain(what: object, code: int) -> int:
-    text = str(what)
+    text = harmless(str(what))
     click.echo(text if text.startswith("Usage:") else f"sensorgen: {' '.join(text.split())}", err=True)
     return code

@@ -54,10 +54,13 @@ def _make(plan: str, *, out: str, no_gcode: bool, time_limit_s: float, force: bo
 
     if not 0 < time_limit_s < float("inf"):
         raise OutOfRange(f"--time-limit {time_limit_s:g}; expected seconds above 0")
+    with log_words.existing(None) as log:
+        head = log.head()[1] if log else ""
     with render.refused(Path(plan).stem), show.progress(STEPS) as step:
         made = make(
-            Path(plan), Path(out), gcode=not no_gcode, time_limit_s=time_limit_s, force=force, strict=strict, step=step
-        )
+            Path(plan), Path(out), gcode=not no_gcode, time_limit_s=time_limit_s, force=force, strict=strict,
+            log_head=head, step=step,
+        )  # fmt: skip
     render.deliver(made)
     return FOUND_ERRORS if made.errors(force=force) else 0
 

@@ -77,7 +77,7 @@ def _work(
     if render.form():
         render.deliver(made)
     else:
-        click.echo(f"{output}: {list(made.document())[-1]}" if output else table, nl=bool(output))
+        render.say(f"{output}: {list(made.document())[-1]}" if output else table, nl=bool(output))
     return 0
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sensorgen.cli import render
 from sensorgen.cli.log_words import made
 from sensorgen.cli.words import Values, one
 from sensorgen.core import units
@@ -27,9 +28,9 @@ def _live(measured: str, rate_hz: tuple[float, ...], cutoff_hz: tuple[float, ...
 
     smooth = Live(one("--rate", rate_hz), one("--cutoff", cutoff_hz) if cutoff_hz else CUTOFF_HZ)
     with readings(measured) as source:
-        click.echo(_header(source))
+        render.say(_header(source))
         for block in source.blocks(1) if measured == "-" else source.blocks():
-            click.echo("".join(_rows(block, smooth(block.impedance_ohm))), nl=False)
+            render.say("".join(_rows(block, smooth(block.impedance_ohm))), nl=False)
 
 
 def _header(source: "Readings") -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import show
+from sensorgen.cli import render, show
 from sensorgen.cli.words import OneOf
 from sensorgen.core.errors import BadInput
 from sensorgen.design.walls import WALLS
@@ -87,7 +87,7 @@ def compensated(
     with show.progress(("designs",)) as step:
         found, changes = changed(design, walls, bake=word == "bake", sliced=sliced, step=step)
     if not changes:
-        click.echo(f"--compensate {word}: nothing to change, by the estimate for {walls} walls", err=True)
+        render.say(f"--compensate {word}: nothing to change, by the estimate for {walls} walls", err=True)
     return found, changes
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import body_options, show
+from sensorgen.cli import body_options, render, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.core.errors import BadInput
 
@@ -40,7 +40,7 @@ def _work(design: "Design", *, output: str | None) -> int:
         if made is None:
             raise BadInput(f"--output {output}: layers are those of a print; expected it without --drawn")
         store.replace(Path(output), layers.of_print(made).encode())
-        click.echo(output)
+        render.say(output)
         return 0
     with show.progress(STEPS) as step:
         held = review(design, step)
@@ -48,11 +48,11 @@ def _work(design: "Design", *, output: str | None) -> int:
         held = replace(held, findings=[*made.findings(), *held.sliced().findings])
     text = draw(design, held, made.scene, made.provenance) if made else draw(design, held)
     if output == "-":
-        click.echo(text, nl=False)
+        render.say(text, nl=False)
         return 0
     path = Path(output or f"{design.name}.svg")
     store.replace(path, text.encode())
-    click.echo(str(path))
+    render.say(str(path))
     return 0
 
 

@@ -31,7 +31,7 @@ def _work(iteration: int, file: str | None, output: str | None, seed: int, *, dr
         made = replace(made, file=str(path))
     render.deliver(made)
     if made.file and not output and not render.form():
-        click.echo(f"take them with {_taken(made)}")
+        render.say(f"take them with {_taken(made)}")
 
 
 def _taken(made: "Fit") -> str:

@@ -77,9 +77,9 @@ def _work(design: "Design", *, measured: str, output: str | None, **how: Any) ->
             if terminal or file:
                 write(answers.rows(block.kept, found, prior=estimator.prior is not None))
     for piece in render.pieces(summary.result(), render.form()):
-        click.echo(piece, nl=False, err=terminal)
+        render.say(piece, nl=False, err=terminal)
     if not render.form() and not terminal:
-        click.echo(output or "--output FILE.csv writes force and position of every sample")
+        render.say(output or "--output FILE.csv writes force and position of every sample")
     return 0
 
 

@@ -55,7 +55,7 @@ def _export(place: str, file: str | None) -> None:
 
     with opened(file) as log:
         rows = exchange.export(log, Path(place))
-    click.echo(f"{rows} rows in {place}")
+    render.say(f"{rows} rows in {place}")
 
 
 def _verify(file: str | None, anchors: str | None) -> int:

@@ -59,7 +59,7 @@ def _predict_ahead(specimen: str, file: str | None) -> None:
 
     with opened(file, create=True) as log:
         for row in stored_prediction.predict(log, specimen):
-            click.echo(f"logged prediction {row.number} of {specimen}", err=bool(render.form()))
+            render.say(f"logged prediction {row.number} of {specimen}", err=bool(render.form()))
 
 
 def _asked_mega(**typed: str) -> bool:

@@ -102,7 +102,7 @@ def _plot(found: "Loaded", folder: Path) -> None:
         for file, content in plots.files(found.model.sensor, *found.axes, found.prediction.design):
             step(file)
             files.replace(folder / file, content)
-    click.echo("\n".join(str(folder / file) for file in plots.STEPS))
+    render.say("\n".join(str(folder / file) for file in plots.STEPS))
 
 
 command = DesignGroup(

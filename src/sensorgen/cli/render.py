@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, show
+from sensorgen.cli import FOUND_ERRORS, harmless, show
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -110,8 +110,7 @@ def pieces(result: "Documented", wanted: str, before: "Iterable[Part]" = ()) -> 
         return [document.comma_separated(tables[0])]
     shown = document.markdown if wanted else document.text
     lines = shown([*before, *result.document()])
-    terminal = sys.stdout is not None and sys.stdout.isatty() and not click.get_current_context().meta.get(_FILE)
-    return (f"{_coloured(line) if terminal and not wanted else line}\n" for line in lines)
+    return (f"{line}\n" for line in lines)
 
 
 def _coloured(line: str) -> str:
@@ -120,10 +119,15 @@ def _coloured(line: str) -> str:
     return click.style(word, fg=_COLOURS[word], bold=True) + line[len(word) :] if word in _COLOURS else line
 
 
+def say(text: object, *, err: bool = False, nl: bool = True) -> None:
+    """Print a message; what strangers have written in it is harmless to the terminal."""
+    click.echo(harmless(str(text)), err=err, nl=nl)
+
+
 def verdict(*problems: str) -> int:
     """Say what is wrong with a result, a line each; the exit code."""
     for problem in problems:
-        click.echo(f"sensorgen: {problem}", err=True)
+        say(f"sensorgen: {problem}", err=True)
     return FOUND_ERRORS if problems else 0
 
 
@@ -131,8 +135,9 @@ def write(text: Iterable[str]) -> None:
     """Print pieces of text as they come, or write them to the file, which is there when all of them are."""
     output = click.get_current_context().meta.get(_FILE)
     if output in (None, "-"):
-        for piece in text:
-            sys.stdout.write(piece)
+        terminal = sys.stdout is not None and sys.stdout.isatty() and not form()
+        for piece in map(harmless, text):
+            sys.stdout.write(_coloured(piece) if terminal else piece)
         return
     from sensorgen.core import files
 
@@ -140,4 +145,4 @@ def write(text: Iterable[str]) -> None:
         for k, piece in enumerate(text):
             step(f"{k} pieces")
             file.write(piece.encode())
-    click.echo(output)
+    say(output)

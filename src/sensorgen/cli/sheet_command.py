@@ -60,7 +60,7 @@ def _work(
 
         where = plot / f"{design.name}-sheet.png"
         files.replace(where, sheet.png(found.sheet, found.bounds, found.ports))
-        click.echo(f"wrote {where}", err=bool(render.form()))
+        render.say(f"wrote {where}", err=bool(render.form()))
     render.deliver(found)
     return 0
 

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 
 import click
 
+from sensorgen.cli import harmless
+
 
 @contextmanager
 def progress(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
@@ -21,7 +23,7 @@ def progress(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
         done = steps.index(name) if name in steps else done  # a part of a step moves the clock alone
         bar = "#" * (20 * done // max(1, len(steps) - 1))
         seconds = time.monotonic() - started
-        click.echo(f"\r[{bar:20}] {seconds:4.1f} s  {name:24.24}", nl=False, err=True)
+        click.echo(f"\r[{bar:20}] {seconds:4.1f} s  {harmless(name):24.24}", nl=False, err=True)
 
     try:
         yield step

@@ -1,15 +1,18 @@
 """The same work for many, several at once in processes of their own; what goes wrong with one leaves the others."""
 
+import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from sensorgen.core.errors import NotInstalled, SensorgenError
+from sensorgen.core.leash import end_with_parent
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
 
+_SAFE = "PYTHONSAFEPATH"
 Found = TypeVar("Found")
 
 
@@ -88,7 +91,9 @@ def _pool(jobs: int) -> Iterator["ProcessPoolExecutor"]:
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 
-    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _quietly)
+    before = os.environ.get(_SAFE)
+    os.environ[_SAFE] = "1"  # a process that is spawned would look for Python's own modules in the working folder
+    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _begin)
     try:
         yield pool
     except BaseException:
@@ -97,9 +102,19 @@ def _pool(jobs: int) -> Iterator["ProcessPoolExecutor"]:
         # wait: else the interpreter, as it ends, may write to a pipe that the pool's thread closes
         pool.shutdown(cancel_futures=True)
         raise
-    pool.shutdown()
+    else:
+        pool.shutdown()
+    finally:
+        if before is None:
+            del os.environ[_SAFE]
+        else:
+            os.environ[_SAFE] = before
 
 
-def _quietly() -> None:
-    """End without a word on Ctrl-C."""
+def _begin() -> None:
+    """End without a word on Ctrl-C, and with the process that works are for."""
+    from multiprocessing import parent_process
+
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    parent = parent_process()
+    end_with_parent(parent.join if parent else None)

@@ -1,6 +1,8 @@
 """Printers and print qualities, read from data: tools, nozzle, layers, bed."""
 
+import os
 import re
+from collections.abc import Callable
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -139,6 +141,17 @@ class Quality(Strict):
         return grid
 
 
+TRUST = "SENSORGEN_TRUST_PRINTER"  # environment variable: printer files may widen limits, also in processes of ours
+_LIMITS: dict[str, Callable[[Printer], float]] = {
+    "max_nozzle_c": lambda printer: printer.max_nozzle_c,
+    "max_bed_c": lambda printer: printer.max_bed_c,
+    "max_speed_mm_s.xy": lambda printer: printer.max_speed_mm_s.xy,
+    "max_speed_mm_s.z": lambda printer: printer.max_speed_mm_s.z,
+    "max_speed_mm_s.extruder": lambda printer: printer.max_speed_mm_s.extruder,
+    "control.coldest_c": lambda printer: -printer.control.coldest_c,
+    "control.longest_purge_mm": lambda printer: printer.control.longest_purge_mm,
+    "control.longest_retraction_mm": lambda printer: printer.control.longest_retraction_mm,
+}
 _Profile = TypeVar("_Profile", Printer, Quality)
 
 
@@ -158,10 +171,40 @@ def quality_names() -> list[str]:
     return sorted(p.stem for p in (folder() / "qualities").glob("*.yaml"))
 
 
-@cache
 def load_printer(name: str) -> Printer:
-    """Read a printer by its name, or from a YAML file of the user's."""
+    """Read a printer by its name, or from a YAML file.
+
+    Raises
+    ------
+    BadInput
+        A file that is no printer's, or that allows more than any printer that ships with sensorgen: such a file may
+        have come with a design, and :data:`TRUST` is not set.
+    """
+    printer = _read_printer(name)
+    if name not in printer_names() and not os.environ.get(TRUST) and (wider := _wider(printer)):
+        raise BadInput(
+            f"{name}: {wider}, more than any printer that ships with sensorgen; if the file is yours, and the printer "
+            "can do that: sensorgen --trust-printer ..."
+        )
+    return printer
+
+
+@cache
+def _read_printer(name: str) -> Printer:
     return _load(Printer, "printer", name, printer_names())
+
+
+def _wider(own: Printer) -> str:
+    """The first limit of hardware or G-code that is wider than all that ship; "" for none."""
+    shipped = [_read_printer(name) for name in printer_names()]
+    for limit, of in _LIMITS.items():
+        if of(own) > max(map(of, shipped)):
+            return f"{limit} {abs(of(own)):g}"
+    allowed = {
+        command for printer in shipped for command, words in printer.control.commands.items() if words is not None
+    }
+    more = sorted(c for c, words in own.control.commands.items() if words is not None and c not in allowed)
+    return f"commands {', '.join(more)}" if more else ""
 
 
 @cache

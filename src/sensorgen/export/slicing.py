@@ -231,8 +231,9 @@ def plate_3mf(pieces: Sequence[Placed], family: str, title: str) -> bytes:
     """The 3MF of a plate for one family of slicers; see :func:`sensorgen.export.threemf.plate`."""
     check(pieces)
     design = pieces[0].design
-    primed = tower(design.machine, design.layers, len(plate_loads(pieces)))
-    return threemf.plate(family, title, plate_parts(pieces), _corner_mm(design), primed)
+    found = plate_loads(pieces)
+    primed, text = tower(design.machine, design.layers, len(found)), prusa.profile(design.machine, design.layers, found)
+    return threemf.plate(family, title, plate_parts(pieces), _corner_mm(design), primed, text)
 
 
 def _corner_mm(design: Design) -> tuple[float, float]:
@@ -253,8 +254,8 @@ def _run(
         plate, profile = folder / "plate.3mf", folder / "profile.ini"
         named = title or " ".join(piece.name for piece in pieces)[:80]
         primed = tower(design.machine, design.layers, len(all_loads))
-        plate.write_bytes(threemf.plate("prusa", named, bodies, _corner_mm(design), primed))
         text = prusa.profile(design.machine, design.layers, all_loads, version)
+        plate.write_bytes(threemf.plate("prusa", named, bodies, _corner_mm(design), primed, text))
         profile.write_text(text, "utf-8")
         before = time.perf_counter()
         prusa.slice_3mf(plate, profile, raw, runner)

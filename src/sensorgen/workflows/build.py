@@ -183,11 +183,10 @@ def _replaced(folder: Path, design: Design) -> tuple[str, ...]:
 def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> Iterator[tuple[str, bytes]]:
     name, primed = design.name, tower(design.machine, design.layers, len(design.used()))
     step("3MF")
+    parts, settings = parts_of(design, held.meshes), prusa.profile(design.machine, design.layers, loads(design))
     for family in threemf.FAMILIES:
-        yield (
-            f"{name}.{family}.3mf",
-            threemf.content(family, name, parts_of(design, held.meshes), _centre_mm(design, family), primed),
-        )
+        content = threemf.content(family, name, parts, _centre_mm(design, family), primed, settings)
+        yield f"{name}.{family}.3mf", content
     step("profiles")
     for path, text in profiles(design).items():
         yield path, text.encode()

@@ -235,11 +235,12 @@ def summed(motion: Motion, found: Crossings, machine: Printer) -> Drags:
         sums = [float(v[mine].sum()) for v in (contact, near, found.rubbing_mm)]
         tools.append(OfTool(tool, sums[0], sums[1], int(whole.sum()), int(bare.sum()), sums[2]))
     keys = np.column_stack([np.round(points.place_mm[:, 2], 2), found.tool[points.row]])
-    layers = []
-    for z, tool in np.unique(keys, axis=0).tolist():
-        here = (keys == (z, tool)).all(1)
-        lengths = [float(points.length_mm[here & rows].sum()) for rows in (touches, ~touches)]
-        layers.append(OfLayer(z, int(tool), *lengths))
+    found_keys, place = np.unique(keys, axis=0, return_inverse=True)
+    lengths = [
+        np.bincount(place.ravel()[rows], points.length_mm[rows], len(found_keys)).tolist()
+        for rows in (touches, ~touches)
+    ]
+    layers = [OfLayer(z, int(tool), *sums) for (z, tool), *sums in zip(found_keys.tolist(), *lengths, strict=True)]
     return Drags(tuple(tools), tuple(layers))
 
 
@@ -293,11 +294,14 @@ class _Lifts:
         self.over_mm = np.bincount(points.row, points.length_mm, minlength=len(self.number))
         for first, last in self._groups(np.unique(points.row)):
             self._lift(first, last, top, before, after)
-        made = []
-        for number, line in enumerate(self.lines, 1):
-            made += [*(text.encode() for text in before.get(number, ())), line]
+        made, done = list[bytes](), 0
+        for number in sorted({*before, *after}):
+            made += self.lines[done : number - 1]
+            made += [text.encode() for text in before.get(number, ())]
+            made.append(self.lines[number - 1])
             made += [text.encode() for text in after.get(number, ())]
-        return b"\n".join(made)
+            done = number
+        return b"\n".join([*made, *self.lines[done:]])
 
     def _groups(self, rows: Whole) -> Iterator[tuple[int, int]]:
         """First and last of the moves that are made in one lift: nothing but travel lies between them."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from sensorgen.core.errors import SlicerFailed
+from sensorgen.core.leash import NOT_RUN, on_leash
 from sensorgen.export.slicers import TIME_LIMIT_S
 
 KEPT_LINES = 12
@@ -81,6 +82,8 @@ def run(
             ) from None
         except OSError as error:
             raise SlicerFailed(f"cannot run {command[0]}: {error.strerror or error}") from None
+        if code == NOT_RUN:
+            raise SlicerFailed(f"cannot run {command[0]}: {_last_words(said)}")
         if code != 0:
             how = (
                 f"failed with exit code {code}"
@@ -96,7 +99,12 @@ def _wait(command: Sequence[str], said: BinaryIO, environment: Mapping[str, str]
     """Exit code of a process, which always ends here, together with whatever it started itself."""
     end = time.monotonic() + runner.time_limit_s
     process = subprocess.Popen(  # noqa: S603 - a slicer found by name, with our own arguments
-        list(command), stdin=subprocess.DEVNULL, stdout=said, stderr=said, env=environment, start_new_session=True
+        on_leash(list(command)),
+        stdin=subprocess.PIPE,
+        stdout=said,
+        stderr=said,
+        env=environment,
+        start_new_session=True,
     )
     try:
         while True:
@@ -115,6 +123,8 @@ def _wait(command: Sequence[str], said: BinaryIO, environment: Mapping[str, str]
                 else:  # Windows
                     process.kill()
             process.wait()
+        if process.stdin:
+            process.stdin.close()
 
 
 def _last_words(said: BinaryIO) -> str:

@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from sensorgen.core.errors import CadFailed, SensorgenError, Unwritable
+from sensorgen.core.leash import end_with_parent
 from sensorgen.scene.scene import AXES, PLANE, Body, Point, Prism, Scene
 
 if TYPE_CHECKING:
@@ -211,6 +212,7 @@ def _step_string(text: str) -> bytes:
 
 def main() -> None:
     """Write one STEP file for each job on standard input, until it ends; answer None, or what went wrong."""
+    end_with_parent()
     with os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)  # what the kernel prints is no answer
         gc.disable()  # what the import makes lives for good: not to look through it for garbage saves a tenth of it
