@@ -61,7 +61,7 @@ def decode(kind: type[_Kind], content: str, number: int, logged_at: str) -> _Kin
     """
     try:
         data = json.loads(content)
-    except (ValueError, RecursionError):
+    except (ValueError, TypeError, RecursionError):
         data = None
     if not isinstance(data, dict):
         raise BadInput(f"a {kind.__name__} of which the content is no JSON object: {content!r:.60}")

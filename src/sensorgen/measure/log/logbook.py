@@ -184,7 +184,7 @@ class Log:
     def head(self) -> tuple[int, str]:
         """Number of records and identity of the last one: who knows it can tell any later change of the log."""
         sequence, head = next(self._rows("SELECT sequence, id FROM head"), (0, ""))
-        return int(sequence), str(head)
+        return sequence if type(sequence) is int else -1, str(head)
 
     def records(self, after: int = 0) -> Iterator[Record]:
         """Records in their order, of all kinds, from a number on."""
@@ -288,7 +288,7 @@ class Log:
             writer.finish()
         return new
 
-    def merge(self, records: Mapping[str, Record]) -> int:
+    def merge(self, records: Mapping[str, Record]) -> tuple[int, int]:
         """Add records of another log; a merge is logged where both have grown.
 
         Parameters
@@ -298,14 +298,14 @@ class Log:
 
         Returns
         -------
-        int
-            Number of records that are new, without the merge.
+        int, int
+            Number of records that are new, without the merge; and of those whose parents are in neither log.
 
         Raises
         ------
         BadInput
             A record that is not what its identity says, or of a kind or schema that this version does not read; then
-            nothing is added. Records whose parents are in neither log are left out.
+            nothing is added.
         """
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         with database.transaction(self._connection, self.path):
@@ -321,7 +321,7 @@ class Log:
                     row = Merge(uid="")
                     writer.append(chain.made(heads, NAMES[Merge], VERSION, now, encode(row)), copy=False)
                 writer.finish()
-            return len(added)
+            return len(added), len(missing) - len(added)
 
     def _received(self, record: Record) -> Entry:
         """Row of another machine's record."""
@@ -403,7 +403,7 @@ class Log:
         """Row of a record; a value that no field can have is reported as damage."""
         try:
             return decode(KINDS[kind], content, number, logged_at)
-        except SensorgenError as error:
+        except (SensorgenError, KeyError) as error:
             raise BadInput(f"the log {str(self.path)!r} is damaged: {error}") from None
 
 
@@ -455,6 +455,8 @@ def _check_prediction(entry: Prediction) -> None:
 
 def _record(row: Sequence[Any]) -> Record:
     key, parents, kind, version, logged_at, content = row
+    if type(version) is not int or not all(type(text) is str for text in (key, parents, kind, logged_at, content)):
+        raise BadInput(f"a record is damaged: it holds {row!r:.80}")
     return Record(key, _parents(parents), kind, version, logged_at, content)
 
 

@@ -69,9 +69,10 @@ def sync(log: Log, place: Path) -> Synced:
         The place cannot be written to.
     """
     with _opened(place, create=True) as folder:
-        received, notes = _pull(log, folder)
-        sent = _push(log, folder)
-    return Synced(str(place), received, sent, log.head()[1], notes)
+        there, notes = _records(folder)
+        received = _pull(log, folder, there, notes)
+        sent = _push(log, folder, there)
+    return Synced(str(place), received, sent, log.head()[1], tuple(notes))
 
 
 def backup(log: Log, place: Path) -> Synced:
@@ -87,7 +88,7 @@ def backup(log: Log, place: Path) -> Synced:
     if place.exists():
         raise BadInput(f"{str(place)!r} is there; expected a new folder or .zip, or sensorgen log sync {str(place)!r}")
     with _opened(place, create=True) as folder:
-        sent = _push(log, folder)
+        sent = _push(log, folder, {})
     return Synced(str(place), 0, sent, log.head()[1])
 
 
@@ -102,8 +103,9 @@ def restore(log: Log, place: Path) -> Synced:
     if log.head()[0]:
         raise BadInput(f"the log {str(log.path)!r} has rows; expected an empty or new one: name it with --log")
     with _opened(place, create=False) as folder:
-        received, notes = _pull(log, folder)
-    return Synced(str(place), received, 0, log.head()[1], notes)
+        there, notes = _records(folder)
+        received = _pull(log, folder, there, notes)
+    return Synced(str(place), received, 0, log.head()[1], tuple(notes))
 
 
 @contextmanager
@@ -143,9 +145,8 @@ def _unpack(place: Path, folder: Path) -> None:
         raise BadInput(f"{str(place)!r} is no archive of a log: {str(error)[:80]}") from None
 
 
-def _pull(log: Log, folder: Path) -> tuple[int, tuple[str, ...]]:
-    """Add what the folder has; number of records, and notes."""
-    records, notes = _records(folder)
+def _pull(log: Log, folder: Path, records: dict[str, Record], notes: list[str]) -> int:
+    """Add what the folder has; number of records. Notes grow by what is incomplete."""
     raw = [decode(RawFile, r.content, 0, r.logged_at) for r in records.values() if r.kind == "raw_file"]
     for file in raw:
         source = files.place(folder / "files", file)
@@ -155,12 +156,10 @@ def _pull(log: Log, folder: Path) -> tuple[int, tuple[str, ...]]:
             files.keep(log.files, source, file)
         else:
             notes.append(f"raw file {shown(file.name)} is not in {str(folder)!r}; sync again when it is")
-    received = log.merge(records)
-    known = {record.id for record in log.records()}
-    left = sum(key not in known for key in records)
+    received, left = log.merge(records)
     if left:
         notes.append(f"{left} records follow others that are not there yet; sync again when they are")
-    return received, tuple(notes)
+    return received
 
 
 def _records(folder: Path) -> tuple[dict[str, Record], list[str]]:
@@ -189,9 +188,8 @@ def _parsed(line: str, path: Path) -> Record:
     return record
 
 
-def _push(log: Log, folder: Path) -> int:
+def _push(log: Log, folder: Path, there: dict[str, Record]) -> int:
     """Add to the folder what it lacks; number of records."""
-    there = _records(folder)[0]
     missing = [record for record in log.records() if record.id not in there]
     for file in log.entries(RawFile, superseded=True):
         target = files.place(folder / "files", file)
