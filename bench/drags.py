@@ -52,7 +52,8 @@ def main():
                 made = sliced([alone(design)], slicer, Path(folder))
                 text = unlifted(made, design.machine)
                 start = time.process_time()
-                lifted, change = lift(text, design.machine)
+                found = lift(text, design.machine)
+                lifted, change = found.text, found.lifting
                 spent = time.process_time() - start
                 found = check(lifted, design.machine)
                 before, after = (f"{d.contact_mm:.1f} + {d.near_mm:.1f}" for d in (change.before, change.after))

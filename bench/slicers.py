@@ -1,7 +1,7 @@
-"""One design through four slicers: writes bench/results/slicers.*, C and R of each from its own G-code.
+"""One design through six slicers: writes bench/results/slicers.*, C and R of each from its own G-code.
 
-PrusaSlicer and CuraEngine are this machine's and those that ``scripts/debian13-slicers`` makes. The designs are
-12 x 10 mm: three to six cells show what a slicer does to each.
+PrusaSlicer and CuraEngine are this machine's and those that ``scripts/debian13-slicers`` makes, also for ``sid`` and
+``bullseye``. The designs are 12 x 10 mm: three to six cells show what a slicer does to each.
 """
 
 import json
@@ -15,6 +15,7 @@ from sensorgen.asprinted.printed import body
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design import design
+from sensorgen.export import slicing
 from sensorgen.export.gcode.check import check
 from sensorgen.export.slicing import alone, sliced
 from sensorgen.prediction import bodies
@@ -24,7 +25,10 @@ RESULTS = Path(__file__).parent / "results"
 DESIGNS = Path(__file__).parents[1] / "designs"
 CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
 NEWER = Path(os.environ.get("SENSORGEN_DEBIAN13") or CACHE / "sensorgen-debian13") / "bin"
-PROGRAMS = (("prusa", ""), ("prusa", "prusa-slicer"), ("cura", ""), ("cura", "CuraEngine"))
+PROGRAMS = (
+    ("prusa", ""), ("prusa", NEWER / "prusa-slicer"), ("prusa", CACHE / "sensorgen-sid/bin/prusa-slicer"),
+    ("cura", CACHE / "sensorgen-bullseye/bin/CuraEngine"), ("cura", ""), ("cura", NEWER / "CuraEngine"),
+)  # fmt: skip
 SIZE = {"length_mm": 12.0, "width_mm": 10.0}
 
 
@@ -66,7 +70,8 @@ def printed(variant, slicer, program):
 
 
 def main():
-    rows, programs = {}, [(slicer, str(NEWER / name) if name else "") for slicer, name in PROGRAMS]
+    slicing._OLDEST["cura"] = (4, 8)  # older than the profiles are for: to see what it makes of them
+    rows, programs = {}, [(slicer, str(path)) for slicer, path in PROGRAMS if not path or path.is_file()]
     for variant in variants():
         started = time.process_time()
         rows[variant.name] = [printed(variant, *at) for at in programs]
@@ -82,7 +87,9 @@ def table(rows):
         "# Slicers beside each other\n",
         "From each slicer's G-code of 12 x 10 mm: C between the electrodes [pF], in brackets the range over the widths "
         "that a bead can have; R of the top electrode, end to end [ohm]. `!`: refused by `gcode check`.\n",
-        "OrcaSlicer, Bambu Studio and SuperSlicer are in no distribution, PyPI or npm, and were not run.\n",
+        "PrusaSlicer 2.9.6 is Debian sid's. CuraEngine 4.8, Debian 11's, is older than the profiles are for, and is "
+        "refused by `sensorgen slice`. PrusaSlicer 2.3, of Debian 11, does not know the options of its command line. "
+        "OrcaSlicer, Bambu Studio and SuperSlicer are in no release of Debian, PyPI or npm, and were not run.\n",
         "| design | " + " | ".join(titles) + " |",
         "|---" * (len(titles) + 1) + "|",
     ]

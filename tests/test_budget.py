@@ -168,9 +168,13 @@ def test_ways_to_print_it_are_a_term_of_a_print():
     from sensorgen.prediction.sensor_model import build_sensor
 
     model = build_sensor(estimated(make({"shape": "tri"})), "unconfined")
-    (term,) = [t for t in budget(model).terms if t.kind == "print"]
-    c = model.rest.capacitance
-    assert term.changes.magnitude == pytest.approx(c.value / c.print.lower - 1, rel=0.02)  # |Z| of a capacitor
+    width, film = [t for t in budget(model).terms if t.kind == "print"]
+    rest = model.rest
+    c = rest.capacitance
+    assert (width.name, film.name) == ("print", "film thickness")
+    assert width.changes.magnitude == pytest.approx(c.value / rest.by_width.lower - 1, rel=0.02)  # |Z| of a capacitor
+    assert film.changes.magnitude == pytest.approx(1 - c.value / rest.by_film.upper, rel=0.02)
+    assert c.print.upper == pytest.approx(rest.by_width.upper * rest.by_film.upper / c.value, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ from sensorgen.export.gcode.check import check
 from sensorgen.export.slicers import run, stl
 from sensorgen.export.slicing import Placed, alone, sliced
 from sensorgen.export.threemf.plate import box_mm
-from sensorgen.scene.geometry.mesh import Mesh
+from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.scene import Body, box
 from sensorgen.workflows.slice import slice_design
 
@@ -71,7 +71,7 @@ def test_a_plate_is_sliced_and_put_into_the_printers_words(slicer, tmp_path):
     assert check(made.raw, SMALL.machine).errors()
     assert [s for n, s in enumerate(steps) if s not in steps[:n]] == list(slicing.STEPS)
     assert (made.lines.tool.tolist(), made.lines.filament_mm.tolist()) == ([3, 4], [0.5, 0.5])
-    assert made.lines.number.tolist() == paths.read(made.raw, SMALL.machine, "slicer").number.tolist()
+    assert made.lines.number.tolist() == paths.read(made.ready, SMALL.machine).number.tolist()
     assert made.seconds > 0
     with zipfile.ZipFile(tmp_path / "x" / "plate.3mf") as plate:
         config = plate.read("Metadata/Slic3r_PE_model.config").decode()

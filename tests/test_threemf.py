@@ -15,7 +15,7 @@ import pytest
 
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
 from sensorgen.export.threemf import FAMILIES, Part, content
-from sensorgen.scene.geometry.mesh import Mesh
+from sensorgen.scene.geometry.meshes import Mesh
 
 CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 HOSTILE = "top \"of\" 'it' <film> & Größe µ € 😀 %s %d {x}"

@@ -1,5 +1,7 @@
 """What is changed so that what was asked for comes out: by the estimate, and by a real slicer."""
 
+from dataclasses import replace
+
 import pytest
 
 from sensorgen.asprinted.printed import body, gap_mm, nominal
@@ -7,13 +9,14 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.design import design
 from sensorgen.prediction.bodies import drawn, estimated, sliced
 from sensorgen.prediction.rest_state import rest_state
-from sensorgen.workflows.compensation import BAKE, compensated, printable
+from sensorgen.workflows import compensation
+from sensorgen.workflows.compensation import BAKE, compensated, found, printable
 
 from .conftest import small
 
 
-def changed(found):
-    return {c.what: (c.before, c.after) for c in found}
+def changed(changes):
+    return {c.what: (c.before, c.after) for c in changes}
 
 
 def estimated_gap(variant, walls):
@@ -48,6 +51,15 @@ def test_a_film_of_one_layer_is_refused_with_the_nearest():
         OutOfRange, match=r"2 layers at least, 0\.2 mm at layers of 0\.1 mm; nearest: a gap of 0\.2 mm and"
     ):
         compensated(small(parameters={"dielectric_mm": 0.1}))
+
+
+def test_a_film_of_one_layer_that_prints_as_two_is_refused_all_the_same(monkeypatch):
+    """A print with the nearest gap that can be had, and the capacitance asked for, is not what was asked for."""
+    asked = small(parameters={"dielectric_mm": 0.1})
+    two = replace(found(drawn(asked)), gap_mm=0.2)
+    monkeypatch.setattr(compensation, "_estimate", lambda design, walls: replace(two, design=design))
+    with pytest.raises(OutOfRange, match=r"2 layers at least.*nearest: a gap of 0\.2 mm and"):
+        compensated(asked)
 
 
 def test_heights_become_whole_layers():
@@ -111,4 +123,4 @@ def test_a_real_slicer_prints_gap_and_capacitance(printed, real):
     wanted = rest_state(drawn(asked)).capacitance.value
     assert rest_state(by_slicer(made)).capacitance.value == pytest.approx(wanted, rel=0.03)
     assert gap_mm(printed("arachne", asked)[1].cell.scene) == pytest.approx(0.3, abs=1e-9)
-    assert nominal(made, real("arachne", made)[1]).rows()
+    assert nominal(made, real("arachne", made)[1]).rows

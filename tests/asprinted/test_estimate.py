@@ -140,7 +140,7 @@ def test_a_slanted_part_is_narrower_by_a_rounding_all_round():
 @pytest.mark.parametrize(("walls", "width", "printed"), [
     ("arachne", 0.11, 0.0), ("arachne", 0.2, 0.34), ("arachne", 0.7, 0.7 - 0.1 * (1 - pi / 4)), ("classic", 0.43, 0.0),
     ("cura", 0.43, 0.0), ("cura", 0.5, 0.44), ("cura", 0.7, 0.61), ("cura", 0.9, 0.9), ("cura-gaps", 0.03, 0.0),
-    ("cura-gaps", 0.05, 0.05), ("cura-5", 0.1, 0.0), ("cura-5", 0.11, 0.34), ("cura-5", 0.7, 0.7),
+    ("cura-gaps", 0.05, 0.05), ("cura-5", 0.105, 0.0), ("cura-5", 0.11, 0.34), ("cura-5", 0.7, 0.7),
 ])  # fmt: skip
 def test_a_strip_in_any_direction_is_as_wide_as_its_walls_print_it(walls, width, printed, turn):
     c, s = cos(turn), sin(turn)
@@ -197,6 +197,17 @@ def test_edges_that_rounding_parted_within_a_window_meet_in_their_middle():
     assert {edges(layer)[1] for layer in found} == {1.0005}
 
 
+def test_a_cell_that_rounding_made_lopsided_is_its_own_mirror_image():
+    given = [strips(0.0, 0.1, (0.25, 0.450363), (1.549638, 1.75)), strips(0.1, 0.2, (0.3, 1.7))]
+    plan = window.Window((0.0, 2.0), (0.0, 1.0))
+    found = window.evened(given, plan, 2e-3)
+    places = [shapely.bounds(part)[[0, 2]] for part in shapely.get_parts(found[0].region("a"))]
+    assert sorted(places[0]) == pytest.approx(sorted(2 - places[1]), abs=1e-12)
+    aside = [strips(0.0, 0.1, (0.25, 0.5), (1.54, 1.75))]
+    assert window.evened(aside, plan, 2e-3) == aside
+    assert window.evened(aside, plan) != aside
+
+
 def test_a_layer_that_is_lost_parts_what_is_above_from_what_is_below():
     like = Scene((Body("a", "x60", (box(0, 1, 0, 1, 0, 0.3),)),), (2.0, 1.0, 0.3))
     found = scene_of(
@@ -246,3 +257,10 @@ def test_lines_of_the_design_decide_what_vanishes():
     wide = design.make({"shape": "reference", "profile": {"line_mm": {"x60": 0.6}}})
     assert layers(scene, wide.machine, wide.layers, "classic")[0].regions
     assert not layers(scene, wide.machine, wide.layers, "classic", lines(wide))[0].regions
+
+
+@pytest.mark.parametrize(("line", "printed"), [(0.39, True), (0.4, True), (0.41, False)])
+def test_cura_5_prints_a_quarter_of_a_line(line, printed):
+    """CuraEngine 5.0 prints tips of 0.1 mm with lines of 0.4 mm, and not with its usual ones of 0.44 mm."""
+    tip = Scene((Body("tip", "x60", (box(1, 1.1, 0, 6, 0, 0.1),)),), (6.0, 6.0, 0.1))
+    assert bool(layers(tip, tri().machine, tri().layers, "cura-5", {"x60": Lines(line)})[0].regions) is printed

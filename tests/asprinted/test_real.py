@@ -48,7 +48,7 @@ def per_period(variant, layers_of):
 def test_volumes_per_layer_are_those_found_by_hand(real, walls):
     variant, lines, version = real(walls)
     assert version.startswith(REFERENCE["slicers"]["cura" if walls.startswith("cura") else "prusa"])
-    rows = nominal(variant, lines).rows()
+    rows = nominal(variant, lines).rows
     found = {(r.bottom_mm, r.top_mm): r.ratio for r in rows if r.body == COG}
     for layer, ratio in zip(REFERENCE["layers_mm"], REFERENCE["printed_over_exact"][walls], strict=True):
         if ratio is not None:
@@ -205,7 +205,7 @@ def test_g_code_of_another_place_or_piece(real):
     with pytest.raises(BadInput, match="was it sliced from this design"):
         body(variant, lines, centre_mm=(100.0, 50.0))
     made = nominal(variant, lines, centre_mm=(100.0, 50.0))
-    rows, found = made.rows(), made.findings()
+    rows, found = made.rows, made.findings()
     assert all(row.printed_mm3 == 0 for row in rows)
     assert {f.severity for f in found} == {"error", "warning"}
 
@@ -229,7 +229,7 @@ def test_resistance_of_the_sliced_electrode(real, degrees):
 
 def test_sparse_infill_thins_the_film_and_not_what_is_walls_alone(real):
     full, sparse = (
-        {(r.body, r.layer): r.ratio for r in nominal(v, real("arachne", v)[1]).rows()}
+        {(r.body, r.layer): r.ratio for r in nominal(v, real("arachne", v)[1]).rows}
         for v in (small(), small(infill={"x60": {"percent": 50}}))
     )
     assert sparse["film_and_lower", 4] < 0.85 * full["film_and_lower", 4]

@@ -6,9 +6,11 @@ import shutil
 
 import pytest
 
-from sensorgen.asprinted.registration import placed
+from sensorgen.asprinted import agreement
+from sensorgen.asprinted.registration import pieces, placed
 from sensorgen.core.errors import BadInput
 from sensorgen.export import slicing
+from sensorgen.export.gcode.motion import follow
 from sensorgen.export.slicing import Placed
 from sensorgen.prediction.bodies import from_gcode
 from sensorgen.prediction.rest_state import rest_state
@@ -80,6 +82,34 @@ def test_each_of_a_plate_is_found(made, tmp_path):
     assert capacitance_f(design, plate.raw) == pytest.approx(capacitance_f(design, done.raw), rel=2e-3, abs=0)
     alone = capacitance_f(other, plate.raw)
     assert alone < capacitance_f(design, plate.raw) * 16 / 12, "its film is thicker"
+
+
+def test_the_piece_of_a_plate_that_has_a_fault_is_named(made, tmp_path):
+    """Three copies, one of them turned; the strips of one are left out, and the two others pass."""
+    design, done = made
+    alone, (x, y) = done.ready.read_text("utf-8"), design.machine.bed_centre_mm()
+    places = [lambda u, v: (u, v), lambda u, v: (u - 40, v + 20), lambda u, v: (y - v + 40, u - x)]
+    turns = [changed(alone, place) for place in places]
+    for broken, at in ((1, f"at x {x - 40:.4g}, y {y + 20:.4g} mm"), (2, "at x 40, y 0 mm")):
+        texts = [without(text, 3) if k == broken else text for k, text in enumerate(turns)]
+        motion = follow("".join(texts).encode())
+        assert len(pieces(design, motion)) == 3
+        faults = [f for f in agreement.check_motion(design, motion) if f.rule == "volume"]
+        assert faults
+        assert all(re.match(rf"piece \d of 3, {at}: .* mm3 in layer", f.message) for f in faults), faults
+    with_all = agreement.check_motion(design, follow("".join(turns).encode()))
+    assert not [f for f in with_all if f.rule in ("volume", "material", "place", "width")]
+
+
+def without(text, tool):
+    """G-code whose tool extrudes but in the first layers."""
+    hand, layer, lines = 0, 0, []
+    for line in text.splitlines():
+        hand = int(line[1]) if re.match(r"T\d", line) else hand
+        layer += line.startswith(";LAYER_CHANGE")
+        gone = hand == tool and layer > 4 and re.match(r"G1 .*[XY].* E[.\d]", line)
+        lines.append(re.sub(r" E[.\d]+", "", line) if gone else line)
+    return "\n".join(lines) + "\n"
 
 
 def test_what_is_not_the_design_is_said(made, tmp_path):

@@ -10,13 +10,26 @@ import pytest
 from sensorgen.core.errors import BadInput, Unprintable, Unwritable
 from sensorgen.design import design
 from sensorgen.design.specimen_name import parse
+from sensorgen.measure.log import Log, importing
 from sensorgen.prediction.bodies import estimated
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import to_json
 from sensorgen.workflows.batch import make
-from sensorgen.workflows.batch.record import RECORD, Differences, differences, read
+from sensorgen.workflows.batch.record import RECORD
+from sensorgen.workflows.sealed import Differences, batch_differences, seal
 
 TRI = design.make({"shape": "tri", "parameters": {"length_mm": 20.0, "width_mm": 10.0}})
+
+
+WRITTEN = ("it does not hold what was written",)
+
+
+def differences(folder, log=None):
+    return batch_differences(folder, RECORD, log)
+
+
+def read(folder):
+    return json.loads((folder / RECORD).read_text("utf-8"))
 
 
 @pytest.fixture
@@ -95,7 +108,7 @@ def test_a_record_of_an_earlier_version_verifies(tmp_path):
     (tmp_path / RECORD).write_text(json.dumps(content | {"sha256": seal}))
     assert not differences(tmp_path)
     (tmp_path / RECORD).write_text(json.dumps(content | {"sha256": seal, "batch": "27"}))
-    assert differences(tmp_path) == Differences(record=True)
+    assert differences(tmp_path) == Differences(record=WRITTEN)
 
 
 def test_the_keys_of_a_record_stay(small):
@@ -123,8 +136,28 @@ def test_verify_finds_a_record_that_was_rewritten(copy):
     text = path.read_text("utf-8")
     path.write_text(text.replace("PI-2026-014", "PI-2026-015"), "utf-8")
     found = differences(copy)
-    assert found == Differences(record=True)
+    assert found == Differences(record=WRITTEN)
     assert found  # which decides the exit code
+
+
+def test_verify_finds_links_and_keys_that_stand_twice(copy, tmp_path):
+    path = copy / RECORD
+    path.write_text(path.read_text("utf-8").replace('"batch":', '"batch": "another",\n  "batch":', 1), "utf-8")
+    assert differences(copy).record == ("key 'batch' stands twice",)
+    (copy / "plate.svg").replace(tmp_path / "plate.svg")
+    (copy / "plate.svg").symlink_to(tmp_path / "plate.svg")  # of the same content
+    assert differences(copy).links == ("plate.svg",)
+
+
+def test_a_record_that_was_sealed_anew_is_found_by_the_log(copy, tmp_path):
+    with Log(tmp_path / "log.db", create=True) as log:
+        importing.import_file(log, copy / RECORD, {})
+        assert not differences(copy, log)
+        data = read(copy)
+        data["tools"][next(iter(data["tools"]))]["lot"] = "another"
+        (copy / RECORD).write_text(json.dumps(data | {"sha256": seal(data)}), "utf-8")
+        assert not differences(copy)
+        assert differences(copy, log).record == ("batch.json is not the one that the log has of batch small",)
 
 
 @pytest.mark.parametrize(
@@ -186,3 +219,9 @@ def test_tabs_are_bodies_of_their_own_and_take_room(plan, tmp_path):
     with_tabs = make(plan("labels: {tab: true}\n" + plan().read_text("utf-8")), tmp_path / "out", gcode=False)
     sizes = {tuple(s["size_mm"]) for s in read(with_tabs.folder)["specimens"].values()}
     assert all(length > 30 for length, _ in sizes)
+
+
+def test_labels_have_the_head_of_the_log(plan, tmp_path):
+    """What was in the log before the print can be proven by a label on the specimen."""
+    folder = make(plan(), tmp_path / "out", gcode=False, log_head="0123456789abcdef" * 4).folder
+    assert folder.joinpath("labels.html").read_text("utf-8").count("<p>log 0123456789abcdef</p>") == 3

@@ -44,6 +44,14 @@ def test_modules_that_are_not_loaded(real, words, never):
     assert not set(never) & set(loaded)
 
 
+def test_build_with_a_stored_prediction_enters_few_modules(real):
+    real("build", "reference", "--no-cad")
+    said = real("build", "reference", "--no-cad", before=LOADED)
+    loaded = [name for name in said.out.rpartition("loaded: ")[2].split() if name.startswith("sensorgen")]
+    assert len(loaded) <= 96
+    assert not [name for name in loaded if name.startswith(("sensorgen.models", "sensorgen.solvers"))]
+
+
 def test_no_other_package_has_a_say_in_how_designs_are_read(real, monkeypatch, tmp_path):
     """Pydantic would look through all that is installed for plugins; here is one."""
     (tmp_path / "meddler.py").write_text("plugin = None\n")

@@ -12,6 +12,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.design.printer import load_printer
 from sensorgen.export.gcode.check import check
+from sensorgen.export.gcode.crossings import crossings
 from sensorgen.export.gcode.drags import drags, lift
 from sensorgen.export.gcode.motion import follow
 
@@ -54,7 +55,8 @@ def printing(text):
 
 def assert_lifted(lines, machine=DIABASE):
     text = "\n".join([*lines, ""]).encode()
-    made, lifting = lift(text, machine)
+    lifted = lift(text, machine)
+    made, lifting = lifted.text, lifted.lifting
     before, after = printing(text), printing(made)
     assert before[0] == after[0]
     assert before[1] == pytest.approx(after[1], abs=1e-3)
@@ -68,6 +70,16 @@ def test_ten_lines_of_half_a_millimetre_are_crossed():
     assert sums(COMB + OVER) == {4: (5.0, 0.0)}
     found = drags(COMB + OVER, DIABASE).tools[0]
     assert (found.crossings, found.unretracted) == (1, 0)
+
+
+def test_stretches_lie_where_the_lines_are():
+    stretches = crossings(follow(COMB + OVER), DIABASE).stretches()
+    assert stretches.length_mm == pytest.approx([0.5] * 10)
+    assert stretches.touches.all()
+    assert set(stretches.tool.tolist()) == {4}
+    middle = (stretches.start_mm + stretches.end_mm) / 2
+    assert middle == pytest.approx(np.array([[10.0, y, 0.1] for y in range(10)]))
+    assert len(crossings(follow(COMB), DIABASE).stretches().tool) == 0
 
 
 def test_one_layer_up_is_near_and_two_are_neither():
@@ -171,7 +183,8 @@ def test_a_slow_z_axis_gets_its_own_feed():
 
 def test_a_file_of_one_tool_stays_as_it_is():
     text = "\n".join([*COMB, "G1 X10 Y-3", "G1 Y12", ""]).encode()
-    made, lifting = lift(text, DIABASE)
+    lifted = lift(text, DIABASE)
+    made, lifting = lifted.text, lifted.lifting
     assert made == text
     assert (lifting.lifts, [*lifting.document()]) == (0, [])
 
@@ -184,7 +197,7 @@ def test_relative_places_and_inches_are_refused(mode):
 
 def test_lifts_are_no_new_findings():
     before = {f.rule for f in check(COMB + OVER, DIABASE).findings}
-    made, _ = lift(COMB + OVER, DIABASE)
+    made = lift(COMB + OVER, DIABASE).text
     assert {f.rule for f in check(made, DIABASE).findings} == before
 
 
@@ -192,7 +205,8 @@ def test_lifts_are_no_new_findings():
 def test_a_planted_crossing_is_found(number):
     """Of a lifted file, one lift left out at a time."""
     back = [f"G1 X{12 + number} Y-4 F7200", f"G1 X15 {e(3)} F1200", f"G1 X{14 - number} Y12 F7200", f"G1 X15 {e(1)}"]
-    made, lifting = lift([*COMB, *OVER, *back, *back], DIABASE)
+    lifted = lift([*COMB, *OVER, *back, *back], DIABASE)
+    made, lifting = lifted.text, lifted.lifting
     assert lifting.lifts == 5
     lines = made.decode().splitlines()
     up = [k for k, line in enumerate(lines) if line == "G1 Z0.3 F3000"]
@@ -202,7 +216,7 @@ def test_a_planted_crossing_is_found(number):
 
 def test_a_planted_change_of_a_printing_line_is_found():
     text = "\n".join([*COMB, *OVER, ""]).encode()
-    made, _ = lift(text, DIABASE)
+    made = lift(text, DIABASE).text
     for old, new in ((rb"X20 E", b"X20.001 E"), (rb"F1200$", b"F1201"), (rb"(X15 E.*)", rb"\1 ;")):
         wrong = re.sub(old, new, made, count=1, flags=re.MULTILINE)
         assert wrong != made

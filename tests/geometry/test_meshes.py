@@ -8,8 +8,7 @@ import pytest
 import trimesh
 
 from sensorgen.design.shapes import rect, reference, tri
-from sensorgen.scene.geometry.mesh import Mesh
-from sensorgen.scene.geometry.meshes import mesh
+from sensorgen.scene.geometry.meshes import Mesh, mesh
 from sensorgen.scene.geometry.validity import solid
 from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 

@@ -11,7 +11,8 @@ from collections import Counter
 from pathlib import Path
 
 from sensorgen.core.errors import SensorgenError
-from sensorgen.measure.log import TABLES, Log, exchange, importing, verify
+from sensorgen.measure.log import Log, exchange, importing, verify
+from sensorgen.measure.log.entries import ROWS
 from sensorgen.measure.log.tables import thesis
 
 ODD = (
@@ -87,7 +88,7 @@ def samples(folder):
 
 def state(log):
     """Everything in a log."""
-    return [entry for kind in TABLES for entry in log.entries(kind, superseded=True)]
+    return [entry for kind in ROWS for entry in log.entries(kind, superseded=True)]
 
 
 def read_through(path):

@@ -68,9 +68,8 @@ def look(path, promised):
     connection = sqlite3.connect(path)
     try:
         found += [str(row) for row in connection.execute("PRAGMA integrity_check") if row != ("ok",)]
-        found += [str(row) for row in connection.execute("PRAGMA foreign_key_check")]
-        uids = {uid for (uid,) in connection.execute("SELECT uid FROM reading")}
-        runs = {uid for (uid,) in connection.execute("SELECT uid FROM bench_run")}
+        uids = {uid for (uid,) in connection.execute("SELECT uid FROM record WHERE kind = 'reading'")}
+        runs = {uid for (uid,) in connection.execute("SELECT uid FROM record WHERE kind = 'bench_run'")}
     finally:
         connection.close()
     tables = {}

@@ -45,12 +45,13 @@ def overwritten(path, at):
 
 
 def typed_wrongly(path):
-    """A row that no version of sensorgen writes, by the back door."""
+    """A record that no version of sensorgen writes, by the back door."""
     connection = sqlite3.connect(path, isolation_level=None)
-    columns = [name for _, name, *_ in connection.execute("PRAGMA table_info(reading)")]
-    other = {"number": "99", "uid": "'u'", "y_ohm": "'[nan'"}
+    columns = [name for _, name, *_ in connection.execute("PRAGMA table_info(record)")]
+    other = {"sequence": "99", "number": "99", "id": "'i'", "uid": "'u'",
+             "content": "'{\"uid\":\"u\",\"specimen\":\"x\",\"written\":\"x\",\"y_ohm\":\"[nan\"}'"}  # fmt: skip
     values = ", ".join(other.get(name, name) for name in columns)
-    connection.execute(f"INSERT INTO reading SELECT {values} FROM reading LIMIT 1")
+    connection.execute(f"INSERT INTO record ({', '.join(columns)}) SELECT {values} FROM record LIMIT 1")
     connection.close()
 
 
@@ -68,7 +69,7 @@ DAMAGE = {
     "cut a little": (lambda p: cut(p, 0.97), "is damaged"),
     "first page lost": (lambda p: overwritten(p, 200), "is damaged"),
     "a page lost": (lambda p: overwritten(p, 5 * 4096), "is damaged|database: "),
-    "a row of nonsense": (typed_wrongly, "is damaged: column y_ohm of a Reading holds"),
+    "a row of nonsense": (typed_wrongly, "record 70, a 'reading', is not what was logged"),
 }
 
 
@@ -138,28 +139,19 @@ def test_raw_files_are_checked(log, tmp_path):
 def test_a_prediction_that_was_tuned_is_found(log, path):
     from sensorgen.measure.log.batches import prediction
 
-    log.add([prediction("d", "trix", {"capacitance_f": 1e-11})])
+    log.add([prediction("d", "trix", {"capacitance_f": {"lower": 1e-11, "upper": 2e-11}})])
     assert list(verify.faults(log)) == []
     connection = sqlite3.connect(path, isolation_level=None)
-    sql = connection.execute("SELECT sql FROM sqlite_schema WHERE name = 'prediction_no_update'").fetchone()[0]
-    connection.execute("DROP TRIGGER prediction_no_update")
-    connection.execute("UPDATE prediction SET data = replace(data, '1', '2')")
+    sql = connection.execute("SELECT sql FROM sqlite_schema WHERE name = 'record_no_update'").fetchone()[0]
+    connection.execute("DROP TRIGGER record_no_update")
+    connection.execute("UPDATE record SET content = replace(content, 'e-11', 'e-12')")
     connection.execute(sql)
     connection.close()
-    assert list(verify.faults(log)) == ["prediction 1 is not what was logged"]
-
-
-def test_a_row_that_refers_to_nothing_is_found(sound):
-    connection = sqlite3.connect(sound, isolation_level=None)
-    connection.execute("INSERT INTO print VALUES (1, 'u', '', '23 triX', 'nobody', '', '')")
-    connection.close()
-    with Log(sound) as log:
-        assert list(verify.faults(log)) == ["'print': a row refers to one that is not there"]
+    assert list(verify.faults(log)) == ["record 1, a 'prediction', is not what was logged"]
 
 
 def test_what_sqlite_finds_is_told(log, monkeypatch):
-    said = {"integrity_check": ("ok", "row 3 missing\nfrom index x"), "foreign_key_check": ()}
-    monkeypatch.setattr(Log, "pragma", lambda _, name: said[name])
+    monkeypatch.setattr(Log, "pragma", lambda *_: ("ok", "row 3 missing\nfrom index x"))
     assert list(verify.faults(log)) == ["database: row 3 missing from index x"]
 
 

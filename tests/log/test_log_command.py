@@ -113,12 +113,13 @@ def test_hostile_words_do_not_reach_the_terminal(run):
 def test_lists(run, path):
     run("import", "--thesis")
     assert "the latest 40 are shown; --all shows all" in run("list").out
-    assert len(run("list", "--all").out.splitlines()) == 69 + 3
-    assert len(run("list", "--last", "3").out.splitlines()) == 3 + 4
+    assert len(run("list", "--all").out.splitlines()) == 69 + 4
+    assert len(run("list", "--last", "3").out.splitlines()) == 3 + 5
     assert max(map(len, run("list", "--all").out.splitlines()[:-1])) <= 80
     listed = run("list", "--iteration", "25").out.splitlines()
-    assert [line.split()[1:3] for line in listed[1:-2]] == [["25", name] for name in ("triX", "triY", "sqXY", "sqYX")]
-    assert listed[-2:] == ["69 readings, 0 recordings, 0 predictions", str(path)]
+    assert [line.split()[1:3] for line in listed[1:-3]] == [["25", name] for name in ("triX", "triY", "sqXY", "sqYX")]
+    assert listed[-3] == "69 readings, 0 recordings, 0 predictions"
+    assert listed[-1] == str(path)
 
 
 def test_a_prediction_is_kept_when_it_is_made(run, path):
@@ -133,7 +134,7 @@ def test_a_prediction_is_kept_when_it_is_made(run, path):
         assert log.predictions(design_id="x") == ()
         assert log.readings()[0].design_id == kept.design_id
     assert json.loads(kept.data)["capacitance"]["lower"] > 1e-12
-    assert "is sound: 2 rows" in run("verify").out
+    assert "is sound: 3 rows" in run("verify").out
 
 
 def test_a_prediction_ahead_of_the_measurement(run, path, tmp_path):
@@ -248,9 +249,10 @@ def test_a_long_list_loads_little(tmp_path):
         one = reading("23 triX .1mm", "650", "40")
         log.add([one])
         number = "WITH RECURSIVE n (k) AS (SELECT 2 UNION ALL SELECT k + 1 FROM n WHERE k < 100000) "
-        columns = [name for name, *_ in log._connection.execute("SELECT * FROM reading").description]
-        values = ", ".join({"number": "k", "uid": "'u' || k"}.get(name, name) for name in columns)
-        log._connection.execute(f"INSERT INTO reading {number} SELECT {values} FROM reading, n WHERE number = 1")
+        columns = [name for name, *_ in log._connection.execute("SELECT * FROM record").description]
+        new = {"number": "k", "sequence": "k", "uid": "'u' || k", "id": "'i' || k"}
+        values = ", ".join(new.get(name, name) for name in columns)
+        log._connection.execute(f"INSERT INTO record {number} SELECT {values} FROM record, n WHERE number = 1")
         assert log.count(Reading) == 100_000
     done = subprocess.run(
         [sys.executable, "-X", "importtime", "-m", "sensorgen", "log", "list", "--log", path],
@@ -258,6 +260,6 @@ def test_a_long_list_loads_little(tmp_path):
         text=True,
     )
     assert "100000 readings" in done.stdout
-    assert len(done.stdout.splitlines()) == 44
+    assert len(done.stdout.splitlines()) == 45
     loaded = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
     assert not {"numpy", "pydantic", "yaml", "scipy", "build123d", "pyarrow", "sensorgen.design.design"} & loaded

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.design import make
 
@@ -155,6 +156,31 @@ def test_coarser_triangles_take_over_where_finer_ones_fail(monkeypatch):
     assert found.doubts[-1].startswith("triangles of 3 um at the apex")
     assert "up to 10 kPa" in found.doubts[-1]
     assert found.displacement_m[-1] * 1e6 == pytest.approx(REFERENCE["tri_d0.1"]["uy_um"][2], rel=0.03)
+    kept = press2d.press(tri(), solids(), [0.0, 1e4, 2e4], enough=0.5)
+    assert (kept.converged_pa, kept.apex, kept.sound().faults) == (1e4, 1.0, ())
+    begun = press2d.press(tri(), solids(), [0.0, 1e4, 2e4], apex=3.0)
+    assert (begun.converged_pa, begun.apex) == (2e4, 3.0)
+    assert begun.displacement_m == pytest.approx(found.displacement_m, rel=1e-12)
+
+
+@pytest.mark.parametrize(("check", "bad"), [("volume_ratio", 0.1), ("penetration", 0.5), ("imbalance", -0.02)])
+def test_the_sound_part_ends_before_the_first_failed_check(check, bad):
+    values = {"volume_ratio": np.ones(4), "penetration": np.zeros(4), "imbalance": np.zeros(4)}
+    values[check] = np.array([*values[check][:2], bad, values[check][3]])
+    known = (Interval(1.0, 1.0), Interval(2.0, 2.0), Interval(3.0, 3.0), Interval(4.0, 4.0))
+    given = pressed.Pressed(STRESSES[:4], STRESSES[:4], known, (), fall_m=0.0, faults=("bad",), **values)
+    found = given.sound()
+    assert (found.converged_pa, found.faults, found.capacitance_f_per_m2) == (STRESSES[1], (), known[:2])
+
+
+def test_the_sound_part_ends_where_the_capacitance_is_unknown_or_falls():
+    c = Interval(2.0, 2.0)
+    for last in (None, Interval(1.0, 1.0)):
+        given = pressed.Pressed(
+            STRESSES[:3], STRESSES[:3], (c, c, last), (), np.ones(3), np.zeros(3), np.zeros(3), 0.0, ("bad",)
+        )
+        assert given.sound().converged_pa == STRESSES[1]
+    assert given.sound().sound().faults == ()
 
 
 def test_outlines_that_are_closed_in_the_wrong_place_do_not_pass(monkeypatch):

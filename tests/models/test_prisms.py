@@ -14,7 +14,9 @@ from sensorgen.design.shapes import rect
 from sensorgen.models import fem2d, fem3d, prisms
 from sensorgen.scene.layers import outlines
 from sensorgen.scene.scene import FLOATING, Body, Fill, Prism, Scene, box, rounded
+from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.bounds import Unsolved
+from sensorgen.solvers.electrostatics.enclosed import enclosing
 from sensorgen.solvers.electrostatics.prisms import Layers, Mesh, solved
 
 if importlib.util.find_spec("ngsolve") is None:
@@ -177,8 +179,9 @@ def test_slivers_are_refused_not_believed():
         (2.0, 2.0), np.array([0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]),
         [{0: full}, {2: full}, *({1: n} for n in nearly), {1: full}], 2, [4.68, 1.0],
     )  # fmt: skip
+    mesh = Mesh.of(layers, (0.2, 0.05), 1e-8)
     with pytest.raises(Unsolved, match="energy and charges differ"):
-        solved(Mesh.of(layers, (0.2, 0.05), 1e-8), 3, np.zeros(1))
+        solved(mesh, mesh, 3, np.zeros(1))
 
 
 def test_a_seam_through_conductors_that_do_not_fit_is_one_place_of_many():
@@ -193,3 +196,51 @@ def test_a_seam_through_conductors_that_do_not_fit_is_one_place_of_many():
         scene = replace(sensor(rounded_all(inside), (2.0, 2.0)), repeats=(True, True))
         ends.append(prisms.capacitance(scene, EPS, 2e-2))
     holds(ends[0], ends[1], 2e-2)
+
+
+@pytest.mark.parametrize("kind", [1, 2], ids=["conductor", "dielectric"])
+def test_rounded_outlines_enclose_the_exact_ones(kind):
+    """Of conductors and of dielectrics, posts a little narrower than the layer below; far layers drawn together."""
+    full = shapely.box(0, 0, 1, 1)
+    discs = [shapely.Polygon(post(0.0131, -0.0077, 0.4 - k * 0.004, corners=8, turn=0.3)) for k in range(3)]
+    discs = [shapely.intersection(disc, full) for disc in discs]
+    regions = [{0: full}, {2: full}, *({kind: disc} for disc in discs), {1: full}]
+    cell = Layers((1.0, 1.0), np.arange(7) / 10, regions, 2, [4.68, 1.0])
+    beside, far = (0.2, 0.04), 0.15
+    exact = Mesh.of(cell, beside, 1e-6, far)
+    exact = solved(exact, exact, 2, np.zeros(1))
+    ends = [enclosing(cell, 3e-3, far, 0.005, outwards=way) for way in (False, True)]
+    if kind == 1:
+        assert all(end.regions[3] == end.regions[4] != end.regions[2] for end in ends)
+    inner, outer = (Mesh.of(end, beside, 3e-3, far) for end in ends)
+    found, swapped = solved(inner, outer, 2, np.zeros(1)), solved(outer, inner, 2, np.zeros(1))
+    assert exact.lower / 1.04 < found.lower < exact.lower
+    assert exact.upper < found.upper < exact.upper * 1.04
+    assert swapped.lower > exact.lower  # planted: the wrong cell for each bound
+    assert swapped.upper < exact.upper
+
+
+def test_outlines_of_all_ranks_move_one_way():
+    """So that no slit opens between a conductor and the dielectric beside it."""
+    full, half = shapely.box(0, 0, 2, 2), shapely.box(0, 0, 1, 2)
+    cell = Layers((2.0, 2.0), np.array([0, 0.1, 0.2, 0.3]), [{0: full}, {1: half, 2: full - half}, {1: full}], 2,
+                  [4.68, 1.0])  # fmt: skip
+    for outwards in (False, True):
+        layer = enclosing(cell, 1e-2, 1.0, 0.0, outwards=outwards).regions[1]
+        assert layer[1].area == pytest.approx(2 + (0.03 if outwards else -0.03))
+        assert layer[1].area + layer[2].area == pytest.approx(4)
+
+
+def test_conductors_nearer_than_the_grid_are_refused():
+    full, one, other = shapely.box(0, 0, 2, 2), shapely.box(0.5, 0.5, 1, 1.5), shapely.box(1.001, 0.5, 1.5, 1.5)
+    cell = Layers((2.0, 2.0), np.array([0, 0.1, 0.2, 0.3]), [{0: full}, {2: one, 3: other}, {1: full}], 4, [1.0])
+    with pytest.raises(Unsolved, match="nearer than the grid"):
+        enclosing(cell, 1e-3, 0.1, 0.0, outwards=True)
+
+
+@pytest.mark.parametrize("enclosed", [False, True])
+def test_a_part_that_occurs_more_often_is_enclosed_too(enclosed):
+    """A quarter of the energy twice: what a larger cell adds may all lie there."""
+    found = fem.whole(fem.Energies(0.98, 1.0, 0.25, 1, enclosed=enclosed), [1.0, 2.0])
+    least = 0.98 + (0.5 - (1 + enclosed) * 0.02**0.5) ** 2
+    assert found.lower == pytest.approx(least, rel=1e-8)

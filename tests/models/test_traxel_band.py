@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+import scipy.sparse.linalg
 from scipy.sparse import csr_array, diags_array
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.solvers.network import band as _traxel_band
-from sensorgen.solvers.network import multigrid
 
 
 def network(n, reach, seed=1):
@@ -31,16 +31,28 @@ def test_a_product_is_that_of_a_dense_solve(n, reach, stretch, monkeypatch):
     assert found == pytest.approx(one @ np.linalg.solve(matrix, other), rel=1e-10)
 
 
-@pytest.mark.parametrize("most", [multigrid._MOST, 1])
+@pytest.mark.parametrize("most", [_traxel_band._ITERATIONS, 1])
 def test_a_wide_band_has_the_same_product(most, monkeypatch):
     """By multigrid, and by a sparse factor where that takes too many iterations."""
     matrix, (one, other) = network(600, 9)
     monkeypatch.setattr(_traxel_band, "_MOST", 4)
-    monkeypatch.setattr(multigrid, "_COARSEST", 20)
-    monkeypatch.setattr(multigrid, "_MOST", most)
-    assert (multigrid.solve(csr_array(matrix), other) is None) == (most == 1)
+    monkeypatch.setattr(_traxel_band, "_COARSEST", 20)
+    monkeypatch.setattr(_traxel_band, "_ITERATIONS", most)
+    factors, factor = [], scipy.sparse.linalg.splu
+    monkeypatch.setattr(scipy.sparse.linalg, "splu", lambda m, **how: factors.append(m.shape[0]) or factor(m, **how))
     found = _traxel_band.product(csr_array(matrix), one, other)
     assert found == pytest.approx(one @ np.linalg.solve(matrix, other), rel=1e-8)
+    assert (600 in factors) == (most == 1)
+
+
+def test_multigrid_has_equal_bits_each_time_and_leaves_random_numbers_alone(monkeypatch):
+    matrix, (one, other) = network(600, 9)
+    monkeypatch.setattr(_traxel_band, "_MOST", 4)
+    monkeypatch.setattr(_traxel_band, "_COARSEST", 20)
+    before = np.random.get_state()[1:3]
+    found = {_traxel_band.product(csr_array(matrix), one, other) for _ in range(3)}
+    assert len(found) == 1
+    assert all(np.array_equal(a, b) for a, b in zip(np.random.get_state()[1:3], before, strict=True))
 
 
 def test_a_wide_network_of_no_single_potential_is_refused(monkeypatch):

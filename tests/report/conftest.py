@@ -7,7 +7,7 @@ import pytest
 
 from sensorgen.design.specimen_name import design_of, parse
 from sensorgen.measure.log import Log, bench, importing, notes
-from sensorgen.workflows.stored_prediction import predicted_row
+from sensorgen.workflows.stored_prediction import predicted_rows
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -36,7 +36,7 @@ def recorded(tmp_path_factory):
     design = design_of(parse(names[0]))
     sensor = bench_files.truth(design, **bench_files.TRUTH)
     with Log(folder / "log.db", create=True) as log:
-        log.add([predicted_row(design)])
+        log.add(predicted_rows(design))
         for k, name in enumerate(names[:2]):
             bench.log_recording(
                 log,

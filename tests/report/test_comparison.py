@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sensorgen.analysis.comparison import of_iteration, predicted
+from sensorgen.analysis.comparison.expected import stored_or_made
 from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
@@ -171,6 +172,8 @@ def test_stored_predictions_are_plain_data(tmp_path):
     design = make({"shape": "reference"})
     found = evaluate(drawn(design))
     row = prediction(design.id(), design.name, json.loads(to_json(found)))
-    assert json.loads(row.data)["capacitance"]["lower"] == predicted(default_body(design), [row]).capacitance_f.lower
-    untimed = dataclasses.replace(found, plan=without_times(found.plan))  # stored without run times
-    assert predicted(default_body(design), [row]).prediction == untimed
+    with Log(tmp_path / "log.db", create=True) as book:
+        (logged,) = book.add([row])
+        kept = stored_or_made(default_body(design), book, [logged], [], [])
+    assert json.loads(row.data)["capacitance"]["lower"] == kept.capacitance_f.lower
+    assert kept.prediction == dataclasses.replace(found, plan=without_times(found.plan))  # stored without run times

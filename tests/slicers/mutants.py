@@ -9,7 +9,7 @@ from sensorgen.asprinted import agreement
 from sensorgen.core import document
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design import design
-from sensorgen.export.gcode.check import check
+from sensorgen.export.gcode.check import check_motion
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.ready import ready
 
@@ -72,8 +72,9 @@ def outcome(content: bytes, path: Path) -> str:
     path.write_bytes(content)
     loaded = {SENSOR.tool(name): name for name in SENSOR.used()}
     try:
-        found = check(path, SENSOR.machine, loaded, others_empty=True)
-        found = found.with_more(agreement.check_file(SENSOR, path))
+        motion = follow(path, SENSOR.machine.control.prime_macro)
+        found = check_motion(motion, SENSOR.machine, loaded, others_empty=True)
+        found = found.with_more(agreement.check_motion(SENSOR, motion))
     except SensorgenError as error:
         if "\n" in str(error) or not str(error):
             raise ValueError(f"not one line: {error}") from error

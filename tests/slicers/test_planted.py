@@ -77,9 +77,9 @@ def test_a_file_is_checked_where_it_stands(base, prusa_slicer, tmp_path):
     path, lines = tmp_path / "a.gcode", base("prusa")
     for x, y in ((0.0, 0.0), (-30.0, 12.0)):
         path.write_text("\n".join(moved(x, y, ";TYPE")(lines)))
-        assert agreement.check_file(SENSOR, path) == []
+        assert agreement.check_motion(SENSOR, follow(path)) == []
     path.write_text("\n".join(swapped(lines)))
-    assert {f.rule for f in agreement.check_file(SENSOR, path)} >= {"material"}
+    assert {f.rule for f in agreement.check_motion(SENSOR, follow(path))} >= {"material"}
     other = design.make({"shape": "tri", "parameters": {"dielectric_mm": 0.2, "length_mm": 14.0, "width_mm": 8.0}})
     with pytest.raises(BadInput, match=r"no piece of 14 x 8 mm.*off by 3.7\d mm at least"):
-        agreement.check_file(other, path)
+        agreement.check_motion(other, follow(path))

@@ -102,7 +102,8 @@ def test_another_printer_keeps_its_words(slicer, tmp_path):
     variant = small("23/trix-d0.1.yaml", printer="prusa-xl5", tools={"etpu": 0, "x60": 1})
     made = sliced([alone(variant)], slicer, tmp_path)
     assert check(made.ready, variant.machine).errors() == []
-    lifted, lifting = lift(made.raw, variant.machine)
+    found = lift(made.raw, variant.machine)
+    lifted, lifting = found.text, found.lifting
     assert made.ready.read_bytes() == lifted
     assert lifting.lifts > 0
     assert lifting.after.contact_mm + lifting.after.near_mm == 0

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from sensorgen.export.threemf import Part, content
-from sensorgen.scene.geometry.mesh import Mesh
+from sensorgen.scene.geometry.meshes import Mesh
 
 CONFIG = "Metadata/Slic3r_PE_model.config"
 

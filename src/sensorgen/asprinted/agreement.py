@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from itertools import groupby, zip_longest
 
@@ -9,14 +10,12 @@ import numpy as np
 import shapely
 
 from sensorgen.asprinted.beads import Beads, beads
-from sensorgen.asprinted.registration import placed
+from sensorgen.asprinted.registration import pieces
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.design.design import Design
 from sensorgen.design.tower import PRIME_MM3
-from sensorgen.export.gcode.files import Source
 from sensorgen.export.gcode.found import Found
-from sensorgen.export.gcode.motion import follow
-from sensorgen.export.gcode.moves import NO_TOOL, Change
+from sensorgen.export.gcode.moves import NO_TOOL, Change, Motion
 from sensorgen.export.gcode.paths import NOT_MODEL, Paths
 from sensorgen.scene.layers import LayerRegions, Region, drawn, narrow_mm, parts
 from sensorgen.scene.scene import Point
@@ -36,7 +35,14 @@ _SUPPORT = "support"
 
 
 def check(
-    design: Design, paths: Paths, changes: Sequence[Change], centre_mm: Point, *, alone: bool = False
+    design: Design,
+    paths: Paths,
+    changes: Sequence[Change],
+    centre_mm: Point,
+    *,
+    alone: bool = False,
+    piece: str = "",
+    lines: Beads | None = None,
 ) -> list[Found]:
     """What disagrees with the design, as findings about lines of the file.
 
@@ -52,7 +58,34 @@ def check(
         Middle of the piece on the bed [mm].
     alone : bool
         Whether the file prints nothing else.
+    piece : str
+        Name of the piece among others, which every finding then names.
+    lines : Beads, optional
+        Lines of the piece; found in ``paths`` if not given.
     """
+    found = _of_piece(design, paths, changes, centre_mm, alone, lines)
+    return [replace(f, message=f"{piece}: {f.message}") for f in found] if piece else found
+
+
+def check_motion(design: Design, motion: Motion) -> list[Found]:
+    """The same for a file that prints the design at any place, once or more often, alone or with others.
+
+    Raises
+    ------
+    BadInput
+        It does not print this design; see :func:`sensorgen.asprinted.registration.pieces`.
+    """
+    places, found = pieces(design, motion), list[Found]()
+    for number, place in enumerate(places, 1):
+        x, y = place.bed_mm
+        name = f"piece {number} of {len(places)}, at x {x:.4g}, y {y:.4g} mm" if len(places) > 1 else ""
+        found += check(design, place.paths, motion.changes, place.centre_mm, piece=name)
+    return found
+
+
+def _of_piece(
+    design: Design, paths: Paths, changes: Sequence[Change], centre_mm: Point, alone: bool, lines: Beads | None
+) -> list[Found]:  # fmt: skip
     corner = np.array(centre_mm) - np.array(design.printed.size_mm[:2]) / 2
     ends = [p[:, :2] - corner for p in (paths.start_mm, paths.end_mm)]
     inside = ((ends[0] + ends[1]) / 2 > -design.machine.line_mm() / 4).all(1)
@@ -66,7 +99,7 @@ def check(
         message = f"nothing is printed at the place of {design.name}; the nearest line is "
         message += f"{float(np.hypot(*off.T).min()):.3g} mm away" if model.any() else "not there at all"
         return [Found("place", "error", 1, message, "slice this design")]
-    lines, layers = beads(design, paths, centre_mm), _sampled(design, 0.0)
+    lines, layers = lines or beads(design, paths, centre_mm), _sampled(design, 0.0)
     return [
         *_heights(design, paths, piece),
         *_tools(design, lines, layers),
@@ -77,18 +110,6 @@ def check(
         *_purged(design, paths, changes, piece),
         *_beside(paths, ends, design.printed.size_mm, model & ~inside & alone, waste),
     ]
-
-
-def check_file(design: Design, source: Source) -> list[Found]:
-    """The same for a file that prints the design at any place, alone or with others.
-
-    Raises
-    ------
-    BadInput
-        No G-code, or it does not print this design; see :func:`sensorgen.asprinted.registration.placed`.
-    """
-    place = placed(design, source)
-    return check(design, place.paths, follow(source, design.machine.control.prime_macro).changes, place.centre_mm)
 
 
 def _sampled(design: Design, off: float) -> tuple[LayerRegions, ...]:
@@ -109,10 +130,9 @@ def _heights(design: Design, paths: Paths, piece: Mask) -> Iterator[Found]:
     tops = np.array(design.layers.boundaries_mm(design.printed.size_mm[2]))[1:]
     first_mm, layer_mm = design.layers.first_layer_mm, design.layers.layer_mm
     z = paths.end_mm[:, 2]
-    pushed = paths.length_mm() > 0
-    lowest = float(z[pushed].min())
+    lowest = float(z[piece].min())
     if abs(lowest - first_mm) > LEVEL_MM:
-        number, count = _line(paths.number, pushed & (z == lowest))
+        number, count = _line(paths.number, piece & (z == lowest))
         message = f"the lowest line lies at Z {lowest:g} mm; the first layer of {design.name} is {first_mm:g} mm"
         yield Found("first-layer", "error", number, message, "set the first layer's height, and no offset of Z", count)
     near = np.searchsorted((tops[1:] + tops[:-1]) / 2, z)  # the layer whose top is nearest
@@ -174,9 +194,10 @@ def _tools(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iter
         mine = [body.name for body in design.printed.bodies if design.tool(body.material) == tool]
         for k in np.unique(lines.layer[lines.tool == tool]).tolist():
             rows = np.flatnonzero((lines.tool == tool) & (lines.layer == k))
-            region = shapely.union_all([each[k].region(name) for each in around for name in mine])
-            shapely.prepare(region)
-            away = rows[~shapely.dwithin(middle[rows], region, design.machine.line_mm())]
+            away = rows
+            for region in {each[k].region(name) for each in around for name in mine}:
+                shapely.prepare(region)
+                away = away[~shapely.dwithin(middle[away], region, design.machine.line_mm())]
             share = float(lines.volume_mm3[away].sum() / lines.volume_mm3[rows].sum())
             if share > FOREIGN:
                 found.setdefault(tool, []).append((k, share, int(lines.number[away][0])))

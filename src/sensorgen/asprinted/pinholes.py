@@ -11,8 +11,6 @@ from typing import Annotated
 
 import numpy as np
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from shapely import Polygon
 
 from sensorgen.asprinted.beads import Beads, beads
@@ -21,6 +19,7 @@ from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.paths import Paths
+from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, drawn, parts
 from sensorgen.scene.scene import Point
 
@@ -148,8 +147,7 @@ def through(layers: Sequence[Region]) -> list[Polygon]:
         wide = shapely.area(over) > _LEAST_MM2
         throats.append((over[wide], np.stack([here[wide] + first[k], there[wide] + first[k + 1]])))
     edges = np.concatenate([ends for _, ends in throats], axis=1)
-    shape = (int(first[-1]), int(first[-1]))
-    of = connected_components(coo_array((np.ones(edges.shape[1]), edges), shape=shape), directed=False)[1]
+    of = groups(int(first[-1]), *edges)
     found = []
     for one in set(of[: first[1]].tolist()) & set(of[first[-2] :].tolist()):
         between = [over[of[ends[0]] == one] for over, ends in throats]
@@ -180,7 +178,12 @@ def pinholes(
     most_layers : int
         Films of more layers are left out [-].
     """
-    found = [film for film in films(design, beads(design, paths, centre_mm)) if len(film.lines) <= most_layers]
+    return of_lines(design, beads(design, paths, centre_mm), widths=widths, most_layers=most_layers)
+
+
+def of_lines(design: Design, lines: Beads, *, widths: Sequence[float], most_layers: int) -> Pinholes:
+    """The same by the lines of the piece."""
+    found = [film for film in films(design, lines) if len(film.lines) <= most_layers]
     return Pinholes(design.name, tuple(_row(film, width) for film in found for width in widths))
 
 

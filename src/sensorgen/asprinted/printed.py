@@ -10,9 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from sensorgen.asprinted.beads import CONVENTIONS, Beads, beads
-from sensorgen.asprinted.beads import layers as printed_layers
-from sensorgen.asprinted.window import Window, cut, evened, window
 from sensorgen.checks import estimate, volumes
 from sensorgen.checks.volumes import Row
 from sensorgen.core.errors import BadInput, OutOfRange
@@ -20,13 +17,15 @@ from sensorgen.core.findings import Finding
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.walls import WALLS
-from sensorgen.scene.connections import Connected, connected_layers
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.layers import LayerRegions, drawn, scene_of
 from sensorgen.scene.scene import FLOATING, Body, Point, Scene, rectangle
 
 if TYPE_CHECKING:
+    from sensorgen.asprinted.beads import Beads
+    from sensorgen.asprinted.window import Window
     from sensorgen.export.gcode.paths import Paths
+    from sensorgen.scene.connections import Connected
     from sensorgen.solvers.network.nodes import Lines
 
 _JOINED_MM = 1e-4
@@ -67,7 +66,7 @@ class Printed:
     design: Design
     provenance: str
     layers: Mapping[str, Sequence[LayerRegions]]
-    lines: Beads | None = None
+    lines: "Beads | None" = None
 
     @property
     def scene(self) -> Scene:
@@ -82,13 +81,17 @@ class Printed:
     @cached_property
     def cells(self) -> dict[str, Cell]:
         """The unit cell by every convention."""
+        from sensorgen.asprinted.window import window
+
         scene = self.design.printed
         plan = window(drawn(scene, self.design.layers.boundaries_mm(scene.size_mm[2])), scene)
         return {name: cell(self.design, found.layers, found.bodies, plan) for name, found in self._connected.items()}
 
     @cached_property
-    def _connected(self) -> dict[str, Connected]:
+    def _connected(self) -> "dict[str, Connected]":
         """The layers by every convention, each conductor at the terminal that it touches."""
+        from sensorgen.scene.connections import connected_layers
+
         bodies, conducts = self.design.printed.bodies, self.design.conducts
         return {name: connected_layers(layers, bodies, conducts) for name, layers in self.layers.items()}
 
@@ -107,6 +110,7 @@ class Printed:
         gaps = [gap_mm(cell.scene) for cell in self.cells.values()]
         return min(gaps), max(gaps)
 
+    @cached_property
     def rows(self) -> list[Row]:
         """Printed and drawn volume per body and layer."""
         lines, scene, extruded = self.lines, self.design.printed, None
@@ -126,7 +130,7 @@ class Printed:
             )
             for short in next(iter(self._connected.values())).shorts
         ]  # fmt: skip
-        return self.design.waived([*volumes.findings(self.rows(), self.design.printed), *shorts])
+        return self.design.waived([*volumes.findings(self.rows, self.design.printed), *shorts])
 
 
 def body(
@@ -166,6 +170,9 @@ def body(
         laid = estimate.lines(design)
         layers = estimate.layers(design.printed, design.machine, design.layers, walls, laid, shift)
         return Printed(design, f"printed, estimated ({WALLS[walls]})", {"mid-plane": layers})
+    from sensorgen.asprinted.beads import CONVENTIONS, beads
+    from sensorgen.asprinted.beads import layers as printed_layers
+
     lines = beads(design, paths, centre_mm)
     if not len(lines.number):
         tools = sorted({design.tool(body.material) for body in design.printed.bodies})
@@ -185,12 +192,15 @@ def nominal(design: Design, paths: "Paths", slicer: str = "", centre_mm: Point |
     design, paths, slicer, centre_mm : Design, Paths, str, (float, float)
         As of :func:`body`; here a file that prints nothing of the design is no error.
     """
+    from sensorgen.asprinted.beads import CONVENTIONS, beads
+    from sensorgen.asprinted.beads import layers as printed_layers
+
     lines, first = beads(design, paths, centre_mm), CONVENTIONS[0]
     provenance = f"printed, {slicer or 'from G-code'}"
     return Printed(design, provenance, {first: printed_layers(design, lines, first)}, lines)
 
 
-def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body], plan: Window) -> Cell:
+def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body], plan: "Window") -> Cell:
     """The unit cell of printed layers.
 
     Parameters
@@ -204,11 +214,13 @@ def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body],
     plan : Window
         The drawing's.
     """
+    from sensorgen.asprinted.window import ROUNDED_MM, cut, evened
+
     scene = design.printed
     inside = cut(layers, plan)
     crossed = all(side < whole for side, whole in zip(plan.sides_mm(), scene.size_mm[:2], strict=True))
-    if crossed and not any(plan.repeats):
-        inside = evened(inside, plan)
+    if not any(plan.repeats):
+        inside = evened(inside, plan) if crossed else evened(inside, plan, ROUNDED_MM)
     like = replace(scene, bodies=tuple(bodies), size_mm=(*plan.sides_mm(), scene.size_mm[2]), repeats=plan.repeats)
     found = scene_of(inside, like)
     if design.orientation == "upside-down":
@@ -239,7 +251,7 @@ def drawn_gap_mm(design: Design) -> float:
     return round(validity.electrode_gap_mm(scene, {b.name: meshes.mesh(b) for b in scene.bodies}), 9)
 
 
-def electrode_lines(design: Design, lines: Beads, end: str) -> "Lines":
+def electrode_lines(design: Design, lines: "Beads", end: str) -> "Lines":
     """The extruded lines of one electrode as a network, its middle at the origin: for studies of contact resistance.
 
     Parameters

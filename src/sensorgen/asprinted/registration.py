@@ -10,6 +10,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.files import Source
 from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.moves import Motion
 from sensorgen.export.gcode.paths import Paths, paths_of
 from sensorgen.scene.scene import Point
 
@@ -19,25 +20,28 @@ WITHIN_MM = 0.8  # by which a piece may be larger or smaller than the design: wa
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """The lines of a file in the design's own directions.
+    """A piece of a design in a file, whose lines are turned to the design's own directions.
 
     Attributes
     ----------
     paths : Paths
-        All of them, with the printer's own tool numbers.
+        All lines of the file, with the printer's own tool numbers.
     centre_mm : (float, float)
-        Middle of the design's first piece [mm].
+        Middle of the piece among these lines [mm].
+    bed_mm : (float, float)
+        The same on the bed, as the file has it [mm].
     copies : int
         Pieces of the design's size in the file.
     """
 
     paths: Paths
     centre_mm: Point
+    bed_mm: Point
     copies: int
 
 
 def placed(design: Design, source: Source) -> Placed:
-    """Find a design in a file of G-code.
+    """The first piece of a design in a file of G-code.
 
     Parameters
     ----------
@@ -49,9 +53,27 @@ def placed(design: Design, source: Source) -> Placed:
     Raises
     ------
     BadInput
-        No G-code, other tools than the design's, or no piece of its size; with the sizes that there are.
+        No G-code, or none of this design; see :func:`pieces`.
     """
-    paths = _of_tools(design, source)
+    return pieces(design, follow(source, design.machine.control.prime_macro))[0]
+
+
+def pieces(design: Design, motion: Motion) -> list[Placed]:
+    """All pieces of a design in a file of G-code, straight and turned by 90 degrees.
+
+    Parameters
+    ----------
+    design : Design
+        That was sliced, by whatever slicer.
+    motion : Motion
+        The file.
+
+    Raises
+    ------
+    BadInput
+        Other tools than the design's, or no piece of its size; with the sizes that there are.
+    """
+    paths = _of_tools(design, motion)
     model = paths.model()
     mine = np.isin(model.tool, _tools(design))
     low, high = (of(model.start_mm[mine, :2], model.end_mm[mine, :2]) for of in (np.minimum, np.maximum))
@@ -59,32 +81,35 @@ def placed(design: Design, source: Source) -> Placed:
         np.array([low[rows].min(0), high[rows].max(0)]) for rows in _pieces(low, high, np.arange(len(low)))
     ]  # fmt: skip
     size = np.array(design.printed.size_mm[:2]) - design.machine.line_mm()  # lines run half a line inside
-    for turned in (False, True):
-        wanted = size[::-1] if turned else size
-        found = [box for box in boxes if (abs(box[1] - box[0] - wanted) < WITHIN_MM).all()]
-        if found:
-            x, y = (float(v) for v in found[0].mean(0))
-            return Placed(_turned(paths), (y, -x), len(found)) if turned else Placed(paths, (x, y), len(found))
-    line = design.machine.line_mm()
-    there = "; ".join(
-        f"{w + line:.4g} x {h + line:.4g} mm at x {x:.4g}, y {y:.4g}"
-        for (w, h), (x, y) in sorted({(tuple(b[1] - b[0]), tuple(b.mean(0))) for b in boxes})[:3]
-    )
-    length, width, _ = design.printed.size_mm
-    off = min((abs(box[1] - box[0] - wanted).max() for box in boxes for wanted in (size, size[::-1])), default=np.nan)
-    raise BadInput(
-        f"no piece of {length:g} x {width:g} mm, as {design.name}, in this G-code; it prints {there}, off by {off:.3g} "
-        "mm at least: was it sliced from this design, straight or turned by 90 degrees?"
-    )
+    off = np.array([[abs(box[1] - box[0] - wanted).max() for wanted in (size, size[::-1])] for box in boxes])
+    fits = [bool((each < WITHIN_MM).any()) for each in off]
+    if not any(fits):
+        line = design.machine.line_mm()
+        there = "; ".join(
+            f"{w + line:.4g} x {h + line:.4g} mm at x {x:.4g}, y {y:.4g}"
+            for (w, h), (x, y) in sorted({(tuple(b[1] - b[0]), tuple(b.mean(0))) for b in boxes})[:3]
+        )
+        length, width, _ = design.printed.size_mm
+        raise BadInput(
+            f"no piece of {length:g} x {width:g} mm, as {design.name}, in this G-code; it prints {there}, off by "
+            f"{off.min(initial=np.inf):.3g} mm at least: was it sliced from this design, straight or turned by 90 "
+            "degrees?"
+        )
+    straight, found = off[:, 0] < WITHIN_MM, []  # a square one counts as straight
+    turned = paths if straight[fits].all() else _turned(paths)
+    for box, is_straight in ((box, straight[k]) for k, box in enumerate(boxes) if fits[k]):
+        x, y = (float(v) for v in box.mean(0))
+        found.append(Placed(paths if is_straight else turned, (x, y) if is_straight else (y, -x), (x, y), sum(fits)))
+    return found
 
 
 def _tools(design: Design) -> list[int]:
     return sorted({design.tool(body.material) for body in design.printed.bodies})
 
 
-def _of_tools(design: Design, source: Source) -> Paths:
+def _of_tools(design: Design, motion: Motion) -> Paths:
     """The file's lines, its tools counted as the printer does, or from 0 as a slicer's own file does."""
-    motion, wanted = follow(source, design.machine.control.prime_macro), set(_tools(design))
+    wanted = set(_tools(design))
     used: list[set[int]] = []
     for numbering in ("printer", "slicer"):
         paths = paths_of(motion, design.machine, numbering)

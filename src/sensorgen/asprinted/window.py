@@ -136,10 +136,11 @@ def _moved(region: Region, places: list[tuple[Real, Real]], along: str) -> Regio
     return cleaned(shapely.transform(shapely.set_precision(region, ROUNDED_MM / 2), to_sides))
 
 
-def evened(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:
+def evened(layers: Sequence[LayerRegions], to: Window, within_mm: float = np.inf) -> list[LayerRegions]:
     """Layers of a window with each strip as far to one side as its mirror image is to the other [mm].
 
-    For crossed strips, whose lopsided cell would take sixteen times the bricks. Widths stay; a strip that is printed a
+    For crossed strips, whose lopsided cell would take sixteen times the bricks, and for cells that rounding alone made
+    lopsided: as they are where a strip would move by ``within_mm`` or more. Widths stay; a strip that is printed a
     little aside moves to its place, which changes the field in second order.
     """
     sides, found = np.array([*to.sides_mm(), *to.sides_mm()]), []
@@ -148,6 +149,9 @@ def evened(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:
         for name, region in regions.items() if layer.along else ():
             bounds = shapely.bounds(parts(region))
             mirrored = (sides - bounds)[::-1][:, [2, 3, 0, 1]]
-            regions[name] = shapely.union_all(shapely.box(*((bounds + mirrored) / 2).round(6).T))
+            if np.abs(mirrored - bounds).max(initial=0.0) >= 2 * within_mm:
+                return list(layers)
+            middle = ((bounds + mirrored - sides) / 2).round(9).round(6) + sides / 2  # alike to both sides
+            regions[name] = shapely.union_all(shapely.box(*middle.round(9).T))
         found.append(layer.mapped(regions))
     return found

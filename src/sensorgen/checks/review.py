@@ -14,7 +14,7 @@ from sensorgen.design.tower import tower
 from sensorgen.design.walls import rule
 from sensorgen.scene import drawing
 from sensorgen.scene.geometry import meshes, validity
-from sensorgen.scene.geometry.mesh import Mesh
+from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.scene import Scene
 
 Step = Callable[[str], None]

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
-from sensorgen.cli import FOUND_ERRORS, render, show
+from sensorgen.cli import FOUND_ERRORS, log_words, render, show
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.export.slicers import TIME_LIMIT_S
 
@@ -54,19 +54,27 @@ def _make(plan: str, *, out: str, no_gcode: bool, time_limit_s: float, force: bo
 
     if not 0 < time_limit_s < float("inf"):
         raise OutOfRange(f"--time-limit {time_limit_s:g}; expected seconds above 0")
+    with log_words.existing(None) as log:
+        head = log.head()[1] if log else ""
     with render.refused(Path(plan).stem), show.progress(STEPS) as step:
         made = make(
-            Path(plan), Path(out), gcode=not no_gcode, time_limit_s=time_limit_s, force=force, strict=strict, step=step
-        )
+            Path(plan), Path(out), gcode=not no_gcode, time_limit_s=time_limit_s, force=force, strict=strict,
+            log_head=head, step=step,
+        )  # fmt: skip
     render.deliver(made)
     return FOUND_ERRORS if made.errors(force=force) else 0
 
 
-def _verify(folder: str) -> int:
-    """Hash every file of a batch's folder again, and say what differs from its record; exit code 1 if anything does."""
-    from sensorgen.workflows.batch.record import differences
+def _verify(folder: str, file: str | None) -> int:
+    """Hash every file of a batch's folder again, and say what differs from its record; exit code 1 if anything does.
 
-    found = differences(Path(folder))
+    The record itself is compared with the log, if that has the batch.
+    """
+    from sensorgen.workflows.batch.record import RECORD
+    from sensorgen.workflows.sealed import batch_differences
+
+    with log_words.existing(file) as log:
+        found = batch_differences(Path(folder), RECORD, log)
     render.deliver(found)
     return FOUND_ERRORS if found else 0
 
@@ -79,7 +87,7 @@ command = _PlanGroup(
             callback=_verify,
             help=_verify.__doc__,
             short_help="Hash every file again and say what differs.",
-            params=[click.Argument(["folder"]), *render.options("json", "markdown")],
+            params=[click.Argument(["folder"]), log_words.where(), *render.options("json", "markdown")],
         )
     ],
     options_metavar="",

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import body_options, render, show
+from sensorgen.cli import FOUND_ERRORS, body_options, log_words, render, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
@@ -17,17 +17,28 @@ OWN: list[click.Parameter] = [
     click.Option(["--force"], is_flag=True, help="Write the files even if checks report errors."),
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
     body_options.compensate_option(),
+    click.Option(["--verify"], is_flag=True, help="Write nothing: compare the folder with its record and the log."),
     click.Option(["--details"], is_flag=True, help="Print all findings and the whole prediction."),
     *render.options("json", "markdown"),
 ]
 
 
 def _work(
-    design: "Design", *, out: str, no_cad: bool, force: bool, strict: bool, compensate: str | None, details: bool
+    design: "Design",
+    *,
+    out: str,
+    no_cad: bool,
+    force: bool,
+    strict: bool,
+    compensate: str | None,
+    verify: bool,
+    details: bool,
 ) -> int:
     from sensorgen.checks.review import lost
     from sensorgen.workflows.build import STEPS, DetailedBuild, build
 
+    if verify:
+        return _verify(design, Path(out) / design.name)
     design, changes = body_options.compensated(design, compensate, design.walls)
     with render.refused(design.name), show.progress(STEPS) as step:
         built = build(
@@ -35,6 +46,15 @@ def _work(
         )  # fmt: skip
     render.deliver(DetailedBuild(**vars(built)) if details else built)
     return 1 if lost(built.findings) and not force else 0
+
+
+def _verify(design: "Design", folder: Path) -> int:
+    from sensorgen.workflows.sealed import build_differences
+
+    with log_words.existing(None) as log:
+        found = build_differences(folder, design, log)
+    render.deliver(found)
+    return FOUND_ERRORS if found else 0
 
 
 command = DesignGroup(

@@ -79,7 +79,15 @@ def printers() -> Catalogue:
 def _printer(p: printer.Printer) -> Entry:
     bed = f"bed {p.bed_mm[0]:g} x {p.bed_mm[1]:g} mm, height {p.height_mm:g} mm, nozzle {p.nozzle_mm:g} mm"
     tools = ", ".join(f"{material} on {tool}" for material, tool in p.default_tools.items())
-    return Entry(p.title, (bed, f"tools {list(p.tool_numbers)}: {tools}", f"source: {p.source}"))
+    return Entry(
+        p.title,
+        (
+            bed,
+            f"tools {list(p.tool_numbers)}: {tools}",
+            f"heights of two tools equal to {p.tool_height_error_mm:g} mm",
+            f"source: {p.source}",
+        ),
+    )
 
 
 def qualities() -> Catalogue:

@@ -1,9 +1,15 @@
 """``sensorgen gcode``: files for the printer, whoever has sliced them."""
 
+from typing import TYPE_CHECKING
+
 import click
 
 from sensorgen.cli import render
 from sensorgen.cli.words import completed
+
+if TYPE_CHECKING:
+    from sensorgen.design.design import Design
+    from sensorgen.design.printer import Printer
 
 DEFAULT = "diabase-h5"
 
@@ -25,30 +31,26 @@ def _check(file: str, design: str | None, printer: str | None, materials: tuple[
     from pathlib import Path
 
     from sensorgen.core.errors import BadInput
-    from sensorgen.design.design import load
-    from sensorgen.design.printer import load_printer
-    from sensorgen.export.gcode.check import CheckedFile
-    from sensorgen.export.gcode.check import check as checked
+    from sensorgen.export.gcode.check import CheckedFile, check_motion
+    from sensorgen.export.gcode.motion import follow
 
-    drawn = load(Path(design)) if design else None
-    machine = drawn.machine if drawn else load_printer(printer or DEFAULT)
-    if drawn and printer and load_printer(printer).name != machine.name:
-        raise BadInput(f"--printer {printer}: {design} is for {machine.name}; expected one of them")
+    drawn, machine = _subject(design, printer)
     loaded = {drawn.tool(name): name for name in drawn.used()} if drawn else {}
     loaded |= _loaded(materials, machine.tool_numbers)
-    found = checked(Path(file), machine, loaded, others_empty=drawn is not None)
+    motion = follow(Path(file), machine.control.prime_macro)
+    found = check_motion(motion, machine, loaded, others_empty=drawn is not None)
     if drawn:
         from sensorgen.asprinted import agreement
 
         try:
-            found = found.with_more(agreement.check_file(drawn, Path(file)))
+            found = found.with_more(agreement.check_motion(drawn, motion))
         except BadInput as error:
             raise error.within(file) from None
     render.deliver(CheckedFile(**vars(found), file=file, printer=machine.name, design=drawn.name if drawn else ""))
     return 1 if found.errors(strict) else 0
 
 
-def _drags(file: str, design: str | None, printer: str) -> int:
+def _drags(file: str, design: str | None, printer: str | None) -> int:
     """Measure where the nozzle travels over what another tool has printed, in the order of printing.
 
     Travel in contact can draw a conductor over a dielectric. Counted are the centre of the nozzle in contact with
@@ -58,16 +60,15 @@ def _drags(file: str, design: str | None, printer: str) -> int:
     """
     from pathlib import Path
 
-    if design:
+    drawn, machine = _subject(design, printer)
+    if drawn:
         from sensorgen.asprinted import strands
-        from sensorgen.design.design import load
 
-        render.deliver(strands.drags(load(Path(design)), Path(file)))
+        render.deliver(strands.drags(drawn, Path(file)))
     else:
-        from sensorgen.design.printer import load_printer
         from sensorgen.export.gcode import drags
 
-        render.deliver(drags.drags(Path(file), load_printer(printer)))
+        render.deliver(drags.drags(Path(file), machine))
     return 0
 
 
@@ -99,6 +100,22 @@ def _pinholes(file: str, design: str, log: str | None, pictures: str | None) -> 
     return 0
 
 
+def _subject(design: str | None, printer: str | None) -> "tuple[Design | None, Printer]":
+    """What a file prints, as far as it is known, and on which printer."""
+    from pathlib import Path
+
+    from sensorgen.core.errors import BadInput
+    from sensorgen.design.design import load
+    from sensorgen.design.printer import load_printer
+
+    if not design:
+        return None, load_printer(printer or DEFAULT)
+    drawn = load(Path(design))
+    if printer and load_printer(printer).name != drawn.machine.name:
+        raise BadInput(f"--printer {printer}: {design} is for {drawn.machine.name}; expected one of them")
+    return drawn, drawn.machine
+
+
 def _loaded(words: tuple[str, ...], tools: tuple[int, ...]) -> dict[int, str]:
     """Material of each tool that was named."""
     from sensorgen.cli.settings import pairs
@@ -115,6 +132,16 @@ def _loaded(words: tuple[str, ...], tools: tuple[int, ...]) -> dict[int, str]:
     return found
 
 
+_FILE = click.Argument(["file"], metavar="FILE")
+_SUBJECT: list[click.Parameter] = [
+    _FILE,
+    click.Option(["--design"], metavar="FILE", help="The design that the file prints, as YAML."),
+    click.Option(
+        ["--printer"], metavar="NAME", shell_complete=completed(_printers),
+        help=f"A printer that is listed, or a YAML file; the design's, or {DEFAULT}, if not given.",
+    ),
+]  # fmt: skip
+
 command = click.Group(
     "gcode", help="Check G-code, whoever has sliced it.",
     commands=[
@@ -122,12 +149,7 @@ command = click.Group(
             "check", callback=_check, help=_check.__doc__,
             short_help="Simulate the printer: what would go wrong, and what it takes.",
             params=[
-                click.Argument(["file"], metavar="FILE"),
-                click.Option(["--design"], metavar="FILE", help="The design that the file is to print, as YAML."),
-                click.Option(
-                    ["--printer"], metavar="NAME", shell_complete=completed(_printers),
-                    help=f"A printer that is listed, or a YAML file; the design's, or {DEFAULT}, if not given.",
-                ),
+                *_SUBJECT,
                 click.Option(
                     ["--material", "materials"], multiple=True, metavar="TOOL=NAME",
                     help="What a tool prints, for mass, temperatures and melt rate; if not given, the printer's usual "
@@ -139,22 +161,13 @@ command = click.Group(
         ),
         click.Command(
             "drags", callback=_drags, help=_drags.__doc__,
-            short_help="Measure travel over what another tool has printed.",
-            params=[
-                click.Argument(["file"], metavar="FILE"),
-                click.Option(["--design"], metavar="FILE", help="The design that the file prints, as YAML."),
-                click.Option(
-                    ["--printer"], default="diabase-h5", show_default=True, metavar="NAME",
-                    shell_complete=completed(_printers), help="A printer that is listed, or a YAML file.",
-                ),
-                *render.options(),
-            ],
+            short_help="Measure travel over what another tool has printed.", params=[*_SUBJECT, *render.options()],
         ),
         click.Command(
             "pinholes", callback=_pinholes, help=_pinholes.__doc__,
             short_help="Search a film for through-holes; probability of a short.",
             params=[
-                click.Argument(["file"], metavar="FILE"),
+                _FILE,
                 click.Option(["--design"], metavar="FILE", required=True, help="The design, as YAML."),
                 click.Option(["--log"], metavar="FILE", help="The log with verdicts of earlier prints."),
                 click.Option(["--figures", "pictures"], metavar="FOLDER", help="Write a plan there, PNG and SVG."),

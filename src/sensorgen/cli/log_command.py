@@ -30,7 +30,8 @@ def command() -> None:
 
 
 for _each in (
-    log_write.multimeter, log_write.table, log_write.bench, log_write.predict,
-    log_read.listing, log_read.showing, log_read.exporting, log_read.verifying,
+    log_write.multimeter, log_write.table, log_write.bench, log_write.predict, log_write.withdrawing,
+    log_read.listing, log_read.showing, log_read.exporting, log_read.verifying, log_read.heading, log_read.anchoring,
+    log_read.syncing, log_read.backing_up, log_read.restoring,
 ):  # fmt: skip
     command.add_command(_each)

@@ -58,14 +58,60 @@ def _export(place: str, file: str | None) -> None:
     render.say(f"{rows} rows in {place}")
 
 
-def _verify(file: str | None) -> int:
-    """Check database, references and the SHA-256 of every raw file; exit code 1 where something is wrong."""
+def _verify(file: str | None, anchors: str | None) -> int:
+    """Check every record, its order, references and the SHA-256 of every raw file; exit code 1 where one is wrong.
+
+    Somebody who rewrites the whole log is found only by a head that was kept elsewhere: --anchor FILE.
+    """
     from sensorgen.measure.log.verify import verified
 
     with opened(file) as log:
-        found = verified(log)
+        found = verified(log, Path(anchors) if anchors else None)
     render.deliver(found)
     return FOUND_ERRORS if found.faults else 0
+
+
+def _head(file: str | None) -> None:
+    """Show the identity of the last record: who keeps it can tell any later change of what is in the log now."""
+    from sensorgen.measure.log import anchors
+
+    with opened(file) as log:
+        render.deliver(anchors.head(log))
+
+
+def _anchor(place: str, file: str | None) -> None:
+    """Append the identity of the last record to a text file, for git or mail; 'log verify --anchor' compares."""
+    from sensorgen.measure.log import anchors
+
+    with opened(file) as log:
+        render.deliver(anchors.anchor(log, Path(place)), before=[f"written to {place}"])
+
+
+def _sync(place: str, file: str | None) -> None:
+    """Exchange records and raw files with a folder or a .zip that other machines sync with too.
+
+    A shared drive, a stick or a cloud folder will do; every machine keeps a log of its own.
+    """
+    from sensorgen.measure.log import sync
+
+    with opened(file, create=True) as log:
+        render.deliver(sync.sync(log, Path(place)))
+
+
+def _backup(place: str, file: str | None) -> None:
+    """Write the whole log with its raw files to a new folder or .zip; 'log restore' takes it back."""
+    from sensorgen.measure.log import sync
+
+    with opened(file) as log:
+        render.deliver(sync.backup(log, Path(place)))
+
+
+def _restore(place: str, file: str | None) -> None:
+    """Fill a new log from a backup, or from the folder that logs are synced with."""
+    from sensorgen.measure.log import sync
+
+    with opened(file, create=True) as log:
+        render.deliver(sync.restore(log, Path(place)))
 
 
 listing = made(
@@ -88,5 +134,17 @@ exporting = made(
     where(),
 )  # fmt: skip
 verifying = made(
-    _verify, "verify", "Check that the log is what was logged.", where(), *render.options("json", "markdown")
+    _verify, "verify", "Check that the log is what was logged.",
+    click.Option(["--anchor", "anchors"], metavar="FILE", help="A text with heads, as 'log anchor' writes it."),
+    where(), *render.options("json", "markdown"),
+)  # fmt: skip
+heading = made(_head, "head", "Show the last record.", where(), *render.options("json", "markdown"))
+anchoring, syncing, backing_up, restoring = (
+    made(work, name, about, click.Argument(["place"], metavar=what), where(), *render.options("json", "markdown"))
+    for work, name, about, what in (
+        (_anchor, "anchor", "Write the last record's identity to a file.", "FILE"),
+        (_sync, "sync", "Exchange records with a shared folder.", "FOLDER|FILE.zip"),
+        (_backup, "backup", "Write the log to a new place.", "FOLDER|FILE.zip"),
+        (_restore, "restore", "Fill a new log from a backup.", "FOLDER|FILE.zip"),
+    )
 )

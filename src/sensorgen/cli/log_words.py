@@ -1,6 +1,7 @@
 """Options that the commands of ``sensorgen log`` and ``bench`` share, and the log that they name."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +41,18 @@ def opened(file: str | None, *, create: bool = False) -> "Log":
     from sensorgen.measure.log import Log, place
 
     return Log(Path(file) if file else place(), create=create)
+
+
+@contextmanager
+def existing(file: str | None) -> Iterator["Log | None"]:
+    """The log, or None where ``--log`` names none and there is none yet."""
+    from sensorgen.measure.log import place
+
+    if file is None and not place().exists():
+        yield None
+        return
+    with opened(file) as log:
+        yield log
 
 
 def columns_of(words: tuple[str, ...], option: str) -> dict[str, str]:

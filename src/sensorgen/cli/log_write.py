@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from sensorgen.measure.log import Entry, Log
 
 
+KINDS = ("reading", "recording", "prediction", "print", "batch", "design", "raw-file")
+
+
 def _multimeter(
     specimen: str, y_words: str, z_words: str, file: str | None, corrects: int | None, *, predict: bool,
     visa: str | None, axis: str | None, wires: str, baked: bool | None, remark: str, measured_at: str,
@@ -141,12 +144,24 @@ def _bench(
 
 
 def _predict(design: "Design", *, file: str | None) -> int:
-    from sensorgen.workflows.stored_prediction import predicted_row
+    from sensorgen.measure.log import Prediction
+    from sensorgen.workflows.stored_prediction import predicted_rows
 
     with opened(file, create=True) as log:
-        new = log.add([predicted_row(design)])
+        new = [row for row in log.add(predicted_rows(design)) if isinstance(row, Prediction)]
         _deliver(new, log, f"{design.name}: the log has this very prediction")
     return 0
+
+
+def _withdraw(kind: str, number: int, reason: str, file: str | None) -> None:
+    """Take a row out of use: it stays in the log with the reason, and no report uses it.
+
+    For a reading or a recording that is to be replaced, --corrects of 'log multimeter' and 'log bench' is better.
+    """
+    from sensorgen.measure.log.withdrawing import withdraw
+
+    with opened(file) as log:
+        _deliver([withdraw(log, kind, number, reason)], log)
 
 
 _OF_READINGS: list[click.Parameter] = [
@@ -194,4 +209,12 @@ predict = DesignGroup(
     _predict, [where(), *render.options("json", "markdown")], name="predict",
     help="Keep what a design is expected to measure, so that no later comparison can be tuned.",
     short_help="Log what a design is expected to measure.",
+)  # fmt: skip
+withdrawing = made(
+    _withdraw, "withdraw", "Take a row out of use, with a reason.",
+    click.Argument(["kind"], type=OneOf(KINDS)),
+    click.Argument(["number"], type=int),
+    click.Option(["--reason"], metavar="TEXT", required=True, help="Why, in your own words."),
+    where(),
+    *render.options("json", "markdown"),
 )  # fmt: skip

@@ -13,6 +13,23 @@ DRAWN: Literal["drawn"] = "drawn"
 
 
 @dataclass(frozen=True)
+class Film:
+    """Thickness of the film between the electrodes of a print.
+
+    Attributes
+    ----------
+    error_mm : float
+        By which it may be thinner or thicker [mm].
+    thinner, thicker : Scene or None
+        The most likely cell with such a film; None where none is left.
+    """
+
+    error_mm: float
+    thinner: Scene | None
+    thicker: Scene
+
+
+@dataclass(frozen=True)
 class Cells:
     """Unit cells of a body.
 
@@ -31,6 +48,8 @@ class Cells:
         Extruded lines, where a tool path is known.
     remarks : mapping of str to tuple of str
         Where electrodes touch, and which conductors float, by the same rules.
+    film : Film or None
+        Of a print; None of a drawing, and where no film lies between the electrodes.
     """
 
     scenes: Mapping[str, Scene]
@@ -39,6 +58,7 @@ class Cells:
     gaps: Callable[[], Mapping[str, float]]
     tracks: Any = None
     remarks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    film: Film | None = None
 
     @cached_property
     def gap_mm(self) -> Mapping[str, float]:
@@ -91,7 +111,7 @@ class Body:
     def printed_otherwise(self, rule: str) -> "Body":
         """The body by one of the rules of its cells alone."""
         cells = self.cells
-        one = replace(cells, scenes={rule: cells.scenes[rule]}, gaps=lambda: {rule: cells.gap_mm[rule]})
+        one = replace(cells, scenes={rule: cells.scenes[rule]}, gaps=lambda: {rule: cells.gap_mm[rule]}, film=None)
         return replace(self, identity=sha256(f"{self.identity} {rule}".encode()).hexdigest(), make=lambda: one)
 
     @property

@@ -18,7 +18,6 @@ from sensorgen.core import plugins as registry
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, shown
-from sensorgen.core.version import __version__
 from sensorgen.design import materials as material_files
 from sensorgen.design import shapes
 from sensorgen.design.materials import own
@@ -198,7 +197,6 @@ class Design(Strict):
         for name, source in sorted(self.used().items()):
             stuff[name] = self.material(name).model_dump(exclude=_LIMITS) | {"source": source}
         return {
-            "sensorgen": __version__,
             **self.model_dump(exclude={"name", "parameters", "printer", "quality", "waivers"} | self._plain()),
             "parameters": dataclasses.asdict(self.params),
             "materials_values": stuff,
@@ -216,8 +214,8 @@ class Design(Strict):
         return self.profile.walls or "arachne"
 
     def id(self) -> str:
-        """Hash of all resolved parameters, material values and the software's version; not of the design's name."""
-        text = json.dumps(self.resolved(), sort_keys=True, allow_nan=True)
+        """Hash of all resolved parameters and material values; not of the design's name, nor of sensorgen's version."""
+        text = json.dumps(_FIRST | self.resolved(), sort_keys=True, allow_nan=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def waived(self, findings: list[Finding]) -> list[Finding]:
@@ -241,8 +239,12 @@ class Design(Strict):
         ]
 
 
-# What only the check of G-code reads: it decides no sensor.
-_LIMITS: dict[str, set[str]] = {"control": {"commands", "longest_retraction_mm"}, "print": {"max_flow_mm3_s"}}
+# Version 0.1.0 hashed its own number, and its identities last: the logs, labels and batches that name them stay valid.
+_FIRST = {"sensorgen": "0.1.0"}
+# What only the check of G-code reads, and how exact the printer is: neither decides a sensor.
+_LIMITS: dict[str, Any] = {
+    "control": {"commands", "longest_retraction_mm"}, "print": {"max_flow_mm3_s"}, "tool_height_error_mm": True
+}  # fmt: skip
 
 
 def _covers(waiver: Waiver, finding: Finding) -> bool:

@@ -76,6 +76,7 @@ class Printer(Strict):
     line_width_ratio: Positive
     filament_mm: Positive
     min_layer_mm: Positive
+    tool_height_error_mm: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.02  # of one tool beside another
     max_nozzle_c: Positive
     max_bed_c: Positive
     max_speed_mm_s: MaxSpeed

@@ -14,7 +14,7 @@ from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
 from sensorgen.design.tower import tower
 from sensorgen.export import threemf
-from sensorgen.export.gcode.drags import Lifting, lift
+from sensorgen.export.gcode.drags import Lifted, lift
 from sensorgen.export.gcode.files import text_of
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.paths import Paths, paths_of
@@ -66,14 +66,14 @@ class Sliced:
     ----------
     raw, ready : Path
         The slicer's own G-code, and that for the printer, the nozzle lifted over other tools' material.
+    lifted : Lifted
+        ``ready``, followed, and what its lifts have changed.
     lines : Paths
-        What is printed, by the lines of ``raw`` and the printer's own tool numbers.
+        What ``ready`` prints.
     slicer : str
         ``prusa`` or ``cura``.
     version : str
         Version that the slicer gives itself.
-    lifting : Lifting
-        What the lifts have changed.
     seconds, own_seconds : float
         Time that the slicer took, and that everything around it took [s].
     findings : tuple of Finding
@@ -82,10 +82,10 @@ class Sliced:
 
     raw: Path
     ready: Path
+    lifted: Lifted
     lines: Paths
     slicer: str
     version: str
-    lifting: Lifting
     seconds: float
     own_seconds: float
     findings: tuple[Finding, ...]
@@ -153,9 +153,9 @@ def sliced(
     version = _version(text, slicer)
     step("G-code")
     motion = follow(text)
-    lifted, lifting = lift(b"".join(ready(text, motion, machine)), machine)
+    lifted = lift(b"".join(ready(text, motion, machine)), machine)
     with store.replacing(made) as file:
-        file.write(lifted)
+        file.write(lifted.text)
     end = machine.end_gcode.strip().rpartition("\n")[2].strip().encode()
     placeholder = set(b"{[") & set(end)  # that the slicer fills in
     if end and not placeholder and end not in map(bytes.strip, text[-_TAIL:].splitlines()):
@@ -163,11 +163,11 @@ def sliced(
             f"the slicer's file is cut short: it lacks the printer's last line, {end.decode()!r}; "
             "see that the disk is not full, and slice again"
         )
-    lines = paths_of(motion, machine, "slicer")
+    lines = paths_of(lifted.motion, machine)
     step("done")
     own_seconds = time.perf_counter() - started - seconds
     findings = versions.unknown(f"{TITLES[slicer]} {version}", not_known)
-    return Sliced(raw, made, lines, slicer, version, lifting, seconds, own_seconds, findings)
+    return Sliced(raw, made, lifted, lines, slicer, version, seconds, own_seconds, findings)
 
 
 def check(pieces: Sequence[Placed]) -> None:
@@ -231,8 +231,9 @@ def plate_3mf(pieces: Sequence[Placed], family: str, title: str) -> bytes:
     """The 3MF of a plate for one family of slicers; see :func:`sensorgen.export.threemf.plate`."""
     check(pieces)
     design = pieces[0].design
-    primed = tower(design.machine, design.layers, len(plate_loads(pieces)))
-    return threemf.plate(family, title, plate_parts(pieces), _corner_mm(design), primed)
+    found = plate_loads(pieces)
+    primed, text = tower(design.machine, design.layers, len(found)), prusa.profile(design.machine, design.layers, found)
+    return threemf.plate(family, title, plate_parts(pieces), _corner_mm(design), primed, text)
 
 
 def _corner_mm(design: Design) -> tuple[float, float]:
@@ -253,8 +254,8 @@ def _run(
         plate, profile = folder / "plate.3mf", folder / "profile.ini"
         named = title or " ".join(piece.name for piece in pieces)[:80]
         primed = tower(design.machine, design.layers, len(all_loads))
-        plate.write_bytes(threemf.plate("prusa", named, bodies, _corner_mm(design), primed))
         text = prusa.profile(design.machine, design.layers, all_loads, version)
+        plate.write_bytes(threemf.plate("prusa", named, bodies, _corner_mm(design), primed, text))
         profile.write_text(text, "utf-8")
         before = time.perf_counter()
         prusa.slice_3mf(plate, profile, raw, runner)

@@ -31,7 +31,7 @@ _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 
 _STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid when they touched counts [-]
 _FIELD_GROWTH = 0.2  # of the triangles of the capacitance's mesh, per distance [-]
 _MISFIT = 1e-3  # of a solid's area: gaps that were closed in the wrong place change more [-]
-_COARSER = (3, 9)  # times the size of the triangles at an apex, where the finer ones do not converge [-]
+_APEX = (1.0, 3.0, 9.0)  # times the size of the triangles at an apex, the next where the finer ones do not converge [-]
 
 
 def press(
@@ -42,6 +42,8 @@ def press(
     boundary: BoundaryConditions | None = None,
     fineness: Fineness | None = None,
     step: Callable[[float], None] | None = None,
+    enough: float = 1.0,
+    apex: float = 1.0,
 ) -> Pressed:
     """Solve a cell under pressure on its top.
 
@@ -61,6 +63,10 @@ def press(
         Of the mesh.
     step : callable, optional
         Called with every pressure of ``stress_pa`` that is reached [Pa].
+    enough : float
+        Share of the last pressure: what is sound up to there is not solved again on coarser triangles [-].
+    apex : float
+        Factor on the size of triangles at an apex to begin with: one of those that a solution tells [-].
 
     Raises
     ------
@@ -72,19 +78,20 @@ def press(
     boundary, fineness = boundary or BoundaryConditions(), fineness or Fineness()
     check(stress_pa, boundary)
     told = step or (lambda _: None)
-    first, _ = best, run = _solved(cell, solids, stress_pa, boundary, fineness, told)
-    for factor in _COARSER:
-        if not best.faults:
+    meshes = {factor: replace(fineness, apex_mm=factor * fineness.apex_mm) for factor in _APEX if factor >= apex}
+    first, run = _solved(cell, solids, stress_pa, boundary, meshes.pop(apex), told)
+    best = replace(first, apex=apex)
+    for factor, coarser in meshes.items():
+        if not best.faults or best.sound().converged_pa >= enough * stress_pa[-1]:
             break
-        coarser = replace(fineness, apex_mm=factor * fineness.apex_mm)
         again, other = _solved(cell, solids, stress_pa, boundary, coarser, told)
         if (again.converged_pa, -len(again.faults)) > (best.converged_pa, -len(best.faults)):
             both = len(first.stress_pa)
             apart = float(np.abs(again.displacement_m[1:both] / first.displacement_m[1:] - 1).max(initial=0.0))
             known = f"displacement {apart:.1%} off up to {first.converged_pa / 1e3:.4g} kPa"
-            apex = f"triangles of {coarser.apex_mm * 1e3:.3g} um at the apex, because finer ones do not converge"
-            doubt = f"{apex}: {known if both > 1 else 'error not known'}"
-            best, run = replace(again, doubts=(*again.doubts, doubt)), other
+            size = f"triangles of {coarser.apex_mm * 1e3:.3g} um at the apex, because finer ones do not converge"
+            doubt = f"{size}: {known if both > 1 else 'error not known'}"
+            best, run = replace(again, doubts=(*again.doubts, doubt), apex=factor), other
     return _with_fields(best, cell, run, permittivity) if permittivity else best
 
 

@@ -24,6 +24,7 @@ from sensorgen.scene.raster import raster
 from sensorgen.scene.repetition import Repeat, repeat
 from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Prism, Scene, rectangle
 from sensorgen.solvers.electrostatics import bounds as fem
+from sensorgen.solvers.electrostatics.enclosed import enclosing
 from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, Layers, Mesh, solved
 
 SOURCE = "Dirichlet's and Thomson's principles; prisms of triangles, H1 and hybrid H(div) by NGSolve"
@@ -33,16 +34,19 @@ WIDTH = 1e-2  # of the interval unless given
 
 _RUNGS = (  # distances of lines from outlines, in electrode gaps; order of the potential; width that it often reaches
     ((2.0, 0.5), 2, 2.5e-2),
-    ((2.0, 0.5), 3, 1e-2),
+    ((2.0, 0.4, 0.1), 2, 1e-2),
     ((1.5, 0.3), 3, 5e-3),
-    ((2.0, 0.5, 0.12), 3, 2.5e-3),
+    ((2.0, 0.4, 0.08), 3, 2.5e-3),
     ((2.0, 0.5, 0.12), 4, 1e-3),
 )
-_GRIDS_MM = (1e-6, 1e-4, 1e-3)  # to which corners are rounded: coarser ones where outlines nearly coincide
-_SLENDER_MM = 1e-4  # height of a triangle below which a coarser grid is better
+_GRID_MM = 1e-6  # to which corners are rounded
+_COARSER_MM = (1e-4, 3e-4, 1e-3, 3e-3)  # where outlines nearly coincide
+_SLENDER_MM = 2e-5  # height of a triangle below which a coarser grid is better
 _COVERS = 0.99  # of the plan, by an electrode's layers together: between round beads there may be holes
 _OVERLAP_MM2 = 1e-6
-_MOST = 1_500_000  # unknowns of a rung: more would take too long
+_MOST_MB = 4000.0  # memory of a mesh: more would take too long as well
+_FAR = 1.25  # in electrode gaps: from other conductors, where outlines are drawn together
+_LOOSE = 0.03  # in electrode gaps: by how much
 
 
 def why_not_applicable(scene: Scene) -> str | None:
@@ -110,8 +114,9 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
 
     Notes
     -----
-    Corners are rounded to a grid of 1e-6 mm, or of 1e-4 or 1e-3 mm where outlines nearly coincide, as those of beads
-    do. The bounds are moved outwards by what the rounding of the conductors' outlines does, to first order.
+    Corners are rounded to a grid of 1e-6 mm; the bounds are moved outwards by what this does to the conductors'
+    outlines, to first order. Where outlines nearly coincide, as those of beads do, the grid is 1e-4 to 3e-3 mm, and the
+    bounds are those of two cells that enclose the true one.
     """
     fem.check(permittivity, width)
     return min((step.interval for step in steps(scene, permittivity, width)), key=Interval.width)
@@ -122,28 +127,41 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     cell = _cell(scene)
     layers = cell.layers([permittivity[name] for name in cell.dielectrics])
     first = sum(reach > 2 * width for *_, reach in _RUNGS[:-1])
-    failed = None
+    failed, reached = None, False
     for factors, order, _ in _RUNGS[first:]:
         beside = [factor * cell.gap_mm for factor in factors]
-        for grid_mm in _GRIDS_MM:
-            mesh = Mesh.of(layers, beside, grid_mm)
-            if mesh.plan.slenderness_mm() > _SLENDER_MM:
-                break
-        if mesh.unknowns(order) > _MOST:
-            failed = fem.Unsolved(f"{mesh.unknowns(order)} unknowns; at most {_MOST} are solved")
-            break
         try:
-            found = solved(mesh, order, cell.shares(mesh))
+            inner, outer = _meshes(cell, layers, beside)
+            if outer.memory_mb(order) > _MOST_MB:
+                raise fem.Unsolved(f"{outer.memory_mb(order):.0f} MB; meshes of up to {_MOST_MB:g} MB are solved")
+            found = solved(inner, outer, order, cell.shares(outer))
         except fem.Unsolved as error:
             failed = error
             continue
         interval = fem.whole(found, np.outer(cell.x.shares, cell.y.shares).ravel().tolist())
-        failed = None
-        yield Step(order, int(mesh.free.sum()), found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
+        reached = True
+        yield Step(order, int(outer.free.sum()), found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
         if interval.width() <= width:
             return
-    if failed:
+    if failed and not reached:
         raise failed
+
+
+def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[Mesh, Mesh]:
+    """The mesh of a cell, twice; of two cells that enclose it where that has slivers."""
+    far_mm, loose_mm = _FAR * cell.gap_mm, _LOOSE * cell.gap_mm
+    exact = Mesh.of(layers, beside_mm, _GRID_MM, far_mm)
+    if exact.plan.slenderness_mm() > _SLENDER_MM:
+        return exact, exact
+    found = []
+    for outwards, least_mm in ((False, _SLENDER_MM), (True, _SLENDER_MM / 10)):  # a potential bears more than a flux
+        for grid_mm in _COARSER_MM:
+            near = enclosing(layers, grid_mm, far_mm, loose_mm, outwards=outwards)
+            mesh = Mesh.of(near, beside_mm, grid_mm, far_mm)
+            if mesh.plan.slenderness_mm() > least_mm:
+                break
+        found.append(mesh)
+    return found[0], found[1]
 
 
 @dataclass(frozen=True)

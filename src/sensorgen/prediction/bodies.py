@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import BadInput
 from sensorgen.core.files import reading
-from sensorgen.design.body import DRAWN, Body, Cells
+from sensorgen.design.body import DRAWN, Body, Cells, Film
 from sensorgen.design.design import Design
 from sensorgen.design.walls import WALLS
 from sensorgen.design.walls import rules as wall_rules
@@ -55,9 +55,8 @@ def estimated(design: Design, walls: str = "") -> Body:
     """
     rules = (walls,) if walls else wall_rules(design.profile.walls)
     said = f"printed, estimated ({WALLS.get(rules[0], rules[0])})"
-    return Body(
-        design, "estimated", said, _identity(design, "estimated", *rules), partial(_estimated_cells, design, rules)
-    )
+    identity = _identity(design, "estimated", *rules, _height_error(design))
+    return Body(design, "estimated", said, identity, partial(_estimated_cells, design, rules))
 
 
 def _estimated_cells(design: Design, rules: Sequence[str]) -> Cells:
@@ -85,7 +84,7 @@ def sliced(design: Design, printed: "Callable[[], Printed]", source: str, conten
     content : bytes
         Of the file.
     """
-    identity = _identity(design, "sliced", sha256(content).hexdigest())
+    identity = _identity(design, "sliced", sha256(content).hexdigest(), _height_error(design))
     return Body(design, "sliced", f"printed, {source}", identity, partial(_sliced_cells, printed, source))
 
 
@@ -165,6 +164,7 @@ def _read(design: Design, path: Path, source: str) -> "Printed":
 
 def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
     """Cells by every rule: of walls for estimates, of bead widths for a tool path."""
+    from sensorgen.asprinted import film
     from sensorgen.scene.sections import sections
 
     cells, remarks = {}, {}
@@ -181,13 +181,20 @@ def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
         except ValueError:  # no constant cross-section
             period = first.scene.size_mm[0]
     scenes = {name: cell.scene for name, cell in cells.items()}
-    return Cells(scenes, first.count, period, partial(_printed_gaps, scenes), printed.lines, remarks)
+    error_mm = printed.design.machine.tool_height_error_mm
+    thicker = film.thicker(first.scene, error_mm)
+    changed = Film(error_mm, film.thicker(first.scene, -error_mm), thicker) if error_mm and thicker else None
+    return Cells(scenes, first.count, period, partial(_printed_gaps, scenes), printed.lines, remarks, changed)
 
 
 def _printed_gaps(scenes: "Mapping[str, Scene]") -> dict[str, float]:
     from sensorgen.asprinted.printed import gap_mm
 
     return {name: gap_mm(scene) for name, scene in scenes.items()}
+
+
+def _height_error(design: Design) -> str:
+    return f"tools to {design.machine.tool_height_error_mm:g} mm"
 
 
 def _identity(design: Design, *parts: str) -> str:

@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import sha256
-from itertools import takewhile
 from json import dumps
 from typing import TYPE_CHECKING
 
@@ -41,6 +40,7 @@ LAWS = ("unconfined", "bonded", "solved")
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)))  # 6 N on a tip of 10 x 10 mm are 60 kPa
 _LANDING = f"feet land at negligible force: the rise of C up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
 _SAME_RATIO = 1e-3  # difference of Poisson's ratios: 0.4999 and 0.5 are one cell, 0.45 deforms by 11 % more
+_ENOUGH = 0.5  # of the last of them: a curve that is known so far is extended, not solved again on another mesh [-]
 _ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 0.2 mm from 0.5 kPa on
 _LIKE = {"press2d": "tri", "press3d": "rect"}  # prototypes that other cells are assumed to resemble
 
@@ -243,16 +243,15 @@ def solved(
     piece = printed or drawn(design)
     model = model_of(piece)
     case = _case(design, piece, model, boundary or BoundaryConditions())
-    found = pressed(case, STRESS_PA, level)
-    pairs = zip(found.stress_pa.tolist(), found.capacitance_f_per_m2, strict=True)
-    last_pa = max((p for p, _ in takewhile(lambda pair: pair[1] is not None, pairs)), default=0.0)
-    if 0 < last_pa < STRESS_PA[-1]:
-        found = pressed(case, [p for p in STRESS_PA if p <= last_pa], level)
+    found = pressed(case, STRESS_PA, level, enough=_ENOUGH)
+    sound = found.sound()
+    found = sound if sound.converged_pa >= _ENOUGH * STRESS_PA[-1] else found
     curve = curve_of(found)
     # Loads, not the mesh, cost the coarsest mesh its time, and its solution serves for nothing else.
     last = len(curve.stress_pa) - 1
     shared = sorted({0, 1, *range(last, 0, -4)}) if level - 1 == COARSEST else list(range(last + 1))
-    other = curve_of(pressed(case, [curve.stress_pa[k] for k in shared], level - 1))
+    stress = [curve.stress_pa[k] for k in shared]
+    other = curve_of(pressed(case, stress, level - 1, enough=_ENOUGH, apex=found.apex).sound())
     rises = zip((curve.ratio[k] for k in shared[1:]), other.ratio[1:], strict=False)
     least = next(mesh.rise_error for mesh in mesh_levels(piece, model, 1) if mesh.level == level)
     curve = replace(

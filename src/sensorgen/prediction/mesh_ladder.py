@@ -149,7 +149,7 @@ def fineness(model: str, level: int) -> "Fineness | Pieces":
 
 def pressed(
     case: Case, stress_pa: Sequence[float], level: int = USUAL, *, keep: bool = True,
-    step: Callable[[float], None] | None = None,
+    step: Callable[[float], None] | None = None, enough: float = 1.0, apex: float = 1.0,
 ) -> "Pressed":  # fmt: skip
     """A case under increasing pressure on one mesh, computed or from the cache; without the deformed outlines.
 
@@ -165,6 +165,8 @@ def pressed(
         Use the cache.
     step : callable, optional
         Called with every pressure that is reached [Pa].
+    enough, apex : float
+        Of a cross-section, as of :func:`sensorgen.models.press2d.press` [-].
 
     Raises
     ------
@@ -177,7 +179,7 @@ def pressed(
         raise BadInput(f"{overlaps}; expected each place to belong to one body")
     refuse_crushing(stress_pa[-1], {name: solid.youngs_modulus_pa for name, solid in case.solids.items()})
     mesh, stress = fineness(case.model, level), list(stress_pa)
-    press, cell = _press(case)
+    press, cell = _press(case, enough, apex)
 
     def work() -> Data:
         return _plain(press(case.solids, stress, case.permittivity, case.boundary, mesh, step=step))
@@ -193,11 +195,11 @@ def pressed(
         "permittivity": dict(case.permittivity),
         "stress_pa": stress,
         "held": vars(case.boundary),
-    }
+    } | ({"enough": enough, "apex": apex} if enough < 1 else {})
     return _of_plain(cached.answer(question, work))
 
 
-def _press(case: Case) -> "tuple[Callable[..., Pressed], str]":
+def _press(case: Case, enough: float, apex: float) -> "tuple[Callable[..., Pressed], str]":
     """The solver of a case, and its cell as text."""
     from sensorgen.models import press2d, press3d
 
@@ -205,7 +207,7 @@ def _press(case: Case) -> "tuple[Callable[..., Pressed], str]":
         boxes = press3d.cell(case.piece.scene)
         return partial(press3d.press, boxes), boxes.written()
     cell = press2d.cell(case.piece.scene, case.piece.period_mm)
-    return partial(press2d.press, cell), repr(cell)
+    return partial(press2d.press, cell, enough=enough, apex=apex), repr(cell)
 
 
 def _plain(found: "Pressed") -> Data:

@@ -71,7 +71,8 @@ def _gap(body: Body) -> Bounds | None:
     gaps = [gap * M_PER_MM for gap in body.cells.gap_mm.values()]
     if inf in gaps:
         return None
-    by_print = Interval(min(gaps), max(gaps))
+    error = body.cells.film.error_mm * M_PER_MM if body.cells.film else 0.0
+    by_print = Interval(max(min(gaps) - error, 0.0), max(gaps) + error)
     if gaps[0] == 0:
         exact = Interval(0.0, 0.0)
         return Bounds(0.0, by_print.lower, by_print.upper, "m", exact, by_print, exact, certified=True)

@@ -352,8 +352,8 @@ def from_json(text: str) -> Prediction:
         if isinstance(data, dict) and data["schema"] != SCHEMA:
             raise BadInput(f"a prediction of schema {data['schema']}; this version reads {SCHEMA} and older: update")
         return adapter().validate_json(text)
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise BadInput(f"not a prediction: {str(error).splitlines()[0]}") from None
+    except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:
+        raise BadInput(f"not a prediction: {str(error).partition(chr(10))[0]:.200}") from None
 
 
 def _of_schema_2(data: dict[str, Any]) -> dict[str, Any]:

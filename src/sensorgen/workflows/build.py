@@ -30,7 +30,7 @@ from sensorgen.export.threemf.part import parts_of
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless, to_json
-from sensorgen.workflows import compensation
+from sensorgen.workflows import compensation, sealed
 from sensorgen.workflows.compensation import Change
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
@@ -58,6 +58,8 @@ class Built:
         Of the print, with the drawing's beside it.
     compensated : tuple of Change
         How the design differs from the one that was asked for.
+    replaced : tuple of str
+        What made room: files of another design in the same folder.
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
@@ -69,6 +71,7 @@ class Built:
     findings: tuple[Finding, ...]
     prediction: Prediction
     compensated: tuple[Change, ...] = ()
+    replaced: tuple[str, ...] = ()
 
     def document(self) -> Iterator[Part]:
         """Verdict, quantities drawn beside printed, and the three findings that matter most."""
@@ -80,6 +83,7 @@ class Built:
         yield f"{self.folder}: {len(self.files)} files; --details prints all"
 
     def _head(self) -> Iterator[Part]:
+        yield from self.replaced
         yield from compensation.document(self.compensated)
         yield f"{self.verdict}  {self.name}: {counted(counts(self.findings))}"
         yield ""
@@ -155,24 +159,34 @@ def build(
         if job:
             _await(job, step)
         store.write(stage, {store.MANIFEST: json_bytes(_manifest(design, stage))})
+        replaced = _replaced(folder, design)
         store.publish(stage, folder)
+        replaced += sealed.set_aside(folder, design)
         step("done")
     number = held.counts()
     return Built(
         design.name, folder, tuple(sorted([*store.listed(folder), store.MANIFEST])),
         "CHANGE" if number["error"] else "PRINT WITH WARNINGS" if number["warning"] else "PRINT",
-        tuple(held.findings), timeless(predicted), tuple(compensated),
+        tuple(held.findings), timeless(predicted), tuple(compensated), replaced,
     )  # fmt: skip
+
+
+def _replaced(folder: Path, design: Design) -> tuple[str, ...]:
+    """That the folder holds another design, whose files make room."""
+    try:
+        key = json.loads((folder / store.MANIFEST).read_text("utf-8"))["design"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return ()
+    return (f"{folder} held another design, {key!r:.40}: its files were replaced",) if key != design.id() else ()
 
 
 def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> Iterator[tuple[str, bytes]]:
     name, primed = design.name, tower(design.machine, design.layers, len(design.used()))
     step("3MF")
+    parts, settings = parts_of(design, held.meshes), prusa.profile(design.machine, design.layers, loads(design))
     for family in threemf.FAMILIES:
-        yield (
-            f"{name}.{family}.3mf",
-            threemf.content(family, name, parts_of(design, held.meshes), _centre_mm(design, family), primed),
-        )
+        content = threemf.content(family, name, parts, _centre_mm(design, family), primed, settings)
+        yield f"{name}.{family}.3mf", content
     step("profiles")
     for path, text in profiles(design).items():
         yield path, text.encode()
@@ -223,13 +237,14 @@ def _colours(design: Design) -> dict[str, str]:
 
 
 def _manifest(design: Design, stage: Path) -> dict[str, Any]:
-    return {
+    content = {
         "name": design.name,
         "design": design.id(),
-        "resolved": design.resolved(),
+        "resolved": json.loads(json.dumps(design.resolved())),
         "files": store.hashes(stage),
         "versions": versions(),
     }
+    return content | {sealed.SEAL: sealed.seal(_plain(content))}
 
 
 def versions() -> dict[str, str]:

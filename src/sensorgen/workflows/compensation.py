@@ -1,7 +1,7 @@
 """Compensation: parameters changed until the print has the electrode gap and the capacitance that were asked for."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from math import inf, log
 
@@ -26,6 +26,7 @@ _HALVINGS = 12  # of a step between two widths
 _MOST_TRIED, _MOST_SOLVED = 300, 60  # designs whose gap, and whose capacitance is found, before it gives up
 
 Slice = Callable[[Design], Body]
+_Values = tuple[tuple[str, float], ...]  # of parameters, by their names
 
 
 @dataclass(frozen=True)
@@ -117,15 +118,17 @@ def compensated(
     asked = found(drawn(design))
     before = _estimate(now, walls) if sliced is None else found(sliced(now))
     wanted = Found(now, _attainable_mm(now, asked.gap_mm), asked.capacitance_pf)
-    if not 0 < asked.gap_mm < inf or _reached(before, wanted):
+    if not 0 < asked.gap_mm < inf:
         return now, changes
-    after = _searched(now, wanted, walls, sliced, step)
+    after = before if _reached(before, wanted) else _searched(now, wanted, walls, sliced, step)
     if abs(wanted.gap_mm - asked.gap_mm) > now.layers.layer_mm / 2:
         layer = now.layers.layer_mm
         raise OutOfRange(
             f"{asked.words()} cannot be printed: a film has {FILM_LAYERS} layers at least, {FILM_LAYERS * layer:g} mm "
             f"at layers of {layer:g} mm; nearest: {_told(design, after)}"
         )
+    if after is before:
+        return now, changes
     old, new = asdict(now.params), asdict(after.design.params)
     changes += [Change(name, old[name], new[name], "gap and capacitance") for name in old if old[name] != new[name]]
     changes.append(Change("electrode gap as printed [mm]", before.gap_mm, after.gap_mm, f"{asked.gap_mm:g} mm asked"))
@@ -197,7 +200,7 @@ def _told(design: Design, nearest: Found | None) -> str:
     return f"{nearest.words()} by {values or 'the design as it is'}"
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class _Search:
     """Designs whose estimated print is the wanted one: heights in whole layers, and one width or the period.
 
@@ -208,16 +211,14 @@ class _Search:
     wanted: Found
     walls: str
     margin: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_known", {})
+    tried: dict[_Values, Found | None] = field(default_factory=dict, init=False)
 
     @cached_property
     def best(self) -> Found | None:
         """The one with the least changes."""
         best, least = None, inf
         for heights, moved in _heights(self.design, self.wanted.gap_mm):
-            if moved >= least or self._weary():
+            if moved >= least or self._exhausted():
                 break
             for name in _widths(self.design):
                 for way in (_STEP, 1 / _STEP):
@@ -226,23 +227,22 @@ class _Search:
                         best, least = hit, moved + further
         return best or (self.nearest if self.nearest and _reached(self.nearest, self.wanted) else None)
 
-    def _weary(self) -> bool:
-        known: dict[object, Found | None] = self._known  # type: ignore[attr-defined]
-        return (
-            len(known) > _MOST_TRIED or sum(bool(one and one.capacitance_pf) for one in known.values()) > _MOST_SOLVED
-        )
+    def _exhausted(self) -> bool:
+        """Whether as many designs were tried as may be."""
+        solved = sum(bool(one and one.capacitance_pf) for one in self.tried.values())
+        return len(self.tried) > _MOST_TRIED or solved > _MOST_SOLVED
 
     @property
     def nearest(self) -> Found | None:
         """Of all that were tried, the one nearest to what is wanted."""
-        known: dict[object, Found | None] = self._known  # type: ignore[attr-defined]
-        return min((one for one in known.values() if one), key=lambda one: _distance(one, self.wanted), default=None)
+        found = (one for one in self.tried.values() if one)
+        return min(found, key=lambda one: _distance(one, self.wanted), default=None)
 
     def _along(self, heights: dict[str, float], name: str, way: float, most: float) -> tuple[Found | None, float]:
         """The first print with the wanted capacitance on the way up or down from a width, and how far it is."""
         start, before = getattr(self.design.params, name), None
         share = 1.0
-        while _SHARES[0] <= share <= _SHARES[1] and abs(log(share)) < most and not self._weary():
+        while _SHARES[0] <= share <= _SHARES[1] and abs(log(share)) < most and not self._exhausted():
             here = self._at(heights | {name: start * share})
             if here and abs(here.off(self.wanted)) <= WITHIN / 2:
                 return here, abs(log(share))
@@ -268,13 +268,12 @@ class _Search:
     def _at(self, values: dict[str, float]) -> Found | None:
         """The estimate of a design with other values, if it has the wanted gap, with the margin."""
         key = tuple(sorted((name, round(value, 3)) for name, value in values.items()))
-        known: dict[object, Found | None] = self._known  # type: ignore[attr-defined]
-        if key not in known:
+        if key not in self.tried:
             try:
-                known[key] = self._estimated(dict(key))
+                self.tried[key] = self._estimated(dict(key))
             except SensorgenError:  # such a design cannot be made
-                known[key] = None
-        one = known[key]
+                self.tried[key] = None
+        one = self.tried[key]
         return one if one and one.gap_mm == self.wanted.gap_mm and one.off(self.wanted) < inf else None
 
     def _estimated(self, values: dict[str, float]) -> Found:

@@ -22,8 +22,6 @@ from sensorgen.design.design import Design
 from sensorgen.design.walls import rule
 from sensorgen.export.gcode.check import Checked, check_motion
 from sensorgen.export.gcode.drags import Lifting
-from sensorgen.export.gcode.motion import follow
-from sensorgen.export.gcode.paths import paths_of
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 from sensorgen.export.slicing import Step, alone, sliced
 from sensorgen.workflows import compensation
@@ -158,12 +156,21 @@ def slice_design(
     with tempfile.TemporaryDirectory() as stage:
         made = sliced([alone(design)], slicer, Path(stage), program=program, time_limit_s=time_limit_s, step=step)
         content = made.ready.read_bytes()
-        checked = _checked(design, made.ready)
-        printed = nominal(design, made.lines, f"{made.slicer} {made.version}")
-        layers, findings = printed.rows(), printed.findings()
-        films = pinholes.pinholes(design, made.lines, widths=(1.0,), most_layers=pinholes.MOST_LAYERS)
+    machine, loaded = design.machine, {design.tool(name): name for name in design.used()}
+    printed = nominal(design, made.lines, f"{made.slicer} {made.version}")
+    checked = check_motion(made.lifted.motion, machine, loaded, others_empty=True).with_more(
+        agreement.check(
+            design, made.lines, made.lifted.motion.changes, machine.bed_centre_mm(), alone=True, lines=printed.lines
+        )
+    )
+    layers, findings = printed.rows, printed.findings()
+    if printed.lines and len(printed.lines.number):
+        films = pinholes.of_lines(design, printed.lines, widths=(1.0,), most_layers=pinholes.MOST_LAYERS)
         findings += design.waived([*pinholes.findings(films)])
-        page = pages.of_print(printed, findings) if printed.lines and len(printed.lines.number) else ""
+        travel = {"as sliced": made.lifted.before, "as written": made.lifted.after}
+        page = pages.of_print(printed, findings, {when: found.stretches() for when, found in travel.items()})
+    else:
+        page = ""
     stopped, stem = bool(checked.errors(strict)), f"{design.name}.{slicer}"
     names, others = (f"{stem}.gcode", f"{stem}.gcode.json"), (f"{stem}.refused.gcode", f"{stem}.refused.json")
     names, others = (others, names) if stopped else (names, others)
@@ -171,7 +178,7 @@ def slice_design(
         **vars(checked), name=design.name, design=design.id(), gcode=names[0], refused=stopped,
         sha256=sha256(content).hexdigest(), slicer=Slicer(made.slicer, made.version), sensorgen=__version__,
         printer=design.machine.name, quality=design.layers.name, design_findings=tuple(held.sliced().findings),
-        printed=Volumes(tuple(layers), (*made.findings, *findings)), lifting=made.lifting,
+        printed=Volumes(tuple(layers), (*made.findings, *findings)), lifting=made.lifted.lifting,
         compensated=tuple(compensated),
     )  # fmt: skip
     folder = out / design.name
@@ -182,12 +189,3 @@ def slice_design(
     for old in others:
         (folder / old).unlink(missing_ok=True)
     return replace(result, gcode=str(folder / names[0]))
-
-
-def _checked(design: Design, ready: Path) -> Checked:
-    """The file for the printer, on its own and against the design."""
-    machine = design.machine
-    motion = follow(ready, machine.control.prime_macro)
-    checked = check_motion(motion, machine, {design.tool(name): name for name in design.used()}, others_empty=True)
-    lines = paths_of(motion, machine)
-    return checked.with_more(agreement.check(design, lines, motion.changes, machine.bed_centre_mm(), alone=True))

@@ -5,8 +5,8 @@ import json
 from sensorgen.core.errors import MissingValue
 from sensorgen.design.design import Design
 from sensorgen.measure.log import notes
-from sensorgen.measure.log.batches import prediction
-from sensorgen.measure.log.entries import Entry
+from sensorgen.measure.log.batches import design_row, prediction
+from sensorgen.measure.log.entries import Entry, Prediction
 from sensorgen.measure.log.logbook import Log
 
 
@@ -39,14 +39,17 @@ def predict(log: Log, specimen: str) -> list[Entry]:
         return []
     if design is None or design.id() != design_ids[0]:
         raise MissingValue(f"{specimen!r} names no design; log a prediction of its file: sensorgen log predict FILE")
-    return log.add([predicted_row(design)])
+    return [row for row in log.add(predicted_rows(design)) if isinstance(row, Prediction)]
 
 
-def predicted_row(design: Design) -> Entry:
-    """Prediction of a design's print, as a row of the log."""
+def predicted_rows(design: Design) -> list[Entry]:
+    """A design and the prediction of its print, as rows of the log."""
     from sensorgen.prediction import bodies
     from sensorgen.prediction.evaluate import evaluate
     from sensorgen.prediction.results import to_json
 
     predicted = evaluate(bodies.default_body(design))
-    return prediction(design.id(), design.name, json.loads(to_json(predicted)))
+    return [
+        design_row(design.id(), design.name, design.resolved()),
+        prediction(design.id(), design.name, json.loads(to_json(predicted))),
+    ]

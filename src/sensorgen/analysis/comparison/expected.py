@@ -6,9 +6,11 @@ from functools import cached_property
 from statistics import geometric_mean
 
 from sensorgen.core.bounds import Bounds, Interval
+from sensorgen.core.errors import BadInput
 from sensorgen.core.version import __version__
 from sensorgen.design.body import Body
-from sensorgen.measure import log
+from sensorgen.measure.log import Entry, Log, Withdrawal
+from sensorgen.measure.log import Prediction as Stored
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, from_json
 
@@ -27,6 +29,11 @@ class Predicted:
         When the log stored it, UTC; "" where it was made now, after the measurement.
     version : str
         Of sensorgen, which made it.
+    before : bool or None
+        Whether it was stored before every reading and recording, by the order of the log's records; None where that
+        proves nothing.
+    order : str
+        Its place in that order, in words.
     """
 
     design: str
@@ -34,6 +41,8 @@ class Predicted:
     prediction: Prediction
     stored_at: str
     version: str
+    before: bool | None = False
+    order: str = ""
 
     @cached_property
     def ry_ohm(self) -> Bounds | None:
@@ -72,22 +81,48 @@ class Predicted:
     def provenance(self) -> str:
         """Where the prediction comes from, in words."""
         if self.stored_at:
-            return f"stored {self.stored_at} by sensorgen {self.version}"
+            return f"stored {self.stored_at} by sensorgen {self.version}; {self.order}"
         return f"made afterwards by sensorgen {self.version}: none was stored before"
 
 
-def predicted(body: Body, stored: Sequence[log.Prediction] = ()) -> Predicted:
+def predicted(body: Body) -> Predicted:
+    """A prediction that is made now."""
+    return Predicted(body.design.name, body.design.id(), evaluate(body), "", __version__)
+
+
+def stored_or_made(
+    body: Body, log: Log, stored: Sequence[Stored], measured: Sequence[Entry], left_out: list[tuple[str, str]]
+) -> Predicted:
     """The earliest prediction that the log has of a body's design, else one that is made now.
 
     Parameters
     ----------
     body : Body
         That was measured.
-    stored : sequence of log.Prediction
-        The log's predictions of this very design.
+    log : Log
+        An open one.
+    stored : sequence of Stored
+        The log's predictions of this very design, withdrawn ones too.
+    measured : sequence of Entry
+        Readings and recordings of it.
+    left_out : list of (str, str)
+        Grows by predictions that were withdrawn or cannot be read, and why.
     """
-    design = body.design
-    first = min(stored, key=lambda p: p.number, default=None)
-    if first:
-        return Predicted(design.name, design.id(), from_json(first.data), first.logged_at, first.version)
-    return Predicted(design.name, design.id(), evaluate(body), "", __version__)
+    for first in sorted(stored, key=lambda p: p.number):
+        try:
+            found = from_json(first.data)
+            why = next((row.reason for row in log.superseding(first) if isinstance(row, Withdrawal)), "")
+        except BadInput as error:
+            why = str(error)
+        if why:
+            left_out.append((f"prediction {first.number} of {first.design}", why))
+            continue
+        before = log.before(first, measured)
+        order = {
+            True: "before anything was measured",
+            False: "AFTER something was measured",
+            None: "before or after the measurement only by clocks",
+        }[before]
+        place = f"record {log.record_of(first)[0]} of the log, {order}"
+        return Predicted(body.design.name, body.design.id(), found, first.logged_at, first.version, before, place)
+    return predicted(body)

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite, log, nan
 
-from sensorgen.analysis.comparison.expected import Predicted, predicted
+from sensorgen.analysis.comparison.expected import Predicted, stored_or_made
 from sensorgen.analysis.comparison.measured import Measured, Readings, readings
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.lazy import Lazy
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
 from sensorgen.design.specimen_name import Specimen, design_of, parse
-from sensorgen.measure.log import Log, Reading
+from sensorgen.measure.log import BenchRun, Entry, Log, Prediction, Reading, Withdrawal
 from sensorgen.measure.log.batches import designs as on_beds
 from sensorgen.measure.signal.verdicts import Evidence, Verdict, expected_from, least, verdict
 from sensorgen.prediction import bodies
@@ -103,7 +103,7 @@ def of_iteration(
         Makes the body of a design.
     """
     measured = readings(log.entries(Reading, iteration=iteration))
-    left_out = list(_corrected(log, iteration, measured))
+    left_out = list(_superseded(log, iteration, measured))
     printed = {row.specimen: row.design_id for row in log.prints()}
     by_specimen = _by_specimen(log, iteration, printed, left_out)
     names = {specimen: design.name for specimen, design in by_specimen.items()}
@@ -112,11 +112,13 @@ def of_iteration(
     for specimen in by_specimen.keys() & printed.keys():
         ids[names[specimen]].add(printed[specimen])  # another version of sensorgen may have named it
     left_out += _other_designs(measured.designs, set().union(*ids.values()))
+    begun = _begun(log, iteration, names)
     made, found = {}, {}
     for name, design in designs.items():
         step(name)
         made[name] = body_of(design)
-        found[name] = predicted(made[name], [p for each in ids[name] for p in log.predictions(design_id=each)])
+        stored = [p for each in ids[name] for p in log.entries(Prediction, superseded=True, design_id=each)]
+        found[name] = stored_or_made(made[name], log, stored, begun.get(name, []), left_out)
     by_shape: dict[str, array[float]] = {}
     for reading in measured.rows:
         by_shape.setdefault(reading.shape, array("d")).extend(least(_evidence(reading, None)))
@@ -132,14 +134,30 @@ def of_iteration(
     return Comparison(rows, made, names, found, (*left_out, *_first(_unused(rows))))
 
 
-def _corrected(log: Log, iteration: int, measured: Readings) -> Iterator[tuple[str, str]]:
+def _begun(log: Log, iteration: int, names: Mapping[str, str]) -> dict[str, list[Entry]]:
+    """The first reading and the first recording of each design; all of them where several machines wrote the log."""
+    found: dict[str, dict[object, Entry]] = {}
+    kinds: tuple[type[Reading | BenchRun], ...] = (Reading, BenchRun)
+    for kind in kinds:
+        for row in log.entries(kind, superseded=True, iteration=iteration):
+            if row.specimen in names:
+                found.setdefault(names[row.specimen], {}).setdefault((kind, row.number * log.merged), row)
+    return {name: list(rows.values()) for name, rows in found.items()}
+
+
+def _superseded(log: Log, iteration: int, measured: Readings) -> Iterator[tuple[str, str]]:
+    """Readings out of use, and why."""
     current = (reading.number for reading in measured.rows)
     now = next(current, 0)
     for old in log.entries(Reading, superseded=True, iteration=iteration):  # both in the order of the log
         if old.number == now:
             now = next(current, 0)
-        else:
-            yield f"reading {old.number}, {old.specimen}", "a later reading corrects it"
+            continue
+        later = log.superseding(old)
+        reason = next((row.reason for row in later if isinstance(row, Withdrawal)), "")
+        both = f"; {len(later)} corrections of it, made on different machines, all count" if len(later) > 1 else ""
+        why = f"withdrawn: {reason}" if reason else f"a later reading corrects it{both}"
+        yield f"reading {old.number}, {old.specimen}", why
 
 
 def _first(left_out: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:

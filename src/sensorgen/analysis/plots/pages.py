@@ -5,18 +5,17 @@ from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
-from sensorgen.analysis.plots.figure import Figure
-from sensorgen.analysis.plots.interactive import data, height_px
-from sensorgen.analysis.plots.libraries import needed
 from sensorgen.core.version import __version__
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
+    from sensorgen.analysis.plots.figure import Figure
+
 _OWN = "sensorgen.analysis.plots"
 
 
-def render(package: str, name: str, figures: Sequence[Figure] = (), **context: Any) -> str:
+def render(package: str, name: str, figures: "Sequence[Figure]" = (), **context: Any) -> str:
     """A page from a template that extends ``base.html``; whatever text stands in it is escaped.
 
     Parameters
@@ -35,13 +34,17 @@ def render(package: str, name: str, figures: Sequence[Figure] = (), **context: A
     MissingValue
         Plotly is not installed, and there are figures.
     """
+    drawn: dict[str, Any] = {"figures": figures, "data": [], "plotly": None}
     if figures:
+        from sensorgen.analysis.plots.interactive import data, height_px
+        from sensorgen.analysis.plots.libraries import needed
+
         needed("plotly")
-    drawn = {"figures": figures, "data": [data(figure) for figure in figures], "plotly": _plotly if figures else None}
+        drawn |= {"data": [data(figure) for figure in figures], "plotly": _plotly, "height_px": height_px}
     return _environment(package).get_template(name).render(drawn | context) + "\n"
 
 
-def page(title: str, words: Sequence[str], figures: Sequence[Figure]) -> str:
+def page(title: str, words: Sequence[str], figures: "Sequence[Figure]") -> str:
     """A page of figures under a title and paragraphs of text."""
     return render(_OWN, "page.html", figures, title=title, words=words)
 
@@ -60,7 +63,7 @@ def _environment(package: str) -> "Environment":
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     made.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
-    made.globals |= {"inline": inline, "version": __version__, "height_px": height_px, "zip": zip}
+    made.globals |= {"inline": inline, "version": __version__, "zip": zip}
     return made
 
 

@@ -124,10 +124,17 @@ def headline(found: Comparison) -> Iterator[str]:
 
 def findings(found: Comparison) -> Iterator[str]:
     """When predictions were made, and which electrodes touch as drawn."""
-    made = sum(not p.stored_at for p in found.predictions.values())
-    if found.predictions:
-        late = f"; {made} made after the measurement" if made else ""
-        yield f"{len(found.predictions) - made} of {len(found.predictions)} predictions were stored in the log{late}."
+    every = list(found.predictions.values())
+    before = sum(bool(p.stored_at) and p.before is True for p in every)
+    late = {
+        "by the clocks of the log alone": sum(bool(p.stored_at) and p.before is None for p in every),
+        "stored after a measurement": sum(bool(p.stored_at) and p.before is False for p in every),
+        "made after the measurement": sum(not p.stored_at for p in every),
+    }
+    if every:
+        rest = "".join(f"; {count} {how}" for how, count in late.items() if count)
+        order = "stored before anything was measured, by the order of the log's records"
+        yield f"{before} of {len(every)} predictions were {order}{rest}."
     touching = Counter(r.predicted.design for r in found.rows if r.predicted and r.predicted.touches)
     if touching:
         names = ", ".join(f"{name} ({count})" for name, count in sorted(touching.items()))

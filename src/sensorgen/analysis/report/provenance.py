@@ -3,7 +3,6 @@
 import platform
 from collections import Counter
 from dataclasses import dataclass
-from hashlib import file_digest
 from importlib.metadata import version
 from typing import Annotated
 
@@ -27,13 +26,12 @@ class Origin:
 
 def origins(log: Log, found: Comparison) -> Table:
     """Versions, the log, raw files, designs with the predictions of each, and sources of material values."""
-    with log.path.open("rb") as file:
-        digest = file_digest(file, "sha256").hexdigest()
+    records, head = log.head()
     readings = Counter(r.reading.words.source for r in found.rows)
     rows = [
         Origin("program", "sensorgen", __version__), Origin("program", "Python", platform.python_version()),
         *(Origin("library", name, version(name)) for name in LIBRARIES),
-        Origin("log", log.path.name, f"SHA-256 {digest}, at the time of the report"),
+        Origin("log", log.path.name, f"{records} records; head {head}"),
         *(Origin("raw file", f.name, f"SHA-256 {f.uid}, {f.size} bytes") for f in log.entries(RawFile)),
         *(Origin("source of readings", name, f"{count} readings") for name, count in sorted(readings.items())),
         *(Origin("prediction", f"{p.design} ({p.design_id})", p.provenance) for p in found.predictions.values()),

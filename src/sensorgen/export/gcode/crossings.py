@@ -105,6 +105,29 @@ class Points:
 
 
 @dataclass(frozen=True, eq=False)
+class Stretches:
+    """Straight stretches of travel over lines of another tool.
+
+    Attributes
+    ----------
+    start_mm, end_mm : (n, 3) array
+        First and last point of each.
+    length_mm : (n,) array
+        Length that its points stand for.
+    touches : (n,) array of bool
+        Whether the nozzle is in contact.
+    tool : (n,) array of int
+        The printer's own number of the tool [-].
+    """
+
+    start_mm: Real
+    end_mm: Real
+    length_mm: Real
+    touches: Mask
+    tool: Whole
+
+
+@dataclass(frozen=True, eq=False)
 class Crossings:
     """What moves of a file pass over.
 
@@ -122,8 +145,21 @@ class Crossings:
     rubbing_mm: Real
     tool: Whole
 
+    def stretches(self) -> Stretches:
+        """The travel as straight stretches, in contact or near."""
+        points = self.travel
+        touches, place = points.gap_mm <= CONTACT_MM, points.place_mm
+        joined = (np.diff(points.row) == 0) & (touches[1:] == touches[:-1])
+        joined &= np.hypot(*np.diff(place[:, :2], axis=0).T) < 1.5 * PITCH_MM
+        first = np.flatnonzero(np.append(True, ~joined)[: len(place)])
+        last = np.append(first[1:], len(place))[: len(first)] - 1
+        length = np.diff(np.append(0.0, np.cumsum(points.length_mm)[last]))
+        return Stretches(place[first], place[last], length, touches[first], self.tool[points.row[first]])
 
-def crossings(motion: Motion, machine: Printer, numbering: Numbering = "printer") -> Crossings:
+
+def crossings(
+    motion: Motion, machine: Printer, numbering: Numbering = "printer", rubbing_mm: Real | None = None
+) -> Crossings:
     """Find where the nozzle passes over what another tool has printed before.
 
     Parameters
@@ -134,14 +170,19 @@ def crossings(motion: Motion, machine: Printer, numbering: Numbering = "printer"
         Whose G-code it is.
     numbering : "printer" or "slicer"
         Whether T counts as the printer does, or from 0.
+    rubbing_mm : (k,) array, optional
+        Of every move that extrudes, where it is known; measured if not given.
     """
     lines, tool = printed_lines(motion, machine, numbering), tools_of(motion, machine, numbering)
     moves = (motion.across_mm > 0) & (motion.rows[:, 5] < lines.top_mm.max(initial=0.0) + NEAR_MM)
     travels = np.flatnonzero(moves & (motion.extruded_mm <= 0))
     rubs = np.flatnonzero(moves & (motion.extruded_mm > 0) & np.isin(motion.number, lines.number))
     rubbing = np.zeros(len(tool))
-    for points in _over(_blocks(motion, tool, rubs), lines, CONTACT_MM, FACE_MM):
-        np.add.at(rubbing, points.row, points.length_mm)
+    if rubbing_mm is None:
+        for points in _over(_blocks(motion, tool, rubs), lines, CONTACT_MM, FACE_MM):
+            np.add.at(rubbing, points.row, points.length_mm)
+    else:
+        rubbing[motion.extruded_mm > 0] = rubbing_mm
     nothing = Points(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
     over = [nothing, *_over(_blocks(motion, tool, travels), lines, NEAR_MM, 0.0)]
     travel = (np.concatenate([getattr(p, name) for p in over]) for name in Points.__dataclass_fields__)

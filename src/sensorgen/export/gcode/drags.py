@@ -129,6 +129,29 @@ class Lifting:
         )  # fmt: skip
 
 
+@dataclass(frozen=True, eq=False)
+class Lifted:
+    """A file with its lifts.
+
+    Attributes
+    ----------
+    text : bytes
+        The file.
+    motion : Motion
+        The same, followed.
+    before, after : Crossings
+        What its moves pass over, without the lifts and with them.
+    lifting : Lifting
+        Both summed up.
+    """
+
+    text: bytes
+    motion: Motion
+    before: Crossings
+    after: Crossings
+    lifting: Lifting
+
+
 def drags(source: Source, machine: Printer) -> Drags:
     """Measure the travel over foreign material in a file, whoever has sliced it.
 
@@ -155,8 +178,8 @@ def drags(source: Source, machine: Printer) -> Drags:
     return summed(motion, crossings(motion, machine), machine)
 
 
-def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> tuple[bytes, Lifting]:
-    """Lift the nozzle wherever it travels over foreign material; the file, and what was changed.
+def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> Lifted:
+    """Lift the nozzle wherever it travels over foreign material.
 
     Parameters
     ----------
@@ -177,7 +200,7 @@ def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> 
     found, retracted = crossings(motion, machine, numbering), _retracted(motion, machine)
     before = summed(motion, found, machine)
     if not len(found.travel.row):
-        return text, Lifting(before, before, 0, 0, 0.0)
+        return Lifted(text, motion, found, found, Lifting(before, before, 0, 0, 0.0))
     odd = next((e for e in motion.events if e.command.code in ("G91", "G20")), None)
     if odd:
         raise BadInput(
@@ -187,9 +210,12 @@ def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> 
     writer = _Lifts(text, motion, machine, found, retracted)
     lifted = writer.text()
     again = follow(lifted, machine.control.prime_macro)
-    after = summed(again, crossings(again, machine, numbering), machine)
+    rubbing_mm = found.rubbing_mm[motion.extruded_mm > 0]  # its lines are the same, and in the same order
+    left = crossings(again, machine, numbering, rubbing_mm)
     took = [float(seconds(m, machine.max_speed_mm_s).sum()) for m in (motion, again)]
-    return lifted, Lifting(before, after, writer.lifts, writer.retractions, took[1] - took[0])
+    after = summed(again, left, machine)
+    lifting = Lifting(before, after, writer.lifts, writer.retractions, took[1] - took[0])
+    return Lifted(lifted, again, found, left, lifting)
 
 
 def summed(motion: Motion, found: Crossings, machine: Printer) -> Drags:
@@ -209,11 +235,12 @@ def summed(motion: Motion, found: Crossings, machine: Printer) -> Drags:
         sums = [float(v[mine].sum()) for v in (contact, near, found.rubbing_mm)]
         tools.append(OfTool(tool, sums[0], sums[1], int(whole.sum()), int(bare.sum()), sums[2]))
     keys = np.column_stack([np.round(points.place_mm[:, 2], 2), found.tool[points.row]])
-    layers = []
-    for z, tool in np.unique(keys, axis=0).tolist():
-        here = (keys == (z, tool)).all(1)
-        lengths = [float(points.length_mm[here & rows].sum()) for rows in (touches, ~touches)]
-        layers.append(OfLayer(z, int(tool), *lengths))
+    found_keys, place = np.unique(keys, axis=0, return_inverse=True)
+    lengths = [
+        np.bincount(place.ravel()[rows], points.length_mm[rows], len(found_keys)).tolist()
+        for rows in (touches, ~touches)
+    ]
+    layers = [OfLayer(z, int(tool), *sums) for (z, tool), *sums in zip(found_keys.tolist(), *lengths, strict=True)]
     return Drags(tuple(tools), tuple(layers))
 
 
@@ -267,11 +294,14 @@ class _Lifts:
         self.over_mm = np.bincount(points.row, points.length_mm, minlength=len(self.number))
         for first, last in self._groups(np.unique(points.row)):
             self._lift(first, last, top, before, after)
-        made = []
-        for number, line in enumerate(self.lines, 1):
-            made += [*(text.encode() for text in before.get(number, ())), line]
+        made, done = list[bytes](), 0
+        for number in sorted({*before, *after}):
+            made += self.lines[done : number - 1]
+            made += [text.encode() for text in before.get(number, ())]
+            made.append(self.lines[number - 1])
             made += [text.encode() for text in after.get(number, ())]
-        return b"\n".join(made)
+            done = number
+        return b"\n".join([*made, *self.lines[done:]])
 
     def _groups(self, rows: Whole) -> Iterator[tuple[int, int]]:
         """First and last of the moves that are made in one lift: nothing but travel lies between them."""

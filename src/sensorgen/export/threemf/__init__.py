@@ -23,7 +23,12 @@ FAMILIES = tuple(_WRITERS)
 
 
 def content(
-    family: str, title: str, parts: Sequence[Part], centre_mm: tuple[float, float], tower: Tower | None = None
+    family: str,
+    title: str,
+    parts: Sequence[Part],
+    centre_mm: tuple[float, float],
+    tower: Tower | None = None,
+    profile: str = "",
 ) -> bytes:
     """The 3MF of some bodies for one family of slicers.
 
@@ -41,6 +46,8 @@ def content(
         ``cura``. The lowest point comes to stand on the bed.
     tower : Tower, optional
         The prime tower, in coordinates of the bed; PrusaSlicer reads its place here since 2.9.
+    profile : str
+        Text of an ``.ini`` that PrusaSlicer's window opens with the bodies; for ``prusa`` alone.
 
     Returns
     -------
@@ -56,7 +63,7 @@ def content(
 
     Examples
     --------
-    >>> from sensorgen.scene.geometry.mesh import Mesh
+    >>> from sensorgen.scene.geometry.meshes import Mesh
     >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
     >>> sides = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], dtype=np.int32)
     >>> film = Part("film", "X60", "#cccccc", 1, Mesh(corners, sides))
@@ -69,12 +76,20 @@ def content(
     ordered = sorted(parts, key=lambda part: part.name)
     low, high = box_mm(parts)
     shift_mm = np.array([*centre_mm, 0.0]) - [*(low + high)[:2] / 2, low[2]]
-    files = _WRITERS[family](title, ordered, shift_mm)
-    return archive.pack([*files, prusa.tower(tower)] if tower and family == "prusa" else files)
+    files = list(_WRITERS[family](title, ordered, shift_mm))
+    if family == "prusa":
+        files += [prusa.tower(tower)] if tower else []
+        files += [prusa.profile(profile)] if profile else []
+    return archive.pack(files)
 
 
 def plate(
-    family: str, title: str, parts: Sequence[Part], corner_mm: tuple[float, float], tower: Tower | None = None
+    family: str,
+    title: str,
+    parts: Sequence[Part],
+    corner_mm: tuple[float, float],
+    tower: Tower | None = None,
+    profile: str = "",
 ) -> bytes:
     """The 3MF of a plate with several sensors, each body where it stands.
 
@@ -88,7 +103,7 @@ def plate(
         All bodies, made by :func:`placed` in the coordinates of the bed.
     corner_mm : (float, float)
         The front left corner of the bed in those coordinates [mm]: Cura counts from there.
-    tower : Tower, optional
+    tower, profile : Tower, str
         See :func:`content`.
 
     Raises
@@ -101,4 +116,4 @@ def plate(
     low, high = box_mm(parts)
     middle_x, middle_y = (low + high)[:2] / 2
     x0, y0 = corner_mm if family == "cura" else (0.0, 0.0)
-    return content(family, title, parts, (float(middle_x - x0), float(middle_y - y0)), tower)
+    return content(family, title, parts, (float(middle_x - x0), float(middle_y - y0)), tower, profile)

@@ -13,7 +13,7 @@ from sensorgen.design import materials
 from sensorgen.design.design import Design
 from sensorgen.export.slicers.loads import load
 from sensorgen.export.slicers.prusa import volume_settings
-from sensorgen.scene.geometry.mesh import Mesh
+from sensorgen.scene.geometry.meshes import Mesh
 
 # What XML 1.0 cannot carry, not even escaped; and line breaks and tabs, whose escapes lib3mf refuses.
 _NOT_XML = re.compile("[^\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")

@@ -1,9 +1,20 @@
 """Append-only log of readings, recordings and predictions of printed specimens."""
 
-from sensorgen.measure.log.entries import Batch, BenchRun, Entry, Prediction, Print, RawFile, Reading, Specimen
-from sensorgen.measure.log.logbook import PLACE, TABLES, Log, place
+from sensorgen.measure.log.entries import (
+    Batch,
+    BenchRun,
+    DesignRow,
+    Entry,
+    Prediction,
+    Print,
+    RawFile,
+    Reading,
+    Specimen,
+    Withdrawal,
+)
+from sensorgen.measure.log.logbook import PLACE, Log, place
 
 __all__ = [
-    "PLACE", "TABLES", "Batch", "BenchRun", "Entry", "Log", "Prediction", "Print", "RawFile", "Reading", "Specimen",
-    "place",
+    "PLACE", "Batch", "BenchRun", "DesignRow", "Entry", "Log", "Prediction", "Print", "RawFile", "Reading", "Specimen",
+    "Withdrawal", "place",
 ]  # fmt: skip

@@ -1,5 +1,6 @@
 """Import the record of a print bed, ``batch.json``: its specimens with their designs and predictions."""
 
+import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -14,8 +15,7 @@ from sensorgen.core.version import __version__
 from sensorgen.design.design import Design, of_resolved
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log import notes
-from sensorgen.measure.log.entries import Batch, Entry, Prediction, Print, RawFile
-from sensorgen.measure.log.verify import prediction_uid
+from sensorgen.measure.log.entries import Batch, DesignRow, Entry, Prediction, Print, RawFile
 
 if TYPE_CHECKING:
     from sensorgen.measure.log.logbook import Log
@@ -31,6 +31,13 @@ class _Piece(Strict, extra="ignore"):
     expected: dict[str, Any] | None = None
 
 
+class _Design(Strict, extra="ignore"):
+    """A design on the bed, with everything that decides it."""
+
+    name: str
+    resolved: dict[str, Any]
+
+
 class _Slicer(Strict, extra="ignore"):
     """Predictions of the designs as one slicer prints them, by design."""
 
@@ -41,6 +48,7 @@ class _Record(Strict, extra="ignore"):
     """The parts of ``batch.json`` that are logged."""
 
     specimens: dict[str, _Piece]
+    designs: dict[str, _Design] = Field(default_factory=dict)
     predictions: dict[str, dict[str, Any]] | None = None
     batch: str | None = None
     slicers: dict[str, _Slicer] | None = None
@@ -66,6 +74,8 @@ def rows(path: Path, file: RawFile) -> Iterator[Entry]:
         record = checked(_Record, data)
         yield file
         yield Batch(uid=file.uid, batch=record.batch or path.absolute().parent.name, file=file.uid)
+        for key, design in record.designs.items():
+            yield design_row(key, design.name, design.resolved)
         pieces = (row for name, piece in record.specimens.items() for row in _piece(file.uid, name, piece, record))
         yield from dict.fromkeys(pieces)  # copies of one design share a prediction
 
@@ -85,14 +95,22 @@ def _piece(batch: str, name: str, piece: _Piece, record: _Record) -> Iterator[En
 
 
 def designs(log: "Log") -> dict[str, Design]:
-    """Designs on the log's print beds, by their identity when they were printed; without those that cannot be read."""
-    found = {}
-    for batch in log.batches():
+    """Designs in the log by their identity when they were logged; without those that cannot be read here."""
+    found = dict[str, Design]()
+    recorded = [(row.uid, row.design, row.data) for row in log.entries(DesignRow)]
+    for batch in log.batches():  # before version 3 the log had them in the files of batches only
         with suppress(SensorgenError):
-            for key, entry in _json(log.raw(batch.file)).get("designs", {}).items():
-                with suppress(SensorgenError, KeyError, TypeError):
-                    found[key] = of_resolved(entry["name"], entry["resolved"])
+            data = _json(log.raw(batch.file)).get("designs", {})
+            recorded += [(key, of["name"], json.dumps(of["resolved"])) for key, of in data.items()]
+    for key, name, data in recorded:
+        with suppress(SensorgenError, KeyError, TypeError):
+            found.setdefault(key, of_resolved(name, json.loads(data)))
     return found
+
+
+def design_row(design_id: str, name: str, resolved: Mapping[str, Any]) -> DesignRow:
+    """Row of a design."""
+    return DesignRow(uid=design_id, design=name, data=_text(resolved))
 
 
 def prediction(design_id: str, design: str, data: Mapping[str, Any]) -> Prediction:
@@ -105,9 +123,14 @@ def prediction(design_id: str, design: str, data: Mapping[str, Any]) -> Predicti
     data : mapping
         The prediction, as JSON has it.
     """
-    text = json.dumps(data, ensure_ascii=False, sort_keys=True)
-    unnamed = Prediction(uid="", design_id=design_id, design=design, version=__version__, data=text)
-    return Prediction(**vars(unnamed) | {"uid": prediction_uid(unnamed)})
+    text = _text(data)
+    content = json.dumps([design_id, design, __version__, text])
+    uid = hashlib.sha256(content.encode()).hexdigest()
+    return Prediction(uid=uid, design_id=design_id, design=design, version=__version__, data=text)
+
+
+def _text(data: Mapping[str, Any]) -> str:
+    return json.dumps(data, ensure_ascii=False, sort_keys=True)
 
 
 def _json(path: Path) -> Any:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from sensorgen.core.errors import BadInput, SensorgenError, Unwritable
 from sensorgen.core.files import part_of, remove_stale_parts, sync_folder
+from sensorgen.measure.log import file_system, migration
 from sensorgen.measure.log.schema import APPLICATION_ID, STEPS, VERSION
 
 WAIT_S = 20.0  # for another writer to finish
@@ -48,6 +49,12 @@ def connect(path: Path, *, create: bool) -> sqlite3.Connection:
         The file cannot be created or migrated.
     """
     with translate_errors(path):
+        shared = file_system.without_locks(path)
+        if shared:
+            raise BadInput(
+                f"{str(path)!r} is on {shared}, where programs cannot lock a file, and rows would be lost; keep the "
+                f"log on a disk of this machine, and share it: sensorgen log sync {str(path.with_suffix(''))!r}"
+            )
         if not os.path.lexists(path):
             if not create:
                 raise BadInput(f"no log at {str(path)!r}: log something first, or name another with --log")
@@ -83,6 +90,8 @@ def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[None]:
         try:
             yield
             connection.execute("COMMIT")
+            with suppress(sqlite3.Error):  # so that a copy of the file alone has everything; the rows are safe without
+                connection.execute("PRAGMA wal_checkpoint(PASSIVE)")
         except BaseException:
             with suppress(sqlite3.Error):
                 connection.execute("ROLLBACK")
@@ -178,6 +187,7 @@ def _take_steps(connection: sqlite3.Connection, version: int) -> None:
     for step in STEPS[version:]:
         for statement in step:
             connection.execute(statement)
+    migration.to_records(connection, version)
     connection.execute(f"PRAGMA user_version = {VERSION}")
 
 

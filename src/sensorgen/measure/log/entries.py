@@ -1,10 +1,10 @@
-"""Records of the log, one dataclass for each table.
+"""Kinds of rows of the log, one dataclass for each.
 
-Rows are never changed or deleted. A correction is a new row that names the old one in ``supersedes``.
+Rows are never changed or deleted. A correction is a new row that names the old one in ``supersedes``; a withdrawal
+does so for a row of any kind.
 """
 
 from dataclasses import dataclass, fields
-from typing import Any, get_type_hints
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,13 +16,16 @@ class Entry:
     uid : str
         Identity, the same in every copy of the log: a hash of an imported row's content, else random.
     logged_at : str
-        Time of logging, UTC, ISO 8601; "" before.
+        Time of logging in this log, UTC, ISO 8601; "" before.
+    claimed_at : str
+        For a row out of an export: the time of logging that the export states, which nothing proves; else "".
     number : int
         Number among the rows of its kind in this log, from 1; 0 before.
     """
 
     uid: str
     logged_at: str = ""
+    claimed_at: str = ""
     number: int = 0
 
 
@@ -59,13 +62,7 @@ class Specimen:
     place: str = ""
 
 
-def columns(kind: type[Any]) -> dict[str, Any]:
-    """Fields of a record with their types."""
-    hints = get_type_hints(kind)
-    return {field.name: hints[field.name] for field in fields(kind)}
-
-
-SPECIMEN_COLUMNS = tuple(columns(Specimen))
+SPECIMEN_COLUMNS = tuple(field.name for field in fields(Specimen))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -216,3 +213,89 @@ class RawFile(Entry):
 
     name: str
     size: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignRow(Entry):
+    """A design, so that the log explains itself.
+
+    Attributes
+    ----------
+    uid : str
+        Identity of the design.
+    design : str
+        Its name.
+    data : str
+        Everything that decides it, as JSON.
+    """
+
+    design: str
+    data: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Withdrawal(Entry):
+    """Takes a row of any kind out of use, without removing it.
+
+    Attributes
+    ----------
+    of : str
+        Kind of the row, as in :data:`KINDS`.
+    supersedes : str
+        Its ``uid``.
+    reason : str
+        Why.
+    """
+
+    of: str
+    supersedes: str
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Anchor(Entry):
+    """The head of the log was written to a file outside.
+
+    Attributes
+    ----------
+    head : str
+        Identity of the last record then.
+    file : str
+        Name of the file.
+    """
+
+    head: str
+    file: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Merge(Entry):
+    """Records of other machines have joined those of this one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Migration(Entry):
+    """The log was kept by an older sensorgen: only clocks state the order of its rows.
+
+    Attributes
+    ----------
+    version : int
+        Of the old file.
+    rows : int
+        Number of its rows, which are the records before this one.
+    """
+
+    version: int
+    rows: int
+
+
+KINDS: dict[str, type[Entry]] = {
+    "raw_file": RawFile, "batch": Batch, "print": Print, "reading": Reading, "bench_run": BenchRun,
+    "prediction": Prediction, "design": DesignRow, "withdrawal": Withdrawal,
+    "anchor": Anchor, "merge": Merge, "migration": Migration,
+}  # fmt: skip
+NAMES = {kind: name for name, kind in KINDS.items()}
+ROWS = tuple(kind for kind in KINDS.values() if kind not in (Anchor, Merge, Migration))  # not about the log itself
+REFERENCES: dict[type[Entry], dict[str, type[Entry]]] = {
+    Batch: {"file": RawFile}, Print: {"batch_uid": Batch}, BenchRun: {"file": RawFile, "rig_file": RawFile},
+}  # fmt: skip

@@ -18,14 +18,16 @@ from sensorgen.core.document import spreadsheet
 from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
 from sensorgen.measure.csv_table import Table
-from sensorgen.measure.log import entries, files
-from sensorgen.measure.log.entries import Entry, RawFile, Reading
-from sensorgen.measure.log.fields import Value, from_cell, from_sql, to_cell, to_sql
-from sensorgen.measure.log.logbook import TABLES, Log
+from sensorgen.measure.log import fields, files
+from sensorgen.measure.log.entries import NAMES, ROWS, DesignRow, Entry, RawFile, Reading, Withdrawal
+from sensorgen.measure.log.fields import Value, from_cell, from_json, to_cell
+from sensorgen.measure.log.logbook import Log
 
 FORMATS = ("csv", "parquet")
-FILES = {kind: f"{table.replace('_', '-')}s" if table != "batch" else "batches" for kind, table in TABLES.items()}
-_COLUMNS = {kind: {k: v for k, v in entries.columns(kind).items() if k != "number"} for kind in TABLES}
+FILES = {kind: f"{NAMES[kind].replace('_', '-')}s".replace("batchs", "batches") for kind in ROWS}
+LATER = (DesignRow, Withdrawal)  # kinds that exports of version 0.1.0 do not have
+_LATER_COLUMN = "claimed_at"
+_COLUMNS = {kind: {k: v for k, v in fields.columns(kind).items() if k != "number"} for kind in ROWS}
 
 
 def columns(kind: type[Entry]) -> dict[str, Any]:
@@ -35,7 +37,8 @@ def columns(kind: type[Entry]) -> dict[str, Any]:
 
 def kind_of(names: Iterable[str]) -> type[Entry] | None:
     """Kind of row with exactly these columns, or None."""
-    return next((kind for kind in TABLES if set(columns(kind)) == set(names)), None)
+    present = {*names, _LATER_COLUMN}
+    return next((kind for kind in ROWS if set(columns(kind)) == present), None)
 
 
 def export(log: Log, place: Path) -> int:
@@ -130,13 +133,13 @@ def from_csv(kind: type[Entry], table: Table) -> Iterator[Entry]:
 def _entry(
     kind: type[Entry], values: Mapping[str, Any], where: str, convert: Callable[[Any, Any], Value]
 ) -> Entry:  # fmt: skip
-    wanted, fields = columns(kind), dict[str, Any]()
+    wanted, found = columns(kind), dict[str, Any]()
     for name, value in values.items():
         try:
-            fields[name] = convert(wanted[name], value)
+            found[name] = convert(wanted[name], value)
         except (TypeError, ValueError, KeyError, OverflowError, RecursionError):
             raise BadInput(f"{where}, column {name}: {value!r:.60} is not what the log writes there") from None
-    return kind(**fields)
+    return kind(**found)
 
 
 def parquet(kind: type[Entry], rows: list[Entry]) -> bytes:
@@ -181,10 +184,7 @@ def from_parquet(path: Path) -> tuple[type[Entry], list[Entry]]:
     if kind is None:
         raise BadInput(f"{str(path)!r}: columns {shown(table.column_names)}; expected those of the export of a log")
 
-    def convert(annotation: Any, value: Any) -> Value:
-        return from_sql(annotation, to_sql(tuple(value) if isinstance(value, list) else value))
-
-    return kind, [_entry(kind, row, f"{path}, row {k}", convert) for k, row in enumerate(rows, 1)]
+    return kind, [_entry(kind, row, f"{path}, row {k}", from_json) for k, row in enumerate(rows, 1)]
 
 
 def _pyarrow() -> Any:

@@ -71,6 +71,8 @@ def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> Imported:
     exported: list[Entry] = []
     for kind, name in exchange.FILES.items():
         file = next((p for suffix in exchange.FORMATS if (p := path / f"{name}.{suffix}").is_file()), None)
+        if file is None and kind in exchange.LATER:
+            continue
         if file is None:
             raise BadInput(f"{str(path)!r} has no {name}.csv; expected the folder of an exported log")
         rows = _table(file, {})[0]

@@ -10,7 +10,7 @@ from typing import Any
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.units import si
 from sensorgen.measure.log import facts
-from sensorgen.measure.log.entries import BenchRun, Entry, Prediction, Print, Reading
+from sensorgen.measure.log.entries import BenchRun, Entry, Prediction, Print, Reading, Withdrawal
 from sensorgen.measure.log.logbook import Log
 
 _REMARK = 20  # letters of a remark in a list
@@ -63,7 +63,9 @@ def listing(log: Log, iteration: int | None = None, last: int | None = None) -> 
     names = {Reading: "readings", BenchRun: "recordings", Prediction: "predictions"}
     total = ", ".join(f"{log.count(kind)} {name}" for kind, name in names.items())
     more = [f"the latest {last} are shown; --all shows all"] if last is not None and len(readings) >= last else []
-    return Listing(readings, recordings, (total, *more, str(log.path)))
+    records, head = log.head()
+    chain = [f"{records} records, head {head[:16]}"] if records else []
+    return Listing(readings, recordings, (total, *more, *chain, str(log.path)))
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,11 @@ class Detail:
         kind = {Reading: "reading", BenchRun: "recording"}.get(type(row), type(row).__name__.lower())
         name = f"{kind} {row.number}: {getattr(row, 'specimen', '')}".rstrip()
         yield f"{name}, written {row.written!r}" if isinstance(row, Reading) and row.written != row.specimen else name
-        known = (*(_of_reading(row) if isinstance(row, Reading) else _of_other(row)), ("logged", row.logged_at))
+        known = (
+            *(_of_reading(row) if isinstance(row, Reading) else _of_other(row)),
+            ("logged", row.logged_at),
+            ("claimed", row.claimed_at),
+        )
         doubts = (("doubtful", doubt) for doubt in getattr(row, "doubts", ()))
         summary = facts.from_json(row.facts).words() if isinstance(row, BenchRun) else ()
         rows = ((name, fact) for name, fact in (*known, *doubts, *summary, *self.remarks) if fact)
@@ -102,7 +108,7 @@ def _of_reading(r: Reading) -> tuple[tuple[str, str], ...]:
 
 def _of_other(row: Entry) -> Iterator[tuple[str, str]]:
     """A recording, a print or a prediction."""
-    names = ("file", "rig_file", "remark", "design", "design_id", "batch", "batch_uid")
+    names = ("file", "rig_file", "remark", "design", "design_id", "batch", "batch_uid", "of", "reason", "head")
     return ((name, getattr(row, name, "")) for name in names)
 
 
@@ -146,12 +152,13 @@ def _near(entry: Entry, log: Log) -> Iterator[tuple[str, str]]:
 
 
 def _corrections(entry: Entry, log: Log) -> Iterator[tuple[str, str]]:
-    if isinstance(entry, Reading | BenchRun):
-        if entry.supersedes:
-            for old in log.entries(type(entry), superseded=True, uid=entry.supersedes):
-                yield "corrects", f"row {old.number}"
-        for new in log.entries(type(entry), superseded=True, supersedes=entry.uid):
-            yield "corrected", f"by row {new.number}"
+    if isinstance(entry, Reading | BenchRun) and entry.supersedes:
+        for old in log.entries(type(entry), superseded=True, uid=entry.supersedes):
+            yield "corrects", f"row {old.number}"
+    for new in log.superseding(entry):
+        yield ("withdrawn", new.reason) if isinstance(new, Withdrawal) else ("corrected", f"by row {new.number}")
+    sequence, key = log.record_of(entry)
+    yield "record", f"{sequence}, {key[:16]}"
 
 
 def short(values: Sequence[float]) -> str:

@@ -1,39 +1,46 @@
 """The log: readings, recordings, prints and predictions of specimens in one append-only SQLite file."""
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Sequence
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
 from sensorgen.core import paths
-from sensorgen.core.errors import BadInput, MissingValue, UnknownName
-from sensorgen.measure.log import database, files
+from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, UnknownName, within
+from sensorgen.measure.log import chain, database, files, schema
+from sensorgen.measure.log.chain import Record
 from sensorgen.measure.log.entries import (
+    KINDS,
+    NAMES,
+    REFERENCES,
     SPECIMEN_COLUMNS,
     Batch,
     BenchRun,
     Entry,
+    Merge,
+    Migration,
     Prediction,
     Print,
     RawFile,
     Reading,
     Specimen,
-    columns,
+    Withdrawal,
 )
-from sensorgen.measure.log.fields import Value, from_sql, to_sql
+from sensorgen.measure.log.fields import INDEXED, Value, columns, decode, encode, word
 
 PLACE = "SENSORGEN_LOG"  # environment variable with another file
-TABLES: dict[type[Any], str] = {
-    RawFile: "raw_file", Batch: "batch", Print: "print", Reading: "reading", BenchRun: "bench_run",
-    Prediction: "prediction",
-}  # fmt: skip
-_NULL_IF_EMPTY = ("supersedes", "rig_file")  # foreign keys, which may be NULL but not ""
+VERSION = 1  # of the schema of every kind
 _FROM_PRINT = ("batch", "design_id", "design")
-_LATEST_PRINT = (
-    "SELECT batch.batch, print.design_id, print.design FROM print JOIN batch ON batch.uid = print.batch_uid "
-    "WHERE print.specimen = ? ORDER BY print.number DESC LIMIT 1"
+# what may differ between copies of one row that several machines have imported
+_LOCAL = ("number", "logged_at", "claimed_at", *_FROM_PRINT)
+_FIELDS = "id, parents, kind, version, logged_at, content"
+_SUPERSEDED = (  # of the kind that is the first value
+    "SELECT supersedes FROM record WHERE supersedes IS NOT NULL AND (+kind = ?1 "
+    "OR +kind = 'withdrawal' AND json_extract(content, '$.of') = ?1)"
 )
 _Kind = TypeVar("_Kind", bound=Entry)
 
@@ -44,29 +51,6 @@ def place() -> Path:
     One log for all working folders, and never below ``out/``, which may be deleted.
     """
     return paths.data(PLACE, "log.db")
-
-
-class _Statements:
-    """SQL for one kind of record; every name in it is a field's or a table's, never a user's text."""
-
-    def __init__(self, kind: type[Any], table: str) -> None:
-        self.columns = columns(kind)
-        joined = issubclass(kind, Specimen) and table != "specimen"  # columns of the name are stored once, by specimen
-        self.home = {name: "specimen" if joined and name in SPECIMEN_COLUMNS[1:] else table for name in self.columns}
-        self.stored = [name for name, home in self.home.items() if home == table and name != "number"]
-        names, marks = ", ".join(self.stored), ", ".join("?" * len(self.stored))
-        self.insert = f"INTO {table} ({names}) VALUES ({marks})"
-        selected = ", ".join(f"{home}.{name}" for name, home in self.home.items())
-        join = f"JOIN specimen ON specimen.specimen = {table}.specimen" if joined else ""
-        self.select = f"SELECT {selected} FROM {table} {join}"  # noqa: S608
-        self.known = f"SELECT 1 FROM {table} WHERE uid = ?"  # noqa: S608
-        self.order = f"ORDER BY {table}.number"
-        later = f"NOT EXISTS (SELECT 1 FROM {table} later WHERE later.supersedes = {table}.uid)"  # noqa: S608
-        self.uncorrected = [later] if "supersedes" in self.columns else []
-
-
-_SQL = {kind: _Statements(kind, table) for kind, table in TABLES.items()}
-_SPECIMEN = _SQL[Specimen] = _Statements(Specimen, "specimen")
 
 
 class Log:
@@ -102,7 +86,7 @@ class Log:
     @property
     def files(self) -> Path:
         """Folder of raw files, beside the log."""
-        return self.path.with_name(f"{self.path.name}.files")
+        return files.folder(self.path)
 
     def raw(self, sha256: str) -> Path:
         """Path of the raw file with that SHA-256.
@@ -119,9 +103,11 @@ class Log:
 
     def specimens(self, *, iteration: int | None = None) -> tuple[Specimen, ...]:
         """Specimens with rows in the log, by iteration and name."""
-        where, values = ("WHERE iteration = ?", [iteration]) if iteration is not None else ("", [])
-        rows = self._rows(f"{_SPECIMEN.select} {where} ORDER BY iteration, specimen", values)
-        return tuple(self._record(Specimen, row) for row in rows)
+        where, values = ("AND iteration = ?", [iteration]) if iteration is not None else ("", [])
+        first = f"SELECT min(sequence) FROM record WHERE specimen IS NOT NULL {where} GROUP BY specimen"  # noqa: S608
+        sql = f"SELECT kind, content FROM record WHERE sequence IN ({first}) ORDER BY iteration, specimen"  # noqa: S608
+        rows = [self._row(kind, content, 0, "") for kind, content in self._rows(sql, values)]
+        return tuple(Specimen(**{name: getattr(row, name) for name in SPECIMEN_COLUMNS}) for row in rows)
 
     def readings(
         self, *, last: int | None = None, superseded: bool = False, **equal: Value
@@ -159,7 +145,7 @@ class Log:
         last : int or None
             Only the latest rows, at most this many.
         superseded : bool
-            Also rows that a later row corrects.
+            Also rows that a later row corrects or withdraws.
         **equal
             Required values by column.
 
@@ -170,17 +156,109 @@ class Log:
         BadInput
             The log is damaged; rows given before are sound.
         """
-        rows = self._rows(*_selection(kind, equal, last, superseded=superseded))
-        yield from (self._record(kind, row) for row in (reversed(list(rows)) if last else rows))
+        for name in equal:
+            if name not in columns(kind):
+                raise UnknownName(f"column of a {kind.__name__}", name, columns(kind))
+        asked = {
+            name: value for name, value in equal.items() if name in (*INDEXED, "number") and value not in ("", None)
+        }
+        where = " AND ".join((*(f"{name} = ?" for name in asked), _current(superseded=superseded)))
+        sql = (
+            "SELECT kind, content, number, logged_at FROM record "  # noqa: S608
+            f"WHERE kind = ?1 AND number IS NOT NULL AND {where} ORDER BY number {'DESC' if last else ''}"
+        )
+        found = (self._row(*row) for row in self._rows(sql, [NAMES[kind], *asked.values()]))
+        wanted = (row for row in found if all(getattr(row, name) == value for name, value in equal.items()))
+        yield from reversed(list(itertools.islice(wanted, last))) if last else wanted
 
     def count(self, kind: type[Entry], *, superseded: bool = False) -> int:
         """Number of rows of a kind."""
-        sql, values = _selection(kind, {}, None, superseded=superseded)
-        return int(next(self._rows(f"SELECT count(*) FROM ({sql})", values))[0])  # noqa: S608
+        where = _current(superseded=superseded)
+        sql = f"SELECT count(*) FROM record WHERE kind = ?1 AND number IS NOT NULL AND {where}"  # noqa: S608
+        return int(next(self._rows(sql, [NAMES[kind]]))[0])
 
     def pragma(self, name: str) -> tuple[str, ...]:
         """SQLite's result of a pragma, first column."""
         return tuple(str(row[0]) for row in self._rows(f"PRAGMA {name}"))
+
+    def head(self) -> tuple[int, str]:
+        """Number of records and identity of the last one: who knows it can tell any later change of the log."""
+        sequence, head = next(self._rows("SELECT sequence, id FROM head"), (0, ""))
+        return sequence if type(sequence) is int else -1, str(head)
+
+    def records(self, after: int = 0) -> Iterator[Record]:
+        """Records in their order, of all kinds, from a number on."""
+        sql = f"SELECT {_FIELDS} FROM record WHERE sequence > ? ORDER BY sequence"  # noqa: S608
+        return (_record(row) for row in self._rows(sql, [after]))
+
+    def stored(self) -> Iterator[tuple[Record, int, int | None, tuple[Value, ...]]]:
+        """Records as they lie in the file: each with its numbers among all and its kind, and the index's fields."""
+        sql = f"SELECT {_FIELDS}, sequence, number, {', '.join(INDEXED)} FROM record ORDER BY sequence"  # noqa: S608
+        return ((_record(row[:6]), row[6], row[7], row[8:]) for row in self._rows(sql))
+
+    def known(self, key: str, before: int = 2**62) -> bool:
+        """Whether the log has a record with that identity, before a number."""
+        sql = "SELECT 1 FROM record WHERE id = ? AND sequence < ?"
+        return next(self._rows(sql, [key, before]), None) is not None
+
+    def merged_after(self, sequence: int) -> bool:
+        """Whether a merge follows a record, as it does where another machine's log begins."""
+        sql = "SELECT 1 FROM record WHERE sequence > ? AND instr(parents, ',') > 0 LIMIT 1"
+        return next(self._rows(sql, [sequence]), None) is not None
+
+    def is_copy(self, sequence: int) -> bool:
+        """Whether a row of the same kind and ``uid`` stands before a record."""
+        sql = ("SELECT 1 FROM record copy JOIN record row ON row.kind = copy.kind AND row.uid = copy.uid "
+               "WHERE copy.sequence = ? AND row.sequence < copy.sequence")  # fmt: skip
+        return next(self._rows(sql, [sequence]), None) is not None
+
+    def record_of(self, entry: Entry) -> tuple[int, str]:
+        """Number of the record that holds a row among all records, and its identity."""
+        sql = "SELECT sequence, id FROM record WHERE kind = ? AND number = ?"
+        sequence, key = next(self._rows(sql, [NAMES[type(entry)], entry.number]))
+        return int(sequence), str(key)
+
+    def before(self, first: Entry, others: Sequence[Entry]) -> bool | None:
+        """Whether a row was logged before all of some others by the order of the records, which no clock decides.
+
+        Returns
+        -------
+        bool or None
+            None where the order proves nothing: rows of two machines that had not synced between, or of a log of an
+            older sensorgen, whose order is that of a clock.
+        """
+        if self._ancestry is None:  # the first of each kind stands for all
+            others = list({type(row): row for row in sorted(others, key=lambda row: -row.number)}.values())
+        found = {self._before(first, other) for other in others}
+        return False if False in found else None if None in found else True
+
+    def _before(self, first: Entry, second: Entry) -> bool | None:
+        (one, key), (other, its_key) = self.record_of(first), self.record_of(second)
+        if max(one, other) <= self._migrated:
+            return None
+        if self._ancestry is None:
+            return one < other
+        return True if self._ancestry.before(key, its_key) else False if self._ancestry.before(its_key, key) else None
+
+    @property
+    def merged(self) -> bool:
+        """Whether several machines have written the log."""
+        return self._ancestry is not None
+
+    @cached_property
+    def _migrated(self) -> int:
+        """Number of the record of a migration: rows before it are in the order of a clock."""
+        migrations = [self.record_of(entry)[0] for entry in self.entries(Migration)]
+        return max(migrations, default=0)
+
+    @cached_property
+    def _ancestry(self) -> chain.Ancestry | None:
+        """Who knew of which records; None in a log of one machine, where the sequence tells."""
+        merged = self._rows("SELECT 1 FROM record WHERE instr(parents, ',') > 0 OR parents = '' LIMIT 2")
+        if len(list(merged)) < 2:
+            return None
+        rows = self._rows("SELECT id, parents FROM record ORDER BY sequence")
+        return chain.Ancestry((key, _parents(text)) for key, text in rows)
 
     def add(self, entries: Iterable[Entry]) -> list[Entry]:
         """Log all rows or none; when this returns, they are on the disk.
@@ -198,74 +276,189 @@ class Log:
         Raises
         ------
         BadInput
-            A row with a known ``uid`` and other content; a correction of a row that is missing or corrected already.
+            A row with a value that its column cannot have; one with a known ``uid`` and other content; a correction of
+            a row that is missing or corrected already; a reference to a row that is missing.
         Unwritable
             The disk is full, or the log cannot be written to.
         """
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         with database.transaction(self._connection, self.path):
-            return [new for entry in entries if (new := self._add(entry, now))]
+            writer = _Writer(self._connection, *self.head())
+            new = [added for entry in entries if (added := self._add(entry, now, writer))]
+            writer.finish()
+        return new
 
-    def _add(self, entry: Entry, now: str) -> Entry | None:
+    def merge(self, records: Mapping[str, Record]) -> tuple[int, int]:
+        """Add records of another log; a merge is logged where both have grown.
+
+        Parameters
+        ----------
+        records : mapping
+            By identity; those that the log has are skipped.
+
+        Returns
+        -------
+        int, int
+            Number of records that are new, without the merge; and of those whose parents are in neither log.
+
+        Raises
+        ------
+        BadInput
+            A record that is not what its identity says, or of a kind or schema that this version does not read; then
+            nothing is added.
+        """
+        now = datetime.now(UTC).isoformat(timespec="milliseconds")
+        with database.transaction(self._connection, self.path):
+            known = {str(key) for (key,) in self._rows("SELECT id FROM record")}
+            missing = {key: record for key, record in records.items() if key not in known}
+            writer, added = _Writer(self._connection, *self.head()), list[Record]()
+            for record in chain.parents_first(missing, known):
+                writer.append(record, self._copy(self._received(record)))
+                added.append(record)
+            if added:
+                heads = chain.heads(self.head()[1], added)
+                if len(heads) > 1:
+                    row = Merge(uid="")
+                    writer.append(chain.made(heads, NAMES[Merge], VERSION, now, encode(row)), copy=False)
+                writer.finish()
+            return len(added), len(missing) - len(added)
+
+    def _received(self, record: Record) -> Entry:
+        """Row of another machine's record."""
+        if record.kind not in KINDS or record.version > VERSION:
+            raise BadInput(f"record {record.id[:12]} is a {record.kind!r:.40} of version {record.version}, "
+                           "which this sensorgen does not read: take a newer one")  # fmt: skip
+        if not chain.sound(record):
+            raise BadInput(f"record {record.id[:12]} is not what its identity says; nothing was added")
+        return decode(KINDS[record.kind], record.content, 0, record.logged_at)
+
+    def _copy(self, entry: Entry) -> bool:
+        """Whether the log has a row already, apart from what each machine adds to it."""
+        return any(_same(entry, row, but=_LOCAL) for row in self._of_uid(type(entry), entry.uid))
+
+    def _of_uid(self, kind: type[_Kind], uid: str) -> Iterator[_Kind]:
+        """Rows of a kind with a ``uid``, corrected or not."""
+        sql = "SELECT kind, content, number, logged_at FROM record WHERE kind = ? AND uid = ? AND number IS NOT NULL"
+        return (self._row(*row) for row in (self._rows(sql, [NAMES[kind], uid]) if uid else ()))
+
+    def _add(self, entry: Entry, now: str, writer: "_Writer") -> Entry | None:
         kind = type(entry)
-        if self._connection.execute(_SQL[kind].known, [entry.uid]).fetchone():
-            known = next(self.entries(kind, superseded=True, uid=entry.uid))
-            if entry.logged_at and dataclasses.replace(known, number=0) != dataclasses.replace(entry, number=0):
+        known = next(self._of_uid(kind, entry.uid), None)
+        if known:
+            if entry.logged_at and not _same(known, entry, but=("number", "logged_at", "claimed_at")):
                 raise BadInput(f"row {entry.uid} has other content in the log; expected the same")
             return None
-        if isinstance(entry, Specimen):
-            self._insert("INSERT OR IGNORE", _SPECIMEN, entry)
-        if isinstance(entry, Reading | BenchRun):
-            entry = self._checked(entry)
-        entry = dataclasses.replace(entry, logged_at=entry.logged_at or now, number=0)
-        return dataclasses.replace(entry, number=self._insert("INSERT", _SQL[kind], entry))
+        self._check_references(entry)
+        self._check_correction(entry)
+        if isinstance(entry, Prediction):
+            _check_prediction(entry)
+        if isinstance(entry, Reading | BenchRun) and not (entry.batch or entry.logged_at):
+            entry = self._with_print(entry)
+        claimed = entry.claimed_at or entry.logged_at
+        entry = dataclasses.replace(entry, logged_at=now, claimed_at=claimed, number=0)
+        record = chain.made([writer.head] if writer.head else [], NAMES[kind], VERSION, now, encode(entry))
+        return dataclasses.replace(entry, number=writer.append(record, copy=False))
 
-    def _checked(self, entry: Reading | BenchRun) -> Reading | BenchRun:
-        """Entry whose correction is sound; a new one with batch and design of the specimen's latest print."""
-        if entry.supersedes:
-            kind = type(entry)
-            old = next(self.entries(kind, superseded=True, uid=entry.supersedes), None)
-            later = next(self.entries(kind, superseded=True, supersedes=entry.supersedes), None)
-            if old is None:
-                raise BadInput(f"nothing to correct: no row {entry.supersedes!r} in the log")
-            if later:
-                raise BadInput(f"row {old.number} was corrected before, by row {later.number}; correct that one")
-        if entry.batch or entry.logged_at:
+    def _check_references(self, entry: Entry) -> None:
+        for name, kind in REFERENCES.get(type(entry), {}).items():
+            uid = getattr(entry, name)
+            if uid and next(self._of_uid(kind, uid), None) is None:
+                raise BadInput(f"a {word(type(entry))} refers to {word(kind)} {uid!r:.80}, which the log does not have")
+
+    def _check_correction(self, entry: Entry) -> None:
+        """Refuse a correction or withdrawal of a row that is missing or has one."""
+        uid = getattr(entry, "supersedes", "")
+        if not uid:
+            return
+        kind = KINDS.get(entry.of, type(entry)) if isinstance(entry, Withdrawal) else type(entry)
+        old = next(self._of_uid(kind, uid), None)
+        if old is None:
+            raise BadInput(f"nothing to correct: no row {uid!r} in the log")
+        later = next(iter(self.superseding(old)), None)
+        if later:
+            how = "withdrawn" if isinstance(later, Withdrawal) else "corrected"
+            raise BadInput(f"row {old.number} was {how} before, by row {later.number}; correct that one")
+
+    def superseding(self, entry: Entry) -> tuple[Entry, ...]:
+        """Corrections and withdrawals of a row: more than one where two machines have made them."""
+        corrections = self.entries(type(entry), superseded=True, supersedes=entry.uid) if entry.uid and hasattr(
+            entry, "supersedes") else ()  # fmt: skip
+        withdrawals = self.entries(Withdrawal, superseded=True, supersedes=entry.uid)
+        return (*corrections, *(row for row in withdrawals if row.of == NAMES[type(entry)]))
+
+    def _with_print(self, entry: Reading | BenchRun) -> Reading | BenchRun:
+        """Entry with batch and design of the specimen's latest print."""
+        printed = next(self.entries(Print, last=1, specimen=entry.specimen), None)
+        if printed is None:
             return entry
-        printed = self._connection.execute(_LATEST_PRINT, [entry.specimen]).fetchone()
-        return dataclasses.replace(entry, **dict(zip(_FROM_PRINT, printed, strict=True))) if printed else entry
-
-    def _insert(self, verb: str, sql: _Statements, entry: Any) -> int:
-        given = ((name, to_sql(getattr(entry, name))) for name in sql.stored)
-        values = [None if name in _NULL_IF_EMPTY and value == "" else value for name, value in given]
-        return int(self._connection.execute(f"{verb} {sql.insert}", values).lastrowid or 0)
+        batch = next(self._of_uid(Batch, printed.batch_uid)).batch
+        return dataclasses.replace(entry, batch=batch, design_id=printed.design_id, design=printed.design)
 
     def _rows(self, sql: str, values: Sequence[Value] = ()) -> Iterator[tuple[Any, ...]]:
         with database.translate_errors(self.path):
             for row in self._connection.execute(sql, values):  # noqa: UP028 - closes the cursor late
                 yield row
 
-    def _record(self, kind: type[Any], row: Sequence[Any]) -> Any:
-        """Record of a row; a value that no field can have is reported as damage."""
-        values = {}
-        for (name, annotation), value in zip(_SQL[kind].columns.items(), row, strict=True):
-            try:
-                values[name] = "" if value is None and name in _NULL_IF_EMPTY else from_sql(annotation, value)
-            except (TypeError, ValueError, KeyError, OverflowError, RecursionError):
-                held = f"column {name} of a {kind.__name__} holds {value!r:.60}"
-                raise BadInput(f"the log {str(self.path)!r} is damaged: {held}") from None
-        return kind(**values)
+    def _row(self, kind: str, content: str, number: int, logged_at: str) -> Any:
+        """Row of a record; a value that no field can have is reported as damage."""
+        try:
+            return decode(KINDS[kind], content, number, logged_at)
+        except (SensorgenError, KeyError) as error:
+            raise BadInput(f"the log {str(self.path)!r} is damaged: {error}") from None
 
 
-def _selection(
-    kind: type[Entry], equal: dict[str, Value], last: int | None, *, superseded: bool
-) -> tuple[str, list[Value]]:
-    """SQL for some rows, and its values."""
-    sql = _SQL[kind]
-    for name in equal:
-        if name not in sql.columns:
-            raise UnknownName(f"column of a {kind.__name__}", name, sql.columns)
-    conditions = [f"{sql.home[name]}.{name} IS ?" for name in equal] + ([] if superseded else sql.uncorrected)
-    where = f"WHERE {' AND '.join(conditions)}" if conditions else ""
-    limit = f"DESC LIMIT {int(last)}" if last else ""
-    return f"{sql.select} {where} {sql.order} {limit}", list(equal.values())
+class _Writer:
+    """Appends records within a transaction, each with its number among those of its kind."""
+
+    def __init__(self, connection: Any, sequence: int, head: str) -> None:
+        self._connection = connection
+        self._sequence, self.head = sequence, head
+        self._numbers: dict[str, int] = {}
+
+    def append(self, record: Record, copy: bool) -> int:
+        """Append a record; a copy of a row that the log has gets no number of its own."""
+        if record.kind not in self._numbers:
+            sql = "SELECT max(number) FROM record WHERE kind = ?"
+            self._numbers[record.kind] = self._connection.execute(sql, [record.kind]).fetchone()[0] or 0
+        self._numbers[record.kind] += not copy
+        number = None if copy else self._numbers[record.kind]
+        self._sequence, self.head = self._sequence + 1, record.id
+        schema.insert(self._connection, record, self._sequence, number)
+        return number or 0
+
+    def finish(self) -> None:
+        """Note the last record apart, so that rows missing at the end are noticed."""
+        if self._numbers:
+            sql = "INSERT INTO head VALUES (1, ?, ?) ON CONFLICT DO UPDATE SET sequence = excluded.sequence, " \
+                  "id = excluded.id"  # fmt: skip
+            self._connection.execute(sql, [self._sequence, self.head])
+
+
+def _current(*, superseded: bool) -> str:
+    return "TRUE" if superseded else f"uid NOT IN ({_SUPERSEDED})"
+
+
+def _same(one: Entry, other: Entry, but: tuple[str, ...]) -> bool:
+    """Whether two rows of a kind have the same content, apart from some fields."""
+    return type(one) is type(other) and all(
+        getattr(one, name) == getattr(other, name) for name in columns(type(one)) if name not in but
+    )
+
+
+def _check_prediction(entry: Prediction) -> None:
+    """Refuse what no report could read later."""
+    from sensorgen.prediction.results import from_json
+
+    with within(f"prediction of {entry.design!r:.60}"):
+        from_json(entry.data)
+
+
+def _record(row: Sequence[Any]) -> Record:
+    key, parents, kind, version, logged_at, content = row
+    if type(version) is not int or not all(type(text) is str for text in (key, parents, kind, logged_at, content)):
+        raise BadInput(f"a record is damaged: it holds {row!r:.80}")
+    return Record(key, _parents(parents), kind, version, logged_at, content)
+
+
+def _parents(text: str) -> tuple[str, ...]:
+    return tuple(text.split(",")) if text else ()

@@ -1,6 +1,10 @@
 """Tables and migrations of the log: a new file takes the same steps as an old one."""
 
+import sqlite3
 from importlib.resources import files
+
+from sensorgen.measure.log.chain import Record
+from sensorgen.measure.log.fields import INDEXED, indexed
 
 APPLICATION_ID = 0x53474C47  # in the header of the file: "SGLG"
 
@@ -23,5 +27,14 @@ def _step(file: str, *tables: str) -> tuple[str, ...]:
 STEPS = (  # migrations from each version to the next
     _step("version1.sql", "specimen", "reading"),
     _step("version2.sql", "raw_file", "batch", "print", "bench_run", "prediction"),
+    _step("version3.sql", "record"),
 )
 VERSION = len(STEPS)
+_COLUMNS = ("sequence", "id", "parents", "kind", "version", "logged_at", "content", "number", *INDEXED)
+_INSERT = f"INSERT INTO record ({', '.join(_COLUMNS)}) VALUES ({', '.join('?' * len(_COLUMNS))})"  # noqa: S608
+
+
+def insert(connection: sqlite3.Connection, record: Record, sequence: int, number: int | None) -> None:
+    """Store a record with its number among all, and among its kind."""
+    of = (record.id, ",".join(record.parents), record.kind, record.version, record.logged_at, record.content)
+    connection.execute(_INSERT, [sequence, *of, number, *indexed(record.content)])

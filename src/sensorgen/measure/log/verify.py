@@ -1,15 +1,21 @@
-"""Verify a log: SQLite's integrity, references between rows, raw files, and hashes of predictions."""
+"""Verify a log: the chain of its records, SQLite's integrity, references between rows, raw files, and anchors."""
 
-import json
+import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from hashlib import sha256
+from pathlib import Path
 
 from sensorgen.core.document import Part
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log import files
-from sensorgen.measure.log.entries import Prediction, RawFile
-from sensorgen.measure.log.logbook import TABLES, Log
+from sensorgen.core.files import reading
+from sensorgen.measure.log import chain, files
+from sensorgen.measure.log.entries import KINDS, REFERENCES, ROWS, Entry, RawFile
+from sensorgen.measure.log.fields import indexed, word
+from sensorgen.measure.log.logbook import Log
+
+MOST_FAULTS = 40  # that are shown to people; JSON has all
+_ANCHORED = re.compile(r"\b[0-9a-f]{64}\b")
 
 
 @dataclass(frozen=True)
@@ -24,50 +30,116 @@ class Verified:
         Number of its rows, if it is sound; else 0.
     faults : tuple of str
         What is wrong.
+    head : str
+        Identity of the last record.
+    notes : tuple of str
+        What is no fault, but worth knowing.
     """
 
     log: str
     rows: int
     faults: tuple[str, ...]
+    head: str = ""
+    notes: tuple[str, ...] = ()
 
     def document(self) -> Iterator[Part]:
-        """The faults, or that there are none."""
-        yield from self.faults or (f"the log is sound: {self.rows} rows", self.log)
+        """The faults, or that there are none; the head and the notes."""
+        yield from self.faults[:MOST_FAULTS]
+        if len(self.faults) > MOST_FAULTS:
+            yield f"... and {len(self.faults) - MOST_FAULTS} more faults"
+        if not self.faults:
+            yield f"the log is sound: {self.rows} rows, head {self.head or 'none'}"
+        yield self.log
+        yield from self.notes
 
 
-def verified(log: Log) -> Verified:
-    """Verify an open log."""
-    found = tuple(faults(log))
-    rows = 0 if found else sum(log.count(kind, superseded=True) for kind in TABLES)
-    return Verified(str(log.path), rows, found)
+def verified(log: Log, anchors: Path | None = None) -> Verified:
+    """Verify an open log.
+
+    Parameters
+    ----------
+    log : Log
+        An open log.
+    anchors : Path, optional
+        A text file with heads of the log, as ``sensorgen log anchor`` writes it, or a mail that has them.
+    """
+    notes: list[str] = []
+    found = (*faults(log, notes), *(_anchor_faults(log, anchors, notes) if anchors else ()))
+    rows = 0 if found else sum(log.count(kind, superseded=True) for kind in ROWS)
+    return Verified(str(log.path), rows, found, "" if found else log.head()[1], tuple(notes))
 
 
-def faults(log: Log) -> Iterator[str]:
+def faults(log: Log, notes: list[str] | None = None) -> Iterator[str]:
     """Faults of a log, as messages; none where it is sound.
 
     Parameters
     ----------
     log : Log
         An open log.
+    notes : list of str, optional
+        Grows by what is no fault.
     """
     try:
         for message in log.pragma("integrity_check"):
             if message != "ok":
                 yield f"database: {' '.join(message.split()):.200}"
-        for table in log.pragma("foreign_key_check"):
-            yield f"{table!r:.60}: a row refers to one that is not there"
-        for kind in TABLES:
-            for _ in log.entries(kind, superseded=True):
-                pass  # reading a damaged row raises
-        yield from files.faults(log.files, log.entries(RawFile))
-        for prediction in log.predictions():
-            if prediction.uid != prediction_uid(prediction):
-                yield f"prediction {prediction.number} is not what was logged"
+        yield from _chain_faults(log, [] if notes is None else notes)
+        for kind, references in REFERENCES.items():
+            for name, other in references.items():
+                yield from _missing(log, kind, name, other)
+        yield from files.faults(log.files, log.entries(RawFile, superseded=True))
     except BadInput as error:
         yield str(error)
 
 
-def prediction_uid(prediction: Prediction) -> str:
-    """Identity of a prediction: a hash of its content."""
-    text = json.dumps([prediction.design_id, prediction.design, prediction.version, prediction.data])
-    return sha256(text.encode()).hexdigest()
+def _chain_faults(log: Log, notes: list[str]) -> Iterator[str]:
+    """Records that are changed, missing or out of order."""
+    counts: Counter[str] = Counter()
+    before, clock, place, late = "", "", 0, list[int]()
+    for record, sequence, number, index in log.stored():
+        place += 1
+        if not chain.sound(record) or record.kind not in KINDS:
+            yield f"record {place}, a {record.kind!r:.40}, is not what was logged"
+        if index != indexed(record.content):
+            yield f"record {place}: the index does not have what the record holds"
+        if sequence != place or not _follows(log, record, sequence, before):
+            yield f"record {place} follows one that is missing or was moved"
+        counts[record.kind] += number is not None
+        if number != counts[record.kind] and not (number is None and log.is_copy(sequence)):
+            yield f"record {place} has number {number} among its kind; expected {counts[record.kind]}"
+        if record.parents == (before,) and record.logged_at < clock:
+            late.append(place)
+        before, clock = record.id, record.logged_at
+    count, head = log.head()
+    if (count, head) != (place, before):
+        yield f"the last record is number {place}, {before[:12]}; expected number {count}, {head[:12]}"
+    if late:
+        back = "the clock was set back; the order of the records holds"
+        notes.append(f"{len(late)} records are dated before the one that they follow, the first is {late[0]}: {back}")
+
+
+def _follows(log: Log, record: chain.Record, sequence: int, before: str) -> bool:
+    """Whether all that a record follows is there; another machine's log may begin anywhere before a merge."""
+    if not record.parents:
+        return not before or log.merged_after(sequence)
+    return all(parent == before or log.known(parent, sequence) for parent in record.parents)
+
+
+def _missing(log: Log, kind: type[Entry], name: str, other: type[Entry]) -> Iterator[str]:
+    known = {row.uid for row in log.entries(other, superseded=True)}
+    for row in log.entries(kind, superseded=True):
+        uid = getattr(row, name)
+        if uid and uid not in known:
+            yield f"{word(kind)} {row.number} refers to {word(other)} {uid!r:.40}, which is not there"
+
+
+def _anchor_faults(log: Log, path: Path, notes: list[str]) -> Iterator[str]:
+    with reading(path):
+        heads = _ANCHORED.findall(path.read_text("utf-8", "replace"))
+    if not heads:
+        raise BadInput(f"{str(path)!r} has no head of a log; expected a text as sensorgen log anchor writes it")
+    missing = [head for head in heads if not log.known(head)]
+    if missing:
+        yield f"{len(missing)} of {len(heads)} heads in {str(path)!r} are not in the log: {missing[0][:12]}..."
+    else:
+        notes.append(f"all {len(heads)} heads in {str(path)!r} are in the log")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sensorgen.scene.geometry.mesh import Mesh
+from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.scene import AXES, Body, Scene
 from sensorgen.scene.sections import overlap, sections
 

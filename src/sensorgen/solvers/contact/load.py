@@ -222,7 +222,8 @@ class Problem:
 
     def stepped(self, state: State, pressure_pa: float, before: State) -> State | None:
         """One load step: solve, update the contact pairs and solve again, until they are settled or often enough."""
-        starts = (self.extrapolated(state, before, pressure_pa), state)
+        start = self.extrapolated(state, before, pressure_pa)
+        starts = [start] if start is state else [start, state]
         tries = (self.newton(start, pressure_pa, state.pairs, _NEARLY) for start in starts)
         found = next((done for done in tries if done), None)
         if found is None:

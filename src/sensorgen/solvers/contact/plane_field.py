@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
+import shapely
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
@@ -109,10 +110,10 @@ def _meshed(cell: Cell, coarse_mm: float, growth: float) -> Mesh:
 
 def _refuse_crossings(edges: Real) -> None:
     """Edges (k, 2, 2) that cross each other would keep the mesher busy for ever, or end the process."""
-    a, b = edges[:, None, 0], edges[:, None, 1]
-    c, d = edges[None, :, 0], edges[None, :, 1]
-    apart = _side(a, b, c) * _side(a, b, d) < 0
-    if (apart & apart.T).any():
+    lines = shapely.linestrings(edges)
+    near = edges[shapely.STRtree(lines).query(lines)]  # (2, pairs, 2, 2)
+    (a, b), (c, d) = near.swapaxes(1, 2)
+    if ((_side(a, b, c) * _side(a, b, d) < 0) & (_side(c, d, a) * _side(c, d, b) < 0)).any():
         raise Unmeshed("the deformed outlines run into each other")
 
 

@@ -65,6 +65,8 @@ class Pressed:
         Other remarks.
     source : str
         Method.
+    apex : float
+        Factor on the size of triangles at an apex with which it converged [-].
     """
 
     stress_pa: Real
@@ -78,11 +80,22 @@ class Pressed:
     faults: tuple[str, ...]
     doubts: tuple[str, ...] = ()
     source: str = ""
+    apex: float = 1.0
 
     @property
     def converged_pa(self) -> float:
         """Highest pressure that was reached [Pa]."""
         return float(self.stress_pa[-1])
+
+    def sound(self) -> "Pressed":
+        """The part before the first pressure at which a check fails, without faults; all where it has no two."""
+        known = [c.middle() if c else -np.inf for c in self.capacitance_f_per_m2]
+        rises = [b >= a * (1 - _LEVELS) for a, b in pairwise(known)]
+        holds = (self.volume_ratio >= _LEAST_VOLUME) & (self.penetration <= DEEPEST) & (abs(self.imbalance) <= _BALANCE)
+        holds[: len(known)] &= np.isfinite(known) & np.array([True, *rises])
+        n = len(holds) if holds.all() else int(holds.argmin())
+        arrays = ("stress_pa", "displacement_m", "capacitance_f_per_m2", "volume_ratio", "penetration", "imbalance")
+        return replace(self, faults=(), **{name: getattr(self, name)[:n] for name in arrays}) if n > 1 else self
 
 
 @dataclass(frozen=True)

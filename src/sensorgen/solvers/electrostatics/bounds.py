@@ -41,6 +41,8 @@ class Energies:
         That the larger of the two systems couples.
     rounding : float
         Share by which doubles may be off, where it was estimated; an answer allows for ``ROUNDING`` at least [-].
+    enclosed : bool
+        Whether the potential is of a cell with more conductor or permittivity.
     """
 
     lower: float
@@ -48,6 +50,7 @@ class Energies:
     part: float
     unknowns: int
     rounding: float = 0.0
+    enclosed: bool = False
 
 
 def third_conductor(scene: Scene) -> str | None:
@@ -81,7 +84,8 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
 
     With weights w up to W on parts of the cell, the energy norm of the exact field differs from the computed one by at
     most :math:`\sqrt{W (C_{upper} - C_{lower})}`, since its error over the whole cell is
-    :math:`\|u_h - u\|^2 = C_{upper} - C`.
+    :math:`\|u_h - u\|^2 = C_{upper} - C`. Of a cell that encloses the true one, the energy of the computed field in the
+    part may be that much larger than in the true one.
 
     Raises
     ------
@@ -101,7 +105,7 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
     least, most = min(shares), max(shares)
     apart = above - below + found.rounding * (above + below)
     part, off = np.sqrt(found.part), np.sqrt((most - least) * max(apart, 0.0))
-    lower = least * below + max(part - off, 0.0) ** 2
+    lower = least * below + max(part - (1 + found.enclosed) * off, 0.0) ** 2
     upper = least * above + (part + off) ** 2
     return Interval(float(min(lower, upper) * (1 - rounding)), float(upper * (1 + rounding)))
 

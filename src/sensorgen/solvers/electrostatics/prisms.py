@@ -20,14 +20,12 @@ from sensorgen.solvers.electrostatics.bounds import Energies, Unsolved
 
 BOTTOM, TOP = 0, 1  # numbers of the electrodes among conductors
 
+_MB = 2.1e-3  # of a prism of order 1, measured at orders 2 and 3
 _BALANCE = 1e-8  # relative: by which energy and the charges of both electrodes may differ
-_DIRECT = 150_000  # unknowns up to which a system is factorised
-_RESIDUAL = 1e-11
-_ITERATIONS = 2000
 _SAME_MM = 1e-9
 _FAR = 1e9  # beyond all lines
 _SET = 0.01
-_MITRE = 2.0  # of lines beside outlines, in their distance
+MITRE = 2.0  # of lines beside outlines, in their distance
 
 
 @dataclass(frozen=True)
@@ -121,9 +119,9 @@ def plan(cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> Plan:
     ]
     lines = [sides, *edges]
     for far in np.array(beside_mm) / grid_mm:
-        near = [_beyond(shapely.simplify(region, far / 5), (x, y), cell.periodic, 2 * far) for region in metal]
+        near = [beyond(shapely.simplify(region, far / 5), (x, y), cell.periodic, 2 * far) for region in metal]
         wide, narrow = (
-            shapely.buffer(near, way * far, join_style="mitre", mitre_limit=_MITRE, quad_segs=2) for way in (1, -1)
+            shapely.buffer(near, way * far, join_style="mitre", mitre_limit=MITRE, quad_segs=2) for way in (1, -1)
         )
         beside = shapely.union_all(shapely.difference(wide, narrow))
         outline = shapely.boundary(shapely.set_precision(shapely.simplify(beside, far / 10), max(far / 10, 1.0)))
@@ -149,7 +147,7 @@ def plan(cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> Plan:
     return Plan(points * pitch, triangles, _filled(layers, faces, cell)[:, of_face])
 
 
-def _beyond(region: Any, size: Sequence[float], periodic: Sequence[bool], far: float) -> Any:
+def beyond(region: Any, size: Sequence[float], periodic: Sequence[bool], far: float) -> Any:
     """A region continued beyond the sides of a cell, by a distance."""
     for axis in (0, 1):
         turn, along = np.eye(2), np.eye(2)[axis]
@@ -214,15 +212,24 @@ class Mesh:
     grid_mm: float
 
     @classmethod
-    def of(cls, cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> "Mesh":
+    def of(cls, cell: Layers, beside_mm: Sequence[float], grid_mm: float, reach_mm: float = np.inf) -> "Mesh":
         """The prisms of a cell; parameters and errors as of :func:`plan`.
 
-        Planes as far from each level at which a conductor ends within the cell as the lines are from its outlines.
+        Planes as far from each level at which a conductor ends within the cell as the lines are from its outlines,
+        where another conductor is within reach in height: elsewhere the field is weak.
         """
         flat = plan(cell, beside_mm, grid_mm)
         metal = np.where(flat.fill < cell.conductors, flat.fill, -1)
         padded = np.concatenate([metal[:1], metal, metal[-1:]])
-        ends = [bool(len(np.unique(pair, axis=1).T) > 1 and (pair[0] != pair[1]).any()) for pair in pairwise(padded)]
+        spans = {
+            k: (cell.heights_mm[:-1][own].min(), cell.heights_mm[1:][own].max())
+            for k in range(cell.conductors) if (own := (metal == k).any(1)).any()
+        }  # fmt: skip
+        ends = []
+        for z, pair in zip(cell.heights_mm.tolist(), pairwise(padded), strict=True):
+            here = set(np.array(pair)[:, pair[0] != pair[1]].ravel().tolist())
+            near = any(max(low - z, z - high) <= reach_mm for k, (low, high) in spans.items() if here - {k, -1})
+            ends.append(bool(len(np.unique(pair, axis=1).T) > 1 and near))
         heights, owner = [cell.heights_mm[:1]], []
         for k, (low, high) in enumerate(pairwise(cell.heights_mm.tolist())):
             far = np.array([d for d in beside_mm if d < 0.45 * (high - low)])
@@ -237,9 +244,9 @@ class Mesh:
         """Prisms that are no conductor (h - 1, t)."""
         return np.asarray(self.fill >= self.cell.conductors)
 
-    def unknowns(self, order: int) -> int:
-        """About how many a flux couples at an order of the potential."""
-        return int(self.free.sum() * (order * (order + 1) / 2 + 1.5 * order**2))
+    def memory_mb(self, order: int) -> float:
+        """About how much memory a flux takes at an order of the potential: a matrix of each prism [MB]."""
+        return float(self.free.sum()) * order**4 * _MB
 
     @cached_property
     def meshed(self) -> Mask:
@@ -375,32 +382,36 @@ def _distinct(faces: Whole) -> Whole:
     return faces[np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]]
 
 
-def solved(mesh: Mesh, order: int, weight: Real) -> Energies:
+def solved(inner: Mesh, outer: Mesh, order: int, weight: Real) -> Energies:
     """Both bounds over eps0 [mm], of a potential of an order and of a flux of one less.
 
     Parameters
     ----------
-    mesh : Mesh
-        Of a cell.
+    inner, outer : Mesh
+        Of a cell, or of two that enclose it, as of :mod:`sensorgen.solvers.electrostatics.enclosed`.
     order : int
         Of the potential's polynomials.
     weight : (t,) array
-        Of each triangle in ``Energies.part``.
+        Of each triangle of the outer one in ``Energies.part``.
 
     Raises
     ------
     Unsolved
         Energy and charges of the flux differ: slivers spoil the system.
     """
+    upper, part, moved = _upper(outer, order, weight)
+    lower, unknowns = _lower(inner, order)
+    return Energies(lower, upper, part, unknowns, moved / upper if outer is inner else 0.0, outer is not inner)
+
+
+def _upper(mesh: Mesh, order: int, weight: Real) -> tuple[float, float, float]:
+    """Energy of the best potential, that of a part, and what the grid may have moved."""
     import ngsolve as ng
 
     space, cell = mesh.netgen, mesh.cell
-    eps = space.MaterialCF({f"d{k}": value for k, value in enumerate(cell.permittivity)})
-    held = "|".join(f"c{k}" for k in range(cell.conductors))
-    repeats = any(cell.periodic)
-
+    eps, held = _coefficients(mesh)
     plain = ng.H1(space, order=order, dirichlet=held)
-    above = ng.Periodic(plain) if repeats else plain
+    above = ng.Periodic(plain) if any(cell.periodic) else plain
     u, v = above.TnT()
     form = ng.BilinearForm(eps * ng.grad(u) * ng.grad(v) * ng.dx, symmetric=True, condense=True)
     upper, potential = _balanced(form, lambda f: f, cell.conductors)
@@ -413,9 +424,18 @@ def solved(mesh: Mesh, order: int, weight: Real) -> Energies:
     if weight.any():
         energies = ng.Integrate(density, space, order=2 * order, element_wise=True).NumPy()
         part = float(energies @ weight[mesh.owner])
+    return upper, part, moved
 
+
+def _lower(mesh: Mesh, order: int) -> tuple[float, int]:
+    """Thomson's functional of the best flux, and its unknowns."""
+    import ngsolve as ng
+
+    space, cell = mesh.netgen, mesh.cell
+    eps, held = _coefficients(mesh)
+    normal = ng.specialcf.normal(3)
     plain = ng.FacetFESpace(space, order=order - 1, dirichlet=held)
-    facet = ng.Periodic(plain) if repeats else plain
+    facet = ng.Periodic(plain) if any(cell.periodic) else plain
     below = ng.HDiv(space, order=order - 1, discontinuous=True, hodivfree=True) * ng.L2(space, order=0) * facet
     (d, q, w), (e, r, z) = below.TnT()
     form = ng.BilinearForm(below, symmetric=True, condense=True)
@@ -433,7 +453,13 @@ def solved(mesh: Mesh, order: int, weight: Real) -> Energies:
     )
     if not wrong < _BALANCE * lower:
         raise Unsolved(f"energy and charges differ by {wrong / lower:.1g}: triangles too slender for doubles")
-    return Energies(lower, upper, part, facet.ndof, moved / upper)
+    return lower, facet.ndof
+
+
+def _coefficients(mesh: Mesh) -> tuple[Any, str]:
+    """Permittivity, and the boundaries at which the potential is held."""
+    eps = mesh.netgen.MaterialCF({f"d{k}": value for k, value in enumerate(mesh.cell.permittivity)})
+    return eps, "|".join(f"c{k}" for k in range(mesh.cell.conductors))
 
 
 def _indicators(space: Any, part: Any, conductors: int) -> list[Any]:
@@ -455,18 +481,12 @@ def _balanced(form: Any, part: Any, conductors: int) -> tuple[float, Any]:
     space = form.space
     free = space.FreeDofs(True)
     with ng.TaskManager():
-        direct = sum(free) <= _DIRECT
-        if not direct:
-            coarse = ng.Preconditioner(form, "bddc")
-            form.Assemble()
-            inverse = ng.CGSolver(form.mat, coarse.mat, tol=_RESIDUAL, maxiter=_ITERATIONS)
-        else:
-            form.Assemble()
-            inverse = form.mat.Inverse(free, "sparsecholesky")
+        form.Assemble()
+        inverse = form.mat.Inverse(free, "sparsecholesky")  # slivers take CG with BDDC a thousand iterations
         found = _indicators(space, part, conductors)[TOP:]
         rest = found[0].vec.CreateVector()
         for f in found:
-            for _ in range(1 + direct):
+            for _ in range(2):
                 rest.data = form.mat * f.vec
                 f.vec.data -= inverse * rest
         images = []

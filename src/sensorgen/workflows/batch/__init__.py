@@ -147,6 +147,7 @@ def make(
     time_limit_s: float = TIME_LIMIT_S,
     force: bool = False,
     strict: bool = False,
+    log_head: str = "",
     step: Step = lambda _: None,
 ) -> Batch:
     """Write all files of a batch into ``out/<name>``.
@@ -165,6 +166,8 @@ def make(
         Write the files even if checks report errors.
     strict : bool
         Take warnings for errors.
+    log_head : str
+        Identity of the last record of the log, for the labels.
     step : callable
         Called with the next step, for a progress display.
 
@@ -191,7 +194,7 @@ def make(
         slicers = found.plan.slicers if gcode else ()
         sliced_from = {"prusa"} & set(slicers)  # slicing leaves the 3MF that it took; CuraEngine takes none
         families = [family for family in threemf.FAMILIES if family not in sliced_from]
-        for name, content in (*printing.threemfs(found.plan.name, on_plate, families), *_files(found)):
+        for name, content in (*printing.threemfs(found.plan.name, on_plate, families), *_files(found, log_head)):
             store.write(stage, {name: content})
         sliced: dict[str, SlicedPlate] = {
             s: printing.gcode(found.plan.name, on_plate, s, stage, time_limit_s, step) for s in slicers
@@ -212,14 +215,15 @@ def _refuse_unprintable(found: Arranged, held: Mapping[str, Review], *, force: b
         raise Unprintable(every, stopping).within(found.designs[wrong[0]].name)
 
 
-def _files(found: Arranged) -> Iterator[tuple[str, bytes]]:
+def _files(found: Arranged, log_head: str) -> Iterator[tuple[str, bytes]]:
     """What is for people: designs, plate and labels."""
     plan, machine = found.plan, found.pieces[0].design.machine
     for key, design in found.designs.items():
         yield f"designs/{key}.json", json_bytes(design.model_dump(mode="json"))
     yield "plate.svg", picture.svg(plan.name, machine, found.room, found.plate, found.pieces).encode()
     if plan.labels.sheet:
-        labels = [sheet.Label.of(found.pieces[n], plan.name, order) for order, n in enumerate(found.plate, 1)]
+        places = enumerate(found.plate, 1)
+        labels = [sheet.Label.of(found.pieces[n], plan.name, order, log_head) for order, n in places]
         yield "labels.html", sheet.page(labels, plan.name).encode()
 
 

@@ -12,8 +12,6 @@ from sensorgen.core import files as store
 from sensorgen.core.errors import SensorgenError
 from sensorgen.export import slicing
 from sensorgen.export.gcode.check import check_motion
-from sensorgen.export.gcode.motion import follow
-from sensorgen.export.gcode.paths import paths_of
 from sensorgen.export.slicers import curaengine, versions
 from sensorgen.export.slicing import Placed, Sliced
 from sensorgen.prediction import bodies
@@ -82,10 +80,11 @@ def gcode(
         store.write(own, {settings: json_bytes(asdict(engine))})
     rmtree(inside)  # what is left are the bodies again, as the slicer took them
     loaded = tools(piece.design for piece in found)
-    motion = follow(ready, machine.control.prime_macro)
-    lines, checked = paths_of(motion, machine), check_motion(motion, machine, loaded, others_empty=True)
+    checked = check_motion(made.lifted.motion, machine, loaded, others_empty=True)
     for piece in found:
-        checked = checked.with_more(agreement.check(piece.design, lines, motion.changes, piece.sensor_mm()))
+        checked = checked.with_more(
+            agreement.check(piece.design, made.lines, made.lifted.motion.changes, piece.sensor_mm(), piece=piece.name)
+        )
     if checked.errors():
         ready = ready.replace(ready.with_suffix(".refused.gcode"))
     step("as printed")
@@ -105,7 +104,7 @@ def _printed(piece: Placed, made: Sliced, content: bytes) -> PrintedDesign:
     try:
         printed = asprinted.body(design, made.lines, slicer=source, centre_mm=piece.sensor_mm())
         body = bodies.sliced(design, lambda: printed, source, content + piece.name.encode())
-        layers, findings = tuple(printed.rows()), (*made.findings, *printed.findings())
+        layers, findings = tuple(printed.rows), (*made.findings, *printed.findings())
         return PrintedDesign(piece.name, design.name, timeless(evaluate(body)), layers, findings)
     except SensorgenError as error:
         return PrintedDesign(piece.name, design.name, reason=str(error))

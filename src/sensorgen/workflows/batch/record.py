@@ -4,16 +4,12 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from hashlib import sha256
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from sensorgen.checks.volumes import Row
-from sensorgen.core import files as store
 from sensorgen.core.document import Column, Part, Table
-from sensorgen.core.errors import BadInput, MissingValue
+from sensorgen.core.errors import MissingValue
 from sensorgen.core.findings import Finding
-from sensorgen.core.records import shown
 from sensorgen.core.units import si
 from sensorgen.design import materials
 from sensorgen.export.gcode.check import Checked
@@ -21,6 +17,7 @@ from sensorgen.prediction.results import Prediction
 from sensorgen.workflows.batch.layout import Plate, Rect
 from sensorgen.workflows.batch.pieces import Piece
 from sensorgen.workflows.batch.plan import Bake, Filament, Layout, Plan
+from sensorgen.workflows.sealed import seal
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
@@ -222,7 +219,7 @@ class Record:
 
     def sealed(self) -> "Record":
         """The record with its own SHA-256."""
-        return replace(self, sha256=_seal(json.loads(self.to_json())))
+        return replace(self, sha256=seal(json.loads(self.to_json())))
 
     def document(self) -> Iterator[Part]:
         """Specimens, checklist, and what the slicers made."""
@@ -294,84 +291,4 @@ def checklist(plan: Plan, loaded: Mapping[str, Spool]) -> tuple[str, ...]:
         *(["Measure R along the electrodes and between them, not baked"] if bake else []),
         *bake,
         "Measure R along the electrodes and between them" + (", baked" if bake else ""),
-    )
-
-
-def _seal(content: Mapping[str, Any]) -> str:
-    rest = {key: value for key, value in content.items() if key != "sha256"}
-    return sha256(json.dumps(rest, sort_keys=True, ensure_ascii=False).encode()).hexdigest()
-
-
-@dataclass(frozen=True)
-class Differences:
-    """How a folder differs from its record; ``record`` says whether the record itself was changed.
-
-    >>> bool(Differences())
-    False
-    """
-
-    missing: tuple[str, ...] = ()
-    changed: tuple[str, ...] = ()
-    extra: tuple[str, ...] = ()
-    record: bool = False
-
-    def __bool__(self) -> bool:
-        """Whether anything differs."""
-        return bool(self.missing or self.changed or self.extra or self.record)
-
-    def document(self) -> Iterator[Part]:
-        """A line for each file that differs."""
-        yield from (f"{word:8} {name}" for word in ("missing", "changed", "extra") for name in getattr(self, word))
-        if self.record:
-            yield "changed  batch.json: it does not hold what was written"
-        yield "differs from its record" if self else "as recorded"
-
-
-def read(folder: Path) -> dict[str, Any]:
-    """The record of a batch.
-
-    Raises
-    ------
-    BadInput
-        There is none, or it is damaged.
-    """
-    path = folder / RECORD
-    try:
-        found = json.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise BadInput(
-            f"cannot read {str(path)!r}: {error.strerror or error}; expected the folder of a batch"
-        ) from None
-    except (ValueError, RecursionError) as error:
-        raise BadInput(f"{path}: not the record of a batch: {error}") from None
-    files = found.get("files") if isinstance(found, dict) else None
-    if not isinstance(files, dict) or not all(isinstance(value, str) for value in files.values()):
-        raise BadInput(f"{path}: not the record of a batch: 'files' is {shown(files)}; expected names to hashes")
-    return dict(found)
-
-
-def differences(folder: Path) -> Differences:
-    """Hash every file of a batch's folder again, and hold it against the record.
-
-    Parameters
-    ----------
-    folder : Path
-        As ``sensorgen batch`` wrote it.
-
-    Raises
-    ------
-    BadInput
-        No record, a damaged one, or a file that cannot be read.
-    """
-    record = read(folder)
-    known = record["files"]
-    try:
-        here = {name: value for name, value in store.hashes(folder).items() if name != RECORD}
-    except OSError as error:
-        raise BadInput(f"cannot read {error.filename!r}: {error.strerror or error}") from None
-    return Differences(
-        missing=tuple(sorted(set(known) - set(here))),
-        changed=tuple(sorted(name for name in set(known) & set(here) if known[name] != here[name])),
-        extra=tuple(sorted(set(here) - set(known))),
-        record=record.get("sha256") != _seal(record),
     )

@@ -32,6 +32,8 @@ class Label:
         Name of the batch, and name and hash of the design.
     place : int
         Its number on the plate.
+    log_head : str
+        Identity of the last record of the log then, which anchors the predictions in it; "" without a log.
     """
 
     name: str
@@ -39,11 +41,12 @@ class Label:
     design: str
     design_id: str
     place: int
+    log_head: str = ""
 
     @classmethod
-    def of(cls, piece: Piece, batch: str, place: int) -> "Label":
+    def of(cls, piece: Piece, batch: str, place: int, log_head: str = "") -> "Label":
         """The label of a specimen."""
-        return cls(piece.name, batch, piece.design.name, piece.design_id, place)
+        return cls(piece.name, batch, piece.design.name, piece.design_id, place, log_head)
 
     @property
     def code(self) -> str:
@@ -75,8 +78,9 @@ def page(labels: Iterable[Label], title: str) -> str:
 
 
 def _section(label: Label) -> str:
-    lines = (f"no. {label.place} on the plate of {label.batch}", label.design, f"design {label.design_id}")
-    text = "".join(f"<p>{html.escape(line)}</p>" for line in lines)
+    log_head = f"log {label.log_head[:16]}" if label.log_head else ""
+    lines = (f"no. {label.place} on the plate of {label.batch}", label.design, f"design {label.design_id}", log_head)
+    text = "".join(f"<p>{html.escape(line)}</p>" for line in lines if line)
     return f"\n<section>{_qr(label.code)}<div><h2>{html.escape(label.name)}</h2>{text}</div></section>"
 
 

@@ -1,0 +1,164 @@
+"""Records of the log: each named by the hash of its content and of its predecessors, so that none changes unseen.
+
+The identity of a record is the SHA-256 of its head line and its content in UTF-8::
+
+    PARENTS KIND VERSION LOGGED_AT
+    CONTENT
+
+``PARENTS`` are identities with commas between them: none for the first record of a log, one as a rule, several where
+logs of several machines were merged. ``CONTENT`` is a JSON object. A record can therefore only have been written after
+all records that its chain of parents leads to, whatever any clock says.
+"""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+
+_WORD = re.compile(r"[^\s]+")
+_HASH = re.compile(r"[0-9a-f]{64}")
+
+
+@dataclass(frozen=True)
+class Record:
+    """A record as it is stored and passed on.
+
+    Attributes
+    ----------
+    id : str
+        SHA-256 of the rest, see :func:`identity`.
+    parents : tuple of str
+        Identities of the records before it.
+    kind : str
+        Kind of the content.
+    version : int
+        Of the kind's schema.
+    logged_at : str
+        Time of logging by the clock of that machine, UTC, ISO 8601.
+    content : str
+        JSON object.
+    """
+
+    id: str
+    parents: tuple[str, ...]
+    kind: str
+    version: int
+    logged_at: str
+    content: str
+
+
+def identity(parents: Sequence[str], kind: str, version: int, logged_at: str, content: str) -> str:
+    """Identity of a record.
+
+    >>> identity((), "reading", 1, "2026-01-01T00:00:00.000+00:00", "{}")[:16]
+    '3bd1ac57cb1b0b5c'
+    """
+    return sha256(f"{','.join(parents)} {kind} {version} {logged_at}\n{content}".encode()).hexdigest()
+
+
+def made(parents: Sequence[str], kind: str, version: int, logged_at: str, content: str) -> Record:
+    """A new record."""
+    return Record(
+        identity(parents, kind, version, logged_at, content), tuple(parents), kind, version, logged_at, content
+    )
+
+
+def sound(record: Record) -> bool:
+    """Whether a record is what its identity says."""
+    words = (record.kind, record.logged_at)
+    return (
+        all(_WORD.fullmatch(word) for word in words)
+        and all(_HASH.fullmatch(parent) for parent in record.parents)
+        and record.id == identity(record.parents, record.kind, record.version, record.logged_at, record.content)
+    )
+
+
+def heads(before: str, new: Iterable[Record]) -> list[str]:
+    """Identities of records that no other one follows.
+
+    Parameters
+    ----------
+    before : str
+        The only one so far; "" for none.
+    new : iterable of Record
+        Records that were added.
+    """
+    found = dict.fromkeys([before] if before else [])
+    for record in new:
+        for parent in record.parents:
+            found.pop(parent, None)
+        found[record.id] = None
+    return list(found)
+
+
+def parents_first(records: Mapping[str, Record], known: set[str]) -> Iterator[Record]:
+    """Records in an order in which each stands after its parents; those with a missing parent are left out.
+
+    Parameters
+    ----------
+    records : mapping
+        By identity, without those that are known.
+    known : set of str
+        Identities that are there; grows.
+    """
+    following: dict[str, list[str]] = {}
+    waiting: dict[str, int] = {}
+    for record in records.values():
+        missing = [parent for parent in record.parents if parent not in known]
+        waiting[record.id] = len(missing)
+        for parent in missing:
+            following.setdefault(parent, []).append(record.id)
+    free = [key for key, count in waiting.items() if not count]
+    free.reverse()
+    while free:
+        key = free.pop()
+        known.add(key)
+        yield records[key]
+        for child in reversed(following.pop(key, [])):
+            waiting[child] -= 1
+            if not waiting[child]:
+                free.append(child)
+
+
+class Ancestry:
+    """Which records of a log were written after which, where several machines wrote.
+
+    Each record is a place on a line, which goes on until another record follows the same one; where lines are merged,
+    the new record knows how far each line had come.
+
+    Parameters
+    ----------
+    records : iterable of (str, tuple of str)
+        Identity and parents, in an order in which each stands after its parents.
+    """
+
+    def __init__(self, records: Iterable[tuple[str, tuple[str, ...]]]) -> None:
+        self._place: dict[str, tuple[int, int]] = {}  # line, and number on it
+        self._ends: list[int] = []  # last number on each line
+        self._known: list[list[tuple[int, dict[int, int]]]] = []  # of a line: from this number on, so far on the others
+        for key, parents in records:
+            self._append(key, parents)
+
+    def _append(self, key: str, parents: tuple[str, ...]) -> None:
+        places = [self._place[parent] for parent in parents]
+        line, number = next((place for place in places if self._ends[place[0]] == place[1]), (len(self._ends), -1))
+        if line == len(self._ends):
+            self._ends.append(-1)
+            self._known.append([])
+        seen: dict[int, int] = dict(self._known[line][-1][1]) if self._known[line] else {}
+        for other, at in places:
+            for each, reached in ((other, at), *self._seen(other, at).items()):
+                if each != line:
+                    seen[each] = max(reached, seen.get(each, -1))
+        if not self._known[line] or seen != self._known[line][-1][1]:
+            self._known[line].append((number + 1, seen))
+        self._place[key] = line, number + 1
+        self._ends[line] = number + 1
+
+    def _seen(self, line: int, number: int) -> dict[int, int]:
+        return next(known for start, known in reversed(self._known[line]) if start <= number)
+
+    def before(self, first: str, second: str) -> bool:
+        """Whether the chain of the second record leads to the first."""
+        (line, number), (other, at) = self._place[first], self._place[second]
+        return number < at if line == other else self._seen(other, at).get(line, -1) >= number

@@ -1,0 +1,70 @@
+"""The log under attack: killed inside commits, bits flipped. ``make attack`` does all of it, ``make test`` a part."""
+
+import json
+import os
+import random
+import shutil
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from sensorgen.core.errors import SensorgenError
+from sensorgen.measure.log import Log, verify
+from sensorgen.measure.log.batches import prediction
+from sensorgen.measure.log.tables import thesis
+
+HERE = Path(__file__).parent
+LONG = bool(os.environ.get("SENSORGEN_ATTACK"))
+EVERY, FLIPS = (1, 3500) if LONG else (7, 200)
+
+
+def test_killed_at_calls_inside_commits(tmp_path):
+    """At least 200 deaths, each at a call that changes a file: before it, after half of its bytes, after it."""
+    if sys.platform != "linux" or shutil.which("cc") is None:
+        pytest.skip("needs Linux and a C compiler")
+    shim = tmp_path / "fault.so"
+    subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", shim, HERE / "fault.c", "-ldl"], check=True)
+    done = subprocess.run(
+        [sys.executable, HERE / "commit_kills.py", tmp_path, str(EVERY)], capture_output=True, text=True,
+        env={**os.environ, "LD_PRELOAD": str(shim)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["faults"] == []
+    assert found["kills"] >= 200
+
+
+def content(path):
+    """What a log says, read by SQLite itself."""
+    with closing(sqlite3.connect(path)) as file:
+        return file.execute("SELECT sequence, id, kind, logged_at, content, number FROM record").fetchall()
+
+
+def test_flipped_bits_change_nothing_unseen(tmp_path):
+    """A flip is found by opening or by ``verify``, or it lies where nothing of the content does."""
+    path, other = tmp_path / "log.db", tmp_path / "other.db"
+    with Log(path, create=True) as log:
+        log.add([*thesis(), prediction("d", "trix", {"capacitance_f": {"lower": 1e-11, "upper": 2e-11}})])
+        log.pragma("wal_checkpoint(TRUNCATE)")
+    whole, before, rng = path.read_bytes(), content(path), random.Random(11)
+    told = 0
+    for _ in range(FLIPS):
+        flipped = bytearray(whole)
+        flipped[rng.randrange(len(whole))] ^= 1 << rng.randrange(8)
+        for left in ("", "-wal", "-shm"):
+            Path(f"{other}{left}").unlink(missing_ok=True)
+        other.write_bytes(flipped)
+        try:
+            with Log(other) as log:
+                found = list(verify.faults(log))
+                rows = [] if found else content(other)
+        except SensorgenError:
+            told += 1
+            continue
+        told += bool(found)
+        assert found or rows == before
+    assert told > FLIPS / 4

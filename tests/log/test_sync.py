@@ -1,0 +1,312 @@
+"""Logs of several machines that exchange records through a folder or a stick: nothing lost, nothing doubled."""
+
+import json
+import random
+import shutil
+import subprocess
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from sensorgen.core.errors import BadInput
+from sensorgen.measure.log import BenchRun, Log, Prediction, Reading, chain, file_system, files, sync, verify
+from sensorgen.measure.log.batches import prediction
+from sensorgen.measure.log.notes import reading
+from sensorgen.measure.log.tables import thesis
+
+PREDICTED = {"capacitance_f": {"lower": 1e-11, "upper": 2e-11}}
+
+
+@pytest.fixture
+def machines(tmp_path):
+    """Logs of three machines."""
+    logs = [Log(tmp_path / name / "log.db", create=True) for name in ("a", "b", "c")]
+    yield logs
+    for log in logs:
+        log.__exit__(None, None, None)
+
+
+def sound(*logs):
+    return all(list(verify.faults(log)) == [] for log in logs)
+
+
+def ids(log):
+    return {record.id for record in log.records()}
+
+
+def test_everything_arrives_everywhere(machines, tmp_path):
+    a, b, c = machines
+    share = tmp_path / "share"
+    (tmp_path / "run.mat").write_bytes(b"raw" * 99)
+    kept = files.keep(a.files, tmp_path / "run.mat")
+    a.add([kept, BenchRun(uid="run", specimen="23 triX", written="23 triX", file=kept.uid)])
+    b.add([reading("23 triX", "650")])
+    c.add([reading("23 triY", "650")])
+    for log in (a, b, c, a, b, c, a):
+        sync.sync(log, share)
+    assert ids(a) == ids(b) == ids(c)
+    assert a.head()[1] == b.head()[1] == c.head()[1]
+    assert {r.specimen for r in c.readings()} == {"23 triX", "23 triY"}
+    assert b.raw(kept.uid).read_bytes() == b"raw" * 99
+    assert sound(a, b, c)
+    before = sorted(path.name for path in share.rglob("*"))
+    assert sync.sync(b, share).sent == 0
+    assert sorted(path.name for path in share.rglob("*")) == before
+
+
+def test_random_work_and_syncs_lose_nothing(machines, tmp_path):
+    rng, made = random.Random(3), set()
+    for _ in range(60):
+        log = rng.choice(machines)
+        if rng.random() < 0.6:
+            made.update(row.uid for row in log.add([reading("23 triX", str(rng.randrange(1, 999)))]))
+        else:
+            sync.sync(log, tmp_path / "share")
+    for log in (*machines, *machines):
+        sync.sync(log, tmp_path / "share")
+    for log in machines:
+        assert {r.uid for r in log.readings()} == made
+        assert sorted(r.number for r in log.readings()) == list(range(1, len(made) + 1))
+    assert sound(*machines)
+    # ancestry, held against a walk through all parents
+    (log, *_), parents = machines, {}
+    for record in log.records():
+        parents[record.id] = set(record.parents).union(*(parents[parent] for parent in record.parents))
+    known = chain.Ancestry((record.id, record.parents) for record in log.records())
+    for _ in range(500):
+        one, other = rng.sample(sorted(parents), 2)
+        assert known.before(one, other) == (one in parents[other])
+
+
+def test_what_precedes_what_is_known_only_where_the_machines_had_synced(machines, tmp_path):
+    a, b, _ = machines
+    (early,) = a.add([prediction("d", "trix", PREDICTED)])
+    (apart,) = b.add([reading("23 triX", "650")])
+    sync.sync(a, tmp_path / "share")
+    sync.sync(b, tmp_path / "share")
+    (after,) = b.add([reading("23 triX", "660")])
+    early = next(b.entries(Prediction))
+    assert b.before(early, [apart]) is None, "neither machine knew of the other's"
+    assert b.before(early, [after]) is True
+    assert b.before(early, [apart, after]) is None
+
+
+def test_the_same_table_imported_twice_is_one_table(machines, tmp_path):
+    a, b, _ = machines
+    a.add([reading("23 triX", "650")])
+    for log in (a, b):
+        log.add(thesis())
+    for log in (a, b, a):
+        sync.sync(log, tmp_path / "share")
+    assert [len(log.readings()) for log in (a, b)] == [70, 70]
+    assert sound(a, b)
+
+
+def test_two_corrections_of_one_row_are_both_shown(machines, tmp_path):
+    a, b, _ = machines
+    (old,) = a.add([reading("23 triX", "0.65")])
+    sync.sync(a, tmp_path / "share")
+    sync.sync(b, tmp_path / "share")
+    for log, ohm in ((a, "650"), (b, "0.66k")):
+        log.add([reading("23 triX", ohm, supersedes=old.uid)])
+    for log in (a, b, a):
+        sync.sync(log, tmp_path / "share")
+    for log in (a, b):
+        assert sorted(r.y_ohm[0] for r in log.readings()) == [650.0, 660.0]
+        assert len(log.superseding(old)) == 2
+    assert sound(a, b)
+
+
+def test_a_log_that_was_copied_and_used_twice(machines, tmp_path):
+    """Both copies go on from the same record: a fork, which a sync joins."""
+    a, *_ = machines
+    a.add(thesis()[:5])
+    a.pragma("wal_checkpoint(TRUNCATE)")
+    shutil.copy(a.path, tmp_path / "copy.db")
+    with Log(tmp_path / "copy.db") as copy:
+        a.add([reading("23 triX", "1")])
+        copy.add([reading("23 triX", "2")])
+        for log in (a, copy, a):
+            sync.sync(log, tmp_path / "share")
+        assert ids(a) == ids(copy)
+        assert a.count(Reading) == copy.count(Reading) == 7
+        assert sound(a, copy)
+
+
+def test_the_file_alone_has_everything_that_was_acknowledged(log, path, tmp_path):
+    """While a program holds the log open, somebody copies the file without its write-ahead log."""
+    for k in range(50):
+        log.add([reading("23 triX", str(k + 1))])
+    shutil.copy(path, tmp_path / "alone.db")
+    with Log(tmp_path / "alone.db") as alone:
+        assert alone.readings() == log.readings()
+        assert len(alone.readings()) == 50
+
+
+@pytest.mark.parametrize("name", ["backup", "backup.zip"])
+def test_backup_and_restore(machines, tmp_path, name):
+    a, b, _ = machines
+    (tmp_path / "run.mat").write_bytes(b"raw" * 99)
+    kept = files.keep(a.files, tmp_path / "run.mat")
+    a.add([kept, BenchRun(uid="run", specimen="23 triX", written="23 triX", file=kept.uid), *thesis()])
+    sync.backup(a, tmp_path / name)
+    with pytest.raises(BadInput, match="is there; expected a new folder"):
+        sync.backup(a, tmp_path / name)
+    sync.restore(b, tmp_path / name)
+    assert list(a.records()) == list(b.records())
+    assert a.readings() == b.readings()
+    assert b.raw(kept.uid).read_bytes() == b"raw" * 99
+    assert sound(a, b)
+    with pytest.raises(BadInput, match="has rows; expected an empty or new one"):
+        sync.restore(a, tmp_path / name)
+
+
+def test_places_that_are_none(log, tmp_path):
+    (tmp_path / "text").write_text("x")
+    (tmp_path / "no.zip").write_text("x")
+    (tmp_path / "empty").mkdir()
+    for call, place, said in (
+        (sync.sync, "text", "is a file; expected a folder or a .zip"),
+        (sync.sync, "no.zip", "is no archive of a log"),
+        (sync.restore, "empty", "has no folder 'records'"),
+        (sync.restore, "none", "no folder or .zip at"),
+    ):
+        with pytest.raises(BadInput, match=said):
+            call(log, tmp_path / place)
+
+
+def test_a_bomb_is_refused_by_its_size(log, tmp_path, monkeypatch):
+    monkeypatch.setattr(sync, "MOST_BYTES", 1_000_000)
+    with zipfile.ZipFile(tmp_path / "bomb.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("records/x.jsonl", b"0" * 5_000_000)
+    with pytest.raises(BadInput, match="GB unpacked"):
+        sync.sync(log, tmp_path / "bomb.zip")
+
+
+def records_file(share):
+    (path,) = (share / "records").iterdir()
+    return path
+
+
+def rewritten(share, change):
+    """A file of records that somebody changed and named anew by its content."""
+    from hashlib import sha256
+
+    path = records_file(share)
+    lines = [json.loads(line) for line in path.read_text("utf-8").splitlines()]
+    path.unlink()
+    content = "".join(json.dumps(line) + "\n" for line in change(lines)).encode()
+    (share / "records" / f"{sha256(content).hexdigest()}.jsonl").write_bytes(content)
+
+
+def without(lines):
+    return [line for line in lines if line is not lines[2]]
+
+
+def tuned(lines):
+    lines[2]["content"] = lines[2]["content"].replace("650", "600")
+    return lines
+
+
+def newer(lines):
+    last = lines[-1]
+    last["version"] = 2
+    last["id"] = chain.identity(last["parents"], last["kind"], 2, last["logged_at"], last["content"])
+    return lines
+
+
+def nonsense(lines):
+    last = lines[-1]
+    last["content"] = json.dumps(json.loads(last["content"]) | {"y_ohm": "x"})
+    last["id"] = chain.identity(last["parents"], last["kind"], 1, last["logged_at"], last["content"])
+    return lines
+
+
+@pytest.mark.parametrize(
+    ("change", "said", "there"),
+    [
+        (without, "3 records follow others that are not there yet", 2),
+        (tuned, "is not what its identity says; nothing was added", 0),
+        (newer, "of version 2, which this sensorgen does not read: take a newer one", 0),
+        (nonsense, "column y_ohm of a Reading holds 'x'", 0),
+        (
+            lambda lines: [{**lines[0], "parents": 5}],
+            "is no record; expected a file as sensorgen log sync writes it",
+            0,
+        ),
+        (lambda lines: ["x"], "is no record", 0),
+    ],
+)
+def test_records_that_were_tampered_with(machines, tmp_path, change, said, there):
+    a, b, _ = machines
+    a.add(reading("23 triX", "650", uid=str(k)) for k in range(6))
+    sync.sync(a, tmp_path / "share")
+    rewritten(tmp_path / "share", change)
+    try:
+        words = " ".join(sync.sync(b, tmp_path / "share").notes)
+    except BadInput as error:
+        words = str(error)
+    assert said in words
+    assert b.count(Reading) == there
+    assert sound(b)
+
+
+def test_a_file_that_has_not_arrived_in_full_is_left_for_later(machines, tmp_path):
+    a, b, _ = machines
+    a.add([reading("23 triX", "650")])
+    sync.sync(a, tmp_path / "share")
+    path = records_file(tmp_path / "share")
+    whole = path.read_bytes()
+    path.write_bytes(whole[:40])
+    assert "is incomplete or was changed" in sync.sync(b, tmp_path / "share").notes[0]
+    path.write_bytes(whole)
+    assert sync.sync(b, tmp_path / "share").received == 1
+
+
+def test_a_file_system_without_locks_is_refused_with_the_way_out(tmp_path):
+    """A real FUSE mount, as of a share or another machine."""
+    if shutil.which("bindfs") is None:
+        pytest.skip("bindfs is not installed")
+    (tmp_path / "real").mkdir()
+    (tmp_path / "mount").mkdir()
+    mounted = subprocess.run(["bindfs", tmp_path / "real", tmp_path / "mount"], capture_output=True, text=True)
+    if mounted.returncode:
+        pytest.skip(f"cannot mount through FUSE here: {mounted.stderr.strip()}")
+    try:
+        with pytest.raises(BadInput, match=r"is on fuse at .*cannot lock a file.*sensorgen log sync"):
+            Log(tmp_path / "mount" / "log.db", create=True)
+        assert list((tmp_path / "real").iterdir()) == []
+        with Log(tmp_path / "log.db", create=True) as log:  # the way out works there
+            log.add([reading("23 triX", "650")])
+            assert sync.sync(log, tmp_path / "mount" / "share").sent == 1
+    finally:
+        subprocess.run(["umount", tmp_path / "mount"], check=True)
+
+
+MOUNTS = """\
+22 1 254:1 / / rw,relatime - ext4 /dev/vda rw
+40 22 0:50 / /mnt/lab\\040share rw - cifs //server/lab rw
+41 22 0:51 / /mnt/lab rw - nfs4 server:/lab rw
+42 41 254:2 / /mnt/lab/disk rw - ext4 /dev/vdb rw
+43 22 0:52 / /media/stick rw - fuseblk /dev/sdb1 rw
+44 22 0:53 / /home/me/cloud rw - fuse.rclone drive: rw
+"""
+
+
+@pytest.mark.parametrize(
+    ("path", "shared"),
+    [
+        ("/home/me/log.db", ""), ("/mnt/lab/log.db", "nfs4 at /mnt/lab"), ("/mnt/lab share/x/log.db", "cifs at"),
+        ("/mnt/lab/disk/log.db", ""), ("/media/stick/log.db", ""), ("/home/me/cloud/log.db", "fuse.rclone at"),
+        ("/mnt/laboratory/log.db", ""),
+    ],
+)  # fmt: skip
+def test_shares_are_told_from_disks(monkeypatch, path, shared):
+    real = Path.read_text
+    monkeypatch.setattr(
+        Path, "read_text", lambda self, *how: MOUNTS if str(self) == "/proc/self/mountinfo" else real(self, *how)
+    )
+    found = file_system.without_locks(Path(path))
+    assert found.startswith(shared)
+    assert bool(found) == bool(shared)
