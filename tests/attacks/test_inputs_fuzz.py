@@ -4,10 +4,12 @@ import fuzz
 import pytest
 
 
-@pytest.mark.parametrize(("kind", "count"), [("mat", 30), ("packed", 20), ("hdf5", 30), ("csv", 20), ("rig", 20),
-                                             ("gcode", 100), ("printer", 150), ("quality", 150), ("plan", 100),
-                                             ("design", 100), ("invert", 100)])  # fmt: skip
-def test_damaged_files_are_read_or_refused(kind, count):
+COUNTS = {"mat": 20, "hdf5": 20, "csv": 10, "rig": 10, "gcode": 40, "printer": 60, "plan": 40, "design": 40}
+
+
+@pytest.mark.parametrize("kind", COUNTS)
+def test_damaged_files_are_read_or_refused(kind):
+    count = COUNTS[kind]
     found = fuzz.fuzz(kind, count, 1)
     assert found["faults"] == []
     assert found["read"] + found["refused"] == count
