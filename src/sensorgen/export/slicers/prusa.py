@@ -48,17 +48,10 @@ def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load], versi
 
     Parameters
     ----------
-    printer, quality : Printer, Quality
-        What prints, and in which layers.
-    loads : mapping
-        Load under the printer's own tool number [-].
+    printer, quality, loads : Printer, Quality, mapping
+        As of :func:`sensorgen.export.slicers.loads.recipes`, whose errors it raises.
     version : tuple of int
         PrusaSlicer's version; the oldest that is supported when not given.
-
-    Raises
-    ------
-    BadInput, MissingValue, OutOfRange, UnknownName
-        See :func:`sensorgen.export.slicers.loads.recipes`.
     """
     used = recipes(printer, quality, loads)
     tools = [used.get(i) for i in range(len(printer.tool_numbers))]
