@@ -78,10 +78,6 @@ def twenty(tmp_path_factory):
     return unpressed(EXAMPLE, tmp_path_factory.mktemp("twenty") / "out")
 
 
-def read(folder):
-    return json.loads((folder / RECORD).read_text("utf-8"))
-
-
 def printed_by(batch, slicer):
     """Lines of the bodies, and for each specimen which of them lie within its place on the record."""
     lines = paths.read(batch.folder / read(batch.folder)["slicers"][slicer]["gcode"], MACHINE).model()
