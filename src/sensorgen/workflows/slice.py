@@ -172,8 +172,8 @@ def slice_design(
     else:
         page = ""
     stopped, stem = bool(checked.errors(strict)), f"{design.name}.{slicer}"
-    names, others = (f"{stem}.gcode", f"{stem}.gcode.json"), (f"{stem}.refused.gcode", f"{stem}.refused.json")
-    names, others = (others, names) if stopped else (names, others)
+    passed, refused = (f"{stem}.gcode", f"{stem}.gcode.json"), (f"{stem}.refused.gcode", f"{stem}.refused.json")
+    names, others = (refused, passed) if stopped else (passed, refused)
     result = Printed(
         **vars(checked), name=design.name, design=design.id(), gcode=names[0], refused=stopped,
         sha256=sha256(content).hexdigest(), slicer=Slicer(made.slicer, made.version), sensorgen=__version__,
@@ -181,11 +181,17 @@ def slice_design(
         printed=Volumes(tuple(layers), (*made.findings, *findings)), lifting=made.lifted.lifting,
         compensated=tuple(compensated),
     )  # fmt: skip
-    folder = out / design.name
-    store.replace(folder / names[0], content)
-    store.replace(folder / names[1], document.to_json(result).encode())
+    return _written(result, out / design.name, content, page, others)
+
+
+def _written(result: Printed, folder: Path, content: bytes, page: str, others: tuple[str, ...]) -> Printed:
+    """Put the files in place, and take away those that an earlier run has left under the other name."""
+    store.replace(folder / result.gcode, content)
+    stem = result.gcode.removesuffix(".gcode").removesuffix(".refused")
+    note = f"{stem}.refused.json" if result.refused else f"{result.gcode}.json"
+    store.replace(folder / note, document.to_json(result).encode())
     if page:
         store.replace(folder / f"{stem}.layers.html", page.encode())
     for old in others:
         (folder / old).unlink(missing_ok=True)
-    return replace(result, gcode=str(folder / names[0]))
+    return replace(result, gcode=str(folder / result.gcode))
