@@ -3,7 +3,6 @@
 import fuzz
 import pytest
 
-
 COUNTS = {"mat": 20, "hdf5": 20, "csv": 10, "rig": 10, "gcode": 40, "printer": 60, "plan": 40, "design": 40}
 
 
