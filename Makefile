@@ -43,6 +43,7 @@ bench: $(READY_DEV) ## measure speed, memory and accuracy; write bench/results
 
 attack: $(READY_DEV) ## feed 10 000 damaged files of each kind to every reader, in 2 GB; takes hours
 	$(BIN)/python tests/attacks/fuzz.py $(ARGS)
+	SENSORGEN_ATTACK=1 $(BIN)/python -m pytest -q tests/attacks/test_log.py
 
 lowest: ## install the lowest versions that pyproject.toml allows in a fresh environment, and run every command there
 	scripts/clean-environment "$(PYTHON)" lowest-direct

@@ -35,6 +35,16 @@ def shared_cache(monkeypatch, _session_cache):
     monkeypatch.setenv("SENSORGEN_CACHE", str(_session_cache))
 
 
+@pytest.fixture
+def unpressed(monkeypatch, tmp_path):
+    """No cross-section is pressed, which takes ten seconds: for tests that look at nothing that a load changes.
+
+    What is predicted without the mesher is kept where only this test finds it.
+    """
+    monkeypatch.setitem(sys.modules, "netgen.geom2d", None)
+    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / "unpressed"))
+
+
 @pytest.fixture(autouse=True, scope="module")
 def one_kernel():
     """build123d and NGSolve bring two versions of one CAD kernel, which crash together: tests load one or the other."""

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from sensorgen.core import plugins as registry
 from sensorgen.core.findings import Finding
 from sensorgen.design import shapes
-from sensorgen.scene.drawing import markers, measures, panels, svg
+from sensorgen.scene.drawing import markers, panels, svg
 from sensorgen.scene.drawing.paper import fitted, spread, width, wrapped
-from sensorgen.scene.drawing.view import period, views
+from sensorgen.scene.drawing.view import nearest, period, views
 from sensorgen.scene.scene import Body, Fill, Point, Prism, Scene, area_mm2, box
 from sensorgen.scene.sections import Column, columns
 
@@ -393,10 +393,10 @@ def test_the_period_survives_a_pattern_that_begins_within_one() -> None:
 def test_the_gap_is_the_smallest_distance_even_aslant() -> None:
     low, high = box(0, 1, 0, 1, 0, 1), box(4, 5, 0, 1, 5, 6)
     scene = Scene((Body("a", "etpu", (low,), "bottom"), Body("b", "etpu", (high,), "top")), (5.0, 1.0, 6.0))
-    gap = measures.nearest(views(scene)[0])
+    gap = nearest(views(scene)[0])
     assert gap is not None
     assert gap.value_mm == pytest.approx(5.0)
-    short = measures.nearest(views(scene_of("tri", dielectric_mm=0.0))[0])
+    short = nearest(views(scene_of("tri", dielectric_mm=0.0))[0])
     assert short is not None
     assert short.value_mm == 0.0
     assert "gap 0: short" in words(drawn(scene_of("tri", dielectric_mm=0.0)))

@@ -188,11 +188,13 @@ def test_the_first_to_be_printed_keeps_its_place_or_the_electrode(real):
     assert won.region(COG).area == pytest.approx(max(width.values()), rel=0.05)
 
 
-def test_a_print_is_predicted_beside_its_drawing(real):
+def test_a_print_is_predicted_beside_its_drawing(real, unpressed):
     variant, lines, version = real("arachne", small(parameters={"length_mm": 16.0}))
     made = sliced(variant, lambda: body(variant, lines, slicer=version), version, b"file")
     found = evaluate(made)
-    assert (found.gap.value, found.gap.lower, found.gap.upper) == pytest.approx((2e-4, 2e-4, 2e-4))
+    assert (found.gap.value, found.gap.lower, found.gap.upper) == pytest.approx(
+        (2e-4, 1.8e-4, 2.2e-4)
+    )  # heights of two tools to 0.02 mm
     assert found.drawn.gap.value == pytest.approx(1e-4)
     assert version in found.body
     assert found.capacitance.print.upper < found.drawn.capacitance.value

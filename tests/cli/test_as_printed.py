@@ -18,7 +18,7 @@ def test_predict_shows_the_print_beside_the_drawing(run):
     assert (said.code, said.err) == (0, "")
     head, gap = said.out.splitlines()[1:3]
     assert head.split()[:2] == ["drawn", "printed"]
-    assert gap.split() == ["electrode", "gap", "0.1", "mm", "0.3", "mm"]
+    assert " ".join(gap.split()) == "electrode gap 0.1 mm 0.3 mm (0.28 to 0.32)"
 
 
 def test_the_drawing_alone(run):
@@ -46,7 +46,9 @@ def test_all_walls_are_in_the_range_of_the_print(run):
     found = predicted(run, *SMALL, "--dielectric", "0.1")["gap"]
     each = [predicted(run, *SMALL, "--dielectric", "0.1", "--walls", w)["gap"]["value"]
             for w in ("arachne", "classic", "cura", "cura-gaps")]  # fmt: skip
-    assert (found["value"], found["lower"], found["upper"]) == pytest.approx((each[0], min(each), max(each)))
+    heights = 2e-5  # of two tools
+    ends = each[0], min(each) - heights, max(each) + heights
+    assert (found["value"], found["lower"], found["upper"]) == pytest.approx(ends)
 
 
 def test_a_waiver_accepts_lost_layers(run, tmp_path):
@@ -108,7 +110,7 @@ def test_the_drawing_has_printed_outlines_and_rule_7(run):
     assert "7-printed" in printed
 
 
-def test_a_build_is_compensated(run, contents, tmp_path):
+def test_a_build_is_compensated(run, unpressed, contents, tmp_path):
     said = run("build", *SMALL, "--dielectric", "0.2", "--no-cad", "--compensate", "print", "--force")
     assert said.code in (0, 1)
     assert "hang_height_mm                 0.5 -> 0.6: gap and capacitance" in said.out
@@ -123,7 +125,7 @@ def test_nothing_to_compensate(run):
     assert "nothing to change" in run("build", "reference", "--size", "12x8", "--no-cad", "--compensate", "print").err
 
 
-def test_the_print_by_any_file(run, program, tmp_path):
+def test_the_print_by_any_file(run, unpressed, program, tmp_path):
     program("prusa-slicer", "prusa-slicer")
     words = [*SMALL, "--dielectric", "0.1"]
     assert run("slice", *words, "--out", str(tmp_path / "elsewhere")).code == 1  # tips are lost

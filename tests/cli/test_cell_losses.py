@@ -59,7 +59,7 @@ def test_in_words_and_planned(run):
     assert "minus the imaginary part" in said
     assert "loss tangent of x60 0.05 (set by the user)" in said
     assert "columns" in said
-    assert "it knows no losses" in said
+    assert "dielectric losses are solved by fem2d and fem3d alone" in " ".join(said.split())
 
 
 def test_a_sweep_has_the_losses_too(run):
@@ -82,7 +82,7 @@ def test_a_loss_may_be_swept_from_0(run):
         (("--set", "resistivity_x60=1e6"), "--frequency 1.1kHz"),
         (("--set", "loss_x60=-0.1"), "expected 0 to 1e+06"),
         (("--set", "loss_x60=1e7"), "expected 0 to 1e+06"),
-        (("--set", "loss_x60=0.1", "--model", "columns"), "it knows no losses"),
+        (("--set", "loss_x60=0.1", "--model", "columns"), "losses are solved by fem2d and fem3d alone"),
         (("--set", "loss_x60=0.1", "--model", "thesis-3.35"), "knows no losses"),
         (("--set", "loss_x60=0.1", "--frequency", "1kHz,2kHz"), "expected one"),
         (("--set", "loss_x60=0.1", "--frequency", "0"), "above 0"),

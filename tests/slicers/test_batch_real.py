@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,10 +19,18 @@ from sensorgen.export.slicers import run
 from sensorgen.measure.log import batches
 from sensorgen.measure.log.entries import Prediction, RawFile
 from sensorgen.workflows.batch import make, tab
-from sensorgen.workflows.batch.record import RECORD, differences, read
+from sensorgen.workflows.batch.record import RECORD
+from sensorgen.workflows.sealed import batch_differences
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
 MACHINE = load_printer("diabase-h5")
+
+
+def read(folder):
+    """The record of a batch."""
+    return json.loads((folder / RECORD).read_text("utf-8"))
+
+
 SMALL = """\
 iteration: 26
 seed: 3
@@ -38,7 +47,15 @@ LINE_MM = 0.44
 def made(folder, text, name="plan"):
     path = folder / f"{name}.yaml"
     path.write_text(text, "utf-8")
-    return make(path, folder / "out")
+    return unpressed(path, folder / "out")
+
+
+def unpressed(plan, out):
+    """A batch whose predictions press no cross-section, which no test here looks at."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "netgen.geom2d", None)
+        patch.setenv("SENSORGEN_CACHE", str(out.parent / "cache"))
+        return make(plan, out)
 
 
 def needed(*programs):
@@ -58,7 +75,7 @@ def small(tmp_path_factory):
 def twenty(tmp_path_factory):
     """The example: twenty sensors of 100 x 10 mm on one plate."""
     needed("prusa-slicer")
-    return make(EXAMPLE, tmp_path_factory.mktemp("twenty"))
+    return unpressed(EXAMPLE, tmp_path_factory.mktemp("twenty") / "out")
 
 
 def printed_by(batch, slicer):
@@ -133,7 +150,7 @@ def test_twenty_sensors_in_one_file(twenty):
     assert len(inside) == 20
     assert (np.sum(list(inside.values()), axis=0) == 1).all()
     assert all(rows.sum() > 500 for rows in inside.values())
-    assert not differences(twenty.folder)
+    assert not batch_differences(twenty.folder, RECORD)
 
 
 def test_skirt_and_tower_stay_on_the_bed_and_off_the_specimens(twenty):
@@ -158,7 +175,7 @@ def test_the_record_names_slicer_profile_and_gcode(small):
     for used in slicers.values():
         assert used["version"][0].isdigit()
         assert {used["gcode"], used["raw"], used["profile"]} <= set(read(small.folder)["files"])
-    assert not differences(small.folder)
+    assert not batch_differences(small.folder, RECORD)
     assert not [p for p in small.folder.rglob("*") if p.suffix in (".stl", ".part")]
 
 
@@ -221,7 +238,7 @@ def test_a_batch_that_fails_leaves_the_earlier_one_as_it_was(tmp_path, monkeypat
     path.write_text(SMALL.replace("seed: 3", "seed: 4"), "utf-8")
     with pytest.raises(SlicerFailed):
         make(path, tmp_path / "out")
-    assert not differences(folder)
+    assert not batch_differences(folder, RECORD)
     assert json.loads((folder / RECORD).read_text("utf-8"))["seed"] == 3
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["plan"]
 
@@ -255,7 +272,7 @@ def test_faults_of_the_gcode_are_on_record_and_in_the_exit_code(tmp_path, monkey
     assert plate["gcode"] == "plan.prusa.refused.gcode"
     assert [path.name for path in batch.folder.glob("*.gcode")] == [plate["gcode"]]
     assert batch.errors(force=True)
-    assert not differences(batch.folder)
+    assert not batch_differences(batch.folder, RECORD)
 
 
 def test_masses_are_those_of_what_the_plan_loads(tmp_path, monkeypatch):

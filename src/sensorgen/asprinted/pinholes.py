@@ -167,12 +167,8 @@ def pinholes(
 
     Parameters
     ----------
-    design : Design
-        That was sliced.
-    paths : Paths
-        Lines of the file, with the printer's own tool numbers.
-    centre_mm : (float, float), optional
-        Middle of the piece on the printer's bed [mm]; the middle of the bed if not given.
+    design, paths, centre_mm : Design, Paths, (float, float)
+        As of :func:`sensorgen.asprinted.beads.beads`.
     widths : sequence of float
         Widths of the lines to look at, of what the file says [-].
     most_layers : int

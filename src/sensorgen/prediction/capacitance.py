@@ -167,8 +167,11 @@ def _ordered(scene: Scene, width: float, model: str) -> list[Candidate]:
 
 
 def _unfit(candidate: Candidate, scene: Scene, kind: str) -> str:
-    model = capacitance_models()[candidate.model]
-    return (model.why_not_applicable(scene) or "") if hasattr(model, kind) else "it knows no losses"
+    loaded = capacitance_models()
+    if hasattr(loaded[candidate.model], kind):
+        return loaded[candidate.model].why_not_applicable(scene) or ""
+    able = " and ".join(name for name, model in loaded.items() if hasattr(model, kind))
+    return f"dielectric losses are solved by {able} alone: leave the losses out to use it"
 
 
 def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float]:

@@ -32,10 +32,8 @@ def profiles(printer: Printer, quality: Quality, loads: Mapping[int, Load], vers
 
     Parameters
     ----------
-    printer, quality : Printer, Quality
-        What prints, and in which layers.
-    loads : mapping
-        Load under the printer's own tool number [-].
+    printer, quality, loads : Printer, Quality, mapping
+        As of :func:`sensorgen.export.slicers.loads.recipes`, whose errors it raises.
     version : tuple of int
         Cura's version; the oldest that is supported when not given.
 

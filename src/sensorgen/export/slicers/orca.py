@@ -26,15 +26,8 @@ def profiles(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> d
 
     Parameters
     ----------
-    printer, quality : Printer, Quality
-        What prints, and in which layers.
-    loads : mapping
-        Load under the printer's own tool number [-].
-
-    Raises
-    ------
-    BadInput, MissingValue, OutOfRange, UnknownName
-        See :func:`sensorgen.export.slicers.loads.recipes`.
+    printer, quality, loads : Printer, Quality, mapping
+        As of :func:`sensorgen.export.slicers.loads.recipes`, whose errors it raises.
     """
     used, machine = recipes(printer, quality, loads), f"sensorgen {printer.name}"
     tools, options = [used.get(i) for i in range(len(printer.tool_numbers))], next(iter(loads.values())).profile

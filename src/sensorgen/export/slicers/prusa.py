@@ -20,11 +20,12 @@ from sensorgen.export.slicers.loads import (
     recipes,
     templates,
 )
-from sensorgen.export.slicers.run import USUAL, Runner, find, run
 from sensorgen.export.slicers.versions import Version
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+
+    from sensorgen.export.slicers.run import Runner
 
 FLAVOURS = {"reprapfirmware": "reprapfirmware", "marlin": "marlin2"}
 _SPEEDS = (
@@ -47,17 +48,10 @@ def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load], versi
 
     Parameters
     ----------
-    printer, quality : Printer, Quality
-        What prints, and in which layers.
-    loads : mapping
-        Load under the printer's own tool number [-].
+    printer, quality, loads : Printer, Quality, mapping
+        As of :func:`sensorgen.export.slicers.loads.recipes`, whose errors it raises.
     version : tuple of int
         PrusaSlicer's version; the oldest that is supported when not given.
-
-    Raises
-    ------
-    BadInput, MissingValue, OutOfRange, UnknownName
-        See :func:`sensorgen.export.slicers.loads.recipes`.
     """
     used = recipes(printer, quality, loads)
     tools = [used.get(i) for i in range(len(printer.tool_numbers))]
@@ -115,7 +109,7 @@ def volume_settings(printer: Printer, quality: Quality, tool: int, load: Load) -
     return {key: value for key, value in own.items() if key not in load.profile.texts("prusa")}
 
 
-def slice_3mf(threemf: Path, profile: Path, gcode: Path, runner: Runner = USUAL) -> None:
+def slice_3mf(threemf: Path, profile: Path, gcode: Path, runner: "Runner | None" = None) -> None:
     """Slice a 3MF with PrusaSlicer, where it stands on the bed.
 
     Parameters
@@ -134,6 +128,9 @@ def slice_3mf(threemf: Path, profile: Path, gcode: Path, runner: Runner = USUAL)
     SlicerFailed
         PrusaSlicer is not installed, refuses, or cannot read one of the files.
     """
+    from sensorgen.export.slicers.run import USUAL, find, run
+
+    runner = runner or USUAL
     program = find(*PROGRAMS["prusa"], runner.program)
     for path in (threemf, profile):
         if not path.is_file():  # PrusaSlicer would take a missing profile for an empty one

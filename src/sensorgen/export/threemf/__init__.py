@@ -11,7 +11,7 @@ import numpy as np
 
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.design.tower import Tower
-from sensorgen.export.threemf import archive, cura, orca, prusa
+from sensorgen.export.threemf import core, cura, orca, prusa
 from sensorgen.export.threemf.part import Part, check
 from sensorgen.export.threemf.plate import box_mm, placed
 
@@ -80,7 +80,7 @@ def content(
     if family == "prusa":
         files += [prusa.tower(tower)] if tower else []
         files += [prusa.profile(profile)] if profile else []
-    return archive.pack(files)
+    return core.pack(files)
 
 
 def plate(

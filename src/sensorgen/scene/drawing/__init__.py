@@ -17,10 +17,10 @@ from collections.abc import Iterator, Sequence
 from importlib import resources
 
 from sensorgen.core.findings import Finding
-from sensorgen.scene.drawing import dimensions, layers, markers, measures, overview, panels, titleblock
+from sensorgen.scene.drawing import dimensions, layers, markers, overview, panels, titleblock
 from sensorgen.scene.drawing.panels import Colours, Panel
 from sensorgen.scene.drawing.paper import ARROWS, box, element, escaped, line
-from sensorgen.scene.drawing.view import views
+from sensorgen.scene.drawing.view import Measure, heights, nearest, views, widths
 from sensorgen.scene.scene import Point, Scene
 
 WIDTH, HEIGHT = 297.0, 210.0
@@ -28,7 +28,7 @@ LEFT, RIGHT = 9.0, 288.0
 DETAIL, OVERVIEW, FOOT, BOTTOM = 8.0, 109.0, 143.0, 204.0  # where the parts of the page begin, and the end
 SPLIT = 192.0  # between findings and legend
 NAMES = "AB"  # of the sections
-Lanes = Sequence[Sequence[measures.Measure]]
+Lanes = Sequence[Sequence[Measure]]
 
 
 def svg(
@@ -70,7 +70,7 @@ def svg(
     letters, marked = panels.letters(scene.bodies), markers.ranked(findings)
     entries = markers.placed(marked, letters, (LEFT + 2, FOOT + 8.5, SPLIT - 3, BOTTOM - 2))
     shown = [entry.mark for entry in entries]
-    gaps = [(nearest, panel) for panel in details if (nearest := measures.nearest(panel.view))]
+    gaps = [(found, panel) for panel in details if (found := nearest(panel.view))]
     gap = min(gaps, key=lambda pair: round(pair[0].value_mm, 6), default=None)
     taken: list[Point] = [place for panel in details for place in panels.letter_places(panel).values()]
     left, room = SPLIT + 3, RIGHT - SPLIT - 3
@@ -99,8 +99,8 @@ def _details(scene: Scene, grid: Sequence[float]) -> tuple[Lanes, list[Panel]]:
     """The lanes of heights and the detail views between them and the layers' numbers."""
     height = scene.size_mm[2]
     seen = views(scene)
-    lanes = measures.heights(seen, height)
-    above, below = (max(len(measures.widths(view)[side]) for view in seen) for side in (0, 1))
+    lanes = heights(seen, height)
+    above, below = (max(len(widths(view)[side]) for view in seen) for side in (0, 1))
     left = LEFT + 2 + sum(map(dimensions.lane_width, lanes)) + 2
     top = DETAIL + 7 + dimensions.ROW * above
     bottom = OVERVIEW - 5 - dimensions.ROW * below
@@ -121,7 +121,7 @@ def _sections(
     yield from layers.labels(first, grid, right + panels.GUTTER)
     yield from dimensions.beside(first, lanes)
     for panel, name in zip(details, NAMES, strict=False):
-        above, below = measures.widths(panel.view)
+        above, below = widths(panel.view)
         over = panel.frame.top - 3
         yield panels.caption(panel, name, min(over - dimensions.ROW * len(above) - 1.5, panel.frame.top - 5.8))
         yield from dimensions.rows(panel.frame, above, over, -dimensions.ROW)

@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Sequence
 from itertools import accumulate, pairwise
 
-from sensorgen.scene.drawing.measures import Gap, Measure
 from sensorgen.scene.drawing.panels import Panel
 from sensorgen.scene.drawing.paper import Frame, line, number, seen, spread, text, width
+from sensorgen.scene.drawing.view import Gap, Measure
 from sensorgen.scene.scene import Point
 
 ROW = 5.6  # from one row of dimensions to the next [mm]

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from sensorgen.scene.drawing import dimensions
-from sensorgen.scene.drawing.measures import Measure
 from sensorgen.scene.drawing.panels import Colours, Panel, materials
 from sensorgen.scene.drawing.paper import Frame, box, fitted, number, text
+from sensorgen.scene.drawing.view import Measure
 from sensorgen.scene.scene import AXES, Scene
 
 HEIGHT = 9.0  # of the strip on paper [mm]

@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from sensorgen.scene.drawing import layers
-from sensorgen.scene.drawing.measures import Gap
 from sensorgen.scene.drawing.panels import Colours, colour, scale_words
 from sensorgen.scene.drawing.paper import Frame, box, clean, fitted, line, number, text, wrapped
+from sensorgen.scene.drawing.view import Gap
 from sensorgen.scene.scene import Scene
 
 ROW = 3.6

@@ -1,19 +1,21 @@
-"""What to draw of a scene: the cross-sections that show most, and their period.
+"""What to draw of a scene: the cross-sections that show most, their period, and sizes worth a dimension line.
 
 Numbers only; nothing here knows of paper.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, permutations
+from math import hypot
 
-from sensorgen.scene.scene import AXES, SLIVER_MM, Body, Outline, Scene, area_mm2, clipped
+from sensorgen.scene.scene import AXES, SLIVER_MM, Body, Outline, Point, Scene, area_mm2, clipped
 from sensorgen.scene.sections import Column, Section, columns
 
 PLACES = 8  # places tried for a section: two periods of crossed strips change eight times
 PROBE = 64  # corners looked at for a period: enough for two repetitions of any pattern one would draw
 SAME_MM = 1e-6
+MOST_LEVELS, MOST_COLUMNS, MOST_EXTENTS, MOST_PIECES = 9, 8, 3, 2  # measures of a view
 Region = tuple[Body, Outline]
 
 
@@ -118,3 +120,156 @@ def _alike(a: Column, b: Column) -> bool:
         for column in (a, b)
     )
     return bodies == others and all(abs(p - q) < SAME_MM for p, q in zip(sizes, beside, strict=True))
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A distance on one axis, and where on the other axis its two ends are [mm]."""
+
+    low_mm: float
+    high_mm: float
+    ends_mm: Point = (0.0, 0.0)
+
+    @property
+    def value_mm(self) -> float:
+        """The distance [mm]."""
+        return self.high_mm - self.low_mm
+
+    def same(self, other: "Measure") -> bool:
+        """Whether both have the same ends."""
+        return abs(self.low_mm - other.low_mm) + abs(self.high_mm - other.high_mm) < SAME_MM
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Where two terminals come nearest to each other in a view, in (along, z) [mm].
+
+    ``at_corner`` is False in the middle of a flat edge, which shows better.
+    """
+
+    near: Point
+    far: Point
+    at_corner: bool
+
+    @property
+    def value_mm(self) -> float:
+        """The distance [mm]."""
+        return hypot(self.near[0] - self.far[0], self.near[1] - self.far[1])
+
+
+def heights(views: Sequence[View], height_mm: float) -> list[list[Measure]]:
+    """Vertical measures in lanes from the sensor outwards: level by level, whole bodies, the whole."""
+    levels = _distinct([0.0, height_mm, *(z for view in views for z in _levels(view))])
+    if len(levels) > MOST_LEVELS:
+        levels = _distinct([0.0, height_mm, *(z for view in views for span in _extents(view) for z in span)])
+    chain = [Measure(low, high) for low, high in pairwise(levels[:MOST_LEVELS])]
+    whole = Measure(0.0, height_mm)
+    bodies = _new((Measure(*span) for view in views for span in _extents(view)), [*chain, whole])
+    bodies = sorted(sorted(bodies, key=lambda m: m.value_mm)[:MOST_EXTENTS], key=lambda m: m.low_mm)
+    lanes: list[list[Measure]] = []  # side by side, those that overlap in different ones
+    for m in bodies:
+        free = next((lane for lane in lanes if lane[-1].high_mm <= m.low_mm + SAME_MM), None)
+        if free is None:
+            lanes.append([m])
+        else:
+            free.append(m)
+    return [lane for lane in (chain, *lanes, [whole]) if lane and (lane != chain or len(chain) > 1)]
+
+
+def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
+    """Horizontal measures in rows from the sensor outwards: those above the view, and those below it."""
+    middle = max(z for _, outline in view.regions for _, z in outline) / 2
+    columns = [*(column.left_mm for column in view.columns), view.columns[-1].right_mm]  # where nothing repeats
+    edges = [u for u in view.period_mm or columns if u <= view.end_mm + SAME_MM]
+    lowest = [_reach(view, u, min) for u in edges]
+    above = bool(edges) and min(lowest) > middle
+    reach = [_reach(view, u, max) for u in edges] if above else lowest
+    chain = [Measure(a, b, ends) for (a, b), ends in zip(pairwise(edges), pairwise(reach), strict=True)]
+    chain = chain if 1 < len(chain) <= MOST_COLUMNS else []
+    repeats = view.period_mm and len(edges) == len(view.period_mm)  # the view shows all of a period
+    whole = [Measure(edges[0], edges[-1], (reach[0], reach[-1]))] if repeats else []
+    sides = (side for _, outline in view.regions for side in _sides(outline))
+    flats = sorted((min(a[0], b[0]), max(a[0], b[0]), a[1]) for a, b in sides if a[1] == b[1])
+    flats = [flat for flat in flats if flat[0] > SAME_MM and flat[1] < view.end_mm - SAME_MM]
+    known = [*chain, *whole, Measure(0.0, view.end_mm)]
+    pieces = _new((Measure(low, high, (z, z)) for low, high, z in flats), known, by_value=True)[:MOST_PIECES]
+    rows: tuple[list[list[Measure]], list[list[Measure]]] = ([], [])
+    rows[not above].append(chain)
+    for measure in pieces:
+        rows[measure.ends_mm[0] <= middle].append([measure])
+    rows[not above].append(whole)
+    return [row for row in rows[0] if row], [row for row in rows[1] if row]
+
+
+def nearest(view: View) -> Gap | None:
+    """Where two terminals come nearest; of several such places the one nearest to the middle.
+
+    Looks beyond the view's end where the first period does: its end must not hide the gap.
+    """
+    middle = view.end_mm / 2
+    if view.period_mm and view.period_mm[-1] > view.end_mm:
+        view = replace(view, end_mm=view.period_mm[-1])
+    terminals: dict[str, list[Outline]] = {}
+    for body, outline in view.regions:
+        if body.terminal:
+            terminals.setdefault(body.terminal, []).append(outline)
+    found = []
+    for corners, others in permutations(terminals.values(), 2):
+        edges = [edge for outline in others for edge in _sides(outline)]
+        for a, b in (side for outline in corners for side in _sides(outline)):
+            between = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
+            for place, at_corner in ((a, True), (between, False)):
+                found += [Gap(place, _foot(place, *edge), at_corner) for edge in edges]
+    return min(found, key=lambda gap: (round(gap.value_mm, 6), gap.at_corner, abs(gap.near[0] - middle)), default=None)
+
+
+def _levels(view: View) -> Iterator[float]:
+    """Heights at which an outline is flat or turns, but for corners that only the view's end makes."""
+    for _, outline in view.regions:
+        for before, (u, z), after in zip(outline[-1:] + outline[:-1], outline, outline[1:] + outline[:1], strict=True):
+            flat = any(z == p[1] and abs(u - p[0]) > SAME_MM for p in (before, after))
+            turns = (before[1] - z) * (after[1] - z) > 0 and SAME_MM < u < view.end_mm - SAME_MM
+            if flat or turns:
+                yield z
+
+
+def _extents(view: View) -> Iterator[Point]:
+    """Lowest and highest place of each body [mm]."""
+    by_body: dict[str, list[float]] = {}
+    for body, outline in view.regions:
+        by_body.setdefault(body.name, []).extend(z for _, z in outline)
+    return ((min(zs), max(zs)) for zs in by_body.values())
+
+
+def _reach(view: View, at_mm: float, end: Callable[..., float]) -> float:
+    """Height of the lowest or the highest corner at one place of the section [mm]."""
+    return end((z for _, outline in view.regions for u, z in outline if abs(u - at_mm) < SAME_MM), default=0.0)
+
+
+def _new(measures: Iterable[Measure], known: Sequence[Measure], by_value: bool = False) -> list[Measure]:
+    """Those that no other one tells already."""
+    kept: list[Measure] = []
+    for m in measures:
+        if not any(abs(m.value_mm - k.value_mm) < SAME_MM if by_value else m.same(k) for k in [*known, *kept]):
+            kept.append(m)
+    return kept
+
+
+def _distinct(values: Iterable[float]) -> list[float]:
+    kept: list[float] = []
+    for value in sorted(values):
+        if not kept or value - kept[-1] > SAME_MM:
+            kept.append(value)
+    return kept
+
+
+def _sides(outline: Outline) -> Iterator[tuple[Point, Point]]:
+    return zip(outline, outline[1:] + outline[:1], strict=True)
+
+
+def _foot(p: Point, a: Point, b: Point) -> Point:
+    """The point of an edge that is nearest to ``p``."""
+    along = (b[0] - a[0], b[1] - a[1])
+    share = ((p[0] - a[0]) * along[0] + (p[1] - a[1]) * along[1]) / (along[0] ** 2 + along[1] ** 2)
+    share = min(max(share, 0.0), 1.0)
+    return a[0] + share * along[0], a[1] + share * along[1]
