@@ -5,7 +5,7 @@ BIN = $(VENV)/bin
 READY = $(VENV)/.ready
 READY_DEV = $(VENV)/.ready-dev
 
-.PHONY: help demo test lint docs site words size bench clean
+.PHONY: help demo test lint docs site words size bench clean attack lowest pythons wheel hashes sbom
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 8
@@ -40,6 +40,29 @@ size: ## print code lines, functions and the longest function of each package
 
 bench: $(READY_DEV) ## measure speed, memory and accuracy; write bench/results
 	set -e; for program in bench/*.py; do $(BIN)/python $$program; done
+
+attack: $(READY_DEV) ## feed 10 000 damaged files of each kind to every reader, in 2 GB; takes hours
+	$(BIN)/python tests/attacks/fuzz.py $(ARGS)
+	SENSORGEN_ATTACK=1 $(BIN)/python -m pytest -q tests/attacks/test_log.py
+
+lowest: ## install the lowest versions that pyproject.toml allows in a fresh environment, and run every command there
+	scripts/clean-environment "$(PYTHON)" lowest-direct
+
+pythons: ## install the newest versions in fresh environments of Python 3.11 to 3.13, and run every command there
+	set -e; for version in 3.11 3.12 3.13; do scripts/clean-environment python$$version highest; done
+
+wheel: $(READY_DEV) ## build the wheel twice, compare the bytes, and run every command from it in a fresh environment
+	scripts/same-wheel $(BIN)/python out/wheel
+	scripts/clean-environment "$(PYTHON)" highest out/wheel/*.whl
+
+hashes: ## write constraints-hashes.txt, with the SHA-256 of every file, for pip install --require-hashes
+	scripts/clean-environment --tools "$(PYTHON)" && out/tools/bin/uv pip compile --quiet --generate-hashes \
+		--no-header --no-emit-index-url --all-extras -c constraints.txt pyproject.toml -o constraints-hashes.txt
+
+sbom: $(READY) ## write out/sbom.json, what is installed beside sensorgen and its licences (CycloneDX)
+	scripts/clean-environment --tools "$(PYTHON)"
+	mkdir -p out
+	out/tools/bin/cyclonedx-py environment --output-reproducible --of JSON -o out/sbom.json $(BIN)/python
 
 clean: ## remove everything that is derived
 	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -4,14 +4,13 @@ import pytest
 from child import run
 
 BAD = "a\\e]0;title\\x07\\e[31m\\x9b2J\\u202eb"  # as YAML writes it
+FORMS = ("check",), ("check", "--csv"), ("check", "--markdown")
 CODES = "\x1b\x07\x9b\u202e"
 
 
-@pytest.mark.parametrize(
-    "words", [("check",), ("check", "--csv"), ("check", "--markdown"), ("build", "--no-cad", "--force")], ids=" ".join
-)
+@pytest.mark.parametrize("words", FORMS, ids=" ".join)
 def test_a_waivers_reason_is_shown_harmless(tmp_path, words):
-    waivers = ", ".join(f'{{rule: "{rule}", reason: "{BAD}"}}' for rule in (7, 5))
+    waivers = ", ".join(f'{{rule: "{rule}", reason: "{BAD}"}}' for rule in (5, 7))
     text = f"{{shape: tri, waivers: [{waivers}], parameters: {{length_mm: 6}}}}"
     (tmp_path / "x.yaml").write_text(text)
     done = run(words[0], tmp_path / "x.yaml", *words[1:], cwd=tmp_path, addresses=8 << 30)

@@ -24,6 +24,13 @@ from sensorgen.workflows.sealed import batch_differences
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
 MACHINE = load_printer("diabase-h5")
+
+
+def read(folder):
+    """The record of a batch."""
+    return json.loads((folder / RECORD).read_text("utf-8"))
+
+
 SMALL = """\
 iteration: 26
 seed: 3
@@ -69,10 +76,6 @@ def twenty(tmp_path_factory):
     """The example: twenty sensors of 100 x 10 mm on one plate."""
     needed("prusa-slicer")
     return unpressed(EXAMPLE, tmp_path_factory.mktemp("twenty") / "out")
-
-
-def read(folder):
-    return json.loads((folder / RECORD).read_text("utf-8"))
 
 
 def printed_by(batch, slicer):

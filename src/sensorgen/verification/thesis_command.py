@@ -3,12 +3,14 @@
 import json
 from collections import Counter
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 import click
 
 from sensorgen.cli import FOUND_ERRORS, show
 from sensorgen.cli.words import OneOf
+from sensorgen.core.errors import NotInstalled
 
 FORMATS = ("html", "md", "json")
 
@@ -31,6 +33,8 @@ def command(output: str, formats: tuple[str, ...]) -> int:
     from sensorgen.verification.thesis.items import CHAPTERS
     from sensorgen.verification.thesis.verdicts import UNEXPLAINED, WORDS
 
+    if find_spec("ngsolve") is None:  # other models would answer, and differ
+        raise NotInstalled("thesis needs the solver NGSolve: pip install 'sensorgen[fem]'")
     with show.progress(CHAPTERS) as step:
         rows = thesis.rows(step)
     made: dict[str, Callable[[Sequence[thesis.Row]], str]] = {

@@ -1,0 +1,219 @@
+"""Damaged files of every kind to every reader: ``python fuzz.py [--count N] [--seed N] [KIND ...]``.
+
+Each file may be read, or refused with a message of ours, in 2 GB of addresses and half a minute of processor; anything
+else is a fault. Every kind has a process of its own, which a fault ends and which is started again after it.
+"""
+
+import argparse
+import json
+import multiprocessing
+import os
+import random
+import resource
+import runpy
+import signal
+import sys
+import tempfile
+import traceback
+from collections import Counter
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+ADDRESSES, SECONDS = 2 << 30, 30
+ODD = (
+    b"", b"\0", b"\xff", b'"', b"'", b",", b";", b"\n", b"\r", b"1e999", b"-", b"nan", b"null", b"{", b"[" * 99,
+    b"9" * 400, b"\xe2\x82", "¥".encode(), b"/", b"PK\x03\x04", b"true", b"\x00" * 64, b"&a [*a]", b"-0.0", b"604800",
+    b"!!python/object:x ", b"1e-320", b"M98 P\"x.g\"", b"G1 E1e9\n", b"\x1b[2J", b"0x10", b"inf", b": ", b"- ",
+)  # fmt: skip
+
+
+def mutated(content, rng):
+    """Bytes replaced, removed, doubled, cut off, or numbers changed."""
+    content = bytearray(content)
+    for _ in range(rng.choice((1, 1, 2, 4, 12))):
+        at, length = rng.randrange(len(content) + 1), rng.choice((0, 1, 1, 2, 4, 8, 100))
+        kind = rng.randrange(7)
+        if kind == 0:
+            content[at : at + length] = rng.choice(ODD)
+        elif kind == 1:
+            content[at : at + length] = rng.randbytes(length)
+        elif kind == 2:
+            del content[at : at + length]
+        elif kind == 3:
+            content[at:at] = content[at : at + length]
+        elif kind == 4:
+            content[at : at + 4] = rng.choice(
+                (b"\xff" * 4, b"\0" * 4, b"\x80\0\0\0", b"\0\0\0\x80", b"\xff\xff\xff\x7f")
+            )
+        elif kind == 5 and content:
+            content[at % len(content)] ^= 1 << rng.randrange(8)
+        elif rng.random() < 0.2:
+            del content[at:]
+    return bytes(content)
+
+
+def command(*words):
+    """Reader that is a command; what it prints must not reach the terminal's control."""
+    from sensorgen.cli import cli
+
+    def read(file):
+        import click
+
+        out = StringIO()
+        try:
+            with redirect_stdout(out), redirect_stderr(out):
+                cli.main([str(file) if word is None else str(word) for word in words], standalone_mode=False)
+        except click.ClickException:
+            pass
+        assert "\x1b" not in out.getvalue()
+
+    return read
+
+
+def recordings(folder):
+    """Recordings and a log of the rig, by kind."""
+    sys.path.insert(0, str(ROOT / "tests/recording"))
+    import h5py
+    import made
+    import scipy.io as sio
+
+    run = made.run(made.presses(2))
+    z, t, tones = run.impedance_ohm[:1500, :2], run.time_s[:1500], made.TONES_HZ[:2]
+    tree = made.tree([z], [t], made.stamps(t), (tones,))
+    for name, packed in (("mat", False), ("packed", True)):
+        sio.savemat(folder / f"whole.{name}", tree, do_compression=packed, appendmat=False)
+    with h5py.File(folder / "whole.hdf5", "w") as file:
+        file["impedance_data/lockin1"], file["impedance_time"] = z, t
+        file.create_group("settings").attrs.update(dem_freqs=tones, version="V9", bandwidth=10.0)
+    rows = [f"{a:.5f},{a + made.EPOCH_S:.4f},{b[0].real:.6g},{b[0].imag:.6g}" for a, b in zip(t, z, strict=True)]
+    (folder / "whole.csv").write_text("time_s,stamp_s,re_ohm_1kHz,im_ohm_1kHz\n" + "\n".join(rows) + "\n")
+    made.write_rig(folder / "whole.rig", [c[:300] for c in made.rig_rows(made.presses(2))])
+
+
+def samples(folder):
+    """Whole files by kind, with their readers."""
+    from sensorgen.design import printer
+    from sensorgen.measure.readings import readings
+    from sensorgen.workflows import api
+    from sensorgen.workflows.batch import plan
+
+    sys.path.insert(0, str(ROOT / "tests/gcode"))
+    import good
+
+    recordings(folder)
+    (folder / "whole.invert").write_bytes((folder / "whole.csv").read_bytes())
+    (folder / "whole.gcode").write_text(good.MAKER)
+    for kind, name in (("printer", "printers/diabase-h5"), ("quality", "qualities/fine")):
+        (folder / f"whole.{kind}").write_bytes((printer.folder() / f"{name}.yaml").read_bytes())
+    (folder / "whole.design").write_bytes((ROOT / "designs/23/sqxy-d0.1.yaml").read_bytes())
+    (folder / "whole.plan").write_text(runpy.run_path(str(ROOT / "tests/batch/conftest.py"))["SMALL"])
+
+    def table(file):
+        with readings(str(file)) as source:
+            list(source.blocks())
+
+    def design(file):
+        _ = api.load(file).printed
+
+    show = command("bench", "show", None)
+    return {
+        "mat": (show, ""), "packed": (show, ""), "hdf5": (show, ""), "csv": (show, ""),
+        "rig": (command("bench", "show", folder / "whole.csv", "--rig", None), ""), "invert": (table, ""),
+        "gcode": (command("gcode", "check", None), ".gcode"),
+        "printer": (lambda file: printer.load_printer(str(file)), ".yaml"),
+        "quality": (lambda file: printer.load_quality(str(file)), ".yaml"), "plan": (plan.load, ".yaml"),
+        "design": (design, ".yaml"),
+    }  # fmt: skip
+
+
+def outcome(read, file):
+    """What came of a file: "read", a message's kind, or a fault."""
+    from sensorgen.core.errors import SensorgenError
+
+    try:
+        signal.alarm(SECONDS)
+        read(file)
+        return "read", ""
+    except SensorgenError:
+        return "refused", ""
+    except MemoryError:
+        return "fault", "MemoryError\n" + traceback.format_exc()
+    except BaseException:  # also SystemExit and the alarm
+        return "fault", traceback.format_exc()
+    finally:
+        signal.alarm(0)
+
+
+def late(*_):
+    raise TimeoutError(f"more than {SECONDS} s")
+
+
+def work(kind, numbers, seed, folder, results):
+    """Files of one kind, one after the other."""
+    resource.setrlimit(resource.RLIMIT_AS, (ADDRESSES, ADDRESSES))
+    signal.signal(signal.SIGALRM, late)
+    folder = Path(folder)
+    os.chdir(folder)
+    read, suffix = samples(folder)[kind]
+    content = (folder / f"whole.{kind}").read_bytes()
+    (folder / f"whole{suffix}").write_bytes(content)
+    read(folder / f"whole{suffix}")
+    for number in numbers:
+        results.put((number, "begun", ""))
+        file = folder / f"damaged{number}{suffix}"
+        file.write_bytes(mutated(content, random.Random(f"{seed} {kind} {number}")))
+        results.put((number, *outcome(read, file)))
+        file.unlink()
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss >> 10
+    results.put((-1, "peak", str(peak)))
+
+
+KINDS = ("mat", "packed", "hdf5", "csv", "rig", "invert", "gcode", "printer", "quality", "plan", "design")
+
+
+def fuzz(kind, count, seed):
+    """Number of files by what came of them, the faults, and the largest memory [MB]."""
+    spawn, found, faults, peak, begin = multiprocessing.get_context("spawn"), Counter(), [], 0, 0
+    while begin < count:
+        with tempfile.TemporaryDirectory() as folder:
+            results = spawn.SimpleQueue()
+            process = spawn.Process(target=work, args=(kind, range(begin, count), seed, folder, results))
+            process.start()
+            while process.is_alive() or not results.empty():
+                if not results.empty():
+                    number, what, said = results.get()
+                    if what == "peak":
+                        peak = max(peak, int(said))
+                    elif what == "begun":
+                        begin = number + 1
+                    else:
+                        found[what] += 1
+                        faults += [f"{kind} {number}: {said}"] if what == "fault" else []
+                else:
+                    process.join(0.01)
+        if process.exitcode:
+            found["fault"] += 1
+            faults.append(f"{kind} {begin - 1}: the process ended with {process.exitcode}")
+    return {"kind": kind, **found, "resident_mb": peak, "faults": faults}
+
+
+def main():
+    """Print a line of JSON for each kind; exit code 1 with faults."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("kinds", nargs="*", default=KINDS)
+    options.add_argument("--count", type=int, default=10_000)
+    options.add_argument("--seed", type=int, default=15)
+    given = options.parse_args()
+    bad = False
+    for kind in given.kinds or KINDS:
+        result = fuzz(kind, given.count, given.seed)
+        bad |= bool(result["faults"])
+        print(json.dumps(result), flush=True)
+    return int(bad)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,22 @@
+"""A few damaged files of each kind; ``make attack`` feeds 10 000 of each."""
+
+import fuzz
+import pytest
+
+COUNTS = {"mat": 20, "hdf5": 20, "csv": 10, "rig": 10, "gcode": 40, "printer": 60, "plan": 40, "design": 40}
+
+
+@pytest.mark.parametrize("kind", COUNTS)
+def test_damaged_files_are_read_or_refused(kind):
+    count = COUNTS[kind]
+    found = fuzz.fuzz(kind, count, 1)
+    assert found["faults"] == []
+    assert found["read"] + found["refused"] == count
+    assert found["refused"] > count / 20
+    assert found["resident_mb"] < 512
+
+
+def test_a_reader_that_fails_is_seen(monkeypatch):
+    """The harness itself: a planted fault in a reader is counted."""
+    assert fuzz.outcome(lambda _: 1 / 0, None)[0] == "fault"
+    assert fuzz.outcome(lambda _: None, None)[0] == "read"
