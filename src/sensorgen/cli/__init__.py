@@ -64,6 +64,15 @@ def harmless(text: str) -> str:
     return _CONTROL.sub("", text)
 
 
+def escaped(text: str) -> str:
+    r"""The same for JSON, where nothing of the text may be lost.
+
+    >>> escaped('"a\u202eb"' + "\n")
+    '"a\\u202eb"\n'
+    """
+    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
 class _Lazy(click.Group):
     """Commands that are imported when they are asked for: ``cli/NAME_command.py`` holds ``command``."""
 

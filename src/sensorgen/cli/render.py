@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, harmless, show
+from sensorgen.cli import FOUND_ERRORS, escaped, harmless, show
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ def write(text: Iterable[str]) -> None:
     output = click.get_current_context().meta.get(_FILE)
     if output in (None, "-"):
         terminal = sys.stdout is not None and sys.stdout.isatty() and not form()
-        for piece in map(harmless, text):
+        for piece in map(escaped if form() == "json" else harmless, text):
             sys.stdout.write(_coloured(piece) if terminal else piece)
         return
     from sensorgen.core import files
