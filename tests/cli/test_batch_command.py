@@ -43,7 +43,7 @@ def test_json(run, plan):
     record = json.loads(said.out)
     assert (record["folder"], len(record["specimens"])) == ("out/plan", 2)
     assert json.loads(run("batch", "verify", "out/plan", "--json").out) == {
-        "missing": [], "changed": [], "extra": [], "record": False,
+        "missing": [], "changed": [], "extra": [], "links": [], "record": [],
     }  # fmt: skip
 
 
