@@ -51,7 +51,7 @@ def identity(parents: Sequence[str], kind: str, version: int, logged_at: str, co
     """Identity of a record.
 
     >>> identity((), "reading", 1, "2026-01-01T00:00:00.000+00:00", "{}")[:16]
-    '3bd1ac57cb1b0b5c'
+    '8910045b51efe426'
     """
     return sha256(f"{','.join(parents)} {kind} {version} {logged_at}\n{content}".encode()).hexdigest()
 
