@@ -186,10 +186,9 @@ class Log:
         sequence, head = next(self._rows("SELECT sequence, id FROM head"), (0, ""))
         return sequence if type(sequence) is int else -1, str(head)
 
-    def records(self, after: int = 0) -> Iterator[Record]:
-        """Records in their order, of all kinds, from a number on."""
-        sql = f"SELECT {_FIELDS} FROM record WHERE sequence > ? ORDER BY sequence"  # noqa: S608
-        return (_record(row) for row in self._rows(sql, [after]))
+    def records(self) -> Iterator[Record]:
+        """Records of all kinds in their order."""
+        return (_record(row) for row in self._rows(f"SELECT {_FIELDS} FROM record ORDER BY sequence"))  # noqa: S608
 
     def stored(self) -> Iterator[tuple[Record, int, int | None, tuple[Value, ...]]]:
         """Records as they lie in the file: each with its numbers among all and its kind, and the index's fields."""
