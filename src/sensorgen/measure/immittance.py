@@ -18,20 +18,22 @@ from decimal import Decimal
 from types import MappingProxyType
 
 from sensorgen.core.errors import BadInput, within
-from sensorgen.core.records import shown
 from sensorgen.core.units import PREFIXES, frequency_hz, si
 
 UNITS: Mapping[str, str] = MappingProxyType({
     "R": "ohm", "X": "ohm", "Z": "ohm", "phase": "rad", "G": "S", "B": "S", "Y": "S", "Cp": "F", "Cs": "F", "Lp": "H",
     "Ls": "H", "Rp": "ohm", "D": "", "Q": "",
 })  # fmt: skip
-QUANTITIES = tuple(UNITS)
+QUANTITIES = frozenset(UNITS)
+NEVER_NEGATIVE = ("R", "Z", "G", "Y", "Cp", "Cs", "Lp", "Ls", "Rp", "D", "Q")  # of a passive specimen
 _EXAMPLES = {"Cp": "12.3pF@1kHz", "Cs": "12.3pF@1kHz", "D": "0.02@1kHz", "phase": "-88deg@1kHz"}
-_SPELLINGS = {"f": "F", "farad": "F", "Ω": "ohm", "Ω": "ohm", "ohms": "ohm", "r": "ohm", "°": "deg", "degree": "deg",
-              "degrees": "deg", "s": "S", "h": "H", "%": "%"}  # fmt: skip
+_SPELLINGS = {
+    "f": "F", "farad": "F", "Ω": "ohm", "\u03c9": "ohm", "\u2126": "ohm", "ohms": "ohm", "r": "ohm", "°": "deg",
+    "degree": "deg", "degrees": "deg", "s": "S", "h": "H",
+}  # fmt: skip
 _SCALES = {("rad", "deg"): Decimal(repr(math.pi / 180)), ("", "%"): Decimal("0.01")}
-_PREFIX = {name: Decimal(10) ** power for power, name in PREFIXES.items()} | {"µ": Decimal("1e-6"), "K": Decimal(1000)}
-_PREFIX |= {"μ": Decimal("1e-6")}
+_PREFIX = {name: Decimal(10) ** power for power, name in PREFIXES.items()}
+_PREFIX |= {"\u00b5": Decimal("1e-6"), "\u03bc": Decimal("1e-6"), "K": Decimal(1000)}
 _NUMBER = r"[-+]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][-+]?[0-9]{1,3})?"
 _READING = re.compile(rf"(?P<value>{_NUMBER})\s*(?:(?:±|\+/?-)\s*(?P<pm>{_NUMBER})\s*)?(?P<unit>[^\s0-9]*)")
 
@@ -81,7 +83,7 @@ def parse(quantity: str, text: str) -> tuple[AcReading, ...]:
     -1.570796
     """
     words, _, at = text.partition("@")
-    with within(f"{quantity} {shown(text)}"):
+    with within(f"{quantity} {text!r:.60}"):
         if not at.strip():
             raise BadInput(f"no frequency; write it behind the value, as {_EXAMPLES.get(quantity, '650ohm@1kHz')}")
         frequency = frequency_hz(at)
@@ -130,7 +132,7 @@ def factor(quantity: str, unit: str) -> Decimal:
             return _SCALES[wanted, base]
     if wanted and unit in _PREFIX:  # 12.3p
         return _PREFIX[unit]
-    raise BadInput(f"unit {shown(unit)}; expected {wanted or 'none, or %'}{' or deg' * (wanted == 'rad')}")
+    raise BadInput(f"unit {unit!r:.20}; expected {wanted or 'none, or %'}{' or deg' * (wanted == 'rad')}")
 
 
 _Closed = Callable[[float, float, float], complex]
@@ -142,10 +144,10 @@ def _loss(x: float, d: float) -> complex:
 
 
 _PAIRS: dict[tuple[str, str], _Closed] = {  # two values and the angular frequency to Z
-    ("R", "X"): lambda r, x, w: complex(r, x),
-    ("Z", "phase"): lambda z, angle, w: cmath.rect(z, angle),
-    ("G", "B"): lambda g, b, w: 1 / complex(g, b),
-    ("Y", "phase"): lambda y, angle, w: 1 / cmath.rect(y, angle),
+    ("R", "X"): lambda r, x, _w: complex(r, x),
+    ("Z", "phase"): lambda z, angle, _w: cmath.rect(z, angle),
+    ("G", "B"): lambda g, b, _w: 1 / complex(g, b),
+    ("Y", "phase"): lambda y, angle, _w: 1 / cmath.rect(y, angle),
     ("Cp", "D"): lambda c, d, w: 1 / _loss(w * c, d),
     ("Cp", "Q"): lambda c, q, w: 1 / _loss(w * c, 1 / q),
     ("Cp", "G"): lambda c, g, w: 1 / complex(g, w * c),
@@ -153,13 +155,13 @@ _PAIRS: dict[tuple[str, str], _Closed] = {  # two values and the angular frequen
     ("Cs", "D"): lambda c, d, w: _loss(-1 / (w * c), d),
     ("Cs", "Q"): lambda c, q, w: _loss(-1 / (w * c), 1 / q),
     ("Cs", "R"): lambda c, r, w: complex(r, -1 / (w * c)),
-    ("Lp", "D"): lambda l, d, w: 1 / _loss(-1 / (w * l), d),
-    ("Lp", "Q"): lambda l, q, w: 1 / _loss(-1 / (w * l), 1 / q),
-    ("Lp", "G"): lambda l, g, w: 1 / complex(g, -1 / (w * l)),
-    ("Lp", "Rp"): lambda l, r, w: 1 / complex(1 / r, -1 / (w * l)),
-    ("Ls", "D"): lambda l, d, w: _loss(w * l, d),
-    ("Ls", "Q"): lambda l, q, w: _loss(w * l, 1 / q),
-    ("Ls", "R"): lambda l, r, w: complex(r, w * l),
+    ("Lp", "D"): lambda h, d, w: 1 / _loss(-1 / (w * h), d),
+    ("Lp", "Q"): lambda h, q, w: 1 / _loss(-1 / (w * h), 1 / q),
+    ("Lp", "G"): lambda h, g, w: 1 / complex(g, -1 / (w * h)),
+    ("Lp", "Rp"): lambda h, r, w: 1 / complex(1 / r, -1 / (w * h)),
+    ("Ls", "D"): lambda h, d, w: _loss(w * h, d),
+    ("Ls", "Q"): lambda h, q, w: _loss(w * h, 1 / q),
+    ("Ls", "R"): lambda h, r, w: complex(r, w * h),
 }
 
 

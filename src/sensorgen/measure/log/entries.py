@@ -6,6 +6,9 @@ does so for a row of any kind.
 
 from dataclasses import dataclass, fields
 
+from sensorgen.core.errors import BadInput
+from sensorgen.measure.immittance import QUANTITIES
+
 DEFECTS = ("misprint", "zits", "hole", "clog", "under-extrusion", "adhesion", "torn")
 
 
@@ -154,6 +157,16 @@ class Reading(_OfSpecimen):
     photo: str = ""
     file: str = ""
     defects: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        ac = len(self.quantity)
+        if (len(self.value), len(self.frequency_hz)) != (ac, ac) or len(self.uncertainty) not in (0, ac):
+            raise BadInput(
+                f"a reading of {ac} AC quantities with {len(self.value)} values, {len(self.frequency_hz)} "
+                f"frequencies and {len(self.uncertainty)} uncertainties; expected as many of each"
+            )
+        if not QUANTITIES.issuperset(self.quantity):
+            raise BadInput(f"AC quantities {self.quantity!r:.80}; expected some of {', '.join(sorted(QUANTITIES))}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,12 +3,15 @@
 import dataclasses
 import re
 import uuid
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import BadInput, SensorgenError, within
+from sensorgen.core.units import frequency_text
 from sensorgen.design import specimen_name
 from sensorgen.design.design import Design
+from sensorgen.measure import immittance
 from sensorgen.measure.log import resistances
 from sensorgen.measure.log.entries import SPECIMEN_COLUMNS, Print, Reading, Specimen
 from sensorgen.measure.log.resistances import Resistances
@@ -105,13 +108,53 @@ def reading(
         doubts.append(blank if y.ohm or z.ohm else "no measurement")
     if unbaked and baked:
         doubts.append("baked, but the remark says that it is not")
-    design_id, design = (bound.design_id, bound.design) if bound else design_fields(written)
+    design_id, design = design_fields(written, log)
     return Reading(
         **vars(of), uid=uid or uuid.uuid4().hex, design_id=design_id, design=design, written=written,
         y_words=y_words, z_words=z_words, y_ohm=y.ohm, z_ohm=z.ohm, remark=remark, doubts=tuple(doubts),
         baked=False if baked is None and unbaked else baked, measured_at=measured_at, instrument=instrument,
         source=source, source_row=source_row, supersedes=supersedes,
     )  # fmt: skip
+
+
+def with_ac(of: Reading, typed: Mapping[str, Sequence[str]]) -> Reading:
+    """Reading with AC quantities between the electrodes.
+
+    Parameters
+    ----------
+    of : Reading
+        Of the same specimen and time.
+    typed : mapping of str to sequence of str
+        Texts as :func:`sensorgen.measure.immittance.parse` reads them, by quantity.
+
+    Raises
+    ------
+    BadInput
+        A text that cannot be parsed; the message names the quantity.
+
+    Examples
+    --------
+    >>> found = with_ac(reading("23 triX"), {"Cp": ["63pF@1kHz"], "D": ["0.02@1kHz", "0.01@10kHz"]})
+    >>> found.quantity, found.frequency_hz
+    (('Cp', 'D', 'D'), (1000.0, 1000.0, 10000.0))
+    """
+    every = [one for name, texts in typed.items() for text in texts for one in immittance.parse(name, text)]
+    stated = tuple(one.uncertainty for one in every)
+    return dataclasses.replace(
+        of, quantity=tuple(one.quantity for one in every), value=tuple(one.value for one in every),
+        frequency_hz=tuple(one.frequency_hz for one in every), uncertainty=stated if any(stated) else (),
+        doubts=(*of.doubts, *implausible(every)),
+    )  # fmt: skip
+
+
+def implausible(every: Iterable[immittance.AcReading]) -> tuple[str, ...]:
+    """AC readings that no passive specimen has, in words."""
+    return tuple(
+        f"{one.quantity} {immittance.shown_value(one.quantity, one.value)} at {frequency_text(one.frequency_hz)}: "
+        "below 0, as no passive specimen; check contacts and open/short compensation"
+        for one in every
+        if one.value < 0 and one.quantity in immittance.NEVER_NEGATIVE
+    )
 
 
 def resistance(axis: str, text: str, *, mega: bool = False) -> Resistances:
@@ -126,8 +169,11 @@ def resistance(axis: str, text: str, *, mega: bool = False) -> Resistances:
         return resistances.parse(text, mega=mega)
 
 
-def design_fields(written: str) -> tuple[str, str]:
-    """Identity and name of the design that a specimen's name stands for; "" where it stands for none."""
+def design_fields(written: str, log: "Log | None" = None) -> tuple[str, str]:
+    """Identity and name of the design that a specimen's name is bound to or stands for; "" where there is none."""
+    bound = _bound(written, log)
+    if bound:
+        return bound.design_id, bound.design
     design = design_of(written)
     return (design.id(), design.name) if design else ("", "")
 
