@@ -171,6 +171,28 @@ class Log:
         wanted = (row for row in found if all(getattr(row, name) == value for name, value in equal.items()))
         yield from reversed(list(itertools.islice(wanted, last))) if last else wanted
 
+    def about(
+        self, kind: type[_Kind], iteration: int | None, specimens: Sequence[str] = (), *, superseded: bool = False
+    ) -> Iterator[_Kind]:
+        """Rows of one kind about some specimens, else about an iteration, else all.
+
+        Parameters
+        ----------
+        kind : type
+            Kind of the rows.
+        iteration : int or None
+            Iteration, if no specimens are given.
+        specimens : sequence of str
+            Names of specimens; their rows come one specimen after the other.
+        superseded : bool
+            Also rows that a later row corrects or withdraws.
+        """
+        for specimen in specimens:
+            yield from self.entries(kind, superseded=superseded, specimen=specimen)
+        if not specimens:
+            which = {} if iteration is None else {"iteration": iteration}
+            yield from self.entries(kind, superseded=superseded, **which)
+
     def count(self, kind: type[Entry], *, superseded: bool = False) -> int:
         """Number of rows of a kind."""
         where = _current(superseded=superseded)
