@@ -160,6 +160,14 @@ class SpecimenModel:
         distance = np.subtract.outer(np.log(FORCES_N), np.log(FORCES_N))
         return np.linalg.cholesky(np.exp(-(distance**2) / 2) + 1e-6 * np.eye(len(FORCES_N)))
 
+    def law_weights(self) -> Real:
+        """Ln of the factor on the rise at each of ``FORCES_N``, per standard deviation of each parameter (k, p)."""
+        found = np.zeros((len(FORCES_N), len(self.names)))
+        common = self._at["rise"]
+        found[:, common] = self.spread.law
+        found[:, common + 1 : common + 1 + len(FORCES_N)] = self.spread.law_shape * self._shapes
+        return found
+
     def rest(self, at: Real) -> Complex:
         """Ln of the impedance that the bench reads with nothing on the sensor, without its gain.
 
