@@ -133,19 +133,28 @@ def _deliver(new: "Sequence[Entry]", log: "Log", known: str = "") -> None:
     render.deliver(listing.logged(log, new, known), before=[f"{'logged' if new else 'not logged'} in {log.path}"])
 
 
-def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, thesis: bool) -> None:
+def _import(
+    path: str | None, columns: tuple[str, ...], file: str | None, *, thesis: bool, specimen: str | None,
+    instrument: str, baked: bool | None, remark: str,
+) -> None:  # fmt: skip
     """Log all rows of a file, or none of them.
 
-    A table of readings as CSV, the batch.json of a print bed, or what 'log export' wrote. Rows that the log has are
-    passed over.
+    A table of readings as CSV, the batch.json of a print bed, what 'log export' wrote, or with --specimen the export of
+    an LCR meter: Frequency, Cp, D and the like, with any separator. Rows that the log has are passed over.
     """
     from sensorgen.measure.log import importing
 
     if thesis == bool(path):
         raise BadInput(f"{'both' if path else 'neither'} of FILE and --thesis given; expected one of them")
     named = dict(pairs(columns, "--column"))
+    if specimen is None and (instrument or remark or baked is not None):
+        raise BadInput("--instrument, --baked and --remark are for the export of an LCR meter; expected --specimen too")
     with opened(file, create=True) as log:
-        done = importing.thesis(log) if thesis else importing.import_file(log, Path(str(path)), named)
+        if specimen is not None:
+            how = {"instrument": instrument, "remark": remark}
+            done = importing.lcr_export(log, Path(str(path)), specimen, baked=baked, **how)
+        else:
+            done = importing.thesis(log) if thesis else importing.import_file(log, Path(str(path)), named)
         render.deliver(done, before=[f"import into {log.path}"])
 
 
@@ -245,6 +254,10 @@ table = made(
         ["--column", "columns"], metavar="OURS=THEIRS", multiple=True,
         help="Which column is which, as y='Resistance in Y': specimen, y, z, remark, baked, measured_at.",
     ),
+    click.Option(["--specimen"], metavar="NAME", help="The file is an LCR meter's export of this specimen."),
+    click.Option(["--instrument"], metavar="NAME", default="", help="That meter, as 'HP 4284A'."),
+    click.Option(["--baked/--unbaked"], default=None, help="Whether that specimen was baked before."),
+    click.Option(["--remark"], metavar="TEXT", default="", help="Anything worth knowing of that specimen."),
     where(),
     *render.options("json", "markdown"),
 )  # fmt: skip
