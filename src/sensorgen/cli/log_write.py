@@ -39,11 +39,12 @@ def _add(
     """
     from dataclasses import replace
 
+    from sensorgen.measure.immittance import parse
     from sensorgen.measure.log import Reading, binding, files, notes
 
     if visa and (y_words or z_words):
         raise BadInput("--visa beside --y or --z; expected the meter's readings or words, not both")
-    typed = {name: texts for name, texts in ac.items() if texts}
+    typed = {name: texts for name, texts in ac.items() if texts and [parse(name, text) for text in texts]}
     if not (y_words.strip() or z_words.strip() or remark or visa or typed or defects or photo):
         raise BadInput("nothing to log; expected --y, --z, --C or another quantity, --visa, --defect or --remark")
     if design:
@@ -52,12 +53,13 @@ def _add(
                 render.say(f"{specimen}: design {getattr(bound, 'design', '')}", err=bool(render.form()))
     with nullcontext() if file and not Path(file).exists() else existing(file) as known:
         notes.specimen(specimen, known)  # a wrong name is refused before anybody measures, and before a log is made
+    if predict:
+        with opened(file, create=True) as log:
+            _predict_ahead(log, specimen)
     if visa:
         y_words, z_words, instrument = _measured(visa, axis, wires or "2")
     mega = _asked_mega(y=y_words, z=z_words)
     with opened(file, create=True) as log:
-        if predict:
-            _predict_ahead(log, specimen)
         row = notes.reading(
             specimen, y_words, z_words, mega=mega, supersedes=_uid(log, Reading, corrects), baked=baked, remark=remark,
             measured_at=measured_at, instrument=instrument, source=visa or "typed", log=log,
