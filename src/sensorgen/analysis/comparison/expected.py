@@ -69,8 +69,13 @@ class Predicted:
 
     @cached_property
     def touches(self) -> bool:
-        """Whether the electrodes touch as drawn, so that the film is a short by design."""
-        return (self.prediction.drawn or self.prediction).status == "short"
+        """Whether the electrodes touch as printed, so that the film is a short by design."""
+        return self.prediction.status == "short"
+
+    @property
+    def parted(self) -> bool:
+        """Whether the electrodes touch as drawn, but have a gap as printed."""
+        return self.prediction.drawn is not None and self.prediction.drawn.status == "short" and not self.touches
 
     @property
     def reason(self) -> str:

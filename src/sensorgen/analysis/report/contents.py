@@ -9,7 +9,7 @@ from sensorgen.analysis.comparison import Comparison, of_iteration
 from sensorgen.analysis.comparison.runs import Run, runs
 from sensorgen.analysis.comparison.specimens import known_iterations
 from sensorgen.analysis.plots.figure import Figure
-from sensorgen.analysis.report import electrodes, explained, recordings, variants, yields
+from sensorgen.analysis.report import direction, electrodes, explained, recordings, variants, yields
 from sensorgen.analysis.report.provenance import origins
 from sensorgen.analysis.report.variants import Variant
 from sensorgen.core.document import Column, Table
@@ -134,7 +134,7 @@ def report(
     explanations = explained.explanations(found, recorded)
     impedances = recordings.impedances(recorded, found) if recorded else None
     verdicts = (*yields.headline(found),) if found.rows else ()
-    shorts = (*yields.findings(found),) if found.rows else ()
+    shorts = (*yields.findings(found), *direction.findings(found)) if found.rows else ()
     headline = (*electrodes.headline(found), *verdicts)
     findings = (*shorts, *explained.sentences(explanations), *electrodes.findings(found))
     step("variants")
@@ -155,7 +155,8 @@ def _sections(
     tables = (*([electrodes.readings(found)] if found.rows else ()), *([impedances] if impedances else ()))
     yield Section("measured", "Measured and predicted", figures, tables, electrodes.NOTES if found.rows else ())
     if found.rows:
-        tables = (*([yields.table(found)] if len(found.last) > 1 else ()), electrodes.reasons(found))
+        grouped = (yields.table(found) if len(found.last) > 1 else None, direction.table(found))
+        tables = (*filter(None, grouped), electrodes.reasons(found))
         yield Section("verdicts", "Verdicts and yield", yields.figures(found), tables, yields.notes(found))
     if explanations:
         tables, title = (explained.table(explanations),), "Which parameter explains the residuals"

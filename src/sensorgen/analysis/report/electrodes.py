@@ -138,7 +138,7 @@ def findings(found: Comparison) -> Iterator[str]:
     touching = Counter(r.predicted.design for r in found.rows if r.predicted and r.predicted.touches)
     if touching:
         names = ", ".join(f"{name} ({count})" for name, count in sorted(touching.items()))
-        yield f"Shorted by design, the electrodes touch as drawn: {names}; {touching.total()} readings."
+        yield f"Shorted by design, the electrodes touch as printed: {names}; {touching.total()} readings."
 
 
 def figures(found: Comparison) -> tuple[Figure, ...]:
