@@ -86,15 +86,19 @@ class Comparison:
     @cached_property
     def last(self) -> Lazy[Compared]:
         """The last DC reading of each specimen: a yield counts specimens, however often one was measured."""
+        return self.direct.at({row.reading.specimen: k for k, row in enumerate(self.direct)}.values())
+
+    @cached_property
+    def direct(self) -> Lazy[Compared]:
+        """Rows but those with AC quantities alone."""
         ac = {reading.number for reading in self.alternating if not reading.y_ohm and not reading.z_ohm}
-        found = {row.reading.specimen: k for k, row in enumerate(self.rows) if row.reading.number not in ac}
-        return self.rows.at(found.values())
+        return self.rows.where(lambda row: row.reading.number not in ac) if ac else self.rows
 
     @cached_property
     def by_bake(self) -> Lazy[Compared]:
         """The last reading of each specimen before the bake, after it, and where that is not known."""
-        found = {(row.reading.specimen, row.reading.words.baked): k for k, row in enumerate(self.rows)}
-        return self.rows.at(found.values())
+        found = {(row.reading.specimen, row.reading.words.baked): k for k, row in enumerate(self.direct)}
+        return self.direct.at(found.values())
 
 
 def of_iteration(

@@ -93,7 +93,7 @@ def rank_p(one: Sequence[float], other: Sequence[float]) -> float:
     count, total = len(one), len(one) + len(other)
     if comb(total, count) > _ORDERS:
         return float(mannwhitneyu(one, other, method="asymptotic").pvalue)
-    ranks = rankdata([*one, *other]).tolist()
+    ranks: list[float] = rankdata([*one, *other]).tolist()
     seen, sums = sum(ranks[:count]), [sum(some) for some in combinations(ranks, count)]  # of halves: exact
-    tail = min(sum(value <= seen for value in sums), sum(value >= seen for value in sums))
+    tail: int = min(sum(value <= seen for value in sums), sum(value >= seen for value in sums))
     return min(1.0, 2 * tail / len(sums))

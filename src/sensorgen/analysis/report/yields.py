@@ -147,7 +147,7 @@ def notes(found: Comparison) -> tuple[str, ...]:
     )
     if len(found.last) == 1:
         return (how,)
-    earlier = len(found.rows) - len(found.last)
+    earlier = len(found.direct) - len(found.last)
     more = f"; {earlier} earlier readings are not counted" if earlier else ""
     return (
         how,
