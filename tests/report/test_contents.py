@@ -115,6 +115,18 @@ def test_whether_groups_differ_is_asked_of_what_has_a_gap(of_thesis, by_hand):
         assert "no significant difference" in said_so
 
 
+def test_what_leaks_at_dc_is_judged_by_frequency_too(of_thesis, by_hand):
+    """By hand with some 61 pF of triangles, 203 pF of squares with 0.1 mm: beyond 26 and 8 kohm at 99.7 kHz."""
+    said_so = next(text for text in of_thesis.findings if "films that leak at DC" in text)
+    leaking, capacitors = 0, 0
+    for y, z, name in by_hand:
+        if not math.isnan(y + z) and has_gap(name) and z > 2 * y:
+            leaking += 1
+            capacitors += z > 1 / (2 * math.pi * 99.7e3 * (61e-12 if "tri" in name else 203e-12))
+    assert f"{capacitors} of {leaking} films that leak" in said_so
+    assert capacitors == 5
+
+
 def test_triangles_along_the_length_have_less_resistance(of_thesis, by_hand):
     """Ten prints without a film: each triX above each triY, which chance does in 2 of 252 orders."""
     x, y = (
@@ -368,7 +380,7 @@ def test_one_reading_makes_a_short_report(tmp_path):
         made = report(log, 40)
     assert made.headline[0].startswith("Electrode resistance of 40 triX .1mm: measured 700 ohm, predicted ")
     assert made.headline[1] == "Verdict of 40 triX .1mm: intact."
-    assert [t.key for t in made.tables] == ["readings", "verdicts", "identifiability", "provenance"]
+    assert [t.key for t in made.tables] == ["readings", "verdicts", "provenance"]
     assert written(made, "md").count("\n| ") < 20
 
 

@@ -13,6 +13,7 @@ from sensorgen.core.units import frequency_text
 from sensorgen.measure import accuracy
 from sensorgen.measure.immittance import impedance
 from sensorgen.measure.log import Reading
+from sensorgen.prediction.query import TONES_HZ
 
 _F_PER_PF = 1e-12
 NOTE = (
@@ -162,7 +163,7 @@ def headline(made: Sequence[AcRow]) -> Iterator[str]:
     lowest = min({row.frequency_hz for row in known}, key=lambda f: (-sum(r.frequency_hz == f for r in known), f))
     here = [row for row in known if row.frequency_hz == lowest]
     inside = sum(row.c_from_pf <= row.c_pf <= row.c_to_pf for row in here)  # type: ignore[operator]
-    at = frequency_text(lowest)
+    at = at_text(lowest)
     if len(here) == 1:
         row = here[0]
         error = f" ± {row.c_error_pf:.2g}" if isfinite(row.c_error_pf) else ""
@@ -177,6 +178,15 @@ def headline(made: Sequence[AcRow]) -> Iterator[str]:
         f"Capacitance at {at}: measured {median(row.c_ratio for row in here):.3g} times the prediction as printed "
         f"(median of {len(here)} readings of {specimens} specimens; {inside} within its range)."
     )
+
+
+def at_text(frequency_hz: float) -> str:
+    """Frequency for people.
+
+    >>> at_text(3.000000000000001e6), at_text(10100.0)
+    ('3MHz', '10.1kHz')
+    """
+    return frequency_text(float(f"{frequency_hz:.4g}"))
 
 
 def findings(made: Sequence[AcRow]) -> Iterator[str]:
@@ -206,11 +216,26 @@ def capacitor_from(verdicts: dict[float, str]) -> str:
     while start and verdicts[rising[start - 1]] == "capacitor":
         start -= 1
     if start == len(rising):
-        return f"no capacitor up to {frequency_text(rising[-1])}"
+        return f"no capacitor up to {at_text(rising[-1])}"
     if start == 0:
-        span = frequency_text(rising[0]) + (f" to {frequency_text(rising[-1])}" if len(rising) > 1 else "")
+        span = at_text(rising[0]) + (f" to {at_text(rising[-1])}" if len(rising) > 1 else "")
         return f"a capacitor at {span}"
-    return f"a capacitor from {frequency_text(rising[start])} on"
+    return f"a capacitor from {at_text(rising[start])} on"
+
+
+def behind_leak(found: Comparison) -> Iterator[str]:
+    """Above which frequency a film that leaks at DC is a capacitor, if it has the predicted capacitance."""
+    corners = [
+        row.verdict.leak_s / (2 * pi * c.value) for row in found.last
+        if row.verdict.film == "leak" and row.predicted and (c := row.predicted.prediction.capacitance)
+        and isfinite(row.verdict.leak_s)
+    ]  # fmt: skip
+    if corners:
+        within = sum(corner <= TONES_HZ[-1] for corner in corners)
+        yield (
+            f"By frequency: {within} of {len(corners)} films that leak at DC should be capacitors at "
+            f"{at_text(TONES_HZ[-1])} with the predicted capacitance, the best from {at_text(min(corners))} on."
+        )
 
 
 def figures(made: Sequence[AcRow]) -> Iterator[Figure]:

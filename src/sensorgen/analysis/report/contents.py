@@ -138,16 +138,30 @@ def report(
     shorts = (*yields.findings(found), *direction.findings(found)) if found.direct else ()
     ac = alternating.rows(found)
     headline = (*electrodes.headline(found), *verdicts, *alternating.headline(ac))
-    by_frequency = (*alternating.findings(ac), *recordings.findings(recorded, impedances))
+    by_frequency = (
+        *alternating.findings(ac),
+        *alternating.behind_leak(found),
+        *recordings.findings(recorded, impedances),
+    )
     findings = (*shorts, *by_frequency, *explained.sentences(explanations), *electrodes.findings(found))
     step("variants")
     sections = list(_sections(log, found, recorded, explanations, impedances, ac, left_out))
     step("page")
     return Report(
         iteration, specimens, datetime.now(UTC).isoformat(timespec="seconds"),
-        (*headline, *recordings.headline(impedances)), findings,
+        (*headline, *recordings.headline(impedances), *_basis(found, recorded)), findings,
         tuple(s for s in sections if s.tables or s.figures or s.variants),
     )  # fmt: skip
+
+
+def _basis(found: Comparison, recorded: Sequence[Run]) -> Iterator[str]:
+    """What was measured, in one sentence; none of a single reading."""
+    specimens = {row.reading.specimen for row in found.rows} | {run.entry.specimen for run in recorded}
+    if len(found.rows) + len(recorded) > 1:
+        yield (
+            f"Basis: {len(found.rows)} readings and {len(recorded)} recordings of {len(specimens)} specimens of "
+            f"{len(found.predictions)} designs."
+        )
 
 
 def _sections(

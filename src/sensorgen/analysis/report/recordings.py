@@ -11,11 +11,11 @@ from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.comparison.runs import Run
 from sensorgen.analysis.plots import recordings as plots
 from sensorgen.analysis.plots.figure import BLUE, ORANGE, Axis, Curve, Figure, Panel
-from sensorgen.analysis.report.alternating import capacitor_from, verdict
+from sensorgen.analysis.report.alternating import at_text, capacitor_from, verdict
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import Cell, Column, Table
 from sensorgen.core.errors import SensorgenError
-from sensorgen.core.units import frequency_text, si
+from sensorgen.core.units import si
 
 _SAME = 1e-6  # relative: frequencies nearer than this are the same
 _F_PER_PF = 1e-12
@@ -123,7 +123,7 @@ def findings(recorded: Sequence[Run], table: Table | None) -> Iterator[str]:
     for run in recorded:
         mine = [row for row in rows if row.recording == run.name]
         verdicts = {row.frequency_hz: row.verdict for row in mine}
-        negative = [frequency_text(f) for f, word in verdicts.items() if word == "negative resistance"]
+        negative = [at_text(f) for f, word in verdicts.items() if word == "negative resistance"]
         if negative:
             at = ", ".join(negative)
             yield f"Flagged: {run.name} has a negative resistance at {at}: check the bridge's calibration."
@@ -133,7 +133,7 @@ def findings(recorded: Sequence[Run], table: Table | None) -> Iterator[str]:
         c = f", C {low.c_pf:.4g} pF" if low.c_pf > 0 else ""
         yield (
             f"{run.name}, nothing pressed: |Z| {si(hypot(low.r_ohm, low.x_ohm), 'ohm')} at "
-            f"{frequency_text(low.frequency_hz)}{c}; noise of a sample {low.noise_percent:.2g} % of |Z|; "
+            f"{at_text(low.frequency_hz)}{c}; noise of a sample {low.noise_percent:.2g} % of |Z|; "
             f"{capacitor_from(verdicts)}."
         )
 

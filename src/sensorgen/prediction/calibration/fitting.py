@@ -188,9 +188,7 @@ def _descended(
     return at, information
 
 
-def _components(
-    model: SpecimenModel, data: Data, at: Real, before: tuple[Real, Real], usual: Real
-) -> Real:
+def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, Real], usual: Real) -> Real:
     """Most probable standard deviations from press to press, the parameters integrated out where they enter linearly."""
     from scipy.optimize import minimize
 
@@ -211,7 +209,9 @@ def _components(
         information = fixed + np.einsum("nia,nib->ab", by, by)
         gradient = pull + np.einsum("nia,ni->a", by, white)
         logs = -2 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum() + np.linalg.slogdet(information)[1]
-        return float(logs + (white**2).sum() - gradient @ np.linalg.solve(information, gradient) + ln @ ln / _LN_SPREAD**2)
+        return float(
+            logs + (white**2).sum() - gradient @ np.linalg.solve(information, gradient) + ln @ ln / _LN_SPREAD**2
+        )
 
     count = len(usual)
     simplex = np.vstack([np.zeros(count), np.eye(count)])

@@ -120,10 +120,10 @@ class Inverter:
         coarse = np.linspace(0, 1, _COARSE[0]) ** 2 * force_limit_n, np.linspace(0, self._length, _COARSE[1])
         mean, covariance = _readings(model, posterior, *coarse)
         self.force_n, self.position_m = _grid(coarse, mean, covariance)
-        self._means, self._covariances = (_refined(coarse, (self.force_n, self.position_m), v) for v in (mean, covariance))
-        self._mean = parts(
-            model.ratio(posterior.at, _of(posterior, *_pairs(self.force_n, self.position_m)))
+        self._means, self._covariances = (
+            _refined(coarse, (self.force_n, self.position_m), v) for v in (mean, covariance)
         )
+        self._mean = parts(model.ratio(posterior.at, _of(posterior, *_pairs(self.force_n, self.position_m))))
         self._weight = np.log(_steps(self.force_n)[:, None] * _steps(self.position_m)).ravel()
         for axis, normal in enumerate(() if prior is None else (prior.force_n, prior.position_m)):
             if normal is not None:
@@ -165,7 +165,9 @@ class Inverter:
         for start in range(0, len(rows), _BLOCK):
             some = rows[start : start + _BLOCK]
             values = self._block(parts(ratio[some][:, tones]), tones)
-            for name, value in zip(("force_n", "position_m", "force_90_n", "position_90_m", "chi2"), values, strict=True):
+            for name, value in zip(
+                ("force_n", "position_m", "force_90_n", "position_90_m", "chi2"), values, strict=True
+            ):
                 getattr(found, name)[some] = value
             found.tones[some] = tones.sum()
 
@@ -209,9 +211,7 @@ class Inverter:
             root = np.linalg.inv(np.linalg.cholesky(covariance))
             ln = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(1) + self._weight
             mean = np.einsum("gij,gj->gi", root, self._mean[:, kept])
-            self._tables[key] = _Table(
-                root.reshape(-1, len(kept)).astype(np.float32), mean.astype(np.float32), ln
-            )
+            self._tables[key] = _Table(root.reshape(-1, len(kept)).astype(np.float32), mean.astype(np.float32), ln)
         return self._tables[key]
 
     def _judged(self, found: Found, stale: Mask) -> Found:
