@@ -6,6 +6,7 @@ independent solvers (tests/reference), and the elastomer remembers: it creeps, a
 
 import json
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +18,16 @@ PIECES = 120
 AGE_S = 5.0  # of the rest reading before a press
 
 
-def _curve(name):
-    found = json.loads((REFERENCE / "contact.json").read_text())[name]
-    return np.array(found["p_kPa"]) * 1e3, np.array(found["C_pF_per_m"]) / found["C_pF_per_m"][0] - 1
+@cache
+def _curve(film_mm, boundary):
+    """Pressure [Pa] and relative rise of C; with other boundary conditions from the runs that varied them."""
+    found = json.loads((REFERENCE / "contact.json").read_text())
+    usual = found[f"tri_d{film_mm:g}"]
+    c = found["variants_L1_k60_error_about_1pc"][f"{boundary}_d{film_mm:g}"]["C"] if boundary else usual["C_pF_per_m"]
+    return np.array(usual["p_kPa"]) * 1e3, np.array(c) / c[0] - 1
 
 
+@cache
 def _capacitance_f_per_m(film_mm):
     cells = json.loads((REFERENCE / "cells.json").read_text())["tri"]
     per_period = next(cell["C_F_per_m"] for cell in cells if cell["d"] == film_mm)
@@ -53,6 +59,7 @@ class Truth:
     noise_by_tone: tuple[float, ...] = (1.0,) * 7
     tip_m: float = 5e-3
     film_mm: float = 0.2
+    boundary: str = ""  # of the solver's runs, as "free" or "stick"
     rest_averages: int = 10
 
     def impedance(self, force_n, place_m, peak_n=None, hold_s=None, ln_c=0.0, ln_r=0.0, frequency_hz=TONES_HZ):
@@ -83,7 +90,7 @@ class Truth:
 
     def rise(self, pressure_pa, force_n, peak_n, hold_s):
         """By how much the capacitance under the tip is above its own at rest."""
-        knots, values = _curve(f"tri_d{self.film_mm:g}")
+        knots, values = _curve(self.film_mm, self.boundary)
         p = pressure_pa * np.exp(-self.stiffness)
         slope = (values[-1] - values[-3]) / (knots[-1] - knots[-3])
         found = np.interp(p, knots, values) + np.maximum(p - knots[-1], 0) * slope
@@ -180,3 +187,54 @@ def drawn(seed, scale=1.0, **fixed):
         clock_s=float(normal(0.05)),
     )  # fmt: skip
     return replace(made, **fixed)
+
+
+def recorded(truth, folder, count=30, seed=1, force_n=(0.3, 6.0), rate_hz=20.0, name="run"):
+    """A run of random presses as the bench would write it: ``NAME-lcr.csv`` and ``NAME-rig.csv``; returns them."""
+    rng = np.random.default_rng(seed)
+    shares = (np.stack([rng.permutation(count) for _ in range(3)]) + rng.random((3, count))) / count
+    force = force_n[0] + (force_n[1] - force_n[0]) * shares[0]
+    place = truth.tip_m / 2 + (LENGTH_M - truth.tip_m) * shares[1]
+    back = rng.permutation(count) < count // 2
+    peak = np.where(back, force + (1.1 * force_n[1] - force) * rng.random(count), force)
+    hold = 1.6 * 5 ** shares[2]
+    times, sets, places, peaks, holds = [], [], [], [], []
+    now = 0.0
+    for f, x, p, h in zip(force, place, peak, hold, strict=True):
+        for span, start, end, high, held in (
+            (5.0, 0.0, 0.0, 0.0, False), (0.3, 0.0, p, None, False), (0.3, p, f, p, False), (h, f, f, p, True),
+            (0.3, f, 0.0, p, False),
+        ):  # fmt: skip
+            n = max(int(round(span * rate_hz)), 1)
+            t = np.arange(n) / rate_hz
+            values = start + (end - start) * t / span
+            times.append(now + t)
+            sets.append(values)
+            places.append(np.full(n, x))
+            peaks.append(values if high is None else np.full(n, high))
+            holds.append(t + 0.1 if held else np.full(n, 0.1))
+            now += n / rate_hz
+    time, force, place, peak, hold = (np.concatenate(v) for v in (times, sets, places, peaks, holds))
+    steps = _walk(time, truth, rng), _walk(time, truth, rng)
+    felt = np.where(force > 0, np.maximum(force + truth.force_offset_n, 0), 0)
+    z = truth.impedance(
+        felt, np.clip(place + truth.place_offset_m, 0, LENGTH_M), np.maximum(peak, felt), hold, steps[0], steps[1]
+    )
+    sigma = truth.noise * np.array(truth.noise_by_tone)
+    white = rng.standard_normal((2, *z.shape))
+    z = z + np.abs(z) * sigma * (white[0] + 1j * white[1])
+    lcr, rig = folder / f"{name}-lcr.csv", folder / f"{name}-rig.csv"
+    write_csv(lcr, time, z, TONES_HZ)
+    head = "time_s,set_force_n,set_position_mm,force_n"
+    np.savetxt(
+        rig, np.column_stack([time + truth.clock_s, force, place * 1e3, force]), "%.9g", ",", header=head, comments=""
+    )
+    return lcr, rig
+
+
+def write_csv(path, time_s, impedance_ohm, frequency_hz, **more):
+    """Readings as a table: time, two columns per tone, and more columns."""
+    names = [f"{part}_ohm_{f / 1e3:g}kHz" for f in frequency_hz for part in ("re", "im")]
+    both = np.stack([impedance_ohm.real, impedance_ohm.imag], -1).reshape(len(time_s), -1)
+    table = np.column_stack([time_s, both, *more.values()])
+    np.savetxt(path, table, "%.9g", ",", header=",".join(["time_s", *names, *more]), comments="")

@@ -207,6 +207,22 @@ class Prediction(Entry):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Calibration(_OfSpecimen):
+    """Calibration of a specimen.
+
+    Attributes
+    ----------
+    version : str
+        Version of sensorgen.
+    data : str
+        The calibration as JSON.
+    """
+
+    version: str
+    data: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Batch(Entry):
     """A print bed.
 
@@ -339,7 +355,7 @@ class Migration(Entry):
 
 KINDS: dict[str, type[Entry]] = {
     "raw_file": RawFile, "batch": Batch, "print": Print, "reading": Reading, "bench_run": BenchRun,
-    "prediction": Prediction, "design": DesignRow, "withdrawal": Withdrawal,
+    "prediction": Prediction, "calibration": Calibration, "design": DesignRow, "withdrawal": Withdrawal,
     "anchor": Anchor, "merge": Merge, "migration": Migration,
 }  # fmt: skip
 VERSIONS = {"reading": 2, "print": 2}  # of the schemas of kinds that have changed; 1 of every other

@@ -1,6 +1,7 @@
 """Calibration: posterior of a specimen's parameters, and of what changes from press to press."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -188,7 +189,9 @@ def _descended(
     return at, information
 
 
-def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, Real], usual: Real) -> Real:
+def _components(
+    model: SpecimenModel, data: Data, at: Real, before: tuple[Real, Real], usual: Real
+) -> Real:
     """Most probable standard deviations from press to press, the parameters integrated out where they enter linearly."""
     from scipy.optimize import minimize
 
@@ -209,9 +212,7 @@ def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, 
         information = fixed + np.einsum("nia,nib->ab", by, by)
         gradient = pull + np.einsum("nia,ni->a", by, white)
         logs = -2 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum() + np.linalg.slogdet(information)[1]
-        return float(
-            logs + (white**2).sum() - gradient @ np.linalg.solve(information, gradient) + ln @ ln / _LN_SPREAD**2
-        )
+        return float(logs + (white**2).sum() - gradient @ np.linalg.solve(information, gradient) + ln @ ln / _LN_SPREAD**2)
 
     count = len(usual)
     simplex = np.vstack([np.zeros(count), np.eye(count)])
@@ -219,3 +220,51 @@ def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, 
         cost, simplex[0], method="Nelder-Mead", options={"xatol": 0.05, "fatol": 0.02, "initial_simplex": simplex}
     )
     return np.asarray(usual * np.exp(found.x))
+
+
+def gain(model: SpecimenModel, data: Data, at: Real) -> Complex:
+    """Most probable ln of each tone's gain (m,), phase as imaginary part, given the other parameters."""
+    m, sd = len(data.rest), model.spread.gain
+    own = sd**2 / 2 * np.kron(np.eye(2), np.eye(m) + np.ones((m, m)))
+    left = parts(data.rest - model.rest(at))
+    found = own @ np.linalg.solve(_rest_covariance(model, data), left)
+    return np.asarray(found[:m] + 1j * found[m:])
+
+
+def shared(models: Sequence[SpecimenModel], posteriors: Sequence[Posterior], names: Sequence[str]) -> list[Posterior]:
+    """Posteriors of specimens that have some parameters in common, from those of each alone.
+
+    What each says of them, beyond the prior, is added up; its other parameters follow by their correlation.
+
+    Parameters
+    ----------
+    models : sequence of SpecimenModel
+        Of the specimens.
+    posteriors : sequence of Posterior
+        Of each alone, all from the same prior.
+    names : sequence of str
+        Parameters in common.
+    """
+    which = [models[0].names.index(name) for name in names]
+    information, pull = np.eye(len(which)), np.zeros(len(which))
+    for p in posteriors:
+        own = np.linalg.inv(p.covariance[np.ix_(which, which)])
+        information, pull = information + own - np.eye(len(which)), pull + own @ p.at[which]
+    covariance = np.linalg.inv(information)
+    mean = covariance @ pull
+    found = []
+    for p in posteriors:
+        by = p.covariance[:, which] @ np.linalg.inv(p.covariance[np.ix_(which, which)])
+        spread = p.covariance + by @ (covariance - p.covariance[np.ix_(which, which)]) @ by.T
+        found.append(replace(p, at=p.at + by @ (mean - p.at[which]), covariance=spread))
+    return found
+
+
+def widened(model: SpecimenModel, posterior: Posterior) -> Posterior:
+    """A posterior that no longer knows how the film yields under the tip, nor where that is: another tip, or day."""
+    kept = [k for k, name in enumerate(model.names) if not name.startswith(("rise", "force", "position"))]
+    loose = np.setdiff1d(np.arange(len(model.names)), kept)
+    covariance = posterior.covariance.copy()
+    covariance[loose] = covariance[:, loose] = 0.0
+    covariance[loose, loose] = 1.0
+    return replace(posterior, covariance=covariance, presses=posterior.presses)

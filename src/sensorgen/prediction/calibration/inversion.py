@@ -4,6 +4,7 @@ The posterior over force and position is worked out on a grid as fine as the rea
 at each of its points the expected ratio and the covariance of readings about it are known beforehand.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
@@ -24,7 +25,7 @@ STALE_S = 15.0  # age of a rest reading from which on it no longer stands for th
 _COARSE = 20, 16  # forces and positions at which covariances are worked out
 _MOST = 128, 96  # forces and positions of the grid
 _LEAST = 40, 32
-_BLOCK = 64  # readings at a time
+_BLOCK = 128  # readings at a time
 _FEW_TONES = 2
 
 
@@ -120,10 +121,10 @@ class Inverter:
         coarse = np.linspace(0, 1, _COARSE[0]) ** 2 * force_limit_n, np.linspace(0, self._length, _COARSE[1])
         mean, covariance = _readings(model, posterior, *coarse)
         self.force_n, self.position_m = _grid(coarse, mean, covariance)
-        self._means, self._covariances = (
-            _refined(coarse, (self.force_n, self.position_m), v) for v in (mean, covariance)
+        self._means, self._covariances = (_refined(coarse, (self.force_n, self.position_m), v) for v in (mean, covariance))
+        self._mean = parts(
+            model.ratio(posterior.at, _of(posterior, *_pairs(self.force_n, self.position_m)))
         )
-        self._mean = parts(model.ratio(posterior.at, _of(posterior, *_pairs(self.force_n, self.position_m))))
         self._weight = np.log(_steps(self.force_n)[:, None] * _steps(self.position_m)).ravel()
         for axis, normal in enumerate(() if prior is None else (prior.force_n, prior.position_m)):
             if normal is not None:
@@ -150,7 +151,7 @@ class Inverter:
         if ratio.ndim != 2 or ratio.shape[1] != m:
             raise BadInput(f"readings of shape {ratio.shape}; expected (n, {m}), a column for each calibrated tone")
         measured = np.isfinite(ratio)
-        found = _nothing(len(ratio))
+        found = nothing(len(ratio))
         for pattern in np.unique(measured, axis=0):
             rows = np.flatnonzero((measured == pattern).all(axis=1))
             if pattern.sum() >= _FEW_TONES:
@@ -162,22 +163,27 @@ class Inverter:
         return self._judged(found, stale)
 
     def _put(self, found: Found, rows: NDArray[np.intp], ratio: Complex, tones: Mask) -> None:
-        for start in range(0, len(rows), _BLOCK):
-            some = rows[start : start + _BLOCK]
-            values = self._block(parts(ratio[some][:, tones]), tones)
-            for name, value in zip(
-                ("force_n", "position_m", "force_90_n", "position_90_m", "chi2"), values, strict=True
-            ):
+        table = self._table(tones)
+
+        def block(some: NDArray[np.intp]) -> None:
+            values = self._block(parts(ratio[some][:, tones]), table)
+            for name, value in zip(("force_n", "position_m", "force_90_n", "position_90_m", "chi2"), values, strict=True):
                 getattr(found, name)[some] = value
             found.tones[some] = tones.sum()
 
+        blocks = [rows[start : start + _BLOCK] for start in range(0, len(rows), _BLOCK)]
+        if len(blocks) == 1:
+            return block(rows)
+        with ThreadPoolExecutor(2) as pool:
+            list(pool.map(block, blocks))
+
     def _without_one(self, found: Found, rows: NDArray[np.intp], ratio: Complex, measured: Mask) -> None:
         """Of readings that no press explains, leave out the tone whose absence explains the most."""
-        best = _nothing(len(rows))
+        best = nothing(len(rows))
         for tone in range(ratio.shape[1]):
             left = measured[rows].copy()
             left[:, tone] = False
-            trial = _nothing(len(rows))
+            trial = nothing(len(rows))
             for pattern in np.unique(left, axis=0):
                 if pattern.sum() >= max(_FEW_TONES, ratio.shape[1] // 2):
                     self._put(trial, np.flatnonzero((left == pattern).all(axis=1)), ratio[rows], pattern)
@@ -188,8 +194,7 @@ class Inverter:
         for name, value in vars(best).items():
             getattr(found, name)[rows[good]] = value[good]
 
-    def _block(self, reading: Real, tones: Mask) -> tuple[Real, ...]:
-        table = self._table(tones)
+    def _block(self, reading: Real, table: _Table) -> tuple[Real, ...]:
         k = reading.shape[1]
         white = (table.root @ reading.T.astype(np.float32)).reshape(-1, k, len(reading))
         white -= table.mean[:, :, None]
@@ -211,7 +216,9 @@ class Inverter:
             root = np.linalg.inv(np.linalg.cholesky(covariance))
             ln = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(1) + self._weight
             mean = np.einsum("gij,gj->gi", root, self._mean[:, kept])
-            self._tables[key] = _Table(root.reshape(-1, len(kept)).astype(np.float32), mean.astype(np.float32), ln)
+            self._tables[key] = _Table(
+                root.reshape(-1, len(kept)).astype(np.float32), mean.astype(np.float32), ln
+            )
         return self._tables[key]
 
     def _judged(self, found: Found, stale: Mask) -> Found:
@@ -229,7 +236,8 @@ class Inverter:
         return found
 
 
-def _nothing(n: int) -> Found:
+def nothing(n: int) -> Found:
+    """Results of readings in which nothing was found yet."""
     def nan(*shape: int) -> Real:
         return np.full(shape, np.nan)
 
@@ -283,7 +291,7 @@ def _grid(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> tuple[Real
         passed = np.concatenate([[0.0], np.cumsum((per_step[1:] + per_step[:-1]) / 2 * np.diff(at))])
         passed = passed / passed[-1] + np.linspace(0, 0.5, len(at))  # some everywhere
         steps = float(np.sum((per_step[1:] + per_step[:-1]) / 2 * np.diff(at)))
-        count = int(np.clip(1.5 * steps, _LEAST[axis], _MOST[axis]))
+        count = int(np.clip(steps, _LEAST[axis], _MOST[axis]))
         found.append(np.interp(np.linspace(0, passed[-1], count), passed, at))
     return found[0], found[1]
 

@@ -160,6 +160,14 @@ class SpecimenModel:
         distance = np.subtract.outer(np.log(FORCES_N), np.log(FORCES_N))
         return np.linalg.cholesky(np.exp(-(distance**2) / 2) + 1e-6 * np.eye(len(FORCES_N)))
 
+    def law_weights(self) -> Real:
+        """Ln of the factor on the rise at each of ``FORCES_N``, per standard deviation of each parameter (k, p)."""
+        found = np.zeros((len(FORCES_N), len(self.names)))
+        common = self._at["rise"]
+        found[:, common] = self.spread.law
+        found[:, common + 1 : common + 1 + len(FORCES_N)] = self.spread.law_shape * self._shapes
+        return found
+
     def rest(self, at: Real) -> Complex:
         """Ln of the impedance that the bench reads with nothing on the sensor, without its gain.
 
@@ -215,9 +223,7 @@ class SpecimenModel:
         omega = 2 * np.pi * self.frequency_hz
         per_m = (sensor.capacitance_f_per_m * np.exp(spread.capacitance * value["capacitance"] + c))[..., None]
         exponent = spread.dispersion * np.exp(value["dispersion"] - 0.5)[..., None]
-        leak = (
-            sensor.leak_s_per_m + spread.leak * np.exp(spread.leak_spread * value["leak"])[..., None] * omega[0] * per_m
-        )
+        leak = sensor.leak_s_per_m + spread.leak * np.exp(spread.leak_spread * value["leak"])[..., None] * omega[0] * per_m
         film = 1j * omega * (omega / omega[0]) ** -exponent * np.exp(-0.5j * np.pi * exponent)
         loose = leak + (film + sensor.tan_delta * omega) * per_m
         pressed = leak + (film + sensor.tan_delta * omega) * per_m * lifted[..., None]
