@@ -38,7 +38,7 @@ def _capacitance_f_per_m(film_mm):
 class Truth:
     """What a specimen and its bench are; all errors 0 by default."""
 
-    track_ohm_per_m: float = 2 * 0.83 / (0.5e-3 * WIDTH_M)
+    track_ohm_per_m: float = 1 / 1.2 / WIDTH_M * (1 / 3e-4 + 1 / 3.547e-4)  # plain and with cogs
     profile: tuple[float, ...] = ()  # of ln resistivity: amplitudes of half waves along the strip
     capacitance: float = 0.0  # ln of the factor
     law: tuple[float, ...] = ()  # of ln rise: amplitudes of half waves over ln force

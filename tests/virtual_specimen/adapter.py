@@ -11,7 +11,10 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.calibration.fitting import Data
 from sensorgen.prediction.calibration.specimen import Presses
 
-DESIGN = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
+ETPU = "etpu@thesis-3.2"  # 1/1.2 ohm m
+DESIGN = {
+    "shape": "tri", "parameters": {"dielectric_mm": 0.2}, "materials": {"top_electrode": ETPU, "bottom_electrode": ETPU},
+}  # fmt: skip
 LIMIT_N = 6.6
 CLEAN = Truth()
 ERRORS = {  # what is off, as a truth by a seed

@@ -218,7 +218,7 @@ def _perfect(
     with readings(measured) as source, ExitStack() as stack:
         model = sensor_model(body, query)[0]
         limit = one("--force-limit", force_limit_n) if force_limit_n else FORCE_LIMIT_N
-        estimator = Estimator(model.sensor, source.frequency_hz, noise or NOISE, _prior(prior), limit)
+        estimator = Estimator(model.sensor, source.frequency_hz, NOISE if noise is None else noise, _prior(prior), limit)
         summary = answers.Summary(estimator, model.doubts)
         write, live, terminal = _writer(stack, measured, output)
         step = stack.enter_context(show.progress(["reading"]))

@@ -83,20 +83,19 @@ class Calibration:
         scales = {  # unit, what multiplies the exponential, standard deviation of the logarithm
             "resistance": ("ohm", sensor.resistance_ohm(), spread.resistance),
             "capacitance": ("pF", sensor.capacitance_f() * 1e12, spread.capacitance),
-            "rise": ("x predicted", 1.0, spread.law),
-            "leak": ("share", spread.leak, spread.leak_spread),
-            "dispersion": ("exponent", spread.dispersion * exp(-0.5), 1.0),
+            "rise": ("predicted", 1.0, spread.law),
+            "leak": ("", spread.leak, spread.leak_spread),
+            "dispersion": ("", spread.dispersion * exp(-0.5), 1.0),
             "lead": ("ohm", spread.lead_ohm * exp(-0.5), 1.0),
+            "hysteresis": ("%", spread.hysteresis * 100 * exp(-0.5), 1.0),
+            "creep": ("%/decade", spread.creep * 100 * exp(-0.5), 1.0),
             "stray": ("pF", spread.stray_f * 1e12 * exp(-0.5), 1.0),
         }
         straight = {  # unit, mean, standard deviation
             "force offset": ("N", spread.force_offset_n, spread.force_n),
             "position offset": ("mm", 0.0, spread.position_m * 1e3),
-            "hysteresis": ("% of the rise", 0.0, spread.hysteresis * 100),
-            "creep": ("% of the rise per decade", 0.0, spread.creep * 100),
-            "profile 1": ("of ln resistivity", 0.0, spread.profile),
-            "profile 2": ("of ln resistivity", 0.0, spread.profile),
         }
+        straight |= {n: ("", 0.0, spread.profile / int(n[-1])) for n in m.names if n.startswith("profile")}
         for k, name in enumerate(m.names):
             at, sd = float(self.posterior.at[k]), sqrt(self.posterior.covariance[k, k])
             ends = np.array([at, at - _NORMAL_90 * sd, at + _NORMAL_90 * sd, -_NORMAL_90, _NORMAL_90])
@@ -107,7 +106,7 @@ class Calibration:
                 unit, mean, of = straight[name]
                 values = mean + of * ends
             else:
-                unit, values = "x predicted", np.exp(self._rise(k - m.names.index(f"rise at {FORCES_N[0]:g} N")))
+                unit, values = "predicted", np.exp(self._rise(k - m.names.index(f"rise at {FORCES_N[0]:g} N")))
             found.append(Value(name, unit, *values.tolist(), "presses and rest" if sd < _TOLD else "prediction"))
         return found
 

@@ -146,13 +146,15 @@ def covariances(model: SpecimenModel, at: Real, data: Data, components: Real, ve
     found[:, k, k] = np.tile(np.maximum(data.noise, _FLOOR), 2) ** 2
     vectors = model.scatters(at, presses) if vectors is None else vectors
     variance = np.tile(components**2, (len(presses.force_n), 1))
-    variance[:, 0] += np.where(np.isnan(presses.unloading), (_memory(model, at, "hysteresis") * 0.3) ** 2, 0.0)
-    variance[:, 0] += np.where(np.isnan(presses.decades), (_memory(model, at, "creep") * 0.6) ** 2, 0.0)
+    courses = (("hysteresis", presses.unloading), ("creep", presses.decades))
+    for (name, course), (_, sd) in zip(courses, _USUAL, strict=True):
+        variance[:, 0] += np.where(np.isnan(course), (memory(model, at, name) * sd) ** 2, 0.0)
     return found + np.einsum("nik,nk,njk->nij", vectors, variance, vectors)
 
 
-def _memory(model: SpecimenModel, at: Real, name: str) -> float:
-    return float(getattr(model.spread, name) * at[model.names.index(name)])
+def memory(model: SpecimenModel, at: Real, name: str) -> float:
+    """Change of the rise by hysteresis or creep [-]."""
+    return float(getattr(model.spread, name) * np.exp(at[model.names.index(name)] - 0.5))
 
 
 def _descended(

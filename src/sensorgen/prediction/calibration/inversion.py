@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances
+from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances, memory
 from sensorgen.prediction.calibration.specimen import SpecimenModel, parts, unknown
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
 from sensorgen.prediction.inverse.prior import Prior
@@ -33,12 +33,12 @@ class Verdict(IntEnum):
     """The verdict on a reading, the worst that applies."""
 
     OK = 0
-    NOT_CALIBRATED = 1
-    """The interval is what the prediction alone allows."""
-    FORCE_ONLY = 2
+    FORCE_ONLY = 1
     """The position's interval is most of the sensor."""
-    AT_THE_END = 3
+    AT_THE_END = 2
     """The force's interval ends at the largest force that was looked for."""
+    NOT_CALIBRATED = 3
+    """The interval is what the prediction alone allows."""
     STALE_REST = 4
     """The reading at rest is too old."""
     NO_FIT = 5
@@ -52,7 +52,7 @@ class Verdict(IntEnum):
         return _WORDS[self]
 
 
-_WORDS = ("ok", "not calibrated", "force only", "at the end", "stale rest", "no fit", "missing")
+_WORDS = ("ok", "force only", "at the end", "not calibrated", "stale rest", "no fit", "missing")
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,9 +224,9 @@ class Inverter:
     def _judged(self, found: Found, stale: Mask) -> Found:
         wide = np.ptp(found.position_90_m, axis=1) > 0.8 * self._length
         rules = (
-            (Verdict.NOT_CALIBRATED, np.full(len(wide), self._posterior.presses == 0)),
-            (Verdict.FORCE_ONLY, wide & (self._posterior.presses > 0)),
+            (Verdict.FORCE_ONLY, wide),
             (Verdict.AT_THE_END, found.force_90_n[:, 1] > self.force_n[-2]),
+            (Verdict.NOT_CALIBRATED, np.full(len(wide), self._posterior.presses == 0)),
             (Verdict.STALE_REST, stale),
             (Verdict.NO_FIT, found.chi2 > chi2_limit(2 * found.tones - 2)),
             (Verdict.MISSING, found.tones < _FEW_TONES),
@@ -265,16 +265,12 @@ def _readings(model: SpecimenModel, posterior: Posterior, force_n: Real, positio
     presses = _of(posterior, force, position)
     slopes = model.slopes(posterior.at, presses)
     vectors = model.scatters(posterior.at, presses)
-    for name, sd in (("hysteresis", posterior.unloading[1]), ("creep", posterior.decades[1])):
-        pass
     noise = np.tile(posterior.noise, (len(force), 1))
     data = Data(presses, np.zeros_like(noise, complex), noise, np.zeros(noise.shape[1], complex), noise[0])
     components = posterior.components.copy()
-    memory = [
-        getattr(model.spread, name) * posterior.at[model.names.index(name)] * sd
-        for name, sd in (("hysteresis", posterior.unloading[1]), ("creep", posterior.decades[1]))
-    ]
-    components[0] = np.sqrt(components[0] ** 2 + memory[0] ** 2 + memory[1] ** 2)
+    courses = (("hysteresis", posterior.unloading[1]), ("creep", posterior.decades[1]))
+    unknown_course = [memory(model, posterior.at, name) * sd for name, sd in courses]
+    components[0] = np.sqrt(components[0] ** 2 + np.sum(np.square(unknown_course)))
     own = covariances(model, posterior.at, data, components, vectors)
     shared = slopes @ posterior.covariance @ slopes.transpose(0, 2, 1)
     return parts(model.ratio(posterior.at, presses)), own + shared

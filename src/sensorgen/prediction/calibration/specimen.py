@@ -5,6 +5,7 @@ Each parameter is a standard normal number before calibration; its unit is the s
 
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,7 +16,8 @@ from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.inverse.forward import Forward, tones
 
 FORCES_N = (0.2, 0.5, 1.0, 2.0, 4.0, 8.0)  # at which the law of compression may differ from the predicted one
-_BENDS = 2  # modes of the resistivity's profile
+_BENDS = 4  # modes of the resistivity's profile, half waves along the strip
+_PIECES = 3  # on either side of the tip
 _STEP = 1e-3  # of finite differences [standard deviations]
 _FAR_N = 1e4  # more than any press
 _NOTHING_N = 1e-6  # least force, as its logarithm counts
@@ -30,7 +32,7 @@ class Spread:
     resistance, capacitance : float
         Of ln R and ln C [-].
     profile : float
-        Of ln resistivity along the strip [-].
+        Of ln resistivity along the strip: of one half wave; of k of them 1/k of it [-].
     law, law_shape : float
         Of ln of the capacitance's rise: as a whole, and from one force to another [-].
     leak, leak_spread : float
@@ -45,10 +47,9 @@ class Spread:
         Of the position's offset [m].
     gain : float
         Of ln of each tone's gain, of real and imaginary part [-]; half of its variance is common to all tones.
-    hysteresis : float
-        Of the relative change of the rise after a much higher load [-].
-    creep : float
-        Of the relative change of the rise per decade of time [-].
+    hysteresis, creep : float
+        Relative change of the rise after a much higher load, and per decade of time: mean and standard deviation alike
+        [-].
     scatter : float
         Median of what stays unexplained of ln of the rise, from press to press [-].
     wander : float
@@ -57,7 +58,7 @@ class Spread:
 
     resistance: float = 0.5
     capacitance: float = 0.2
-    profile: float = 0.08
+    profile: float = 0.1
     law: float = 0.2
     law_shape: float = 0.1
     leak: float = 1e-3
@@ -199,16 +200,17 @@ class SpecimenModel:
         -------
         (..., n, m) array
         """
-        return self._read(at, presses, changes) - self.rest(at)[..., None, :]
+        # at rest, too, cut where the tip would be: what the cuts leave of a profile cancels
+        return self._read(at, presses, changes) - self._read(at, presses, loaded=False)
 
     def _read(self, at: Real, presses: Presses, changes: Real | None = None, *, loaded: bool = True) -> Complex:
         sensor, spread, of = self.sensor, self.spread, self._at
         value = {name: at[..., k, None] for name, k in of.items()}
         rise, c, r = np.moveaxis(np.zeros(3) if changes is None else changes, -1, 0)[..., None]
         position = np.clip(presses.position_m + spread.position_m * value["position offset"], 0, sensor.length_m)
-        force = presses.force_n + np.zeros(position.shape)
+        force = np.zeros(position.shape)
         if loaded:
-            force = np.maximum(force + spread.force_offset_n + spread.force_n * value["force offset"], _NOTHING_N)
+            force = np.maximum(presses.force_n + spread.force_offset_n + spread.force_n * value["force offset"], _NOTHING_N)
         patch = sensor.patch(position)
         length = np.broadcast_to(patch.length_m, position.shape)
         stress = force / (sensor.width_m * length)
@@ -216,8 +218,8 @@ class SpecimenModel:
         first = of[f"rise at {FORCES_N[0]:g} N"]
         knots = spread.law_shape * (at[..., first : first + len(FORCES_N)] @ self._shapes.T)
         ln_rise = rise + spread.law * value["rise"] + _interpolated(np.log(np.maximum(force, _NOTHING_N)), knots)
-        ln_rise = ln_rise + spread.hysteresis * value["hysteresis"] * np.nan_to_num(presses.unloading)
-        ln_rise = ln_rise + spread.creep * value["creep"] * np.nan_to_num(presses.decades)
+        for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
+            ln_rise = ln_rise + getattr(spread, name) * np.exp(value[name] - 0.5) * np.nan_to_num(course)
         lifted = 1 + share / (1 - share) * np.maximum(stress / self._most_pa, 1.0) * np.exp(ln_rise)
 
         omega = 2 * np.pi * self.frequency_hz
@@ -231,21 +233,25 @@ class SpecimenModel:
         track, by_pressure = sensor.track_ohm_per_m()
         whole = track * np.exp(spread.resistance * value["resistance"] + r)
         left, right = patch.left_m, np.maximum(sensor.length_m - patch.left_m - length, 0.0)
-        lengths = [left / 2, left / 2, length, right / 2, right / 2]
-        middles = [left / 4, 0.75 * left, left + length / 2, left + length + right / 4, left + length + 0.75 * right]
-        tracks = [whole * np.exp(self._bent(at, middle)) for middle in middles]
-        tracks[2] = tracks[2] + stress * by_pressure
+        shares = np.arange(_PIECES + 1) / _PIECES
+        ends = np.stack([*(left * k for k in shares), *(left + length + right * k for k in shares)])
+        tracks = [whole * np.exp(self._bent(at, start, end)) for start, end in pairwise(ends)]
+        tracks[_PIECES] = tracks[_PIECES] + stress * by_pressure
+        films = [loose] * _PIECES + [pressed] + [loose] * _PIECES
         z = line.cascade(
-            [one[..., None] for one in tracks], [loose, loose, pressed, loose, loose],
-            [one[..., None] for one in lengths], sensor.far_end,
-        )  # fmt: skip
+            [one[..., None] for one in tracks], films, [one[..., None] for one in np.diff(ends, axis=0)], sensor.far_end
+        )
         stray, lead = (np.exp(value[name] - 0.5)[..., None] for name in ("stray", "lead"))
         return np.asarray(np.log(spread.lead_ohm * lead + 1 / (1 / z + 1j * omega * spread.stray_f * stray)))
 
-    def _bent(self, at: Real, position_m: Real) -> Real:
-        first, turns = self._at["profile 1"], np.pi * position_m / self.sensor.length_m
-        bends = (at[..., first + k, None] * np.cos((k + 1) * turns) for k in range(_BENDS))
-        return np.asarray(self.spread.profile * sum(bends))
+    def _bent(self, at: Real, start_m: Real, end_m: Real) -> Real:
+        """Mean of ln resistivity over parts of the strip, less that of the whole."""
+        first, found = self._at["profile 1"], np.zeros(1)
+        for k in range(1, _BENDS + 1):
+            start, end = (k * np.pi / self.sensor.length_m * x for x in (start_m, end_m))
+            turn = (end - start) / 2
+            found = found + at[..., first + k - 1, None] / k * np.cos((start + end) / 2) * np.sinc(turn / np.pi)
+        return np.asarray(self.spread.profile * found)
 
     def slopes(self, at: Real, presses: Presses) -> Real:
         """Derivatives of the ratio's real and imaginary parts by the parameters, (n, 2 m, p)."""
