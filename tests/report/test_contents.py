@@ -380,7 +380,7 @@ def test_one_reading_makes_a_short_report(tmp_path):
         made = report(log, 40)
     assert made.headline[0].startswith("Electrode resistance of 40 triX .1mm: measured 700 ohm, predicted ")
     assert made.headline[1] == "Verdict of 40 triX .1mm: intact."
-    assert [t.key for t in made.tables] == ["readings", "verdicts", "provenance"]
+    assert [t.key for t in made.tables] == ["readings", "verdicts", "identifiability", "provenance"]
     assert written(made, "md").count("\n| ") < 20
 
 

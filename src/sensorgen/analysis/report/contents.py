@@ -188,8 +188,8 @@ def _sections(
     if recorded:
         tables = (recordings.facts(recorded),)
         yield Section("recorded", "Recordings", tuple(recordings.figures(recorded)), tables)
-    drawings, tables = ((), ()) if alone else (tuple(variants.figures(found)), variants.identifiability(found))
-    yield Section("variants", "The variants", drawings, tables, (), variants.variants(found))
+    drawings = () if alone else tuple(variants.figures(found))
+    yield Section("variants", "The variants", drawings, variants.identifiability(found), (), variants.variants(found))
     if left_out:
         caption = "What was left out, or taken with care, and why"
         tables = (Table.of("left_out", caption, tuple(LeftOut(*row) for row in left_out)),)
