@@ -1,6 +1,8 @@
 """AC readings in the report: beside the prediction of the print, with their uncertainty, verdicts and flags."""
 
+import itertools
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -85,12 +87,15 @@ def test_verdicts_go_by_frequency_and_flags_name_what_is_impossible(logged):
 
 
 def test_before_and_after_the_bake_stay_apart(tmp_path, design):
+    defects = {"S1": ("hole", "zits"), "S2": ()}
     with Log(tmp_path / "log.db", create=True) as log:
         binding.bind(log, ["S1", "S2"], str(design))
-        log.add([notes.reading(name, "2k", "OL" if baked else "10", baked=baked, log=log)
-                 for name in ("S1", "S2") for baked in (False, True)])  # fmt: skip
+        for name, baked in itertools.product(defects, (False, True)):
+            one = notes.reading(name, "2k", "OL" if baked else "10", baked=baked, log=log)
+            log.add([replace(one, defects=defects[name])])
         made = report(log, None)
     table = next(t for t in made.tables if t.key == "yield")
+    assert {row.group for row in table.rows if row.by == "defect"} == {"hole, zits", "none"}
     of = {row.group: row for row in table.rows if row.by == "bake"}
     assert {name: (row.specimens, row.short) for name, row in of.items()} == {"baked": (2, 0), "not baked": (2, 2)}
 

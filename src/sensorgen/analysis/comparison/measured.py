@@ -18,6 +18,7 @@ class Words:
     axes: str
     baked: bool | None
     batch: str
+    defects: str
     remark: str
     doubts: tuple[str, ...]
     source: str
@@ -80,8 +81,9 @@ def readings(logged: Iterable[Reading]) -> Readings:
     designs, alternating = set(), []
     for one in logged:
         words = Words(
-            one.specimen, one.shape, one.film_mm, one.axes, one.baked, one.batch, one.remark, one.doubts, one.source
-        )
+            one.specimen, one.shape, one.film_mm, one.axes, one.baked, one.batch, ", ".join(one.defects), one.remark,
+            one.doubts, one.source,
+        )  # fmt: skip
         if one.quantity:
             alternating.append(one)
         kinds.append(known.setdefault(words, len(known)))

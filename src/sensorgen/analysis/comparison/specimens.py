@@ -264,7 +264,7 @@ def _evidence(reading: Measured, of: Predicted | None, expected_ohm: float = nan
     words, touches = reading.words, of is not None and of.touches
     return Evidence(
         words.specimen, ry, rz, expected_ohm, words.shape, words.film_mm, words.remark, touches, words.axes,
-        words.batch, words.baked,
+        words.batch, words.baked, words.defects,
     )  # fmt: skip
 
 

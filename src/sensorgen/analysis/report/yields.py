@@ -27,6 +27,7 @@ BY: dict[str, Callable[[Evidence], tuple[Hashable, ...]]] = {
     "direction": lambda of: (of.shape or "unknown", of.axes or "unknown"),
     "bake": lambda of: ({True: "baked", False: "not baked", None: "unknown"}[of.baked],),
     "plate": lambda of: (of.plate or "unknown",),
+    "defect": lambda of: (of.defects or "none",),
     "remark": lambda of: (of.remark or "none",),
 }
 TESTED = ("film", "shape")  # groups that are tested for a difference

@@ -34,7 +34,7 @@ class Evidence:
         Readings along an electrode and between the electrodes; inf for an overload, empty if not measured [ohm].
     expected_ohm : float
         Expected resistance of an electrode [ohm]; nan if unknown.
-    shape, remark, axes, plate : str
+    shape, remark, axes, plate, defects : str
         For groups.
     baked : bool or None
         For groups; None if unknown.
@@ -55,6 +55,7 @@ class Evidence:
     axes: str = ""
     plate: str = ""
     baked: bool | None = None
+    defects: str = ""
 
 
 @dataclass(frozen=True, slots=True)
