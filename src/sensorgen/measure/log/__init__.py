@@ -16,6 +16,6 @@ from sensorgen.measure.log.entries import (
 from sensorgen.measure.log.logbook import PLACE, Log, place
 
 __all__ = [
-    "PLACE", "Batch", "BenchRun", "Calibration", "DesignRow", "Entry", "Log", "Prediction", "Print", "RawFile", "Reading", "Specimen",
-    "Withdrawal", "place",
+    "PLACE", "Batch", "BenchRun", "Calibration", "DesignRow", "Entry", "Log", "Prediction", "Print", "RawFile",
+    "Reading", "Specimen", "Withdrawal", "place",
 ]  # fmt: skip

@@ -37,7 +37,7 @@ class Listing:
         """A line for each row, "?" where something is to be doubted."""
         if self.readings:
             ac = any(r.quantity for r in self.readings)
-            rows: Iterable[tuple[Cell, ...]] = (
+            rows: Iterator[tuple[Cell, ...]] = (
                 (r.number, r.specimen, short(r.y_ohm), short(r.z_ohm), *([_ac(r)] if ac else []),
                  ("? " if r.doubts else "") + _remark(r))
                 for r in self.readings
