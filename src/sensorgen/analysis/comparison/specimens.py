@@ -8,7 +8,7 @@ from functools import cached_property
 from math import isfinite, log, nan
 
 from sensorgen.analysis.comparison.expected import Predicted, stored_or_made
-from sensorgen.analysis.comparison.measured import Measured, Readings, readings
+from sensorgen.analysis.comparison.measured import Measured, readings
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.lazy import Lazy
 from sensorgen.design.body import Body, BodyOf
@@ -20,6 +20,7 @@ from sensorgen.measure.signal.verdicts import Evidence, Verdict, expected_from, 
 from sensorgen.prediction import bodies
 
 _MOST_LEFT_OUT = 1000  # readings that are listed for one reason
+_KEPT = 120_000  # rows that are kept, in 0.1 GB: a report reads each some 16 times
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +104,7 @@ def of_iteration(
         Makes the body of a design.
     """
     measured = readings(log.entries(Reading, iteration=iteration))
-    left_out = list(_superseded(log, iteration, measured))
+    left_out = list(_superseded(log, iteration))
     printed = {row.specimen: row.design_id for row in log.prints()}
     by_specimen = _by_specimen(log, iteration, printed, left_out)
     names = {specimen: design.name for specimen, design in by_specimen.items()}
@@ -124,11 +125,18 @@ def of_iteration(
         by_shape.setdefault(reading.shape, array("d")).extend(least(_evidence(reading, None)))
     usual = {shape: expected_from(values) for shape, values in by_shape.items()}
 
+    kept: dict[int, Compared] = {}
+
     def compared(place: int) -> Compared:
+        if place in kept:
+            return kept[place]
         reading = measured.rows[place]
         of = found.get(names.get(reading.specimen, ""))
         evidence = _evidence(reading, of, usual[reading.shape])
-        return Compared(reading, of, evidence, verdict(evidence))
+        row = Compared(reading, of, evidence, verdict(evidence))
+        if len(kept) < _KEPT:
+            kept[place] = row
+        return row
 
     rows = Lazy(compared, range(len(measured.rows)))
     return Comparison(rows, made, names, found, (*left_out, *_first(_unused(rows))))
@@ -139,20 +147,20 @@ def _begun(log: Log, iteration: int, names: Mapping[str, str]) -> dict[str, list
     found: dict[str, dict[object, Entry]] = {}
     kinds: tuple[type[Reading | BenchRun], ...] = (Reading, BenchRun)
     for kind in kinds:
-        for row in log.entries(kind, superseded=True, iteration=iteration):
+        if log.merged:
+            rows = log.entries(kind, superseded=True, iteration=iteration)
+        else:
+            each = (log.entries(kind, superseded=True, iteration=iteration, specimen=specimen) for specimen in names)
+            rows = iter(sorted(filter(None, (next(of, None) for of in each)), key=lambda row: row.number))
+        for row in rows:
             if row.specimen in names:
                 found.setdefault(names[row.specimen], {}).setdefault((kind, row.number * log.merged), row)
     return {name: list(rows.values()) for name, rows in found.items()}
 
 
-def _superseded(log: Log, iteration: int, measured: Readings) -> Iterator[tuple[str, str]]:
+def _superseded(log: Log, iteration: int) -> Iterator[tuple[str, str]]:
     """Readings out of use, and why."""
-    current = (reading.number for reading in measured.rows)
-    now = next(current, 0)
-    for old in log.entries(Reading, superseded=True, iteration=iteration):  # both in the order of the log
-        if old.number == now:
-            now = next(current, 0)
-            continue
+    for old in log.entries(Reading, replaced=True, iteration=iteration):
         later = log.superseding(old)
         reason = next((row.reason for row in later if isinstance(row, Withdrawal)), "")
         both = f"; {len(later)} corrections of it, made on different machines, all count" if len(later) > 1 else ""

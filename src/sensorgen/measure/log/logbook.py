@@ -135,7 +135,13 @@ class Log:
         return tuple(self.entries(Print, specimen=specimen) if specimen else self.entries(Print))
 
     def entries(
-        self, kind: type[_Kind], *, last: int | None = None, superseded: bool = False, **equal: Value
+        self,
+        kind: type[_Kind],
+        *,
+        last: int | None = None,
+        superseded: bool = False,
+        replaced: bool = False,
+        **equal: Value,
     ) -> Iterator[_Kind]:
         """Rows of one kind, the earliest first.
 
@@ -147,6 +153,8 @@ class Log:
             Only the latest rows, at most this many.
         superseded : bool
             Also rows that a later row corrects or withdraws.
+        replaced : bool
+            These alone.
         **equal
             Required values by column.
 
@@ -163,7 +171,8 @@ class Log:
         asked = {
             name: value for name, value in equal.items() if name in (*INDEXED, "number") and value not in ("", None)
         }
-        where = " AND ".join((*(f"{name} = ?" for name in asked), _current(superseded=superseded)))
+        current = f"uid IN ({_SUPERSEDED})" if replaced else _current(superseded=superseded)
+        where = " AND ".join((*(f"{name} = ?" for name in asked), current))
         sql = (
             "SELECT kind, content, number, logged_at FROM record "  # noqa: S608
             f"WHERE kind = ?1 AND number IS NOT NULL AND {where} ORDER BY number {'DESC' if last else ''}"
