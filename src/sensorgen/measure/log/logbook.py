@@ -19,6 +19,7 @@ from sensorgen.measure.log.entries import (
     NAMES,
     REFERENCES,
     SPECIMEN_COLUMNS,
+    Anchor,
     Batch,
     BenchRun,
     Entry,
@@ -248,6 +249,15 @@ class Log:
         if self._ancestry is None:
             return one < other
         return True if self._ancestry.before(key, its_key) else False if self._ancestry.before(its_key, key) else None
+
+    def anchored(self, entry: Entry) -> tuple[Anchor, int] | None:
+        """The first anchor that proves a row, and the number of records from the row to what was anchored."""
+        place, key = self.record_of(entry)
+        for anchor in self.entries(Anchor):
+            head = self.sequence(anchor.head)
+            if head == place or (head > place and (not self._ancestry or self._ancestry.before(key, anchor.head))):
+                return anchor, head - place
+        return None
 
     @property
     def merged(self) -> bool:
