@@ -4,6 +4,7 @@ from sensorgen.measure.log.entries import (
     Anchor,
     Batch,
     BenchRun,
+    Calibration,
     DesignRow,
     Entry,
     Prediction,
@@ -16,6 +17,6 @@ from sensorgen.measure.log.entries import (
 from sensorgen.measure.log.logbook import PLACE, Log, place
 
 __all__ = [
-    "PLACE", "Anchor", "Batch", "BenchRun", "DesignRow", "Entry", "Log", "Prediction", "Print", "RawFile", "Reading",
-    "Specimen", "Withdrawal", "place",
+    "PLACE", "Anchor", "Batch", "BenchRun", "Calibration", "DesignRow", "Entry", "Log", "Prediction", "Print",
+    "RawFile", "Reading", "Specimen", "Withdrawal", "place",
 ]  # fmt: skip
