@@ -211,15 +211,15 @@ def tuned(lines):
 
 def newer(lines):
     last = lines[-1]
-    last["version"] = 2
-    last["id"] = chain.identity(last["parents"], last["kind"], 2, last["logged_at"], last["content"])
+    last["version"] = 99
+    last["id"] = chain.identity(last["parents"], last["kind"], 99, last["logged_at"], last["content"])
     return lines
 
 
 def nonsense(lines):
     last = lines[-1]
     last["content"] = json.dumps(json.loads(last["content"]) | {"y_ohm": "x"})
-    last["id"] = chain.identity(last["parents"], last["kind"], 1, last["logged_at"], last["content"])
+    last["id"] = chain.identity(last["parents"], last["kind"], last["version"], last["logged_at"], last["content"])
     return lines
 
 
@@ -228,7 +228,7 @@ def nonsense(lines):
     [
         (without, "3 records follow others that are not there yet", 2),
         (tuned, "is not what its identity says; nothing was added", 0),
-        (newer, "of version 2, which this sensorgen does not read: take a newer one", 0),
+        (newer, "of version 99, which this sensorgen does not read: take a newer one", 0),
         (nonsense, "column y_ohm of a Reading holds 'x'", 0),
         (
             lambda lines: [{**lines[0], "parents": 5}],

@@ -19,13 +19,13 @@ from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
 from sensorgen.measure.csv_table import Table
 from sensorgen.measure.log import fields, files
-from sensorgen.measure.log.entries import NAMES, ROWS, DesignRow, Entry, Print, RawFile, Reading, Withdrawal
+from sensorgen.measure.log.entries import NAMES, ROWS, Calibration, DesignRow, Entry, Print, RawFile, Reading, Withdrawal
 from sensorgen.measure.log.fields import Value, from_cell, from_json, to_cell
 from sensorgen.measure.log.logbook import Log
 
 FORMATS = ("csv", "parquet")
 FILES = {kind: f"{NAMES[kind].replace('_', '-')}s".replace("batchs", "batches") for kind in ROWS}
-LATER = (DesignRow, Withdrawal)  # kinds that exports of version 0.1.0 do not have
+LATER = (Calibration, DesignRow, Withdrawal)  # kinds that exports of version 0.1.0 do not have
 _LATER_COLUMNS: dict[type[Entry], tuple[str, ...]] = {  # that exports of earlier versions do not have
     Print: ("printed",),
     Reading: ("quantity", "value", "frequency_hz", "uncertainty", "wires", "temperature_c", "humidity_percent",
