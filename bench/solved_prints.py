@@ -30,14 +30,19 @@ cells:
 
 def main() -> None:
     """Solve and write."""
-    kept = FILE.read_text("utf-8") if FILE.exists() else ""
-    found = {text[2:18]: text for text in re.findall(r"(?m)^  \w{16}:.*\n(?:    .*\n)+", kept)}
+    text = FILE.read_text("utf-8") if FILE.exists() else ""
+    before = {entry[2:18]: entry for entry in re.findall(r"(?m)^  \w{16}:.*\n(?:    .*\n)+", text)}
+    found: dict[str, str] = {}
     films = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
     for walls, quality, along, film in product(WALLS, ("fine", "extrafine"), "xy", films):
         sizes = {"dielectric_mm": film, "along": along}
         design = make({"shape": "tri", "quality": quality, "parameters": sizes})
         for what, cell in cells(design, walls):
-            if content(cell) in found:
+            key = content(cell)
+            if key in found:
+                continue
+            if key in before:
+                found[key] = before[key]
                 continue
             name = f"tri repeating along {along}, film {film:g}{what} mm, {quality}, {walls}"
             try:
@@ -46,15 +51,16 @@ def main() -> None:
                 print(name, error, flush=True)
                 continue
             curve = law.compression
-            found[content(cell)] = (
-                f"  {content(cell)}:  # {name}\n"
+            found[key] = (
+                f"  {key}:  # {name}\n"
                 f"    displacement_um: {curve.displacement_m * 1e6:.5g}\n"
                 f"    stress_kpa: {[round(p / 1e3, 6) for p in curve.stress_pa]}\n"
                 f"    rise_percent: {[round(100 * (r - 1), 6) for r in curve.ratio]}\n"
                 f"    within: {curve.within:.4g}\n" + (f"    doubts: {dumps(law.doubts)}\n" if law.doubts else "")
             )
-            print(name, content(cell), law.doubts, flush=True)
-            FILE.write_text(HEAD + "".join(found.values()), "utf-8")
+            print(name, key, law.doubts, flush=True)
+            FILE.write_text(HEAD + "".join((before | found).values()), "utf-8")
+    FILE.write_text(HEAD + "".join(found.values()), "utf-8")
 
 
 def cells(design: Design, walls: str) -> Iterator[tuple[str, Piece]]:
