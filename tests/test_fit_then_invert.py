@@ -84,7 +84,7 @@ def test_force_and_position_come_back(truth, design, specimen, body, told, comma
     assert predicted["capacitance"]["value"] == pytest.approx(line.capacitance_f, rel=1e-3)
 
     lumped_line.readings_csv(tmp_path / "m.csv", line, made, noise=1e-3)
-    command("invert", fitted[0], "m.csv", *fitted[1:], "-o", "found.csv")
+    command("invert", fitted[0], "--perfect", "m.csv", *fitted[1:], "-o", "found.csv")
     with (tmp_path / "found.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     statuses = [row["status"] for row in rows]

@@ -123,7 +123,7 @@ def test_a_recording_of_the_log_by_its_number_with_tables_and_pictures(run, file
     filtered = read(tmp_path / "f.csv")
     assert filtered.tones_hz.tolist() == made.TONES_HZ.tolist()
     assert filtered.source.rate_hz == pytest.approx(70, rel=1e-3)
-    back = run("invert", "tri", "p.csv")
+    back = run("invert", "tri", "--perfect", "p.csv")
     assert (back.code, back.err) == (0, "")
     assert f"{len(MADE)} " in back.out
 

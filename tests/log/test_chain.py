@@ -42,7 +42,7 @@ def by_the_back_door(path, *statements, rows=()):
 def test_the_identity_is_the_sha256_of_what_the_documentation_says(full):
     before = []
     for record in full.records():
-        text = f"{','.join(before)} {record.kind} 1 {record.logged_at}\n{record.content}"
+        text = f"{','.join(before)} {record.kind} {record.version} {record.logged_at}\n{record.content}"
         assert record.id == sha256(text.encode()).hexdigest()
         before = [record.id]
     assert full.head() == (14, record.id)

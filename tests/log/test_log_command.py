@@ -42,7 +42,7 @@ def test_json_for_programs(run):
 
 
 WRONG = {
-    "nothing": (["23 triX"], "nothing to log; expected --y, --z, --visa or --remark"),
+    "nothing": (["23 triX"], "nothing to log; expected --y, --z, --C or"),
     "blank": (["23 triX", "--y", " "], "nothing to log"),
     "value": (["23 triX", "--y", "abc"], "resistance in Y: 'abc' is no resistance; expected a resistance such as 650"),
     "name": (["23 trj", "--y", "1"], "'23 trj' is no specimen's name"),

@@ -84,7 +84,7 @@ def test_every_reading_is_tied_to_specimen_iteration_design_and_batch(log):
     assert log.recordings()[0].batch == "26"
     again = [
         Batch(uid="b2", batch="26 again", file=SHA),
-        Print(uid="p2", specimen="26 triX", batch_uid="b2", design_id="e", design="t"),
+        Print(uid="p2", specimen="26 triX", batch_uid="b2", design_id="d", design="trix"),
     ]
     log.add([*again, reading("26 triX", "700", uid="last")])
     assert next(log.entries(Reading, uid="last")).batch == "26 again"

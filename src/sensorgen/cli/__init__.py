@@ -33,6 +33,7 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
     "Measure": {
         "log": "Log of readings, recordings, prints and predictions.",
         "bench": "Plan a run of loads, and evaluate its recording.",
+        "calibrate": "Calibrate specimens by known presses.",
         "report": "Compare predictions and measurements, as one page.",
         "fit": "Fit material values to what was measured.",
     },

@@ -1,32 +1,43 @@
-"""``sensorgen invert``: force and position back from measured impedances."""
+"""``sensorgen invert``: force and position back from measured impedances, of a calibrated specimen or of a design."""
 
 import re
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
-from sensorgen.cli import body_options, render, show
+from sensorgen.cli import body_options, log_words, render, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Length, OneOf, Share, Values, one
 from sensorgen.core import files as store
 from sensorgen.core import units
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, UnknownName
 
 if TYPE_CHECKING:
+    from sensorgen.core.document import Documented
     from sensorgen.design.design import Design
-    from sensorgen.measure.readings import Readings
-    from sensorgen.prediction.inverse import Estimator, Prior
+    from sensorgen.measure.readings import Block, Readings
+    from sensorgen.prediction.calibration.inversion import Inverter
+    from sensorgen.prediction.calibration.rest import Rest
+    from sensorgen.prediction.inverse import Prior
 
 _NORMAL = re.compile(r"(force|position)=(.+?)(?:\+-|±)(.+)")
+_REST, _TIME = "rest", "time_s"
+_TIP = click.Option(["--tip", "tip_mm"], type=Length(), default="10mm", show_default=True, help="Length of the tip.")
 
-
-OWN: list[click.Parameter] = [
+_COMMON: list[click.Parameter] = [
     click.Argument(["measured"], metavar="MEASURED.csv"),
     click.Option(
-        ["--noise"], type=Share(), default="0.1%", show_default=True, metavar="SHARE",
-        help="Standard deviation of R and of X, each as a share of the impedance's magnitude.",
+        ["--rest", "rest_file"], metavar="FILE.csv",
+        help="Readings with nothing on the sensor, if MEASURED.csv has no column 'rest' with 1 for them.",
+    ),
+    click.Option(
+        ["--noise"], type=Share(), metavar="SHARE",
+        help="Standard deviation of R and of X, each as a share of the impedance's magnitude "
+        "[default: what the readings at rest scatter by, else 0.1 %].",
     ),
     click.Option(
         ["--prior"], metavar="WHAT",
@@ -34,74 +45,189 @@ OWN: list[click.Parameter] = [
     ),
     click.Option(
         ["--force-limit", "force_limit_n"], type=Values(units.FORCE_N, zero=False), metavar="N",
-        help="Largest force to look for [default: 13 N].",
-    ),
-    click.Option(["--tip", "tip_mm"], type=Length(), default="10mm", show_default=True, help="Length of the tip."),
-    click.Option(
-        ["--compression"], type=OneOf(("unconfined", "bonded")),
-        help="Compression law of a plate; the best of the cell if not given.",
+        help="Largest force to look for [default: 13 N, or a quarter above the largest that calibrated].",
     ),
     click.Option(
         ["--output", "-o"], metavar="FILE.csv",
         help="Write a row per sample, '-' to the terminal; readings from the standard input go there by themselves.",
+    ),
+]  # fmt: skip
+OWN: list[click.Parameter] = [
+    *_COMMON,
+    click.Option(
+        ["--perfect"], is_flag=True,
+        help="As if the sensor were exactly as predicted, and no reading at rest were needed: what noise alone leaves.",
+    ),
+    _TIP,
+    click.Option(
+        ["--compression"], type=OneOf(("unconfined", "bonded")),
+        help="Compression law of a plate; the best of the cell if not given.",
     ),
     *body_options.body_options(),
     *render.options("json", "markdown", file=False),
 ]  # fmt: skip
 
 
-def _work(design: "Design", *, measured: str, output: str | None, **how: Any) -> int:
-    """The rows go to the terminal, at once, or to a file that is there when it is whole; then the summary."""
-    from sensorgen.measure.readings import readings
-    from sensorgen.prediction.inverse import answers
+def _work(
+    design: "Design", *, measured: str, output: str | None, perfect: bool, rest_file: str | None, tip_mm: float,
+    compression: str | None, **how: Any,
+) -> int:  # fmt: skip
+    from sensorgen.prediction.query import Query, Tip
 
+    query = Query(tip=Tip(tip_mm * units.M_PER_MM), law=compression or "")
+    body = body_options.body_of()(design)
+    if perfect:
+        if rest_file:
+            raise BadInput("--perfect needs no reading at rest; expected one of --perfect and --rest")
+        return _perfect(body, query, measured, output, **how)
+    from sensorgen.analysis.calibration import Bench, model_of
+    from sensorgen.prediction.calibration import fitting
+
+    def inverter(source: "Readings", noise: Any, limit_n: float | None) -> "tuple[Inverter, float, int, Any]":
+        from sensorgen.prediction.calibration.inversion import Inverter
+        from sensorgen.prediction.inverse import FORCE_LIMIT_N
+
+        model, found = model_of(body, source.frequency_hz, Bench(tip_mm * units.M_PER_MM))
+        limit = limit_n or FORCE_LIMIT_N
+        known = fitting.prior(model, np.broadcast_to(noise, source.frequency_hz.shape))
+        return Inverter(model, known, _prior(how["prior"]), limit), limit, 0, found.doubts
+
+    return _by_ratio(design.name, inverter, measured, output, rest_file, None, how["noise"], how["force_limit_n"])
+
+
+def _specimen(
+    name: str, measured: str, output: str | None, rest_file: str | None, noise: float | None, prior: str | None,
+    force_limit_n: tuple[float, ...] | None, file: str | None,
+) -> int:  # fmt: skip
+    """Force and position of a specimen that 'sensorgen calibrate' has calibrated."""
+    from sensorgen.analysis.calibration import design_of, stored
+
+    with log_words.opened(file) as log:
+        of, design = design_of(log, name)
+        known = stored(log, of)
+    if known is None:
+        raise BadInput(
+            f"{of} was never calibrated: sensorgen calibrate {of!r}, or sensorgen invert DESIGN for what its design "
+            f"({design.name}) alone allows"
+        )
+
+    def inverter(source: "Readings", noise: Any, limit_n: float | None) -> "tuple[Inverter, float, int, Any]":  # noqa: ARG001
+        limit = limit_n or known.limit_n
+        made = known.inverter(noise, _prior(prior), limit)
+        beyond = (f"forces above {known.force_n:.3g} N were not calibrated",) if limit > known.limit_n else ()
+        return made, limit, known.posterior.presses, beyond
+
+    return _by_ratio(of, inverter, measured, output, rest_file, known.model.frequency_hz, noise, force_limit_n)
+
+
+def _by_ratio(
+    of: str, inverter: "Callable[[Readings, Any, float | None], tuple[Inverter, float, int, Any]]", measured: str,
+    output: str | None, rest_file: str | None, tones_hz: Any, noise: float | None,
+    force_limit_n: tuple[float, ...] | None,
+) -> int:  # fmt: skip
+    """Ratios to the latest reading at rest, row by row; the inverter is made when the first of them is there."""
+    from sensorgen.measure.readings import readings
+    from sensorgen.prediction.calibration import answers
+    from sensorgen.prediction.calibration.rest import Rest, checked
+
+    limit_n = one("--force-limit", force_limit_n) if force_limit_n else None
+    with readings(measured, beside=(_REST, _TIME)) as source, ExitStack() as stack:
+        order = checked(source.frequency_hz, source.frequency_hz if tones_hz is None else tones_hz)
+        if rest_file is None and _REST not in source.numbers:
+            raise BadInput(
+                f"{measured}: no reading at rest; expected a column 'rest' with 1 where nothing was on the sensor, or "
+                "--rest FILE.csv: what counts is the ratio to it (or --perfect, as if the sensor were as predicted)"
+            )
+        rest = _taken_apart(rest_file, source.frequency_hz) if rest_file else Rest()
+        summary, made = answers.Summary(), None
+        write, live, terminal = _writer(stack, measured, output)
+        step = stack.enter_context(show.progress(["reading"]))
+        kept = [_TIME] * (_TIME in source.numbers) + source.kept
+        write(answers.header(kept))
+        for block in source.blocks(1) if live else source.blocks():
+            at_rest, time_s = _beside(source, block)
+            ratio, age_s = rest.ratios(block.impedance_ohm, at_rest, time_s)
+            if made is None and not at_rest.all():
+                made = inverter(source, (rest.noise() if noise is None else noise * np.sqrt(1.1)), limit_n)
+            found = made[0].batch(ratio[:, order], age_s) if made else answers.nothing(len(ratio))
+            summary.add(found, at_rest)
+            step(f"{summary.samples} samples")
+            own = [[f"{t:.9g}"] if _TIME in source.numbers else [] for t in time_s.tolist()]
+            write(answers.rows([[*a, *b] for a, b in zip(own, block.kept, strict=True)], found, at_rest))
+    sigma = float(np.median(rest.noise())) if noise is None else noise
+    result = summary.result(of, made[2] if made else 0, made[1] if made else 0.0, sigma, made[3] if made else ())
+    _said(result, terminal, output)
+    return 0
+
+
+def _beside(source: "Readings", block: "Block") -> tuple[Any, Any]:
+    """Which rows are at rest, and the time of each [s]."""
+    columns = dict(zip(source.numbers, block.numbers.T, strict=True))
+    nothing = np.full(len(block.rows), np.nan)
+    return columns.get(_REST, nothing) == 1, columns.get(_TIME, nothing)
+
+
+def _taken_apart(path: str, tones_hz: Any) -> "Rest":
+    from sensorgen.measure.readings import readings
+    from sensorgen.prediction.calibration.rest import Rest, checked
+
+    with readings(path, beside=(_TIME,)) as source:
+        order = checked(source.frequency_hz, tones_hz)
+        blocks = list(source.blocks())
+        if not blocks:
+            raise BadInput(f"{path}: no readings; expected some with nothing on the sensor")
+        times = blocks[-1].numbers[-1] if source.numbers else np.array([np.nan])
+        return Rest(np.concatenate([block.impedance_ohm for block in blocks])[:, order], float(times[0]))
+
+
+def _writer(stack: ExitStack, measured: str, output: str | None) -> tuple[Callable[[str], None], bool, bool]:
+    """What takes rows: the terminal, at once, or a file that is there when it is whole; whether live, and which."""
     live = measured == "-" and output is None
     terminal = live or output == "-"
+    file = stack.enter_context(store.replacing(Path(output))) if output and not terminal else None
+
+    def write(text: str) -> None:
+        if terminal:
+            print(text, end="", flush=True)
+        elif file:
+            file.write(text.encode())
+
+    return write, live, terminal
+
+
+def _said(result: "Documented", terminal: bool, output: str | None) -> None:
+    for piece in render.pieces(result, render.form()):
+        render.say(piece, nl=False, err=terminal)
+    if not render.form() and not terminal:
+        render.say(output or "--output FILE.csv writes force and position of every sample")
+
+
+def _perfect(
+    body: Any, query: Any, measured: str, output: str | None, *, noise: float | None, prior: str | None,
+    force_limit_n: tuple[float, ...] | None,
+) -> int:  # fmt: skip
+    from sensorgen.measure.readings import readings
+    from sensorgen.prediction.inverse import FORCE_LIMIT_N, Estimator, answers
+    from sensorgen.prediction.planning import sensor_model
+    from sensorgen.prediction.query import NOISE
+
     with readings(measured) as source, ExitStack() as stack:
-        estimator, doubts = _estimator(design, source, **how)
-        summary = answers.Summary(estimator, doubts)
-        file = stack.enter_context(store.replacing(Path(output))) if output and not terminal else None
-
-        def write(text: str) -> None:
-            if terminal:
-                print(text, end="", flush=True)
-            elif file:
-                file.write(text.encode())
-
+        model = sensor_model(body, query)[0]
+        limit = one("--force-limit", force_limit_n) if force_limit_n else FORCE_LIMIT_N
+        estimator = Estimator(
+            model.sensor, source.frequency_hz, NOISE if noise is None else noise, _prior(prior), limit
+        )
+        summary = answers.Summary(estimator, model.doubts)
+        write, live, terminal = _writer(stack, measured, output)
         step = stack.enter_context(show.progress(["reading"]))
         write(answers.header(source.kept))
         for block in source.blocks(1) if live else source.blocks():
             found = estimator.batch(block.impedance_ohm)
             summary.add(found)
             step(f"{summary.samples} samples")
-            if terminal or file:
-                write(answers.rows(block.kept, found, prior=estimator.prior is not None))
-    for piece in render.pieces(summary.result(), render.form()):
-        render.say(piece, nl=False, err=terminal)
-    if not render.form() and not terminal:
-        render.say(output or "--output FILE.csv writes force and position of every sample")
+            write(answers.rows(block.kept, found, prior=estimator.prior is not None))
+    _said(summary.result(), terminal, output)
     return 0
-
-
-def _estimator(
-    design: "Design",
-    source: "Readings",
-    *,
-    noise: float,
-    prior: str | None,
-    force_limit_n: tuple[float, ...] | None,
-    tip_mm: float,
-    compression: str | None,
-) -> "tuple[Estimator, tuple[str, ...]]":
-    """The estimator for this design, and what to doubt about its sensor."""
-    from sensorgen.prediction.inverse import FORCE_LIMIT_N, Estimator
-    from sensorgen.prediction.planning import sensor_model
-    from sensorgen.prediction.query import Query, Tip
-
-    query = Query(tip=Tip(tip_mm * units.M_PER_MM), law=compression or "")
-    model = sensor_model(body_options.body_of()(design), query)[0]
-    limit = one("--force-limit", force_limit_n) if force_limit_n else FORCE_LIMIT_N
-    return Estimator(model.sensor, source.frequency_hz, noise, _prior(prior), limit), model.doubts
 
 
 def _prior(text: str | None) -> "Prior | None":
@@ -124,8 +250,23 @@ def _prior(text: str | None) -> "Prior | None":
     return Prior(found.get("force"), found.get("position"))
 
 
-command = DesignGroup(
+class _Specimens(DesignGroup):
+    """A word that is neither a shape nor a file is a specimen of the log."""
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command:
+        """The command for a shape, a design file, or a specimen."""
+        try:
+            return super().get_command(ctx, name)
+        except UnknownName:
+            params = [*_COMMON, log_words.where(), *render.options("json", "markdown", file=False)]
+            return click.Command(
+                name, params=params, help=_specimen.__doc__, callback=lambda **given: _specimen(name, **given)
+            )
+
+
+command = _Specimens(
     _work, OWN, name="invert",
     help="Force and position behind the impedances in MEASURED.csv ('-' reads the standard input): one row per sample, "
-    "columns re_ohm_1.1kHz and im_ohm_1.1kHz for every tone.",
+    "columns re_ohm_1.1kHz and im_ohm_1.1kHz for every tone, 'rest' with 1 where nothing was on the sensor, and time_s "
+    "if known. The first word is a specimen that was calibrated, or a design.",
 )  # fmt: skip

@@ -15,6 +15,7 @@ class _Group(click.Group):
         return list(self.commands)
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        args = ["add", *args[1:]] if args[0] == "multimeter" else args  # its name in version 0.1.0
         if not ctx.resilient_parsing and not args[0].startswith("-") and args[0] not in self.commands:
             raise UnknownName("command of log", args[0], self.commands)
         return super().resolve_command(ctx, args)
@@ -30,7 +31,7 @@ def command() -> None:
 
 
 for _each in (
-    log_write.multimeter, log_write.table, log_write.bench, log_write.predict, log_write.withdrawing,
+    log_write.specimen, log_write.add, log_write.table, log_write.bench, log_write.predict, log_write.withdrawing,
     log_read.listing, log_read.showing, log_read.exporting, log_read.verifying, log_read.heading, log_read.anchoring,
     log_read.syncing, log_read.backing_up, log_read.restoring,
 ):  # fmt: skip

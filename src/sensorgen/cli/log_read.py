@@ -38,7 +38,7 @@ def _found(log: "Log", what: str) -> "list[Entry]":
     if what.isascii() and what.isdigit():
         found += log.entries(Reading, superseded=True, number=int(what))
     else:
-        name = notes.specimen(what).specimen
+        name = notes.specimen(what, log).specimen
         rows: list[Print | Reading | BenchRun] = [*log.entries(Print, specimen=name)]
         rows += log.entries(Reading, superseded=True, specimen=name)
         rows += log.entries(BenchRun, superseded=True, specimen=name)

@@ -1,7 +1,8 @@
-"""``sensorgen log multimeter|import|bench|predict``: what goes into the log."""
+"""``sensorgen log specimen|add|import|bench|predict``: what goes into the log."""
 
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ import click
 
 from sensorgen.cli import render
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.log_words import columns_of, made, opened, recorded_columns, where
+from sensorgen.cli.log_words import columns_of, existing, made, opened, recorded_columns, where
 from sensorgen.cli.settings import pairs
 from sensorgen.cli.words import OneOf
 from sensorgen.core.errors import BadInput
@@ -19,47 +20,73 @@ if TYPE_CHECKING:
     from sensorgen.measure.log import Entry, Log
 
 
+DEFECTS = ("misprint", "zits", "hole", "clog", "under-extrusion", "adhesion", "torn")
 KINDS = ("reading", "recording", "prediction", "print", "batch", "design", "raw-file")
 
 
-def _multimeter(
-    specimen: str, y_words: str, z_words: str, file: str | None, corrects: int | None, *, predict: bool,
-    visa: str | None, axis: str | None, wires: str, baked: bool | None, remark: str, measured_at: str,
+def _add(
+    specimen: str, y_words: str, z_words: str, file: str | None, corrects: int | None, *, design: str | None,
+    predict: bool, visa: str | None, axis: str | None, wires: str | None, baked: bool | None, remark: str,
+    measured_at: str, instrument: str, temperature: float | None, humidity: float | None, photo: str | None,
+    defects: tuple[str, ...], **ac: tuple[str, ...],
 ) -> None:  # fmt: skip
-    """Log the resistances of one specimen, named as in '23 triY .2mm 3'.
+    """Log what meters show of one specimen: DC resistances, and AC quantities between its electrodes.
 
-    Several readings have / between them, as in --z '2.3k / 3.8k'. A small m is taken for mega, and asked for on a
-    terminal.
+    SPECIMEN is any name that is bound to a design, by --design here or by 'log specimen', or one as '23 triY .2mm 3'.
+    An AC quantity stands with its frequency, as --C 12.3pF@1kHz --D 0.02@1kHz; repeats have / between them, and a
+    standard uncertainty may follow, as 12.3/12.4±0.1pF@1kHz. A small m of --y and --z is taken for mega, and asked for
+    on a terminal.
     """
-    from sensorgen.measure.log import Reading, notes
+    from dataclasses import replace
+
+    from sensorgen.measure.log import Reading, binding, files, notes
 
     if visa and (y_words or z_words):
         raise BadInput("--visa beside --y or --z; expected the meter's readings or words, not both")
-    notes.specimen(specimen)  # a wrong name is told before anybody measures
-    if predict:
-        _predict_ahead(specimen, file)
-    instrument, source = "", "typed"
+    typed = {name: texts for name, texts in ac.items() if texts}
+    if not (y_words.strip() or z_words.strip() or remark or visa or typed or defects or photo):
+        raise BadInput("nothing to log; expected --y, --z, --C or another quantity, --visa, --defect or --remark")
+    if design:
+        with opened(file, create=True) as log:
+            for bound in binding.bind(log, [specimen], design):
+                render.say(f"{specimen}: design {getattr(bound, 'design', '')}", err=bool(render.form()))
+    with nullcontext() if file and not Path(file).exists() else existing(file) as known:
+        notes.specimen(specimen, known)  # a wrong name is refused before anybody measures, and before a log is made
     if visa:
-        y_words, z_words, instrument = _measured(visa, axis, wires)
-        source = visa
-    if not (y_words.strip() or z_words.strip() or remark):
-        raise BadInput("nothing to log; expected --y, --z, --visa or --remark")
+        y_words, z_words, instrument = _measured(visa, axis, wires or "2")
     mega = _asked_mega(y=y_words, z=z_words)
     with opened(file, create=True) as log:
+        if predict:
+            _predict_ahead(log, specimen)
         row = notes.reading(
             specimen, y_words, z_words, mega=mega, supersedes=_uid(log, Reading, corrects), baked=baked, remark=remark,
-            measured_at=measured_at, instrument=instrument, source=source,
+            measured_at=measured_at, instrument=instrument, source=visa or "typed", log=log,
         )  # fmt: skip
-        _deliver(log.add([row]), log)
+        kept = [files.keep(log.files, Path(photo))] if photo else []
+        row = replace(
+            notes.with_ac(row, typed), wires=int(wires) if wires else None, temperature_c=temperature,
+            humidity_percent=humidity, photo=kept[0].uid if kept else "", defects=tuple(dict.fromkeys(defects)),
+        )  # fmt: skip
+        _deliver([new for new in log.add([*kept, row]) if isinstance(new, Reading)], log)
 
 
-def _predict_ahead(specimen: str, file: str | None) -> None:
+def _specimen(
+    names: tuple[str, ...], design: str | None, printed: str | None, iteration: int | None, file: str | None
+) -> None:
+    """Bind specimens to the design that they were printed of; readings and recordings then get it by the name."""
+    from sensorgen.measure.log import binding
+
+    with opened(file, create=True) as log:
+        new = binding.bind(log, names, design or "", printed=printed or "", iteration=iteration)
+        _deliver(new, log, "the log has these specimens with this very design")
+
+
+def _predict_ahead(log: "Log", specimen: str) -> None:
     """Log what is expected before the specimen is measured; beside JSON, which has the measurement alone."""
     from sensorgen.workflows import stored_prediction
 
-    with opened(file, create=True) as log:
-        for row in stored_prediction.predict(log, specimen):
-            render.say(f"logged prediction {row.number} of {specimen}", err=bool(render.form()))
+    for row in stored_prediction.predict(log, specimen):
+        render.say(f"logged prediction {row.number} of {specimen}", err=bool(render.form()))
 
 
 def _asked_mega(**typed: str) -> bool:
@@ -133,9 +160,9 @@ def _bench(
     from sensorgen.measure.log import BenchRun, bench
 
     ours, rig = columns_of(columns, "--column"), columns_of(rig_columns, "--rig-column")
-    if predict:
-        _predict_ahead(specimen, file)
     with opened(file, create=True) as log:
+        if predict:
+            _predict_ahead(log, specimen)
         new = bench.log_recording(
             log, specimen, Path(lcr_file), Path(rig_file) if rig_file else None, columns=ours, rig_columns=rig,
             remark=remark, supersedes=_uid(log, BenchRun, corrects),
@@ -156,7 +183,7 @@ def _predict(design: "Design", *, file: str | None) -> int:
 def _withdraw(kind: str, number: int, reason: str, file: str | None) -> None:
     """Take a row out of use: it stays in the log with the reason, and no report uses it.
 
-    For a reading or a recording that is to be replaced, --corrects of 'log multimeter' and 'log bench' is better.
+    For a reading or a recording that is to be replaced, --corrects of 'log add' and 'log bench' is better.
     """
     from sensorgen.measure.log.withdrawing import withdraw
 
@@ -174,17 +201,41 @@ _OF_READINGS: list[click.Parameter] = [
     where(),
     *render.options("json", "markdown"),
 ]  # fmt: skip
-multimeter = made(
-    _multimeter, "multimeter", "Log resistances of one specimen.",
+add = made(
+    _add, "add", "Log what meters show of one specimen.",
     click.Argument(["specimen"]),
-    click.Option(["--y", "y_words"], metavar="WORDS", default="", help="Resistance along an electrode, as 0.65k."),
-    click.Option(["--z", "z_words"], metavar="WORDS", default="", help="Resistance between the electrodes."),
+    click.Option(["--y", "y_words"], metavar="WORDS", default="", help="DC resistance along an electrode, as 0.65k."),
+    click.Option(["--z", "z_words"], metavar="WORDS", default="", help="DC resistance between the electrodes."),
+    *(
+        click.Option([flag, name], metavar="WORDS", multiple=True, help=about)
+        for flag, name, about in (
+            ("--C", "Cp", "Capacitance in parallel (Cp), as 12.3pF@1kHz."), ("--Cs", "Cs", "Capacitance in series."),
+            ("--D", "D", "Loss factor, as 0.02@1kHz."), ("--R", "R", "Real part of Z (Rs), as 1.2kohm@10kHz."),
+            ("--X", "X", "Imaginary part of Z, negative of a capacitor."), ("--Z", "Z", "Magnitude of Z."),
+            ("--phase", "phase", "Angle of Z, as -88deg@1kHz."),
+        )
+    ),
+    click.Option(["--design"], metavar="DESIGN", help="Bind the name to it first: a design file, or one in the log."),
     click.Option(["--baked/--unbaked"], default=None, help="Whether the specimen was baked before."),
     click.Option(["--measured-at"], metavar="WHEN", default="", help="When it was measured, in your own words."),
+    click.Option(["--instrument"], metavar="NAME", default="", help="The meter, as 'HP 4284A': its accuracy is used."),
+    click.Option(["--temperature"], metavar="C", type=click.FloatRange(-50, 200), help="Of the air [C]."),
+    click.Option(["--humidity"], metavar="PERCENT", type=click.FloatRange(0, 100), help="Of the air, relative."),
+    click.Option(["--photo"], metavar="FILE", help="A photo of the specimen, kept with the log."),
+    click.Option(["--defect", "defects"], type=OneOf(DEFECTS), multiple=True, help="A defect that can be seen."),
     click.Option(["--visa"], metavar="ADDRESS", help="Read the meter there, as GPIB0::22::INSTR: first Y, then Z."),
     click.Option(["--axis"], type=OneOf(("y", "z")), help="Let the meter read this one only."),
-    click.Option(["--wires"], type=OneOf(("2", "4")), default="2", show_default=True, help="Leads of the meter."),
+    click.Option(["--wires"], type=OneOf(("2", "4")), help="Leads of the meter; 2 with --visa if not given."),
     *_OF_READINGS,
+)  # fmt: skip
+specimen = made(
+    _specimen, "specimen", "Bind specimens of any name to their design.",
+    click.Argument(["names"], metavar="NAME...", nargs=-1, required=True),
+    click.Option(["--design"], metavar="DESIGN", help="A design file, or identity or name of a design in the log."),
+    click.Option(["--printed"], metavar="NAME", help="The specimen's name on a print bed of the log, with its design."),
+    click.Option(["--iteration"], type=click.IntRange(0), help="Of the design, to report specimens together."),
+    where(),
+    *render.options("json", "markdown"),
 )  # fmt: skip
 table = made(
     _import, "import", "Log a table, a print bed, or an export of a log.",

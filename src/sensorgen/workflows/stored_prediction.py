@@ -5,7 +5,7 @@ import json
 from sensorgen.core.errors import MissingValue
 from sensorgen.design.design import Design
 from sensorgen.measure.log import notes
-from sensorgen.measure.log.batches import design_row, prediction
+from sensorgen.measure.log.batches import design_row, designs, prediction
 from sensorgen.measure.log.entries import Entry, Prediction
 from sensorgen.measure.log.logbook import Log
 
@@ -30,14 +30,14 @@ def predict(log: Log, specimen: str) -> list[Entry]:
     BadInput
         A name that cannot be parsed.
     MissingValue
-        The name stands for no design, or the specimen was printed from another design, whose file must be predicted.
+        The name stands for no design, or the log lacks the design that it is bound to.
     """
-    design = notes.design_of(specimen)
-    printed = [row.design_id for row in log.prints(specimen=notes.specimen(specimen).specimen)][-1:]
-    design_ids = printed or ([design.id()] if design else [])
-    if design_ids and log.predictions(design_id=design_ids[0]):
+    bound = log.bound(notes.specimen(specimen, log).specimen)
+    design = designs(log).get(bound.design_id) if bound else notes.design_of(specimen)
+    design_id = bound.design_id if bound else design.id() if design else ""
+    if design_id and log.predictions(design_id=design_id):
         return []
-    if design is None or design.id() != design_ids[0]:
+    if design is None:
         raise MissingValue(f"{specimen!r} names no design; log a prediction of its file: sensorgen log predict FILE")
     return [row for row in log.add(predicted_rows(design)) if isinstance(row, Prediction)]
 

@@ -67,19 +67,23 @@ class Run:
         return f"{self.entry.specimen}, recording {self.entry.number}{part}{lockin}"
 
 
-def runs(log: Log, iteration: int, left_out: list[tuple[str, str]]) -> Iterator[Run]:
+def runs(
+    log: Log, iteration: int | None, left_out: list[tuple[str, str]], *, specimens: Sequence[str] = ()
+) -> Iterator[Run]:
     """Recordings of an iteration, part after part; what cannot be read or used goes to ``left_out`` with its reason.
 
     Parameters
     ----------
     log : Log
         An open one.
-    iteration : int
-        Of the design.
+    iteration : int or None
+        Of the design; of all if None, and no specimens are given.
     left_out : list of (str, str)
         Grows.
+    specimens : sequence of str
+        Names of specimens, in place of an iteration.
     """
-    for entry in log.recordings(iteration=iteration):
+    for entry in log.about(BenchRun, iteration, specimens):
         name = f"recording {entry.number}, {entry.specimen}"
         with _noted(left_out, name):
             parts, pressed = read_again(log, entry)

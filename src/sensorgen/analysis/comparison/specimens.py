@@ -2,7 +2,7 @@
 
 from array import array
 from collections import Counter
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite, log, nan
@@ -14,7 +14,7 @@ from sensorgen.core.lazy import Lazy
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
 from sensorgen.design.specimen_name import Specimen, design_of, parse
-from sensorgen.measure.log import BenchRun, Entry, Log, Prediction, Reading, Withdrawal
+from sensorgen.measure.log import BenchRun, Entry, Log, Prediction, Print, Reading, Withdrawal
 from sensorgen.measure.log.batches import designs as on_beds
 from sensorgen.measure.signal.verdicts import Evidence, Verdict, expected_from, least, verdict
 from sensorgen.prediction import bodies
@@ -87,32 +87,37 @@ class Comparison:
 
 
 def of_iteration(
-    log: Log, iteration: int, step: Callable[[str], None] = lambda _: None, body_of: BodyOf = bodies.default_body
-) -> Comparison:
-    """Everything in the log about an iteration, compared.
+    log: Log, iteration: int | None, step: Callable[[str], None] = lambda _: None,
+    body_of: BodyOf = bodies.default_body, *, specimens: Sequence[str] = (),
+) -> Comparison:  # fmt: skip
+    """Everything in the log about an iteration or some specimens, compared.
 
     Parameters
     ----------
     log : Log
         An open one.
-    iteration : int
-        Of the design.
+    iteration : int or None
+        Of the design; of all if None, and no specimens are given.
     step : callable
         Called with the name of each design before it is predicted.
     body_of : callable
         Makes the body of a design.
+    specimens : sequence of str
+        Names of specimens, in place of an iteration.
     """
-    measured = readings(log.entries(Reading, iteration=iteration))
-    left_out = list(_superseded(log, iteration, measured))
-    printed = {row.specimen: row.design_id for row in log.prints()}
-    by_specimen = _by_specimen(log, iteration, printed, left_out)
-    names = {specimen: design.name for specimen, design in by_specimen.items()}
-    designs = dict(sorted((design.name, design) for design in by_specimen.values()))
+    measured = readings(log.about(Reading, iteration, specimens))
+    left_out = list(_superseded(log, iteration, specimens, measured))
+    printed = _printed(log, left_out)
+    by_specimen = _by_specimen(log, iteration, specimens, printed, left_out)
+    by_id = {design.id(): design for design in {id(d): d for d in by_specimen.values()}.values()}
+    alike = Counter(design.name for design in by_id.values())
+    names = {name: _label(design, alike) for name, design in by_specimen.items()}
+    designs = {label: by_id[key] for label, key in sorted((_label(d, alike), key) for key, d in by_id.items())}
     ids = {name: {design.id()} for name, design in designs.items()}
     for specimen in by_specimen.keys() & printed.keys():
-        ids[names[specimen]].add(printed[specimen])  # another version of sensorgen may have named it
+        ids[names[specimen]].add(printed[specimen].design_id)  # another version of sensorgen may have named it
     left_out += _other_designs(measured.designs, set().union(*ids.values()))
-    begun = _begun(log, iteration, names)
+    begun = _begun(log, iteration, specimens, names)
     made, found = {}, {}
     for name, design in designs.items():
         step(name)
@@ -134,22 +139,31 @@ def of_iteration(
     return Comparison(rows, made, names, found, (*left_out, *_first(_unused(rows))))
 
 
-def _begun(log: Log, iteration: int, names: Mapping[str, str]) -> dict[str, list[Entry]]:
+def _label(design: Design, alike: Mapping[str, int]) -> str:
+    """Name of a design, with its identity where another one has the same name."""
+    return design.name if alike[design.name] < 2 else f"{design.name} ({design.id()[:8]})"
+
+
+def _begun(
+    log: Log, iteration: int | None, specimens: Sequence[str], names: Mapping[str, str]
+) -> dict[str, list[Entry]]:
     """The first reading and the first recording of each design; all of them where several machines wrote the log."""
     found: dict[str, dict[object, Entry]] = {}
     kinds: tuple[type[Reading | BenchRun], ...] = (Reading, BenchRun)
     for kind in kinds:
-        for row in log.entries(kind, superseded=True, iteration=iteration):
+        for row in log.about(kind, iteration, specimens, superseded=True):
             if row.specimen in names:
                 found.setdefault(names[row.specimen], {}).setdefault((kind, row.number * log.merged), row)
     return {name: list(rows.values()) for name, rows in found.items()}
 
 
-def _superseded(log: Log, iteration: int, measured: Readings) -> Iterator[tuple[str, str]]:
+def _superseded(
+    log: Log, iteration: int | None, specimens: Sequence[str], measured: Readings
+) -> Iterator[tuple[str, str]]:
     """Readings out of use, and why."""
     current = (reading.number for reading in measured.rows)
     now = next(current, 0)
-    for old in log.entries(Reading, superseded=True, iteration=iteration):  # both in the order of the log
+    for old in log.about(Reading, iteration, specimens, superseded=True):  # both in the same order
         if old.number == now:
             now = next(current, 0)
             continue
@@ -172,27 +186,49 @@ def _first(left_out: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
             yield f"{count - _MOST_LEFT_OUT} more readings", why
 
 
+def _printed(log: Log, left_out: list[tuple[str, str]]) -> dict[str, Print]:
+    """The latest print of each specimen; one that two machines have bound to different designs is left out."""
+    found: dict[str, Print] = {}
+    for row in log.prints():
+        before = found.setdefault(row.specimen, row)
+        if before.design_id != row.design_id:
+            both = f"{before.design} ({before.design_id}) and {row.design} ({row.design_id})"
+            left_out.append((f"design of {row.specimen}", f"bound to {both}: withdraw one of the prints"))
+            row = replace(row, design_id="", design="")
+        found[row.specimen] = row
+    return found
+
+
 def _by_specimen(
-    log: Log, iteration: int, printed: Mapping[str, str], left_out: list[tuple[str, str]]
-) -> dict[str, Design]:
-    """The designs that the specimens were printed of: from their print bed, else what their names stand for."""
+    log: Log, iteration: int | None, specimens: Sequence[str], printed: Mapping[str, Print],
+    left_out: list[tuple[str, str]],
+) -> dict[str, Design]:  # fmt: skip
+    """The designs of specimens: those that they are bound to, else what their names stand for."""
     found: dict[str, Design] = {}
     recorded = on_beds(log)
     made: dict[Specimen, Design | None] = {}
     for specimen in log.specimens(iteration=iteration):
-        if printed.get(specimen.specimen) in recorded:
-            found[specimen.specimen] = recorded[printed[specimen.specimen]]
+        name, of = specimen.specimen, printed.get(specimen.specimen)
+        if specimens and name not in specimens:
+            continue
+        if of and of.design_id in recorded:
+            found[name] = recorded[of.design_id]
             continue
         try:
-            kind = replace(parse(specimen.specimen), iteration=None, replicate=None, place="")
+            kind = replace(parse(name), iteration=None, replicate=None, place="")
             design = made[kind] if kind in made else made.setdefault(kind, design_of(kind))
         except SensorgenError as error:
-            left_out.append((f"design of {specimen.specimen}", str(error)))
+            left_out.append((f"design of {name}", str(error)))
             continue
-        if design is None:
-            left_out.append((f"design of {specimen.specimen}", "its name stands for no design"))
+        if of and not of.design_id:
+            continue
+        if of and (design is None or design.name != of.design):  # of the same name it is another version's identity
+            left_out.append((f"design of {name}", f"printed of {of.design} ({of.design_id}), which the log does not "
+                             "have: sensorgen log predict its file"))  # fmt: skip
+        elif design is None:
+            left_out.append((f"design of {name}", "its name stands for no design"))
         else:
-            found[specimen.specimen] = design
+            found[name] = design
     return found
 
 

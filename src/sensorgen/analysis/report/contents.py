@@ -14,7 +14,7 @@ from sensorgen.analysis.report.provenance import origins
 from sensorgen.analysis.report.variants import Variant
 from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log import Log
+from sensorgen.measure.log import Log, notes
 
 STEPS = ("readings", "recordings", "residuals", "variants", "page")
 
@@ -57,8 +57,10 @@ class Report:
 
     Attributes
     ----------
-    iteration : int
-        Of the design.
+    iteration : int or None
+        Of the design; None of specimens, or of all.
+    specimens : tuple of str
+        Specimens that it was asked of.
     made_at : str
         UTC.
     headline : tuple of str
@@ -69,7 +71,8 @@ class Report:
         Residuals first.
     """
 
-    iteration: int
+    iteration: int | None
+    specimens: tuple[str, ...]
     made_at: str
     headline: tuple[str, ...]
     findings: tuple[str, ...]
@@ -78,7 +81,8 @@ class Report:
     @property
     def title(self) -> str:
         """Of the page."""
-        return f"Iteration {self.iteration}: predicted and measured"
+        which = f"Iteration {self.iteration}" if self.iteration is not None else "All specimens"
+        return f"{', '.join(self.specimens) or which}: predicted and measured"
 
     @property
     def figures(self) -> tuple[Figure, ...]:
@@ -91,34 +95,40 @@ class Report:
         return tuple(table for section in self.sections for table in section.tables)
 
 
-def report(log: Log, iteration: int, step: Callable[[str], None] = lambda _: None) -> Report:
-    """The report of an iteration.
+def report(
+    log: Log, iteration: int | None, step: Callable[[str], None] = lambda _: None, *, specimens: Sequence[str] = ()
+) -> Report:
+    """The report of an iteration or of specimens.
 
     Parameters
     ----------
     log : Log
         An open one.
-    iteration : int
-        Of the design.
+    iteration : int or None
+        Of the design; of all if None, and no specimens are given.
     step : callable
         Called with each of ``STEPS``, and with the name of each design to predict, before it is done.
+    specimens : sequence of str
+        Specimens as written, in place of an iteration.
 
     Raises
     ------
     BadInput
-        The log has no readings of the iteration.
+        The log has no readings of the iteration, or of a specimen.
     """
     step("readings")
-    found = of_iteration(log, iteration, step)
+    specimens = tuple(notes.specimen(name, log).specimen for name in specimens)
+    found = of_iteration(log, iteration, step, specimens=specimens)
     left_out = list(found.left_out)
     step("recordings")
-    recorded = list(runs(log, iteration, left_out))
+    recorded = list(runs(log, iteration, left_out, specimens=specimens))
     if not found.rows and not recorded:
         known = ", ".join(map(str, known_iterations(log))) or "none"
         lost = "; ".join(f"{what}: {why}" for what, why in left_out)
+        of = ", ".join(specimens) or f"iteration {iteration}"
         raise BadInput(
-            f"the log has no readings of iteration {iteration}{f' ({lost})' if lost else ''}; iterations in it: "
-            f"{known}. Log some with: sensorgen log multimeter SPECIMEN --y 0.65k --z OL"
+            f"the log has no readings of {of}{f' ({lost})' if lost else ''}; iterations in it: {known}. "
+            "Log some with: sensorgen log add SPECIMEN --y 0.65k --z OL"
         )
     step("residuals")
     explanations = explained.explanations(found, recorded)
@@ -131,8 +141,9 @@ def report(log: Log, iteration: int, step: Callable[[str], None] = lambda _: Non
     sections = list(_sections(log, found, recorded, explanations, impedances, left_out))
     step("page")
     return Report(
-        iteration, datetime.now(UTC).isoformat(timespec="seconds"), (*headline, *recordings.headline(impedances)),
-        findings, tuple(s for s in sections if s.tables or s.figures or s.variants),
+        iteration, specimens, datetime.now(UTC).isoformat(timespec="seconds"),
+        (*headline, *recordings.headline(impedances)), findings,
+        tuple(s for s in sections if s.tables or s.figures or s.variants),
     )  # fmt: skip
 
 

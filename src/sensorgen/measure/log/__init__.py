@@ -3,6 +3,7 @@
 from sensorgen.measure.log.entries import (
     Batch,
     BenchRun,
+    Calibration,
     DesignRow,
     Entry,
     Prediction,
@@ -15,6 +16,6 @@ from sensorgen.measure.log.entries import (
 from sensorgen.measure.log.logbook import PLACE, Log, place
 
 __all__ = [
-    "PLACE", "Batch", "BenchRun", "DesignRow", "Entry", "Log", "Prediction", "Print", "RawFile", "Reading", "Specimen",
-    "Withdrawal", "place",
+    "PLACE", "Batch", "BenchRun", "Calibration", "DesignRow", "Entry", "Log", "Prediction", "Print", "RawFile",
+    "Reading", "Specimen", "Withdrawal", "place",
 ]  # fmt: skip

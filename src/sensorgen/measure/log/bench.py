@@ -59,7 +59,7 @@ def log_recording(
     from sensorgen.measure import recording as recordings
     from sensorgen.measure.recording.spool import MOST_BYTES
 
-    of = notes.specimen(specimen)
+    of, (design_id, design) = notes.specimen(specimen, log), notes.design_fields(specimen, log)
     paths = [recording, *([rig] if rig else [])]
     for path in paths:  # before their SHA-256 is computed
         checked_head(path, MOST_BYTES, "a recording")
@@ -69,7 +69,6 @@ def log_recording(
     kept = [files.keep(log.files, path) for path in paths]
     if kept != before:
         raise BadInput(f"{str(recording)!r} {files.CHANGED}")
-    design_id, design = notes.design_fields(specimen)
     identity = " ".join(filter(None, (of.specimen, *(file.uid for file in kept), supersedes)))
     run = BenchRun(
         **vars(of), uid=sha256(identity.encode()).hexdigest()[:32], written=specimen, design_id=design_id,

@@ -6,6 +6,11 @@ does so for a row of any kind.
 
 from dataclasses import dataclass, fields
 
+from sensorgen.core.errors import BadInput
+from sensorgen.measure.immittance import QUANTITIES
+
+DEFECTS = ("misprint", "zits", "hole", "clog", "under-extrusion", "adhesion", "torn")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
@@ -36,7 +41,7 @@ class Specimen:
     Attributes
     ----------
     specimen : str
-        Name in normal form.
+        Any name that is bound to a design, or one that stands for a design, in normal form.
     iteration : int or None
         Iteration of the design.
     shape, axes : str
@@ -96,12 +101,14 @@ class _OfSpecimen(Specimen, Entry):
 
 @dataclass(frozen=True, kw_only=True)
 class Reading(_OfSpecimen):
-    """Resistances of a specimen by a multimeter, measured together.
+    """What meters showed of a specimen, measured together.
+
+    Version 1 had the fields up to ``source_row``.
 
     Attributes
     ----------
     y_words, z_words : str
-        Resistance along an electrode and between the electrodes, as written.
+        DC resistance along an electrode and between the electrodes, as written.
     y_ohm, z_ohm : tuple of float
         Readings [ohm]; infinite for an overload, empty if not measured.
     baked : bool or None
@@ -114,6 +121,21 @@ class Reading(_OfSpecimen):
         Identification of the instrument; "" for typed readings.
     source_row : int or None
         Row of the imported table, from 1 below its header.
+    quantity : tuple of str
+        Quantity of each AC reading between the electrodes, as in :data:`sensorgen.measure.immittance.QUANTITIES`;
+        a quantity stands once for each repeat.
+    value, frequency_hz : tuple of float
+        Each reading in SI units (phase in rad), and its frequency [Hz].
+    uncertainty : tuple of float
+        Standard uncertainty of each as stated by who measured, 0 where none is; empty if none is stated at all.
+    wires : int or None
+        Leads of the meter, 2 or 4; None if unknown.
+    temperature_c, humidity_percent : float or None
+        Of the air [°C], relative [%].
+    photo, file : str
+        SHA-256 of a photo of the specimen, and of the instrument's export; "" for none.
+    defects : tuple of str
+        Visible defects, as in :data:`DEFECTS`.
     """
 
     y_words: str = ""
@@ -125,6 +147,26 @@ class Reading(_OfSpecimen):
     measured_at: str = ""
     instrument: str = ""
     source_row: int | None = None
+    quantity: tuple[str, ...] = ()
+    value: tuple[float, ...] = ()
+    frequency_hz: tuple[float, ...] = ()
+    uncertainty: tuple[float, ...] = ()
+    wires: int | None = None
+    temperature_c: float | None = None
+    humidity_percent: float | None = None
+    photo: str = ""
+    file: str = ""
+    defects: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        ac = len(self.quantity)
+        if (len(self.value), len(self.frequency_hz)) != (ac, ac) or len(self.uncertainty) not in (0, ac):
+            raise BadInput(
+                f"a reading of {ac} AC quantities with {len(self.value)} values, {len(self.frequency_hz)} "
+                f"frequencies and {len(self.uncertainty)} uncertainties; expected as many of each"
+            )
+        if not QUANTITIES.issuperset(self.quantity):
+            raise BadInput(f"AC quantities {self.quantity!r:.80}; expected some of {', '.join(sorted(QUANTITIES))}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,6 +207,22 @@ class Prediction(Entry):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Calibration(_OfSpecimen):
+    """Calibration of a specimen.
+
+    Attributes
+    ----------
+    version : str
+        Version of sensorgen.
+    data : str
+        The calibration as JSON.
+    """
+
+    version: str
+    data: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Batch(Entry):
     """A print bed.
 
@@ -182,19 +240,25 @@ class Batch(Entry):
 
 @dataclass(frozen=True, kw_only=True)
 class Print(Specimen, Entry):
-    """A specimen on a print bed; later rows of the specimen get its design and batch.
+    """A specimen bound to its design, and to a place on a print bed where that is known.
+
+    Later rows of the specimen get its design and batch. Version 1 had no prints without a batch, and none of another
+    name than on the bed.
 
     Attributes
     ----------
     batch_uid : str
-        ``uid`` of the batch.
+        ``uid`` of the batch; "" if unknown.
     design_id, design : str
         Identity and name of the design.
+    printed : str
+        Its name on the print bed, if that is another.
     """
 
     batch_uid: str
     design_id: str
     design: str
+    printed: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -291,11 +355,13 @@ class Migration(Entry):
 
 KINDS: dict[str, type[Entry]] = {
     "raw_file": RawFile, "batch": Batch, "print": Print, "reading": Reading, "bench_run": BenchRun,
-    "prediction": Prediction, "design": DesignRow, "withdrawal": Withdrawal,
+    "prediction": Prediction, "calibration": Calibration, "design": DesignRow, "withdrawal": Withdrawal,
     "anchor": Anchor, "merge": Merge, "migration": Migration,
 }  # fmt: skip
+VERSIONS = {"reading": 2, "print": 2}  # of the schemas of kinds that have changed; 1 of every other
 NAMES = {kind: name for name, kind in KINDS.items()}
 ROWS = tuple(kind for kind in KINDS.values() if kind not in (Anchor, Merge, Migration))  # not about the log itself
 REFERENCES: dict[type[Entry], dict[str, type[Entry]]] = {
     Batch: {"file": RawFile}, Print: {"batch_uid": Batch}, BenchRun: {"file": RawFile, "rig_file": RawFile},
+    Reading: {"photo": RawFile, "file": RawFile},
 }  # fmt: skip

@@ -19,14 +19,18 @@ from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
 from sensorgen.measure.csv_table import Table
 from sensorgen.measure.log import fields, files
-from sensorgen.measure.log.entries import NAMES, ROWS, DesignRow, Entry, RawFile, Reading, Withdrawal
+from sensorgen.measure.log.entries import NAMES, ROWS, DesignRow, Entry, Print, RawFile, Reading, Withdrawal
 from sensorgen.measure.log.fields import Value, from_cell, from_json, to_cell
 from sensorgen.measure.log.logbook import Log
 
 FORMATS = ("csv", "parquet")
 FILES = {kind: f"{NAMES[kind].replace('_', '-')}s".replace("batchs", "batches") for kind in ROWS}
 LATER = (DesignRow, Withdrawal)  # kinds that exports of version 0.1.0 do not have
-_LATER_COLUMN = "claimed_at"
+_LATER_COLUMNS: dict[type[Entry], tuple[str, ...]] = {  # that exports of earlier versions do not have
+    Print: ("printed",),
+    Reading: ("quantity", "value", "frequency_hz", "uncertainty", "wires", "temperature_c", "humidity_percent",
+              "photo", "file", "defects"),
+}  # fmt: skip
 _COLUMNS = {kind: {k: v for k, v in fields.columns(kind).items() if k != "number"} for kind in ROWS}
 
 
@@ -36,9 +40,13 @@ def columns(kind: type[Entry]) -> dict[str, Any]:
 
 
 def kind_of(names: Iterable[str]) -> type[Entry] | None:
-    """Kind of row with exactly these columns, or None."""
-    present = {*names, _LATER_COLUMN}
-    return next((kind for kind in ROWS if set(columns(kind)) == present), None)
+    """Kind of row with exactly these columns, or None; those of later versions may be missing."""
+    present = {*names, "claimed_at"}
+    for kind in ROWS:
+        needed = columns(kind).keys() - _LATER_COLUMNS.get(kind, ())
+        if needed <= present <= columns(kind).keys():
+            return kind
+    return None
 
 
 def export(log: Log, place: Path) -> int:

@@ -7,8 +7,9 @@ from dataclasses import asdict, dataclass
 from math import isinf
 from typing import Any
 
-from sensorgen.core.document import Column, Facts, Part, Table
-from sensorgen.core.units import si
+from sensorgen.core.document import Cell, Column, Facts, Part, Table
+from sensorgen.core.units import frequency_text, si
+from sensorgen.measure.immittance import shown_value
 from sensorgen.measure.log import facts
 from sensorgen.measure.log.entries import BenchRun, Entry, Prediction, Print, Reading, Withdrawal
 from sensorgen.measure.log.logbook import Log
@@ -35,11 +36,14 @@ class Listing:
     def document(self) -> Iterator[Part]:
         """A line for each row, "?" where something is to be doubted."""
         if self.readings:
-            rows = (
-                (r.number, r.specimen, short(r.y_ohm), short(r.z_ohm), ("? " if r.doubts else "") + _remark(r))
+            ac = any(r.quantity for r in self.readings)
+            rows: Iterator[tuple[Cell, ...]] = (
+                (r.number, r.specimen, short(r.y_ohm), short(r.z_ohm), *([_ac(r)] if ac else []),
+                 ("? " if r.doubts else "") + _remark(r))
                 for r in self.readings
-            )
-            yield Table("readings", "", _READING, tuple(rows))
+            )  # fmt: skip
+            columns = (*_READING[:-1], *([Column("AC")] if ac else []), _READING[-1])
+            yield Table("readings", "", columns, tuple(rows))
         if self.recordings:
             runs = ((run.number, run.specimen, run.file[:12], run.remark) for run in self.recordings)
             yield Table("recordings", "", _RECORDING, tuple(runs))
@@ -96,19 +100,58 @@ def _of_reading(r: Reading) -> tuple[tuple[str, str], ...]:
     return (
         ("Y", _ohms(r.y_words, r.y_ohm)),
         ("Z", _ohms(r.z_words, r.z_ohm)),
+        *(("" if k else "AC", line) for k, line in enumerate(_ac_lines(r))),
         ("baked", {None: "", True: "yes", False: "no"}[r.baked]),
         ("remark", r.remark),
         ("measured", r.measured_at),
-        ("instrument", r.instrument),
+        ("instrument", " by ".join(filter(None, (f"{r.wires} wires" if r.wires else "", r.instrument)))),
+        ("air", ", ".join(_air(r))),
+        ("defects", ", ".join(r.defects)),
+        ("photo", r.photo),
+        ("file", r.file),
         ("design", f"{r.design} ({r.design_id})" if r.design_id else ""),
         ("batch", r.batch),
         ("source", r.source + (f", row {r.source_row}" if r.source_row is not None else "")),
     )
 
 
+def _air(r: Reading) -> Iterator[str]:
+    if r.temperature_c is not None:
+        yield f"{r.temperature_c:g} °C"
+    if r.humidity_percent is not None:
+        yield f"{r.humidity_percent:g} % relative humidity"
+
+
+def _ac_lines(r: Reading) -> list[str]:
+    """AC quantities of a reading, repeats side by side, as ``Cp 24.9 pF / 25.1 pF at 10kHz``."""
+    found: dict[tuple[str, float], list[str]] = {}
+    stated = r.uncertainty or (0.0,) * len(r.value)
+    for quantity, value, frequency, plus_minus in zip(r.quantity, r.value, r.frequency_hz, stated, strict=True):
+        text = shown_value(quantity, value) + (f" ± {shown_value(quantity, plus_minus)}" if plus_minus else "")
+        found.setdefault((quantity, frequency), []).append(text)
+    return [f"{name} {' / '.join(values)} at {frequency_text(f)}" for (name, f), values in found.items()]
+
+
+def _ac(r: Reading) -> str:
+    first, *more = _ac_lines(r) or ["-"]
+    return f"{first}, {len(more)} more" if more else first
+
+
 def _of_other(row: Entry) -> Iterator[tuple[str, str]]:
     """A recording, a print or a prediction."""
-    names = ("file", "rig_file", "remark", "design", "design_id", "batch", "batch_uid", "of", "reason", "head")
+    names = (
+        "file",
+        "rig_file",
+        "remark",
+        "design",
+        "design_id",
+        "printed",
+        "batch",
+        "batch_uid",
+        "of",
+        "reason",
+        "head",
+    )
     return ((name, getattr(row, name, "")) for name in names)
 
 
@@ -144,7 +187,7 @@ def logged(log: Log, entries: Iterable[Entry], known: str) -> Details:
 
 def _near(entry: Entry, log: Log) -> Iterator[tuple[str, str]]:
     """A hint where a specimen is on no print bed of its iteration, and another with nearly its name is."""
-    if isinstance(entry, Reading) and not entry.batch:
+    if isinstance(entry, Reading) and not entry.batch and not log.bound(entry.specimen):
         names = [printed.specimen for printed in log.entries(Print, iteration=entry.iteration)]
         for near in difflib.get_close_matches(entry.specimen, names, n=1, cutoff=0.8):
             hint = f"no print bed here has {entry.specimen!r}; near is {near!r}: --corrects {entry.number}, if meant"

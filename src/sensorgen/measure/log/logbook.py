@@ -18,6 +18,7 @@ from sensorgen.measure.log.entries import (
     NAMES,
     REFERENCES,
     SPECIMEN_COLUMNS,
+    VERSIONS,
     Batch,
     BenchRun,
     Entry,
@@ -33,7 +34,6 @@ from sensorgen.measure.log.entries import (
 from sensorgen.measure.log.fields import INDEXED, Value, columns, decode, encode, word
 
 PLACE = "SENSORGEN_LOG"  # environment variable with another file
-VERSION = 1  # of the schema of every kind
 _FROM_PRINT = ("batch", "design_id", "design")
 # what may differ between copies of one row that several machines have imported
 _LOCAL = ("number", "logged_at", "claimed_at", *_FROM_PRINT)
@@ -170,6 +170,28 @@ class Log:
         found = (self._row(*row) for row in self._rows(sql, [NAMES[kind], *asked.values()]))
         wanted = (row for row in found if all(getattr(row, name) == value for name, value in equal.items()))
         yield from reversed(list(itertools.islice(wanted, last))) if last else wanted
+
+    def about(
+        self, kind: type[_Kind], iteration: int | None, specimens: Sequence[str] = (), *, superseded: bool = False
+    ) -> Iterator[_Kind]:
+        """Rows of one kind about some specimens, else about an iteration, else all.
+
+        Parameters
+        ----------
+        kind : type
+            Kind of the rows.
+        iteration : int or None
+            Iteration, if no specimens are given.
+        specimens : sequence of str
+            Names of specimens; their rows come one specimen after the other.
+        superseded : bool
+            Also rows that a later row corrects or withdraws.
+        """
+        for specimen in specimens:
+            yield from self.entries(kind, superseded=superseded, specimen=specimen)
+        if not specimens:
+            which = {} if iteration is None else {"iteration": iteration}
+            yield from self.entries(kind, superseded=superseded, **which)
 
     def count(self, kind: type[Entry], *, superseded: bool = False) -> int:
         """Number of rows of a kind."""
@@ -318,13 +340,13 @@ class Log:
                 heads = chain.heads(self.head()[1], added)
                 if len(heads) > 1:
                     row = Merge(uid="")
-                    writer.append(chain.made(heads, NAMES[Merge], VERSION, now, encode(row)), copy=False)
+                    writer.append(chain.made(heads, NAMES[Merge], 1, now, encode(row)), copy=False)
                 writer.finish()
             return len(added), len(missing) - len(added)
 
     def _received(self, record: Record) -> Entry:
         """Row of another machine's record."""
-        if record.kind not in KINDS or record.version > VERSION:
+        if record.kind not in KINDS or record.version > VERSIONS.get(record.kind, 1):
             raise BadInput(f"record {record.id[:12]} is a {record.kind!r:.40} of version {record.version}, "
                            "which this sensorgen does not read: take a newer one")  # fmt: skip
         if not chain.sound(record):
@@ -351,11 +373,16 @@ class Log:
         self._check_correction(entry)
         if isinstance(entry, Prediction):
             _check_prediction(entry)
+        if isinstance(entry, Print) and not entry.logged_at:
+            before = self.bound(entry.specimen)
+            if before and before.design_id != entry.design_id:
+                raise BadInput(_two_designs(before, entry))
         if isinstance(entry, Reading | BenchRun) and not (entry.batch or entry.logged_at):
             entry = self._with_print(entry)
         claimed = entry.claimed_at or entry.logged_at
         entry = dataclasses.replace(entry, logged_at=now, claimed_at=claimed, number=0)
-        record = chain.made([writer.head] if writer.head else [], NAMES[kind], VERSION, now, encode(entry))
+        version = VERSIONS.get(NAMES[kind], 1)
+        record = chain.made([writer.head] if writer.head else [], NAMES[kind], version, now, encode(entry))
         return dataclasses.replace(entry, number=writer.append(record, copy=False))
 
     def _check_references(self, entry: Entry) -> None:
@@ -387,11 +414,25 @@ class Log:
 
     def _with_print(self, entry: Reading | BenchRun) -> Reading | BenchRun:
         """Entry with batch and design of the specimen's latest print."""
-        printed = next(self.entries(Print, last=1, specimen=entry.specimen), None)
+        printed = self.bound(entry.specimen)
         if printed is None:
             return entry
-        batch = next(self._of_uid(Batch, printed.batch_uid)).batch
+        batch = next((row.batch for row in self._of_uid(Batch, printed.batch_uid)), "")
         return dataclasses.replace(entry, batch=batch, design_id=printed.design_id, design=printed.design)
+
+    def bound(self, specimen: str) -> Print | None:
+        """The latest print of a specimen, which binds its name to a design; None of a name that is not bound.
+
+        Raises
+        ------
+        BadInput
+            Two machines have bound the name to different designs.
+        """
+        *others, printed = (None, *self.entries(Print, specimen=specimen)) if specimen else (None,)
+        for other in others:
+            if printed and other and other.design_id != printed.design_id:
+                raise BadInput(_two_designs(other, printed))
+        return printed
 
     def _rows(self, sql: str, values: Sequence[Value] = ()) -> Iterator[tuple[Any, ...]]:
         with database.translate_errors(self.path):
@@ -435,6 +476,14 @@ class _Writer:
 
 def _current(*, superseded: bool) -> str:
     return "TRUE" if superseded else f"uid NOT IN ({_SUPERSEDED})"
+
+
+def _two_designs(one: Print, other: Print) -> str:
+    return (
+        f"specimen {one.specimen!r:.80} is {one.design or 'a design'} ({one.design_id}, print {one.number}) and cannot "
+        f"be {other.design or 'a design'} ({other.design_id}) as well: take another name for one of them, or, if print "
+        f"{one.number} is wrong: sensorgen log withdraw print {one.number} --reason TEXT"
+    )
 
 
 def _same(one: Entry, other: Entry, but: tuple[str, ...]) -> bool:

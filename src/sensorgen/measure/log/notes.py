@@ -3,36 +3,60 @@
 import dataclasses
 import re
 import uuid
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import BadInput, SensorgenError, within
+from sensorgen.core.units import frequency_text
 from sensorgen.design import specimen_name
 from sensorgen.design.design import Design
+from sensorgen.measure import immittance
 from sensorgen.measure.log import resistances
-from sensorgen.measure.log.entries import SPECIMEN_COLUMNS, Reading, Specimen
+from sensorgen.measure.log.entries import SPECIMEN_COLUMNS, Print, Reading, Specimen
 from sensorgen.measure.log.resistances import Resistances
+
+if TYPE_CHECKING:
+    from sensorgen.measure.log.logbook import Log
 
 MAX_REMARK = 10_000  # characters
 FIRST_WITH_FILMS = 22  # iteration from which on the thesis writes films into names
 _UNBAKED = re.compile(r"\b(not|un|never)[\s-]*baked\b|\bbefore (the )?bak(e|ing)\b", re.IGNORECASE)
 
 
-def specimen(written: str) -> Specimen:
+def specimen(written: str, log: "Log | None" = None) -> Specimen:
     """Specimen by its name.
+
+    Parameters
+    ----------
+    written : str
+        Name as written.
+    log : Log, optional
+        Where names are bound to designs; any other name must be one that stands for a design.
 
     Raises
     ------
     BadInput
-        The name cannot be parsed.
+        The name is bound to two designs; or to none, and it cannot be parsed.
     """
-    name = specimen_name.parse(written)
+    bound = _bound(written, log)
+    if bound:
+        return Specimen(**{key: getattr(bound, key) for key in SPECIMEN_COLUMNS})
+    try:
+        name = specimen_name.parse(written)
+    except BadInput as error:
+        raise BadInput(f"{error}; or bind it to its design: sensorgen log specimen NAME --design FILE") from None
     return Specimen(specimen=name.name, **{key: getattr(name, key) for key in SPECIMEN_COLUMNS[1:]})
+
+
+def _bound(written: str, log: "Log | None") -> Print | None:
+    return log.bound(" ".join(written.split())) if log else None
 
 
 def reading(
     written: str, y_words: str = "", z_words: str = "", *, remark: str = "", baked: bool | None = None,
     measured_at: str = "", instrument: str = "", source: str = "typed", source_row: int | None = None,
-    supersedes: str = "", uid: str = "", table: bool = False, mega: bool = False,
+    supersedes: str = "", uid: str = "", table: bool = False, mega: bool = False, log: "Log | None" = None,
 ) -> Reading:  # fmt: skip
     """Reading of the multimeter, from text.
 
@@ -54,6 +78,8 @@ def reading(
         Whether the text comes from a table, where a blank beside a reading may be an overload.
     mega : bool
         Whether a small m is known to mean mega, so that it raises no doubt.
+    log : Log, optional
+        As of :func:`specimen`.
 
     Raises
     ------
@@ -70,24 +96,65 @@ def reading(
         raise BadInput(f"a remark of {len(remark)} characters; expected at most {MAX_REMARK}")
     if any("\0" in text for text in (remark, written, y_words, z_words)):
         raise BadInput("a zero byte in a name, a value or a remark; expected text")
-    of, name = specimen(written), specimen_name.parse(written)
+    of, bound = specimen(written, log), _bound(written, log)
     y, z = resistance("y", y_words, mega=mega), resistance("z", z_words, mega=mega)
     unbaked = bool(_UNBAKED.search(remark))
-    film_expected = (name.iteration or 0) < FIRST_WITH_FILMS
-    doubts = [doubt for doubt in name.assumed if doubt != specimen_name.NO_FILM or film_expected]
+    film_expected = (of.iteration or 0) < FIRST_WITH_FILMS
+    assumed = () if bound else specimen_name.parse(written).assumed
+    doubts = [doubt for doubt in assumed if doubt != specimen_name.NO_FILM or film_expected]
     doubts += [f"{axis}: {doubt}" for axis, parsed in (("y", y), ("z", z)) for doubt in parsed.doubts]
     if table and not (y.ohm and z.ohm):
         blank = f"{'z' if y.ohm else 'y'} blank: not measured, or an overload"
         doubts.append(blank if y.ohm or z.ohm else "no measurement")
     if unbaked and baked:
         doubts.append("baked, but the remark says that it is not")
-    design_id, design = design_fields(written)
+    design_id, design = design_fields(written, log)
     return Reading(
         **vars(of), uid=uid or uuid.uuid4().hex, design_id=design_id, design=design, written=written,
         y_words=y_words, z_words=z_words, y_ohm=y.ohm, z_ohm=z.ohm, remark=remark, doubts=tuple(doubts),
         baked=False if baked is None and unbaked else baked, measured_at=measured_at, instrument=instrument,
         source=source, source_row=source_row, supersedes=supersedes,
     )  # fmt: skip
+
+
+def with_ac(of: Reading, typed: Mapping[str, Sequence[str]]) -> Reading:
+    """Reading with AC quantities between the electrodes.
+
+    Parameters
+    ----------
+    of : Reading
+        Of the same specimen and time.
+    typed : mapping of str to sequence of str
+        Texts as :func:`sensorgen.measure.immittance.parse` reads them, by quantity.
+
+    Raises
+    ------
+    BadInput
+        A text that cannot be parsed; the message names the quantity.
+
+    Examples
+    --------
+    >>> found = with_ac(reading("23 triX"), {"Cp": ["63pF@1kHz"], "D": ["0.02@1kHz", "0.01@10kHz"]})
+    >>> found.quantity, found.frequency_hz
+    (('Cp', 'D', 'D'), (1000.0, 1000.0, 10000.0))
+    """
+    every = [one for name, texts in typed.items() for text in texts for one in immittance.parse(name, text)]
+    stated = tuple(one.uncertainty for one in every)
+    return dataclasses.replace(
+        of, quantity=tuple(one.quantity for one in every), value=tuple(one.value for one in every),
+        frequency_hz=tuple(one.frequency_hz for one in every), uncertainty=stated if any(stated) else (),
+        doubts=(*of.doubts, *implausible(every)),
+    )  # fmt: skip
+
+
+def implausible(every: Iterable[immittance.AcReading]) -> tuple[str, ...]:
+    """AC readings that no passive specimen has, in words."""
+    return tuple(
+        f"{one.quantity} {immittance.shown_value(one.quantity, one.value)} at {frequency_text(one.frequency_hz)}: "
+        "below 0, as no passive specimen; check contacts and open/short compensation"
+        for one in every
+        if one.value < 0 and one.quantity in immittance.NEVER_NEGATIVE
+    )
 
 
 def resistance(axis: str, text: str, *, mega: bool = False) -> Resistances:
@@ -102,8 +169,11 @@ def resistance(axis: str, text: str, *, mega: bool = False) -> Resistances:
         return resistances.parse(text, mega=mega)
 
 
-def design_fields(written: str) -> tuple[str, str]:
-    """Identity and name of the design that a specimen's name stands for; "" where it stands for none."""
+def design_fields(written: str, log: "Log | None" = None) -> tuple[str, str]:
+    """Identity and name of the design that a specimen's name is bound to or stands for; "" where there is none."""
+    bound = _bound(written, log)
+    if bound:
+        return bound.design_id, bound.design
     design = design_of(written)
     return (design.id(), design.name) if design else ("", "")
 

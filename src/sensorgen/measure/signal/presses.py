@@ -17,6 +17,7 @@ _SHORTEST_S = 0.2
 _LEAST = 8  # samples that a mean and its error need
 _HYSTERESIS = 0.5
 _STEP_S, _SIGNIFICANT = 0.3, 6.0
+_SAME, _SAME_N = 0.05, 0.05  # share, and least difference, up to which two forces are one
 _MAD = 0.6745  # median absolute deviation of noise over its standard deviation
 
 
@@ -126,6 +127,8 @@ class Pairs:
         Standard errors of the difference: of R in the real part, of X in the imaginary part [ohm].
     samples : (p, 2) array
         Readings in the two means.
+    peak_n, hold_s : (p,) array
+        Largest force of the press so far [N], and the time for which the force has been what it is [s]; nan if unknown.
     left_out : tuple of str
         Presses without enough readings.
     """
@@ -138,6 +141,8 @@ class Pairs:
     difference_ohm: Complex
     error_ohm: Complex
     samples: NDArray[np.intp]
+    peak_n: Real
+    hold_s: Real
     left_out: tuple[str, ...] = ()
 
 
@@ -192,11 +197,26 @@ def pairs(
         rows.append((
             press.start_s, _known_mean(force_n[under]), _known_mean(position_mm[under]), first.mean(axis=0),
             second.mean(axis=0), re + 1j * im, (len(before), len(under)),
+            *_course(time_s, force_n, press.start_s, end - window_s / 2),
         ))  # fmt: skip
     if not rows:
         raise BadInput(f"{len(presses)} presses, none with {_LEAST} readings before and under it; expected some")
-    start, force, position, unloaded, loaded, error, samples = map(np.array, zip(*rows, strict=True))
-    return Pairs(start, force, position, unloaded, loaded, loaded - unloaded, error, samples, tuple(left_out))
+    start, force, position, unloaded, loaded, error, samples, peak, hold = map(np.array, zip(*rows, strict=True))
+    return Pairs(
+        start, force, position, unloaded, loaded, loaded - unloaded, error, samples, peak, hold, tuple(left_out)
+    )  # fmt: skip
+
+
+def _course(time_s: Real, force_n: Real, start_s: float, at_s: float) -> tuple[float, float]:
+    """Largest force so far, and since when the force has been as at that time."""
+    first, last = np.searchsorted(time_s, [start_s, at_s])
+    force = force_n[first : last + 1]
+    if not np.isfinite(force).any():
+        return np.nan, np.nan
+    now = force[np.isfinite(force)][-1]
+    other = np.flatnonzero(~(np.abs(force - now) <= max(_SAME * now, _SAME_N)))
+    since = time_s[first + other[-1] + 1] if other.size else start_s
+    return float(np.nanmax(force)), float(at_s - since)
 
 
 def _known_mean(values: Real) -> float:

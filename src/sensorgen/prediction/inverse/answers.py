@@ -27,7 +27,7 @@ def header(kept: Sequence[str]) -> str:
     >>> header(["time_s", "force_n"])[:32]
     'time_s,force_n_given,force_n,pos'
     """
-    return _row([*(_cell(f"{name}_given" if name in COLUMNS else name) for name in kept), *COLUMNS])
+    return csv_row([*(csv_cell(f"{name}_given" if name in COLUMNS else name) for name in kept), *COLUMNS])
 
 
 def rows(kept: Sequence[Sequence[str]], found: Estimates, *, prior: bool = False) -> str:
@@ -44,7 +44,9 @@ def rows(kept: Sequence[Sequence[str]], found: Estimates, *, prior: bool = False
     """
     words = [status.words for status in Status]
     ends = zip(kept, _numbers(found, prior).tolist(), found.tones.tolist(), found.status.tolist(), strict=True)
-    return "".join(_row([*map(_cell, own), *map(_text, row), str(n), words[status]]) for own, row, n, status in ends)
+    return "".join(
+        csv_row([*map(csv_cell, own), *map(number, row), str(n), words[status]]) for own, row, n, status in ends
+    )
 
 
 def _numbers(found: Estimates, prior: bool) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -181,14 +183,16 @@ def _middle(values: Sequence[float]) -> float | None:
     return found if found < np.inf else None
 
 
-def _text(value: float) -> str:
+def number(value: float) -> str:
+    """A number as CSV; blank where there is none."""
     return f"{value:.9g}" if abs(value) < np.inf else ""
 
 
-def _cell(text: str) -> str:
+def csv_cell(text: str) -> str:
     """A cell as CSV; quoted where it would come apart."""
     return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
 
 
-def _row(cells: Sequence[str]) -> str:
+def csv_row(cells: Sequence[str]) -> str:
+    """A row of a CSV file."""
     return ",".join(cells) + "\n"

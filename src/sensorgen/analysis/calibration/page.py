@@ -1,0 +1,99 @@
+"""Pictures of a calibration: presses found again, what was learnt of each parameter, and what is left over."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sensorgen.analysis.calibration import Made, Recheck
+from sensorgen.analysis.plots import pages
+from sensorgen.analysis.plots.figure import BLUE, COLOURS, GREY, ORANGE, Axis, Curve, Figure, Panel
+from sensorgen.core import document
+from sensorgen.core.units import M_PER_MM
+from sensorgen.prediction.calibration.calibration import Calibration
+from sensorgen.prediction.calibration.inversion import LEVEL
+
+_NORMAL_90 = 1.6448536269514722  # normal deviate of 5 %
+
+
+def html(made: Sequence[Made | Recheck]) -> str:
+    """A page for the browser; raises MissingValue where Plotly is not installed."""
+    figures, words = [], []
+    for number, one in enumerate(made):
+        words += [part for part in one.document() if isinstance(part, str) and part]
+        if isinstance(one, Made):
+            figures += [*_presses(one, number), _left_over(one, number)]
+        figures.append(_parameters(one.calibration, number))
+    names = ", ".join(one.calibration.specimen for one in made)
+    return pages.page(f"Calibration of {document.visible(names)}", words, figures)
+
+
+def _presses(made: Made, number: int) -> list[Figure]:
+    """Force and position of known presses against what was found of them without them."""
+    if made.held is None:
+        return []
+    known, found = made.data.presses, made.held
+    panels = []
+    for truth, middle, ends, words in (
+        (known.force_n, found.force_n, found.force_90_n, "force [N]"),
+        (known.position_m / M_PER_MM, found.position_m / M_PER_MM, found.position_90_m / M_PER_MM, "position [mm]"),
+    ):
+        inside = (ends[:, 0] <= truth) & (truth <= ends[:, 1])
+        most = float(max(truth.max(), ends.max()))
+        content = [Curve("line", "true", [0, most], [0, most], colour=GREY, dash="dash")]
+        for name, rows, colour in ((f"in the {LEVEL:.0%} interval", inside, BLUE), ("outside", ~inside, ORANGE)):
+            if rows.any():
+                content.append(Curve(
+                    "points", name, middle[rows], truth[rows], low=ends[rows, 0], high=ends[rows, 1], colour=colour
+                ))  # fmt: skip
+        panels.append(Panel(tuple(content), Axis(f"found {words}"), Axis(f"known {words}")))
+    title = f"{made.calibration.specimen}: each press found again from the others"
+    alt = "Force and position that were found, with their intervals, against those that are known."
+    return [Figure(f"presses-{number}", title, alt, {"": tuple(panels)}, columns=2)]
+
+
+def _left_over(made: Made, number: int) -> Figure:
+    """Residuals of the ratios at each tone, over force."""
+    model, data = made.calibration.model, made.data
+    panels = []
+    if len(data.presses.force_n):
+        left = data.ratio - model.ratio(made.calibration.posterior.at, data.presses)
+        for part, of in (("magnitude", left.real), ("phase", left.imag)):
+            content = tuple(
+                Curve(
+                    "points", f"{f / 1e3:g} kHz", data.presses.force_n, 100 * of[:, k], colour=COLOURS[k % len(COLOURS)]
+                )
+                for k, f in enumerate(model.frequency_hz.tolist())
+            )
+            unit = "%" if part == "magnitude" else "0.01 rad"
+            panels.append(
+                Panel(content, Axis("force [N]"), Axis(f"measured less fitted {part} of pressed/rest [{unit}]"))
+            )
+    rest = 100 * (data.rest - model.rest(made.calibration.posterior.at))
+    khz = model.frequency_hz / 1e3
+    panels.append(Panel(
+        (Curve("points", "magnitude [%]", khz, rest.real, colour=BLUE),
+         Curve("points", "phase [0.01 rad]", khz, rest.imag, colour=ORANGE)),
+        Axis("frequency [kHz]", log=True), Axis("at rest: measured less fitted"),
+    ))  # fmt: skip
+    alt = "Residuals of the calibration: of presses over force, of the reading at rest over frequency."
+    return Figure(
+        f"residuals-{number}",
+        f"{made.calibration.specimen}: what the fit leaves over",
+        alt,
+        {"": tuple(panels)},
+        columns=2,
+    )
+
+
+def _parameters(calibration: Calibration, number: int) -> Figure:
+    """Posterior of every parameter beside its prior, in standard deviations of the prior."""
+    p, names = calibration.posterior, calibration.model.names
+    sd = np.sqrt(np.diag(p.covariance))
+    before = np.full(len(names), _NORMAL_90)
+    content = (
+        Curve("ranges", "before", np.zeros(len(names)), names, low=-before, high=before, colour=GREY),
+        Curve("ranges", "after", p.at, names, low=p.at - _NORMAL_90 * sd, high=p.at + _NORMAL_90 * sd, colour=BLUE),
+    )
+    alt = "Ranges of 90 % of each parameter before and after calibration, in standard deviations before."
+    panel = Panel(content, Axis("standard deviations of what was known before"), Axis(names=tuple(names)))
+    return Figure(f"parameters-{number}", f"{calibration.specimen}: what was learnt", alt, {"": (panel,)})

@@ -1,0 +1,86 @@
+"""``sensorgen calibrate``: how one specimen differs from its prediction, by known presses."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from sensorgen.cli import body_options, log_words, render, show
+from sensorgen.cli.words import Length
+from sensorgen.core import units
+from sensorgen.core.errors import BadInput
+
+if TYPE_CHECKING:
+    from sensorgen.analysis.calibration import Made, Recheck
+
+
+def _work(
+    specimens: tuple[str, ...], tip_mm: float, force_offset: str, recordings: tuple[int, ...], page: str | None,
+    file: str | None, *, again: bool, dry_run: bool,
+) -> int:  # fmt: skip
+    """Calibrate specimens by recordings with known presses that the log has of them.
+
+    Several specimens share the bench. Some 30 presses, half of them after a higher one and held for 0.3 to 30 s, are
+    enough; with none, R, C and leak are calibrated by the readings at rest. 'sensorgen invert SPECIMEN' then uses the
+    result, which the log keeps.
+    """
+    from sensorgen.analysis import calibration
+
+    bench = calibration.Bench(tip_mm * units.M_PER_MM, _offset(force_offset))
+    if again and len(specimens) > 1:
+        raise BadInput(f"--recheck of {len(specimens)} specimens; expected one")
+    with log_words.opened(file) as log, show.progress(["calibrating"]) as step:
+        made: list[Made | Recheck]
+        if again:
+            made = [calibration.recheck(log, specimens[0], recordings)]
+        else:
+            made = [
+                *calibration.calibrate(log, specimens, bench, recordings, body_of=body_options.body_of(), step=step)
+            ]
+        if not dry_run:
+            log.add(calibration.rows(log, [one.calibration for one in made]))
+    for one in made:
+        render.deliver(one)
+    if page:
+        from sensorgen.analysis.calibration.page import html
+        from sensorgen.core import files as store
+
+        store.replace(Path(page), html(made).encode())
+        render.say(page)
+    return 0
+
+
+def _offset(text: str) -> tuple[float, float]:
+    mean, mark, spread = text.replace(" ", "").replace("±", "+-").partition("+-")
+    if not mark:
+        raise BadInput(f"--force-offset {text!r:.40}: expected mean and standard deviation, as 0.9+-0.1 (N)")
+    try:
+        return units.force_n(mean), units.force_n(spread)
+    except BadInput as error:
+        raise error.within("--force-offset") from None
+
+
+command = click.Command(
+    "calibrate", callback=_work, help=_work.__doc__,
+    params=[
+        click.Argument(["specimens"], nargs=-1, required=True, metavar="SPECIMEN..."),
+        click.Option(["--tip", "tip_mm"], type=Length(), default="5mm", show_default=True, help="Length of the tip."),
+        click.Option(
+            ["--force-offset"], default="0+-0.1", show_default=True, metavar="N+-N",
+            help="Force on the sensor above what the rig says, as the weight of its piston: 0.9+-0.1 for the thesis's.",
+        ),
+        click.Option(
+            ["--recording", "recordings"], type=click.IntRange(1), multiple=True, metavar="NUMBER",
+            help="Only this recording of the log.",
+        ),
+        click.Option(
+            ["--recheck", "again"], is_flag=True,
+            help="Hold 3 to 5 new known presses against the calibration, as after a change of tip, and mend it.",
+        ),
+        click.Option(["--page"], metavar="FILE.html", help="Write pictures of the presses and of what was learnt."),
+        log_words.where(),
+        *body_options.body_options(),
+        click.Option(["--dry-run"], is_flag=True, help="Log nothing."),
+        *render.options("json", "markdown"),
+    ],
+)  # fmt: skip

@@ -1,0 +1,207 @@
+r"""AC quantities between two terminals, as people type them and as LCR meters show them; impedance from any pair.
+
+With :math:`\omega = 2 \pi f`, the closed forms are
+
+.. math:: Z = R + jX = |Z| e^{j\theta}, \qquad 1/Z = Y = G + jB, \qquad D = 1/Q = R/|X| = G/|B|,
+
+    X = -1/(\omega C_s) = \omega L_s, \qquad B = \omega C_p = -1/(\omega L_p), \qquad R_p = 1/G.
+
+Series and parallel values differ by :math:`C_s = (1 + D^2) C_p`.
+"""
+
+import cmath
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+from types import MappingProxyType
+
+from sensorgen.core.errors import BadInput, within
+from sensorgen.core.units import PREFIXES, frequency_hz, si
+
+UNITS: Mapping[str, str] = MappingProxyType({
+    "R": "ohm", "X": "ohm", "Z": "ohm", "phase": "rad", "G": "S", "B": "S", "Y": "S", "Cp": "F", "Cs": "F", "Lp": "H",
+    "Ls": "H", "Rp": "ohm", "D": "", "Q": "",
+})  # fmt: skip
+QUANTITIES = frozenset(UNITS)
+NEVER_NEGATIVE = ("R", "Z", "G", "Y", "Cp", "Cs", "Lp", "Ls", "Rp", "D", "Q")  # of a passive specimen
+_EXAMPLES = {"Cp": "12.3pF@1kHz", "Cs": "12.3pF@1kHz", "D": "0.02@1kHz", "phase": "-88deg@1kHz"}
+_SPELLINGS = {
+    "f": "F", "farad": "F", "Ω": "ohm", "\u03c9": "ohm", "\u2126": "ohm", "ohms": "ohm", "r": "ohm", "°": "deg",
+    "degree": "deg", "degrees": "deg", "s": "S", "h": "H",
+}  # fmt: skip
+_SCALES = {("rad", "deg"): Decimal(repr(math.pi / 180)), ("", "%"): Decimal("0.01")}
+_PREFIX = {name: Decimal(10) ** power for power, name in PREFIXES.items()}
+_PREFIX |= {"\u00b5": Decimal("1e-6"), "\u03bc": Decimal("1e-6"), "K": Decimal(1000)}
+_NUMBER = r"[-+]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][-+]?[0-9]{1,3})?"
+_READING = re.compile(rf"(?P<value>{_NUMBER})\s*(?:(?:±|\+/?-)\s*(?P<pm>{_NUMBER})\s*)?(?P<unit>[^\s0-9]*)")
+
+
+@dataclass(frozen=True)
+class AcReading:
+    """One reading of one quantity.
+
+    Attributes
+    ----------
+    quantity : str
+        One of ``QUANTITIES``.
+    value : float
+        In SI units.
+    frequency_hz : float
+        Frequency [Hz].
+    uncertainty : float
+        Standard uncertainty as stated; 0 where none is.
+    """
+
+    quantity: str
+    value: float
+    frequency_hz: float
+    uncertainty: float = 0.0
+
+
+def parse(quantity: str, text: str) -> tuple[AcReading, ...]:
+    """Readings of one quantity at one frequency as typed; repeats have ``/`` between them.
+
+    Parameters
+    ----------
+    quantity : str
+        One of ``QUANTITIES``.
+    text : str
+        As ``12.3pF@1kHz``, ``12.3 / 12.4pF@1kHz`` or ``12.3±0.1pF@1kHz``.
+
+    Raises
+    ------
+    BadInput
+        No number, a unit of another quantity, or no frequency.
+
+    Examples
+    --------
+    >>> [(r.value, r.uncertainty, r.frequency_hz) for r in parse("Cp", "12,3 / 12.4±0.1pF @ 1kHz")]
+    [(1.23e-11, 0.0, 1000.0), (1.24e-11, 1e-13, 1000.0)]
+    >>> round(parse("phase", "-90deg@1kHz")[0].value, 6)
+    -1.570796
+    """
+    words, _, at = text.partition("@")
+    with within(f"{quantity} {text!r:.60}"):
+        if not at.strip():
+            raise BadInput(f"no frequency; write it behind the value, as {_EXAMPLES.get(quantity, '650ohm@1kHz')}")
+        frequency = frequency_hz(at)
+        if not frequency > 0:
+            raise BadInput("expected a frequency above 0 Hz; DC resistances go to --y and --z")
+        found = [_READING.fullmatch(part.strip()) for part in re.split("[/;|]", words.replace("+/-", "±"))]
+        matches = [match for match in found if match]
+        if len(matches) < len(found):
+            raise BadInput(f"no number; expected one as {_EXAMPLES.get(quantity, '650ohm@1kHz')}")
+        last = matches[-1]["unit"]
+        readings = []
+        for match in matches:
+            scale = factor(quantity, match["unit"] or last)
+            value, stated = (float(_decimal(match[name] or "0") * scale) for name in ("value", "pm"))
+            readings.append(AcReading(quantity, value, frequency, abs(stated)))
+    return tuple(readings)
+
+
+def _decimal(text: str) -> Decimal:
+    return Decimal(text.replace(",", "."))
+
+
+def factor(quantity: str, unit: str) -> Decimal:
+    """What a number in a unit is to be multiplied by for SI; 1 where there is no unit.
+
+    Raises
+    ------
+    BadInput
+        A unit of another quantity.
+
+    Examples
+    --------
+    >>> factor("Cp", "pF"), factor("R", "kΩ"), factor("D", "%"), factor("G", "")
+    (Decimal('1E-12'), Decimal('1000'), Decimal('0.01'), Decimal('1'))
+    """
+    wanted = UNITS[quantity]
+    if not unit or unit == wanted:
+        return Decimal(1)
+    for length in range(len(unit)):  # the prefix is what stands before the unit
+        base = unit[length:]
+        base = base if base == wanted else _SPELLINGS.get(base, _SPELLINGS.get(base.casefold(), base.casefold()))
+        prefix = _PREFIX.get(unit[:length])
+        if prefix is not None and base == wanted:
+            return prefix
+        if length == 0 and (wanted, base) in _SCALES:
+            return _SCALES[wanted, base]
+    if wanted and unit in _PREFIX:  # 12.3p
+        return _PREFIX[unit]
+    raise BadInput(f"unit {unit!r:.20}; expected {wanted or 'none, or %'}{' or deg' * (wanted == 'rad')}")
+
+
+_Closed = Callable[[float, float, float], complex]
+
+
+def _loss(x: float, d: float) -> complex:
+    """Of a reactance, or a susceptance, and D."""
+    return complex(abs(x) * d, x)
+
+
+_PAIRS: dict[tuple[str, str], _Closed] = {  # two values and the angular frequency to Z
+    ("R", "X"): lambda r, x, _w: complex(r, x),
+    ("Z", "phase"): lambda z, angle, _w: cmath.rect(z, angle),
+    ("G", "B"): lambda g, b, _w: 1 / complex(g, b),
+    ("Y", "phase"): lambda y, angle, _w: 1 / cmath.rect(y, angle),
+    ("Cp", "D"): lambda c, d, w: 1 / _loss(w * c, d),
+    ("Cp", "Q"): lambda c, q, w: 1 / _loss(w * c, 1 / q),
+    ("Cp", "G"): lambda c, g, w: 1 / complex(g, w * c),
+    ("Cp", "Rp"): lambda c, r, w: 1 / complex(1 / r, w * c),
+    ("Cs", "D"): lambda c, d, w: _loss(-1 / (w * c), d),
+    ("Cs", "Q"): lambda c, q, w: _loss(-1 / (w * c), 1 / q),
+    ("Cs", "R"): lambda c, r, w: complex(r, -1 / (w * c)),
+    ("Lp", "D"): lambda h, d, w: 1 / _loss(-1 / (w * h), d),
+    ("Lp", "Q"): lambda h, q, w: 1 / _loss(-1 / (w * h), 1 / q),
+    ("Lp", "G"): lambda h, g, w: 1 / complex(g, -1 / (w * h)),
+    ("Lp", "Rp"): lambda h, r, w: 1 / complex(1 / r, -1 / (w * h)),
+    ("Ls", "D"): lambda h, d, w: _loss(w * h, d),
+    ("Ls", "Q"): lambda h, q, w: _loss(w * h, 1 / q),
+    ("Ls", "R"): lambda h, r, w: complex(r, w * h),
+}
+
+
+def impedance(values: Mapping[str, float], frequency_hz: float) -> complex | None:
+    """Impedance from the first pair of quantities that determines it.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        Quantities at one frequency, in SI units.
+    frequency_hz : float
+        Frequency [Hz].
+
+    Returns
+    -------
+    complex or None
+        Z [ohm]; None where no pair is among them, or it stands for no finite impedance.
+
+    Examples
+    --------
+    >>> z = impedance({"Cp": 10e-12, "D": 0.02}, 1e3)
+    >>> round(z.real), round(z.imag)
+    (318183, -15909131)
+    """
+    for (one, other), closed in _PAIRS.items():
+        if one in values and other in values:
+            try:
+                z = closed(values[one], values[other], 2 * math.pi * frequency_hz)
+            except (ZeroDivisionError, OverflowError):
+                return None
+            return z if cmath.isfinite(z) else None
+    return None
+
+
+def shown_value(quantity: str, value: float) -> str:
+    """A value for people, as ``12.3 pF``.
+
+    >>> shown_value("Cp", 1.23e-11), shown_value("phase", -1.5), shown_value("D", 0.02)
+    ('12.3 pF', '-85.94 deg', '0.02')
+    """
+    if quantity == "phase":
+        return f"{math.degrees(value):.4g} deg"
+    return si(value, UNITS[quantity]) if UNITS[quantity] else f"{value:.4g}"

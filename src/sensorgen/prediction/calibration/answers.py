@@ -1,0 +1,143 @@
+"""What an inversion found, as rows of a CSV file, and its summary with advice."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sensorgen.core.arrays import Mask
+from sensorgen.core.document import Part
+from sensorgen.core.units import M_PER_MM
+from sensorgen.prediction.calibration.inversion import STALE_S, Found, Verdict, nothing
+from sensorgen.prediction.inverse.answers import csv_cell, csv_row, number
+
+COLUMNS = (
+    "force_n", "force_low_n", "force_high_n", "position_mm", "position_low_mm", "position_high_mm", "chi2", "tones",
+    "status",
+)  # fmt: skip
+REST = "rest"
+
+
+def header(kept: Sequence[str]) -> str:
+    """Names of the columns, those of the input before; one that has the name of a result is ``..._given``."""
+    return csv_row([*(csv_cell(f"{name}_given" if name in COLUMNS else name) for name in kept), *COLUMNS])
+
+
+def rows(kept: Sequence[Sequence[str]], found: Found, rest: Mask) -> str:
+    """Rows of a CSV file, blank where nothing was found.
+
+    Parameters
+    ----------
+    kept : sequence of sequence of str
+        The input's other cells, row by row.
+    found : Found
+        The results.
+    rest : (n,) array of bool
+        Readings at rest.
+    """
+    force, place = found.force_90_n, found.position_90_m / M_PER_MM
+    numbers = np.column_stack([
+        found.force_n, force, found.position_m / M_PER_MM, place, found.chi2,
+    ])  # fmt: skip
+    words = np.where(rest, REST, np.array([v.words for v in Verdict])[found.verdict])
+    ends = zip(kept, numbers.tolist(), found.tones.tolist(), words.tolist(), strict=True)
+    return "".join(csv_row([*map(csv_cell, own), *map(number, row), str(n), word]) for own, row, n, word in ends)
+
+
+@dataclass(frozen=True)
+class CalibratedInversion:
+    """Counts and medians over all readings under load.
+
+    Attributes
+    ----------
+    of : str
+        The specimen or design.
+    calibrated_by : int
+        Known presses that the calibration rests on; 0 without one.
+    samples, at_rest : int
+        Readings under load, and at rest.
+    statuses : dict of str to int
+        How many have which status.
+    force_limit_n : float
+        Largest force that was looked for [N].
+    median_force_width_n, median_position_width_mm : float or None
+        Of the 90 % intervals [N], [mm].
+    noise : float
+        Median standard deviation of a ratio's parts over the tones [-].
+    notes : tuple of str
+        What to doubt.
+    """
+
+    of: str
+    calibrated_by: int
+    samples: int
+    at_rest: int
+    statuses: dict[str, int]
+    force_limit_n: float
+    median_force_width_n: float | None
+    median_position_width_mm: float | None
+    noise: float | None
+    notes: tuple[str, ...]
+
+    def document(self) -> Iterator[Part]:
+        """Counts, widths, and advice."""
+        counts = ", ".join(f"{count} {words}" for words, count in self.statuses.items()) or "none"
+        yield f"{self.of}: {self.samples} readings under load ({self.at_rest} at rest): {counts}"
+        if self.median_force_width_n is not None:
+            yield (
+                f"median widths of the 90 % intervals: {self.median_force_width_n:.3g} N, "
+                f"{self.median_position_width_mm:.3g} mm (noise {self.noise:.2g} of |Z|)"
+            )
+        if not self.calibrated_by:
+            yield (
+                "not calibrated: the intervals hold all that a specimen of this design may differ in; some 30 known "
+                "presses make them several times narrower (sensorgen calibrate)"
+            )
+        most = self.samples / 2
+        if self.statuses.get(Verdict.STALE_REST.words, 0) > most:
+            yield f"most readings at rest are older than {STALE_S:g} s: take one before each press"
+        if self.statuses.get(Verdict.NO_FIT.words, 0) > most:
+            yield (
+                "most readings fit no press: another specimen or tip, or a change of the sensor; recheck it with 3 "
+                "to 5 known presses (sensorgen calibrate --recheck)"
+            )
+        yield from (f"note: {note}" for note in self.notes)
+
+
+class Summary:
+    """Counts blocks of results; of widths each block's median is kept."""
+
+    def __init__(self) -> None:
+        self._statuses: Counter[int] = Counter()
+        self._widths: list[tuple[float, float]] = []
+        self.at_rest = 0
+
+    @property
+    def samples(self) -> int:
+        """Readings under load so far."""
+        return self._statuses.total()
+
+    def add(self, found: Found, rest: Mask) -> None:
+        """Count a block."""
+        self.at_rest += int(rest.sum())
+        self._statuses.update(found.verdict[~rest].tolist())
+        good = ~rest & np.isfinite(found.force_n)
+        if good.any():
+            self._widths.append((
+                float(np.median(np.ptp(found.force_90_n[good], axis=1))),
+                float(np.median(np.ptp(found.position_90_m[good], axis=1))) / M_PER_MM,
+            ))  # fmt: skip
+
+    def result(
+        self, of: str, by: int, limit_n: float, noise: float | None, notes: Sequence[str]
+    ) -> CalibratedInversion:
+        """The summary so far."""
+        widths = np.median(self._widths, axis=0).tolist() if self._widths else [None, None]
+        statuses = {v.words: self._statuses[v] for v in Verdict if self._statuses[v]}
+        return CalibratedInversion(
+            of, by, self.samples, self.at_rest, statuses, limit_n, widths[0], widths[1], noise, tuple(notes)
+        )
+
+
+__all__ = ["CalibratedInversion", "Summary", "header", "nothing", "rows"]

@@ -1,0 +1,236 @@
+"""A calibration as it is stored and shown: it holds all that an inversion needs, and what it could not tell."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from math import exp, sqrt
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sensorgen.core.arrays import Real
+from sensorgen.core.document import Column, Part, Table
+from sensorgen.core.errors import BadInput
+from sensorgen.models.compression import Curve, Plate
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.calibration.coverage import FEWEST, Coverage
+from sensorgen.prediction.calibration.fitting import Posterior
+from sensorgen.prediction.calibration.inversion import Inverter
+from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread
+from sensorgen.prediction.inverse.prior import Prior
+
+SCHEMA = 1
+_TOLD = 0.8  # of the prior's standard deviation: a parameter that keeps more was not identified
+_NORMAL_90 = 1.6448536269514722  # normal deviate of 5 %
+_LAWS = {"plate": Plate, "curve": Curve}
+
+
+@dataclass(frozen=True)
+class Value:
+    """A parameter after calibration, and before."""
+
+    name: Annotated[str, Column("parameter")]
+    unit: Annotated[str, Column("unit")]
+    value: Annotated[float, Column("median")]
+    lower: Annotated[float, Column("5 %")]
+    upper: Annotated[float, Column("95 %")]
+    before_lower: Annotated[float, Column("before 5 %")]
+    before_upper: Annotated[float, Column("before 95 %")]
+    by: Annotated[str, Column("known by", about="presses and rest: what the readings say; prediction: what was known")]
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A specimen's calibration.
+
+    Attributes
+    ----------
+    specimen, design, design_id : str
+        Name of the specimen, name and identity of its design.
+    model : SpecimenModel
+        What was predicted of it, and how far it may differ.
+    posterior : Posterior
+        What the presses say.
+    force_n : float
+        Largest known force [N].
+    held_out : Coverage or None
+        Of presses held back in turn; None of too few.
+    recordings : tuple of str
+        Rows of the log that it rests on.
+    gain : tuple of complex
+        Most probable ln of each tone's gain, phase as its imaginary part [-].
+    notes : tuple of str
+        What was left out, what is to be doubted.
+    """
+
+    specimen: str
+    design: str
+    design_id: str
+    model: SpecimenModel
+    posterior: Posterior
+    force_n: float
+    held_out: Coverage | None
+    recordings: tuple[str, ...]
+    gain: tuple[complex, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def limit_n(self) -> float:
+        """Largest force that an inversion looks for [N]."""
+        return 1.25 * self.force_n
+
+    def inverter(self, noise: ArrayLike | None = None, prior: Prior | None = None, limit_n: float = 0.0) -> Inverter:
+        """What finds force and position behind readings of this specimen.
+
+        Parameters
+        ----------
+        noise : float or (m,) array, optional
+            Standard deviation of a ratio's real and imaginary part [-]; that of the calibration if not given.
+        prior : Prior, optional
+            On force and position.
+        limit_n : float
+            Largest force to look for [N]; a quarter above the largest known one if 0.
+        """
+        known = self.posterior
+        if noise is not None:
+            known = replace(known, noise=np.broadcast_to(noise, known.noise.shape))
+        return Inverter(self.model, known, prior, limit_n or self.limit_n)
+
+    def values(self) -> list[Value]:
+        """Parameters in their units."""
+        found, m, spread, sensor = [], self.model, self.model.spread, self.model.sensor
+        scales = {  # unit, what multiplies the exponential, standard deviation of the logarithm
+            "resistance": ("ohm", sensor.resistance_ohm(), spread.resistance),
+            "capacitance": ("pF", sensor.capacitance_f() * 1e12, spread.capacitance),
+            "rise": ("predicted", 1.0, spread.law),
+            "leak": ("", spread.leak, spread.leak_spread),
+            "dispersion": ("", spread.dispersion * exp(-0.5), 1.0),
+            "lead": ("ohm", spread.lead_ohm * exp(-0.5), 1.0),
+            "hysteresis": ("%", spread.hysteresis * 100 * exp(-0.5), 1.0),
+            "creep": ("%/decade", spread.creep * 100 * exp(-0.5), 1.0),
+            "stray": ("pF", spread.stray_f * 1e12 * exp(-0.5), 1.0),
+        }
+        straight = {  # unit, mean, standard deviation
+            "force offset": ("N", spread.force_offset_n, spread.force_n),
+            "position offset": ("mm", 0.0, spread.position_m * 1e3),
+        }
+        straight |= {n: ("", 0.0, spread.profile / int(n[-1])) for n in m.names if n.startswith("profile")}
+        for k, name in enumerate(m.names):
+            at, sd = float(self.posterior.at[k]), sqrt(self.posterior.covariance[k, k])
+            ends = np.array([at, at - _NORMAL_90 * sd, at + _NORMAL_90 * sd, -_NORMAL_90, _NORMAL_90])
+            if name in scales:
+                unit, scale, of = scales[name]
+                values = scale * np.exp(of * ends)
+            elif name in straight:
+                unit, mean, of = straight[name]
+                values = mean + of * ends
+            else:
+                unit, values = "predicted", np.exp(self._rise(k - m.names.index(f"rise at {FORCES_N[0]:g} N")))
+            by = "presses and rest" if sd < _TOLD else "prediction"
+            median, lower, upper, *before = map(float, values)
+            found.append(Value(name, unit, median, lower, upper, before[0], before[1], by))
+        return found
+
+    def _rise(self, knot: int) -> Real:
+        """Of ln of the rise at a force: median, 5 % and 95 %, and the same ends before."""
+        weights = self.model.law_weights()[knot]
+        at, sd = float(weights @ self.posterior.at), sqrt(weights @ self.posterior.covariance @ weights)
+        before = sqrt(weights @ weights)
+        return np.array([at, at - _NORMAL_90 * sd, at + _NORMAL_90 * sd, -_NORMAL_90 * before, _NORMAL_90 * before])
+
+    @property
+    def unidentified(self) -> tuple[str, ...]:
+        """Parameters of which the readings said next to nothing."""
+        return tuple(value.name for value in self.values() if value.by == "prediction")
+
+    def document(self) -> Iterator[Part]:
+        """What the calibration is worth, its values, and what it could not tell."""
+        p, held = self.posterior, self.held_out
+        yield (
+            f"{self.specimen}, design {self.design}: calibrated by {p.presses} known "
+            f"press{'es' * (p.presses != 1)} up to {self.force_n:.3g} N and its readings at rest"
+        )
+        if held:
+            yield (
+                f"presses held back in turn: {held.force} of {held.presses} forces and {held.position} of "
+                f"{held.presses} positions lie in their 90 % intervals, whose median widths are "
+                f"{held.force_width_n:.3g} N and {held.position_width_m * 1e3:.3g} mm"
+            )
+        elif p.presses:
+            yield f"not checked on presses held back: that takes {FEWEST} known presses"
+        else:
+            yield "no known press: force and position are as uncertain as predicted, and inversions say so"
+        yield (
+            f"from press to press the rise scatters by {p.scatter:.2%}, C wanders by {p.wander_c:.2%} and R by "
+            f"{p.wander_r:.2%} between a reading at rest and its press"
+        )
+        yield Table.of("parameters", "", self.values())
+        if self.gain:
+            tones = self.model.frequency_hz.tolist()
+            rows = tuple((f / 1e3, 100 * g.real, np.rad2deg(g.imag)) for f, g in zip(tones, self.gain, strict=True))
+            yield Table(
+                "gain", "gain of each tone that the rest reading asks for; ratios do not depend on it",
+                (Column("frequency", "kHz"), Column("gain", "%", digits=2), Column("phase", "°", digits=2)), rows,
+            )  # fmt: skip
+        if self.unidentified:
+            yield f"not identified by these readings: {', '.join(self.unidentified)}"
+        yield from (f"note: {note}" for note in self.notes)
+
+    def to_json(self) -> str:
+        """As the log keeps it."""
+        sensor, p = self.model.sensor, self.posterior
+        law = next(name for name, kind in _LAWS.items() if isinstance(sensor.compression, kind))
+        data = {
+            "schema": SCHEMA, "specimen": self.specimen, "design": self.design, "design_id": self.design_id,
+            "sensor": asdict(sensor) | {"compression": {law: asdict(sensor.compression)}},
+            "frequency_hz": self.model.frequency_hz.tolist(), "spread": asdict(self.model.spread),
+            "parameters": list(self.model.names),
+            "posterior": {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in vars(p).items()},
+            "force_n": self.force_n, "held_out": asdict(self.held_out) if self.held_out else None,
+            "recordings": self.recordings, "gain": [[g.real, g.imag] for g in self.gain], "notes": self.notes,
+        }  # fmt: skip
+        return json.dumps(data, ensure_ascii=False)
+
+    def shown_json(self, **more: Any) -> str:
+        """As JSON shows it: the record, its parameters in their units, and more."""
+        data = json.loads(self.to_json()) | {"values": [asdict(value) for value in self.values()]} | more
+        return json.dumps(data, ensure_ascii=False, indent=2) + "\n"
+
+
+def from_json(text: str) -> Calibration:
+    """A calibration out of the log.
+
+    Raises
+    ------
+    BadInput
+        No calibration, or of a schema or parameters that this version does not have.
+    """
+    try:
+        data = json.loads(text)
+        if data["schema"] != SCHEMA:
+            raise BadInput(f"a calibration of schema {data['schema']!r:.20}; this sensorgen reads {SCHEMA}")
+        sensor = dict(data["sensor"])
+        ((law, fields),) = sensor.pop("compression").items()
+        compression = _LAWS[law](**_frozen(fields))
+        model = SpecimenModel(
+            Sensor(**_frozen(sensor), compression=compression), np.array(data["frequency_hz"], float),
+            Spread(**data["spread"]),
+        )  # fmt: skip
+        p: dict[str, Any] = _frozen(data["posterior"])
+        posterior = Posterior(**p | {k: np.array(p[k], float) for k in ("at", "covariance", "noise")})
+        count = len(model.names)
+        if data["parameters"] != list(model.names) or posterior.covariance.shape != (count, count):
+            raise BadInput("a calibration with other parameters than this sensorgen has: calibrate again")
+        return Calibration(
+            data["specimen"], data["design"], data["design_id"], model, posterior, float(data["force_n"]),
+            Coverage(**data["held_out"]) if data["held_out"] else None, tuple(data["recordings"]),
+            tuple(complex(*pair) for pair in data["gain"]), tuple(data["notes"]),
+        )  # fmt: skip
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise BadInput(f"no calibration that can be read ({type(error).__name__}: {str(error)[:80]})") from None
+
+
+def _frozen(data: dict[str, Any]) -> dict[str, Any]:
+    """JSON's lists as tuples, one level deep."""
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in data.items()}

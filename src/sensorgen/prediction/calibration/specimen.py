@@ -1,0 +1,295 @@
+"""Model of one specimen on one bench: the line sensor with everything in which specimens differ, and its prior.
+
+Each parameter is a standard normal number before calibration; its unit is the standard deviation of the prior.
+"""
+
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.core.errors import BadInput
+from sensorgen.models import line
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.inverse.forward import Forward, tones
+
+FORCES_N = (0.2, 0.5, 1.0, 2.0, 4.0, 8.0)  # at which the law of compression may differ from the predicted one
+_BENDS = 4  # modes of the resistivity's profile, half waves along the strip
+_PIECES = 3  # on either side of the tip
+_STEP = 1e-3  # of finite differences [standard deviations]
+_FAR_N = 1e4  # more than any press
+_NOTHING_N = 1e-6  # least force, as its logarithm counts
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Standard deviations before calibration, of a specimen by its design and of a bench that is not known.
+
+    Attributes
+    ----------
+    resistance, capacitance : float
+        Of ln R and ln C [-].
+    profile : float
+        Of ln resistivity along the strip: of one half wave; of k of them 1/k of it [-].
+    law, law_shape : float
+        Of ln of the capacitance's rise: as a whole, and from one force to another [-].
+    leak, leak_spread : float
+        Leakage conductance of the film over its susceptance at the lowest tone: median [-], and of its ln.
+    dispersion : float
+        Exponent with which the capacitance falls with frequency: mean and standard deviation alike [-].
+    lead_ohm, stray_f : float
+        Resistance in series and capacitance beside the sensor: mean and standard deviation alike [ohm], [F].
+    force_n, force_offset_n : float
+        Of the force's offset, and its mean [N].
+    position_m : float
+        Of the position's offset [m].
+    gain : float
+        Of ln of each tone's gain, of real and imaginary part [-]; half of its variance is common to all tones.
+    hysteresis, creep : float
+        Relative change of the rise after a much higher load, and per decade of time: mean and standard deviation alike
+        [-].
+    scatter : float
+        Median of what stays unexplained of ln of the rise, from press to press [-].
+    wander : float
+        Median of changes of ln R and ln C between a rest reading and its press [-].
+    """
+
+    resistance: float = 0.5
+    capacitance: float = 0.2
+    profile: float = 0.1
+    law: float = 0.2
+    law_shape: float = 0.1
+    leak: float = 1e-3
+    leak_spread: float = 2.0
+    dispersion: float = 0.01
+    lead_ohm: float = 30.0
+    stray_f: float = 5e-13
+    force_n: float = 0.1
+    force_offset_n: float = 0.0
+    position_m: float = 1e-3
+    gain: float = 5e-3
+    hysteresis: float = 0.05
+    creep: float = 0.02
+    scatter: float = 0.02
+    wander: float = 5e-4
+
+    def __post_init__(self) -> None:
+        """Refuse what is no spread."""
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if not np.isfinite(value) or (value <= 0 and one.name != "force_offset_n"):
+                raise BadInput(f"{one.name} of a calibration's prior is {value:g}; expected a number above 0")
+
+
+@dataclass(frozen=True, eq=False)
+class Presses:
+    """Known presses, and how they came about.
+
+    Attributes
+    ----------
+    force_n, position_m : (n,) array
+        As the rig says [N], [m].
+    unloading : (n,) array
+        By which share the highest force of this press so far is above the force [-]; nan where unknown.
+    decades : (n,) array
+        Common logarithm of the time at this force over 1 s [-]; nan where unknown.
+    """
+
+    force_n: Real
+    position_m: Real
+    unloading: Real
+    decades: Real
+
+    def rows(self, which: NDArray[np.intp] | Mask) -> "Presses":
+        """Some of them."""
+        return Presses(*(value[which] for value in vars(self).values()))
+
+
+def unknown(force_n: Real, position_m: Real) -> Presses:
+    """Presses whose course is unknown."""
+    nan = np.full(len(force_n), np.nan)
+    return Presses(force_n, position_m, nan, nan)
+
+
+@dataclass(frozen=True, eq=False)
+class SpecimenModel:
+    """A line sensor with all that may differ from it in one specimen on one bench.
+
+    Attributes
+    ----------
+    sensor : Sensor
+        As predicted.
+    frequency_hz : (m,) array
+        Tones [Hz].
+    spread : Spread
+        Of the parameters.
+    """
+
+    sensor: Sensor
+    frequency_hz: Real
+    spread: Spread = field(default_factory=Spread)
+
+    def __post_init__(self) -> None:
+        """Refuse tones that are none."""
+        object.__setattr__(self, "frequency_hz", tones(self.frequency_hz))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Of the parameters."""
+        bends = (f"profile {k + 1}" for k in range(_BENDS))
+        law = (f"rise at {force:g} N" for force in FORCES_N)
+        return (
+            "resistance", *bends, "capacitance", "rise", *law, "leak", "dispersion", "lead", "stray", "force offset",
+            "position offset", "hysteresis", "creep",
+        )  # fmt: skip
+
+    @cached_property
+    def _at(self) -> dict[str, int]:
+        return {name: k for k, name in enumerate(self.names)}
+
+    @cached_property
+    def _most_pa(self) -> float:
+        """Pressure up to which the law of compression reaches; beyond, the rise goes on in proportion [Pa]."""
+        sensor = self.sensor
+        return Forward(sensor, self.frequency_hz).force_limit_n(_FAR_N) / (sensor.width_m * sensor.tip_m / 2)
+
+    @cached_property
+    def _shapes(self) -> Real:
+        """Root of the covariance of the rise among ``FORCES_N``: smooth over ln force, correlated over a factor e."""
+        distance = np.subtract.outer(np.log(FORCES_N), np.log(FORCES_N))
+        return np.asarray(np.linalg.cholesky(np.exp(-(distance**2) / 2) + 1e-6 * np.eye(len(FORCES_N))))
+
+    def law_weights(self) -> Real:
+        """Ln of the factor on the rise at each of ``FORCES_N``, per standard deviation of each parameter (k, p)."""
+        found = np.zeros((len(FORCES_N), len(self.names)))
+        common = self._at["rise"]
+        found[:, common] = self.spread.law
+        found[:, common + 1 : common + 1 + len(FORCES_N)] = self.spread.law_shape * self._shapes
+        return found
+
+    def rest(self, at: Real) -> Complex:
+        """Ln of the impedance that the bench reads with nothing on the sensor, without its gain.
+
+        Parameters
+        ----------
+        at : (..., p) array
+            Parameters in standard deviations.
+
+        Returns
+        -------
+        (..., m) array
+        """
+        nothing = unknown(np.zeros(1), np.full(1, self.sensor.length_m / 2))
+        return self._read(at, nothing, loaded=False)[..., 0, :]
+
+    def ratio(self, at: Real, presses: Presses, changes: Real | None = None) -> Complex:
+        """Ln of pressed over rest.
+
+        Parameters
+        ----------
+        at : (..., p) array
+            Parameters in standard deviations.
+        presses : Presses
+            n presses.
+        changes : (..., 3) array, optional
+            Of ln of the rise, of C and of R since the rest reading [-].
+
+        Returns
+        -------
+        (..., n, m) array
+        """
+        # at rest, too, cut where the tip would be: what the cuts leave of a profile cancels
+        return self._read(at, presses, changes) - self._read(at, presses, loaded=False)
+
+    def _read(self, at: Real, presses: Presses, changes: Real | None = None, *, loaded: bool = True) -> Complex:
+        sensor, spread, of = self.sensor, self.spread, self._at
+        value = {name: at[..., k, None] for name, k in of.items()}
+        rise, c, r = np.moveaxis(np.zeros(3) if changes is None else changes, -1, 0)[..., None]
+        position = np.clip(presses.position_m + spread.position_m * value["position offset"], 0, sensor.length_m)
+        force = np.zeros(position.shape)
+        if loaded:
+            force = np.maximum(
+                presses.force_n + spread.force_offset_n + spread.force_n * value["force offset"], _NOTHING_N
+            )
+        patch = sensor.patch(position)
+        length = np.broadcast_to(patch.length_m, position.shape)
+        stress = force / (sensor.width_m * length)
+        share, _ = sensor.compression.capacitive_strain(np.minimum(stress, self._most_pa))
+        first = of[f"rise at {FORCES_N[0]:g} N"]
+        knots = spread.law_shape * (at[..., first : first + len(FORCES_N)] @ self._shapes.T)
+        ln_rise = rise + spread.law * value["rise"] + _interpolated(np.log(np.maximum(force, _NOTHING_N)), knots)
+        for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
+            ln_rise = ln_rise + getattr(spread, name) * np.exp(value[name] - 0.5) * np.nan_to_num(course)
+        lifted = 1 + share / (1 - share) * np.maximum(stress / self._most_pa, 1.0) * np.exp(ln_rise)
+
+        omega = 2 * np.pi * self.frequency_hz
+        per_m = (sensor.capacitance_f_per_m * np.exp(spread.capacitance * value["capacitance"] + c))[..., None]
+        exponent = spread.dispersion * np.exp(value["dispersion"] - 0.5)[..., None]
+        leak = (
+            sensor.leak_s_per_m + spread.leak * np.exp(spread.leak_spread * value["leak"])[..., None] * omega[0] * per_m
+        )
+        film = 1j * omega * (omega / omega[0]) ** -exponent * np.exp(-0.5j * np.pi * exponent)
+        loose = leak + (film + sensor.tan_delta * omega) * per_m
+        pressed = leak + (film + sensor.tan_delta * omega) * per_m * lifted[..., None]
+
+        track, by_pressure = sensor.track_ohm_per_m()
+        whole = track * np.exp(spread.resistance * value["resistance"] + r)
+        left, right = patch.left_m, np.maximum(sensor.length_m - patch.left_m - length, 0.0)
+        shares = np.arange(_PIECES + 1) / _PIECES
+        ends = np.stack([*(left * k for k in shares), *(left + length + right * k for k in shares)])
+        tracks = [whole * np.exp(self._bent(at, start, end)) for start, end in pairwise(ends)]
+        tracks[_PIECES] = tracks[_PIECES] + stress * by_pressure
+        films = [loose] * _PIECES + [pressed] + [loose] * _PIECES
+        z = line.cascade(
+            [one[..., None] for one in tracks], films, [one[..., None] for one in np.diff(ends, axis=0)], sensor.far_end
+        )
+        stray, lead = (np.exp(value[name] - 0.5)[..., None] for name in ("stray", "lead"))
+        return np.asarray(np.log(spread.lead_ohm * lead + 1 / (1 / z + 1j * omega * spread.stray_f * stray)))
+
+    def _bent(self, at: Real, start_m: Real, end_m: Real) -> Real:
+        """Mean of ln resistivity over parts of the strip, less that of the whole."""
+        first, found = self._at["profile 1"], np.zeros(1)
+        for k in range(1, _BENDS + 1):
+            start, end = (k * np.pi / self.sensor.length_m * x for x in (start_m, end_m))
+            turn = (end - start) / 2
+            found = found + at[..., first + k - 1, None] / k * np.cos((start + end) / 2) * np.sinc(turn / np.pi)
+        return np.asarray(self.spread.profile * found)
+
+    def slopes(self, at: Real, presses: Presses) -> Real:
+        """Derivatives of the ratio's real and imaginary parts by the parameters, (n, 2 m, p)."""
+        step = np.eye(len(at)) * _STEP
+        return _slopes(self.ratio(np.concatenate([at + step, at - step]), presses))
+
+    def rest_slopes(self, at: Real) -> Real:
+        """Derivatives of the rest reading's parts by the parameters, (2 m, p)."""
+        step = np.eye(len(at)) * _STEP
+        return _slopes(self.rest(np.concatenate([at + step, at - step])))
+
+    def scatters(self, at: Real, presses: Presses) -> Real:
+        """Derivatives of the ratio's parts by ln of the rise, of C and of R since the rest reading, (n, 2 m, 3)."""
+        step = np.eye(3) * _STEP
+        return _slopes(self.ratio(at, presses, np.concatenate([step, -step])))
+
+
+def _slopes(ends: Complex) -> Real:
+    """Central differences of parts, from values at all steps forward, then backward."""
+    more, less = np.split(parts(ends), 2)
+    return np.moveaxis(more - less, 0, -1) / (2 * _STEP)
+
+
+def _interpolated(ln_force: Real, knots: Real) -> Real:
+    """Values at the knots of ``FORCES_N`` between them, straight over ln force: (..., n) of (..., knots)."""
+    ln = np.log(FORCES_N)
+    inside = np.clip(ln_force, ln[0], ln[-1])
+    k = np.clip(np.searchsorted(ln, inside, side="right") - 1, 0, len(ln) - 2)
+    share = (inside - ln[k]) / (ln[k + 1] - ln[k])
+    low, high = (np.take_along_axis(np.broadcast_to(knots, (*k.shape[:-1], len(ln))), at, -1) for at in (k, k + 1))
+    return np.asarray(low + share * (high - low))
+
+
+def parts(value: Complex) -> Real:
+    """Real parts, then imaginary parts, along the last axis."""
+    return np.concatenate([value.real, value.imag], -1)

@@ -1,0 +1,220 @@
+"""Calibration of a specimen and inversion of its readings, held against specimens that share no line with them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sensorgen.core.errors import BadInput
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.calibration import calibration as records
+from sensorgen.prediction.calibration.coverage import coverage_of, held_out, inside
+from sensorgen.prediction.calibration.fitting import calibrated, gain, prior, shared, widened
+from sensorgen.prediction.calibration.inversion import Inverter, Verdict
+from sensorgen.prediction.calibration.rest import Rest, checked
+from sensorgen.prediction.calibration.specimen import Spread, unknown
+from sensorgen.prediction.inverse import Estimator, Prior
+from virtual_specimen import TONES_HZ, drawn, session
+from virtual_specimen.adapter import ERRORS, LIMIT_N, data, specimen_model, split
+
+
+@pytest.fixture(scope="module")
+def model():
+    return specimen_model()
+
+
+@pytest.fixture(scope="module")
+def one(model):
+    """A specimen with all errors at once, its presses, and its calibration."""
+    truth = drawn(2)
+    known, others = split(truth, 30, 200, 2)
+    return truth, data(known, truth), data(others, truth), calibrated(model, data(known, truth))
+
+
+def test_without_errors_the_model_is_the_line_sensor(model):
+    at = np.zeros(len(model.names))
+    clean = replace(model, spread=Spread(leak=1e-12, dispersion=1e-12, lead_ohm=1e-9, stray_f=1e-24))
+    force, place = np.array([0.5, 3.0]), np.array([0.02, 0.07])
+    sensor: Sensor = model.sensor
+    z = [sensor.impedance(TONES_HZ, f, x) for f, x in zip(force, place, strict=True)]
+    rest = sensor.impedance(TONES_HZ, 0.0, 0.05)
+    assert clean.rest(at) == pytest.approx(np.log(rest), rel=1e-9)
+    assert clean.ratio(at, unknown(force, place)) == pytest.approx(np.log(np.array(z) / rest), abs=1e-9)
+
+
+@pytest.mark.parametrize("error", ["C +1 %", "stray 1 pF", "gain 0.3 %, 20 ohm, 0.3 pF, E -5 %"])
+def test_an_error_of_the_model_no_longer_misleads(model, error):
+    truth = ERRORS[error](1)
+    known, others = split(truth, 30, 200, 1)
+    known, unseen = data(known, truth), data(others, truth)
+    exact = Estimator(model.sensor, TONES_HZ, truth.noise, force_limit_n=LIMIT_N).batch(others.pressed_ohm)
+    assert inside(exact, unseen.presses)[0].mean() < 0.8  # the planted error, seen without calibration
+    found = coverage_of(
+        Inverter(model, calibrated(model, known), force_limit_n=LIMIT_N).batch(unseen.ratio), unseen.presses
+    )
+    assert found.force >= 0.85 * found.presses
+    assert found.position >= 0.85 * found.presses
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_intervals_hold_on_specimens_with_all_errors_at_once(model, scale):
+    """Some of the specimens of bench/coverage.py, which has 200 of each kind."""
+    shares = []
+    for seed in range(6):
+        truth = drawn(seed, scale)
+        known, others = split(truth, 30, 200, seed)
+        found = Inverter(model, calibrated(model, data(known, truth)), force_limit_n=LIMIT_N)
+        shares.append([np.mean(x) for x in inside(found.batch(data(others, truth).ratio), data(others, truth).presses)])
+    assert 0.82 <= np.mean(shares, axis=0).min() <= np.mean(shares, axis=0).max() <= 0.97
+    assert np.min(shares) >= 0.75
+
+
+def test_never_calibrated_is_said_and_holds(model, one):
+    _, _, unseen, _ = one
+    found = Inverter(model, prior(model, unseen.noise[0]), force_limit_n=LIMIT_N).batch(unseen.ratio)
+    said = coverage_of(found, unseen.presses)
+    assert min(said.force, said.position) >= 0.85 * said.presses
+    assert (found.verdict != Verdict.OK).all()
+    assert (found.verdict == Verdict.NOT_CALIBRATED).sum() > 100
+    calibrated_ = coverage_of(Inverter(model, one[3], force_limit_n=LIMIT_N).batch(unseen.ratio), unseen.presses)
+    assert calibrated_.force_width_n < said.force_width_n / 2
+
+
+def test_what_is_told_is_found(model, one):
+    truth, known, _, found = one
+    values = {v.name: v for v in _record(model, one).values()}
+    assert values["resistance"].lower < truth.track_ohm_per_m * 0.1 < values["resistance"].upper
+    c_pf = 64.256829 * np.exp(truth.capacitance)
+    assert values["capacitance"].lower < c_pf < values["capacitance"].upper
+    assert "lead" in _record(model, one).unidentified
+    told = gain(model, known, found.at)
+    assert np.abs(told.real - np.real(truth.gain)).max() < 8e-3
+
+
+def _record(model, one):
+    _, known, _, found = one
+    held = held_out(model, known, LIMIT_N)
+    return records.Calibration("S1", "mine", "0" * 16, model, found, 6.0, held[0], ("a",), (1e-3 + 0j,) * 7, ("n",))
+
+
+def test_its_own_check_on_presses_held_back(model, one):
+    _, known, unseen, found = one
+    held, again = held_out(model, known, LIMIT_N)
+    true = coverage_of(Inverter(model, found, force_limit_n=LIMIT_N).batch(unseen.ratio), unseen.presses)
+    assert held.presses == len(again.force_n) == 30
+    assert held.force_width_n == pytest.approx(true.force_width_n, rel=0.4)
+    assert held_out(model, known.rows(np.arange(9)), LIMIT_N) is None
+
+
+def test_a_calibration_comes_back_from_the_log_as_it_was(model, one):
+    record = _record(model, one)
+    again = records.from_json(record.to_json())
+    assert again.to_json() == record.to_json()
+    inverters = [Inverter(r.model, r.posterior, force_limit_n=LIMIT_N) for r in (record, again)]
+    found = [inverter.batch(one[2].ratio[:20]).force_n for inverter in inverters]
+    assert (found[0] == found[1]).all()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda t: t.replace('"schema": 1', '"schema": 9'), lambda t: t.replace('"leak"', '"rust"', 1),
+        lambda _: "[]", lambda _: "{", lambda t: t.replace('"covariance": [[', '"covariance": [[[', 1),
+        lambda t: t.replace('"at"', '"it"'),
+    ],
+)  # fmt: skip
+def test_what_is_no_calibration_is_refused(model, one, change):
+    with pytest.raises(BadInput):
+        records.from_json(change(_record(model, one).to_json()))
+
+
+def test_specimens_of_one_bench_share_what_is_its_own(model):
+    truths = [replace(drawn(seed), stray_f=2e-12, force_offset_n=0.15) for seed in range(6)]
+    alone = [calibrated(model, data(session(truth, 30, seed), truth)) for seed, truth in enumerate(truths)]
+    names = ("lead", "stray", "force offset", "position offset")
+    together = shared([model] * 6, alone, names)
+    k = [model.names.index(name) for name in names]
+    assert all((p.at[k] == together[0].at[k]).all() or p.at[k] == pytest.approx(together[0].at[k]) for p in together)
+    for before, after in zip(alone, together, strict=True):
+        assert (np.diag(after.covariance) <= np.diag(before.covariance) + 1e-12).all()
+        assert np.linalg.eigvalsh(after.covariance).min() > 0
+    assert np.sqrt(together[0].covariance[k[2], k[2]]) < 0.8 * np.sqrt(alone[0].covariance[k[2], k[2]])
+
+
+def test_another_tip_alarms_and_few_presses_mend_it(model):
+    """Over specimens: 5 presses with an 8 mm tip, after a calibration with one of 5 mm."""
+    shares = []
+    for seed in range(5):
+        truth, other = drawn(seed), replace(drawn(seed), tip_m=8e-3)
+        old = calibrated(model, data(session(truth, 30, seed), truth))
+        known, unseen = (data(part, other) for part in split(other, 5, 200, seed))
+        for posterior in (old, calibrated(model, known, widened(model, old))):
+            found = Inverter(model, posterior, force_limit_n=LIMIT_N).batch(unseen.ratio)
+            shares.append(inside(found, unseen.presses)[0].mean())
+    assert np.mean(shares[::2]) < 0.6
+    assert np.mean(shares[1::2]) > 0.8
+
+
+def test_a_spoilt_tone_is_left_out(model, one):
+    _, _, unseen, found = one
+    inverter = Inverter(model, found, force_limit_n=LIMIT_N)
+    good, spoilt = unseen.ratio[:60], unseen.ratio[:60].copy()
+    spoilt[:, 3] += 0.05
+    sound, mended = inverter.batch(good), inverter.batch(spoilt)
+    assert (mended.tones == 6).all()
+    assert not (mended.verdict == Verdict.NO_FIT).any()
+    assert np.median(np.abs(mended.force_n - sound.force_n)) < 0.3
+    spoilt[:, :5] += np.array([0.4, -0.3, 0.2, 0.1j, -0.2j])
+    assert (inverter.batch(spoilt).verdict == Verdict.NO_FIT).all()
+
+
+def test_missing_tones_stale_rests_and_priors(model, one):
+    _, _, unseen, found = one
+    inverter = Inverter(model, found, force_limit_n=LIMIT_N)
+    ratio = unseen.ratio[:6].copy()
+    ratio[0, 2] = np.nan
+    ratio[1] = np.nan
+    at = inverter.batch(ratio, np.array([1.0, 1.0, 14.0, 16.0, 1e6, 1.0]))
+    assert at.tones.tolist() == [6, 0, 7, 7, 7, 7]
+    assert np.isnan(at.force_n[1])
+    words = [Verdict(v).words for v in at.verdict]
+    assert words[1] == "missing"
+    assert words[3:5] == ["stale rest"] * 2
+    sharp = Inverter(model, found, Prior(force_n=(2.0, 0.05)), LIMIT_N).batch(unseen.ratio[:6])
+    assert sharp.force_n == pytest.approx(2.0, abs=0.2)
+    with pytest.raises(BadInput, match="a column for each calibrated tone"):
+        inverter.batch(ratio[:, :3])
+
+
+def test_the_latest_reading_at_rest_counts():
+    z = np.array([[100.0], [102.0], [50.0], [0.0], [200.0], [50.0]], complex)
+    at_rest = np.array([True, True, False, False, True, False])
+    rest = Rest()
+    ratio, age = rest.ratios(z[:3], at_rest[:3], np.arange(3.0))
+    more, later = rest.ratios(z[3:], at_rest[3:], np.array([3.0, 4.0, 9.0]))
+    found = np.exp(np.concatenate([ratio, more])[:, 0])
+    assert found[[2, 5]] == pytest.approx([50 / 101, 0.25])
+    assert np.isnan(found[[0, 1, 3, 4]]).all()
+    assert [*age, *later] == [0, 0, 1, 2, 0, 5]
+
+
+def test_noise_is_told_by_readings_at_rest():
+    rng = np.random.default_rng(1)
+    z = 1e5 * (1 + np.linspace(0, 0.05, 400)[:, None] + rng.normal(0, [1e-3, 4e-3], (400, 2)) * (1 + 0j))
+    z = z + 1j * 1e5 * rng.normal(0, [1e-3, 4e-3], (400, 2))
+    rest = Rest()
+    rest.ratios(z, np.ones(400, bool), np.arange(400.0))
+    assert rest.noise() == pytest.approx(np.array([1e-3, 4e-3]) * np.sqrt(1.1), rel=0.12)
+    assert Rest(z[:5]).noise() == pytest.approx(1e-3 * np.sqrt(1.1))
+
+
+def test_other_tones_are_refused():
+    assert checked(TONES_HZ[::-1], TONES_HZ).tolist() == [6, 5, 4, 3, 2, 1, 0]
+    with pytest.raises(BadInput, match=r"readings at 1\.1, 2\.3 kHz; the specimen was calibrated at"):
+        checked(TONES_HZ[:2], TONES_HZ)
+
+
+@pytest.mark.parametrize("bad", [{"force_n": 0.0}, {"lead_ohm": -1.0}, {"capacitance": np.nan}])
+def test_a_prior_that_is_none_is_refused(bad):
+    with pytest.raises(BadInput, match="above 0"):
+        Spread(**bad)
