@@ -256,7 +256,7 @@ def test_a_leak_that_the_design_sets_itself():
 def test_few_prints_are_less_sure_than_their_scatter():
     """Student, with a prior of 10 % that is worth three prints; one print is never the material."""
     mean, error = _together([(1.0, 1e-9), (1.2, 1e-9)], ["a", "b"])
-    scatter = np.sqrt((3 * 0.1**2 + 2 * 0.1**2) / 4)
+    scatter = ((3 * 0.1**2 + 2 * 0.1**2) / 4) ** 0.5
     assert (mean, 2 * error) == (pytest.approx(1.1), pytest.approx(stats.t.ppf(0.975, 4) * scatter / 2**0.5))
     assert _together([(1.0, 0.3), (1.0, 0.4)], ["a", "b"]) == (1.0, pytest.approx(0.25))
     assert _together([(1.0, 1e-9)], ["a"]) == (1.0, pytest.approx(stats.t.ppf(0.975, 3) * 0.1 / 2))

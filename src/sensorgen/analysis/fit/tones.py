@@ -117,8 +117,8 @@ def values(fits: Sequence[OfRun]) -> list[Fitted | Untold]:
         together = _together(moduli, _prints([fit for fit, _ in pressed]))
         modulus = _value(film, MODULUS, together, f"presses of {len(moduli)} recordings, {law}", len(moduli))
     return [
-        _value(electrode, "resistivity_ohm_m", _together(along, _prints(fits)), rho, len(fits)), _permittivity(fits, film),
-        modulus, _leak(fits, film),
+        _value(electrode, "resistivity_ohm_m", _together(along, _prints(fits)), rho, len(fits)),
+        _permittivity(fits, film), modulus, _leak(fits, film),
     ]  # fmt: skip
 
 
