@@ -154,6 +154,25 @@ def covariances(model: SpecimenModel, at: Real, data: Data, components: Real, ve
     return np.asarray(found + np.einsum("nik,nk,njk->nij", vectors, variance, vectors))
 
 
+def information(model: SpecimenModel, data: Data, at: Real, weight: Real) -> Real:
+    """Information of presses and rest on the parameters (p, p), the prior's left out.
+
+    Parameters
+    ----------
+    model, data, at
+        As of :func:`covariances`.
+    weight : (n, 2 m, 2 m) array
+        Inverse of those.
+    """
+    rest_weight = np.asarray(np.linalg.inv(_rest_covariance(model, data)))
+    return _information(model.slopes(at, data.presses), weight, model.rest_slopes(at), rest_weight)
+
+
+def _information(slopes: Real, weight: Real, rest_slopes: Real, rest_weight: Real) -> Real:
+    of_presses = np.einsum("nia,nij,njb->ab", slopes, weight, slopes, optimize=True)
+    return np.asarray(of_presses + rest_slopes.T @ rest_weight @ rest_slopes)
+
+
 def memory(model: SpecimenModel, at: Real, name: str) -> float:
     """Change of the rise by hysteresis or creep [-]."""
     return float(getattr(model.spread, name) * np.exp(at[model.names.index(name)] - 0.5))
@@ -164,8 +183,8 @@ def _descended(
 ) -> tuple[Real, Real]:
     """Gauss-Newton with damping: the most probable parameters, and the information on them."""
     middle, inverse = before
-    rest_weight = np.linalg.inv(_rest_covariance(model, data))
-    weight = np.linalg.inv(covariances(model, at, data, components))
+    rest_weight = np.asarray(np.linalg.inv(_rest_covariance(model, data)))
+    weight = np.asarray(np.linalg.inv(covariances(model, at, data, components)))
 
     def off(x: Real) -> tuple[Real, Real, float]:
         ratio = parts(data.ratio - model.ratio(x, data.presses))
@@ -174,14 +193,13 @@ def _descended(
         return ratio, rest, float(cost + (x - middle) @ inverse @ (x - middle))
 
     ratio, rest, cost = off(at)
-    damping, information = 0.0, inverse
+    damping, found = 0.0, inverse
     for _ in range(_STEPS):
         slopes, rest_slopes = model.slopes(at, data.presses), model.rest_slopes(at)
-        information = inverse + np.einsum("nia,nij,njb->ab", slopes, weight, slopes, optimize=True)
-        information = information + rest_slopes.T @ rest_weight @ rest_slopes
+        found = inverse + _information(slopes, weight, rest_slopes, rest_weight)
         gradient = np.einsum("nia,nij,nj->a", slopes, weight, ratio, optimize=True)
         gradient = gradient + rest_slopes.T @ rest_weight @ rest - inverse @ (at - middle)
-        step = np.linalg.solve(information + damping * np.eye(len(at)), gradient)
+        step = np.linalg.solve(found + damping * np.eye(len(at)), gradient)
         step *= min(1.0, 3.0 / np.abs(step).max())
         tried = off(at + step)
         if tried[2] <= cost:
@@ -190,7 +208,7 @@ def _descended(
                 break
         else:
             damping = max(10 * damping, 1.0)
-    return at, information
+    return at, found
 
 
 def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, Real], usual: Real) -> Real:
@@ -199,7 +217,7 @@ def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, 
 
     middle, inverse = before
     slopes, rest_slopes = model.slopes(at, data.presses), model.rest_slopes(at)
-    rest_weight = np.linalg.inv(_rest_covariance(model, data))
+    rest_weight = np.asarray(np.linalg.inv(_rest_covariance(model, data)))
     left = parts(data.ratio - model.ratio(at, data.presses)) + slopes @ (at - middle)
     rest = parts(data.rest - model.rest(at)) + rest_slopes @ (at - middle)
     fixed = inverse + rest_slopes.T @ rest_weight @ rest_slopes

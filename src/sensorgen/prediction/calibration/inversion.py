@@ -119,7 +119,7 @@ class Inverter:
     ) -> None:  # fmt: skip
         self._posterior, self._length = posterior, model.sensor.length_m
         coarse = np.linspace(0, 1, _COARSE[0]) ** 2 * force_limit_n, np.linspace(0, self._length, _COARSE[1])
-        mean, covariance = _readings(model, posterior, *coarse)
+        mean, covariance = readings(model, posterior, *coarse)
         self.force_n, self.position_m = _grid(coarse, mean, covariance)
         self._means, self._covariances = (
             _refined(coarse, (self.force_n, self.position_m), v) for v in (mean, covariance)
@@ -257,8 +257,16 @@ def _of(posterior: Posterior, force_n: Real, position_m: Real) -> Presses:
     return Presses(force_n, position_m, unloading, decades)
 
 
-def _readings(model: SpecimenModel, posterior: Posterior, force_n: Real, position_m: Real) -> tuple[Real, Real]:
-    """Expected parts (points, 2 m), and their covariance with all that is not known (points, 2 m, 2 m)."""
+def readings(model: SpecimenModel, posterior: Posterior, force_n: Real, position_m: Real) -> tuple[Real, Real]:
+    """Expected parts of ratios (points, 2 m), and their covariance with all that is open (points, 2 m, 2 m).
+
+    Parameters
+    ----------
+    model, posterior
+        Of the specimen.
+    force_n, position_m : (f,), (x,) array
+        Of a grid, whose points go along positions first [N], [m].
+    """
     force, position = _pairs(force_n, position_m)
     presses = _of(posterior, force, position)
     slopes = model.slopes(posterior.at, presses)
