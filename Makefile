@@ -46,14 +46,14 @@ attack: $(READY_DEV) ## feed 10 000 damaged files of each kind to every reader, 
 	SENSORGEN_ATTACK=1 $(BIN)/python -m pytest -q tests/attacks/test_log.py
 
 lowest: ## install the lowest versions that pyproject.toml allows in a fresh environment, and run every command there
-	scripts/clean-environment "$(PYTHON)" lowest-direct
+	scripts/clean-environment "$(PYTHON)" lowest-direct $(ARGS)
 
-pythons: ## install the newest versions in fresh environments of Python 3.11 to 3.13, and run every command there
+pythons: ## install the newest versions in fresh environments of Python 3.11 to 3.13 (of the system, pyenv or uv), and run every command
 	set -e; for version in 3.11 3.12 3.13; do scripts/clean-environment python$$version highest; done
 
-wheel: $(READY_DEV) ## build the wheel twice, compare the bytes, and run every command from it in a fresh environment
+wheel: $(READY_DEV) ## build the wheel twice, compare the bytes, and run every command from it in a fresh environment of hashed files
 	scripts/same-wheel $(BIN)/python out/wheel
-	scripts/clean-environment "$(PYTHON)" highest out/wheel/*.whl
+	scripts/clean-environment "$(PYTHON)" out/wheel/*.whl $(ARGS)
 
 hashes: ## write constraints-hashes.txt, with the SHA-256 of every file, for pip install --require-hashes
 	scripts/clean-environment --tools "$(PYTHON)" && out/tools/bin/uv pip compile --quiet --generate-hashes \

@@ -1,5 +1,6 @@
 """An installed sensorgen has its data with it."""
 
+import re
 import subprocess
 import sys
 import zipfile
@@ -27,3 +28,12 @@ def test_the_wheel_works_without_the_repository(tmp_path):
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "out" / "trix-d0.2-length6" / "manifest.json").exists()
+
+
+def test_the_hashed_files_are_of_the_versions_that_the_tests_ran_with():
+    tested, hashed = (
+        {name.lower().replace("_", "-"): number for name, number in re.findall(r"^([\w.-]+)==(\S+)", text, re.M)}
+        for text in ((ROOT / name).read_text() for name in ("constraints.txt", "constraints-hashes.txt"))
+    )
+    assert len(hashed) > 60
+    assert {name: tested.get(name) for name in hashed} == hashed

@@ -21,39 +21,11 @@ from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
 
+import damage
+
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 ADDRESSES, SECONDS = 2 << 30, 30
-ODD = (
-    b"", b"\0", b"\xff", b'"', b"'", b",", b";", b"\n", b"\r", b"1e999", b"-", b"nan", b"null", b"{", b"[" * 99,
-    b"9" * 400, b"\xe2\x82", "¥".encode(), b"/", b"PK\x03\x04", b"true", b"\x00" * 64, b"&a [*a]", b"-0.0", b"604800",
-    b"!!python/object:x ", b"1e-320", b"M98 P\"x.g\"", b"G1 E1e9\n", b"\x1b[2J", b"0x10", b"inf", b": ", b"- ",
-)  # fmt: skip
-
-
-def mutated(content, rng):
-    """Bytes replaced, removed, doubled, cut off, or numbers changed."""
-    content = bytearray(content)
-    for _ in range(rng.choice((1, 1, 2, 4, 12))):
-        at, length = rng.randrange(len(content) + 1), rng.choice((0, 1, 1, 2, 4, 8, 100))
-        kind = rng.randrange(7)
-        if kind == 0:
-            content[at : at + length] = rng.choice(ODD)
-        elif kind == 1:
-            content[at : at + length] = rng.randbytes(length)
-        elif kind == 2:
-            del content[at : at + length]
-        elif kind == 3:
-            content[at:at] = content[at : at + length]
-        elif kind == 4:
-            content[at : at + 4] = rng.choice(
-                (b"\xff" * 4, b"\0" * 4, b"\x80\0\0\0", b"\0\0\0\x80", b"\xff\xff\xff\x7f")
-            )
-        elif kind == 5 and content:
-            content[at % len(content)] ^= 1 << rng.randrange(8)
-        elif rng.random() < 0.2:
-            del content[at:]
-    return bytes(content)
 
 
 def command(*words):
@@ -165,7 +137,7 @@ def work(kind, numbers, seed, folder, results):
     for number in numbers:
         results.put((number, "begun", ""))
         file = folder / f"damaged{number}{suffix}"
-        file.write_bytes(mutated(content, random.Random(f"{seed} {kind} {number}")))
+        file.write_bytes(damage.mutated(content, random.Random(f"{seed} {kind} {number}")))
         results.put((number, *outcome(read, file)))
         file.unlink()
     status = Path("/proc/self/status")  # getrusage counts the parent's memory too

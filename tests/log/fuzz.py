@@ -15,34 +15,9 @@ from sensorgen.measure.log import Log, exchange, importing, verify
 from sensorgen.measure.log.entries import ROWS
 from sensorgen.measure.log.tables import thesis
 
-ODD = (
-    b"",
-    b"\0",
-    b"\xff",
-    b'"',
-    b"'",
-    b",",
-    b";",
-    b"\n",
-    b"\r",
-    b"1e999",
-    b"-",
-    b"m",
-    b"null",
-    b"{",
-    b"[" * 99,
-    b"=1+1",
-    b"nan",
-    b"9" * 400,
-    b"\xe2\x82",
-    "¥".encode(),
-    b"/",
-    b"PK\x03\x04",
-    b"\x80\x04",
-    b"uid",
-    b"true",
-    b"\x00" * 64,
-)
+sys.path.insert(0, str(Path(__file__).parents[1] / "attacks"))
+import damage
+
 BATCH = {
     "batch": "26",
     "specimens": {
@@ -50,25 +25,6 @@ BATCH = {
         "26 triX .1mm 2": {"design": "trix-d0.1", "design_id": "0" * 16, "expected": {}},
     },
 }
-
-
-def tampered(content, rng):
-    """A few bytes replaced, taken out, doubled or cut off."""
-    content = bytearray(content)
-    for _ in range(rng.randint(1, 4)):
-        at, length = rng.randrange(len(content) + 1), rng.choice((0, 1, 1, 1, 2, 8, 100))
-        kind = rng.randrange(5)
-        if kind == 0:
-            content[at : at + length] = rng.choice(ODD)
-        elif kind == 1:
-            content[at : at + length] = rng.randbytes(length)
-        elif kind == 2:
-            del content[at : at + length]
-        elif kind == 3:
-            content[at:at] = content[at : at + length]
-        elif rng.random() < 0.2:
-            del content[at:]
-    return bytes(content)
 
 
 def samples(folder):
@@ -110,7 +66,7 @@ def main(folder, count, seed):
         for _ in range(count):
             name = rng.choice(sorted(sound))
             path = folder / f"odd{Path(name).suffix}"
-            path.write_bytes(tampered(sound[name], rng))
+            path.write_bytes(damage.mutated(sound[name], rng))
             for left in (folder / "odd.db-wal", folder / "odd.db-shm"):
                 left.unlink(missing_ok=True)
             try:

@@ -37,6 +37,7 @@ def test_json_for_programs(run):
         "rows": 69,
         "new": 69,
         "doubtful": 38,
+        "corrections": 0,
         "left_out": [],
     }
 

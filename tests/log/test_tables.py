@@ -7,6 +7,7 @@ import pytest
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.measure.log import Log, importing, tables
+from sensorgen.measure.log.withdrawing import withdraw
 
 HEAD = "specimen,y,z,remark\n"
 
@@ -152,3 +153,48 @@ def test_a_table_as_log_and_a_log_as_table(log, path, tmp_path):
     (tmp_path / "t.csv").write_text(HEAD + "x" * 200)
     with pytest.raises(SensorgenError, match="is no SQLite file; expected a log"):
         Log(tmp_path / "t.csv")
+
+
+def used(log):
+    return [(r.specimen, r.y_ohm[0], r.remark) for r in log.readings()]
+
+
+SHEET = HEAD + "23 triX,650,40,\n23 triX,650,40,\n23 triY,1k,5,\n"
+X, Y = ("23 triX", 650, ""), ("23 triY", 1e3, "")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "left"),
+    [
+        ("650,40,\n23 triY", "650,40,holes\n23 triY", [X, Y, ("23 triX", 650, "holes")]),
+        ("1k,5,", "1.1k,5,", [X, X, ("23 triY", 1.1e3, "")]),
+        ("1k,5,", "1k,5,odd", [X, X, ("23 triY", 1e3, "odd")]),
+        ("23 triY,", "23 triY 2,", [X, X, ("23 triY 2", 1e3, "")]),
+        ("remark\n", "remark\n23 triX 3,9,9,\n", [X, X, Y, ("23 triX 3", 9, "")]),
+    ],
+)
+def test_an_edited_row_corrects_the_reading_that_it_came_from(take, log, before, after, left):
+    assert take(SHEET).new == 3
+    edited = SHEET.replace(before, after)
+    done = take(edited)
+    assert used(log) == left
+    assert (done.new, done.corrections) == (1, len(left) == 3)
+    assert take(edited).new == 0
+    assert used(log) == left
+
+
+def test_an_edit_that_is_taken_back_and_made_again(take, log):
+    for remark in ("", "a", "", "b", "a", ""):
+        assert take(HEAD + f"23 triX,650,40,{remark}\n23 triY,1k,5,\n").rows == 2
+        assert sorted(used(log)) == [("23 triX", 650.0, remark), ("23 triY", 1e3, "")]
+
+
+def test_another_table_of_the_same_name_is_refused_with_the_way_out(take, log):
+    take(HEAD + "23 triX,650,40,\n")
+    with pytest.raises(SensorgenError, match=r"row 2: .*withdraw reading 1 .*another name"):
+        take(HEAD + "23 triX,700,40,\n")
+    assert take(HEAD + "23 triX,700,40,\n", name="tuesday.csv").new == 1
+    assert take(HEAD + "23 triY,700,40,\n").new == 1  # another specimen: another reading
+    withdraw(log, "reading", 1, "corrected")
+    assert take(HEAD + "23 triX,710,40,\n").new == 1
+    assert [r.y_ohm[0] for r in log.readings()] == [700.0, 700.0, 710.0]

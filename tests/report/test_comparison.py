@@ -4,18 +4,20 @@ import dataclasses
 import json
 from math import inf, log, sqrt
 
+import mpmath
 import numpy as np
 import pytest
 
 from sensorgen.analysis.comparison import of_iteration, predicted
 from sensorgen.analysis.comparison.expected import stored_or_made
 from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
+from sensorgen.analysis.report.provenance import origins
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.design.specimen_name import design_of, parse
-from sensorgen.measure.log import Log, notes
+from sensorgen.measure.log import Log, anchors, notes
 from sensorgen.measure.log.batches import prediction
-from sensorgen.measure.signal.leakage import across_ohm, along_ohm, electrode_and_leak
+from sensorgen.measure.signal.leakage import across_ohm, along_ohm, electrode_and_leak, leak_s
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
@@ -95,6 +97,37 @@ def test_the_earliest_stored_prediction_is_taken_as_it_was(tmp_path):
     afterwards = predicted(default_body(make({"shape": "reference"})))
     assert not afterwards.stored_at
     assert "made afterwards" in afterwards.provenance
+
+
+def test_an_anchor_after_a_prediction_is_shown_with_it(tmp_path):
+    design, other = design_of(parse("40 triX .1mm")), design_of(parse("40 triY .1mm"))
+    data = {"electrode_resistance_ohm": {"top": 1000.0, "bottom": 3000.0}}
+    with Log(tmp_path / "log.db", create=True) as book:
+        book.add([prediction(design.id(), design.name, data), prediction("x" * 16, "another", data)])
+        anchors.anchor(book, tmp_path / "heads.txt")
+        anchors.anchor(book, tmp_path / "later.txt")
+        book.add([prediction(other.id(), other.name, data)])
+        book.add([notes.reading("40 triX .1mm", "0.65k", "40"), notes.reading("40 triY .1mm", "0.65k", "40")])
+        found = of_iteration(book, 40)
+        table = origins(book, found)
+    dated = (tmp_path / "heads.txt").read_text()[:10]
+    said = {p.design: p.provenance for p in found.predictions.values()}
+    assert f"anchored {dated}T" in said[design.name]
+    assert said[design.name].endswith(" in heads.txt, 1 record later")
+    assert "anchored" not in said[other.name]  # no anchor was made after it
+    assert [row.name for row in table.rows if row.kind == "anchor"] == ["heads.txt", "later.txt"]
+
+
+def test_leakage_by_newton_is_that_of_halving_in_50_digits():
+    """Over 30 decades of R_Z over R."""
+    mpmath.mp.dps = 50
+    for ratio in np.geomspace(1e-12, 1e18, 301):
+        wanted, low, high = 2 / mpmath.mpf(float(ratio)), mpmath.mpf("1e-12"), mpmath.mpf("1e14")
+        while high / low > 1 + mpmath.mpf("1e-30"):
+            middle = mpmath.sqrt(low * high)
+            low, high = (low, middle) if middle * mpmath.tanh(middle) > wanted else (middle, high)
+        exact = float(low**2 / 2 / 700)
+        assert leak_s(700.0 * ratio, 700.0) == pytest.approx(exact, rel=5e-15, abs=0), ratio
 
 
 def test_corrected_readings_count_for_nothing_and_are_told(tmp_path):

@@ -242,7 +242,7 @@ def test_resistivity_explains_what_it_must(of_thesis):
 
 def test_it_says_that_predictions_were_made_afterwards(of_thesis, of_recorded):
     assert "made after the measurement" in " ".join(of_thesis.findings)
-    assert "1 of 1 predictions were stored before anything was measured" in " ".join(of_recorded.findings)
+    assert "1 of 1 prediction was stored before anything was measured" in " ".join(of_recorded.findings)
     assert any(row.which.startswith("stored 20") for row in table(of_recorded, "provenance").rows)
 
 

@@ -125,6 +125,8 @@ def publish(stage: Path, folder: Path, manifest: str = MANIFEST) -> None:
     staged = {_key(file, stage): file for file in _files(stage)}
     targets = {name: folder / name for name in staged}
     for target in targets.values():
+        if not target.parent.resolve().is_relative_to(folder.resolve()):
+            raise Unwritable(f"{str(target.parent)!r} is a link to another folder: move it away, and start again")
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir() or not os.access(target.parent, os.W_OK):
             raise Unwritable(

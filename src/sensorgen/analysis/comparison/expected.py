@@ -155,5 +155,9 @@ def stored_or_made(
             None: "before or after the measurement only by clocks",
         }[before]
         place = f"record {log.record_of(first)[0]} of the log, {order}"
+        if proof := log.anchored(first):
+            anchor, later = proof
+            place += f"; anchored {anchor.logged_at} in {anchor.file}"
+            place += f", {later} record{'s' * (later > 1)} later" if later else ""
         return Predicted(body.design.name, body.design.id(), found, first.logged_at, first.version, before, place)
     return predicted(body)

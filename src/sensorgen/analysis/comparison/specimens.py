@@ -8,7 +8,7 @@ from functools import cached_property
 from math import isfinite, log, nan
 
 from sensorgen.analysis.comparison.expected import Predicted, stored_or_made
-from sensorgen.analysis.comparison.measured import Measured, Readings, readings
+from sensorgen.analysis.comparison.measured import Measured, readings
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.lazy import Lazy
 from sensorgen.design.body import Body, BodyOf
@@ -20,6 +20,7 @@ from sensorgen.measure.signal.verdicts import Evidence, Verdict, expected_from, 
 from sensorgen.prediction import bodies
 
 _MOST_LEFT_OUT = 1000  # readings that are listed for one reason
+_KEPT = 120_000  # rows that are kept, in 0.1 GB: a report reads each some 16 times
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +122,7 @@ def of_iteration(
         Names of specimens, in place of an iteration.
     """
     measured = readings(log.about(Reading, iteration, specimens))
-    left_out = list(_superseded(log, iteration, specimens, measured))
+    left_out = list(_superseded(log, iteration, specimens))
     printed = _printed(log, left_out)
     by_specimen = _by_specimen(log, iteration, specimens, printed, left_out)
     by_id = {design.id(): design for design in {id(d): d for d in by_specimen.values()}.values()}
@@ -144,11 +145,18 @@ def of_iteration(
         by_shape.setdefault(reading.shape, array("d")).extend(least(_evidence(reading, None)))
     usual = {shape: expected_from(values) for shape, values in by_shape.items()}
 
+    kept: dict[int, Compared] = {}
+
     def compared(place: int) -> Compared:
+        if place in kept:
+            return kept[place]
         reading = measured.rows[place]
         of = found.get(names.get(reading.specimen, ""))
         evidence = _evidence(reading, of, usual[reading.shape])
-        return Compared(reading, of, evidence, verdict(evidence))
+        row = Compared(reading, of, evidence, verdict(evidence))
+        if len(kept) < _KEPT:
+            kept[place] = row
+        return row
 
     rows = Lazy(compared, range(len(measured.rows)))
     ac = {reading.number for reading in measured.alternating}
@@ -167,22 +175,20 @@ def _begun(
     found: dict[str, dict[object, Entry]] = {}
     kinds: tuple[type[Reading | BenchRun], ...] = (Reading, BenchRun)
     for kind in kinds:
-        for row in log.about(kind, iteration, specimens, superseded=True):
+        if log.merged:
+            rows = log.about(kind, iteration, specimens, superseded=True)
+        else:
+            each = (log.about(kind, None, [specimen], superseded=True) for specimen in names)
+            rows = iter(sorted(filter(None, (next(of, None) for of in each)), key=lambda row: row.number))
+        for row in rows:
             if row.specimen in names:
                 found.setdefault(names[row.specimen], {}).setdefault((kind, row.number * log.merged), row)
     return {name: list(rows.values()) for name, rows in found.items()}
 
 
-def _superseded(
-    log: Log, iteration: int | None, specimens: Sequence[str], measured: Readings
-) -> Iterator[tuple[str, str]]:
+def _superseded(log: Log, iteration: int | None, specimens: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Readings out of use, and why."""
-    current = (reading.number for reading in measured.rows)
-    now = next(current, 0)
-    for old in log.about(Reading, iteration, specimens, superseded=True):  # both in the same order
-        if old.number == now:
-            now = next(current, 0)
-            continue
+    for old in log.about(Reading, iteration, specimens, replaced=True):
         later = log.superseding(old)
         reason = next((row.reason for row in later if isinstance(row, Withdrawal)), "")
         both = f"; {len(later)} corrections of it, made on different machines, all count" if len(later) > 1 else ""

@@ -160,7 +160,8 @@ def findings(found: Comparison) -> Iterator[str]:
     if every:
         rest = "".join(f"; {count} {how}" for how, count in late.items() if count)
         order = "stored before anything was measured, by the order of the log's records"
-        yield f"{before} of {len(every)} predictions were {order}{rest}."
+        predictions = "prediction was" if len(every) == 1 else "predictions were"
+        yield f"{before} of {len(every)} {predictions} {order}{rest}."
     touching = Counter(r.predicted.design for r in found.rows if r.predicted and r.predicted.touches)
     if touching:
         names = ", ".join(f"{name} ({count})" for name, count in sorted(touching.items()))

@@ -10,7 +10,7 @@ from sensorgen.analysis.comparison import Comparison
 from sensorgen.core.document import Column, Table
 from sensorgen.core.version import __version__
 from sensorgen.design.materials import SET, citations
-from sensorgen.measure.log import Log, RawFile
+from sensorgen.measure.log import Anchor, Log, RawFile
 
 LIBRARIES = ("numpy", "scipy", "plotly", "matplotlib", "jinja2")
 
@@ -45,10 +45,12 @@ def origins(log: Log, found: Comparison, *, brief: bool = False) -> Table:
         program, kept = Origin("program", "sensorgen", __version__), f"{records} records; head {head}"
         rows = [program, Origin("log", log.path.name, kept), *predictions]
         return Table.of("provenance", "Program, log and prediction", tuple(rows))
+    anchors = log.entries(Anchor)
     rows = [
         Origin("program", "sensorgen", __version__), Origin("program", "Python", platform.python_version()),
         *(Origin("library", name, version(name)) for name in LIBRARIES),
         Origin("log", log.path.name, f"{records} records; head {head}"),
+        *(Origin("anchor", a.file, f"{a.logged_at}: record {log.sequence(a.head)}, {a.head}") for a in anchors),
         *(Origin("raw file", f.name, f"SHA-256 {f.uid}, {f.size} bytes") for f in log.entries(RawFile)),
         *(Origin("source of readings", name, f"{count} readings") for name, count in sorted(readings.items())),
         *predictions, *_sources(found),

@@ -1,6 +1,7 @@
 """Append-only log of readings, recordings and predictions of printed specimens."""
 
 from sensorgen.measure.log.entries import (
+    Anchor,
     Batch,
     BenchRun,
     Calibration,
@@ -16,6 +17,6 @@ from sensorgen.measure.log.entries import (
 from sensorgen.measure.log.logbook import PLACE, Log, place
 
 __all__ = [
-    "PLACE", "Batch", "BenchRun", "Calibration", "DesignRow", "Entry", "Log", "Prediction", "Print", "RawFile",
-    "Reading", "Specimen", "Withdrawal", "place",
+    "PLACE", "Anchor", "Batch", "BenchRun", "Calibration", "DesignRow", "Entry", "Log", "Prediction", "Print",
+    "RawFile", "Reading", "Specimen", "Withdrawal", "place",
 ]  # fmt: skip

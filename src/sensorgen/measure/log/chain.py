@@ -11,7 +11,7 @@ all records that its chain of parents leads to, whatever any clock says.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 
@@ -65,59 +65,12 @@ def made(parents: Sequence[str], kind: str, version: int, logged_at: str, conten
 
 def sound(record: Record) -> bool:
     """Whether a record is what its identity says."""
-    words = (record.kind, record.logged_at)
     return (
-        all(_WORD.fullmatch(word) for word in words)
-        and all(_HASH.fullmatch(parent) for parent in record.parents)
+        _WORD.fullmatch(record.kind) is not None
+        and _WORD.fullmatch(record.logged_at) is not None
+        and all(map(_HASH.fullmatch, record.parents))
         and record.id == identity(record.parents, record.kind, record.version, record.logged_at, record.content)
     )
-
-
-def heads(before: str, new: Iterable[Record]) -> list[str]:
-    """Identities of records that no other one follows.
-
-    Parameters
-    ----------
-    before : str
-        The only one so far; "" for none.
-    new : iterable of Record
-        Records that were added.
-    """
-    found = dict.fromkeys([before] if before else [])
-    for record in new:
-        for parent in record.parents:
-            found.pop(parent, None)
-        found[record.id] = None
-    return list(found)
-
-
-def parents_first(records: Mapping[str, Record], known: set[str]) -> Iterator[Record]:
-    """Records in an order in which each stands after its parents; those with a missing parent are left out.
-
-    Parameters
-    ----------
-    records : mapping
-        By identity, without those that are known.
-    known : set of str
-        Identities that are there; grows.
-    """
-    following: dict[str, list[str]] = {}
-    waiting: dict[str, int] = {}
-    for record in records.values():
-        missing = [parent for parent in record.parents if parent not in known]
-        waiting[record.id] = len(missing)
-        for parent in missing:
-            following.setdefault(parent, []).append(record.id)
-    free = [key for key, count in waiting.items() if not count]
-    free.reverse()
-    while free:
-        key = free.pop()
-        known.add(key)
-        yield records[key]
-        for child in reversed(following.pop(key, [])):
-            waiting[child] -= 1
-            if not waiting[child]:
-                free.append(child)
 
 
 class Ancestry:

@@ -8,7 +8,8 @@ Pydantic is not used here: ``sensorgen log list`` would spend most of its time o
 import json
 import math
 from dataclasses import MISSING, fields
-from functools import cache
+from functools import cache, lru_cache
+from operator import eq
 from types import NoneType
 from typing import Any, TypeVar, cast, get_args, get_type_hints
 
@@ -20,10 +21,26 @@ UNHASHED = ("number", "logged_at")  # given by the log, and by the record
 INDEXED: dict[str, type] = {"uid": str, "specimen": str, "iteration": int, "design_id": str, "supersedes": str}
 _Kind = TypeVar("_Kind", bound=Entry)
 _COLUMNS: dict[type[Entry], dict[str, Any]] = {kind: get_type_hints(kind) for kind in KINDS.values()}
-_HELD: dict[type[Entry], dict[str, tuple[Any, object]]] = {  # by a record: types and defaults
-    kind: {f.name: (of[f.name], f.default) for f in fields(kind) if f.name not in UNHASHED}
+_Kinds = tuple[bool, Any, frozenset[type]]
+
+
+@cache
+def _kinds(annotation: Any) -> _Kinds:
+    """Whether a field may be None, its type in JSON, and the types of its items if that is a list."""
+    if annotation == tuple[float, ...]:
+        return False, list, frozenset((int, float))
+    if annotation == tuple[str, ...]:
+        return False, list, frozenset((str,))
+    kinds = get_args(annotation) or (annotation,)
+    return NoneType in kinds, next(kind for kind in kinds if kind is not NoneType), frozenset()
+
+
+_TEXT = _kinds(str)
+_HELD: dict[type[Entry], dict[str, tuple[_Kinds, object]]] = {  # by a record: types and defaults
+    kind: {f.name: (_kinds(of[f.name]), f.default) for f in fields(kind) if f.name not in UNHASHED}
     for kind, of in _COLUMNS.items()
 }
+_REQUIRED = {kind: {name for name, (_, usual) in held.items() if usual is MISSING} for kind, held in _HELD.items()}
 
 
 def columns(kind: type[Entry]) -> dict[str, Any]:
@@ -40,11 +57,11 @@ def encode(entry: Entry) -> str:
         A value that the field cannot have.
     """
     kind, data = type(entry), dict[str, Any]()
-    for name, (annotation, usual) in _HELD[kind].items():
+    for name, (kinds, usual) in _HELD[kind].items():
         value = getattr(entry, name)
         if value != usual:
             data[name] = value
-            _checked(name, annotation, list(value) if isinstance(value, tuple) else value, kind)
+            _checked(name, kinds, list(value) if isinstance(value, tuple) else value, kind)
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":"))
     if "Infinity" not in text:
         return text
@@ -59,35 +76,38 @@ def decode(kind: type[_Kind], content: str, number: int, logged_at: str) -> _Kin
     BadInput
         Content that no version of sensorgen writes for this kind.
     """
-    try:
-        data = json.loads(content)
-    except (ValueError, TypeError, RecursionError):
-        data = None
-    if not isinstance(data, dict):
+    data, held = _object(content), _HELD[kind]
+    if data is None:
         raise BadInput(f"a {kind.__name__} of which the content is no JSON object: {content!r:.60}")
-    held = _HELD[kind]
-    strange = data.keys() - held.keys()
-    missing = [name for name, (_, usual) in held.items() if usual is MISSING and name not in data]
-    if strange or missing:
+    if not (data.keys() <= held.keys() and _REQUIRED[kind] <= data.keys()):
+        strange, missing = data.keys() - held.keys(), [name for name in held if name in _REQUIRED[kind] - data.keys()]
         wrong = f"has {min(strange)!r:.40}" if strange else f"lacks {missing[0]!r}"
         raise BadInput(f"a {kind.__name__} {wrong}; expected {', '.join(held)}")
-    values = {name: _checked(name, held[name][0], value, kind) for name, value in data.items()}
+    values = {
+        name: value if held[name][0] is _TEXT and type(value) is str else _checked(name, held[name][0], value, kind)
+        for name, value in data.items()
+    }
     return kind(**values, number=number, logged_at=logged_at)  # type: ignore[arg-type]
 
 
 def indexed(content: str) -> tuple[str | int | None, ...]:
     """What the log's index has of a record's content: the fields of ``INDEXED``, None for those that it has not."""
+    held = _object(content) or {}
+    return tuple([held[name] if type(held.get(name)) is kind else None for name, kind in INDEXED.items()])
+
+
+@lru_cache(maxsize=1)  # a record is decoded, and then indexed
+def _object(content: str) -> dict[str, Any] | None:
     try:
         data = json.loads(content)
-    except (ValueError, RecursionError):
-        data = None
-    held = data if isinstance(data, dict) else {}
-    return tuple(held[name] if type(held.get(name)) is kind else None for name, kind in INDEXED.items())
+    except (ValueError, TypeError, RecursionError):
+        return None
+    return data if isinstance(data, dict) else None
 
 
-def _checked(name: str, annotation: Any, value: Any, kind: type[Any]) -> Value:
+def _checked(name: str, kinds: _Kinds, value: Any, kind: type[Any]) -> Value:
     try:
-        return from_json(annotation, value)
+        return _value(kinds, value)
     except (TypeError, ValueError):
         raise BadInput(f"column {name} of a {kind.__name__} holds {value!r:.60}") from None
 
@@ -126,26 +146,19 @@ def from_cell(annotation: Any, cell: str) -> Value:
 
 def from_json(annotation: Any, value: Any) -> Value:
     """Value out of JSON, by the field's type; ValueError or TypeError for any other."""
-    optional, kind, items = _kinds(annotation)
+    return _value(_kinds(annotation), value)
+
+
+def _value(kinds: _Kinds, value: Any) -> Value:
+    optional, kind, items = kinds
     if value is None and optional:
         return None
     if kind is list:
-        if type(value) is not list or not all(type(item) in items and item == item for item in value):
-            raise ValueError(f"{value!r:.60} is no list of {items[-1].__name__}")
-        return tuple(items[-1](item) for item in value)
+        if type(value) is not list or not items.issuperset(map(type, value)) or not all(map(eq, value, value)):
+            raise ValueError(f"{value!r:.60} is no list of {'texts' if str in items else 'numbers'}")
+        return tuple(value) if str in items else tuple(map(float, value))
     if kind is float and type(value) in (float, int) and math.isfinite(value):
         return float(value)
     if type(value) is not kind or kind is float:
         raise TypeError(f"{value!r:.60} is no {kind.__name__}")
     return cast(Value, value)
-
-
-@cache
-def _kinds(annotation: Any) -> tuple[bool, Any, tuple[type, ...]]:
-    """Whether a field may be None, its type in JSON, and the types of its items if that is a list."""
-    if annotation == tuple[float, ...]:
-        return False, list, (int, float)
-    if annotation == tuple[str, ...]:
-        return False, list, (str,)
-    kinds = get_args(annotation) or (annotation,)
-    return NoneType in kinds, next(kind for kind in kinds if kind is not NoneType), ()

@@ -103,7 +103,9 @@ def faults(folder: Path, files: Iterator[RawFile]) -> Iterator[str]:
     for file in files:
         path = place(folder, file)
         try:
-            if _digest(path) != file.uid:
+            if path.is_symlink() or (path.exists() and not path.is_file()):
+                yield f"raw file {file.name} ({path}) is a link or no file; expected the file itself"
+            elif _digest(path) != file.uid:
                 yield f"raw file {file.name} ({path}) is not what was logged"
         except OSError as error:
             yield f"raw file {file.name} ({path}): {error.strerror or error}"

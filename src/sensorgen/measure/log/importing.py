@@ -9,7 +9,7 @@ from pathlib import Path
 from sensorgen.core.document import Part
 from sensorgen.core.errors import BadInput
 from sensorgen.measure import accuracy, lcr
-from sensorgen.measure.log import batches, exchange, files, notes, tables
+from sensorgen.measure.log import batches, edited, exchange, files, notes, tables
 from sensorgen.measure.log.entries import Entry, RawFile, Reading
 from sensorgen.measure.log.logbook import Log
 
@@ -28,6 +28,8 @@ class Imported:
         Rows that the log did not have.
     doubtful : int
         New readings with doubts.
+    corrections : int
+        New rows that correct one that was logged before the table was edited.
     left_out : tuple of str
         Columns that were ignored.
     """
@@ -35,13 +37,15 @@ class Imported:
     rows: int
     new: int
     doubtful: int
+    corrections: int = 0
     left_out: tuple[str, ...] = ()
 
     def document(self) -> Iterator[Part]:
         """Rows, and the columns that were ignored."""
         known = f"{self.rows - self.new} were there" if self.new < self.rows else ""
         doubtful = f"{self.doubtful} with doubts" if self.doubtful else ""
-        rows = ", ".join(filter(None, (f"{self.new} of {self.rows} rows logged", known, doubtful)))
+        edited = f"{self.corrections} correct what was logged before the table was edited" if self.corrections else ""
+        rows = ", ".join(filter(None, (f"{self.new} of {self.rows} rows logged", known, doubtful, edited)))
         yield rows
         if self.left_out:
             yield f"columns left out: {', '.join(self.left_out)}"
@@ -111,7 +115,9 @@ def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> Imported:
     if path.suffix.lower() == ".json":
         return _add(log, list(batches.rows(path, files.keep(log.files, path))))
     if not path.is_dir():
-        return _add(log, *_table(path, columns))
+        rows, left_out = _table(path, columns)
+        readings = [row for row in rows if isinstance(row, Reading) and not row.logged_at]  # of no export
+        return _add(log, edited.corrections(log, readings, path.name) if readings else rows, left_out)
     exported: list[Entry] = []
     for kind, name in exchange.FILES.items():
         file = next((p for suffix in exchange.FORMATS if (p := path / f"{name}.{suffix}").is_file()), None)
@@ -152,4 +158,5 @@ def _is_log_table(path: Path) -> bool:
 def _add(log: Log, rows: Sequence[Entry], left_out: Iterable[str] = ()) -> Imported:
     new = log.add(rows)
     doubtful = sum(isinstance(row, Reading) and bool(row.doubts) for row in new)
-    return Imported(len(rows), len(new), doubtful, tuple(left_out))
+    corrections = 0 if any(row.logged_at for row in rows) else sum(bool(getattr(row, "supersedes", "")) for row in new)
+    return Imported(len(rows), len(new), doubtful, corrections, tuple(left_out))

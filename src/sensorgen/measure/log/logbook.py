@@ -2,7 +2,8 @@
 
 import dataclasses
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +20,7 @@ from sensorgen.measure.log.entries import (
     REFERENCES,
     SPECIMEN_COLUMNS,
     VERSIONS,
+    Anchor,
     Batch,
     BenchRun,
     Entry,
@@ -134,7 +136,13 @@ class Log:
         return tuple(self.entries(Print, specimen=specimen) if specimen else self.entries(Print))
 
     def entries(
-        self, kind: type[_Kind], *, last: int | None = None, superseded: bool = False, **equal: Value
+        self,
+        kind: type[_Kind],
+        *,
+        last: int | None = None,
+        superseded: bool = False,
+        replaced: bool = False,
+        **equal: Value,
     ) -> Iterator[_Kind]:
         """Rows of one kind, the earliest first.
 
@@ -146,6 +154,8 @@ class Log:
             Only the latest rows, at most this many.
         superseded : bool
             Also rows that a later row corrects or withdraws.
+        replaced : bool
+            These alone.
         **equal
             Required values by column.
 
@@ -162,7 +172,8 @@ class Log:
         asked = {
             name: value for name, value in equal.items() if name in (*INDEXED, "number") and value not in ("", None)
         }
-        where = " AND ".join((*(f"{name} = ?" for name in asked), _current(superseded=superseded)))
+        current = f"uid IN ({_SUPERSEDED})" if replaced else _current(superseded=superseded)
+        where = " AND ".join((*(f"{name} = ?" for name in asked), current))
         sql = (
             "SELECT kind, content, number, logged_at FROM record "  # noqa: S608
             f"WHERE kind = ?1 AND number IS NOT NULL AND {where} ORDER BY number {'DESC' if last else ''}"
@@ -172,7 +183,13 @@ class Log:
         yield from reversed(list(itertools.islice(wanted, last))) if last else wanted
 
     def about(
-        self, kind: type[_Kind], iteration: int | None, specimens: Sequence[str] = (), *, superseded: bool = False
+        self,
+        kind: type[_Kind],
+        iteration: int | None,
+        specimens: Sequence[str] = (),
+        *,
+        superseded: bool = False,
+        replaced: bool = False,
     ) -> Iterator[_Kind]:
         """Rows of one kind about some specimens, else about an iteration, else all.
 
@@ -186,12 +203,14 @@ class Log:
             Names of specimens; their rows come one specimen after the other.
         superseded : bool
             Also rows that a later row corrects or withdraws.
+        replaced : bool
+            These alone.
         """
         for specimen in specimens:
-            yield from self.entries(kind, superseded=superseded, specimen=specimen)
+            yield from self.entries(kind, superseded=superseded, replaced=replaced, specimen=specimen)
         if not specimens:
             which = {} if iteration is None else {"iteration": iteration}
-            yield from self.entries(kind, superseded=superseded, **which)
+            yield from self.entries(kind, superseded=superseded, replaced=replaced, **which)
 
     def count(self, kind: type[Entry], *, superseded: bool = False) -> int:
         """Number of rows of a kind."""
@@ -261,6 +280,15 @@ class Log:
             return one < other
         return True if self._ancestry.before(key, its_key) else False if self._ancestry.before(its_key, key) else None
 
+    def anchored(self, entry: Entry) -> tuple[Anchor, int] | None:
+        """The first anchor that proves a row, and the number of records from the row to what was anchored."""
+        place, key = self.record_of(entry)
+        for anchor in self.entries(Anchor):
+            head = self.sequence(anchor.head)
+            if head == place or (head > place and (not self._ancestry or self._ancestry.before(key, anchor.head))):
+                return anchor, head - place
+        return None
+
     @property
     def merged(self) -> bool:
         """Whether several machines have written the log."""
@@ -309,18 +337,9 @@ class Log:
             writer.finish()
         return new
 
-    def merge(self, records: Mapping[str, Record]) -> tuple[int, int]:
-        """Add records of another log; a merge is logged where both have grown.
-
-        Parameters
-        ----------
-        records : mapping
-            By identity; those that the log has are skipped.
-
-        Returns
-        -------
-        int, int
-            Number of records that are new, without the merge; and of those whose parents are in neither log.
+    @contextmanager
+    def merging(self) -> Iterator["Merging"]:
+        """Add records of another log inside, all or none; a merge is logged at the end where both have grown.
 
         Raises
         ------
@@ -330,22 +349,22 @@ class Log:
         """
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         with database.transaction(self._connection, self.path):
-            known = {str(key) for (key,) in self._rows("SELECT id FROM record")}
-            missing = {key: record for key, record in records.items() if key not in known}
-            writer, added = _Writer(self._connection, *self.head()), list[Record]()
-            for record in chain.parents_first(missing, known):
-                writer.append(record, self._copy(self._received(record)))
-                added.append(record)
-            if added:
-                heads = chain.heads(self.head()[1], added)
-                if len(heads) > 1:
+            writer = _Writer(self._connection, *self.head())
+            merging = Merging(self, writer)
+            yield merging
+            if merging.added:
+                if len(merging.heads) > 1:
                     row = Merge(uid="")
-                    writer.append(chain.made(heads, NAMES[Merge], 1, now, encode(row)), copy=False)
+                    writer.append(chain.made(list(merging.heads), NAMES[Merge], 1, now, encode(row)), copy=False)
                 writer.finish()
-            return len(added), len(missing) - len(added)
 
-    def _received(self, record: Record) -> Entry:
-        """Row of another machine's record."""
+    def sequence(self, key: str) -> int:
+        """Number of the record with that identity; 0 if the log does not have it."""
+        found = self._connection.execute("SELECT sequence FROM record WHERE id = ?", [key]).fetchone()
+        return found[0] if found else 0
+
+    def received(self, record: Record) -> Entry:
+        """Row of another machine's record; parameters and errors as :meth:`merging`."""
         if record.kind not in KINDS or record.version > VERSIONS.get(record.kind, 1):
             raise BadInput(f"record {record.id[:12]} is a {record.kind!r:.40} of version {record.version}, "
                            "which this sensorgen does not read: take a newer one")  # fmt: skip
@@ -353,8 +372,11 @@ class Log:
             raise BadInput(f"record {record.id[:12]} is not what its identity says; nothing was added")
         return decode(KINDS[record.kind], record.content, 0, record.logged_at)
 
-    def _copy(self, entry: Entry) -> bool:
+    def has(self, entry: Entry) -> bool:
         """Whether the log has a row already, apart from what each machine adds to it."""
+        sql = "SELECT 1 FROM record WHERE kind = ? AND uid = ? AND number IS NOT NULL"
+        if not self._connection.execute(sql, [NAMES[type(entry)], entry.uid]).fetchone():
+            return False
         return any(_same(entry, row, but=_LOCAL) for row in self._of_uid(type(entry), entry.uid))
 
     def _of_uid(self, kind: type[_Kind], uid: str) -> Iterator[_Kind]:
@@ -447,12 +469,54 @@ class Log:
             raise BadInput(f"the log {str(self.path)!r} is damaged: {error}") from None
 
 
+class Merging:
+    """Records of another log that join a log; see :meth:`Log.merging`.
+
+    Attributes
+    ----------
+    added : int
+        Number of records that are new.
+    heads : dict of str to None
+        Identities of records that no other one follows.
+    offered : bytearray
+        At the number of each record that was offered and that the log has now: 1.
+    """
+
+    def __init__(self, log: Log, writer: "_Writer") -> None:
+        self._log, self._writer = log, writer
+        self.added, self.heads = 0, dict.fromkeys([writer.head] if writer.head else [])
+        self.offered = bytearray(writer.sequence + 1)
+
+    def take(self, record: Record) -> str:
+        """Add a record unless the log has it.
+
+        Returns
+        -------
+        str
+            Identity of a record that it follows and that the log does not have: offer it again later; else "".
+        """
+        sequence = self._log.sequence(record.id)
+        if sequence:
+            self.offered[sequence] = 1
+            return ""
+        for parent in record.parents:
+            if parent != self._writer.head and not self._log.sequence(parent):
+                return parent
+        self._writer.append(record, self._log.has(self._log.received(record)))
+        self.offered.append(1)
+        self.added += 1
+        for parent in record.parents:
+            self.heads.pop(parent, None)
+        self.heads[record.id] = None
+        return ""
+
+
 class _Writer:
     """Appends records within a transaction, each with its number among those of its kind."""
 
     def __init__(self, connection: Any, sequence: int, head: str) -> None:
         self._connection = connection
-        self._sequence, self.head = sequence, head
+        self.sequence, self.head = sequence, head
         self._numbers: dict[str, int] = {}
 
     def append(self, record: Record, copy: bool) -> int:
@@ -462,8 +526,8 @@ class _Writer:
             self._numbers[record.kind] = self._connection.execute(sql, [record.kind]).fetchone()[0] or 0
         self._numbers[record.kind] += not copy
         number = None if copy else self._numbers[record.kind]
-        self._sequence, self.head = self._sequence + 1, record.id
-        schema.insert(self._connection, record, self._sequence, number)
+        self.sequence, self.head = self.sequence + 1, record.id
+        schema.insert(self._connection, record, self.sequence, number)
         return number or 0
 
     def finish(self) -> None:
@@ -471,7 +535,7 @@ class _Writer:
         if self._numbers:
             sql = "INSERT INTO head VALUES (1, ?, ?) ON CONFLICT DO UPDATE SET sequence = excluded.sequence, " \
                   "id = excluded.id"  # fmt: skip
-            self._connection.execute(sql, [self._sequence, self.head])
+            self._connection.execute(sql, [self.sequence, self.head])
 
 
 def _current(*, superseded: bool) -> str:

@@ -5,14 +5,16 @@ has them. Each machine only adds files under names that their content decides, s
 a drive without locks, a stick or a cloud folder will do. A ``.zip`` holds the same.
 """
 
+import itertools
 import json
+import os
 import shutil
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from hashlib import sha256
+from hashlib import file_digest, sha256
 from pathlib import Path
 
 from sensorgen.core import files as store
@@ -21,11 +23,12 @@ from sensorgen.core.errors import BadInput, Unwritable
 from sensorgen.core.records import shown
 from sensorgen.measure.log import files
 from sensorgen.measure.log.chain import Record
-from sensorgen.measure.log.entries import RawFile
+from sensorgen.measure.log.entries import NAMES, RawFile
 from sensorgen.measure.log.fields import decode
 from sensorgen.measure.log.logbook import Log
 
 MOST_BYTES = 2_000_000_000  # of an archive when unpacked
+MOST_LINE = 100_000_000  # bytes of one record
 _FIELDS = ("id", "parents", "kind", "version", "logged_at", "content")
 
 
@@ -68,9 +71,9 @@ def sync(log: Log, place: Path) -> Synced:
     Unwritable
         The place cannot be written to.
     """
+    notes: list[str] = []
     with _opened(place, create=True) as folder:
-        there, notes = _records(folder)
-        received = _pull(log, folder, there, notes)
+        received, there = _pull(log, folder, notes)
         sent = _push(log, folder, there)
     return Synced(str(place), received, sent, log.head()[1], tuple(notes))
 
@@ -88,7 +91,7 @@ def backup(log: Log, place: Path) -> Synced:
     if place.exists():
         raise BadInput(f"{str(place)!r} is there; expected a new folder or .zip, or sensorgen log sync {str(place)!r}")
     with _opened(place, create=True) as folder:
-        sent = _push(log, folder, {})
+        sent = _push(log, folder, b"")
     return Synced(str(place), 0, sent, log.head()[1])
 
 
@@ -102,9 +105,9 @@ def restore(log: Log, place: Path) -> Synced:
     """
     if log.head()[0]:
         raise BadInput(f"the log {str(log.path)!r} has rows; expected an empty or new one: name it with --log")
+    notes: list[str] = []
     with _opened(place, create=False) as folder:
-        there, notes = _records(folder)
-        received = _pull(log, folder, there, notes)
+        received, _ = _pull(log, folder, notes)
     return Synced(str(place), received, 0, log.head()[1], tuple(notes))
 
 
@@ -145,35 +148,69 @@ def _unpack(place: Path, folder: Path) -> None:
         raise BadInput(f"{str(place)!r} is no archive of a log: {str(error)[:80]}") from None
 
 
-def _pull(log: Log, folder: Path, records: dict[str, Record], notes: list[str]) -> int:
-    """Add what the folder has; number of records. Notes grow by what is incomplete."""
-    raw = [decode(RawFile, r.content, 0, r.logged_at) for r in records.values() if r.kind == "raw_file"]
-    for file in raw:
-        source = files.place(folder / "files", file)
-        if files.place(log.files, file).is_file():
-            continue
-        if source.is_file():
-            files.keep(log.files, source, file)
-        else:
-            notes.append(f"raw file {shown(file.name)} is not in {str(folder)!r}; sync again when it is")
-    received, left = log.merge(records)
+def _pull(log: Log, folder: Path, notes: list[str]) -> tuple[int, bytearray]:
+    """Add what the folder has: number of new records, and which records it had. Notes grow by what is incomplete.
+
+    A file is read until a record follows one that is not there yet, and on from that place when it is. Records are
+    therefore held one at a time.
+    """
+    ready = [(path, 0) for path in _whole(log, folder, notes)]
+    waiting: dict[str, list[tuple[Path, int]]] = {}
+    with log.merging() as merging:
+        while ready:
+            for record, at, path in _records(*ready.pop()):
+                missing = merging.take(record)
+                if missing:
+                    waiting.setdefault(missing, []).append((path, at))
+                    break
+                ready += waiting.pop(record.id, [])
+        stuck, left, before = list(itertools.chain(*waiting.values())), set[str](), -1
+        while stuck and before < merging.added:  # what does not follow a missing record
+            before = merging.added
+            left = {record.id for start in stuck for record, *_ in _records(*start) if merging.take(record)}
     if left:
-        notes.append(f"{left} records follow others that are not there yet; sync again when they are")
-    return received
+        notes.append(f"{len(left)} records follow others that are not there yet; sync again when they are")
+    return merging.added, merging.offered
 
 
-def _records(folder: Path) -> tuple[dict[str, Record], list[str]]:
-    """Records in a folder by identity, and notes on files that are incomplete."""
-    found, notes = dict[str, Record](), list[str]()
+def _whole(log: Log, folder: Path, notes: list[str]) -> Iterator[Path]:
+    """Files of records that are what their names say, and no links; the raw files that they tell of are kept."""
     for path in sorted((folder / "records").glob("*.jsonl")):
-        content = path.read_bytes()
-        if path.is_symlink() or sha256(content).hexdigest() != path.stem:
-            notes.append(f"{path.name:.20} is incomplete or was changed, and was left out")
+        whole = not path.is_symlink() and path.is_file()
+        if whole:
+            with path.open("rb") as file:
+                whole = file_digest(file, "sha256").hexdigest() == path.stem
+        if not whole:
+            wrong = "is a link" if path.is_symlink() else "is incomplete or was changed"
+            notes.append(f"{path.name:.20} {wrong}, and was left out")
             continue
-        for line in content.decode("utf-8", "replace").splitlines():
-            record = _parsed(line, path)
-            found[record.id] = record
-    return found, notes
+        for record, *_ in _records(path, 0, b"raw_file"):
+            if record.kind == NAMES[RawFile]:
+                _fetch(log, folder, decode(RawFile, record.content, 0, record.logged_at), notes)
+        yield path
+
+
+def _fetch(log: Log, folder: Path, file: RawFile, notes: list[str]) -> None:
+    """Keep a raw file that the folder has and the log has not."""
+    source = files.place(folder / "files", file)
+    if files.place(log.files, file).is_file():
+        return
+    if source.is_symlink():
+        notes.append(f"raw file {shown(file.name)} is a link in {str(folder)!r}, and was left out; put the file there")
+    elif source.is_file():
+        files.keep(log.files, source, file)
+    else:
+        notes.append(f"raw file {shown(file.name)} is not in {str(folder)!r}; sync again when it is")
+
+
+def _records(path: Path, start: int, word: bytes = b"") -> Iterator[tuple[Record, int, Path]]:
+    """Records of a file from a byte on, each with the byte where it begins; only lines with a word if one is given."""
+    with path.open("rb") as file:
+        file.seek(start)
+        while line := file.readline(MOST_LINE):
+            if word in line:
+                yield _parsed(line.decode("utf-8", "replace"), path), start, path
+            start += len(line)
 
 
 def _parsed(line: str, path: Path) -> Record:
@@ -188,20 +225,49 @@ def _parsed(line: str, path: Path) -> Record:
     return record
 
 
-def _push(log: Log, folder: Path, there: dict[str, Record]) -> int:
-    """Add to the folder what it lacks; number of records."""
-    missing = [record for record in log.records() if record.id not in there]
+def _push(log: Log, folder: Path, there: Sequence[int]) -> int:
+    """Add to the folder what it lacks; number of records.
+
+    Parameters
+    ----------
+    log : Log
+        The log.
+    folder : Path
+        The folder.
+    there : sequence of int
+        At the number of each record that the folder has: 1.
+    """
+    for name in ("records", "files"):
+        _refuse_link(folder / name)
     for file in log.entries(RawFile, superseded=True):
         target = files.place(folder / "files", file)
         kept = files.place(log.files, file)
         if not target.is_file() and kept.is_file():
+            _refuse_link(target.parent)
             with store.replacing(target) as copy, kept.open("rb") as source:
                 shutil.copyfileobj(source, copy)
-    if missing:
-        text = "".join(_line(record) for record in missing).encode()
-        store.replace(folder / "records" / f"{sha256(text).hexdigest()}.jsonl", text)
-    return len(missing)
+    sent, digest, part = 0, sha256(), store.part_of(folder / "records" / "new.jsonl")
+    part.parent.mkdir(exist_ok=True)
+    try:
+        with part.open("wb") as lines:
+            for number, record in enumerate(log.records(), 1):
+                if number >= len(there) or not there[number]:
+                    line = (
+                        json.dumps({name: getattr(record, name) for name in _FIELDS}, ensure_ascii=False) + "\n"
+                    ).encode()
+                    digest.update(line)
+                    lines.write(line)
+                    sent += 1
+            lines.flush()
+            os.fsync(lines.fileno())
+        if sent:
+            part.replace(part.with_name(f"{digest.hexdigest()}.jsonl"))
+    finally:
+        part.unlink(missing_ok=True)
+    return sent
 
 
-def _line(record: Record) -> str:
-    return json.dumps({name: getattr(record, name) for name in _FIELDS}, ensure_ascii=False) + "\n"
+def _refuse_link(folder: Path) -> None:
+    """Refuse to write through a link, which may lead to any place."""
+    if folder.is_symlink():
+        raise BadInput(f"{str(folder)!r} is a link; expected a folder: move it away, and sync again")

@@ -78,7 +78,7 @@ def leak_s(rz_ohm: float, electrode_ohm: float) -> float:
         raise OutOfRange(f"readings of {electrode_ohm:g} and {rz_ohm:g} ohm; expected numbers from 0 on")
     line = 2 * electrode_ohm
     if rz_ohm in (0, inf) or line == 0 or rz_ohm / line > 1e7:
-        return inf if rz_ohm == 0 else 1 / rz_ohm
+        return inf if rz_ohm == 0 else (1 + line / rz_ohm / 3) / rz_ohm  # to 4/45 (line/rz)^2
     wanted = line / rz_ohm
     q = sqrt(wanted) if wanted < 1 else wanted  # of q tanh q = wanted, by Newton's method
     for _ in range(_STEPS):
