@@ -51,6 +51,18 @@ def kept(tmp_path_factory):
     return tmp_path_factory.mktemp("cache")
 
 
+def specimen_on_a_bench(command, folder):
+    """What ``calibrate S1`` and ``invert S1`` start from: known presses in the log, readings beside it."""
+    if command not in ("calibrate", "invert"):
+        return
+    lcr, rig = virtual_specimen.recorded(virtual_specimen.drawn(1), folder, 12)
+    sofar = [["log", "specimen", "S1", "--design", "flat-tri.yaml"], ["log", "bench", "S1", lcr, rig]]
+    for words in [*sofar, *([["calibrate", "S1"]] if command == "invert" else [])]:
+        subprocess.run([sys.executable, "-m", "sensorgen", *words], cwd=folder, check=True, capture_output=True)
+    readings = virtual_specimen.Truth().impedance([0.0, 2.0], [0.05, 0.05])
+    virtual_specimen.write_csv(folder / "measured.csv", range(2), readings, virtual_specimen.TONES_HZ, rest=[1, 0])
+
+
 @pytest.mark.parametrize("words", list(commands()))
 def test_every_command_of_the_pages_works(words, tmp_path, program, kept, monkeypatch):
     monkeypatch.setenv("SENSORGEN_CACHE", str(kept))
@@ -74,13 +86,8 @@ def test_every_command_of_the_pages_works(words, tmp_path, program, kept, monkey
     if words[:2] == ["log", "import"] and "S1" in words:
         of = ["log", "specimen", "S1", "--design", "flat-tri.yaml"]
         subprocess.run([sys.executable, "-m", "sensorgen", *of], cwd=tmp_path, check=True, capture_output=True)
-    if "S1" in words and words[0] in ("calibrate", "invert"):
-        lcr, rig = virtual_specimen.recorded(virtual_specimen.drawn(1), tmp_path, 12)
-        sofar = [["log", "specimen", "S1", "--design", "flat-tri.yaml"], ["log", "bench", "S1", lcr, rig]]
-        for of in [*sofar, *([["calibrate", "S1"]] if words[0] == "invert" else [])]:
-            subprocess.run([sys.executable, "-m", "sensorgen", *of], cwd=tmp_path, check=True, capture_output=True)
-        at_rest = virtual_specimen.Truth().impedance([0.0, 2.0], [0.05, 0.05])
-        virtual_specimen.write_csv(tmp_path / "measured.csv", range(2), at_rest, virtual_specimen.TONES_HZ, rest=[1, 0])
+    if "S1" in words:
+        specimen_on_a_bench(words[0], tmp_path)
     extra = ["--no-cad"] if words[0] == "build" else []
     done = subprocess.run(
         [sys.executable, "-m", "sensorgen", *words, *extra], cwd=tmp_path, capture_output=True, text=True

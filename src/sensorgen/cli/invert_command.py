@@ -83,13 +83,13 @@ def _work(
     from sensorgen.analysis.calibration import Bench, model_of
     from sensorgen.prediction.calibration import fitting
 
-    def inverter(source: "Readings", noise: Any, limit_n: float | None) -> "tuple[Inverter, float, int, Any]":
+    def inverter(rest: "Rest", tones_hz: Any, noise: Any, limit_n: float | None) -> "tuple[Inverter, float, int, Any]":
         from sensorgen.prediction.calibration.inversion import Inverter
         from sensorgen.prediction.inverse import FORCE_LIMIT_N
 
-        model, found = model_of(body, source.frequency_hz, Bench(tip_mm * units.M_PER_MM))
-        limit = limit_n or FORCE_LIMIT_N
-        known = fitting.prior(model, np.broadcast_to(noise, source.frequency_hz.shape))
+        model, found = model_of(body, tones_hz, Bench(tip_mm * units.M_PER_MM))
+        limit, (mean, count) = limit_n or FORCE_LIMIT_N, rest.mean()
+        known = fitting.by_rest(model, np.log(mean), noise / count**0.5, noise)
         return Inverter(model, known, _prior(how["prior"]), limit), limit, 0, found.doubts
 
     return _by_ratio(design.name, inverter, measured, output, rest_file, None, how["noise"], how["force_limit_n"])
@@ -111,7 +111,7 @@ def _specimen(
             f"({design.name}) alone allows"
         )
 
-    def inverter(source: "Readings", noise: Any, limit_n: float | None) -> "tuple[Inverter, float, int, Any]":  # noqa: ARG001
+    def inverter(rest: "Rest", tones_hz: Any, noise: Any, limit_n: float | None) -> "tuple[Inverter, float, int, Any]":  # noqa: ARG001
         limit = limit_n or known.limit_n
         made = known.inverter(noise, _prior(prior), limit)
         beyond = (f"forces above {known.force_n:.3g} N were not calibrated",) if limit > known.limit_n else ()
@@ -121,7 +121,7 @@ def _specimen(
 
 
 def _by_ratio(
-    of: str, inverter: "Callable[[Readings, Any, float | None], tuple[Inverter, float, int, Any]]", measured: str,
+    of: str, inverter: "Callable[[Rest, Any, Any, float | None], tuple[Inverter, float, int, Any]]", measured: str,
     output: str | None, rest_file: str | None, tones_hz: Any, noise: float | None,
     force_limit_n: tuple[float, ...] | None,
 ) -> int:  # fmt: skip
@@ -148,7 +148,9 @@ def _by_ratio(
             at_rest, time_s = _beside(source, block)
             ratio, age_s = rest.ratios(block.impedance_ohm, at_rest, time_s)
             if made is None and not at_rest.all():
-                made = inverter(source, (rest.noise() if noise is None else noise * np.sqrt(1.1)), limit_n)
+                sigma = rest.noise() if noise is None else noise * np.sqrt(1.1)
+                sigma = np.broadcast_to(sigma, order.shape)[order]
+                made = inverter(rest, source.frequency_hz, sigma, limit_n)
             found = made[0].batch(ratio[:, order], age_s) if made else answers.nothing(len(ratio))
             summary.add(found, at_rest)
             step(f"{summary.samples} samples")

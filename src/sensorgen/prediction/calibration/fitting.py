@@ -12,6 +12,7 @@ from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, pa
 ROUNDS = 3  # Gauss-Newton and variance components in turn
 _STEPS = 12
 _SETTLED = 1e-3  # of a standard deviation
+NOISE = 1e-3  # of the parts of a ratio, where no press tells
 _FLOOR = 1e-5  # of ln Z: no bench is right to more
 _USUAL = (0.25, 0.25), (0.5, 0.6)  # mean and standard deviation of how presses come about: unloading, decades
 _LN_SPREAD = 1.5  # of ln of each variance component's standard deviation, before calibration
@@ -111,7 +112,7 @@ def calibrated(model: SpecimenModel, data: Data, start: Posterior | None = None)
     start : Posterior, optional
         Earlier knowledge, as from an earlier calibration; the prior if not given.
     """
-    known = start or prior(model, np.median(data.noise, axis=0) if len(data.noise) else np.zeros(len(data.rest)))
+    known = start or prior(model, np.median(data.noise, axis=0) if len(data.noise) else np.full(len(data.rest), NOISE))
     inverse: Real = np.asarray(np.linalg.inv(known.covariance))
     at, components = known.at.copy(), known.components
     presses, spread = data.presses, model.spread
@@ -126,6 +127,26 @@ def calibrated(model: SpecimenModel, data: Data, start: Posterior | None = None)
         _mean(presses.unloading, known.unloading), _mean(presses.decades, known.decades), known.noise,
         known.presses + len(presses.force_n),
     )  # fmt: skip
+
+
+def by_rest(model: SpecimenModel, rest: Complex, rest_noise: Real | float, noise: Real | float) -> Posterior:
+    """The posterior of a specimen of which nothing is known but a reading at rest.
+
+    Parameters
+    ----------
+    model : SpecimenModel
+        Of the specimen.
+    rest : (m,) array
+        Ln of Z/ohm at rest, complex.
+    rest_noise, noise : (m,) array or float
+        Standard deviations of its parts, and of those of a ratio [-].
+    """
+    m, none = len(rest), np.empty(0)
+    nothing = np.empty((0, m))
+    data = Data(
+        Presses(none, none, none, none), nothing.astype(complex), nothing, rest, np.broadcast_to(rest_noise, (m,))
+    )
+    return calibrated(model, data, prior(model, np.array(np.broadcast_to(noise, (m,)))))
 
 
 def _mean(values: Real, otherwise: tuple[float, float]) -> tuple[float, float]:

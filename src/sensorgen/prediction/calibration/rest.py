@@ -66,6 +66,11 @@ class Rest:
             self._was = bool(rest[start])
         return ratio, age
 
+    def mean(self) -> tuple[Complex, int]:
+        """Mean of the latest readings at rest [ohm], and their number."""
+        latest = np.array(self._latest)
+        return np.asarray(np.nanmean(latest, axis=0)), len(latest)
+
     def noise(self) -> "Real | float":
         """Standard deviation of a ratio's parts at each tone (m,), by the scatter at rest; ``NOISE`` of too few."""
         squares = [square for square in self._squares if np.isfinite(square).all()]
