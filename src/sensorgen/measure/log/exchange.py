@@ -19,7 +19,17 @@ from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
 from sensorgen.measure.csv_table import Table
 from sensorgen.measure.log import fields, files
-from sensorgen.measure.log.entries import NAMES, ROWS, Calibration, DesignRow, Entry, Print, RawFile, Reading, Withdrawal
+from sensorgen.measure.log.entries import (
+    NAMES,
+    ROWS,
+    Calibration,
+    DesignRow,
+    Entry,
+    Print,
+    RawFile,
+    Reading,
+    Withdrawal,
+)
 from sensorgen.measure.log.fields import Value, from_cell, from_json, to_cell
 from sensorgen.measure.log.logbook import Log
 
