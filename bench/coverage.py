@@ -1,7 +1,7 @@
 """How often force and position lie in their 90 % intervals, over virtual specimens with the errors that prints have.
 
-Run as ``python bench/coverage.py [SPECIMENS [FEWER]]``; writes results/coverage.md. ``FEWER`` specimens make the rows of
-a single error, in which they differ by their noise alone. Each specimen (tests/virtual_specimen, which
+Run as ``python bench/coverage.py [SPECIMENS [FEWER]]``; writes results/coverage.md. ``FEWER`` specimens make the rows
+of a single error, in which they differ by their noise alone. Each specimen (tests/virtual_specimen, which
 shares no line with the package) is pressed 30 times for its calibration and 200 times for the inversion.
 """
 
@@ -14,13 +14,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from virtual_specimen import TONES_HZ
-from virtual_specimen.adapter import ERRORS, LIMIT_N, data, specimen_model, split
-
 from sensorgen.prediction.calibration.coverage import inside
 from sensorgen.prediction.calibration.fitting import calibrated, prior
 from sensorgen.prediction.calibration.inversion import Inverter, Verdict
 from sensorgen.prediction.inverse import Estimator
+from virtual_specimen import TONES_HZ
+from virtual_specimen.adapter import ERRORS, LIMIT_N, data, specimen_model, split
 
 RESULTS = Path(__file__).parent / "results" / "coverage.md"
 KNOWN, UNKNOWN = 30, 200
@@ -54,7 +53,8 @@ def row(name, truth_of, model, specimens, known=KNOWN):
     tenth = np.percentile(np.array(rows)[:, 3:5], 10, axis=0)
     print(name, np.round([force, position, *tenth], 3), flush=True)
     return (
-        f"| {name} | {specimens} | {known} | {ok:.0%} | {force0:.0%} / {position0:.0%} | {force:.3f} / {position:.3f} | "
+        f"| {name} | {specimens} | {known} | {ok:.0%} | {force0:.0%} / {position0:.0%} | "
+        f"{force:.3f} / {position:.3f} | "
         f"{tenth[0]:.2f} / {tenth[1]:.2f} | {wide_n:.2f} N | {wide_mm:.0f} mm | "
         f"{verdicts[Verdict.NO_FIT] / verdicts.sum():.1%} |"
     ), np.median(seconds, axis=0)
@@ -75,10 +75,13 @@ def main():
     head = (
         f"Design: tri 0.2 mm, 100 mm, tip 5 mm, seven tones, noise 0.1 %; {UNKNOWN} presses each of "
         "0.1 to 6 N, half of them after a higher one, held for 0.3 to 30 s.\n\n"
-        "| what is off | specimens | known presses | before: ok | force / place covered | now: force / place covered | tenth "
-        "percentile | median width | | no fit |\n|---|---|---|---|---|---|---|---|---|---|\n"
+        "| what is off | specimens | known presses | before: ok | force / place covered | now: force / place covered "
+        "| tenth percentile | median width | | no fit |\n|---|---|---|---|---|---|---|---|---|---|\n"
     )
-    foot = f"\n\nA calibration takes {fit:.2f} s of processor time; an inversion in a batch {1e3 * invert:.2f} ms, its table included.\n"
+    foot = (
+        f"\n\nA calibration takes {fit:.2f} s of processor time; an inversion in a batch {1e3 * invert:.2f} ms, its "
+        "table included.\n"
+    )
     RESULTS.write_text(head + "\n".join(lines) + foot)
 
 

@@ -20,7 +20,7 @@ PAGES = (
     ["invert"], ["sheet"], ["stack"],
     ["bench"], ["bench", "plan"], ["bench", "plan", "tri"], ["bench", "show"],
     ["bench", "hysteresis"], ["bench", "sets"], ["bench", "live"],
-    ["log"], *(["log", w] for w in ("multimeter", "import", "bench", "predict", "list", "show", "export", "verify")),
+    ["log"], *(["log", w] for w in ("specimen", "add", "import", "bench", "predict", "list", "show", "export", "verify")),
     ["report"], ["fit"], ["thesis"], ["list"], ["schema"], ["completion"],
 )  # fmt: skip
 

@@ -69,6 +69,10 @@ def test_every_command_of_the_pages_works(words, tmp_path, program, kept, monkey
         subprocess.run(
             [sys.executable, "-m", "sensorgen", "log", "import", "--thesis"], check=True, capture_output=True
         )
+    (tmp_path / "lcr.csv").write_text("Frequency,Cp,D\n10100,63e-12,0.02\n", "utf-8")
+    if words[:2] == ["log", "import"] and "S1" in words:
+        of = ["log", "specimen", "S1", "--design", "flat-tri.yaml"]
+        subprocess.run([sys.executable, "-m", "sensorgen", *of], cwd=tmp_path, check=True, capture_output=True)
     extra = ["--no-cad"] if words[0] == "build" else []
     done = subprocess.run(
         [sys.executable, "-m", "sensorgen", *words, *extra], cwd=tmp_path, capture_output=True, text=True

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from sensorgen.prediction.results import Prediction as Prediction
     from sensorgen.workflows.api import as_printed as as_printed
     from sensorgen.workflows.api import build as build
+    from sensorgen.workflows.api import calibrate as calibrate
     from sensorgen.workflows.api import check as check
     from sensorgen.workflows.api import compare as compare
     from sensorgen.workflows.api import compress as compress
@@ -46,7 +47,19 @@ _TYPES = {
     "Log": "measure.log",
     "Prediction": "prediction.results",
 }
-_FUNCTIONS = ("as_printed", "build", "check", "compare", "compress", "fit", "invert", "load", "predict", "slice_design")
+_FUNCTIONS = (
+    "as_printed",
+    "build",
+    "calibrate",
+    "check",
+    "compare",
+    "compress",
+    "fit",
+    "invert",
+    "load",
+    "predict",
+    "slice_design",
+)
 
 __all__ = [*_TYPES, *_FUNCTIONS]
 

@@ -160,6 +160,13 @@ def test_noise_alone_has_no_presses(run, tmp_path):
     rows = "".join(f"{k / 50},{100 + x:.6f},{-50 + y:.6f}\n" for k, (x, y) in enumerate(rng.normal(0, 0.1, (3000, 2))))
     (tmp_path / "a.csv").write_text("time_s,re_ohm_1kHz,im_ohm_1kHz\n" + rows)
     assert "nothing pressed" in run("bench", "show", "a.csv").out
+    (rest,) = json.loads(run("bench", "show", "a.csv", "--json").out)["rest"]
+    assert (rest["re_ohm"], rest["im_ohm"]) == pytest.approx((100, -50), abs=4 * 0.1 / 3000**0.5)
+    assert rest["noise_re_ohm"] == pytest.approx(0.1, rel=0.06)
+    assert rest["capacitance_f"] == pytest.approx(1 / (2 * np.pi * 1e3 * 50), rel=1e-3)
+    assert "negative" not in run("bench", "show", "a.csv").out
+    (tmp_path / "b.csv").write_text("time_s,re_ohm_1kHz,im_ohm_1kHz\n" + rows.replace(",1", ",-1").replace(",9", ",-9"))
+    assert "negative resistance at 1kHz" in run("bench", "show", "b.csv").out
     assert "nothing pressed" in run("bench", "show", "a.csv", "--plot", "out").line
     assert "nothing pressed" in run("bench", "show", "a.csv", "--presses", "p.csv").line
     assert not (tmp_path / "p.csv").exists()

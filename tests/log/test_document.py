@@ -35,10 +35,12 @@ def test_a_day_at_the_bench(run, path, tmp_path, monkeypatch):
     content = made.tree([lived.impedance_ohm], [lived.time_s], made.stamps(lived.time_s))
     scipy.io.savemat(tmp_path / "run.mat", content)
     made.write_rig(tmp_path / "rig.csv", made.rig_rows(pressed))
+    (tmp_path / "mysensor.yaml").write_text("shape: tri\nname: mysensor\nparameters: {length_mm: 120}\n")
+    (tmp_path / "lcr.csv").write_text("Frequency,Cp,D\n1000,12.3e-12,0.02\n")
     commands = [
         shlex.split(line, comments=True) for line in re.search(r"```sh\n(.*?)```", PAGE, re.DOTALL)[1].splitlines()
     ]
-    assert len(commands) == 14
+    assert len(commands) == 17
     for words in commands:
         if words[1] == "bench":
             assert cli.main(words[1:], standalone_mode=False) in (None, 0)
@@ -48,7 +50,11 @@ def test_a_day_at_the_bench(run, path, tmp_path, monkeypatch):
         assert (said.code, said.err) == (0, ""), words
         assert words[2] != "verify" or "is sound" in said.out
     with Log(path) as log:
-        assert [(r.y_ohm, r.baked, r.batch) for r in log.readings()] == [
+        assert [(r.design, r.quantity, r.defects) for r in log.readings(specimen="S1")] == [
+            ("mysensor", ("Cp", "D"), ("hole",)),
+            ("mysensor", ("Cp", "D"), ()),
+        ]
+        assert [(r.y_ohm, r.baked, r.batch) for r in log.readings(specimen=NAME)] == [
             ((660.0,), False, "film-study"),
             ((648.1,), True, "film-study"),
         ]

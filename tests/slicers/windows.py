@@ -95,7 +95,8 @@ def opened(screen, command, environment, log):
 def only(screen):
     """The program's window, and nothing in front of it; for a moment there may be none, while a dialog takes over."""
     titles = until(lambda: list(screen.windows().values()), lambda: "no window is left")
-    assert len(titles) == 1 and " - PrusaSlicer-" in titles[0], titles
+    assert len(titles) == 1, titles
+    assert " - PrusaSlicer-" in titles[0], titles
 
 
 def saved(screen, path):

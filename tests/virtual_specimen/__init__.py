@@ -7,6 +7,7 @@ independent solvers (tests/reference), and the elastomer remembers: it creeps, a
 import json
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +74,7 @@ class Truth:
         edges = np.linspace(0, LENGTH_M, PIECES + 1)
         a, b = np.ones((len(force), len(omega)), complex), np.zeros((len(force), len(omega)), complex)
         cc, d = b.copy(), a.copy()
-        for start, end in zip(edges, edges[1:]):
+        for start, end in pairwise(edges):
             under = np.clip(np.minimum(end, right) - np.maximum(start, left), 0, None) / (end - start)
             at = (start + end) / 2 / LENGTH_M
             bend = sum(k * np.cos((n + 1) * np.pi * at) for n, k in enumerate(self.profile))
@@ -205,7 +206,7 @@ def recorded(truth, folder, count=30, seed=1, force_n=(0.3, 6.0), rate_hz=20.0, 
             (5.0, 0.0, 0.0, 0.0, False), (0.3, 0.0, p, None, False), (0.3, p, f, p, False), (h, f, f, p, True),
             (0.3, f, 0.0, p, False),
         ):  # fmt: skip
-            n = max(int(round(span * rate_hz)), 1)
+            n = max(round(span * rate_hz), 1)
             t = np.arange(n) / rate_hz
             values = start + (end - start) * t / span
             times.append(now + t)

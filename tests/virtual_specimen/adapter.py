@@ -3,17 +3,18 @@
 from dataclasses import replace
 
 import numpy as np
-from virtual_specimen import TONES_HZ, Truth, drawn, session
 
 from sensorgen.analysis.calibration import Bench, model_of
 from sensorgen.design.design import make
 from sensorgen.prediction import bodies
 from sensorgen.prediction.calibration.fitting import Data
 from sensorgen.prediction.calibration.specimen import Presses
+from virtual_specimen import TONES_HZ, Truth, drawn, session
 
 ETPU = "etpu@thesis-3.2"  # 1/1.2 ohm m
 DESIGN = {
-    "shape": "tri", "parameters": {"dielectric_mm": 0.2}, "materials": {"top_electrode": ETPU, "bottom_electrode": ETPU},
+    "shape": "tri", "parameters": {"dielectric_mm": 0.2},
+    "materials": {"top_electrode": ETPU, "bottom_electrode": ETPU},
 }  # fmt: skip
 LIMIT_N = 6.6
 CLEAN = Truth()

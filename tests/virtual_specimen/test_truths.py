@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from virtual_specimen import LENGTH_M, TONES_HZ, WIDTH_M, Truth, drawn, session
 
 C_F = 1.2851365895937111e-10 * WIDTH_M / 2e-3 * LENGTH_M  # tests/reference/cells.json

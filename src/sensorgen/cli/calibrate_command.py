@@ -34,7 +34,9 @@ def _work(
         if again:
             made = [calibration.recheck(log, specimens[0], recordings)]
         else:
-            made = [*calibration.calibrate(log, specimens, bench, recordings, body_of=body_options.body_of(), step=step)]
+            made = [
+                *calibration.calibrate(log, specimens, bench, recordings, body_of=body_options.body_of(), step=step)
+            ]
         if not dry_run:
             log.add(calibration.rows(log, [one.calibration for one in made]))
     for one in made:
@@ -50,13 +52,12 @@ def _work(
 
 def _offset(text: str) -> tuple[float, float]:
     mean, mark, spread = text.replace(" ", "").replace("±", "+-").partition("+-")
+    if not mark:
+        raise BadInput(f"--force-offset {text!r:.40}: expected mean and standard deviation, as 0.9+-0.1 (N)")
     try:
-        found = units.force_n(mean), units.force_n(spread)
+        return units.force_n(mean), units.force_n(spread)
     except BadInput as error:
         raise error.within("--force-offset") from None
-    if not mark or not found[1] > 0:
-        raise BadInput(f"--force-offset {text!r:.40}: expected mean and standard deviation, as 0.9+-0.1 (N)")
-    return found
 
 
 command = click.Command(
@@ -74,7 +75,7 @@ command = click.Command(
         ),
         click.Option(
             ["--recheck", "again"], is_flag=True,
-            help="Hold 3 to 5 new known presses against the calibration, as after a change of tip, and mend it by them.",
+            help="Hold 3 to 5 new known presses against the calibration, as after a change of tip, and mend it.",
         ),
         click.Option(["--page"], metavar="FILE.html", help="Write pictures of the presses and of what was learnt."),
         log_words.where(),

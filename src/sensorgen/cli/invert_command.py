@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sensorgen.measure.readings import Block, Readings
     from sensorgen.prediction.calibration.inversion import Inverter
     from sensorgen.prediction.calibration.rest import Rest
-    from sensorgen.prediction.inverse import Estimator, Prior
+    from sensorgen.prediction.inverse import Prior
 
 _NORMAL = re.compile(r"(force|position)=(.+?)(?:\+-|±)(.+)")
 _REST, _TIME = "rest", "time_s"
@@ -100,10 +100,7 @@ def _specimen(
     force_limit_n: tuple[float, ...] | None, file: str | None,
 ) -> int:  # fmt: skip
     """Force and position of a specimen that 'sensorgen calibrate' has calibrated."""
-    from dataclasses import replace
-
     from sensorgen.analysis.calibration import design_of, stored
-    from sensorgen.prediction.calibration.inversion import Inverter
 
     with log_words.opened(file) as log:
         of, design = design_of(log, name)
@@ -116,8 +113,7 @@ def _specimen(
 
     def inverter(source: "Readings", noise: Any, limit_n: float | None) -> "tuple[Inverter, float, int, Any]":  # noqa: ARG001
         limit = limit_n or known.limit_n
-        posterior = replace(known.posterior, noise=np.broadcast_to(noise, known.model.frequency_hz.shape))
-        made = Inverter(known.model, posterior, _prior(prior), limit)
+        made = known.inverter(noise, _prior(prior), limit)
         beyond = (f"forces above {known.force_n:.3g} N were not calibrated",) if limit > known.limit_n else ()
         return made, limit, known.posterior.presses, beyond
 
@@ -218,7 +214,9 @@ def _perfect(
     with readings(measured) as source, ExitStack() as stack:
         model = sensor_model(body, query)[0]
         limit = one("--force-limit", force_limit_n) if force_limit_n else FORCE_LIMIT_N
-        estimator = Estimator(model.sensor, source.frequency_hz, NOISE if noise is None else noise, _prior(prior), limit)
+        estimator = Estimator(
+            model.sensor, source.frequency_hz, NOISE if noise is None else noise, _prior(prior), limit
+        )
         summary = answers.Summary(estimator, model.doubts)
         write, live, terminal = _writer(stack, measured, output)
         step = stack.enter_context(show.progress(["reading"]))

@@ -39,11 +39,12 @@ def _add(
     """
     from dataclasses import replace
 
+    from sensorgen.measure.immittance import parse
     from sensorgen.measure.log import Reading, binding, files, notes
 
     if visa and (y_words or z_words):
         raise BadInput("--visa beside --y or --z; expected the meter's readings or words, not both")
-    typed = {name: texts for name, texts in ac.items() if texts}
+    typed = {name: texts for name, texts in ac.items() if texts and [parse(name, text) for text in texts]}
     if not (y_words.strip() or z_words.strip() or remark or visa or typed or defects or photo):
         raise BadInput("nothing to log; expected --y, --z, --C or another quantity, --visa, --defect or --remark")
     if design:
@@ -52,12 +53,13 @@ def _add(
                 render.say(f"{specimen}: design {getattr(bound, 'design', '')}", err=bool(render.form()))
     with nullcontext() if file and not Path(file).exists() else existing(file) as known:
         notes.specimen(specimen, known)  # a wrong name is refused before anybody measures, and before a log is made
+    if predict:
+        with opened(file, create=True) as log:
+            _predict_ahead(log, specimen)
     if visa:
         y_words, z_words, instrument = _measured(visa, axis, wires or "2")
     mega = _asked_mega(y=y_words, z=z_words)
     with opened(file, create=True) as log:
-        if predict:
-            _predict_ahead(log, specimen)
         row = notes.reading(
             specimen, y_words, z_words, mega=mega, supersedes=_uid(log, Reading, corrects), baked=baked, remark=remark,
             measured_at=measured_at, instrument=instrument, source=visa or "typed", log=log,
@@ -133,19 +135,28 @@ def _deliver(new: "Sequence[Entry]", log: "Log", known: str = "") -> None:
     render.deliver(listing.logged(log, new, known), before=[f"{'logged' if new else 'not logged'} in {log.path}"])
 
 
-def _import(path: str | None, columns: tuple[str, ...], file: str | None, *, thesis: bool) -> None:
+def _import(
+    path: str | None, columns: tuple[str, ...], file: str | None, *, thesis: bool, specimen: str | None,
+    instrument: str, baked: bool | None, remark: str,
+) -> None:  # fmt: skip
     """Log all rows of a file, or none of them.
 
-    A table of readings as CSV, the batch.json of a print bed, or what 'log export' wrote. Rows that the log has are
-    passed over.
+    A table of readings as CSV, the batch.json of a print bed, what 'log export' wrote, or with --specimen the export of
+    an LCR meter: Frequency, Cp, D and the like, with any separator. Rows that the log has are passed over.
     """
     from sensorgen.measure.log import importing
 
     if thesis == bool(path):
         raise BadInput(f"{'both' if path else 'neither'} of FILE and --thesis given; expected one of them")
     named = dict(pairs(columns, "--column"))
+    if specimen is None and (instrument or remark or baked is not None):
+        raise BadInput("--instrument, --baked and --remark are for the export of an LCR meter; expected --specimen too")
     with opened(file, create=True) as log:
-        done = importing.thesis(log) if thesis else importing.import_file(log, Path(str(path)), named)
+        if specimen is not None:
+            how = {"instrument": instrument, "remark": remark}
+            done = importing.lcr_export(log, Path(str(path)), specimen, baked=baked, **how)
+        else:
+            done = importing.thesis(log) if thesis else importing.import_file(log, Path(str(path)), named)
         render.deliver(done, before=[f"import into {log.path}"])
 
 
@@ -245,6 +256,10 @@ table = made(
         ["--column", "columns"], metavar="OURS=THEIRS", multiple=True,
         help="Which column is which, as y='Resistance in Y': specimen, y, z, remark, baked, measured_at.",
     ),
+    click.Option(["--specimen"], metavar="NAME", help="The file is an LCR meter's export of this specimen."),
+    click.Option(["--instrument"], metavar="NAME", default="", help="That meter, as 'HP 4284A'."),
+    click.Option(["--baked/--unbaked"], default=None, help="Whether that specimen was baked before."),
+    click.Option(["--remark"], metavar="TEXT", default="", help="Anything worth knowing of that specimen."),
     where(),
     *render.options("json", "markdown"),
 )  # fmt: skip

@@ -30,6 +30,7 @@ _EXAMPLES = {"Cp": "12.3pF@1kHz", "Cs": "12.3pF@1kHz", "D": "0.02@1kHz", "phase"
 _SPELLINGS = {
     "f": "F", "farad": "F", "Ω": "ohm", "\u03c9": "ohm", "\u2126": "ohm", "ohms": "ohm", "r": "ohm", "°": "deg",
     "degree": "deg", "degrees": "deg", "s": "S", "h": "H",
+    "hz": "Hz", "siemens": "S", "henry": "H", "radian": "rad", "ohm": "ohm",
 }  # fmt: skip
 _SCALES = {("rad", "deg"): Decimal(repr(math.pi / 180)), ("", "%"): Decimal("0.01")}
 _PREFIX = {name: Decimal(10) ** power for power, name in PREFIXES.items()}
@@ -116,10 +117,10 @@ def factor(quantity: str, unit: str) -> Decimal:
 
     Examples
     --------
-    >>> factor("Cp", "pF"), factor("R", "kΩ"), factor("D", "%"), factor("G", "")
-    (Decimal('1E-12'), Decimal('1000'), Decimal('0.01'), Decimal('1'))
+    >>> factor("Cp", "pF"), factor("R", "kΩ"), factor("D", "%"), factor("G", ""), factor("frequency", "kHz")
+    (Decimal('1E-12'), Decimal('1000'), Decimal('0.01'), Decimal('1'), Decimal('1000'))
     """
-    wanted = UNITS[quantity]
+    wanted = UNITS.get(quantity, "Hz")
     if not unit or unit == wanted:
         return Decimal(1)
     for length in range(len(unit)):  # the prefix is what stands before the unit
@@ -130,7 +131,7 @@ def factor(quantity: str, unit: str) -> Decimal:
             return prefix
         if length == 0 and (wanted, base) in _SCALES:
             return _SCALES[wanted, base]
-    if wanted and unit in _PREFIX:  # 12.3p
+    if unit in _PREFIX:  # 12.3p
         return _PREFIX[unit]
     raise BadInput(f"unit {unit!r:.20}; expected {wanted or 'none, or %'}{' or deg' * (wanted == 'rad')}")
 

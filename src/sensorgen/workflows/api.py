@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sensorgen.analysis import calibration as calibrations
+from sensorgen.analysis.calibration import Bench, Calibration
 from sensorgen.analysis.comparison import Comparison, of_iteration
 from sensorgen.analysis.fit import Fit
 from sensorgen.analysis.fit import fit as fit_values
@@ -206,7 +208,9 @@ def slice_design(design: Design, out: str | Path = "out", *, slicer: str = "prus
 
 
 def invert(what: Design | Body, frequency_hz: Sequence[float], impedance_ohm: ArrayLike, *, noise: float) -> Estimates:
-    """Force and position from measured impedances.
+    """Force and position from measured impedances, as if the sensor were exactly as predicted.
+
+    A real specimen is not: :func:`calibrate` it.
 
     Parameters
     ----------
@@ -234,6 +238,15 @@ def invert(what: Design | Body, frequency_hz: Sequence[float], impedance_ohm: Ar
     """
     model, _ = sensor_model(_body(what))
     return Estimator(model.sensor, tuple(frequency_hz), noise).batch(np.asarray(impedance_ohm))
+
+
+def calibrate(log: Log, *specimens: str, bench: Bench | None = None) -> list[Calibration]:
+    """Calibrate specimens that were measured in one go, by their recordings in a log; nothing is logged.
+
+    ``Calibration.inverter()`` then finds force and position. Parameters and errors as of
+    :func:`sensorgen.analysis.calibration.calibrate`.
+    """
+    return [made.calibration for made in calibrations.calibrate(log, specimens, bench)]
 
 
 def compare(log: Log, iteration: int) -> Comparison:

@@ -21,7 +21,7 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.calibration.calibration import Calibration, from_json
 from sensorgen.prediction.calibration.coverage import coverage_of, held_out
 from sensorgen.prediction.calibration.fitting import Data, Posterior, calibrated, gain, shared, widened
-from sensorgen.prediction.calibration.inversion import Found, Inverter
+from sensorgen.prediction.calibration.inversion import Found
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, Spread
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import Query, Tip
@@ -62,7 +62,7 @@ class Made:
 
 @dataclass(frozen=True)
 class Bench:
-    """What is known of the bench.
+    """Tip and force of the bench.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ def calibrate(
     specimens : sequence of str
         Their names.
     bench : Bench, optional
-        What is known of it.
+        Its tip and force.
     recordings : sequence of int
         Numbers of the only recordings to use; all of the specimens if empty.
     body_of : callable
@@ -148,7 +148,7 @@ def calibrate(
     Raises
     ------
     BadInput, MissingValue
-        As :func:`design_of`; nothing recorded of a specimen; recordings of other tones, or of another specimen.
+        As :func:`design_of`; nothing recorded of a specimen; recordings at different frequencies.
     OutOfRange
         Known presses beyond the sensor.
     """
@@ -186,14 +186,14 @@ def _check_presses(name: str, model: SpecimenModel, data: Data) -> None:
     if ((at < 0) | (at > length)).any():
         worst = float(at[(at < 0) | (at > length)][0])
         raise BadInput(
-            f"{name}: a press at {worst * 1e3:.4g} mm, but the sensor is {length * 1e3:.4g} mm long; expected the centre "
-            "of the tip from the contacts' end on"
+            f"{name}: a press at {worst * 1e3:.4g} mm, but the sensor is {length * 1e3:.4g} mm long; expected the "
+            "centre of the tip from the contacts' end on"
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Recheck:
-    """Known presses held against a calibration.
+    """Known presses compared with a calibration.
 
     Attributes
     ----------
@@ -231,7 +231,7 @@ class Recheck:
 
 
 def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
-    """Hold a calibration against a few new known presses, and mend it by them.
+    """Compare a calibration with a few new known presses, and mend it by them.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
     Raises
     ------
     BadInput
-        Never calibrated; other tones; fewer presses than ``FEWEST_RECHECK``.
+        Never calibrated; recorded at different frequencies; fewer presses than ``FEWEST_RECHECK``.
     """
     name, _ = design_of(log, specimen)
     old = stored(log, name)
@@ -261,10 +261,11 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
         raise BadInput(f"{name}: recorded at {_tones(tones)}, calibrated at {_tones(old.model.frequency_hz)}")
     count = len(data.presses.force_n)
     if count < FEWEST_RECHECK:
-        raise BadInput(f"{name}: {count} new known presses; expected {FEWEST_RECHECK} to 5, spread over force and place")
+        raise BadInput(
+            f"{name}: {count} new known presses; expected {FEWEST_RECHECK} to 5, spread over force and place"
+        )
     most = max(old.force_n, float(data.presses.force_n.max()))
-    found = Inverter(old.model, replace(old.posterior, noise=np.median(data.noise, axis=0)), force_limit_n=1.25 * most)
-    at = found.batch(data.ratio)
+    at = old.inverter(np.median(data.noise, axis=0), limit_n=1.25 * most).batch(data.ratio)
     sd = np.ptp(at.force_90_n, axis=1) / _SURE
     z = float(np.mean((data.presses.force_n - at.force_n) / sd) * np.sqrt(count))
     posterior = calibrated(old.model, data, widened(old.model, old.posterior))

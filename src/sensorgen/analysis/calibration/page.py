@@ -59,11 +59,15 @@ def _left_over(made: Made, number: int) -> Figure:
         left = data.ratio - model.ratio(made.calibration.posterior.at, data.presses)
         for part, of in (("magnitude", left.real), ("phase", left.imag)):
             content = tuple(
-                Curve("points", f"{f / 1e3:g} kHz", data.presses.force_n, 100 * of[:, k], colour=COLOURS[k % len(COLOURS)])
+                Curve(
+                    "points", f"{f / 1e3:g} kHz", data.presses.force_n, 100 * of[:, k], colour=COLOURS[k % len(COLOURS)]
+                )
                 for k, f in enumerate(model.frequency_hz.tolist())
             )
             unit = "%" if part == "magnitude" else "0.01 rad"
-            panels.append(Panel(content, Axis("force [N]"), Axis(f"measured less fitted {part} of pressed/rest [{unit}]")))
+            panels.append(
+                Panel(content, Axis("force [N]"), Axis(f"measured less fitted {part} of pressed/rest [{unit}]"))
+            )
     rest = 100 * (data.rest - model.rest(made.calibration.posterior.at))
     khz = model.frequency_hz / 1e3
     panels.append(Panel(
@@ -72,7 +76,13 @@ def _left_over(made: Made, number: int) -> Figure:
         Axis("frequency [kHz]", log=True), Axis("at rest: measured less fitted"),
     ))  # fmt: skip
     alt = "Residuals of the calibration: of presses over force, of the reading at rest over frequency."
-    return Figure(f"residuals-{number}", f"{made.calibration.specimen}: what the fit leaves over", alt, {"": tuple(panels)}, columns=2)
+    return Figure(
+        f"residuals-{number}",
+        f"{made.calibration.specimen}: what the fit leaves over",
+        alt,
+        {"": tuple(panels)},
+        columns=2,
+    )
 
 
 def _parameters(calibration: Calibration, number: int) -> Figure:

@@ -37,7 +37,9 @@ def known_presses(log: Log, name: str, rows: Sequence[BenchRun]) -> tuple[Data, 
         No recording that can be used; recordings of different tones.
     """
     if not rows:
-        raise BadInput(f"the log has no recording of {name}; expected one: sensorgen log bench {name!r} LCR_FILE RIG_FILE")
+        raise BadInput(
+            f"the log has no recording of {name}; expected one: sensorgen log bench {name!r} LCR_FILE RIG_FILE"
+        )
     found, left_out = list[tuple[Real, Pairs | None, Complex, Real]](), list[str]()
     for row in rows:
         try:
@@ -46,7 +48,9 @@ def known_presses(log: Log, name: str, rows: Sequence[BenchRun]) -> tuple[Data, 
                 beside = joined_all(part, rig) if rig is not None else [None] * len(part)
                 for recording, with_rig in zip(part, beside, strict=True):
                     done = processed(recording, with_rig, remove_drift=False)
-                    left_out += [f"recording {row.number}: {note}" for note in (done.pairs.left_out if done.pairs else ())]
+                    left_out += [
+                        f"recording {row.number}: {note}" for note in (done.pairs.left_out if done.pairs else ())
+                    ]
                     pairs = done.pairs if done.by_force else None
                     found.append((recording.tones_hz, pairs, *_rest(done.recording, done.pairs)))
         except SensorgenError as error:
@@ -56,7 +60,9 @@ def known_presses(log: Log, name: str, rows: Sequence[BenchRun]) -> tuple[Data, 
     tones = found[0][0]
     if any(not np.array_equal(other, tones) for other, *_ in found):
         kinds = sorted({", ".join(f"{f / 1e3:g}" for f in other) for other, *_ in found})
-        raise BadInput(f"{name}: recordings at different tones ({' kHz; '.join(kinds)} kHz): name those to use, --recording")
+        raise BadInput(
+            f"{name}: recordings at different tones ({' kHz; '.join(kinds)} kHz): name those to use, --recording"
+        )
     return _data([f[1:] for f in found]), tones, left_out
 
 

@@ -3,7 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import log
 from statistics import geometric_mean
+
+import numpy as np
 
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import BadInput
@@ -69,8 +72,36 @@ class Predicted:
 
     @cached_property
     def touches(self) -> bool:
-        """Whether the electrodes touch as drawn, so that the film is a short by design."""
-        return (self.prediction.drawn or self.prediction).status == "short"
+        """Whether the electrodes touch as printed, so that the film is a short by design."""
+        return self.prediction.status == "short"
+
+    @property
+    def parted(self) -> bool:
+        """Whether the electrodes touch as drawn, but have a gap as printed."""
+        return self.prediction.drawn is not None and self.prediction.drawn.status == "short" and not self.touches
+
+    def impedance_at(self, frequency_hz: float) -> tuple[complex, complex, complex] | None:
+        """Predicted Z, and the ends of its range, R and -X at their least and at their largest [ohm].
+
+        Power laws between the predicted frequencies, and below the lowest; None above the highest, where the
+        line's far end drops out, and of what is no capacitor.
+        """
+        known = self.prediction.impedance
+        if len(known) < 2 or frequency_hz > known[-1].frequency_hz * (1 + 1e-9):
+            return None
+        ln_f = np.log([one.frequency_hz for one in known])
+        at = min(max(int(np.searchsorted(ln_f, log(frequency_hz))), 1), len(known) - 1)
+        share = (log(frequency_hz) - ln_f[at - 1]) / (ln_f[at] - ln_f[at - 1])
+
+        def part(values: Sequence[float]) -> float:
+            low, high = values[at - 1], values[at]
+            return float(low * (high / low) ** share if low * high > 0 else low + (high - low) * share)
+
+        ends = [
+            complex(part([getattr(one.re, r) for one in known]), part([getattr(one.im, x) for one in known]))
+            for r, x in (("value", "value"), ("lower", "upper"), ("upper", "lower"))
+        ]  # fmt: skip
+        return (ends[0], ends[1], ends[2]) if ends[0].imag < 0 else None
 
     @property
     def reason(self) -> str:

@@ -15,6 +15,10 @@ class Words:
     specimen: str
     shape: str
     film_mm: float | None
+    axes: str
+    baked: bool | None
+    batch: str
+    defects: str
     remark: str
     doubts: tuple[str, ...]
     source: str
@@ -58,11 +62,14 @@ class Readings:
     ----------
     rows : Lazy of Measured
         In the order of the log.
+    alternating : tuple of Reading
+        Those with AC quantities.
     designs : frozenset of (str, str)
         Names and identities of designs that the log has for them.
     """
 
     rows: Lazy[Measured]
+    alternating: tuple[Reading, ...]
     designs: frozenset[tuple[str, str]]
 
 
@@ -71,9 +78,14 @@ def readings(logged: Iterable[Reading]) -> Readings:
     numbers, ends = array("q"), array("q", [0])
     ohms, along, kinds = array("d"), array("q"), array("q")
     known: dict[Words, int] = {}
-    designs = set()
+    designs, alternating = set(), []
     for one in logged:
-        words = Words(one.specimen, one.shape, one.film_mm, one.remark, one.doubts, one.source)
+        words = Words(
+            one.specimen, one.shape, one.film_mm, one.axes, one.baked, one.batch, ", ".join(one.defects), one.remark,
+            one.doubts, one.source,
+        )  # fmt: skip
+        if one.quantity:
+            alternating.append(one)
         kinds.append(known.setdefault(words, len(known)))
         numbers.append(one.number)
         ohms.extend((*one.y_ohm, *one.z_ohm))
@@ -87,4 +99,4 @@ def readings(logged: Iterable[Reading]) -> Readings:
         split = begin + along[k]
         return Measured(numbers[k], tuple(ohms[begin:split]), tuple(ohms[split:end]), listed[kinds[k]])
 
-    return Readings(Lazy(made, range(len(numbers))), frozenset(designs))
+    return Readings(Lazy(made, range(len(numbers))), tuple(alternating), frozenset(designs))

@@ -38,6 +38,8 @@ class Run:
         The same, low-passed forward and backward [s], [ohm].
     rest_ohm, rest_error_ohm : (m,) array
         Impedance at rest, and its standard error: of R in the real, of X in the imaginary part [ohm].
+    noise_ohm : (m,) array
+        Standard deviation of one sample at rest, drift included, in the same way [ohm].
     pairs : Pairs or None
         Before and under each press; None where there are none, or no force is known.
     notes : tuple of str
@@ -56,6 +58,7 @@ class Run:
     filtered_ohm: Complex
     rest_ohm: Complex
     rest_error_ohm: Complex
+    noise_ohm: Complex
     pairs: presses.Pairs | None
     notes: tuple[str, ...]
 
@@ -132,5 +135,5 @@ def _of_part(entry: BenchRun, found: Sequence[Recording], pressed: RigLog | None
         yield Run(
             entry, one.source, one.tones_hz, counts["samples"], counts["valid"], float(one.time_s[-1]),
             one.time_s[raw], one.impedance_ohm[raw], done.filtered_s[smooth], done.filtered_ohm[smooth], rest, spread,
-            done.pairs if done.by_force else None, notes,
+            scatter, done.pairs if done.by_force else None, notes,
         )  # fmt: skip

@@ -65,6 +65,8 @@ class Comparison:
     ----------
     rows : Lazy of Compared
         One for each reading, in the order of the log.
+    alternating : tuple of Reading
+        Readings with AC quantities.
     bodies : mapping of str to Body
         What was measured, by the design's name.
     names : mapping of str to str
@@ -76,6 +78,7 @@ class Comparison:
     """
 
     rows: Lazy[Compared]
+    alternating: tuple[Reading, ...]
     bodies: Mapping[str, Body]
     names: Mapping[str, str]
     predictions: Mapping[str, Predicted]
@@ -83,8 +86,20 @@ class Comparison:
 
     @cached_property
     def last(self) -> Lazy[Compared]:
-        """The last reading of each specimen: a yield counts specimens, however often one was measured."""
-        return self.rows.at({row.reading.specimen: k for k, row in enumerate(self.rows)}.values())
+        """The last DC reading of each specimen: a yield counts specimens, however often one was measured."""
+        return self.direct.at({row.reading.specimen: k for k, row in enumerate(self.direct)}.values())
+
+    @cached_property
+    def direct(self) -> Lazy[Compared]:
+        """Rows but those with AC quantities alone."""
+        ac = {reading.number for reading in self.alternating if not reading.y_ohm and not reading.z_ohm}
+        return self.rows.where(lambda row: row.reading.number not in ac) if ac else self.rows
+
+    @cached_property
+    def by_bake(self) -> Lazy[Compared]:
+        """The last reading of each specimen before the bake, after it, and where that is not known."""
+        found = {(row.reading.specimen, row.reading.words.baked): k for k, row in enumerate(self.direct)}
+        return self.direct.at(found.values())
 
 
 def of_iteration(
@@ -144,7 +159,8 @@ def of_iteration(
         return row
 
     rows = Lazy(compared, range(len(measured.rows)))
-    return Comparison(rows, made, names, found, (*left_out, *_first(_unused(rows))))
+    ac = {reading.number for reading in measured.alternating}
+    return Comparison(rows, measured.alternating, made, names, found, (*left_out, *_first(_unused(rows, ac))))
 
 
 def _label(design: Design, alike: Mapping[str, int]) -> str:
@@ -252,14 +268,19 @@ def _evidence(reading: Measured, of: Predicted | None, expected_ohm: float = nan
     """Readings that a resistance can have; a slip below 0 is kept in the log, with a doubt."""
     ry, rz = (tuple(v for v in values if v >= 0) for values in (reading.y_ohm, reading.z_ohm))
     words, touches = reading.words, of is not None and of.touches
-    return Evidence(words.specimen, ry, rz, expected_ohm, words.shape, words.film_mm, words.remark, touches)
+    return Evidence(
+        words.specimen, ry, rz, expected_ohm, words.shape, words.film_mm, words.remark, touches, words.axes,
+        words.batch, words.baked, words.defects,
+    )  # fmt: skip
 
 
-def _unused(rows: Iterable[Compared]) -> Iterator[tuple[str, str]]:
+def _unused(rows: Iterable[Compared], alternating: Container[int]) -> Iterator[tuple[str, str]]:
     for row in rows:
         name = f"reading {row.reading.number}, {row.reading.specimen}"
         if row.predicted is None:
             yield name, "no design is known: nothing to compare it with"
+        if row.reading.number in alternating:
+            continue
         if not row.reading.y_ohm and not row.reading.z_ohm:
             yield name, "no measurement in it"
         elif not row.reading.y_ohm or not row.reading.z_ohm:

@@ -19,6 +19,7 @@ _SURE = 2.0  # standard errors on either side of a value
 _UNSURE = log(3.0)  # standard error of a logarithm from which on the data do not tell
 _FLOOR = 1e-4  # of ln Z: no bench is right to more
 _BOUND = log(1e3)  # factors beyond are no fit
+_BETWEEN, _WEIGHT = 0.1, 3  # prior of the scatter of ln of a value between prints: its size, worth so many of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,18 +105,20 @@ def values(fits: Sequence[OfRun]) -> list[Fitted | Untold]:
     along = [
         (fit.resistivity[0] + log(fit.of.model.sensor.common_resistivity_ohm_m()), fit.resistivity[1]) for fit in fits
     ]
-    moduli = [
-        (fit.stiffness[0] + log(t.value), fit.stiffness[1]) for fit in fits if fit.stiffness
+    pressed = [
+        (fit, (fit.stiffness[0] + log(t.value), fit.stiffness[1])) for fit in fits if fit.stiffness
         for t in fit.of.model.values if t.material == film and t.quantity == MODULUS
     ]  # fmt: skip
     rho = f"Re Z of {len(fits)} recordings: one value for both electrodes, along them"
     law = f"by the law of compression {sensor.compression.name}; all moduli move together"
     modulus: Fitted | Untold = Untold(MODULUS, "no recording with presses whose force and position are known")
-    if moduli:
-        modulus = _value(film, MODULUS, _together(moduli), f"presses of {len(moduli)} recordings, {law}", len(moduli))
+    if pressed:
+        moduli = [pair for _, pair in pressed]
+        together = _together(moduli, [fit for fit, _ in pressed])
+        modulus = _value(film, MODULUS, together, f"presses of {len(moduli)} recordings, {law}", len(moduli))
     return [
-        _value(electrode, "resistivity_ohm_m", _together(along), rho, len(fits)), _permittivity(fits, film), modulus,
-        _leak(fits, film),
+        _value(electrode, "resistivity_ohm_m", _together(along, fits), rho, len(fits)), _permittivity(fits, film),
+        modulus, _leak(fits, film),
     ]  # fmt: skip
 
 
@@ -127,19 +130,26 @@ def _value(material: str, quantity: str, ln: tuple[float, float], note: str, cou
     return Fitted(material, quantity, exp(at), exp(at - _SURE * error), exp(at + _SURE * error), note)
 
 
-def _together(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Mean, and its standard error from the errors or from the scatter, whichever is more.
+def _together(
+    found: Sequence[tuple[float, float]], fits: Sequence[OfRun], usual: float = _BETWEEN
+) -> tuple[float, float]:
+    """Mean over prints, and its standard error from the errors or from the scatter between prints, whichever is more.
 
-    Few recordings tell their own scatter badly: it counts as much more as Student's interval is wider.
+    Recordings of one specimen count as one print, and specimens of one plate as one: they share its conditions. Few
+    prints tell their own scatter badly: a prior stands in for it, and it counts as much more as Student's interval is
+    wider. One print alone therefore never gives its own value for the material's.
     """
     from scipy.special import stdtrit
 
-    at, errors = np.array(found).T
+    prints = [fit.run.entry.batch or fit.run.entry.specimen for fit in fits]
+    of = {name: [pair for pair, print_ in zip(found, prints, strict=True) if print_ == name] for name in prints}
+    means = np.array([np.mean(pairs, axis=0) for pairs in of.values()])
+    at, errors = means.T
     own, count = sqrt(float((errors**2).sum())) / len(at), len(at)
-    if count == 1:
-        return float(at[0]), own
-    wider = float(stdtrit(count - 1, (1 + LEVEL) / 2)) / _SURE
-    return float(at.mean()), max(own, wider * float(at.std(ddof=1)) / sqrt(count))
+    degrees = _WEIGHT + count - 1
+    scatter = sqrt((_WEIGHT * usual**2 + float(((at - at.mean()) ** 2).sum())) / degrees)
+    wider = float(stdtrit(degrees, (1 + LEVEL) / 2)) / _SURE
+    return float(at.mean()), max(own, wider * scatter / sqrt(count))
 
 
 def _permittivity(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
@@ -157,8 +167,8 @@ def _permittivity(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
         c = fit.of.model.rest.capacitance  # what model and print leave open
         open_ = log(c.model.upper / c.model.lower * c.print.upper / c.print.lower) / 2 / _SURE
         found.append((log(fit.of.permittivity) + at, sqrt(fit.capacitance[1] ** 2 + open_**2) / slope))
-    at, _ = _together(found)
-    error = max(_together(found)[1], max(e for _, e in found))  # bounds of a model do not average out
+    at, between = _together(found, fits)
+    error = max(between, max(e for _, e in found))  # bounds of a model do not average out
     note = f"Im Z of {len(fits)} recordings; the interval holds the bounds of the cell's model"
     return _value(film, PERMITTIVITY, (at, error), note, len(fits))
 
@@ -170,7 +180,8 @@ def _leak(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
     if any(at < _SURE * error for at, error in found):
         most = max(at + _SURE * error for at, error in found)
         return Untold("leak", f"in {len(found)} recordings no more than {most:.2g} S/m2, and none of it certain")
-    at, error = _together(found)
+    typical = sum(at for at, _ in found) / len(found)
+    at, error = _together(found, fits, _BETWEEN * typical)
     if at <= _SURE * error:
         return Untold("leak", f"{len(found)} recordings differ too much: {at:.2g} S/m2, give or take {error:.2g}")
     return Fitted(film, FILM_LEAK, at, at - _SURE * error, at + _SURE * error,

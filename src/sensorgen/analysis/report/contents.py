@@ -9,12 +9,13 @@ from sensorgen.analysis.comparison import Comparison, of_iteration
 from sensorgen.analysis.comparison.runs import Run, runs
 from sensorgen.analysis.comparison.specimens import known_iterations
 from sensorgen.analysis.plots.figure import Figure
-from sensorgen.analysis.report import electrodes, explained, recordings, variants, yields
+from sensorgen.analysis.report import alternating, direction, electrodes, explained, recordings, variants, yields
 from sensorgen.analysis.report.provenance import origins
 from sensorgen.analysis.report.variants import Variant
 from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log import Log, notes
+from sensorgen.measure.log import Log
+from sensorgen.measure.log.notes import specimen as named
 
 STEPS = ("readings", "recordings", "residuals", "variants", "page")
 
@@ -117,7 +118,7 @@ def report(
         The log has no readings of the iteration, or of a specimen.
     """
     step("readings")
-    specimens = tuple(notes.specimen(name, log).specimen for name in specimens)
+    specimens = tuple(named(name, log).specimen for name in specimens)
     found = of_iteration(log, iteration, step, specimens=specimens)
     left_out = list(found.left_out)
     step("recordings")
@@ -133,40 +134,64 @@ def report(
     step("residuals")
     explanations = explained.explanations(found, recorded)
     impedances = recordings.impedances(recorded, found) if recorded else None
-    verdicts = (*yields.headline(found),) if found.rows else ()
-    shorts = (*yields.findings(found),) if found.rows else ()
-    headline = (*electrodes.headline(found), *verdicts)
-    findings = (*shorts, *explained.sentences(explanations), *electrodes.findings(found))
+    verdicts = (*yields.headline(found),) if found.direct else ()
+    shorts = (*yields.findings(found), *direction.findings(found)) if found.direct else ()
+    ac = alternating.rows(found)
+    headline = (*electrodes.headline(found), *verdicts, *alternating.headline(ac))
+    by_frequency = (
+        *alternating.findings(ac),
+        *alternating.behind_leak(found),
+        *recordings.findings(recorded, impedances),
+    )
+    findings = (*shorts, *by_frequency, *explained.sentences(explanations), *electrodes.findings(found))
     step("variants")
-    sections = list(_sections(log, found, recorded, explanations, impedances, left_out))
+    sections = list(_sections(log, found, recorded, explanations, impedances, ac, left_out))
     step("page")
     return Report(
         iteration, specimens, datetime.now(UTC).isoformat(timespec="seconds"),
-        (*headline, *recordings.headline(impedances)), findings,
+        (*headline, *recordings.headline(impedances), *_basis(found, recorded)), findings,
         tuple(s for s in sections if s.tables or s.figures or s.variants),
     )  # fmt: skip
 
 
+def _basis(found: Comparison, recorded: Sequence[Run]) -> Iterator[str]:
+    """What was measured, in one sentence; none of a single reading."""
+    specimens = {row.reading.specimen for row in found.rows} | {run.entry.specimen for run in recorded}
+    if len(found.rows) + len(recorded) > 1:
+        yield (
+            f"Basis: {len(found.rows)} readings and {len(recorded)} recordings of {len(specimens)} specimens of "
+            f"{len(found.predictions)} designs."
+        )
+
+
 def _sections(
     log: Log, found: Comparison, recorded: Sequence[Run], explanations: Sequence[explained.Explanation],
-    impedances: Table | None, left_out: Sequence[tuple[str, str]],
+    impedances: Table | None, ac: Sequence[alternating.AcRow], left_out: Sequence[tuple[str, str]],
 ) -> Iterator[Section]:  # fmt: skip
+    alone = len(found.rows) <= 1 and not recorded  # a short page
     figures = (*electrodes.figures(found), *(recordings.residuals(impedances) if impedances else ()))
-    tables = (*([electrodes.readings(found)] if found.rows else ()), *([impedances] if impedances else ()))
-    yield Section("measured", "Measured and predicted", figures, tables, electrodes.NOTES if found.rows else ())
-    if found.rows:
-        tables = (*([yields.table(found)] if len(found.last) > 1 else ()), electrodes.reasons(found))
-        yield Section("verdicts", "Verdicts and yield", yields.figures(found), tables, yields.notes(found))
+    tables = (*([electrodes.readings(found)] if found.direct else ()), *([impedances] if impedances else ()))
+    notes: tuple[str, ...] = electrodes.NOTES if found.direct and not alone else ()
+    yield Section("measured", "Measured and predicted", figures, tables, notes)
+    if ac:
+        tables = (alternating.table(ac),)
+        yield Section("ac", "Capacitance and impedance by frequency", tuple(alternating.figures(ac)), tables,
+                      (alternating.NOTE,))  # fmt: skip
+    if found.direct:
+        grouped = (yields.table(found) if len(found.last) > 1 else None, direction.table(found))
+        tables = (*filter(None, grouped), electrodes.reasons(found))
+        notes = () if alone else yields.notes(found)
+        yield Section("verdicts", "Verdicts and yield", yields.figures(found), tables, notes)
     if explanations:
         tables, title = (explained.table(explanations),), "Which parameter explains the residuals"
         yield Section("explained-by", title, (), tables, (explained.NOTE,))
     if recorded:
         tables = (recordings.facts(recorded),)
         yield Section("recorded", "Recordings", tuple(recordings.figures(recorded)), tables)
-    drawings = tuple(variants.figures(found))
+    drawings = () if alone else tuple(variants.figures(found))
     yield Section("variants", "The variants", drawings, variants.identifiability(found), (), variants.variants(found))
     if left_out:
         caption = "What was left out, or taken with care, and why"
         tables = (Table.of("left_out", caption, tuple(LeftOut(*row) for row in left_out)),)
         yield Section("left-out", "What was left out, and why", tables=tables)
-    yield Section("provenance", "Provenance", tables=(origins(log, found),))
+    yield Section("provenance", "Provenance", tables=(origins(log, found, brief=alone),))

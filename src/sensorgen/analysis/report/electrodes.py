@@ -68,7 +68,7 @@ def readings(found: Comparison) -> Table:
     """A row for each reading, the largest deviation first."""
 
     def row_of(k: int) -> ReadingRow:
-        row = found.rows[k]
+        row = found.direct[k]
         r, v = row.reading, row.verdict
         expected = row.predicted.ry_ohm if row.predicted else None
         bounds = (expected.lower, expected.value, expected.upper) if expected else (nan, nan, nan)
@@ -79,7 +79,7 @@ def readings(found: Comparison) -> Table:
             v.leak_s, v.word,
         )  # fmt: skip
 
-    off = np.array([-abs(row.residual) if isfinite(row.residual) else 1.0 for row in found.rows])
+    off = np.array([-abs(row.residual) if isfinite(row.residual) else 1.0 for row in found.direct])
     rows = Lazy(row_of, range(len(off))).at(np.argsort(off, kind="stable").tolist())
     return Table.of("readings", "Every reading and its prediction; the largest deviation first", rows)
 
@@ -88,12 +88,12 @@ def reasons(found: Comparison) -> Table:
     """Verdicts with reasons, remarks and doubts, in the order of the log."""
 
     def row_of(k: int) -> VerdictRow:
-        row = found.rows[k]
+        row = found.direct[k]
         r, words, (electrode, film) = row.reading, row.reading.words, row.verdict.reasons
         doubts = "; ".join(words.doubts)
         return VerdictRow(r.number, r.specimen, row.verdict.word, electrode, film, words.remark, doubts)
 
-    return Table.of("verdicts", "Verdicts and their reasons", Lazy(row_of, range(len(found.rows))))
+    return Table.of("verdicts", "Verdicts and their reasons", Lazy(row_of, range(len(found.direct))))
 
 
 def usable(found: Comparison) -> Lazy[Compared]:
@@ -118,7 +118,7 @@ def headline(found: Comparison) -> Iterator[str]:
             f"Electrode resistance: measured {words} (median of {len(rows)} readings; "
             f"{sum(bool(r.inside) for r in rows)} within the predicted interval)."
         )
-    elif found.rows:
+    elif found.direct:
         yield "Electrode resistance: no reading can be compared with a prediction."
 
 
@@ -139,7 +139,7 @@ def findings(found: Comparison) -> Iterator[str]:
     touching = Counter(r.predicted.design for r in found.rows if r.predicted and r.predicted.touches)
     if touching:
         names = ", ".join(f"{name} ({count})" for name, count in sorted(touching.items()))
-        yield f"Shorted by design, the electrodes touch as drawn: {names}; {touching.total()} readings."
+        yield f"Shorted by design, the electrodes touch as printed: {names}; {touching.total()} readings."
 
 
 def figures(found: Comparison) -> tuple[Figure, ...]:

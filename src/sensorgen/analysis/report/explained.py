@@ -36,7 +36,7 @@ _FLAT = 1e-9  # share below which a parameter has no effect
 NOTE = (
     "Each parameter is moved alone, for all specimens together, until the squared residuals are least. Film resistance "
     "is compared up to the meter's highest range, the prediction for a film without leakage; it is not compared where "
-    "the electrodes touch as drawn."
+    "the electrodes touch as printed."
 )
 
 Model = Callable[[str, float], Complex]

@@ -24,11 +24,28 @@ class Origin:
     which: Annotated[str, Column("which")]
 
 
-def origins(log: Log, found: Comparison) -> Table:
-    """Versions, the log, raw files, designs with the predictions of each, and sources of material values."""
+def origins(log: Log, found: Comparison, *, brief: bool = False) -> Table:
+    """Versions, the log, raw files, designs with the predictions of each, and sources of material values.
+
+    Parameters
+    ----------
+    log : Log
+        An open one.
+    found : Comparison
+        What the report is of.
+    brief : bool
+        Only program, log and predictions.
+    """
     records, head = log.head()
     readings = Counter(r.reading.words.source for r in found.rows)
     anchors = log.entries(Anchor)
+    predictions = [
+        Origin("prediction", f"{p.design} ({p.design_id})", p.provenance) for p in found.predictions.values()
+    ]
+    if brief:
+        program, kept = Origin("program", "sensorgen", __version__), f"{records} records; head {head}"
+        rows = [program, Origin("log", log.path.name, kept), *predictions]
+        return Table.of("provenance", "Program, log and prediction", tuple(rows))
     rows = [
         Origin("program", "sensorgen", __version__), Origin("program", "Python", platform.python_version()),
         *(Origin("library", name, version(name)) for name in LIBRARIES),
@@ -36,8 +53,7 @@ def origins(log: Log, found: Comparison) -> Table:
         *(Origin("anchor", a.file, f"{a.logged_at}: record {log.sequence(a.head)}, {a.head}") for a in anchors),
         *(Origin("raw file", f.name, f"SHA-256 {f.uid}, {f.size} bytes") for f in log.entries(RawFile)),
         *(Origin("source of readings", name, f"{count} readings") for name, count in sorted(readings.items())),
-        *(Origin("prediction", f"{p.design} ({p.design_id})", p.provenance) for p in found.predictions.values()),
-        *_sources(found),
+        *predictions, *_sources(found),
     ]  # fmt: skip
     return Table.of("provenance", "Programs, files, designs and sources", tuple(rows))
 

@@ -11,9 +11,11 @@ from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.comparison.runs import Run
 from sensorgen.analysis.plots import recordings as plots
 from sensorgen.analysis.plots.figure import BLUE, ORANGE, Axis, Curve, Figure, Panel
+from sensorgen.analysis.report.alternating import at_text, capacitor_from, verdict
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import Cell, Column, Table
 from sensorgen.core.errors import SensorgenError
+from sensorgen.core.units import si
 
 _SAME = 1e-6  # relative: frequencies nearer than this are the same
 _F_PER_PF = 1e-12
@@ -38,6 +40,8 @@ class ImpedanceRow:
     x_to_ohm: Annotated[Cell, Column("X to", "ohm")]
     r_residual: Annotated[float | None, Column("residual of R", "", "(measured - predicted) / abs(Z predicted)")]
     x_residual: Annotated[float | None, Column("residual of X", "", "(measured - predicted) / abs(Z predicted)")]
+    noise_percent: Annotated[float, Column("noise", "%", "standard deviation of R and of X of a sample, of |Z|")]
+    verdict: Annotated[str, Column("verdict")]
     c_pf: Annotated[float, Column("C measured", "pF", "-1 / (omega X)")]
     c_predicted_pf: Annotated[Cell, Column("C predicted", "pF")]
     c_from_pf: Annotated[Cell, Column("C from", "pF")]
@@ -68,7 +72,9 @@ def impedances(recorded: Sequence[Run], found: Comparison) -> Table:
         capacitance = [
             None if c is None else c / _F_PER_PF for c in _predicted(of.prediction.capacitance if of else None)
         ]
-        for f, z, error in zip(run.tones_hz.tolist(), run.rest_ohm, run.rest_error_ohm, strict=True):
+        noise = np.hypot(run.noise_ohm.real, run.noise_ohm.imag) / np.abs(run.rest_ohm) / 2**0.5
+        measured = zip(run.tones_hz.tolist(), run.rest_ohm, run.rest_error_ohm, noise.tolist(), strict=True)
+        for f, z, error, share in measured:
             known = of.prediction.impedance if of else ()
             expected = next((e for e in known if abs(e.frequency_hz / f - 1) < _SAME), None)
             middle = complex(expected.re.value, expected.im.value) if expected else complex("nan")
@@ -77,7 +83,7 @@ def impedances(recorded: Sequence[Run], found: Comparison) -> Table:
                 run.name, of.design if of else "", f,
                 float(z.real), float(error.real), *_predicted(expected.re if expected else None),
                 float(z.imag), float(error.imag), *_predicted(expected.im if expected else None),
-                off.real if expected else None, off.imag if expected else None,
+                off.real if expected else None, off.imag if expected else None, 100 * share, verdict(complex(z)),
                 float(-1 / (2 * pi * f * z.imag)) / _F_PER_PF, *capacitance,
             ))  # fmt: skip
     return Table.of("impedance", "Impedance at rest and its prediction, by frequency", rows)
@@ -108,6 +114,27 @@ def headline(table: Table | None) -> Iterator[str]:
         yield (
             f"Impedance at rest: measured {100 * off:.3g} % of |Z| off the prediction (median of {len(rows)} "
             f"frequencies in {names} recording{'s' * (names > 1)})."
+        )
+
+
+def findings(recorded: Sequence[Run], table: Table | None) -> Iterator[str]:
+    """Impedance, noise and capacitance of recordings at rest; verdicts by frequency; negative resistances."""
+    rows: Sequence[ImpedanceRow] = table.rows if table else ()
+    for run in recorded:
+        mine = [row for row in rows if row.recording == run.name]
+        verdicts = {row.frequency_hz: row.verdict for row in mine}
+        negative = [at_text(f) for f, word in verdicts.items() if word == "negative resistance"]
+        if negative:
+            at = ", ".join(negative)
+            yield f"Flagged: {run.name} has a negative resistance at {at}: check the bridge's calibration."
+        if run.pairs is not None or not mine:
+            continue
+        low = min(mine, key=lambda row: row.frequency_hz)
+        c = f", C {low.c_pf:.4g} pF" if low.c_pf > 0 else ""
+        yield (
+            f"{run.name}, nothing pressed: |Z| {si(hypot(low.r_ohm, low.x_ohm), 'ohm')} at "
+            f"{at_text(low.frequency_hz)}{c}; noise of a sample {low.noise_percent:.2g} % of |Z|; "
+            f"{capacitor_from(verdicts)}."
         )
 
 

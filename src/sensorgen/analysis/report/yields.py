@@ -24,6 +24,10 @@ BY: dict[str, Callable[[Evidence], tuple[Hashable, ...]]] = {
     "shape": lambda of: (of.shape or "unknown",),
     "film": lambda of: (_film(of),),
     "shape and film": lambda of: (of.shape or "unknown", _film(of)),
+    "direction": lambda of: (of.shape or "unknown", of.axes or "unknown"),
+    "bake": lambda of: ({True: "baked", False: "not baked", None: "unknown"}[of.baked],),
+    "plate": lambda of: (of.plate or "unknown",),
+    "defect": lambda of: (of.defects or "none",),
     "remark": lambda of: (of.remark or "none",),
 }
 TESTED = ("film", "shape")  # groups that are tested for a difference
@@ -44,14 +48,14 @@ class YieldRow:
     intact: Annotated[int, Column("intact")]
     unknown: Annotated[int, Column("unknown")]
     yield_percent: Annotated[
-        Cell, Column("yield", "%", "intact specimens of those with a verdict; shorts by design left out")
+        Cell, Column("yield", "%", "intact specimens of those with a verdict; without designs that are printed shorted")
     ]
     yield_from: Annotated[Cell, Column("yield from", "%", "95 % confidence")]
     yield_to: Annotated[Cell, Column("yield to", "%", "95 % confidence")]
     shorted: Annotated[
         int, Column("shorted or leaking", "", f"film resistance at most {ORDER:g} times the electrode's")
     ]
-    total: Annotated[int, Column("of", "", "specimens with both resistances; shorts by design left out")]
+    total: Annotated[int, Column("of", "", "specimens with both resistances; without designs that are printed shorted")]
     share_percent: Annotated[Cell, Column("share", "%")]
     share_from: Annotated[Cell, Column("share from", "%", "95 % confidence")]
     share_to: Annotated[Cell, Column("share to", "%", "95 % confidence")]
@@ -60,7 +64,8 @@ class YieldRow:
 
 def judged(found: Comparison, by: str) -> list[Group]:
     """Groups of one kind."""
-    return groups(((row.evidence, row.verdict) for row in found.last), BY[by])
+    rows = found.by_bake if by == "bake" else found.last
+    return groups(((row.evidence, row.verdict) for row in rows), BY[by])
 
 
 def everything(found: Comparison) -> Group:
@@ -97,6 +102,7 @@ def findings(found: Comparison) -> Iterator[str]:
         f"{len(such)} of {len(both)} sensors are shorted or leaking{f' ({of})' if of else ''}: film "
         f"resistance at most {ORDER:g} times the electrode's. {ratio}"
     )
+    yield from _parted(found)
     if design and whole.shorted.total:
         yield (
             f"Without those shorted by design: {whole.shorted.count} of {whole.shorted.total} are shorted or leaking, "
@@ -109,6 +115,19 @@ def findings(found: Comparison) -> Iterator[str]:
             parts = ", ".join(f"{_name(g)}: {g.shorted.count} of {g.shorted.total}" for g in known)
             differ = "a significant difference" if chance < DIFFER else "no significant difference"
             yield f"Shorted or leaking by {by}: {parts}; {differ} (p = {chance:.2g})."
+
+
+def _parted(found: Comparison) -> Iterator[str]:
+    """Specimens whose electrodes touch as drawn, judged by their gap as printed."""
+    rows = [row for row in found.last if row.predicted and row.predicted.parted and row.verdict.same_order is not None]
+    if rows:
+        gaps = {row.predicted.design: row.predicted.prediction.gap for row in rows if row.predicted}
+        gap = "; ".join(f"{name} {bounds.words()}" for name, bounds in sorted(gaps.items()) if bounds)
+        count = sum(bool(row.verdict.same_order) for row in rows)
+        yield (
+            f"Electrodes that touch as drawn, but have a gap as printed ({gap}): {count} of {len(rows)} such sensors "
+            "are shorted or leaking."
+        )
 
 
 def _range(share: Share) -> str:
@@ -129,7 +148,7 @@ def notes(found: Comparison) -> tuple[str, ...]:
     )
     if len(found.last) == 1:
         return (how,)
-    earlier = len(found.rows) - len(found.last)
+    earlier = len(found.direct) - len(found.last)
     more = f"; {earlier} earlier readings are not counted" if earlier else ""
     return (
         how,

@@ -1,14 +1,19 @@
 """Import files into the log: tables of readings, print beds, and exported logs; each file as a whole or not at all."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 
 from sensorgen.core.document import Part
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log import batches, edited, exchange, files, tables
+from sensorgen.measure import accuracy, lcr
+from sensorgen.measure.log import batches, edited, exchange, files, notes, tables
 from sensorgen.measure.log.entries import Entry, RawFile, Reading
 from sensorgen.measure.log.logbook import Log
+
+_MOST_DOUBTS = 5  # of implausible values in one file
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,45 @@ class Imported:
 def thesis(log: Log) -> Imported:
     """Log Table D.1 of the thesis."""
     return _add(log, tables.thesis())
+
+
+def lcr_export(
+    log: Log, path: Path, specimen: str, *, instrument: str = "", baked: bool | None = None, remark: str = ""
+) -> Imported:
+    """Log the export of an LCR meter as one reading of a specimen, and keep the file.
+
+    Parameters
+    ----------
+    log : Log
+        An open log.
+    path : Path
+        Export, as :func:`sensorgen.measure.lcr.read` reads it.
+    specimen : str
+        Name of the specimen.
+    instrument : str
+        The meter; what the file says of it if not given.
+    baked : bool or None
+        Whether the specimen had been baked.
+    remark : str
+        Any text.
+
+    Raises
+    ------
+    BadInput
+        A name that stands for nothing, or a file that cannot be read. Nothing is logged then.
+    """
+    table = lcr.read(path)
+    of = notes.reading(specimen, remark=remark, baked=baked, source=path.name, log=log)
+    kept = files.keep(log.files, path)
+    found = next((name for name in accuracy.names() if accuracy.is_named(name, table.preamble)), "")
+    row = replace(
+        of, uid=sha256(f"{of.specimen} {kept.uid}".encode()).hexdigest()[:32], file=kept.uid,
+        quantity=tuple(one.quantity for one in table.readings), value=tuple(one.value for one in table.readings),
+        frequency_hz=tuple(one.frequency_hz for one in table.readings), instrument=instrument or found,
+        doubts=(*of.doubts, *table.doubts, *notes.implausible(table.readings)[:_MOST_DOUBTS]),
+    )  # fmt: skip
+    new = [row for row in log.add([kept, row]) if isinstance(row, Reading)]
+    return Imported(table.rows, table.rows * len(new), sum(bool(row.doubts) for row in new), table.left_out)
 
 
 def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> Imported:
@@ -95,9 +139,20 @@ def _table(path: Path, columns: Mapping[str, str]) -> tuple[Sequence[Entry], Seq
     """Rows of a table, and the columns that are ignored."""
     if path.suffix.lower() == ".parquet":
         return exchange.from_parquet(path)[1], ()
+    if not columns and lcr.looks_like(path) and not _is_log_table(path):
+        raise BadInput(f"{path}: the export of an LCR meter; say of which specimen, as --specimen S1")
     with tables.opened(path) as table:
         kind = exchange.kind_of(table.names)
         return (list(exchange.from_csv(kind, table)), ()) if kind else tables.readings(table, columns, path.name)
+
+
+def _is_log_table(path: Path) -> bool:
+    """Whether a file is an exported table of a log, or has a column of specimens."""
+    with suppress(BadInput), tables.opened(path) as table:
+        return exchange.kind_of(table.names) is not None or bool(
+            {name.casefold() for name in table.names} & {*tables.NAMES["specimen"]}
+        )
+    return False
 
 
 def _add(log: Log, rows: Sequence[Entry], left_out: Iterable[str] = ()) -> Imported:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from math import isinf
 from typing import Any
 
-from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.document import Cell, Column, Facts, Part, Table
 from sensorgen.core.units import frequency_text, si
 from sensorgen.measure.immittance import shown_value
 from sensorgen.measure.log import facts
@@ -37,7 +37,7 @@ class Listing:
         """A line for each row, "?" where something is to be doubted."""
         if self.readings:
             ac = any(r.quantity for r in self.readings)
-            rows = (
+            rows: Iterator[tuple[Cell, ...]] = (
                 (r.number, r.specimen, short(r.y_ohm), short(r.z_ohm), *([_ac(r)] if ac else []),
                  ("? " if r.doubts else "") + _remark(r))
                 for r in self.readings

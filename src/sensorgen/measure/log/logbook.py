@@ -115,13 +115,13 @@ class Log:
         self, *, last: int | None = None, superseded: bool = False, **equal: Value
     ) -> tuple[Reading, ...]:  # fmt: skip
         """Readings of the multimeter, the earliest first; parameters as :meth:`entries`."""
-        return tuple(self.entries(Reading, last=last, superseded=superseded, **equal))
+        return tuple(self.entries(Reading, last=last, superseded=superseded, replaced=False, **equal))
 
     def recordings(
         self, *, last: int | None = None, superseded: bool = False, **equal: Value
     ) -> tuple[BenchRun, ...]:  # fmt: skip
         """Recordings of the bench, the earliest first; parameters as :meth:`entries`."""
-        return tuple(self.entries(BenchRun, last=last, superseded=superseded, **equal))
+        return tuple(self.entries(BenchRun, last=last, superseded=superseded, replaced=False, **equal))
 
     def predictions(self, *, design_id: str = "") -> tuple[Prediction, ...]:
         """Predictions, the earliest first; of one design if ``design_id`` is given."""

@@ -201,8 +201,10 @@ def pairs(
         ))  # fmt: skip
     if not rows:
         raise BadInput(f"{len(presses)} presses, none with {_LEAST} readings before and under it; expected some")
-    start, force, position, unloaded, loaded, error, *rest = map(np.array, zip(*rows, strict=True))
-    return Pairs(start, force, position, unloaded, loaded, loaded - unloaded, error, *rest, left_out=tuple(left_out))
+    start, force, position, unloaded, loaded, error, samples, peak, hold = map(np.array, zip(*rows, strict=True))
+    return Pairs(
+        start, force, position, unloaded, loaded, loaded - unloaded, error, samples, peak, hold, tuple(left_out)
+    )  # fmt: skip
 
 
 def _course(time_s: Real, force_n: Real, start_s: float, at_s: float) -> tuple[float, float]:

@@ -2,7 +2,9 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import floor, isnan, log10
+from math import floor, hypot, isnan, log10, pi, sqrt
+
+import numpy as np
 
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.units import frequency_text
@@ -46,6 +48,30 @@ class PressResult:
 
 
 @dataclass(frozen=True)
+class RestResult:
+    """Impedance with nothing pressed, at one frequency.
+
+    Attributes
+    ----------
+    frequency_hz : float
+        Frequency [Hz].
+    re_ohm, im_ohm : float
+        Mean of the valid samples [ohm].
+    noise_re_ohm, noise_im_ohm : float
+        Standard deviation of one sample, drift included [ohm].
+    capacitance_f : float or None
+        In series, -1 / (omega X) [F]; None where X is not negative.
+    """
+
+    frequency_hz: float
+    re_ohm: float
+    im_ohm: float
+    noise_re_ohm: float
+    noise_im_ohm: float
+    capacitance_f: float | None
+
+
+@dataclass(frozen=True)
 class RecordingResult:
     """A processed recording.
 
@@ -69,6 +95,8 @@ class RecordingResult:
         Its law, and why this one.
     presses : tuple of PressResult
         What each press changes.
+    rest : tuple of RestResult
+        Of a recording in which nothing is pressed.
     files : tuple of str
         That were written.
     """
@@ -87,10 +115,11 @@ class RecordingResult:
     drift_law: str | None
     drift_reason: str | None
     presses: tuple[PressResult, ...]
+    rest: tuple[RestResult, ...]
     files: tuple[str, ...]
 
     def document(self) -> Iterator[Part]:
-        """Samples, rig, drift, and a line for each press."""
+        """Samples, rig, drift, and a line for each press, or for each frequency at rest."""
         lockin = facts.LockIn(self.tones_hz, self.counts, self.seconds, self.program, lockin=self.lockin)
         rig: Iterable[tuple[str, str]] = [("rig", "no log: forces and positions are not known")]
         if self.rig:
@@ -108,6 +137,21 @@ class RecordingResult:
             columns = (Column("start", "s"), Column("force", "N", digits=3), Column("at", "mm", digits=3))
             changes = (Column(head, right=True) for head in heads)
             yield Table("presses", "", (*columns, *changes), tuple(map(self._row, self.presses)))
+        if self.rest:
+            heads_at_rest = (
+                Column("at rest", "Hz", si=True), Column("R", "ohm", right=True), Column("X", "ohm", right=True),
+                Column("noise", "%", digits=2), Column("C", "F", si=True),
+            )  # fmt: skip
+            rest = tuple(
+                (one.frequency_hz, f"{one.re_ohm:.6g}", f"{one.im_ohm:.6g}",
+                 100 * hypot(one.noise_re_ohm, one.noise_im_ohm) / sqrt(2) / hypot(one.re_ohm, one.im_ohm),
+                 one.capacitance_f)
+                for one in self.rest
+            )  # fmt: skip
+            yield Table("rest", "", heads_at_rest, rest)
+            negative = [frequency_text(one.frequency_hz) for one in self.rest if one.re_ohm < 0]
+            if negative:
+                yield f"negative resistance at {', '.join(negative)}: check the bridge's calibration"
         yield from self.files
 
     def _row(self, press: PressResult) -> tuple[float | str | None, ...]:
@@ -145,8 +189,23 @@ def of_recording(worked: Processed, rig: RigLog | None, files: Iterable[str] = (
         rig=rig.counts() if rig else None, seconds=float(one.time_s[-1]), notes=worked.notes, by_force=worked.by_force,
         drift=float(abs(drift.at(one.time_s[-1:])).max()) if drift else None, drift_law=drift.law if drift else None,
         drift_reason=drift.reason if drift else None,
-        presses=tuple(_press(pairs, i) for i in range(len(pairs.time_s))) if pairs else (), files=tuple(files),
+        presses=tuple(_press(pairs, i) for i in range(len(pairs.time_s))) if pairs else (),
+        rest=() if pairs else tuple(_at_rest(worked)), files=tuple(files),
     )  # fmt: skip
+
+
+def _at_rest(worked: Processed) -> Iterator[RestResult]:
+    """Mean and scatter of the valid samples at each frequency; nothing of fewer than two."""
+    one = worked.recording
+    z = one.impedance_ohm[one.valid()]
+    z = z[np.isfinite(z).all(axis=1)]
+    if len(z) < 2:
+        return
+    for frequency_hz, samples in zip(one.tones_hz.tolist(), z.T, strict=True):
+        mean = complex(samples.mean())
+        c = -1 / (2 * pi * frequency_hz * mean.imag) if mean.imag < 0 else None
+        noise_re, noise_im = (float(part.std(ddof=1)) for part in (samples.real, samples.imag))
+        yield RestResult(frequency_hz, mean.real, mean.imag, noise_re, noise_im, c)
 
 
 def _press(pairs: Pairs, i: int) -> PressResult:

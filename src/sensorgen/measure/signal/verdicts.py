@@ -34,12 +34,14 @@ class Evidence:
         Readings along an electrode and between the electrodes; inf for an overload, empty if not measured [ohm].
     expected_ohm : float
         Expected resistance of an electrode [ohm]; nan if unknown.
-    shape, remark : str
+    shape, remark, axes, plate, defects : str
         For groups.
+    baked : bool or None
+        For groups; None if unknown.
     film_mm : float or None
         For groups [mm].
     touching : bool
-        Whether the electrodes touch by design: such a short is no fault of the print.
+        Whether the electrodes touch as printed of this design: such a short is no fault of the print.
     """
 
     name: str
@@ -50,6 +52,10 @@ class Evidence:
     film_mm: float | None = None
     remark: str = ""
     touching: bool = False
+    axes: str = ""
+    plate: str = ""
+    baked: bool | None = None
+    defects: str = ""
 
 
 @dataclass(frozen=True, slots=True)

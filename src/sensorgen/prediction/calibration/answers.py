@@ -99,8 +99,8 @@ class CalibratedInversion:
             yield f"most readings at rest are older than {STALE_S:g} s: take one before each press"
         if self.statuses.get(Verdict.NO_FIT.words, 0) > most:
             yield (
-                "most readings fit no press: another specimen or tip, or a change of the sensor; recheck it with 3 to 5 "
-                "known presses (sensorgen calibrate --recheck)"
+                "most readings fit no press: another specimen or tip, or a change of the sensor; recheck it with 3 "
+                "to 5 known presses (sensorgen calibrate --recheck)"
             )
         yield from (f"note: {note}" for note in self.notes)
 
@@ -129,7 +129,9 @@ class Summary:
                 float(np.median(np.ptp(found.position_90_m[good], axis=1))) / M_PER_MM,
             ))  # fmt: skip
 
-    def result(self, of: str, by: int, limit_n: float, noise: float | None, notes: Sequence[str]) -> CalibratedInversion:
+    def result(
+        self, of: str, by: int, limit_n: float, noise: float | None, notes: Sequence[str]
+    ) -> CalibratedInversion:
         """The summary so far."""
         widths = np.median(self._widths, axis=0).tolist() if self._widths else [None, None]
         statuses = {v.words: self._statuses[v] for v in Verdict if self._statuses[v]}

@@ -2,11 +2,12 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import exp, sqrt
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Part, Table
@@ -15,7 +16,9 @@ from sensorgen.models.compression import Curve, Plate
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.calibration.coverage import FEWEST, Coverage
 from sensorgen.prediction.calibration.fitting import Posterior
+from sensorgen.prediction.calibration.inversion import Inverter
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread
+from sensorgen.prediction.inverse.prior import Prior
 
 SCHEMA = 1
 _TOLD = 0.8  # of the prior's standard deviation: a parameter that keeps more was not identified
@@ -34,7 +37,7 @@ class Value:
     upper: Annotated[float, Column("95 %")]
     before_lower: Annotated[float, Column("before 5 %")]
     before_upper: Annotated[float, Column("before 95 %")]
-    told: Annotated[str, Column("told by", about="presses and rest: what the readings say; prediction: what was known")]
+    by: Annotated[str, Column("known by", about="presses and rest: what the readings say; prediction: what was known")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +80,23 @@ class Calibration:
         """Largest force that an inversion looks for [N]."""
         return 1.25 * self.force_n
 
+    def inverter(self, noise: ArrayLike | None = None, prior: Prior | None = None, limit_n: float = 0.0) -> Inverter:
+        """What finds force and position behind readings of this specimen.
+
+        Parameters
+        ----------
+        noise : float or (m,) array, optional
+            Standard deviation of a ratio's real and imaginary part [-]; that of the calibration if not given.
+        prior : Prior, optional
+            On force and position.
+        limit_n : float
+            Largest force to look for [N]; a quarter above the largest known one if 0.
+        """
+        known = self.posterior
+        if noise is not None:
+            known = replace(known, noise=np.broadcast_to(noise, known.noise.shape))
+        return Inverter(self.model, known, prior, limit_n or self.limit_n)
+
     def values(self) -> list[Value]:
         """Parameters in their units."""
         found, m, spread, sensor = [], self.model, self.model.spread, self.model.sensor
@@ -107,7 +127,9 @@ class Calibration:
                 values = mean + of * ends
             else:
                 unit, values = "predicted", np.exp(self._rise(k - m.names.index(f"rise at {FORCES_N[0]:g} N")))
-            found.append(Value(name, unit, *values.tolist(), "presses and rest" if sd < _TOLD else "prediction"))
+            by = "presses and rest" if sd < _TOLD else "prediction"
+            median, lower, upper, *before = map(float, values)
+            found.append(Value(name, unit, median, lower, upper, before[0], before[1], by))
         return found
 
     def _rise(self, knot: int) -> Real:
@@ -120,7 +142,7 @@ class Calibration:
     @property
     def unidentified(self) -> tuple[str, ...]:
         """Parameters of which the readings said next to nothing."""
-        return tuple(value.name for value in self.values() if value.told == "prediction")
+        return tuple(value.name for value in self.values() if value.by == "prediction")
 
     def document(self) -> Iterator[Part]:
         """What the calibration is worth, its values, and what it could not tell."""
@@ -161,7 +183,7 @@ class Calibration:
         law = next(name for name, kind in _LAWS.items() if isinstance(sensor.compression, kind))
         data = {
             "schema": SCHEMA, "specimen": self.specimen, "design": self.design, "design_id": self.design_id,
-            "sensor": asdict(sensor) | {"compression": {law: asdict(sensor.compression)}},  # type: ignore[call-overload]
+            "sensor": asdict(sensor) | {"compression": {law: asdict(sensor.compression)}},
             "frequency_hz": self.model.frequency_hz.tolist(), "spread": asdict(self.model.spread),
             "parameters": list(self.model.names),
             "posterior": {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in vars(p).items()},
@@ -195,8 +217,8 @@ def from_json(text: str) -> Calibration:
             Sensor(**_frozen(sensor), compression=compression), np.array(data["frequency_hz"], float),
             Spread(**data["spread"]),
         )  # fmt: skip
-        p = _frozen(data["posterior"])
-        posterior = Posterior(**{k: np.array(v, float) if k in ("at", "covariance", "noise") else v for k, v in p.items()})
+        p: dict[str, Any] = _frozen(data["posterior"])
+        posterior = Posterior(**p | {k: np.array(p[k], float) for k in ("at", "covariance", "noise")})
         count = len(model.names)
         if data["parameters"] != list(model.names) or posterior.covariance.shape != (count, count):
             raise BadInput("a calibration with other parameters than this sensorgen has: calibrate again")

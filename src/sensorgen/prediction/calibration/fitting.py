@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sensorgen.core.arrays import Complex, Real
+from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, parts
 
 ROUNDS = 3  # Gauss-Newton and variance components in turn
@@ -40,7 +41,7 @@ class Data:
     rest: Complex
     rest_noise: Real
 
-    def rows(self, which: np.ndarray) -> "Data":  # type: ignore[type-arg]
+    def rows(self, which: NDArray[np.intp] | Mask) -> "Data":
         """Some of the presses."""
         return Data(self.presses.rows(which), self.ratio[which], self.noise[which], self.rest, self.rest_noise)
 
@@ -82,7 +83,7 @@ class Posterior:
 
 
 def prior(model: SpecimenModel, noise: Real) -> Posterior:
-    """What is known of a specimen that was never calibrated.
+    """Knowledge of a specimen that was never calibrated.
 
     Parameters
     ----------
@@ -108,10 +109,10 @@ def calibrated(model: SpecimenModel, data: Data, start: Posterior | None = None)
     data : Data
         Known presses, none or more, and a rest reading.
     start : Posterior, optional
-        What is known before, as from an earlier calibration; the prior if not given.
+        Earlier knowledge, as from an earlier calibration; the prior if not given.
     """
     known = start or prior(model, np.median(data.noise, axis=0) if len(data.noise) else np.zeros(len(data.rest)))
-    inverse = np.linalg.inv(known.covariance)
+    inverse: Real = np.asarray(np.linalg.inv(known.covariance))
     at, components = known.at.copy(), known.components
     presses, spread = data.presses, model.spread
     usual = known.components if start else np.array([spread.scatter, spread.wander, spread.wander])
@@ -121,12 +122,13 @@ def calibrated(model: SpecimenModel, data: Data, start: Posterior | None = None)
             components = _components(model, data, at, (known.at, inverse), usual)
     at, information = _descended(model, data, at, components, (known.at, inverse))
     return Posterior(
-        at, np.linalg.inv(information), *components.tolist(), _told(presses.unloading, known.unloading),
-        _told(presses.decades, known.decades), known.noise, known.presses + len(presses.force_n),
+        at, np.asarray(np.linalg.inv(information)), float(components[0]), float(components[1]), float(components[2]),
+        _mean(presses.unloading, known.unloading), _mean(presses.decades, known.decades), known.noise,
+        known.presses + len(presses.force_n),
     )  # fmt: skip
 
 
-def _told(values: Real, otherwise: tuple[float, float]) -> tuple[float, float]:
+def _mean(values: Real, otherwise: tuple[float, float]) -> tuple[float, float]:
     seen = values[np.isfinite(values)]
     return (float(seen.mean()), float(seen.std())) if len(seen) > 2 else otherwise
 
@@ -149,7 +151,26 @@ def covariances(model: SpecimenModel, at: Real, data: Data, components: Real, ve
     courses = (("hysteresis", presses.unloading), ("creep", presses.decades))
     for (name, course), (_, sd) in zip(courses, _USUAL, strict=True):
         variance[:, 0] += np.where(np.isnan(course), (memory(model, at, name) * sd) ** 2, 0.0)
-    return found + np.einsum("nik,nk,njk->nij", vectors, variance, vectors)
+    return np.asarray(found + np.einsum("nik,nk,njk->nij", vectors, variance, vectors))
+
+
+def information(model: SpecimenModel, data: Data, at: Real, weight: Real) -> Real:
+    """Information of presses and rest on the parameters (p, p), the prior's left out.
+
+    Parameters
+    ----------
+    model, data, at
+        As of :func:`covariances`.
+    weight : (n, 2 m, 2 m) array
+        Inverse of those.
+    """
+    rest_weight = np.asarray(np.linalg.inv(_rest_covariance(model, data)))
+    return _information(model.slopes(at, data.presses), weight, model.rest_slopes(at), rest_weight)
+
+
+def _information(slopes: Real, weight: Real, rest_slopes: Real, rest_weight: Real) -> Real:
+    of_presses = np.einsum("nia,nij,njb->ab", slopes, weight, slopes, optimize=True)
+    return np.asarray(of_presses + rest_slopes.T @ rest_weight @ rest_slopes)
 
 
 def memory(model: SpecimenModel, at: Real, name: str) -> float:
@@ -162,8 +183,8 @@ def _descended(
 ) -> tuple[Real, Real]:
     """Gauss-Newton with damping: the most probable parameters, and the information on them."""
     middle, inverse = before
-    rest_weight = np.linalg.inv(_rest_covariance(model, data))
-    weight = np.linalg.inv(covariances(model, at, data, components))
+    rest_weight = np.asarray(np.linalg.inv(_rest_covariance(model, data)))
+    weight = np.asarray(np.linalg.inv(covariances(model, at, data, components)))
 
     def off(x: Real) -> tuple[Real, Real, float]:
         ratio = parts(data.ratio - model.ratio(x, data.presses))
@@ -172,14 +193,13 @@ def _descended(
         return ratio, rest, float(cost + (x - middle) @ inverse @ (x - middle))
 
     ratio, rest, cost = off(at)
-    damping, information = 0.0, inverse
+    damping, found = 0.0, inverse
     for _ in range(_STEPS):
         slopes, rest_slopes = model.slopes(at, data.presses), model.rest_slopes(at)
-        information = inverse + np.einsum("nia,nij,njb->ab", slopes, weight, slopes, optimize=True)
-        information = information + rest_slopes.T @ rest_weight @ rest_slopes
+        found = inverse + _information(slopes, weight, rest_slopes, rest_weight)
         gradient = np.einsum("nia,nij,nj->a", slopes, weight, ratio, optimize=True)
         gradient = gradient + rest_slopes.T @ rest_weight @ rest - inverse @ (at - middle)
-        step = np.linalg.solve(information + damping * np.eye(len(at)), gradient)
+        step = np.linalg.solve(found + damping * np.eye(len(at)), gradient)
         step *= min(1.0, 3.0 / np.abs(step).max())
         tried = off(at + step)
         if tried[2] <= cost:
@@ -188,18 +208,16 @@ def _descended(
                 break
         else:
             damping = max(10 * damping, 1.0)
-    return at, information
+    return at, found
 
 
-def _components(
-    model: SpecimenModel, data: Data, at: Real, before: tuple[Real, Real], usual: Real
-) -> Real:
-    """Most probable standard deviations from press to press, the parameters integrated out where they enter linearly."""
+def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, Real], usual: Real) -> Real:
+    """Most probable standard deviations from press to press, the parameters integrated out as if they were linear."""
     from scipy.optimize import minimize
 
     middle, inverse = before
     slopes, rest_slopes = model.slopes(at, data.presses), model.rest_slopes(at)
-    rest_weight = np.linalg.inv(_rest_covariance(model, data))
+    rest_weight = np.asarray(np.linalg.inv(_rest_covariance(model, data)))
     left = parts(data.ratio - model.ratio(at, data.presses)) + slopes @ (at - middle)
     rest = parts(data.rest - model.rest(at)) + rest_slopes @ (at - middle)
     fixed = inverse + rest_slopes.T @ rest_weight @ rest_slopes
@@ -214,7 +232,9 @@ def _components(
         information = fixed + np.einsum("nia,nib->ab", by, by)
         gradient = pull + np.einsum("nia,ni->a", by, white)
         logs = -2 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum() + np.linalg.slogdet(information)[1]
-        return float(logs + (white**2).sum() - gradient @ np.linalg.solve(information, gradient) + ln @ ln / _LN_SPREAD**2)
+        return float(
+            logs + (white**2).sum() - gradient @ np.linalg.solve(information, gradient) + ln @ ln / _LN_SPREAD**2
+        )
 
     count = len(usual)
     simplex = np.vstack([np.zeros(count), np.eye(count)])

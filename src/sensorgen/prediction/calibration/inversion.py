@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances, memory
-from sensorgen.prediction.calibration.specimen import SpecimenModel, parts, unknown
+from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, parts
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
 from sensorgen.prediction.inverse.prior import Prior
 from sensorgen.prediction.inverse.verdict import chi2_limit
@@ -119,12 +119,12 @@ class Inverter:
     ) -> None:  # fmt: skip
         self._posterior, self._length = posterior, model.sensor.length_m
         coarse = np.linspace(0, 1, _COARSE[0]) ** 2 * force_limit_n, np.linspace(0, self._length, _COARSE[1])
-        mean, covariance = _readings(model, posterior, *coarse)
+        mean, covariance = readings(model, posterior, *coarse)
         self.force_n, self.position_m = _grid(coarse, mean, covariance)
-        self._means, self._covariances = (_refined(coarse, (self.force_n, self.position_m), v) for v in (mean, covariance))
-        self._mean = parts(
-            model.ratio(posterior.at, _of(posterior, *_pairs(self.force_n, self.position_m)))
+        self._means, self._covariances = (
+            _refined(coarse, (self.force_n, self.position_m), v) for v in (mean, covariance)
         )
+        self._mean = parts(model.ratio(posterior.at, _of(posterior, *_pairs(self.force_n, self.position_m))))
         self._weight = np.log(_steps(self.force_n)[:, None] * _steps(self.position_m)).ravel()
         for axis, normal in enumerate(() if prior is None else (prior.force_n, prior.position_m)):
             if normal is not None:
@@ -167,13 +167,16 @@ class Inverter:
 
         def block(some: NDArray[np.intp]) -> None:
             values = self._block(parts(ratio[some][:, tones]), table)
-            for name, value in zip(("force_n", "position_m", "force_90_n", "position_90_m", "chi2"), values, strict=True):
+            for name, value in zip(
+                ("force_n", "position_m", "force_90_n", "position_90_m", "chi2"), values, strict=True
+            ):
                 getattr(found, name)[some] = value
             found.tones[some] = tones.sum()
 
         blocks = [rows[start : start + _BLOCK] for start in range(0, len(rows), _BLOCK)]
         if len(blocks) == 1:
-            return block(rows)
+            block(rows)
+            return
         with ThreadPoolExecutor(2) as pool:
             list(pool.map(block, blocks))
 
@@ -216,9 +219,7 @@ class Inverter:
             root = np.linalg.inv(np.linalg.cholesky(covariance))
             ln = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(1) + self._weight
             mean = np.einsum("gij,gj->gi", root, self._mean[:, kept])
-            self._tables[key] = _Table(
-                root.reshape(-1, len(kept)).astype(np.float32), mean.astype(np.float32), ln
-            )
+            self._tables[key] = _Table(root.reshape(-1, len(kept)).astype(np.float32), mean.astype(np.float32), ln)
         return self._tables[key]
 
     def _judged(self, found: Found, stale: Mask) -> Found:
@@ -238,6 +239,7 @@ class Inverter:
 
 def nothing(n: int) -> Found:
     """Results of readings in which nothing was found yet."""
+
     def nan(*shape: int) -> Real:
         return np.full(shape, np.nan)
 
@@ -249,18 +251,22 @@ def _pairs(force_n: Real, position_m: Real) -> tuple[Real, Real]:
     return force.ravel(), position.ravel()
 
 
-def _of(posterior: Posterior, force_n: Real, position_m: Real):  # type: ignore[no-untyped-def]
+def _of(posterior: Posterior, force_n: Real, position_m: Real) -> Presses:
     """Presses with the usual course."""
-    from dataclasses import replace
-
-    return replace(
-        unknown(force_n, position_m), unloading=np.full(len(force_n), posterior.unloading[0]),
-        decades=np.full(len(force_n), posterior.decades[0]),
-    )  # fmt: skip
+    unloading, decades = (np.full(len(force_n), mean) for mean, _ in (posterior.unloading, posterior.decades))
+    return Presses(force_n, position_m, unloading, decades)
 
 
-def _readings(model: SpecimenModel, posterior: Posterior, force_n: Real, position_m: Real) -> tuple[Real, Real]:
-    """Expected parts (points, 2 m), and their covariance with all that is not known (points, 2 m, 2 m)."""
+def readings(model: SpecimenModel, posterior: Posterior, force_n: Real, position_m: Real) -> tuple[Real, Real]:
+    """Expected parts of ratios (points, 2 m), and their covariance with all that is open (points, 2 m, 2 m).
+
+    Parameters
+    ----------
+    model, posterior
+        Of the specimen.
+    force_n, position_m : (f,), (x,) array
+        Of a grid, whose points go along positions first [N], [m].
+    """
     force, position = _pairs(force_n, position_m)
     presses = _of(posterior, force, position)
     slopes = model.slopes(posterior.at, presses)
@@ -282,7 +288,7 @@ def _grid(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> tuple[Real
     weight = np.linalg.inv(covariance)
     found = []
     for axis, at in enumerate(coarse):
-        slope = np.gradient(mean.reshape(*shape, -1), at, axis=axis).reshape(len(mean), -1)
+        slope = np.asarray(np.gradient(mean.reshape(*shape, -1), at, axis=axis)).reshape(len(mean), -1)
         per_step = np.sqrt(np.einsum("gi,gij,gj->g", slope, weight, slope)).reshape(shape).max(1 - axis)
         passed = np.concatenate([[0.0], np.cumsum((per_step[1:] + per_step[:-1]) / 2 * np.diff(at))])
         passed = passed / passed[-1] + np.linspace(0, 0.5, len(at))  # some everywhere
@@ -294,7 +300,7 @@ def _grid(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> tuple[Real
 
 def _refined(coarse: tuple[Real, Real], fine: tuple[Real, Real], values: Real) -> Real:
     """Values on another grid, straight in between: a mean of covariances is one."""
-    shaped = values.reshape(len(coarse[0]), len(coarse[1]), -1)
+    shaped: Real = values.reshape(len(coarse[0]), len(coarse[1]), -1)
     for axis in (0, 1):
         k = np.clip(np.searchsorted(coarse[axis], fine[axis], side="right") - 1, 0, len(coarse[axis]) - 2)
         share = (fine[axis] - coarse[axis][k]) / (coarse[axis][k + 1] - coarse[axis][k])

@@ -3,6 +3,7 @@
 from collections import deque
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
@@ -65,12 +66,13 @@ class Rest:
             self._was = bool(rest[start])
         return ratio, age
 
-    def noise(self) -> Real | float:
+    def noise(self) -> "Real | float":
         """Standard deviation of a ratio's parts at each tone (m,), by the scatter at rest; ``NOISE`` of too few."""
         squares = [square for square in self._squares if np.isfinite(square).all()]
         if len(squares) < FEWEST:
-            return NOISE * np.sqrt(1.1)
-        return np.asarray(np.sqrt(np.mean(squares, axis=0) * 1.1))
+            return float(NOISE * np.sqrt(1.1))
+        found: Real = np.sqrt(np.mean(squares, axis=0) * 1.1)
+        return found
 
 
 def _scatter(z: Complex) -> Real:
@@ -79,13 +81,13 @@ def _scatter(z: Complex) -> Real:
     return np.asarray(np.abs(step) ** 2 / 4)
 
 
-def checked(tones_hz: Real, calibrated_hz: Real) -> np.ndarray:  # type: ignore[type-arg]
+def checked(tones_hz: Real, calibrated_hz: Real) -> NDArray[np.intp]:
     """Order of a file's tones in which they are the calibrated ones.
 
     Raises
     ------
     BadInput
-        Other tones.
+        Those frequencies are not the calibrated ones.
     """
     same = np.isclose(np.asarray(tones_hz)[:, None], np.asarray(calibrated_hz), rtol=1e-6)
     if same.shape[0] != same.shape[1] or not (same.sum(0) == 1).all():

@@ -8,8 +8,9 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sensorgen.core.arrays import Complex, Real
+from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.models import line
 from sensorgen.models.sensor import Sensor
@@ -79,7 +80,7 @@ class Spread:
         """Refuse what is no spread."""
         for one in fields(self):
             value = getattr(self, one.name)
-            if not np.isfinite(value) or value <= 0 and one.name != "force_offset_n":
+            if not np.isfinite(value) or (value <= 0 and one.name != "force_offset_n"):
                 raise BadInput(f"{one.name} of a calibration's prior is {value:g}; expected a number above 0")
 
 
@@ -102,13 +103,13 @@ class Presses:
     unloading: Real
     decades: Real
 
-    def rows(self, which: np.ndarray) -> "Presses":  # type: ignore[type-arg]
+    def rows(self, which: NDArray[np.intp] | Mask) -> "Presses":
         """Some of them."""
         return Presses(*(value[which] for value in vars(self).values()))
 
 
 def unknown(force_n: Real, position_m: Real) -> Presses:
-    """Presses of which nobody knows how they came about."""
+    """Presses whose course is unknown."""
     nan = np.full(len(force_n), np.nan)
     return Presses(force_n, position_m, nan, nan)
 
@@ -159,7 +160,7 @@ class SpecimenModel:
     def _shapes(self) -> Real:
         """Root of the covariance of the rise among ``FORCES_N``: smooth over ln force, correlated over a factor e."""
         distance = np.subtract.outer(np.log(FORCES_N), np.log(FORCES_N))
-        return np.linalg.cholesky(np.exp(-(distance**2) / 2) + 1e-6 * np.eye(len(FORCES_N)))
+        return np.asarray(np.linalg.cholesky(np.exp(-(distance**2) / 2) + 1e-6 * np.eye(len(FORCES_N))))
 
     def law_weights(self) -> Real:
         """Ln of the factor on the rise at each of ``FORCES_N``, per standard deviation of each parameter (k, p)."""
@@ -210,7 +211,9 @@ class SpecimenModel:
         position = np.clip(presses.position_m + spread.position_m * value["position offset"], 0, sensor.length_m)
         force = np.zeros(position.shape)
         if loaded:
-            force = np.maximum(presses.force_n + spread.force_offset_n + spread.force_n * value["force offset"], _NOTHING_N)
+            force = np.maximum(
+                presses.force_n + spread.force_offset_n + spread.force_n * value["force offset"], _NOTHING_N
+            )
         patch = sensor.patch(position)
         length = np.broadcast_to(patch.length_m, position.shape)
         stress = force / (sensor.width_m * length)
@@ -225,7 +228,9 @@ class SpecimenModel:
         omega = 2 * np.pi * self.frequency_hz
         per_m = (sensor.capacitance_f_per_m * np.exp(spread.capacitance * value["capacitance"] + c))[..., None]
         exponent = spread.dispersion * np.exp(value["dispersion"] - 0.5)[..., None]
-        leak = sensor.leak_s_per_m + spread.leak * np.exp(spread.leak_spread * value["leak"])[..., None] * omega[0] * per_m
+        leak = (
+            sensor.leak_s_per_m + spread.leak * np.exp(spread.leak_spread * value["leak"])[..., None] * omega[0] * per_m
+        )
         film = 1j * omega * (omega / omega[0]) ** -exponent * np.exp(-0.5j * np.pi * exponent)
         loose = leak + (film + sensor.tan_delta * omega) * per_m
         pressed = leak + (film + sensor.tan_delta * omega) * per_m * lifted[..., None]

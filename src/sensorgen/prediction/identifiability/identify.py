@@ -26,6 +26,7 @@ from sensorgen.prediction.identifiability.results import (
     FrequencyInformation,
     Identifiability,
     ReferencePress,
+    StandardErrors,
     Stiffest,
     cartesian,
     finite,
@@ -89,6 +90,7 @@ def identify(
     stiff = setup.on(stiffest).bounds() if stiffest else None
     stress = sensor.stress_pa(force_n, setup.position_m)
     strain = float(sensor.compression.capacitive_strain(stress)[0])
+    calibrated, uncalibrated = _on_a_bench(setup)
     return Identifiability(
         **vars(standard_errors(limits)),
         noise=noise,
@@ -107,7 +109,20 @@ def identify(
         advised_frequencies=frequencies.advised(setup, need),
         changes=tuple(one.result() for one in tried),
         changes_together=standard_errors(together) if together else None,
+        calibrated=calibrated,
+        uncalibrated=uncalibrated,
     )
+
+
+def _on_a_bench(setup: Setup) -> tuple[StandardErrors, StandardErrors] | tuple[None, None]:
+    """Errors of a specimen, with a calibration and without."""
+    from sensorgen.prediction.calibration.outlook import outlook
+
+    found = outlook(setup.sensor, np.array(setup.frequency_hz), setup.noise, setup.force_n, setup.position_m)
+    if found is None:
+        return None, None
+    with_, without = (StandardErrors(sigma_force_n=float(f), sigma_position_m=float(x)) for f, x in found)
+    return with_, without
 
 
 def _setup(

@@ -222,6 +222,9 @@ class Identifiability(StandardErrors):
         With all of them.
     doubts : tuple of str
         Why the numbers are uncertain.
+    calibrated, uncalibrated : StandardErrors or None
+        What a specimen leaves, which is never as predicted: after 30 known presses, and without any; None where that
+        was not worked out. All other errors are those of a perfect model.
     """
 
     noise: float
@@ -241,6 +244,8 @@ class Identifiability(StandardErrors):
     changes: tuple[ChangeResult, ...]
     changes_together: StandardErrors | None
     doubts: tuple[str, ...] = ()
+    calibrated: StandardErrors | None = None
+    uncalibrated: StandardErrors | None = None
 
     def document(self) -> Iterator[Part]:
         """Verdict, errors over all presses, changes that reduce them, and what each frequency contributes."""
@@ -267,6 +272,10 @@ class Identifiability(StandardErrors):
         yield from (("doubtful", doubt) for doubt in self.doubts)
         if self.stiffest:
             yield "", f"{self.stiffest.verdict}."
+        if self.calibrated and self.uncalibrated:
+            known, unknown = self.calibrated.words(), self.uncalibrated.words()
+            words = f"perfect model {self.words()}; after 30 known presses {known}; not calibrated {unknown}"
+            yield "on a bench", words
         force, position = self.map.of_force, self.map.of_position
         yield "over all", "; ".join((
             f"median {newtons(force.median)}, {metres(position.median)}",

@@ -44,7 +44,9 @@ def rows(kept: Sequence[Sequence[str]], found: Estimates, *, prior: bool = False
     """
     words = [status.words for status in Status]
     ends = zip(kept, _numbers(found, prior).tolist(), found.tones.tolist(), found.status.tolist(), strict=True)
-    return "".join(csv_row([*map(csv_cell, own), *map(number, row), str(n), words[status]]) for own, row, n, status in ends)
+    return "".join(
+        csv_row([*map(csv_cell, own), *map(number, row), str(n), words[status]]) for own, row, n, status in ends
+    )
 
 
 def _numbers(found: Estimates, prior: bool) -> np.ndarray[Any, np.dtype[np.float64]]:

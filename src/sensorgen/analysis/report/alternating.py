@@ -1,0 +1,256 @@
+"""AC readings of specimens, frequency by frequency, beside the prediction of the print."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import degrees, hypot, inf, isfinite, nan, pi, sqrt
+from statistics import mean, median, stdev
+from typing import Annotated
+
+from sensorgen.analysis.comparison import Comparison, Predicted
+from sensorgen.analysis.plots.figure import GREY, ORANGE, Axis, Curve, Figure, Panel
+from sensorgen.core.document import Cell, Column, Table
+from sensorgen.core.units import frequency_text
+from sensorgen.measure import accuracy
+from sensorgen.measure.immittance import impedance
+from sensorgen.measure.log import Reading
+from sensorgen.prediction.query import TONES_HZ
+
+_F_PER_PF = 1e-12
+NOTE = (
+    "The uncertainty is the standard one: scatter of the repeats (type A) and the instrument's limit of error over the "
+    "root of 3, or what was stated (type B), added in squares. A specimen is a capacitor at a frequency where its "
+    "phase is beyond -45 deg. Ranges of predictions hold the errors of models, print and materials."
+)
+
+
+@dataclass(frozen=True)
+class Value:
+    """A measured value, and its standard uncertainty; nan where none is known."""
+
+    value: float
+    error: float = nan
+
+
+@dataclass(frozen=True)
+class AcRow:
+    """A reading at one frequency beside its prediction."""
+
+    number: Annotated[int, Column("reading", "", "number in the log")]
+    specimen: Annotated[str, Column("specimen")]
+    design: Annotated[str, Column("design")]
+    baked: Annotated[str, Column("bake")]
+    frequency_hz: Annotated[float, Column("frequency", "Hz")]
+    c_pf: Annotated[float, Column("C measured", "pF", "in parallel, Cp")]
+    c_error_pf: Annotated[float, Column("± C", "pF", "standard uncertainty")]
+    c_predicted_pf: Annotated[Cell, Column("C predicted", "pF", "as printed")]
+    c_from_pf: Annotated[Cell, Column("C from", "pF")]
+    c_to_pf: Annotated[Cell, Column("C to", "pF")]
+    c_ratio: Annotated[float, Column("C measured / predicted")]
+    z_ohm: Annotated[float, Column("|Z| measured", "ohm")]
+    z_error_ohm: Annotated[float, Column("± |Z|", "ohm", "standard uncertainty")]
+    z_predicted_ohm: Annotated[Cell, Column("|Z| predicted", "ohm")]
+    z_from_ohm: Annotated[Cell, Column("|Z| from", "ohm")]
+    z_to_ohm: Annotated[Cell, Column("|Z| to", "ohm")]
+    z_ratio: Annotated[float, Column("|Z| measured / predicted")]
+    phase_deg: Annotated[float, Column("phase", "deg")]
+    verdict: Annotated[str, Column("verdict")]
+    flag: Annotated[str, Column("flag")]
+
+
+def verdict(z: complex) -> str:
+    """Verdict at one frequency.
+
+    >>> verdict(100 - 1000j), verdict(1000 - 100j), verdict(50 + 0j), verdict(-3 - 10j)
+    ('capacitor', 'leaking', 'short', 'negative resistance')
+    """
+    if z.real < 0:
+        return "negative resistance"
+    if z.imag >= 0:
+        return "short"
+    return "capacitor" if -z.imag >= z.real else "leaking"
+
+
+def rows(found: Comparison) -> list[AcRow]:
+    """A row for each reading and frequency, in the order of the log."""
+    return [
+        _row(reading, frequency_hz, found.predictions.get(found.names.get(reading.specimen, "")))
+        for reading in found.alternating
+        for frequency_hz in sorted(set(reading.frequency_hz))
+    ]
+
+
+def _row(reading: Reading, frequency_hz: float, of: Predicted | None) -> AcRow:
+    meter = accuracy.find(reading.instrument) if reading.instrument else None
+    values, stated = _values(reading, frequency_hz)
+    repeats = [dict(zip(values, some, strict=True)) for some in zip(*values.values(), strict=False)]
+    known = [z for one in repeats if (z := impedance(one, frequency_hz)) is not None]
+    z = sum(known) / len(known) if known else None
+    omega = 2 * pi * frequency_hz
+    about = z or (complex(0, -1 / (omega * mean(values["Cp"]))) if mean(values.get("Cp", [0.0])) > 0 else None)
+
+    def value(name: str, derived: Sequence[float]) -> Value:
+        these = values.get(name, derived)
+        if not these:
+            return Value(nan)
+        middle = mean(these)
+        a = stdev(these) / sqrt(len(these)) if len(these) > 1 else 0.0
+        b = stated.get(name) or (meter.ac(name, middle, frequency_hz, about) if meter and about else None)
+        return Value(middle, hypot(a, b) if b is not None else a or nan)
+
+    c = value("Cp", [(1 / each).imag / omega for each in known if each])
+    size = value("Z", [abs(each) for each in known])
+    c_range, z_range = _predicted(of, frequency_hz)
+    in_pf = [None if each is None else each / _F_PER_PF for each in c_range]
+    outside = meter is not None and about is not None and meter.ac("Z", abs(about), frequency_hz, about) is None
+    flags = (
+        "negative resistance" if (z.real if z is not None else mean(values.get("R", [0.0]))) < 0 else "",
+        f"outside the range of {meter.name}" if meter and outside else "",
+        "no positive capacitance" if isfinite(c.value) and c.value <= 0 else "",
+    )
+    return AcRow(
+        reading.number, reading.specimen, of.design if of else "",
+        {True: "baked", False: "not baked", None: "unknown"}[reading.baked], frequency_hz,
+        c.value / _F_PER_PF, c.error / _F_PER_PF, in_pf[0], in_pf[1], in_pf[2],
+        c.value / c_range[0] if c_range[0] else nan, size.value, size.error, z_range[0], z_range[1], z_range[2],
+        size.value / z_range[0] if z_range[0] else nan, degrees(_phase(z)) if z else nan,
+        verdict(z) if z is not None else "", "; ".join(filter(None, flags)),
+    )  # fmt: skip
+
+
+def _phase(z: complex) -> float:
+    from cmath import phase
+
+    return phase(z)
+
+
+def _values(reading: Reading, frequency_hz: float) -> tuple[dict[str, list[float]], dict[str, float]]:
+    """Values at one frequency by quantity, and the largest stated uncertainty of each."""
+    values, stated = dict[str, list[float]](), dict[str, float]()
+    errors = reading.uncertainty or (0.0,) * len(reading.value)
+    for name, value, at, error in zip(reading.quantity, reading.value, reading.frequency_hz, errors, strict=True):
+        if at == frequency_hz:
+            values.setdefault(name, []).append(value)
+            stated[name] = max(error, stated.get(name, 0.0))
+    return values, stated
+
+
+_Range = tuple[float | None, float | None, float | None]
+
+
+def _predicted(of: Predicted | None, frequency_hz: float) -> tuple[_Range, _Range]:
+    """Parallel capacitance [F] and magnitude [ohm], each with its range."""
+    nothing: _Range = (None, None, None)
+    z = of.impedance_at(frequency_hz) if of else None
+    if of is None or z is None:
+        return nothing, nothing
+    bounds = of.prediction.capacitance
+    c = (1 / z[0]).imag / (2 * pi * frequency_hz)
+    by = (bounds.lower / bounds.value, bounds.upper / bounds.value) if bounds else (0.0, inf)
+    low, high = sorted((abs(z[1]), abs(z[2])))
+    return (c, c * by[0], c * by[1]), (abs(z[0]), min(low, abs(z[0])), max(high, abs(z[0])))
+
+
+def table(made: Sequence[AcRow]) -> Table:
+    """The rows as a table."""
+    return Table.of("ac", "AC readings and their prediction as printed, by frequency", tuple(made))
+
+
+def headline(made: Sequence[AcRow]) -> Iterator[str]:
+    """Capacitance against the prediction, in one sentence."""
+    known = [row for row in made if isfinite(row.c_ratio) and row.c_ratio > 0]
+    if not known:
+        return
+    lowest = min({row.frequency_hz for row in known}, key=lambda f: (-sum(r.frequency_hz == f for r in known), f))
+    here = [row for row in known if row.frequency_hz == lowest]
+    inside = sum(row.c_from_pf <= row.c_pf <= row.c_to_pf for row in here)  # type: ignore[operator]
+    at = at_text(lowest)
+    if len(here) == 1:
+        row = here[0]
+        error = f" ± {row.c_error_pf:.2g}" if isfinite(row.c_error_pf) else ""
+        yield (
+            f"Capacitance of {row.specimen} at {at}: measured {row.c_pf:.4g}{error} pF, predicted as printed "
+            f"{row.c_predicted_pf:.4g} pF ({row.c_from_pf:.3g} to {row.c_to_pf:.3g}): ratio {row.c_ratio:.3g}, "
+            f"{'within' if inside else 'outside'} the range."
+        )
+        return
+    specimens = len({row.specimen for row in here})
+    yield (
+        f"Capacitance at {at}: measured {median(row.c_ratio for row in here):.3g} times the prediction as printed "
+        f"(median of {len(here)} readings of {specimens} specimens; {inside} within its range)."
+    )
+
+
+def at_text(frequency_hz: float) -> str:
+    """Frequency for people.
+
+    >>> at_text(3.000000000000001e6), at_text(10100.0)
+    ('3MHz', '10.1kHz')
+    """
+    return frequency_text(float(f"{frequency_hz:.4g}"))
+
+
+def findings(made: Sequence[AcRow]) -> Iterator[str]:
+    """From which frequency on each specimen is a capacitor, and how many values are flagged."""
+    sentences: dict[str, list[str]] = {}
+    for specimen in dict.fromkeys(row.specimen for row in made if row.verdict):
+        last = {row.frequency_hz: row.verdict for row in made if row.specimen == specimen and row.verdict}
+        sentences.setdefault(capacitor_from(last), []).append(specimen)
+    for said, specimens in sentences.items():
+        names = ", ".join(specimens[:8]) + (f" and {len(specimens) - 8} more" if len(specimens) > 8 else "")
+        yield f"By frequency: {names}: {said}."
+    flagged = [row for row in made if row.flag]
+    if flagged:
+        kinds = dict.fromkeys(kind for row in flagged for kind in row.flag.split("; "))
+        counted = ", ".join(f"{sum(kind in row.flag for row in flagged)} {kind}" for kind in kinds)
+        yield f"Flagged: {len(flagged)} of {len(made)} AC values ({counted}): check contacts, compensation and range."
+
+
+def capacitor_from(verdicts: dict[float, str]) -> str:
+    """In words, from which frequency on all verdicts are "capacitor".
+
+    >>> capacitor_from({1e3: "leaking", 5e3: "capacitor", 1e4: "capacitor"})
+    'a capacitor from 5kHz on'
+    """
+    rising = sorted(verdicts)
+    start = len(rising)
+    while start and verdicts[rising[start - 1]] == "capacitor":
+        start -= 1
+    if start == len(rising):
+        return f"no capacitor up to {at_text(rising[-1])}"
+    if start == 0:
+        span = at_text(rising[0]) + (f" to {at_text(rising[-1])}" if len(rising) > 1 else "")
+        return f"a capacitor at {span}"
+    return f"a capacitor from {at_text(rising[start])} on"
+
+
+def behind_leak(found: Comparison) -> Iterator[str]:
+    """Above which frequency a film that leaks at DC is a capacitor, if it has the predicted capacitance."""
+    corners = [
+        row.verdict.leak_s / (2 * pi * c.value) for row in found.last
+        if row.verdict.film == "leak" and row.predicted and (c := row.predicted.prediction.capacitance)
+        and isfinite(row.verdict.leak_s)
+    ]  # fmt: skip
+    if corners:
+        within = sum(corner <= TONES_HZ[-1] for corner in corners)
+        yield (
+            f"By frequency: {within} of {len(corners)} films that leak at DC should be capacitors at "
+            f"{at_text(TONES_HZ[-1])} with the predicted capacitance, the best from {at_text(min(corners))} on."
+        )
+
+
+def figures(made: Sequence[AcRow]) -> Iterator[Figure]:
+    """Measured over predicted capacitance, by frequency."""
+    known = [row for row in made if isfinite(row.c_ratio) and row.c_ratio > 0]
+    if len(known) < 2:
+        return
+    ends = [min(row.frequency_hz for row in known), max(row.frequency_hz for row in known)]
+    curves = (
+        Curve("points", "measured / predicted", [row.frequency_hz for row in known], [row.c_ratio for row in known],
+              text=[f"{row.specimen}, reading {row.number}" for row in known], colour=ORANGE),
+        Curve("line", "as predicted", ends, [1.0, 1.0], colour=GREY, dash="dash"),
+    )  # fmt: skip
+    yield Figure(
+        "capacitance", "Capacitance: measured / predicted as printed",
+        "Ratio of measured and predicted capacitance over frequency, a point for each reading.",
+        {"": (Panel(curves, Axis("frequency [Hz]", log=True), Axis("measured / predicted")),)},
+    )  # fmt: skip

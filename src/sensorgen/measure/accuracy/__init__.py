@@ -1,0 +1,177 @@
+r"""Accuracy of instruments as their makers specify it: one YAML file each, and type B uncertainty from it.
+
+A multimeter's limit of error is a share of the reading plus a share of the range. An LCR meter's is a share of
+\|Z\|, :math:`a = a_0 + Z_s/|Z| + |Z| Y_o`, of the whole complex impedance: with :math:`D = R/|X|` and Q = 1/D the
+limits are a of \|Z\|, :math:`a \sqrt{1 + D^2}` of C, L, X and B, :math:`a \sqrt{1 + Q^2}` of R and G, a [rad] of the
+phase and :math:`a (1 + D^2)` of D, as the manuals have it. A limit is taken for the half-width of a uniform
+distribution: its standard uncertainty is the limit over the root of 3 (GUM, JCGM 100:2008, 4.3.7).
+"""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from sensorgen.core import yamlfile
+
+
+@dataclass(frozen=True)
+class Range:
+    """Limits of error of a multimeter in one range.
+
+    Attributes
+    ----------
+    ohm : float
+        Full scale [ohm].
+    reading, range : float
+        Limit as shares of the reading and of the range [-].
+    """
+
+    ohm: float
+    reading: float
+    range: float
+
+
+@dataclass(frozen=True)
+class Band:
+    """Limits of error of an LCR meter in a band of frequencies.
+
+    Attributes
+    ----------
+    from_hz, to_hz : float
+        Frequencies [Hz].
+    share : float
+        Of the reading [-].
+    short_ohm, open_s : float
+        Residual impedance of the short [ohm] and admittance of the open [S].
+    """
+
+    from_hz: float
+    to_hz: float
+    share: float
+    short_ohm: float
+    open_s: float
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """What an instrument's maker specifies.
+
+    Attributes
+    ----------
+    name : str
+        Maker and type.
+    also : tuple of str
+        Other types with the same specification.
+    source : str
+        Document, and its conditions.
+    ranges : tuple of Range
+        DC resistance, the smallest range first.
+    leads_ohm : float
+        Added with two wires [ohm].
+    bands : tuple of Band
+        AC quantities.
+    least_ohm, most_ohm : float
+        Impedances between which the specification holds [ohm].
+    """
+
+    name: str
+    also: tuple[str, ...]
+    source: str
+    ranges: tuple[Range, ...] = ()
+    leads_ohm: float = 0.0
+    bands: tuple[Band, ...] = ()
+    least_ohm: float = 0.0
+    most_ohm: float = math.inf
+
+    def dc_ohm(self, resistance_ohm: float, wires: int | None) -> float | None:
+        """Standard uncertainty of a DC resistance [ohm]; None beyond the ranges."""
+        found = next((one for one in self.ranges if abs(resistance_ohm) <= 1.2 * one.ohm), None)
+        if found is None:
+            return None
+        leads = 0.0 if wires == 4 else self.leads_ohm
+        return (abs(resistance_ohm) * found.reading + found.ohm * found.range + leads) / math.sqrt(3)
+
+    def ac(self, quantity: str, value: float, frequency_hz: float, z_ohm: complex) -> float | None:
+        """Standard uncertainty of an AC quantity.
+
+        Parameters
+        ----------
+        quantity : str
+            As in :data:`sensorgen.measure.immittance.QUANTITIES`.
+        value : float
+            In SI units.
+        frequency_hz : float
+            Frequency [Hz].
+        z_ohm : complex
+            Impedance of the specimen [ohm].
+
+        Returns
+        -------
+        float or None
+            In the quantity's unit; None beyond the frequencies or impedances of the specification.
+        """
+        share = self._share(frequency_hz, abs(z_ohm))
+        if share is None:
+            return None
+        share /= math.sqrt(3)
+        loss = abs(z_ohm.real / z_ohm.imag) if z_ohm.imag else math.inf
+        if quantity in ("R", "X"):
+            return share * abs(z_ohm)
+        if quantity in ("G", "B"):
+            return share / abs(z_ohm)
+        if quantity in ("Cp", "Cs", "Lp", "Ls"):
+            return abs(value) * share * math.hypot(1, loss)
+        if quantity == "Rp":
+            return abs(value) * share * math.hypot(1, 1 / loss) if loss else math.inf
+        if quantity == "phase":
+            return share
+        if quantity == "D":
+            return share * (1 + loss**2)
+        return share * (1 + value**2) if quantity == "Q" else abs(value) * share
+
+    def _share(self, frequency_hz: float, z_ohm: float) -> float | None:
+        band = next((one for one in self.bands if one.from_hz <= frequency_hz <= one.to_hz), None)
+        if band is None or not self.least_ohm <= z_ohm <= self.most_ohm:
+            return None
+        return band.share + band.short_ohm / z_ohm + z_ohm * band.open_s
+
+
+@cache
+def _all() -> dict[str, Instrument]:
+    found = {}
+    for file in sorted(files(__package__).iterdir(), key=lambda one: one.name):
+        if file.name.endswith(".yaml"):
+            one = _instrument(yamlfile.parse(file.read_text("utf-8"), file.name))
+            found[one.name] = one
+    return found
+
+
+def _instrument(data: dict[str, Any]) -> Instrument:
+    ranges = tuple(Range(ohm, percent / 100, of / 100) for ohm, percent, of in data.get("ranges", ()))
+    bands = tuple(Band(low, high, percent / 100, zs, yo) for low, high, percent, zs, yo in data.get("bands", ()))
+    plain = {name: data[name] for name in ("leads_ohm", "least_ohm", "most_ohm") if name in data}
+    return Instrument(data["name"], tuple(data.get("also", ())), data["source"], ranges, bands=bands, **plain)
+
+
+def names() -> Sequence[str]:
+    """Instruments whose accuracy is known."""
+    return tuple(_all())
+
+
+def is_named(name: str, text: str) -> bool:
+    """Whether a text names an instrument, by its type: as a label, or a reply to ``*IDN?``."""
+    types = (name.split()[-1], *_all()[name].also)
+    return any(re.search(rf"(?<![0-9A-Za-z]){re.escape(one)}(?![0-9])", text, re.IGNORECASE) for one in types)
+
+
+def find(text: str) -> Instrument | None:
+    """The instrument that a text names; None if its accuracy is not known.
+
+    >>> find("HEWLETT-PACKARD,34401A,0,7-5-2").name, find("an old meter")
+    ('HP 34401A', None)
+    """
+    return next((one for name, one in _all().items() if is_named(name, text)), None)

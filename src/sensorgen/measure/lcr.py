@@ -1,0 +1,277 @@
+"""Exports of LCR meters: a table of frequency and two or more quantities, as each maker writes it.
+
+Separators (comma, semicolon, tab), decimal commas, comment lines, lines with settings before the header, a row of units
+below it, units in the header or beside each number, UTF-8 with a byte order mark and Windows-1252 are all recognised.
+"""
+
+import csv
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sensorgen.core.errors import BadInput
+from sensorgen.measure import immittance
+from sensorgen.measure.immittance import AcReading
+from sensorgen.measure.input_file import checked_head
+
+MOST_BYTES = 16_000_000
+EXPECTED = "a header such as Frequency,Cp,D with numbers below it"
+OVERLOAD = 9.9e37  # SCPI's number for no value
+_HEADER_LINES = 200  # within which the header stands
+_COMMENTS = ("#", "!", "%", "//", "*")
+_NAMES = {
+    "frequency": "frequency freq f testfrequency frequenz fréquence",
+    "Cp": "cp c cparallel parallelcapacitance capacitance", "Cs": "cs cseries seriescapacitance",
+    "D": "d df tand tanδ tandelta dissipation dissipationfactor lossfactor losstangent loss",
+    "Q": "q qualityfactor", "R": "rs r esr re(z) rez z' zre zreal real seriesresistance resistance",
+    "X": "x im(z) imz z'' z\" zim zimag imag imaginary reactance", "Z": "z |z| abs(z) mag(z) impedance zmod magnitude",
+    "phase": "theta θ phase phi φ ph thetaz θz phasez phase(z) arg(z)", "G": "g conductance",
+    "B": "b susceptance", "Y": "y |y| admittance", "Rp": "rp parallelresistance", "Lp": "lp", "Ls": "ls l inductance",
+}  # fmt: skip
+_QUANTITY = {name: quantity for quantity, names in _NAMES.items() for name in names.split()}
+_ASSUMED = {
+    "c": "C read as parallel, Cp", "capacitance": "capacitance read as parallel, Cp", "l": "L read as series, Ls",
+    "inductance": "inductance read as series, Ls",
+}  # fmt: skip
+_UNIT = re.compile(r"(?P<name>.+?)\s*(?:[\[(](?P<in>[^\])]*)[\])]|[/_ ](?P<after>[^/_ ]+))")
+_NUMBER = re.compile(r"(?P<number>[-+]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][-+]?[0-9]{1,3})?)\s*(?P<unit>\S*)")
+_MISSING = re.compile(r"|[-–]+|n/?a|nan|inf|[-+]?ol|over(load|flow)?|error", re.IGNORECASE)
+_STATUS = ("status", "stat", "state", "error", "validity")
+_FUNCTIONS = {  # what primary and secondary are, by the name of a meter's function (HP 4284A and kin)
+    f"{a}{b}": (immittance_a, immittance_b)
+    for a, immittance_a in (("CP", "Cp"), ("CS", "Cs"), ("LP", "Lp"), ("LS", "Ls"))
+    for b, immittance_b in (("D", "D"), ("Q", "Q"), ("G", "G"), ("RP", "Rp"), ("RS", "R"))
+} | {"RX": ("R", "X"), "GB": ("G", "B"), "ZTD": ("Z", "deg"), "ZTR": ("Z", "rad"), "YTD": ("Y", "deg"),
+     "YTR": ("Y", "rad")}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LcrTable:
+    """An export of an LCR meter.
+
+    Attributes
+    ----------
+    readings : tuple of AcReading
+        Row by row; repeats of a frequency are rows of their own.
+    rows : int
+        Rows with a reading.
+    preamble : str
+        Lines before the header.
+    doubts : tuple of str
+        What was assumed or left out.
+    left_out : tuple of str
+        Columns that were ignored.
+    """
+
+    readings: tuple[AcReading, ...]
+    rows: int
+    preamble: str
+    doubts: tuple[str, ...]
+    left_out: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Column:
+    """Position of a quantity, what its numbers are multiplied by, and its head."""
+
+    at: int
+    quantity: str
+    scale: float | None
+    head: str
+
+
+@dataclass(frozen=True)
+class _Header:
+    line: int
+    separator: str
+    columns: tuple[_Column, ...]
+    heads: tuple[str, ...]
+
+
+def read(path: Path) -> LcrTable:
+    """Read an export.
+
+    Parameters
+    ----------
+    path : Path
+        CSV or text file.
+
+    Raises
+    ------
+    BadInput
+        No such header, no frequency, no quantity, an unknown unit, or a cell that is no number; with file and row.
+    """
+    lines = _lines(path)
+    header = _header(lines)
+    if header is None:
+        first = next((line.strip() for line in lines if line.strip()), "")
+        raise BadInput(f"{path}: no table of an LCR meter, begins with {first!r:.60}; expected {EXPECTED}")
+    if not any(column.quantity == "frequency" for column in header.columns):
+        raise BadInput(f"{path}, row {header.line + 1}: no column of the frequency among {', '.join(header.heads)}")
+    rows, overloads, faulty = [], 0, 0
+    columns, first_row = _with_units(lines, header)
+    status = [k for k, head in enumerate(header.heads) if head.casefold() in _STATUS]
+    for number in range(first_row, len(lines)):
+        cells = _cells(lines[number], header.separator)
+        if not any(cells) or lines[number].lstrip().startswith(_COMMENTS):
+            continue
+        if len(cells) < len(header.heads):
+            raise BadInput(f"{path}, row {number + 1}: {len(cells)} cells, but the header has {len(header.heads)}")
+        if len(cells) > len(header.heads):
+            advice = "; if the numbers have decimal commas, write ';' between the columns" * (header.separator == ",")
+            raise BadInput(
+                f"{path}, row {number + 1}: {len(cells)} cells, but the header has {len(header.heads)}{advice}"
+            )
+        if any(cells[k].strip("+0. ") for k in status):
+            faulty += 1
+            continue
+        found = {column: _value(cells[column.at], column, path, number) for column in columns}
+        overloads += sum(value is None for value in found.values())
+        rows.append({column: value for column, value in found.items() if value is not None})
+    readings = tuple(_readings(rows, columns, path))
+    if not readings:
+        raise BadInput(f"{path}: no readings below the header in row {header.line + 1}")
+    named = {column.head.casefold() for column in columns}
+    doubts = [text for name, text in _ASSUMED.items() if any(_name(head)[0] == name for head in named)]
+    doubts += [f"{overloads} cells without a number"] if overloads else []
+    doubts += [f"{faulty} rows left out: the meter marked them as faulty"] if faulty else []
+    used = {column.at for column in columns} | set(status)
+    left_out = tuple(head for k, head in enumerate(header.heads) if k not in used and head)
+    return LcrTable(readings, len(rows), "\n".join(lines[: header.line]), tuple(doubts), left_out)
+
+
+def looks_like(path: Path) -> bool:
+    """Whether a file has the header of an LCR meter's export."""
+    try:
+        header = _header(_lines(path))
+    except BadInput:
+        return False
+    return header is not None and any(column.quantity == "frequency" for column in header.columns)
+
+
+def _lines(path: Path) -> list[str]:
+    checked_head(path, MOST_BYTES, EXPECTED)
+    content = path.read_bytes()
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("cp1252", "replace")
+    if "\0" in text:
+        raise BadInput(f"{path}: a zero byte; expected {EXPECTED}")
+    return text.splitlines()
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    cells = [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def _header(lines: Sequence[str]) -> _Header | None:
+    """The first line with names of two quantities, the frequency being one of them, or two others."""
+    for number, line in enumerate(lines[:_HEADER_LINES]):
+        bare = line.strip().lstrip("#!%*").strip()  # some write the header as a comment
+        separator = max(";\t,", key=bare.count)
+        heads = _cells(bare, separator) if separator in bare else []
+        columns = tuple(_columns(heads, lines[:number]))
+        if len(columns) > 1 and len({column.quantity for column in columns}) == len(columns):
+            return _Header(number, separator, columns, tuple(heads))
+    return None
+
+
+def _columns(heads: Sequence[str], before: Sequence[str]) -> Iterator[_Column]:
+    function = _function(before)
+    for at, head in enumerate(heads):
+        name, unit = _name(head)
+        if name in ("primary", "secondary", "a", "b", "dataa", "datab") and function:
+            quantity = function[name in ("secondary", "b", "datab")]
+            unit, quantity = (quantity, "phase") if quantity in ("deg", "rad") else (unit, quantity)
+        else:
+            quantity = _QUANTITY.get(name, "")
+        if not quantity:
+            continue
+        try:
+            scale = float(immittance.factor(quantity, unit)) if unit else None
+        except BadInput:
+            continue
+        yield _Column(at, quantity, scale, head)
+
+
+def _function(before: Sequence[str]) -> tuple[str, str] | None:
+    """Primary and secondary quantity, where a line of settings names the meter's function, as Cp-D or CPD."""
+    for line in before:
+        for word in re.split(r"[\s,;:=\"]+", line.upper()):
+            if found := _FUNCTIONS.get(re.sub(r"[-–/_]", "", word)):
+                return found
+    return None
+
+
+def _name(head: str) -> tuple[str, str]:
+    """Name as in ``_QUANTITY``, and unit, of a head such as ``Cp [pF]``, ``f/Hz`` or ``freq_hz``."""
+    plain = re.sub(r"\s+", "", head.casefold())
+    if plain in _QUANTITY:
+        return plain, ""
+    match = _UNIT.fullmatch(head.strip())
+    if match is None:
+        return plain, ""
+    return re.sub(r"[\s_]+", "", match["name"].casefold()), (match["in"] or match["after"] or "").strip()
+
+
+def _with_units(lines: Sequence[str], header: _Header) -> tuple[tuple[_Column, ...], int]:
+    """Columns with the units of a row below the header, if there is one, and the first row of numbers."""
+    below = header.line + 1
+    while below < len(lines) and (not lines[below].strip() or lines[below].lstrip().startswith(_COMMENTS)):
+        below += 1
+    cells = _cells(lines[below], header.separator) if below < len(lines) else []
+    if not any(cells) or any(_NUMBER.match(cell) for cell in cells) or len(cells) > len(header.heads):
+        return header.columns, below
+    columns = []
+    for column in header.columns:
+        unit = cells[column.at].strip("[]() -") if column.at < len(cells) else ""
+        scale = float(immittance.factor(column.quantity, unit)) if unit else column.scale
+        columns.append(_Column(column.at, column.quantity, scale, column.head))
+    return tuple(columns), below + 1
+
+
+def _value(cell: str, column: _Column, path: Path, number: int) -> tuple[float, bool] | None:
+    """Number in SI units, and whether its unit is known; None where there is none."""
+    where = f"{path}, row {number + 1}, column {column.head}"
+    if _MISSING.fullmatch(cell):
+        return None
+    match = _NUMBER.fullmatch(cell)
+    if match is None:
+        raise BadInput(f"{where}: {cell!r:.40} is no number; leave the cell empty where nothing was measured")
+    value = float(match["number"].replace(",", "."))
+    if abs(value) >= OVERLOAD:
+        return None
+    try:
+        scale = float(immittance.factor(column.quantity, match["unit"])) if match["unit"] else column.scale
+    except BadInput as error:
+        raise error.within(where) from None
+    return value * (1.0 if scale is None else scale), scale is not None
+
+
+def _readings(
+    rows: Sequence[Mapping[_Column, tuple[float, bool]]], columns: Sequence[_Column], path: Path
+) -> Iterator[AcReading]:
+    degrees = _degrees(rows, columns, path)
+    for row in rows:
+        frequency = next((value for column, (value, _) in row.items() if column.quantity == "frequency"), 0.0)
+        if frequency < 0 or (frequency == 0 and len(row) > 1 and any(c.quantity == "frequency" for c in row)):
+            raise BadInput(f"{path}: a frequency of {frequency:g} Hz; expected one above 0")
+        for column, (value, known) in row.items():
+            if column.quantity != "frequency" and frequency:
+                in_rad = math.radians(value) if column.quantity == "phase" and degrees and not known else value
+                yield AcReading(column.quantity, in_rad, frequency)
+
+
+def _degrees(rows: Sequence[Mapping[_Column, tuple[float, bool]]], columns: Sequence[_Column], path: Path) -> bool:
+    """Whether angles without a unit are in degrees: only if one is too large for radians."""
+    bare = [value for row in rows for column, (value, known) in row.items() if column.quantity == "phase" and not known]
+    if bare and max(map(abs, bare)) <= math.pi:
+        head = next(column.head for column in columns if column.quantity == "phase")
+        raise BadInput(f"{path}, column {head}: degrees or radians? Write the unit in the header, as phase [deg]")
+    return bool(bare)

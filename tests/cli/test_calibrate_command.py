@@ -1,0 +1,181 @@
+"""``sensorgen calibrate`` and ``invert SPECIMEN``: from the bench's files to force and place, in three commands."""
+
+import csv
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sensorgen.analysis import calibration
+from sensorgen.measure.log import Log, binding
+from sensorgen.measure.log.bench import log_recording
+from sensorgen.prediction.bodies import drawn as drawn_body
+from virtual_specimen import TONES_HZ, drawn, recorded, session, write_csv
+
+DESIGN = "shape: tri\nname: mine\nparameters:\n  dielectric_mm: 0.2\n"
+TRUTH = drawn(3)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A log with a specimen of an own design and one run of known presses, and one that is calibrated, too."""
+    folder = tmp_path_factory.mktemp("bench")
+    (folder / "mine.yaml").write_text(DESIGN)
+    recorded(TRUTH, folder, 24, 1)
+    with Log(folder / "log.db", create=True) as log:
+        binding.bind(log, ["S1"], str(folder / "mine.yaml"))
+        log_recording(log, "S1", folder / "run-lcr.csv", folder / "run-rig.csv")
+    shutil.copytree(folder, folder / "calibrated")
+    with Log(folder / "calibrated" / "log.db") as log:
+        one = calibration.calibrate(log, ["S1"], body_of=drawn_body)
+        log.add(calibration.rows(log, [one[0].calibration]))
+    return folder
+
+
+@pytest.fixture
+def bench(run, made, tmp_path, monkeypatch):
+    """Commands beside the log with known presses."""
+    monkeypatch.setenv("SENSORGEN_LOG", str(tmp_path / "log.db"))
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    return run
+
+
+@pytest.fixture
+def after(bench, tmp_path, monkeypatch):
+    """Commands beside the log with the calibration."""
+    monkeypatch.setenv("SENSORGEN_LOG", str(tmp_path / "calibrated" / "log.db"))
+    return bench
+
+
+def unseen(path, count=100, truth=TRUTH):
+    """Readings of other presses, each after one at rest, with what is true beside them."""
+    made = session(truth, count, 5, (0.5, 5.5))
+    z = np.stack([made.rest_ohm, made.pressed_ohm], 1).reshape(-1, 7)
+    both = {
+        name: np.stack([0 * v, v], 1).ravel()
+        for name, v in (("true_n", made.force_n), ("true_mm", made.position_m * 1e3))
+    }
+    rest = np.tile([1.0, 0.0], count)
+    write_csv(path, np.arange(2.0 * count) * 5, z, TONES_HZ, rest=rest, **both)
+
+
+def rows(path):
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def covered(found, name, unit):
+    """Share of presses that lie in their intervals."""
+    keys = f"{name}_low_{unit}", f"true_{unit}", f"{name}_high_{unit}"
+    low, true, high = (np.array([float(row[key]) for row in found]) for key in keys)
+    return ((low <= true) & (true <= high)).mean()
+
+
+def test_from_files_of_the_bench_to_force_and_place(bench, tmp_path):
+    said = bench("calibrate", "S1", "--drawn", "--page", "cal.html")
+    assert (said.code, said.err) == (0, "")
+    assert "S1, design mine: calibrated by 24 known presses" in said.words
+    assert "of 24 forces and" in said.words
+    page = (tmp_path / "cal.html").read_text()
+    assert all(
+        words in page for words in ("Calibration of S1", "each press found again from the others", "what was learnt")
+    )
+    unseen(tmp_path / "m.csv")
+    said = bench("invert", "S1", "m.csv", "-o", "o.csv")
+    assert (said.code, said.err) == (0, "")
+    assert "S1: 100 readings under load (100 at rest)" in said.words
+    found = rows(tmp_path / "o.csv")
+    assert [row["status"] for row in found[::2]] == ["rest"] * 100
+    pressed = found[1::2]
+    assert sum(row["status"] == "ok" for row in pressed) > 70
+    assert covered(pressed, "force", "n") >= 0.7  # one specimen; over many bench/coverage.py has 0.85 to 0.95
+    assert covered(pressed, "position", "mm") >= 0.7
+
+
+def test_the_record_of_the_log_says_it_all(bench):
+    found = json.loads(bench("calibrate", "S1", "--drawn", "--dry-run", "--json").out)
+    assert found["schema"] == 1
+    assert len(found["posterior"]["at"]) == len(found["values"]) == len(found["parameters"])
+    assert found["held_out"]["presses"] == 24
+    assert "was never calibrated" in bench("invert", "S1", "none.csv").line
+
+
+def test_the_log_with_a_calibration_is_sound(after):
+    assert after("log", "verify").code == 0
+
+
+def test_a_recheck_with_another_tip_alarms_and_mends(after, tmp_path):
+    other = replace(TRUTH, tip_m=9e-3)
+    recorded(other, tmp_path, 5, 9, name="again")
+    unseen(tmp_path / "m.csv", truth=other)
+    assert "no recording of S1" in after("calibrate", "S1", "--recheck").line
+    assert after("log", "bench", "S1", "again-lcr.csv", "again-rig.csv").code == 0
+    shares = []
+    for words in ((), ("calibrate", "S1", "--recheck")):
+        if words:
+            said = after(*words)
+            assert said.code == 0, said.err
+            assert "ALARM: the calibration no longer held" in said.words
+        assert after("invert", "S1", "m.csv", "-o", "o.csv").code == 0
+        shares.append(covered(rows(tmp_path / "o.csv")[1::2], "force", "n"))
+    assert shares[1] > max(0.6, shares[0] + 0.2)
+
+
+def test_without_a_calibration_the_design_alone_says_so(run, tmp_path, monkeypatch):
+    (tmp_path / "mine.yaml").write_text(DESIGN)
+    unseen(tmp_path / "m.csv", 30)
+    said = run("invert", "mine.yaml", "m.csv", "--drawn", "--tip", "5mm", "-o", "o.csv")
+    assert said.code == 0, said.err
+    assert " not calibrated" in said.words
+    assert " ok" not in said.words
+    assert "known presses make them several times narrower" in said.words
+    assert covered(rows(tmp_path / "o.csv")[1::2], "force", "n") >= 0.85
+
+
+def test_readings_at_rest_may_stand_in_a_file_of_their_own(after, tmp_path):
+    unseen(tmp_path / "m.csv", 20)
+    table = rows(tmp_path / "m.csv")
+    for name, part in (("rest.csv", table[:1] * 9), ("pressed.csv", table[1::2])):
+        with (tmp_path / name).open("w", newline="", encoding="utf-8") as file:
+            names = [n for n in table[0] if n not in ("rest", "time_s")]
+            writer = csv.DictWriter(file, names, extrasaction="ignore")
+            writer.writeheader()
+            writer.writerows(part)
+    assert "a column 'rest'" in after("invert", "S1", "pressed.csv").line
+    said = after("invert", "S1", "pressed.csv", "--rest", "rest.csv", "-o", "o.csv")
+    assert said.code == 0, said.err
+    assert "stale" not in said.words
+    assert len(rows(tmp_path / "o.csv")) == 20
+
+
+def test_stale_readings_at_rest_are_named(after, tmp_path):
+    unseen(tmp_path / "m.csv", 10)
+    table = rows(tmp_path / "m.csv")
+    for row in table[2:]:
+        row["time_s"] = float(row["time_s"]) * 10
+    with (tmp_path / "m.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(table[0]))
+        writer.writeheader()
+        writer.writerows(table)
+    said = after("invert", "S1", "m.csv")
+    assert "9 stale rest" in said.words
+    assert "take one before each press" in said.words
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["nobody"], "no design is known of 'nobody'"), (["S2"], "the log has no recording of S2"),
+        (["S1", "S1"], "stands twice"), (["S1", "--recheck"], "was never calibrated"),
+        (["S1", "S2", "--recheck"], "expected one"), (["S1", "--force-offset", "1"], "as 0.9+-0.1"),
+        (["S1", "--force-offset", "x+-1"], "not a force"), (["S1", "--recording", "4"], "has no recording of S1"),
+        ([], "SPECIMEN"),
+    ],
+)  # fmt: skip
+def test_what_is_missing_is_one_line(bench, words, said):
+    assert bench("log", "specimen", "S2", "--design", "mine.yaml").code == 0
+    found = bench("calibrate", *words)
+    assert found.code == 2
+    assert said in found.line

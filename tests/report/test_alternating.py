@@ -1,0 +1,125 @@
+"""AC readings in the report: beside the prediction of the print, with their uncertainty, verdicts and flags."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import pytest
+
+from sensorgen.analysis.comparison import of_iteration, predicted
+from sensorgen.analysis.report import FORMATS, alternating, report, written
+from sensorgen.design.design import load
+from sensorgen.measure.log import Log, binding, notes
+from sensorgen.prediction import bodies, evaluate
+from sensorgen.prediction.query import Query
+from sensorgen.workflows.stored_prediction import predicted_rows
+
+PF = 1e-12
+
+
+@pytest.fixture(scope="module")
+def design(tmp_path_factory):
+    path = tmp_path_factory.mktemp("designs") / "plate.yaml"
+    path.write_text("shape: reference\nname: plate\nparameters: {dielectric_mm: 0.4}\n")
+    return path
+
+
+@pytest.fixture
+def logged(tmp_path, design):
+    """A log with a stored prediction and readings of specimens of any name."""
+
+    def call(**readings):
+        with Log(tmp_path / "log.db", create=True) as log:
+            binding.bind(log, list(readings), str(design))
+            log.add(predicted_rows(load(design)))
+            for name, (instrument, typed) in readings.items():
+                log.add([notes.with_ac(notes.reading(name, instrument=instrument, log=log), typed)])
+            return report(log, None, specimens=list(readings)), of_iteration(log, None)
+
+    return call
+
+
+def rows(made):
+    return next(t for t in made.tables if t.key == "ac").rows
+
+
+def test_a_reading_stands_beside_the_stored_prediction(logged, design):
+    made, found = logged(S1=("HP 4284A", {"Cp": ["60pF@10.1kHz"], "D": ["0.02@10.1kHz"]}))
+    (row,) = rows(made)
+    stored = found.predictions["plate"].prediction
+    z = next(complex(one.re.value, one.im.value) for one in stored.impedance if one.frequency_hz == 10100)
+    c = (1 / z).imag / (2 * math.pi * 10100)
+    assert row.c_predicted_pf == pytest.approx(c / PF, rel=1e-9)
+    assert row.c_predicted_pf == pytest.approx(stored.capacitance.value / PF, rel=0.01)  # the line drops little
+    assert row.c_ratio == pytest.approx(60 * PF / c)
+    assert row.z_ohm == pytest.approx(1 / (2 * math.pi * 10100 * 60 * PF) / math.hypot(1, 0.02))
+    assert row.z_ratio == pytest.approx(row.z_ohm / abs(z))
+    assert row.phase_deg == pytest.approx(-90 + math.degrees(math.atan(0.02)))
+    limit = 0.05e-2 + 1.2e-3 / row.z_ohm + row.z_ohm * 1.07e-9
+    assert row.c_error_pf == pytest.approx(60 * limit / math.sqrt(3) * math.hypot(1, 0.02), rel=1e-6)
+    assert "1 of 1 predictions were stored before anything was measured" in " ".join(made.findings)
+    assert any(text.startswith("Capacitance of S1 at 10.1kHz: measured 60 ± 0.") for text in made.headline)
+
+
+def test_scatter_and_stated_uncertainty_add_in_squares(logged):
+    made, _ = logged(S1=("", {"Cp": ["59/60/61±0.5pF@1kHz"]}))
+    (row,) = rows(made)
+    assert row.c_pf == pytest.approx(60)
+    assert row.c_error_pf == pytest.approx(math.hypot(1 / math.sqrt(3), 0.5))
+    made, _ = logged(S2=("a meter of ours", {"Cp": ["60pF@1kHz"]}))
+    assert math.isnan(rows(made)[0].c_error_pf)  # nothing is known of it
+
+
+def test_verdicts_go_by_frequency_and_flags_name_what_is_impossible(logged):
+    made, _ = logged(
+        leaky=("", {"R": ["80kohm@1kHz", "2kohm@10kHz"], "X": ["-20kohm@1kHz", "-9kohm@10kHz"]}),
+        wrong=("HP 4284A", {"R": ["-11ohm@3MHz"], "X": ["-300ohm@3MHz"]}),
+        alone=("", {"R": ["-3ohm@1kHz"]}),
+    )
+    found = {(row.specimen, row.frequency_hz): row for row in rows(made)}
+    assert [found["leaky", f].verdict for f in (1e3, 1e4)] == ["leaking", "capacitor"]
+    assert found["wrong", 3e6].flag == "negative resistance; outside the range of HP 4284A"
+    assert found["wrong", 3e6].c_predicted_pf is None  # beyond the predicted frequencies
+    assert found["alone", 1e3].flag == "negative resistance"
+    said = " ".join(made.findings)
+    assert "By frequency: leaky: a capacitor from 10kHz on." in said
+    assert "Flagged: 2 of 4 AC values (2 negative resistance, 1 outside the range of HP 4284A)" in said
+
+
+def test_before_and_after_the_bake_stay_apart(tmp_path, design):
+    defects = {"S1": ("hole", "zits"), "S2": ()}
+    with Log(tmp_path / "log.db", create=True) as log:
+        binding.bind(log, ["S1", "S2"], str(design))
+        for name, baked in itertools.product(defects, (False, True)):
+            one = notes.reading(name, "2k", "OL" if baked else "10", baked=baked, log=log)
+            log.add([replace(one, defects=defects[name])])
+        made = report(log, None)
+    table = next(t for t in made.tables if t.key == "yield")
+    assert {row.group for row in table.rows if row.by == "defect"} == {"hole, zits", "none"}
+    of = {row.group: row for row in table.rows if row.by == "bake"}
+    assert {name: (row.specimens, row.short) for name, row in of.items()} == {"baked": (2, 0), "not baked": (2, 2)}
+
+
+def test_predictions_between_the_stored_frequencies_are_those_of_the_model(design):
+    body = bodies.default_body(load(design))
+    of, frequencies = predicted(body), (500.0, 1700.0, 15e3, 70e3)
+    exact = evaluate.evaluate(body, Query(frequency_hz=frequencies))
+    for one in exact.impedance:
+        z = of.impedance_at(one.frequency_hz)[0]
+        assert abs(z - complex(one.re.value, one.im.value)) < 0.01 * abs(z)
+    assert of.impedance_at(1e6) is None
+
+
+def test_one_reading_gets_a_short_page_in_every_format(logged):
+    made, _ = logged(S1=("", {"Cp": ["60pF@1kHz"]}))
+    assert len(written(made, "md").splitlines()) <= 60
+    assert made.title == "S1: predicted and measured"
+    assert len(made.headline) <= 5
+    assert all(written(made, how) for how in FORMATS)
+
+
+def test_words_for_a_verdict_that_changes_over_frequency():
+    said = alternating.capacitor_from
+    assert said({1e3: "capacitor", 1e4: "capacitor"}) == "a capacitor at 1kHz to 10kHz"
+    assert said({1e3: "capacitor", 1e4: "leaking"}) == "no capacitor up to 10kHz"
+    assert said({1e3: "capacitor", 5e3: "short", 1e4: "capacitor"}) == "a capacitor from 10kHz on"
