@@ -92,7 +92,7 @@ def lcr_export(
         doubts=(*of.doubts, *table.doubts, *notes.implausible(table.readings)[:_MOST_DOUBTS]),
     )  # fmt: skip
     new = [row for row in log.add([kept, row]) if isinstance(row, Reading)]
-    return Imported(table.rows, table.rows * len(new), sum(bool(row.doubts) for row in new), table.left_out)
+    return Imported(table.rows, table.rows * len(new), sum(bool(row.doubts) for row in new), left_out=table.left_out)
 
 
 def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> Imported:
