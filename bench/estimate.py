@@ -1,7 +1,7 @@
 """The estimate of a print without a slicer against the real slice: writes bench/results/estimate.md.
 
 PrusaSlicer and CuraEngine are this machine's and those that ``scripts/debian13-slicers`` makes; cases are sensors of
-12 x 10 mm.
+12 x 10 mm. With names of programs, as "CuraEngine 4.13", only their columns are made anew.
 """
 
 import os
@@ -129,13 +129,16 @@ def main():
         "| design | " + " | ".join(PROGRAMS) + " |",
         "|---" * (len(PROGRAMS) + 1) + "|",
     ]
+    path, named = RESULTS / "estimate.md", sys.argv[1:] or list(PROGRAMS)
+    rows = [row.strip("| ").split(" | ") for row in path.read_text("utf-8").splitlines() if row.startswith("| ")]
+    known = {name: dict(zip(PROGRAMS, entries, strict=True)) for name, *entries in rows[1:]}
     with tempfile.TemporaryDirectory() as folder:
         for name, variant in cases(Path(folder)).items():
             started = time.process_time()
-            found = [row(variant, *program) for program in PROGRAMS.values()]
-            lines.append(f"| {name} | " + " | ".join(map(entry, found)) + " |")
+            found = known.get(name, {}) | {each: entry(row(variant, *PROGRAMS[each])) for each in named}
+            lines.append(f"| {name} | " + " | ".join(found[each] for each in PROGRAMS) + " |")
             print(f"{time.process_time() - started:4.0f} s {lines[-1]}", file=sys.stderr, flush=True)
-            (RESULTS / "estimate.md").write_text("\n".join(lines) + "\n", "utf-8")
+    path.write_text("\n".join(lines) + "\n", "utf-8")
 
 
 if __name__ == "__main__":

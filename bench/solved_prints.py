@@ -1,19 +1,26 @@
-"""Compression of the thesis's triangular cells as slicers should print them: writes models/solved_prints.yaml."""
+"""Compression of the thesis's triangular cells as slicers should print them: writes models/solved_prints.yaml.
 
+A cell that the file has is not solved again: delete the file to solve all anew, which takes a quarter of an hour.
+"""
+
+import re
+from collections.abc import Iterator
 from itertools import product
 from json import dumps
 from pathlib import Path
 
-from sensorgen.design.design import make
+from sensorgen.design.design import Design, make
 from sensorgen.prediction.bodies import WALLS, estimated
 from sensorgen.prediction.compression_law import content, solved
+from sensorgen.prediction.mesh_ladder import Piece
 from sensorgen.prediction.sensor_model import piece
 
 FILE = Path(__file__).parents[1] / "src" / "sensorgen" / "models" / "solved_prints.yaml"
 HEAD = """\
 # Rise of the capacitance of printed triangular cells with stress, as bench/solved_prints.py solved it: by press2d, its
-# usual mesh, held against the next coarser one ("within"); layers of 0.1 and 0.06 mm, walls as named. Keys are the
-# content of the cross-section. "held" are the changes under other boundary and contact conditions of the drawn cell.
+# usual mesh, held against the next coarser one ("within"); layers of 0.1 and 0.06 mm, walls as named, and of Arachne's
+# walls the film as thin and as thick as the printer's tools may make it. Keys are the content of the cross-section.
+# "held" are the changes under other boundary and contact conditions of the drawn cell.
 source: plane-strain finite elements with frictionless contact, neo-Hookean, nu 0.4999, of the printed cell
 youngs_modulus_pa: {etpu: 22.0e6, x60: 6.0e6}
 held: {stick: -0.038, stiff tip: 0.017, base sliding: 0.003, free sideways: -0.011}
@@ -23,29 +30,48 @@ cells:
 
 def main() -> None:
     """Solve and write."""
-    found = {}
+    text = FILE.read_text("utf-8") if FILE.exists() else ""
+    before = {entry[2:18]: entry for entry in re.findall(r"(?m)^  \w{16}:.*\n(?:    .*\n)+", text)}
+    found: dict[str, str] = {}
     films = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
     for walls, quality, along, film in product(WALLS, ("fine", "extrafine"), "xy", films):
         sizes = {"dielectric_mm": film, "along": along}
         design = make({"shape": "tri", "quality": quality, "parameters": sizes})
-        cell = piece(estimated(design, walls))
-        if content(cell) in found:
-            continue
-        try:
-            law = solved(design, cell)
-        except Exception as error:  # a cell that cannot be solved stays unsolved
-            print(walls, quality, along, film, error)
-            continue
-        curve = law.compression
-        found[content(cell)] = (
-            f"  {content(cell)}:  # tri repeating along {along}, film {film:g} mm, {quality}, {walls}\n"
-            f"    displacement_um: {curve.displacement_m * 1e6:.5g}\n"
-            f"    stress_kpa: {[round(p / 1e3, 6) for p in curve.stress_pa]}\n"
-            f"    rise_percent: {[round(100 * (r - 1), 6) for r in curve.ratio]}\n"
-            f"    within: {curve.within:.4g}\n" + (f"    doubts: {dumps(law.doubts)}\n" if law.doubts else "")
-        )
-        print(walls, quality, along, film, content(cell), law.doubts)
-        FILE.write_text(HEAD + "".join(found.values()), "utf-8")
+        for what, cell in cells(design, walls):
+            key = content(cell)
+            if key in found:
+                continue
+            if key in before:
+                found[key] = before[key]
+                continue
+            name = f"tri repeating along {along}, film {film:g}{what} mm, {quality}, {walls}"
+            try:
+                law = solved(design, cell)
+            except Exception as error:  # a cell that cannot be solved stays unsolved
+                print(name, error, flush=True)
+                continue
+            curve = law.compression
+            found[key] = (
+                f"  {key}:  # {name}\n"
+                f"    displacement_um: {curve.displacement_m * 1e6:.5g}\n"
+                f"    stress_kpa: {[round(p / 1e3, 6) for p in curve.stress_pa]}\n"
+                f"    rise_percent: {[round(100 * (r - 1), 6) for r in curve.ratio]}\n"
+                f"    within: {curve.within:.4g}\n" + (f"    doubts: {dumps(law.doubts)}\n" if law.doubts else "")
+            )
+            print(name, key, law.doubts, flush=True)
+            FILE.write_text(HEAD + "".join((before | found).values()), "utf-8")
+    FILE.write_text(HEAD + "".join(found.values()), "utf-8")
+
+
+def cells(design: Design, walls: str) -> Iterator[tuple[str, Piece]]:
+    """The printed cell; by Arachne's walls, which are the likeliest, with other films too."""
+    body = estimated(design, walls)
+    yield "", piece(body)
+    film = body.cells.film
+    if walls == "arachne" and film:
+        for sign, scene in (("-", film.thinner), ("+", film.thicker)):
+            if scene:
+                yield f" {sign} {film.error_mm:g}", Piece(scene, body.cells.period_mm)
 
 
 if __name__ == "__main__":

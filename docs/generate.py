@@ -20,8 +20,9 @@ PAGES = (
     ["invert"], ["sheet"], ["stack"],
     ["bench"], ["bench", "plan"], ["bench", "plan", "tri"], ["bench", "show"],
     ["bench", "hysteresis"], ["bench", "sets"], ["bench", "live"],
-    ["log"], *(["log", w] for w in ("specimen", "add", "import", "bench", "predict", "list", "show", "export", "verify")),
-    ["report"], ["fit"], ["thesis"], ["list"], ["schema"], ["completion"],
+    ["log"],
+    *(["log", w] for w in ("specimen", "add", "import", "bench", "predict", "list", "show", "export", "verify")),
+    ["report"], ["fit"], ["calibrate"], ["thesis"], ["list"], ["schema"], ["completion"],
 )  # fmt: skip
 
 

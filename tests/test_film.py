@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from sensorgen.asprinted import film
@@ -10,8 +11,11 @@ from sensorgen.design.body import DRAWN
 from sensorgen.design.design import make
 from sensorgen.models import columns, fem3d
 from sensorgen.prediction import bodies
+from sensorgen.prediction.compression_law import solved
 from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.query import TONES_HZ, Query
 from sensorgen.prediction.rest_state import rest_state
+from sensorgen.prediction.sensor_model import build_sensor, piece
 
 EPS = {"x60": 4.68, "air": 1.00059}
 
@@ -83,3 +87,53 @@ def test_a_film_that_may_be_none_has_no_upper_bound():
     found = rest_state(replace(body, make=lambda: cells)).capacitance
     assert found.open == "upper"
     assert found.lower == near(found.value * 0.6 / 0.62)
+
+
+def test_a_bonded_plate_is_stiffer_the_thinner_it_is():
+    """Gent and Lindley: modulus 4/3 E (1 + (W / 2 d)^2), at 0.58 and 0.62 mm."""
+    found = evaluate(bodies.estimated(make({"shape": "reference"})), Query(law="bonded", force_n=6.0))
+    strain = [60e3 / (4 / 3 * 6e6 * (1 + (10 / (2 * d)) ** 2)) for d in (0.58, 0.6, 0.62)]
+    thin, usual, thick = (s / (1 - s) / 60 for s in strain)
+    assert found.sensitivity.value == near(usual)
+    assert (found.sensitivity.print.lower, found.sensitivity.print.upper) == (near(thin), near(thick))
+    assert found.force_resolution.print.lower < found.force_resolution.value < found.force_resolution.print.upper
+
+
+def test_a_pressed_prints_range_is_that_of_cells_drawn_thinner_and_thicker():
+    """Cells with the teeth moved by 0.02 mm, solved on another mesh as bodies of their own."""
+    body = bodies.estimated(make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}}))
+    scene = body.cells.first()
+    found = evaluate(of_scene(body, scene, body.cells.film), Query(force_n=6.0), keep=False)
+    thin, thinner = pressed(of_scene(body, moved(scene, -0.02)))
+    thick, thicker = pressed(of_scene(body, moved(scene, 0.02)))
+    usual = abs(build_sensor(of_scene(body, scene)).sensor.response(TONES_HZ, 6.0, 0.05)[0])
+    range_of = found.sensitivity.print
+    assert (range_of.lower, range_of.upper) == (near(thick, 1e-2), near(thin, 1e-2))
+    change = max(float(abs(z / usual - 1).max()) for z in (thinner, thicker))
+    term = next(t for t in found.budget.terms if t.name == "film thickness")
+    assert term.changes.magnitude == near(change, 2e-2)
+    assert not term.at_least
+
+
+def pressed(body):
+    """Rise of the capacitance per kPa, and abs(Z) at all frequencies; 6 N are 60 kPa."""
+    law = solved(body.design, piece(body), level=-1)
+    strain = float(law.compression.capacitive_strain(np.asarray(60e3))[0])
+    return strain / (1 - strain) / 60, abs(build_sensor(body, law).sensor.response(TONES_HZ, 6.0, 0.05)[0])
+
+
+def of_scene(body, scene, thickness=None):
+    """A print of one cell alone."""
+    cells = replace(body.cells, scenes={"printed": scene}, film=thickness)
+    return replace(body, make=lambda: cells)
+
+
+def moved(scene, by_mm):
+    """Upright prisms from 0.6 mm on, where the top electrode begins, are higher; those from 0.3 mm on are stretched."""
+    heights = [0.0, 0.3, 0.6, 2.0], [0.0, 0.3, 0.6 + by_mm, 2.0 + by_mm]
+    bodies = []
+    for body in scene.bodies:
+        ends = [[round(float(np.interp(z, *heights)), 9) for z in (p.start_mm, p.end_mm)] for p in body.prisms]
+        prisms = [replace(p, start_mm=a, end_mm=b) for p, (a, b) in zip(body.prisms, ends, strict=True)]
+        bodies.append(replace(body, prisms=tuple(prisms)))
+    return replace(scene, bodies=tuple(bodies), size_mm=(*scene.size_mm[:2], scene.size_mm[2] + by_mm))

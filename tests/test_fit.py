@@ -253,12 +253,20 @@ def test_a_leak_that_the_design_sets_itself():
         assert lost(make(given)).leak_s == pytest.approx(1e-3 * width * 1e-3 * 0.1, rel=1e-12, abs=0)
 
 
-def test_few_recordings_are_less_sure_than_their_scatter():
-    """Student: of two means the interval is 12.7 standard errors wide, not two."""
-    mean, error = _together([(1.0, 1e-9), (1.2, 1e-9)])
-    assert (mean, 2 * error) == (pytest.approx(1.1), pytest.approx(stats.t.ppf(0.975, 1) * 0.1))
-    assert _together([(1.0, 0.3), (1.0, 0.4)]) == (1.0, pytest.approx(0.25))
-    assert _together([(1.0, 0.3)]) == (1.0, 0.3)
+def test_few_prints_are_less_sure_than_their_scatter():
+    """Student, with a prior of 10 % that is worth three prints; one print is never the material."""
+    mean, error = _together([(1.0, 1e-9), (1.2, 1e-9)], ["a", "b"])
+    scatter = ((3 * 0.1**2 + 2 * 0.1**2) / 4) ** 0.5
+    assert (mean, 2 * error) == (pytest.approx(1.1), pytest.approx(stats.t.ppf(0.975, 4) * scatter / 2**0.5))
+    assert _together([(1.0, 0.3), (1.0, 0.4)], ["a", "b"]) == (1.0, pytest.approx(0.25))
+    assert _together([(1.0, 1e-9)], ["a"]) == (1.0, pytest.approx(stats.t.ppf(0.975, 3) * 0.1 / 2))
+
+
+def test_specimens_of_one_plate_are_one_print():
+    pairs = [(1.0, 1e-9), (1.2, 1e-9), (1.1, 1e-9)]
+    one_plate = _together(pairs, ["plate"] * 3)
+    assert one_plate == (pytest.approx(1.1), pytest.approx(_together([(1.1, 1e-9)], ["a"])[1]))
+    assert _together(pairs, ["a", "b", "c"])[1] < one_plate[1]
 
 
 def test_nothing_to_fit_to(tmp_path):

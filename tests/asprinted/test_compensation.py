@@ -124,3 +124,51 @@ def test_a_real_slicer_prints_gap_and_capacitance(printed, real):
     assert rest_state(by_slicer(made)).capacitance.value == pytest.approx(wanted, rel=0.03)
     assert gap_mm(printed("arachne", asked)[1].cell.scene) == pytest.approx(0.3, abs=1e-9)
     assert nominal(made, real("arachne", made)[1]).rows
+
+
+def test_the_stiffness_is_that_of_the_solved_cell():
+    """The stored cell came down by 36.44 um under 100 kPa, on another mesh."""
+    asked = design.make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}})
+    assert found(drawn(asked), stiffness=True).stiffness_kpa_per_mm == pytest.approx(100 / 36.44e-3, rel=0.03)
+    plate = found(drawn(design.make({"shape": "reference"})), stiffness=True)
+    assert plate.stiffness_kpa_per_mm == pytest.approx(6e3 / 0.6)  # 6 MPa over 0.6 mm
+
+
+def test_a_stiffness_of_a_cell_in_3d_is_refused():
+    with pytest.raises(OutOfRange, match=r"stiffness is not known without solving it in 3D.*--compensate print"):
+        compensated(small("rect"), stiffness=True)
+
+
+def few(design, gap_mm):
+    """Of all heights those of the drawing, and one layer more."""
+    return [({"dielectric_mm": gap_mm}, 0.0), ({"dielectric_mm": gap_mm, "lower_height_mm": 0.3}, 0.4)]
+
+
+def stiff(of_print):
+    """``found`` with a stiffness of 1000 kPa/mm per mm of the lower prisms' height; of a print, of another height."""
+
+    def with_stiffness(body, *, stiffness=False):
+        height = body.design.params.lower_height_mm
+        return replace(found(body), stiffness_kpa_per_mm=1e3 * (height if body.is_drawn else of_print(height)))
+
+    return with_stiffness
+
+
+def test_a_stiffness_that_was_asked_for_comes_out_with_gap_and_capacitance(monkeypatch):
+    """0.24 mm as drawn are 0.2 mm in whole layers; it is 0.3 mm that print as stiff."""
+    asked = small(parameters={"dielectric_mm": 0.2})
+    monkeypatch.setattr(compensation, "_heights", few)
+    monkeypatch.setattr(compensation, "found", stiff(lambda height: height - 0.06))
+    made, changes = compensated(asked, stiffness=True)
+    assert made.params.lower_height_mm == pytest.approx(0.3)
+    assert changed(changes)["stiffness as printed [kPa/mm]"][1] == pytest.approx(240.0)
+    wanted, printed = (rest_state(each).capacitance.value for each in (drawn(asked), estimated(made, "arachne")))
+    assert printed == pytest.approx(wanted, rel=0.03)
+    assert estimated_gap(made, "arachne") == pytest.approx(0.2, abs=1e-9)
+
+
+def test_a_stiffness_that_cannot_be_had_is_refused_with_the_nearest(monkeypatch):
+    monkeypatch.setattr(compensation, "_heights", few)
+    monkeypatch.setattr(compensation, "found", stiff(lambda height: 10 * height))
+    with pytest.raises(OutOfRange, match=r"and 240 kPa/mm cannot be printed.*nearest: a gap of 0\.2 mm, .* kPa/mm by"):
+        compensated(small(parameters={"dielectric_mm": 0.2}), stiffness=True)

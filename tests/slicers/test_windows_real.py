@@ -8,12 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from windows import Screen, opened, saved
+import windows
+from cura_settings import write
+from windows import Screen, opened, saved, until
 
 from sensorgen.design import design, materials
 from sensorgen.design.tower import tower
 from sensorgen.export import slicing
-from sensorgen.export.slicers import prusa
+from sensorgen.export.slicers import cura, prusa
+from sensorgen.export.slicers.loads import recipes
 from sensorgen.export.threemf.prusa import CONFIG, PROFILE, TOWER
 
 OUT = Path(__file__).parents[2] / "out" / "windows"  # CI keeps it
@@ -142,3 +145,41 @@ def test_a_window_that_asks_is_found_out(own, screen, monkeypatch):
     content = slicing.plate_3mf([slicing.alone(SENSOR)], "prusa", "sensor")
     with pytest.raises(AssertionError, match="Detected advanced data"):
         opened_and_saved(screen, own, "2.5.0", content)
+
+
+def test_curas_window_opens_the_sensor_on_our_printer(program, screen, monkeypatch, tmp_path):
+    """The printer's profiles, of which Cura finds all, and the bodies, without its assistant of the first start."""
+    command, machine, layers = program("cura", "cura"), SENSOR.machine, SENSOR.layers
+    version = Path("/usr/lib/python3/dist-packages/cura/CuraVersion.py")
+    if not version.exists() or '"4.13' not in version.read_text():
+        pytest.skip("settings of Cura 4.13, as Debian 12 has it, are written here")
+    monkeypatch.setattr(windows, "PATIENCE_S", 240.0)
+    loads = slicing.plate_loads([slicing.alone(SENSOR)])
+    used = recipes(machine, layers, loads)
+    write(
+        tmp_path, cura.profiles(machine, layers, loads), machine, layers.name,
+        {k: cura.material_id(r) for k, r in used.items()},
+    )  # fmt: skip
+    (tmp_path / "sensor.3mf").write_bytes(slicing.plate_3mf([slicing.alone(SENSOR)], "cura", "sensor"))
+    own = {"HOME": str(tmp_path), "DISPLAY": screen.display, "LIBGL_ALWAYS_SOFTWARE": "1"}
+    log = tmp_path / "log"
+    with log.open("wb") as file:
+        kept = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "VIRTUAL_ENV", "XDG_"))}
+        window = subprocess.Popen([command, str(tmp_path / "sensor.3mf")], env=kept | own, stdout=file, stderr=file)
+    try:
+        said = lambda: f"{screen.windows()}; {log.read_text(errors='replace')[-500:]}"  # noqa: E731
+        until(lambda: any("sensor - Ultimaker Cura" in title for title in screen.windows().values()), said)
+        colours = [[int(materials.load(n).colour[k : k + 2], 16) for k in (1, 3, 5)] for n in SENSOR.used()]
+
+        def drawn():
+            shown = np.asarray(screen.picture()).reshape(-1, 3)
+            return all((shown == colour).all(1).sum() > 50 for colour in colours)
+
+        until(drawn, lambda: f"no tools in the colours of their materials: {screen.windows()}")
+        until(lambda: "Loading file took" in log.read_text(errors="replace"), said)
+        assert len(screen.windows()) == 1
+        OUT.mkdir(parents=True, exist_ok=True)
+        screen.picture().save(OUT / "cura-4.13.0.png")
+    finally:
+        window.kill()
+        window.wait()

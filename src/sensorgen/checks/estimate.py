@@ -80,8 +80,7 @@ def cura(width_mm: float, layer_mm: float, line_mm: float, nozzle_mm: float) -> 
     """Cura's walls: what no whole line fits vanishes [mm].
 
     Of two lines that overlap, one is thinned by the overlap and keeps its path: half of the overlap stays open. It is
-    the one further from the middle of the bed (along y: from its back), so that the part is lopsided; here it is not,
-    which makes C up to 7 % too low for lines half as wide again as the nozzle.
+    the one further from the middle of the bed (along y: from its back), so that a strip is lopsided.
     """
     if width_mm < line_mm - SLIVER_MM:
         return 0.0
@@ -200,7 +199,8 @@ def _printed(
             def made(width_mm: float, line_mm: float = line_mm) -> float:
                 return wide(width_mm, layer.height_mm, line_mm, printer.nozzle_mm)
 
-            swollen = _widened(layer, body.name, length * width, made)
+            aside = scene.size_mm if wide in (cura, cura_gaps) else None
+            swollen = _widened(layer, body.name, length * width, made, aside)
             inside = shapely.clip_by_rect(swollen, 0.0, 0.0, length, width)
             found, others = united(inside), shapely.get_parts(list(regions.values()))
             met = np.unique(shapely.STRtree(others).query(inside, predicate="intersects")[1])
@@ -209,8 +209,10 @@ def _printed(
     return regions
 
 
-def _widened(layer: LayerRegions, body: str, plan_mm2: float, wide: Callable[[float], float]) -> Sequence[Region]:
-    """The parts of a body in a layer as their walls print them."""
+def _widened(
+    layer: LayerRegions, body: str, plan_mm2: float, wide: Callable[[float], float], lopsided: Sequence[float] | None
+) -> Sequence[Region]:
+    """The parts of a body in a layer as their walls print them; strips that are ``lopsided``, in a sensor of a size."""
     found = parts(layer.region(body))
     if not found or found[0].area > plan_mm2 * (1 - SLIVER_MM):
         return found
@@ -221,7 +223,12 @@ def _widened(layer: LayerRegions, body: str, plan_mm2: float, wide: Callable[[fl
     more = (printed - width)[:, None] / 2
     if layer.along:
         sides = np.array([-1, 0, 1, 0] if layer.along == "y" else [0, -1, 0, 1])
-        swollen = shapely.box(*(bounds + more * sides).T)
+        swollen = bounds + more * sides
+        if lopsided:
+            # What is lost is lost on the far side of the bed's middle, along y on the front
+            off = bounds[:, ::2].mean(axis=1) - lopsided[0] / 2 if layer.along == "y" else -np.ones(len(found))
+            swollen += np.minimum(more, 0.0) * np.sign(off)[:, None] * abs(sides)
+        swollen = shapely.box(*swollen.T)
     else:
         swollen = shapely.buffer(found, more[:, 0], join_style="mitre")
     return list(swollen[printed > 0])

@@ -69,9 +69,9 @@ def body_of() -> "BodyOf":
 def compensate_option() -> click.Option:
     """``--compensate``, for commands that make files."""
     return click.Option(
-        ["--compensate"], type=OneOf(("print", "bake")),
+        ["--compensate"], type=OneOf(("print", "bake", "stiffness")),
         help="Change the design so that what is asked for comes out: whole layers, widths of a line, electrode gap and "
-        "capacitance; with bake also larger by the 20 % that the bake takes off.",
+        "capacitance; with bake also larger by the 20 % that the bake takes off; with stiffness as stiff, too.",
     )  # fmt: skip
 
 
@@ -85,7 +85,9 @@ def compensated(
 
     sliced = partial(_sliced, slicer, program=program) if slicer else None
     with show.progress(("designs",)) as step:
-        found, changes = changed(design, walls, bake=word == "bake", sliced=sliced, step=step)
+        found, changes = changed(
+            design, walls, bake=word == "bake", stiffness=word == "stiffness", sliced=sliced, step=step
+        )
     if not changes:
         render.say(f"--compensate {word}: nothing to change, by the estimate for {walls} walls", err=True)
     return found, changes

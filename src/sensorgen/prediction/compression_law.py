@@ -266,14 +266,16 @@ def solved(
     return _cell(replace(curve, doubts=doubts), {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}})
 
 
-def at_a_few_pressures(design: Design, printed: Piece, answer: Answer, stress_pa: float) -> Law | None:
+def at_a_few_pressures(
+    design: Design, printed: Piece, answer: Answer, stress_pa: float, name: str = ""
+) -> Law | None:  # fmt: skip
     """The stored law of a printed cell; else a cross-section is solved at a few pressures on the coarsest mesh.
 
     Its own error is not known: it tells by how much ways to print differ, which is far more.
 
     Parameters
     ----------
-    design, printed, answer
+    design, printed, answer, name
         As of :func:`law_of`.
     stress_pa : float
         Up to which it is wanted [Pa].
@@ -285,15 +287,17 @@ def at_a_few_pressures(design: Design, printed: Piece, answer: Answer, stress_pa
     """
     from sensorgen.models.press2d import BoundaryConditions
 
-    known = law_of(design, answer, printed=printed)
+    known = law_of(design, answer, name, printed=printed)
     if known.bounded or model_of(printed) != "press2d":
         return known if known.bounded else None
     try:
         case = _case(design, printed, "press2d", BoundaryConditions())
-        found = curve_of(pressed(case, [stress_pa * part for part in (0, 0.5, 1, 1.25)], COARSEST))
+        found = pressed(case, [stress_pa * part for part in (0, 0.5, 1, 1.25)], COARSEST)
+        curve = curve_of(found)
     except SensorgenError:
         return None
-    return replace(known, compression=found, doubts=())
+    fallen_m = float(found.displacement_m[-1]) - found.fall_m
+    return replace(known, compression=replace(curve, displacement_m=fallen_m), doubts=())
 
 
 def _case(design: Design, piece: Piece, model: str, boundary: "BoundaryConditions") -> Case:

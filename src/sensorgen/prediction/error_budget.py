@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design
 from sensorgen.design.materials import PIEZORESISTANCE
@@ -34,8 +35,9 @@ Complex = NDArray[np.complex128]
 
 
 def error_budget(
-    model: SensorModel, load: Load, accuracy: float | None = None, otherwise: Sequence[Sensor | None] = ()
-) -> ErrorBudget:
+    model: SensorModel, load: Load, accuracy: float | None = None, otherwise: Sequence[Sensor | None] = (),
+    films: Sequence[Sensor | None] = (),
+) -> ErrorBudget:  # fmt: skip
     """The error budget of a load.
 
     Parameters
@@ -48,6 +50,8 @@ def error_budget(
         Wanted of abs(Z), relative [-].
     otherwise : sequence of Sensor or None
         The sensor as it may be printed otherwise; None where one is not known under pressure.
+    films : sequence of Sensor or None
+        The same with the thickest and the thinnest film.
 
     Raises
     ------
@@ -55,7 +59,7 @@ def error_budget(
         A load that the sensor cannot take.
     """
     reference = ReferenceLoad(model.sensor, load)
-    terms = (*_models(model, reference), *_print(model, reference, otherwise), *_materials(model, reference))
+    terms = (*_models(model, reference), *_print(model, reference, otherwise, films), *_materials(model, reference))
     total = Changes()
     for term in terms:
         total = total + (term.changes or Changes())
@@ -127,20 +131,22 @@ def _models(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
     yield Term("tip", what, "model", reference.change(*profiles))
 
 
-def _print(model: SensorModel, reference: ReferenceLoad, otherwise: Sequence[Sensor | None]) -> Iterator[Term]:
-    """Line widths, and the film's thickness, of which the law of compression is left as it is.
+def _print(
+    model: SensorModel, reference: ReferenceLoad, otherwise: Sequence[Sensor | None], films: Sequence[Sensor | None]
+) -> Iterator[Term]:
+    """Line widths, and the film's thickness: by the capacitance, and by the law of compression where that is known."""
+    rest, film = model.rest, model.body.cells.film
 
-    On tri a film twice as thick lowers the rise of capacitance at 100 kPa from 33 to 25 %; a plate's does not change.
-    """
-    span, by_film, film = model.rest.by_width, model.rest.by_film, model.body.cells.film
-    if span.lower < span.upper:
-        ends = [*_with_capacitances(model, (span.lower, span.upper)), *(s for s in otherwise if s)]
+    def changes(span: Interval, sensors: Sequence[Sensor | None]) -> Changes | None:
+        return reference.change(*_with_capacitances(model, (span.lower, span.upper)), *(s for s in sensors if s))
+
+    if rest.by_width.lower < rest.by_width.upper:
         what = f"line widths of {', '.join(model.body.cells.scenes)}"
-        yield Term("print", what, "print", reference.change(*ends), at_least=None in otherwise)
+        yield Term("print", what, "print", changes(rest.by_width, otherwise), at_least=None in otherwise)
     if film:
         what = f"heights of the tools differ by up to {film.error_mm:g} mm ({model.body.design.machine.name})"
-        ends = _with_capacitances(model, (by_film.lower, by_film.upper))
-        yield Term("film thickness", what, "print", reference.change(*ends), at_least=film.thinner is None)
+        at_least = film.thinner is None or None in films
+        yield Term("film thickness", what, "print", changes(rest.by_film, films), at_least=at_least)
 
 
 def _materials(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:

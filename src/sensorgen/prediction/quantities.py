@@ -31,6 +31,8 @@ from sensorgen.prediction.results import SCHEMA, Impedance, Prediction
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
 from sensorgen.prediction.spread import spread
 
+Otherwise = tuple[Sequence[Sensor | None], Sequence[Sensor | None]]  # by other walls; with other films
+
 _ASSUMED = "the cell was not solved, and is taken to deform as a solid plate"
 _PA_PER_KPA = 1e3
 _SAME = 0.05  # capacitances that differ by less are not told apart: solving takes seconds
@@ -141,10 +143,12 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
             model.sensor, load.frequency_hz, query.noise, force_n=load.force_n, position_m=load.position_m,
             stiffest=stiffest, assumed="" if law.bounded else _ASSUMED,
         )  # fmt: skip
-        others = list(_printed_otherwise(model, load, query)) if law.bounded else [None]
+        others: Otherwise = ([None], [None])
+        if law.bounded:
+            others = list(_printed_otherwise(model, load, query)), list(_other_films(model, load, query))
         found = replace(
             found, identifiability=made, sensitivity=_sensitivity(model, load, others),
-            budget=error_budget(model, query.load(model.body.design), query.accuracy, others),
+            budget=error_budget(model, query.load(model.body.design), query.accuracy, *others),
         )  # fmt: skip
         return _resolution(found, model, load, query, others)
     except SensorgenError as error:
@@ -165,8 +169,29 @@ def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator
     pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
     for _, other, rest in ends.values():
         if other is not body:
-            law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa)
+            law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _plate_law(model))
             yield build_sensor(other, law, query.tip, rest=rest).sensor if law else None
+
+
+def _other_films(model: SensorModel, load: Load, query: Query) -> Iterator[Sensor | None]:
+    """Sensors with the thickest and the thinnest film; None where one is not known under pressure."""
+    body, rest = model.body, model.rest
+    film = body.cells.film
+    pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
+    for scene, farad in ((film.thicker, rest.by_film.lower), (film.thinner, rest.by_film.upper)) if film else ():
+        if scene is None:
+            yield None
+            continue
+        cells = replace(body.cells, scenes={"film": scene}, film=None)
+        other = replace(body, make=lambda cells=cells: cells)  # type: ignore[misc]
+        law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _plate_law(model))
+        at_rest = replace(rest, capacitance=replace(rest.capacitance, value=farad))
+        yield build_sensor(other, law, query.tip, rest=at_rest).sensor if law else None
+
+
+def _plate_law(model: SensorModel) -> str:
+    """The law of a plate that was taken, or ""."""
+    return model.law.compression.name if model.law.compression.name in ("unconfined", "bonded") else ""
 
 
 def _end(found: list[tuple[float, Body, RestState]], *, least: bool) -> tuple[float, Body, RestState]:
@@ -175,7 +200,7 @@ def _end(found: list[tuple[float, Body, RestState]], *, least: bool) -> tuple[fl
     return next(pick for pick in found if abs(pick[0] / value - 1) < _SAME)
 
 
-def _sensitivity(model: SensorModel, load: Load, others: Sequence[Sensor | None]) -> Bounds:
+def _sensitivity(model: SensorModel, load: Load, others: Otherwise) -> Bounds:
     """(C(p) / C(0) - 1) / p, with p the pressure of the reference load [1/kPa]."""
     pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
 
@@ -184,9 +209,10 @@ def _sensitivity(model: SensorModel, load: Load, others: Sequence[Sensor | None]
         return strain / (1 - strain) / pressure_pa * _PA_PER_KPA
 
     value, moduli = of(model.law.compression), _moduli(model)
+    by_print = [_range([value, *(of(s.compression) if s else nan for s in sensors)]) for sensors in others]
     return Bounds.of(
         value, "1/kPa", model=_span(value, of, model.law.others), material=_span(value, of, moduli),
-        print=_range([value, *(of(sensor.compression) if sensor else nan for sensor in others)]),
+        print=_compounded(value, by_print),
         open="upper" if any(_is_beyond(of, law) for law in moduli) else "",
     )  # fmt: skip
 
@@ -200,9 +226,7 @@ def _is_beyond(of: Callable[[Compression], float], law: Compression) -> bool:
     return False
 
 
-def _resolution(
-    found: Prediction, model: SensorModel, load: Load, query: Query, others: Sequence[Sensor | None]
-) -> Prediction:
+def _resolution(found: Prediction, model: SensorModel, load: Load, query: Query, others: Otherwise) -> Prediction:
     """Standard errors of force and position from one reading, with what they are of sensors within the errors."""
 
     def errors(sensor: Sensor | None) -> tuple[float, float]:
@@ -214,7 +238,7 @@ def _resolution(
 
     own, law = errors(model.sensor), model.law
     by_law = [errors(replace(model.sensor, compression=other)) for other in law.others] if law.bounded else [(nan, nan)]
-    by_print = [errors(sensor) for sensor in others]
+    by_print = [[errors(sensor) for sensor in sensors] for sensors in others]
     values = list(material_ends(model, ReferenceLoad(model.sensor, load)))
     by_material = [[errors(sensor) for sensor in ends.sensors] for ends in values]
 
@@ -226,18 +250,22 @@ def _resolution(
         def spread_of(each: Sequence[tuple[float, float]]) -> Interval:
             return _range([value, *(e[which] for e in each)])
 
-        material = [spread_of(ends) for ends in by_material]
-        lower, upper = (value * prod(getattr(m, end) / value for m in material) for end in ("lower", "upper"))
         return Bounds.of(
             value,
             unit,
             model=spread_of(by_law),
-            print=spread_of(by_print),
-            material=Interval(lower, upper),
+            print=_compounded(value, map(spread_of, by_print)),
+            material=_compounded(value, map(spread_of, by_material)),
             open="lower" if any(ends.at_least for ends in values) else "",  # softer: more is resolved
         )
 
     return replace(found, force_resolution=bounds(0, "N"), position_resolution=bounds(1, "m"))
+
+
+def _compounded(value: float, parts: Iterable[Interval]) -> Interval:
+    """Ranges of several causes, each at its worst: their relative changes multiply."""
+    parts = list(parts)
+    return Interval(value * prod(p.lower / value for p in parts), value * prod(p.upper / value for p in parts))
 
 
 def _range(values: Sequence[float]) -> Interval:

@@ -1,4 +1,7 @@
-"""Compensation: parameters changed until the print has the electrode gap and the capacitance that were asked for."""
+"""Compensation: parameters changed until the print has the electrode gap and the capacitance that were asked for.
+
+Asked for, its stiffness too: the pressure per displacement of its top.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -16,6 +19,8 @@ BAKE = 0.2  # what the bake takes off in the plane (thesis 6.2)
 MOST_SLICES = 10  # with that of the design as it was, and the last one, which is written
 FILM_LAYERS = 2  # of a film at least: through one layer leads every slit between two lines
 WITHIN = 0.02  # relative error of the capacitance that ends the search
+STIFFNESS_WITHIN = 0.1  # the same of the stiffness, which whole layers leave few values
+PRESSURE_PA = 80e3  # 8 N on 10 x 10 mm: under which a stiffness is meant
 _ENOUGH = 6.0  # periods to estimate a print with
 _MARGIN = 1.04  # by which strips may be narrower without a layer less: at the limit itself a slicer may drop it
 _LAYERS = 3  # by which a height may change
@@ -24,6 +29,7 @@ _SHARES = (0.5, 5.0)  # of its own value, that a width or a period may take
 _ACCURACY = 1e-2  # of a capacitance, relative
 _HALVINGS = 12  # of a step between two widths
 _MOST_TRIED, _MOST_SOLVED = 300, 60  # designs whose gap, and whose capacitance is found, before it gives up
+_MOST_PRESSED = 12  # designs whose stiffness is found
 
 Slice = Callable[[Design], Body]
 _Values = tuple[tuple[str, float], ...]  # of parameters, by their names
@@ -59,22 +65,30 @@ def document(changes: Sequence[Change]) -> Iterator[Part]:
 
 @dataclass(frozen=True)
 class Found:
-    """A design with its electrode gap [mm] and its capacitance [pF], None where it has none."""
+    """A design with its electrode gap [mm], capacitance [pF] and stiffness [kPa/mm]; None where it has none."""
 
     design: Design
     gap_mm: float
     capacitance_pf: float | None
+    stiffness_kpa_per_mm: float | None = None
 
     def off(self, asked: "Found") -> float:
         """Ln of the capacitance over the one asked for; 0 where none is asked for, infinite where there is none."""
-        if asked.capacitance_pf is None:
-            return 0.0
-        return log(self.capacitance_pf / asked.capacitance_pf) if self.capacitance_pf else inf
+        return _off(self.capacitance_pf, asked.capacitance_pf)
+
+    def stiffer(self, asked: "Found") -> float:
+        """The same of the stiffness."""
+        return _off(self.stiffness_kpa_per_mm, asked.stiffness_kpa_per_mm)
 
     def words(self) -> str:
-        """Both in words."""
-        c = f" and {self.capacitance_pf:.3g} pF" if self.capacitance_pf else ""
-        return f"a gap of {self.gap_mm:g} mm{c}"
+        """All in words."""
+        parts = [f"a gap of {self.gap_mm:g} mm", *([f"{self.capacitance_pf:.3g} pF"] if self.capacitance_pf else [])]
+        parts += [f"{self.stiffness_kpa_per_mm:.3g} kPa/mm"] if self.stiffness_kpa_per_mm else []
+        return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else parts[0]
+
+
+def _off(value: float | None, asked: float | None) -> float:
+    return 0.0 if asked is None else log(value / asked) if value else inf
 
 
 def compensated(
@@ -82,6 +96,7 @@ def compensated(
     walls: str = "arachne",
     *,
     bake: bool = False,
+    stiffness: bool = False,
     sliced: Slice | None = None,
     step: Callable[[str], None] = lambda _: None,
 ) -> tuple[Design, list[Change]]:
@@ -99,6 +114,8 @@ def compensated(
         One of :data:`sensorgen.checks.estimate.RULES`, by which prints are estimated.
     bake : bool
         Also enlarge by what the bake shrinks, where the design gives no shrinkage.
+    stiffness : bool
+        Also keep the stiffness of the drawing.
     sliced : callable, optional
         The print of a design by a real slicer, by which estimates are corrected, at most ``MOST_SLICES`` times; the
         estimate decides if not given.
@@ -110,14 +127,14 @@ def compensated(
     UnknownName
         No such walls.
     OutOfRange
-        No design was found that is printed so; the message has the nearest.
+        No design was found that is printed so; the message has the nearest. A stiffness that only 3D would give.
     """
     now, changes = printable(design, bake=bake)
     from sensorgen.prediction.bodies import drawn
 
-    asked = found(drawn(design))
-    before = _estimate(now, walls) if sliced is None else found(sliced(now))
-    wanted = Found(now, _attainable_mm(now, asked.gap_mm), asked.capacitance_pf)
+    asked = found(drawn(design), stiffness=stiffness)
+    before = _estimate(now, walls, stiffness=stiffness) if sliced is None else found(sliced(now), stiffness=stiffness)
+    wanted = replace(asked, design=now, gap_mm=_attainable_mm(now, asked.gap_mm))
     if not 0 < asked.gap_mm < inf:
         return now, changes
     after = before if _reached(before, wanted) else _searched(now, wanted, walls, sliced, step)
@@ -130,42 +147,64 @@ def compensated(
     if after is before:
         return now, changes
     old, new = asdict(now.params), asdict(after.design.params)
-    changes += [Change(name, old[name], new[name], "gap and capacitance") for name in old if old[name] != new[name]]
+    why = "gap, capacitance and stiffness" if stiffness else "gap and capacitance"
+    changes += [Change(name, old[name], new[name], why) for name in old if old[name] != new[name]]
     changes.append(Change("electrode gap as printed [mm]", before.gap_mm, after.gap_mm, f"{asked.gap_mm:g} mm asked"))
     if after.capacitance_pf and asked.capacitance_pf:
         was = before.capacitance_pf or 0.0
         changes.append(
             Change("capacitance as printed [pF]", was, after.capacitance_pf, f"{asked.capacitance_pf:.4g} pF asked")
         )
+    if after.stiffness_kpa_per_mm and asked.stiffness_kpa_per_mm:
+        was, why = before.stiffness_kpa_per_mm or 0.0, f"{asked.stiffness_kpa_per_mm:.4g} kPa/mm asked"
+        changes.append(Change("stiffness as printed [kPa/mm]", was, after.stiffness_kpa_per_mm, why))
     return after.design, changes
 
 
-def found(body: Body) -> Found:
-    """Gap and capacitance of a body, by its most likely cell."""
+def found(body: Body, *, stiffness: bool = False) -> Found:
+    """Gap, capacitance and, asked for, stiffness of a body, by its most likely cell.
+
+    Raises
+    ------
+    OutOfRange
+        A stiffness is asked for that is not known: of a cell that is no cross-section, or that the solver gives up.
+    """
     from sensorgen.design.values import permittivities
     from sensorgen.prediction.capacitance import Unpredictable, capacitance
+    from sensorgen.prediction.compression_law import at_a_few_pressures, gap_m
+    from sensorgen.prediction.mesh_ladder import Piece
 
     cells, eps = body.cells, {v.material: v.value for v in permittivities(body.design)}
     gap = next(iter(cells.gap_mm.values()))
     try:
-        c = capacitance(cells.first(), eps, _ACCURACY).times(cells.count).capacitance_f.middle() * 1e12
+        answer = capacitance(cells.first(), eps, _ACCURACY)
     except Unpredictable:
         return Found(body.design, gap, None)
-    return Found(body.design, gap, c)
+    c = answer.times(cells.count).capacitance_f.middle() * 1e12
+    if not stiffness:
+        return Found(body.design, gap, c)
+    law = at_a_few_pressures(body.design, Piece(cells.first(), cells.period_mm), answer, PRESSURE_PA)
+    if law is None:
+        raise OutOfRange(
+            f"{body.design.name}: its stiffness is not known without solving it in 3D, or not at all; "
+            "--compensate print keeps gap and capacitance"
+        )
+    pa_per_m = law.compression.foundation_stiffness_pa_per_m(gap_m(cells.first()))
+    return Found(body.design, gap, c, pa_per_m * 1e-6)
 
 
 def _reached(now: Found, wanted: Found) -> bool:
-    return abs(now.gap_mm - wanted.gap_mm) < wanted.design.layers.layer_mm / 4 and abs(now.off(wanted)) <= WITHIN
+    near = abs(now.gap_mm - wanted.gap_mm) < wanted.design.layers.layer_mm / 4
+    return near and abs(now.off(wanted)) <= WITHIN and abs(now.stiffer(wanted)) <= STIFFNESS_WITHIN
 
 
 def _searched(
     design: Design, wanted: Found, walls: str, sliced: Slice | None, step: Callable[[str], None]
 ) -> Found:  # fmt: skip
     """The print that is wanted, by the estimate, or by slices that correct it in turn."""
-    share, margin, nearest = 1.0, _MARGIN, None
+    corrected, margin, nearest = wanted, _MARGIN, None
     for count in range(1, MOST_SLICES - 1):
         step(f"design {count}" if sliced else "designs")
-        corrected = Found(design, wanted.gap_mm, wanted.capacitance_pf and wanted.capacitance_pf / share)
         search = _Search(design, corrected, walls, margin)
         best = search.best
         if best is None:
@@ -173,13 +212,19 @@ def _searched(
                 f"{wanted.words()} cannot be printed of {design.name}, by the estimate for {walls} walls; nearest: "
                 f"{_told(design, search.nearest)}"
             )
-        real = best if sliced is None else found(sliced(best.design))
+        stiff = wanted.stiffness_kpa_per_mm is not None
+        real = best if sliced is None else found(sliced(best.design), stiffness=stiff)
         if nearest is None or _distance(real, wanted) < _distance(nearest, wanted):
             nearest = real
         if sliced is None or _reached(real, wanted):
             return real
-        if real.capacitance_pf and best.capacitance_pf:
-            share = real.capacitance_pf / best.capacitance_pf
+        corrected = replace(
+            wanted,
+            capacitance_pf=_corrected(wanted.capacitance_pf, best.capacitance_pf, real.capacitance_pf),
+            stiffness_kpa_per_mm=_corrected(
+                wanted.stiffness_kpa_per_mm, best.stiffness_kpa_per_mm, real.stiffness_kpa_per_mm
+            ),
+        )
         if abs(real.gap_mm - best.gap_mm) > SLIVER_MM:
             margin *= _MARGIN**2
     raise OutOfRange(
@@ -187,8 +232,13 @@ def _searched(
     )
 
 
+def _corrected(wanted: float | None, estimate: float | None, real: float | None) -> float | None:
+    """What an estimate has to give so that the print gives what is wanted."""
+    return wanted * estimate / real if wanted and estimate and real else wanted
+
+
 def _distance(one: Found, wanted: Found) -> tuple[float, float]:
-    return round(abs(one.gap_mm - wanted.gap_mm), 6), abs(one.off(wanted))
+    return round(abs(one.gap_mm - wanted.gap_mm), 6), abs(one.off(wanted)) + abs(one.stiffer(wanted))
 
 
 def _told(design: Design, nearest: Found | None) -> str:
@@ -212,6 +262,7 @@ class _Search:
     walls: str
     margin: float
     tried: dict[_Values, Found | None] = field(default_factory=dict, init=False)
+    pressed: list[Found] = field(default_factory=list, init=False)
 
     @cached_property
     def best(self) -> Found | None:
@@ -223,19 +274,31 @@ class _Search:
             for name in _widths(self.design):
                 for way in (_STEP, 1 / _STEP):
                     hit, further = self._along(heights, name, way, least - moved)
-                    if hit:
+                    if hit and self._stiff_enough(hit):
                         best, least = hit, moved + further
-        return best or (self.nearest if self.nearest and _reached(self.nearest, self.wanted) else None)
+        if best is None and self.nearest and _reached(self.nearest, self.wanted):
+            best = self.nearest
+        return next((one for one in self.pressed if best and one.design == best.design), best)
+
+    def _stiff_enough(self, hit: Found) -> bool:
+        """Whether a print has the wanted stiffness too, where one is wanted."""
+        if self.wanted.stiffness_kpa_per_mm is None:
+            return True
+        try:
+            self.pressed.append(replace(_estimate(hit.design, self.walls, stiffness=True), gap_mm=hit.gap_mm))
+        except SensorgenError:  # the solver gives up
+            return False
+        return abs(self.pressed[-1].stiffer(self.wanted)) <= STIFFNESS_WITHIN
 
     def _exhausted(self) -> bool:
         """Whether as many designs were tried as may be."""
         solved = sum(bool(one and one.capacitance_pf) for one in self.tried.values())
-        return len(self.tried) > _MOST_TRIED or solved > _MOST_SOLVED
+        return len(self.tried) > _MOST_TRIED or solved > _MOST_SOLVED or len(self.pressed) > _MOST_PRESSED
 
     @property
     def nearest(self) -> Found | None:
         """Of all that were tried, the one nearest to what is wanted."""
-        found = (one for one in self.tried.values() if one)
+        found = self.pressed or [one for one in self.tried.values() if one]
         return min(found, key=lambda one: _distance(one, self.wanted), default=None)
 
     def _along(self, heights: dict[str, float], name: str, way: float, most: float) -> tuple[Found | None, float]:
@@ -323,14 +386,14 @@ def _attainable_mm(design: Design, gap_mm: float) -> float:
     return round(max(round(gap_mm / layer), least) * layer, 9) if gap_mm < inf else gap_mm
 
 
-def _estimate(design: Design, walls: str) -> Found:
-    """Gap and capacitance as estimated, from a few periods, counted to the whole sensor."""
+def _estimate(design: Design, walls: str, *, stiffness: bool = False) -> Found:
+    """Gap, capacitance and stiffness as estimated, from a few periods, counted to the whole sensor."""
     from sensorgen.prediction.bodies import estimated
 
     few = _few(design)
-    one = found(estimated(few, walls))
+    one = found(estimated(few, walls), stiffness=stiffness)
     larger = design.params.length_mm * design.params.width_mm / (few.params.length_mm * few.params.width_mm)
-    return Found(design, one.gap_mm, one.capacitance_pf and one.capacitance_pf * larger)
+    return replace(one, design=design, capacitance_pf=one.capacitance_pf and one.capacitance_pf * larger)
 
 
 def _gap_mm(design: Design, walls: str) -> float:

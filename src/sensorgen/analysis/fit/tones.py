@@ -114,11 +114,11 @@ def values(fits: Sequence[OfRun]) -> list[Fitted | Untold]:
     modulus: Fitted | Untold = Untold(MODULUS, "no recording with presses whose force and position are known")
     if pressed:
         moduli = [pair for _, pair in pressed]
-        together = _together(moduli, [fit for fit, _ in pressed])
+        together = _together(moduli, _prints([fit for fit, _ in pressed]))
         modulus = _value(film, MODULUS, together, f"presses of {len(moduli)} recordings, {law}", len(moduli))
     return [
-        _value(electrode, "resistivity_ohm_m", _together(along, fits), rho, len(fits)), _permittivity(fits, film),
-        modulus, _leak(fits, film),
+        _value(electrode, "resistivity_ohm_m", _together(along, _prints(fits)), rho, len(fits)),
+        _permittivity(fits, film), modulus, _leak(fits, film),
     ]  # fmt: skip
 
 
@@ -130,8 +130,12 @@ def _value(material: str, quantity: str, ln: tuple[float, float], note: str, cou
     return Fitted(material, quantity, exp(at), exp(at - _SURE * error), exp(at + _SURE * error), note)
 
 
+def _prints(fits: Sequence[OfRun]) -> list[str]:
+    return [fit.run.entry.batch or fit.run.entry.specimen for fit in fits]
+
+
 def _together(
-    found: Sequence[tuple[float, float]], fits: Sequence[OfRun], usual: float = _BETWEEN
+    found: Sequence[tuple[float, float]], prints: Sequence[str], usual: float = _BETWEEN
 ) -> tuple[float, float]:
     """Mean over prints, and its standard error from the errors or from the scatter between prints, whichever is more.
 
@@ -141,7 +145,6 @@ def _together(
     """
     from scipy.special import stdtrit
 
-    prints = [fit.run.entry.batch or fit.run.entry.specimen for fit in fits]
     of = {name: [pair for pair, print_ in zip(found, prints, strict=True) if print_ == name] for name in prints}
     means = np.array([np.mean(pairs, axis=0) for pairs in of.values()])
     at, errors = means.T
@@ -167,7 +170,7 @@ def _permittivity(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
         c = fit.of.model.rest.capacitance  # what model and print leave open
         open_ = log(c.model.upper / c.model.lower * c.print.upper / c.print.lower) / 2 / _SURE
         found.append((log(fit.of.permittivity) + at, sqrt(fit.capacitance[1] ** 2 + open_**2) / slope))
-    at, between = _together(found, fits)
+    at, between = _together(found, _prints(fits))
     error = max(between, max(e for _, e in found))  # bounds of a model do not average out
     note = f"Im Z of {len(fits)} recordings; the interval holds the bounds of the cell's model"
     return _value(film, PERMITTIVITY, (at, error), note, len(fits))
@@ -181,7 +184,7 @@ def _leak(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
         most = max(at + _SURE * error for at, error in found)
         return Untold("leak", f"in {len(found)} recordings no more than {most:.2g} S/m2, and none of it certain")
     typical = sum(at for at, _ in found) / len(found)
-    at, error = _together(found, fits, _BETWEEN * typical)
+    at, error = _together(found, _prints(fits), _BETWEEN * typical)
     if at <= _SURE * error:
         return Untold("leak", f"{len(found)} recordings differ too much: {at:.2g} S/m2, give or take {error:.2g}")
     return Fitted(film, FILM_LEAK, at, at - _SURE * error, at + _SURE * error,

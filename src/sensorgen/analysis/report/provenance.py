@@ -38,7 +38,6 @@ def origins(log: Log, found: Comparison, *, brief: bool = False) -> Table:
     """
     records, head = log.head()
     readings = Counter(r.reading.words.source for r in found.rows)
-    anchors = log.entries(Anchor)
     predictions = [
         Origin("prediction", f"{p.design} ({p.design_id})", p.provenance) for p in found.predictions.values()
     ]
@@ -46,6 +45,7 @@ def origins(log: Log, found: Comparison, *, brief: bool = False) -> Table:
         program, kept = Origin("program", "sensorgen", __version__), f"{records} records; head {head}"
         rows = [program, Origin("log", log.path.name, kept), *predictions]
         return Table.of("provenance", "Program, log and prediction", tuple(rows))
+    anchors = log.entries(Anchor)
     rows = [
         Origin("program", "sensorgen", __version__), Origin("program", "Python", platform.python_version()),
         *(Origin("library", name, version(name)) for name in LIBRARIES),

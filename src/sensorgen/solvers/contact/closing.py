@@ -9,6 +9,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from shapely import STRtree, box
 
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.units import M_PER_MM
@@ -52,46 +53,81 @@ class _Air:
         return np.unique(self.runs)
 
     @cached_property
-    def along(self) -> Real:
-        return np.asarray(self.places[self.runs[:, 1]] - self.places[self.runs[:, 0]])
-
-    @cached_property
     def length(self) -> Real:
-        return np.asarray(np.hypot(*self.along.T))
+        return np.asarray(np.hypot(*(self.places[self.runs[:, 1]] - self.places[self.runs[:, 0]]).T))
 
     @cached_property
-    def scale(self) -> Real:
-        """Length of the shorter of a run and those at a point (n, k): what makes a gap large or small."""
-        own = np.where(self.mirror, np.inf, self.length)
-        return np.minimum(self._least(np.repeat(own[:, None], len(own), axis=1)), own)
+    def way(self) -> Real:
+        """Unit vector along each run (k, 2)."""
+        along = self.places[self.runs[:, 1]] - self.places[self.runs[:, 0]]
+        return np.asarray(along / np.maximum(self.length, 1e-300)[:, None])
 
     @cached_property
-    def facing(self) -> Mask:
-        """Whether a face at a point looks against a run (n, k), which does not end there."""
-        way = self.along / np.maximum(self.length, 1e-300)[:, None]
-        ends = (self.points[:, None, None] == self.runs).any(axis=2)
-        return np.asarray((self._least(way @ way.T) < _AGAINST) & ~ends & np.isfinite(self.scale))
+    def own(self) -> Real:
+        """Length of each run, infinite of a mirror (k,)."""
+        return np.where(self.mirror, np.inf, self.length)
 
-    def _least(self, values: Real) -> Real:
-        """Of the runs that begin or end at each point, from values of every run (k, m)."""
-        found = np.full((len(self.points), values.shape[1]), np.inf)
-        for end in self.runs.T:
-            np.minimum.at(found, np.searchsorted(self.points, end), values)
-        return found
+    @cached_property
+    def at(self) -> Whole:
+        """Runs that begin or end at each point, the last one again where another has more (n, most)."""
+        point = np.searchsorted(self.points, self.runs.T.ravel())
+        order = np.argsort(point, kind="stable")
+        count = np.bincount(point)
+        each = np.minimum(np.arange(count.max()), count[:, None] - 1) + (np.cumsum(count) - count)[:, None]
+        return np.asarray((order % len(self.runs))[each])
 
-    def seen(self, instead: Whole) -> tuple[Real, Real]:
-        """Where on each run a point lies (0 to 1), and how far before it (n, k), points replaced by others."""
+    @cached_property
+    def reach(self) -> Real:
+        """Shortest run at each point (n,)."""
+        return np.asarray(self.own[self.at].min(axis=1))
+
+    def seen(self, instead: Whole) -> "_Seen":
+        """Where points lie beside runs, points replaced by others."""
         a, b = self.places[instead[self.runs]].transpose(1, 0, 2)
-        u, away = b - a, self.places[instead[self.points]][:, None] - a
+        here, room = self.places[instead[self.points]], _PAST * np.hypot(*(b - a).T)[:, None]
+        spans = np.column_stack([np.minimum(a, b) - room, np.maximum(a, b) + room])
+        around = np.flatnonzero(np.isfinite(self.reach))
+        reach = self.reach[around, None]
+        row, run = STRtree(box(*spans.T)).query(box(*(here[around] - reach).T, *(here[around] + reach).T))
+        row = around[row]
+        against = (self.way[self.at[row]] * self.way[run, None]).sum(axis=2).min(axis=1) < _AGAINST
+        ends = (self.points[row, None] == self.runs[run]).any(axis=1)
+        row, run = row[against & ~ends], run[against & ~ends]
+        order = np.lexsort((run, row))
+        row, run = row[order], run[order]
+        u, away = (b - a)[run], here[row] - a[run]
         square = np.maximum((u**2).sum(axis=1), 1e-300)
-        share = (away * u).sum(axis=2) / square
-        ahead = (away[..., 0] * u[:, 1] - away[..., 1] * u[:, 0]) / np.sqrt(square)
-        return share, ahead
+        share = (away * u).sum(axis=1) / square
+        ahead = (away[:, 0] * u[:, 1] - away[:, 1] * u[:, 0]) / np.sqrt(square)
+        scale = np.minimum(self.reach[row], self.own[run])
+        return _Seen(row, run, share, ahead, scale, np.minimum(self.behind[run], scale))
 
-    def near(self, ahead: Real, limit: Real | float) -> Mask:
+
+@dataclass(frozen=True)
+class _Seen:
+    """Points beside faces that look against those at the point, by point and run.
+
+    Attributes
+    ----------
+    row, run : (k,) array
+        Number of the point among those of the air's border, and of the run.
+    share : (k,) array
+        Where on the run (0 to 1).
+    ahead, scale, behind : (k,) array
+        How far before it; the shorter of the run and those at the point, which makes a gap large or small; and how deep
+        the point may lie behind [mm].
+    """
+
+    row: Whole
+    run: Whole
+    share: Real
+    ahead: Real
+    scale: Real
+    behind: Real
+
+    def near(self, limit: Real | float) -> Mask:
         """Which gaps are none: less than a share of the scale, and not so deep that it is another side."""
-        behind = np.minimum(self.behind, self.scale)
-        return np.asarray(self.facing & (ahead < limit * self.scale) & (ahead > -behind))
+        return np.asarray((self.ahead < limit * self.scale) & (self.ahead > -self.behind))
 
 
 def closed(edges: Sides, air: int, places: Real, faces: Faces) -> Sides:
@@ -140,13 +176,14 @@ def _fixed(edges: Sides, air: int, faces: Faces) -> Mask:
 def _joined(border: _Air, fixed: Mask) -> tuple[Whole, Mask]:
     """Which point stands for each, where two that touch are near each other, and which touch at all."""
     instead, touched = np.arange(len(border.places)), np.zeros(len(border.places), bool)
-    share, ahead = border.seen(instead)
-    touches = border.near(ahead, _CLOSED)
-    touched[border.points[(touches & (share >= 0) & (share <= 1)).any(axis=1)]] = True
-    row, run = np.nonzero(touches & (share > -_PAST) & (share < 1 + _PAST))
-    pairs = np.column_stack([border.points[row], border.runs[run, (share[row, run] > 0.5).astype(int)]])
+    seen = border.seen(instead)
+    touches, share = seen.near(_CLOSED), seen.share
+    touched[border.points[seen.row[touches & (share >= 0) & (share <= 1)]]] = True
+    beside = np.flatnonzero(touches & (share > -_PAST) & (share < 1 + _PAST))
+    ends = border.runs[seen.run[beside], (share[beside] > 0.5).astype(int)]
+    pairs = np.column_stack([border.points[seen.row[beside]], ends])
     apart = np.hypot(*(border.places[pairs[:, 1]] - border.places[pairs[:, 0]]).T)
-    one = np.flatnonzero(apart < _ONE * border.scale[row, run])
+    one = np.flatnonzero(apart < _ONE * seen.scale[beside])
     used: set[int] = set()
     for pair in pairs[one[np.argsort(apart[one], kind="stable")]].tolist():
         if used.isdisjoint(pair):
@@ -159,14 +196,16 @@ def _joined(border: _Air, fixed: Mask) -> tuple[Whole, Mask]:
 
 def _ways(border: _Air, instead: Whole, touched: Mask) -> list[list[int]]:
     """Of each run, over the points that touch it; those that touch a mirror are put onto it."""
-    share, ahead = border.seen(instead)
+    seen = border.seen(instead)
     limit = np.where(touched[border.runs].all(axis=1) & ~border.mirror, _BETWEEN, _CLOSED)
-    near = border.near(ahead, limit) & (share > 0) & (share < 1)
+    near = np.flatnonzero(seen.near(limit[seen.run]) & (seen.share > 0) & (seen.share < 1))
+    near = near[np.lexsort((seen.share[near], seen.run[near]))]
+    points = instead[border.points[seen.row[near]]]
+    last = np.cumsum(np.bincount(seen.run[near], minlength=len(border.runs)))
     found = []
-    for k, (a, b) in enumerate(instead[border.runs].tolist()):
-        inside = np.flatnonzero(near[:, k])
-        over = instead[border.points[inside[np.argsort(share[inside, k], kind="stable")]]].tolist()
-        if border.mirror[k]:
+    ends = instead[border.runs].tolist()
+    for (a, b), mirror, over in zip(ends, border.mirror, np.split(points, last[:-1]), strict=True):
+        if mirror:
             border.places[over, 0] = border.places[a, 0]
-        found.append([a, *(p for p in over if p not in (a, b)), b])
+        found.append([a, *(p for p in over.tolist() if p not in (a, b)), b])
     return found

@@ -13,6 +13,7 @@ from itertools import product
 
 import numpy as np
 from scipy.sparse import csr_matrix, vstack
+from shapely import STRtree, box
 
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.solvers.contact.bricks import BrickMesh
@@ -302,7 +303,7 @@ def hit(rays: Rays, faces: Real, depth_m: Real, *, inwards: bool = False) -> tup
     (rays, faces, (h, d - 1) array, (h,) array)
         Which rays hit, what, where on it, and how far away [m].
     """
-    point, face = np.nonzero(_candidates(rays, faces))
+    point, face = _candidates(rays, faces)
     relative = faces[face] - rays.here_m[point, None]
     level = np.matmul(rays.tangents[point], relative.transpose(0, 2, 1))  # of the nodes, along the tangents
     s = np.zeros(level.shape[:2])
@@ -315,26 +316,50 @@ def hit(rays: Rays, faces: Real, depth_m: Real, *, inwards: bool = False) -> tup
     normal = rays.normal[point]
     distance = (-1 if inwards else 1) * (place * normal).sum(axis=1)
     good = np.flatnonzero(inside & (distance > -depth_m[point]) & ((looks * normal).sum(axis=1) < -_OPPOSED))
-    good = good[np.argsort(np.abs(distance[good]), kind="stable")]
+    good = good[np.lexsort((face[good], np.abs(distance[good])))]
     found, first = np.unique(point[good], return_index=True)
     good = good[first]
     return found, face[good], s[good], distance[good]
 
 
-def _candidates(rays: Rays, faces: Real) -> Mask:
-    """Which faces look against each ray and have it between their corners (k, m)."""
+def _candidates(rays: Rays, faces: Real) -> tuple[Whole, Whole]:
+    """Pairs of a ray and a face that looks against it and has it between its corners."""
     ways = rays.tangents.shape[1]
-    _, looks = on_faces(np.zeros((len(faces), ways)), faces)
-    found = rays.normal @ looks.T < 0
     corners = faces.reshape(-1, *(3,) * ways, ways + 1)[(slice(None), *(slice(None, None, 2),) * ways)]
     corners = corners.reshape(len(faces), 2**ways, ways + 1)
+    ray, face = _boxed(rays, corners)
+    _, looks = on_faces(np.zeros((len(faces), ways)), faces)
+    against = np.einsum("kd,kd->k", rays.normal[ray], looks[face]) < 0
+    ray, face = ray[against], face[against]
     for k in range(ways):
-        way, start = rays.tangents[:, k], (rays.tangents[:, k] * rays.here_m).sum(axis=1)[:, None]
-        across = [way @ corners[:, c].T - start for c in range(corners.shape[1])]
-        low, high = np.minimum.reduce(across), np.maximum.reduce(across)
+        way = rays.tangents[:, k]
+        across = np.einsum("kcd,kd->ck", corners[face], way[ray]) - np.einsum("kd,kd->k", way, rays.here_m)[ray]
+        low, high = across.min(axis=0), across.max(axis=0)
         room = _BULGE * (high - low)
-        found &= (low <= room) & (high >= -room)
-    return np.asarray(found)
+        between = (low <= room) & (high >= -room)
+        ray, face = ray[between], face[between]
+    return ray, face
+
+
+def _boxed(rays: Rays, corners: Real) -> tuple[Whole, Whole]:
+    """Pairs of a ray and a face (m, c, d) whose boxes along the first two axes meet.
+
+    A ray's box is that of its line, to both sides, within the box of all faces.
+    """
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    room = _BULGE * (high - low).max(axis=1, keepdims=True)
+    low, high = low - room, high + room
+    way = np.where(rays.normal == 0, 1e-300, rays.normal)
+    with np.errstate(over="ignore"):
+        ends = (
+            np.array([low.min(axis=0, initial=0), high.max(axis=0, initial=0)])[:, None] - rays.here_m
+        ) / way  # (2, k, d)
+    begin, end = ends.min(axis=0).max(axis=1, keepdims=True), ends.max(axis=0).min(axis=1, keepdims=True)
+    crosses = np.flatnonzero(begin[:, 0] <= end[:, 0])
+    line = rays.here_m[crosses] + np.array([begin[crosses], end[crosses]]) * rays.normal[crosses]
+    spans = np.concatenate([line.min(axis=0)[:, :2], line.max(axis=0)[:, :2]], axis=1)
+    ray, face = STRtree(box(*low[:, :2].T, *high[:, :2].T)).query(box(*spans.T))
+    return crosses[ray], face
 
 
 def _divided(right: Real, matrix: Real) -> Real:
@@ -349,9 +374,11 @@ def _divided(right: Real, matrix: Real) -> Real:
 
 def winding_number(here: Real, starts: Real, ends: Real) -> Whole:
     """How often closed outlines of straight pieces (m, 2) run anticlockwise around points (k, 2)."""
-    x = here[:, :1]
-    (x0, y0), (x1, y1) = starts.T, ends.T
-    sign = np.where(x1 < x0, 1, -1) * ((np.minimum(x0, x1) <= x) & (x < np.maximum(x0, x1)))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        above = y0 + (x - x0) * (y1 - y0) / (x1 - x0) > here[:, 1:]
-    return np.asarray((sign * above).sum(axis=1))
+    order = np.argsort(here[:, 0], kind="stable")
+    low, high = np.sort([starts[:, 0], ends[:, 0]], axis=0)
+    first, last = (np.searchsorted(here[order, 0], edge) for edge in (low, high))
+    piece = np.repeat(np.arange(len(starts)), last - first)  # with each point that is level with it along x
+    point = order[np.arange(len(piece)) + np.repeat(last - np.cumsum(last - first), last - first)]
+    (x, y), (x0, y0), (x1, y1) = here[point].T, starts[piece].T, ends[piece].T
+    above = y0 + (x - x0) * (y1 - y0) / (x1 - x0) > y
+    return np.bincount(point, np.where(x1 < x0, 1, -1) * above, len(here)).astype(int)

@@ -48,20 +48,35 @@ def _filled(ways: list[tuple[float, bool]]) -> float:
 
 def ringed(points: Real, triangles: Whole, region: Whole, tips: list[int], count: int) -> tuple[Real, Whole, Whole]:
     """Points (n, 2), corners of triangles (m, 3) and their regions, with so many rings around some of the points."""
+    is_tip = np.zeros(len(points) + 1, bool)
+    is_tip[tips] = True
+    at: dict[int, dict[int, list[int]]] = {tip: {} for tip in tips}  # triangles there: corners and region, by number
+    made, gone, total = [], set[int](), 0
+
+    def add(new: Whole, regions: Whole) -> None:
+        beside = is_tip[np.minimum(new, len(is_tip) - 1)]
+        for k in np.flatnonzero(beside.any(axis=1)).tolist():
+            for corner in new[k, beside[k]].tolist():
+                at[corner][total + k] = [*new[k].tolist(), int(regions[k])]
+        made.append(np.column_stack([new, regions]))
+
+    add(triangles, region)
     for tip in tips:
         # Cut all sides that start at a point at the same shares, and so each triangle there into a small one and pairs
-        here = (triangles == tip).any(axis=1)
-        first = (triangles[here] == tip).argmax(axis=1)
-        _, *ends = np.take_along_axis(triangles[here], (first[:, None] + np.arange(3)) % 3, axis=1).T
+        total = sum(map(len, made))
+        whole = {k: own for k, own in at[tip].items() if k not in gone}
+        gone.update(whole)
+        rows = np.array(list(whole.values()))
+        here, fill = rows[:, :3], rows[:, 3]
+        first = (here == tip).argmax(axis=1)
+        _, *ends = np.take_along_axis(here, (first[:, None] + np.arange(3)) % 3, axis=1).T
         beside = np.unique(ends)
         levels = np.arange(count)[:, None] * len(beside)
         a, b = (np.vstack([k, len(points) + levels + np.searchsorted(beside, k)]) for k in ends)
         sides = [(a[1:], a[:-1], b[:-1]), (a[1:], b[:-1], b[1:]), (np.full_like(a[-1], tip), a[-1], b[-1])]
         new = np.concatenate([np.stack(side, axis=-1).reshape(-1, 3) for side in sides])
         near = points[tip] + _RATIO ** np.arange(1, count + 1)[:, None, None] * (points[beside] - points[tip])
-        points, triangles, region = (
-            np.concatenate([points, near.reshape(-1, 2)]),
-            np.concatenate([triangles[~here], new]),
-            np.concatenate([region[~here], np.tile(region[here], 2 * count + 1)]),
-        )
-    return points, triangles, region
+        points = np.concatenate([points, near.reshape(-1, 2)])
+        add(new, np.tile(fill, 2 * count + 1))
+    kept = np.concatenate(made)[~np.isin(np.arange(sum(map(len, made))), list(gone))]
+    return points, kept[:, :3], kept[:, 3]
