@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import virtual_specimen
 from sensorgen.cli import COMMANDS, cli
 
 ROOT = Path(__file__).parents[1]
@@ -73,6 +74,13 @@ def test_every_command_of_the_pages_works(words, tmp_path, program, kept, monkey
     if words[:2] == ["log", "import"] and "S1" in words:
         of = ["log", "specimen", "S1", "--design", "flat-tri.yaml"]
         subprocess.run([sys.executable, "-m", "sensorgen", *of], cwd=tmp_path, check=True, capture_output=True)
+    if "S1" in words and words[0] in ("calibrate", "invert"):
+        lcr, rig = virtual_specimen.recorded(virtual_specimen.drawn(1), tmp_path, 12)
+        sofar = [["log", "specimen", "S1", "--design", "flat-tri.yaml"], ["log", "bench", "S1", lcr, rig]]
+        for of in [*sofar, *([["calibrate", "S1"]] if words[0] == "invert" else [])]:
+            subprocess.run([sys.executable, "-m", "sensorgen", *of], cwd=tmp_path, check=True, capture_output=True)
+        at_rest = virtual_specimen.Truth().impedance([0.0, 2.0], [0.05, 0.05])
+        virtual_specimen.write_csv(tmp_path / "measured.csv", range(2), at_rest, virtual_specimen.TONES_HZ, rest=[1, 0])
     extra = ["--no-cad"] if words[0] == "build" else []
     done = subprocess.run(
         [sys.executable, "-m", "sensorgen", *words, *extra], cwd=tmp_path, capture_output=True, text=True

@@ -100,6 +100,17 @@ def test_before_and_after_the_bake_stay_apart(tmp_path, design):
     assert {name: (row.specimens, row.short) for name, row in of.items()} == {"baked": (2, 0), "not baked": (2, 2)}
 
 
+def test_dc_resistances_have_the_meters_uncertainty_and_its_ranges(tmp_path, design):
+    with Log(tmp_path / "log.db", create=True) as log:
+        binding.bind(log, ["S1"], str(design))
+        log.add([replace(notes.reading("S1", "600 / 602", "500M", instrument="HP 34401A", log=log), wires=4)])
+        made = report(log, None)
+    (row,) = next(t for t in made.tables if t.key == "readings").rows
+    limit = 600 * 1e-4 + 1000 * 1e-5  # 0.010 % of the reading, 0.001 % of the 1 kohm range
+    assert row.error_ohm == pytest.approx(math.hypot(2 / math.sqrt(2) / math.sqrt(2), limit / math.sqrt(3)))
+    assert "Flagged: a resistance beyond the meter's ranges: S1 (HP 34401A)." in made.findings
+
+
 def test_predictions_between_the_stored_frequencies_are_those_of_the_model(design):
     body = bodies.default_body(load(design))
     of, frequencies = predicted(body), (500.0, 1700.0, 15e3, 70e3)

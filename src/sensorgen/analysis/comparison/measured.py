@@ -19,6 +19,8 @@ class Words:
     baked: bool | None
     batch: str
     defects: str
+    instrument: str
+    wires: int | None
     remark: str
     doubts: tuple[str, ...]
     source: str
@@ -81,8 +83,8 @@ def readings(logged: Iterable[Reading]) -> Readings:
     designs, alternating = set(), []
     for one in logged:
         words = Words(
-            one.specimen, one.shape, one.film_mm, one.axes, one.baked, one.batch, ", ".join(one.defects), one.remark,
-            one.doubts, one.source,
+            one.specimen, one.shape, one.film_mm, one.axes, one.baked, one.batch, ", ".join(one.defects),
+            one.instrument, one.wires, one.remark, one.doubts, one.source,
         )  # fmt: skip
         if one.quantity:
             alternating.append(one)

@@ -141,6 +141,7 @@ def report(
     by_frequency = (
         *alternating.findings(ac),
         *alternating.behind_leak(found),
+        *electrodes.beyond_meter(found),
         *recordings.findings(recorded, impedances),
     )
     findings = (*shorts, *by_frequency, *explained.sentences(explanations), *electrodes.findings(found))
@@ -159,8 +160,8 @@ def _basis(found: Comparison, recorded: Sequence[Run]) -> Iterator[str]:
     specimens = {row.reading.specimen for row in found.rows} | {run.entry.specimen for run in recorded}
     if len(found.rows) + len(recorded) > 1:
         yield (
-            f"Basis: {len(found.rows)} readings and {len(recorded)} recordings of {len(specimens)} specimens of "
-            f"{len(found.predictions)} designs."
+            f"Basis: {len(found.rows)} readings and {len(recorded)} recordings; specimens: {len(specimens)}; designs: "
+            f"{len(found.predictions)}."
         )
 
 

@@ -3,8 +3,8 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import exp, isfinite, nan
-from statistics import median
+from math import exp, hypot, isfinite, nan, sqrt
+from statistics import median, stdev
 from typing import Annotated
 
 import numpy as np
@@ -13,6 +13,7 @@ from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.plots.figure import GREEN, GREY, ORANGE, PINK, SKY, YELLOW, Axis, Curve, Figure, Panel
 from sensorgen.core.document import Column, Table
 from sensorgen.core.lazy import Lazy
+from sensorgen.measure import accuracy
 from sensorgen.measure.signal.verdicts import WORDS
 
 VERDICT_COLOURS = dict(zip(WORDS, (PINK, ORANGE, YELLOW, SKY, GREEN, GREY), strict=True))
@@ -38,6 +39,9 @@ class ReadingRow:
     ]
     highest_ohm: Annotated[
         float, Column("highest reading", "ohm", "the highest of several readings along an electrode")
+    ]
+    error_ohm: Annotated[
+        float, Column("± electrode resistance", "ohm", "standard uncertainty: scatter, and the meter's limit of error")
     ]
     lower_ohm: Annotated[float, Column("predicted from", "ohm", "lower bound")]
     predicted_ohm: Annotated[float, Column("predicted", "ohm", "most likely value")]
@@ -74,7 +78,7 @@ def readings(found: Comparison) -> Table:
         bounds = (expected.lower, expected.value, expected.upper) if expected else (nan, nan, nan)
         return ReadingRow(
             r.number, r.specimen, row.predicted.design if row.predicted else "", v.ry_ohm,
-            max(row.evidence.ry_ohm, default=nan), *bounds, exp(row.residual),
+            max(row.evidence.ry_ohm, default=nan), _error(row), *bounds, exp(row.residual),
             {None: "", True: "yes", False: "no"}[row.inside], v.rz_ohm, max(row.evidence.rz_ohm, default=nan), v.ratio,
             v.leak_s, v.word,
         )  # fmt: skip
@@ -82,6 +86,28 @@ def readings(found: Comparison) -> Table:
     off = np.array([-abs(row.residual) if isfinite(row.residual) else 1.0 for row in found.direct])
     rows = Lazy(row_of, range(len(off))).at(np.argsort(off, kind="stable").tolist())
     return Table.of("readings", "Every reading and its prediction; the largest deviation first", rows)
+
+
+def _error(row: Compared) -> float:
+    """Standard uncertainty of the readings along an electrode [ohm]; nan where nothing is known of it."""
+    words, finite = row.reading.words, [value for value in row.evidence.ry_ohm if isfinite(value)]
+    meter = accuracy.find(words.instrument) if words.instrument and finite else None
+    limit = meter.dc_ohm(min(finite), words.wires) if meter else None
+    scatter = stdev(finite) / sqrt(len(finite)) if len(finite) > 1 else 0.0
+    return hypot(scatter, limit) if limit is not None else scatter or nan
+
+
+def beyond_meter(found: Comparison) -> Iterator[str]:
+    """DC resistances that are beyond the ranges of the meter that they were read from, in one sentence."""
+    beyond = []
+    for row in found.direct:
+        words = row.reading.words
+        meter = accuracy.find(words.instrument) if words.instrument else None
+        values = (value for value in (*row.reading.y_ohm, *row.reading.z_ohm) if isfinite(value))
+        if meter and meter.ranges and any(meter.dc_ohm(value, words.wires) is None for value in values):
+            beyond.append(f"{row.reading.specimen} ({meter.name})")
+    if beyond:
+        yield f"Flagged: a resistance beyond the meter's ranges: {', '.join(dict.fromkeys(beyond))}."
 
 
 def reasons(found: Comparison) -> Table:
