@@ -83,13 +83,9 @@ def of_records(folder):
             log.add([row])
             times.append(time.perf_counter() - start)
     yield "`Log.add` of one reading, to the disk, by the clock", f"{1e3 * sorted(times)[25]:.1f} ms", "15 ms"
-    yield (
-        f"`log sync` of {READINGS} records to a folder",
-        f"{spent('log', 'sync', share, '--log', path)[0]:.1f} s",
-        "5 s",
-    )
-    pulled = spent("log", "sync", share, "--log", folder / "other.db")[0]
-    yield f"`log sync` of {READINGS} records to an empty log", f"{pulled:.1f} s", "5 s"
+    for what, log in (("to a folder", path), ("to an empty log", folder / "other.db"), ("that are there", path)):
+        seconds, _, peak = spent("log", "sync", share, "--log", log)
+        yield f"`log sync` of {READINGS} records {what}", f"{seconds:.1f} s, {peak:.2f} GB", "5 s, 0.5 GB"
     seconds, _, peak = spent("log", "verify", "--log", path)
     yield f"`log verify` of {READINGS} records", f"{seconds:.1f} s, {peak:.2f} GB", "3 s"
     with Log(path) as log:
@@ -97,6 +93,20 @@ def of_records(folder):
             log.add(dataclasses.replace(row, uid=f"{k} {row.uid}") for row in log.readings(last=READINGS))
     seconds, _, peak = spent("log", "verify", "--log", path)
     yield f"`log verify` of {10 * READINGS} records", f"{seconds:.1f} s, {peak:.2f} GB", "30 s"
+
+
+def of_an_iteration(folder):
+    """Comparison of readings of one iteration: 1000 specimens of eight designs."""
+    of = [f"{kind} .{film}mm {copy}" for kind in ("triX", "triY", "sqXY", "sqYX") for film in (1, 2)
+          for copy in range(2, 127)]  # fmt: skip
+    rows = [reading(f"23 {name}", f"0.{60 + k % 30}k", f"{40 + k % 7} / 2.{k % 9 + 1}k") for k, name in enumerate(of)]
+    for command, count, target in (("report", READINGS, "14 s, 1 GB"), ("fit", 10 * READINGS, "1 GB")):
+        path = folder / f"{command}.db"
+        with Log(path, create=True) as log:
+            log.add(dataclasses.replace(row, uid=f"{k}-{row.uid}") for k in range(count // len(rows)) for row in rows)
+        how = ("-o", folder / "report.html") if command == "report" else ("--dry-run",)
+        seconds, _, peak = spent(command, "--iteration", 23, "--log", path, *how)
+        yield f"`{command}` of {count} readings of an iteration", f"{seconds:.1f} s, {peak:.2f} GB", target
 
 
 def of_a_recording(folder):
@@ -153,6 +163,7 @@ def main():
         for work in (
             of_readings(folder),
             of_records(folder),
+            of_an_iteration(folder),
             of_a_recording(folder),
             of_chance(folder, "`kill -9` at random moments", "kills.py", KILLS, "200 kills, 0 faults"),
             of_chance(folder, "Files tampered with", "fuzz.py", FILES, "10 000 files, 0 faults"),

@@ -30,6 +30,13 @@ def test_the_wheel_works_without_the_repository(tmp_path):
     assert (tmp_path / "out" / "trix-d0.2-length6" / "manifest.json").exists()
 
 
+def test_the_smoke_runs_every_command():
+    from sensorgen.cli import COMMANDS
+
+    text = (ROOT / "scripts" / "smoke").read_text()
+    assert [name for name in COMMANDS if not re.search(rf"(ok|at_most 2) {name}\b", text)] == []
+
+
 def test_the_hashed_files_are_of_the_versions_that_the_tests_ran_with():
     tested, hashed = (
         {name.lower().replace("_", "-"): number for name, number in re.findall(r"^([\w.-]+)==(\S+)", text, re.M)}

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from sensorgen.cli import show
+from sensorgen.cli import escaped, render, show
 from sensorgen.cli.words import Ratio
 from sensorgen.core.errors import UnknownName
 
@@ -51,6 +51,6 @@ def command(scene: tuple[str, ...], budget: float, output: str, as_json: bool) -
     ):
         store.replace(Path(output) / name, content)
         if not as_json:
-            click.echo(str(Path(output) / name))
+            render.say(Path(output) / name)
     if as_json:
-        click.echo(json.dumps(rows, indent=2, ensure_ascii=False))
+        render.say(escaped(json.dumps(rows, indent=2, ensure_ascii=False)))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, show
+from sensorgen.cli import FOUND_ERRORS, render, show
 from sensorgen.cli.words import OneOf
 from sensorgen.core.errors import NotInstalled
 
@@ -44,10 +44,10 @@ def command(output: str, formats: tuple[str, ...]) -> int:
     for name in dict.fromkeys(formats):
         file = Path(output) / f"thesis.{name}"
         store.replace(file, made[name](rows).encode())
-        click.echo(str(file))
+        render.say(file)
     counts = Counter(row.verdict.word for row in rows)
-    click.echo(", ".join(f"{counts[word]} {word}" for word in WORDS if counts[word]))
+    render.say(", ".join(f"{counts[word]} {word}" for word in WORDS if counts[word]))
     for row in rows:
         if row.verdict.word == UNEXPLAINED:
-            click.echo(f"sensorgen: {row.name()}: {row.verdict.text()}", err=True)
+            render.say(f"sensorgen: {row.name()}: {row.verdict.text()}", err=True)
     return FOUND_ERRORS if counts[UNEXPLAINED] else 0

@@ -21,9 +21,9 @@ _MAGIC = b"SQLite format 3\0"
 _ID = slice(68, 72)  # of the header: PRAGMA application_id
 _FORMAT = slice(18, 20)  # of the header: versions to write and to read
 _WAL = bytes((2, 2))
-_PRAGMAS = (
+_PRAGMAS = (  # 64 MB of pages: identities come in no order
     "trusted_schema = OFF", "cell_size_check = ON", "foreign_keys = ON", "recursive_triggers = ON",
-    "journal_mode = WAL", "synchronous = FULL",
+    "journal_mode = WAL", "synchronous = FULL", "cache_size = -64000",
 )  # fmt: skip
 _BUSY = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
 _UNWRITABLE = (
