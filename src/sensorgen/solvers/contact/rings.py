@@ -66,8 +66,8 @@ def ringed(points: Real, triangles: Whole, region: Whole, tips: list[int], count
         total = sum(map(len, made))
         whole = {k: own for k, own in at[tip].items() if k not in gone}
         gone.update(whole)
-        rows = np.array(list(whole.values()))
-        here, fill = rows[:, :3], rows[:, 3]
+        found = np.array(list(whole.values()))
+        here, fill = found[:, :3], found[:, 3]
         first = (here == tip).argmax(axis=1)
         _, *ends = np.take_along_axis(here, (first[:, None] + np.arange(3)) % 3, axis=1).T
         beside = np.unique(ends)
