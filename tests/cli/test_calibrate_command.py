@@ -106,6 +106,13 @@ def test_the_log_with_a_calibration_is_sound(after):
     assert after("log", "verify").code == 0
 
 
+def test_the_report_has_it(after):
+    said = after("report", "S1", "--format", "md", "-o", "-")
+    assert said.code == 0, said.err
+    assert "S1 is calibrated by 24 known presses" in said.words
+    assert "## Calibrated specimens" in said.out
+
+
 def test_a_recheck_with_another_tip_alarms_and_mends(after, tmp_path):
     other = replace(TRUTH, tip_m=9e-3)
     recorded(other, tmp_path, 5, 9, name="again")

@@ -9,13 +9,23 @@ from sensorgen.analysis.comparison import Comparison, of_iteration
 from sensorgen.analysis.comparison.runs import Run, runs
 from sensorgen.analysis.comparison.specimens import known_iterations
 from sensorgen.analysis.plots.figure import Figure
-from sensorgen.analysis.report import alternating, direction, electrodes, explained, recordings, variants, yields
+from sensorgen.analysis.report import (
+    alternating,
+    calibrations,
+    direction,
+    electrodes,
+    explained,
+    recordings,
+    variants,
+    yields,
+)
 from sensorgen.analysis.report.provenance import origins
 from sensorgen.analysis.report.variants import Variant
 from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.notes import specimen as named
+from sensorgen.prediction.calibration.calibration import Calibration
 
 STEPS = ("readings", "recordings", "residuals", "variants", "page")
 
@@ -144,9 +154,14 @@ def report(
         *electrodes.beyond_meter(found),
         *recordings.findings(recorded, impedances),
     )
-    findings = (*shorts, *by_frequency, *explained.sentences(explanations), *electrodes.findings(found))
+    names = {row.reading.specimen for row in found.rows} | {run.entry.specimen for run in recorded}
+    calibrated = calibrations.latest(log, names, left_out)
+    findings = (
+        *calibrations.findings(calibrated), *shorts, *by_frequency, *explained.sentences(explanations),
+        *electrodes.findings(found),
+    )  # fmt: skip
     step("variants")
-    sections = list(_sections(log, found, recorded, explanations, impedances, ac, left_out))
+    sections = list(_sections(log, found, recorded, explanations, impedances, ac, calibrated, left_out))
     step("page")
     return Report(
         iteration, specimens, datetime.now(UTC).isoformat(timespec="seconds"),
@@ -167,7 +182,8 @@ def _basis(found: Comparison, recorded: Sequence[Run]) -> Iterator[str]:
 
 def _sections(
     log: Log, found: Comparison, recorded: Sequence[Run], explanations: Sequence[explained.Explanation],
-    impedances: Table | None, ac: Sequence[alternating.AcRow], left_out: Sequence[tuple[str, str]],
+    impedances: Table | None, ac: Sequence[alternating.AcRow], calibrated: Sequence[Calibration],
+    left_out: Sequence[tuple[str, str]],
 ) -> Iterator[Section]:  # fmt: skip
     alone = len(found.rows) <= 1 and not recorded  # a short page
     figures = (*electrodes.figures(found), *(recordings.residuals(impedances) if impedances else ()))
@@ -186,6 +202,9 @@ def _sections(
     if explanations:
         tables, title = (explained.table(explanations),), "Which parameter explains the residuals"
         yield Section("explained-by", title, (), tables, (explained.NOTE,))
+    if calibrated:
+        tables, title = (calibrations.table(calibrated),), "Calibrated specimens"
+        yield Section("calibrated", title, (), tables, (calibrations.NOTE,))
     if recorded:
         tables = (recordings.facts(recorded),)
         yield Section("recorded", "Recordings", tuple(recordings.figures(recorded)), tables)
