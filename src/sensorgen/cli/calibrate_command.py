@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
-from sensorgen.cli import body_options, log_words, render, show
+from sensorgen.cli import FOUND_ERRORS, body_options, log_words, render, show
 from sensorgen.cli.words import Length
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
@@ -29,6 +30,9 @@ def _work(
     bench = calibration.Bench(tip_mm * units.M_PER_MM, _offset(force_offset))
     if again and len(specimens) > 1:
         raise BadInput(f"--recheck of {len(specimens)} specimens; expected one")
+    given = click.get_current_context().get_parameter_source
+    if again and any(given(name) is ParameterSource.COMMANDLINE for name in ("tip_mm", "force_offset")):
+        raise BadInput("--recheck goes on with tip and offset of the calibration; expected no --tip, no --force-offset")
     with log_words.opened(file) as log, show.progress(["calibrating"]) as step:
         made: list[Made | Recheck]
         if again:
@@ -39,15 +43,14 @@ def _work(
             ]
         if not dry_run:
             log.add(calibration.rows(log, [one.calibration for one in made]))
-    for one in made:
-        render.deliver(one)
+    render.deliver(calibration.Together(tuple(made)))
     if page:
         from sensorgen.analysis.calibration.page import html
         from sensorgen.core import files as store
 
         store.replace(Path(page), html(made).encode())
         render.say(page)
-    return 0
+    return FOUND_ERRORS if any(isinstance(one, calibration.Recheck) and one.alarm for one in made) else 0
 
 
 def _offset(text: str) -> tuple[float, float]:

@@ -13,8 +13,10 @@ from sensorgen.cli import body_options, log_words, render, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Length, OneOf, Share, Values, one
 from sensorgen.core import files as store
+from sensorgen.core import plugins as registry
 from sensorgen.core import units
-from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.core.errors import BadInput, MissingValue, UnknownName, within
+from sensorgen.design import shapes
 
 if TYPE_CHECKING:
     from sensorgen.core.document import Documented
@@ -89,6 +91,8 @@ def _work(
 
         model, found = model_of(body, tones_hz, Bench(tip_mm * units.M_PER_MM))
         limit, (mean, count) = limit_n or FORCE_LIMIT_N, rest.mean()
+        if not np.isfinite(mean).all():
+            raise BadInput(f"{measured}: a frequency without a reading at rest; expected one at each")
         known = fitting.by_rest(model, np.log(mean), noise / count**0.5, noise)
         return Inverter(model, known, _prior(how["prior"]), limit), limit, 0, found.doubts
 
@@ -102,8 +106,16 @@ def _specimen(
     """Force and position of a specimen that 'sensorgen calibrate' has calibrated."""
     from sensorgen.analysis.calibration import design_of, stored
 
-    with log_words.opened(file) as log:
-        of, design = design_of(log, name)
+    with log_words.existing(file) as log:
+        names = [s.specimen for s in log.specimens()] if log else []
+        try:
+            of, design = design_of(log, name) if log else ("", None)
+        except MissingValue:
+            if name in names:
+                raise
+            design = None
+        if log is None or design is None:
+            raise UnknownName("shape or specimen", name, [*registry.names(shapes), *names])
         known = stored(log, of)
     if known is None:
         raise BadInput(
@@ -131,15 +143,18 @@ def _by_ratio(
     from sensorgen.prediction.calibration.rest import Rest, checked
 
     limit_n = one("--force-limit", force_limit_n) if force_limit_n else None
+    if noise is not None and not 0 < noise <= 1:
+        raise BadInput(f"a noise of {noise:g}; expected a share above 0, up to 100 %")
     with readings(measured, beside=(_REST, _TIME)) as source, ExitStack() as stack:
-        order = checked(source.frequency_hz, source.frequency_hz if tones_hz is None else tones_hz)
+        with within(measured):
+            order = checked(source.frequency_hz, source.frequency_hz if tones_hz is None else tones_hz)
         if rest_file is None and _REST not in source.numbers:
             raise BadInput(
                 f"{measured}: no reading at rest; expected a column 'rest' with 1 where nothing was on the sensor, or "
                 "--rest FILE.csv: what counts is the ratio to it (or --perfect, as if the sensor were as predicted)"
             )
         rest = _taken_apart(rest_file, source.frequency_hz) if rest_file else Rest()
-        summary, made = answers.Summary(), None
+        summary, made, told = answers.Summary(), None, False
         write, live, terminal = _writer(stack, measured, output)
         step = stack.enter_context(show.progress(["reading"]))
         kept = [_TIME] * (_TIME in source.numbers) + source.kept
@@ -147,16 +162,17 @@ def _by_ratio(
         for block in source.blocks(1) if live else source.blocks():
             at_rest, time_s = _beside(source, block)
             ratio, age_s = rest.ratios(block.impedance_ohm, at_rest, time_s)
-            if made is None and not at_rest.all():
-                sigma = rest.noise() if noise is None else noise * np.sqrt(1.1)
-                sigma = np.broadcast_to(sigma, order.shape)[order]
-                made = inverter(rest, source.frequency_hz, sigma, limit_n)
+            if rest and not at_rest.all() and (made is None or (rest.tells_noise and not told and noise is None)):
+                told, single = rest.tells_noise, np.sqrt(1 + 1 / rest.mean()[1]) * (noise or rest.noise())
+                made = inverter(rest, source.frequency_hz, np.broadcast_to(single, order.shape)[order], limit_n)
             found = made[0].batch(ratio[:, order], age_s) if made else answers.nothing(len(ratio))
             summary.add(found, at_rest)
             step(f"{summary.samples} samples")
-            own = [[f"{t:.9g}"] if _TIME in source.numbers else [] for t in time_s.tolist()]
+            own = [[repr(t) if np.isfinite(t) else ""] if _TIME in source.numbers else [] for t in time_s.tolist()]
             write(answers.rows([[*a, *b] for a, b in zip(own, block.kept, strict=True)], found, at_rest))
-    sigma = float(np.median(rest.noise())) if noise is None else noise
+        if made is None and summary.samples:
+            raise BadInput(f"{measured}: nothing at rest before readings under load; expected 1 in column 'rest' first")
+    sigma = noise or float(np.nanmedian(rest.noise()))
     result = summary.result(of, made[2] if made else 0, made[1] if made else 0.0, sigma, made[3] if made else ())
     _said(result, terminal, output)
     return 0
@@ -166,7 +182,7 @@ def _beside(source: "Readings", block: "Block") -> tuple[Any, Any]:
     """Which rows are at rest, and the time of each [s]."""
     columns = dict(zip(source.numbers, block.numbers.T, strict=True))
     nothing = np.full(len(block.rows), np.nan)
-    return columns.get(_REST, nothing) == 1, columns.get(_TIME, nothing)
+    return np.nan_to_num(columns.get(_REST, nothing)) != 0, columns.get(_TIME, nothing)
 
 
 def _taken_apart(path: str, tones_hz: Any) -> "Rest":
@@ -174,7 +190,8 @@ def _taken_apart(path: str, tones_hz: Any) -> "Rest":
     from sensorgen.prediction.calibration.rest import Rest, checked
 
     with readings(path, beside=(_TIME,)) as source:
-        order = checked(source.frequency_hz, tones_hz)
+        with within(path):
+            order = checked(source.frequency_hz, tones_hz)
         blocks = list(source.blocks())
         if not blocks:
             raise BadInput(f"{path}: no readings; expected some with nothing on the sensor")

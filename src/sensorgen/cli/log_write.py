@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 DEFECTS = ("misprint", "zits", "hole", "clog", "under-extrusion", "adhesion", "torn")
-KINDS = ("reading", "recording", "prediction", "print", "batch", "design", "raw-file")
+KINDS = ("reading", "recording", "prediction", "calibration", "print", "batch", "design", "raw-file")
 
 
 def _add(

@@ -19,7 +19,7 @@ from sensorgen.core.errors import Unwritable
 from sensorgen.core.version import __version__
 
 PLACE = "SENSORGEN_CACHE"  # environment variable with another folder
-_SOURCES = ("models", "solvers", "scene", "core/bounds.py", "core/units.py")  # what decides an answer
+_SOURCES = ("models", "solvers", "scene", "prediction", "core/bounds.py", "core/units.py")  # what decides an answer
 
 JSON = Any  # None, bool, int, float, str, and lists and string-keyed dicts of these
 

@@ -10,7 +10,7 @@ import numpy as np
 from sensorgen.analysis.calibration.pairs import known_presses
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Part
-from sensorgen.core.errors import BadInput, MissingValue
+from sensorgen.core.errors import BadInput, MissingValue, within
 from sensorgen.core.version import __version__
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
@@ -22,6 +22,7 @@ from sensorgen.prediction.calibration.calibration import Calibration, from_json
 from sensorgen.prediction.calibration.coverage import coverage_of, held_out
 from sensorgen.prediction.calibration.fitting import Data, Posterior, calibrated, gain, shared, widened
 from sensorgen.prediction.calibration.inversion import Found
+from sensorgen.prediction.calibration.rest import checked
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, Spread
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import Query, Tip
@@ -60,6 +61,23 @@ class Made:
         return self.calibration.shown_json()
 
 
+@dataclass(frozen=True, eq=False)
+class Together:
+    """Several results as one."""
+
+    results: tuple["Made | Recheck", ...]
+
+    def document(self) -> Iterator[Part]:
+        """One after the other."""
+        for one in self.results:
+            yield from one.document()
+
+    def to_json(self) -> str:
+        """One object, or a list of several."""
+        texts = [one.to_json().rstrip() for one in self.results]
+        return (texts[0] if len(texts) == 1 else "[" + ",\n".join(texts) + "]") + "\n"
+
+
 @dataclass(frozen=True)
 class Bench:
     """Tip and force of the bench.
@@ -74,6 +92,14 @@ class Bench:
 
     tip_m: float = 5e-3
     force_offset_n: tuple[float, float] = (0.0, 0.1)
+
+    def __post_init__(self) -> None:
+        """Refuse what is no tip and no deviation."""
+        if not self.tip_m > 0 or not self.force_offset_n[1] > 0:
+            raise BadInput(
+                f"a tip of {self.tip_m * 1e3:g} mm and an offset of {self.force_offset_n[0]:g} +- "
+                f"{self.force_offset_n[1]:g} N; expected a length and a deviation above 0"
+            )
 
 
 def design_of(log: Log, specimen: str) -> tuple[str, Design]:
@@ -119,9 +145,24 @@ def model_of(body: Body, frequency_hz: Real, bench: Bench) -> tuple[SpecimenMode
 
 
 def stored(log: Log, specimen: str) -> Calibration | None:
-    """The latest calibration of a specimen that the log has."""
+    """The latest calibration of a specimen that the log has, or None.
+
+    Raises
+    ------
+    BadInput
+        One of another design than the specimen has now, or one of recordings that were withdrawn.
+    """
     row = next(iter(log.entries(Row, last=1, specimen=specimen)), None)
-    return from_json(row.data) if row else None
+    if row is None:
+        return None
+    found = from_json(row.data)
+    again = f"calibrate it again: sensorgen calibrate {specimen!r}"
+    if design_of(log, specimen)[1].id() != found.design_id:
+        raise BadInput(f"{specimen} was calibrated as {found.design} ({found.design_id}), but is no longer; {again}")
+    current = {run.uid for run in log.recordings(specimen=specimen)}
+    if lost := set(found.recordings) - current:
+        raise BadInput(f"{specimen}: {len(lost)} recordings of its calibration were withdrawn or corrected; {again}")
+    return found
 
 
 def calibrate(
@@ -148,9 +189,8 @@ def calibrate(
     Raises
     ------
     BadInput, MissingValue
-        As :func:`design_of`; nothing recorded of a specimen; recordings at different frequencies.
-    OutOfRange
-        Known presses beyond the sensor.
+        As :func:`design_of`; nothing recorded of a specimen; recordings at different frequencies; known presses beyond
+        the sensor.
     """
     bench = bench or Bench()
     fitted: list[tuple[str, Design, SpecimenModel, Data, list[BenchRun], list[str]]] = []
@@ -159,7 +199,7 @@ def calibrate(
     for specimen in specimens:
         step(specimen)
         name, design = design_of(log, specimen)
-        rows = [row for row in log.recordings(specimen=name) if not recordings or row.number in recordings]
+        rows = _chosen(log, name, recordings)
         data, tones, left_out = known_presses(log, name, rows)
         model, found = model_of(body_of(design), tones, bench)
         _check_presses(name, model, data)
@@ -179,6 +219,15 @@ def calibrate(
         )  # fmt: skip
         made.append(Made(calibration, data, held[1] if held else None))
     return made
+
+
+def _chosen(log: Log, name: str, numbers: Sequence[int]) -> list[BenchRun]:
+    """Recordings of a specimen: those of these numbers, or all."""
+    runs = log.recordings(specimen=name)
+    if missing := sorted(set(numbers) - {run.number for run in runs}):
+        has = ", ".join(str(run.number) for run in runs) or "none"
+        raise BadInput(f"no recording {missing[0]} of {name}; expected one of its own: {has}")
+    return [run for run in runs if not numbers or run.number in numbers]
 
 
 def _check_presses(name: str, model: SpecimenModel, data: Data) -> None:
@@ -251,14 +300,14 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
     old = stored(log, name)
     if old is None:
         raise BadInput(f"{name} was never calibrated: sensorgen calibrate {name!r} first")
-    rows = [
-        row for row in log.recordings(specimen=name)
-        if (row.number in recordings if recordings else row.uid not in old.recordings)
-    ]  # fmt: skip
+    rows = [row for row in _chosen(log, name, recordings) if row.uid not in old.recordings]
     data, tones, left_out = known_presses(log, name, rows)
-    data = replace(data, rest_noise=np.ones(len(tones)))  # its gain is that of the first calibration, known already
-    if not np.array_equal(tones, old.model.frequency_hz):
-        raise BadInput(f"{name}: recorded at {_tones(tones)}, calibrated at {_tones(old.model.frequency_hz)}")
+    with within(name):
+        order = checked(tones, old.model.frequency_hz)
+    data = replace(
+        data, ratio=data.ratio[:, order], noise=data.noise[:, order], rest=data.rest[order],
+        rest_noise=np.ones(len(tones)),  # the gain behind it is known from the first calibration
+    )  # fmt: skip
     count = len(data.presses.force_n)
     if count < FEWEST_RECHECK:
         raise BadInput(
@@ -275,10 +324,6 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
         notes=(*left_out, f"mended by {count} presses after a recheck"),
     )  # fmt: skip
     return Recheck(new, count, coverage_of(at, data.presses).force, z)
-
-
-def _tones(hz: Real) -> str:
-    return ", ".join(f"{f / 1e3:g}" for f in hz) + " kHz"
 
 
 def rows(log: Log, calibrations: Sequence[Calibration]) -> list[Row]:

@@ -1,11 +1,13 @@
 """Known presses out of the recordings of a specimen, each with the reading at rest before it."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.core.units import M_PER_MM
 from sensorgen.measure.log import BenchRun, Log
 from sensorgen.measure.log.bench import read_again
@@ -14,8 +16,10 @@ from sensorgen.measure.recording.samples import Recording
 from sensorgen.measure.signal.presses import Pairs
 from sensorgen.measure.signal.run import processed
 from sensorgen.prediction.calibration.fitting import Data
+from sensorgen.prediction.calibration.rest import checked
 from sensorgen.prediction.calibration.specimen import Presses
 
+_LEAST_ERROR = 3e-4  # of a mean at rest: from one recording to the next it differs by more than its noise
 _SHORTEST_S = 0.1  # of a hold: its logarithm counts
 
 
@@ -58,25 +62,30 @@ def known_presses(log: Log, name: str, rows: Sequence[BenchRun]) -> tuple[Data, 
     if not found:
         raise BadInput(f"{name}: none of {len(rows)} recordings can be used: {'; '.join(left_out)[:500]}")
     tones = found[0][0]
-    if any(not np.array_equal(other, tones) for other, *_ in found):
-        kinds = sorted({", ".join(f"{f / 1e3:g}" for f in other) for other, *_ in found})
-        raise BadInput(
-            f"{name}: recordings at different tones ({' kHz; '.join(kinds)} kHz): name those to use, --recording"
-        )
-    return _data([f[1:] for f in found]), tones, left_out
+    same = []
+    for other, pairs, rest, noise in found:
+        with within(f"{name}: recordings at different tones; name those to use, --recording"):
+            order = checked(other, tones)
+        same.append((pairs and _ordered(pairs, order), rest[order], noise[order]))
+    return _data(same), tones, left_out
+
+
+def _ordered(pairs: Pairs, order: NDArray[np.intp]) -> Pairs:
+    columns = ("before_ohm", "pressed_ohm", "difference_ohm", "error_ohm")
+    return replace(pairs, **{name: getattr(pairs, name)[:, order] for name in columns})
 
 
 def _rest(recording: Recording, pairs: Pairs | None) -> tuple[Complex, Real]:
     """Mean reading with nothing on the sensor, and its relative standard error."""
     z = pairs.before_ohm if pairs else recording.impedance_ohm[recording.valid()]
-    if len(z) < 2:
-        raise BadInput(f"{len(z)} readings at rest; expected 2 or more")
+    if not len(z):
+        raise BadInput("no reading at rest; expected one or more")
     mean = z.mean(axis=0)
-    return mean, np.asarray(np.abs(z - mean).std(axis=0) / np.abs(mean) / np.sqrt(2 * len(z)))
+    return mean, np.maximum(z.std(axis=0) / np.abs(mean) / np.sqrt(2 * len(z)), _LEAST_ERROR)
 
 
 def _data(found: Sequence[tuple[Pairs | None, Complex, Real]]) -> Data:
-    weight = np.array([1 / np.maximum(noise, 1e-6) ** 2 for _, _, noise in found])
+    weight = np.array([1 / noise**2 for _, _, noise in found])
     rest = np.einsum("km,km->m", weight, [np.log(mean) for _, mean, _ in found]) / weight.sum(0)
     m = len(rest)
     held = [pairs for pairs, _, _ in found if pairs is not None]
@@ -95,4 +104,6 @@ def _data(found: Sequence[tuple[Pairs | None, Complex, Real]]) -> Data:
         np.log10(np.maximum(all_of("hold_s"), _SHORTEST_S)),
     ).rows(known)  # fmt: skip
     noise = np.abs(error) / np.abs(before) / np.sqrt(2)
-    return Data(presses, np.log(pressed / before), noise, rest, 1 / np.sqrt(weight.sum(0)))
+    means = np.sqrt((1 / all_of("samples")).sum(-1))[known] if held else np.empty(0)
+    single = np.median(noise / means[:, None], axis=0) * np.sqrt(1.1) if len(noise) else None  # over ten at rest
+    return Data(presses, np.log(pressed / before), noise, rest, 1 / np.sqrt(weight.sum(0)), single)

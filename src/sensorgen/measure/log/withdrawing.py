@@ -15,7 +15,7 @@ def withdraw(log: Log, kind: str, number: int, reason: str) -> Entry:
     log : Log
         An open log.
     kind : str
-        Kind of the row: reading, recording, prediction, print, batch, design or raw-file.
+        Kind of the row: reading, recording, prediction, calibration, print, batch, design or raw-file.
     number : int
         Its number among its kind.
     reason : str

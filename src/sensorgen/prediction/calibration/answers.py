@@ -9,7 +9,8 @@ import numpy as np
 from sensorgen.core.arrays import Mask
 from sensorgen.core.document import Part
 from sensorgen.core.units import M_PER_MM
-from sensorgen.prediction.calibration.inversion import STALE_S, Found, Verdict, nothing
+from sensorgen.prediction.calibration.inversion import Found, Verdict, nothing
+from sensorgen.prediction.calibration.rest import STALE_S
 from sensorgen.prediction.inverse.answers import csv_cell, csv_row, number
 
 COLUMNS = (
@@ -47,7 +48,7 @@ def rows(kept: Sequence[Sequence[str]], found: Found, rest: Mask) -> str:
 
 @dataclass(frozen=True)
 class CalibratedInversion:
-    """Counts and medians over all readings under load.
+    """Counts over all readings under load, and medians of the medians of their blocks.
 
     Attributes
     ----------

@@ -127,7 +127,8 @@ class Calibration:
                 values = mean + of * ends
             else:
                 unit, values = "predicted", np.exp(self._rise(k - m.names.index(f"rise at {FORCES_N[0]:g} N")))
-            by = "presses and rest" if sd < _TOLD else "prediction"
+            left = np.log(values[2] / values[1]) / np.log(values[4] / values[3]) if name.startswith("rise at") else sd
+            by = "presses and rest" if left < _TOLD else "prediction"
             median, lower, upper, *before = map(float, values)
             found.append(Value(name, unit, median, lower, upper, before[0], before[1], by))
         return found
@@ -153,12 +154,12 @@ class Calibration:
         )
         if held:
             yield (
-                f"presses held back in turn: {held.force} of {held.presses} forces and {held.position} of "
-                f"{held.presses} positions lie in their 90 % intervals, whose median widths are "
+                f"presses held back in turn, each a mean over a second: {held.force} of {held.presses} forces and "
+                f"{held.position} of {held.presses} positions lie in their 90 % intervals, whose median widths are "
                 f"{held.force_width_n:.3g} N and {held.position_width_m * 1e3:.3g} mm"
             )
         elif p.presses:
-            yield f"not checked on presses held back: that takes {FEWEST} known presses"
+            yield f"not checked on presses held back: that takes {FEWEST} known presses in one calibration"
         else:
             yield "no known press: force and position are as uncertain as predicted, and inversions say so"
         yield (

@@ -1,13 +1,13 @@
 """How far a calibration's own intervals hold: presses are held back in turn, and found again from the others."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sensorgen.core.arrays import Mask, Real
-from sensorgen.prediction.calibration.fitting import Data, Posterior, calibrated
-from sensorgen.prediction.calibration.inversion import LEVEL, Found, Inverter
+from sensorgen.prediction.calibration.fitting import Data, calibrated
+from sensorgen.prediction.calibration.inversion import Found, Inverter
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
 
 FOLDS = 5
@@ -62,14 +62,13 @@ def _rms(off: Real) -> float:
 
 
 def held_out(
-    model: SpecimenModel, data: Data, limit_n: float, step: Callable[[str], None] = lambda _: None,
-    start: Posterior | None = None,
+    model: SpecimenModel, data: Data, limit_n: float, step: Callable[[str], None] = lambda _: None
 ) -> tuple[Coverage, Found] | None:  # fmt: skip
     """Coverage of presses held back in turn; None of fewer presses than ``FEWEST``.
 
     Parameters
     ----------
-    model, data, start
+    model, data
         As of :func:`sensorgen.prediction.calibration.fitting.calibrated`.
     limit_n : float
         Largest force to look for [N].
@@ -83,11 +82,9 @@ def held_out(
     parts = []
     for k in range(FOLDS):
         step(f"held back: part {k + 1} of {FOLDS}")
-        known = calibrated(model, data.rows(np.flatnonzero(fold != k)), start)
+        known = calibrated(model, data.rows(np.flatnonzero(fold != k)))
+        known = replace(known, noise=np.median(data.noise, axis=0))
         parts.append(Inverter(model, known, force_limit_n=limit_n).batch(data.ratio[fold == k]))
     order = np.argsort(np.concatenate([np.flatnonzero(fold == k) for k in range(FOLDS)]), kind="stable")
     found = Found(*(np.concatenate([getattr(p, name) for p in parts])[order] for name in vars(parts[0])))
     return coverage_of(found, data.presses), found
-
-
-__all__ = ["FEWEST", "LEVEL", "Coverage", "coverage_of", "held_out", "inside"]

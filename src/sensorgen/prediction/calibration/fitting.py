@@ -13,6 +13,7 @@ ROUNDS = 3  # Gauss-Newton and variance components in turn
 _STEPS = 12
 _SETTLED = 1e-3  # of a standard deviation
 NOISE = 1e-3  # of the parts of a ratio, where no press tells
+_FEWEST_COURSES = 10  # presses from which on their usual course is known
 _FLOOR = 1e-5  # of ln Z: no bench is right to more
 _USUAL = (0.25, 0.25), (0.5, 0.6)  # mean and standard deviation of how presses come about: unloading, decades
 _LN_SPREAD = 1.5  # of ln of each variance component's standard deviation, before calibration
@@ -34,6 +35,8 @@ class Data:
         Ln of Z/ohm at rest, complex.
     rest_noise : (m,) array
         Standard deviation of its real and imaginary part [-].
+    single : (m,) array or None
+        Standard deviation of the parts of a ratio of single readings, where ``ratio`` has means [-].
     """
 
     presses: Presses
@@ -41,10 +44,12 @@ class Data:
     noise: Real
     rest: Complex
     rest_noise: Real
+    single: Real | None = None
 
     def rows(self, which: NDArray[np.intp] | Mask) -> "Data":
         """Some of the presses."""
-        return Data(self.presses.rows(which), self.ratio[which], self.noise[which], self.rest, self.rest_noise)
+        ratio, noise = self.ratio[which], self.noise[which]
+        return Data(self.presses.rows(which), ratio, noise, self.rest, self.rest_noise, self.single)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +67,7 @@ class Posterior:
     unloading, decades : (float, float)
         Mean and standard deviation of what is not known of a press, see :class:`Presses`.
     noise : (m,) array
-        Median standard deviation of a ratio's real and imaginary part [-].
+        Standard deviation of the real and imaginary part of a ratio of single readings [-].
     presses : int
         Known ones that it rests on.
     """
@@ -112,7 +117,10 @@ def calibrated(model: SpecimenModel, data: Data, start: Posterior | None = None)
     start : Posterior, optional
         Earlier knowledge, as from an earlier calibration; the prior if not given.
     """
-    known = start or prior(model, np.median(data.noise, axis=0) if len(data.noise) else np.full(len(data.rest), NOISE))
+    single = data.single
+    if single is None:
+        single = np.median(data.noise, axis=0) if len(data.noise) else np.full(len(data.rest), NOISE)
+    known = start or prior(model, single)
     inverse: Real = np.asarray(np.linalg.inv(known.covariance))
     at, components = known.at.copy(), known.components
     presses, spread = data.presses, model.spread
@@ -151,7 +159,7 @@ def by_rest(model: SpecimenModel, rest: Complex, rest_noise: Real | float, noise
 
 def _mean(values: Real, otherwise: tuple[float, float]) -> tuple[float, float]:
     seen = values[np.isfinite(values)]
-    return (float(seen.mean()), float(seen.std())) if len(seen) > 2 else otherwise
+    return (float(seen.mean()), float(seen.std())) if len(seen) >= _FEWEST_COURSES else otherwise
 
 
 def _rest_covariance(model: SpecimenModel, data: Data) -> Real:
@@ -310,4 +318,4 @@ def widened(model: SpecimenModel, posterior: Posterior) -> Posterior:
     covariance = posterior.covariance.copy()
     covariance[loose] = covariance[:, loose] = 0.0
     covariance[loose, loose] = 1.0
-    return replace(posterior, covariance=covariance, presses=posterior.presses)
+    return replace(posterior, covariance=covariance)

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances, memory
+from sensorgen.prediction.calibration.rest import STALE_S
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, parts
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
 from sensorgen.prediction.inverse.prior import Prior
 from sensorgen.prediction.inverse.verdict import chi2_limit
 
 LEVEL = 0.9  # probability of the intervals
-STALE_S = 15.0  # age of a rest reading from which on it no longer stands for the specimen
 _COARSE = 20, 16  # forces and positions at which covariances are worked out
 _MOST = 128, 96  # forces and positions of the grid
 _LEAST = 40, 32
@@ -232,6 +232,7 @@ class Inverter:
             (Verdict.NO_FIT, found.chi2 > chi2_limit(2 * found.tones - 2)),
             (Verdict.MISSING, found.tones < _FEW_TONES),
         )
+        found.verdict[:] = Verdict.OK
         for verdict, applies in rules:
             found.verdict[applies] = verdict
         return found
@@ -243,7 +244,9 @@ def nothing(n: int) -> Found:
     def nan(*shape: int) -> Real:
         return np.full(shape, np.nan)
 
-    return Found(nan(n), nan(n), nan(n, 2), nan(n, 2), nan(n), np.zeros(n, np.intp), np.zeros(n, np.uint8))
+    return Found(
+        nan(n), nan(n), nan(n, 2), nan(n, 2), nan(n), np.zeros(n, np.intp), np.full(n, Verdict.MISSING, np.uint8)
+    )
 
 
 def _pairs(force_n: Real, position_m: Real) -> tuple[Real, Real]:

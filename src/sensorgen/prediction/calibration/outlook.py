@@ -36,9 +36,11 @@ def outlook(
     Returns
     -------
     (2,) array, (2,) array, or None
-        Infinite where a quantity is not identifiable; None where the sensor cannot be calibrated, as under a tip whose
-        pressure is not uniform.
+        Infinite where a quantity is not identifiable; None without a force, and where the sensor cannot be calibrated,
+        as under a tip whose pressure is not uniform.
     """
+    if not force_n > 0:
+        return None
     try:
         model = SpecimenModel(sensor, frequency_hz)
         sigma = np.full(len(model.frequency_hz), noise * 1.1**0.5)

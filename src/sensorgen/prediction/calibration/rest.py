@@ -9,7 +9,9 @@ from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
 
 LATEST = 64  # readings at rest that count, of those since the last press
-FEWEST = 8  # from which noise can be told
+FEWEST = 8  # differences of successive ones from which noise can be told
+_MOST_STEPS = 4096
+STALE_S = 15.0  # age from which on a reading at rest no longer stands for the specimen
 NOISE = 1e-3  # of a reading's parts, relative to abs(Z), where it cannot
 
 
@@ -19,18 +21,21 @@ class Rest:
     Parameters
     ----------
     given : (k, m) array, optional
-        Readings at rest that were taken apart [ohm].
+        Readings at rest that were taken apart [ohm]; those of the stream replace them.
     at_s : float
         When the last of them was taken [s]; nan if unknown, and then their age is never judged.
     """
 
     def __init__(self, given: Complex | None = None, at_s: float = np.nan) -> None:
-        self._latest: deque[Complex] = deque(given if given is not None else (), maxlen=LATEST)
-        self._at_s, self._timed, self._was = at_s, not np.isnan(at_s), True
-        self._squares: list[Real] = [] if given is None else list(_scatter(np.asarray(given)))
+        self._latest: deque[tuple[float, Complex]] = deque(maxlen=LATEST)
+        self._squares: deque[Real] = deque(maxlen=_MOST_STEPS)
+        self._loaded = True  # since the latest reading at rest
+        if given is not None:
+            self._take(np.where(given == 0, np.nan, given), np.full(len(given), at_s))
+            self._loaded = True
 
     def ratios(self, impedance_ohm: Complex, rest: Mask, time_s: Real) -> tuple[Complex, Real]:
-        """Ln of each reading over the reading at rest before it, and the age of that.
+        """Ln of each reading over the readings at rest before it, and the age of the last of them.
 
         Parameters
         ----------
@@ -53,30 +58,49 @@ class Rest:
             if start == end:
                 continue
             if rest[start]:
-                if not self._was:
-                    self._latest.clear()
-                self._latest.extend(z[start:end])
-                self._squares.extend(_scatter(z[start:end]))
-                self._at_s, self._timed = float(time_s[end - 1]), not np.isnan(time_s[end - 1])
-            elif self._latest:
-                with np.errstate(invalid="ignore"):
-                    ratio[start:end] = np.log(z[start:end] / np.nanmean(np.array(self._latest), axis=0))
-                if self._timed:
-                    age[start:end] = time_s[start:end] - self._at_s
-            self._was = bool(rest[start])
+                self._take(z[start:end], time_s[start:end])
+            else:
+                self._loaded = True
+                if self._latest:
+                    with np.errstate(invalid="ignore"):
+                        ratio[start:end] = np.log(z[start:end] / self.mean()[0])
+                    age[start:end] = np.nan_to_num(time_s[start:end] - self._latest[-1][0])
         return ratio, age
 
+    def _take(self, z: Complex, time_s: Real) -> None:
+        """Readings at rest; the first ones after a press replace those before it."""
+        before = [] if self._loaded or not self._latest else [self._latest[-1][1]]
+        if self._loaded:
+            self._latest.clear()
+        self._loaded = False
+        self._squares.extend(square for square in _scatter(np.array([*before, *z])) if np.isfinite(square).all())
+        self._latest.extend(zip(time_s.tolist(), z, strict=True))
+
     def mean(self) -> tuple[Complex, int]:
-        """Mean of the latest readings at rest [ohm], and their number."""
-        latest = np.array(self._latest)
-        return np.asarray(np.nanmean(latest, axis=0)), len(latest)
+        """Mean of the latest readings at rest (m,) [ohm], nan where none was measured, and their number.
+
+        Those count that are no more than ``STALE_S`` older than the last one: the specimen wanders.
+        """
+        last = self._latest[-1][0]
+        latest = np.array([z for t, z in self._latest if not t < last - STALE_S])
+        known = np.isfinite(latest)
+        with np.errstate(invalid="ignore"):
+            return np.where(known, latest, 0).sum(0) / known.sum(0), len(latest)
+
+    def __bool__(self) -> bool:
+        """Whether there is one."""
+        return bool(self._latest)
+
+    @property
+    def tells_noise(self) -> bool:
+        """Whether there were enough of them."""
+        return len(self._squares) >= FEWEST
 
     def noise(self) -> "Real | float":
-        """Standard deviation of a ratio's parts at each tone (m,), by the scatter at rest; ``NOISE`` of too few."""
-        squares = [square for square in self._squares if np.isfinite(square).all()]
-        if len(squares) < FEWEST:
-            return float(NOISE * np.sqrt(1.1))
-        found: Real = np.sqrt(np.mean(squares, axis=0) * 1.1)
+        """Standard deviation of the parts of a reading at each tone (m,), by the scatter at rest; else ``NOISE``."""
+        if not self.tells_noise:
+            return NOISE
+        found: Real = np.sqrt(np.mean(self._squares, axis=0))
         return found
 
 
@@ -97,5 +121,5 @@ def checked(tones_hz: Real, calibrated_hz: Real) -> NDArray[np.intp]:
     same = np.isclose(np.asarray(tones_hz)[:, None], np.asarray(calibrated_hz), rtol=1e-6)
     if same.shape[0] != same.shape[1] or not (same.sum(0) == 1).all():
         said, expected = (", ".join(f"{f / 1e3:g}" for f in hz) for hz in (tones_hz, calibrated_hz))
-        raise BadInput(f"readings at {said} kHz; the specimen was calibrated at {expected} kHz: expected those")
+        raise BadInput(f"readings at {said} kHz; expected {expected} kHz")
     return np.asarray(same.argmax(0))

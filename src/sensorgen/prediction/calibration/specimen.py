@@ -226,12 +226,13 @@ class SpecimenModel:
         lifted = 1 + share / (1 - share) * np.maximum(stress / self._most_pa, 1.0) * np.exp(ln_rise)
 
         omega = 2 * np.pi * self.frequency_hz
+        lowest = omega.min()
         per_m = (sensor.capacitance_f_per_m * np.exp(spread.capacitance * value["capacitance"] + c))[..., None]
         exponent = spread.dispersion * np.exp(value["dispersion"] - 0.5)[..., None]
         leak = (
-            sensor.leak_s_per_m + spread.leak * np.exp(spread.leak_spread * value["leak"])[..., None] * omega[0] * per_m
+            sensor.leak_s_per_m + spread.leak * np.exp(spread.leak_spread * value["leak"])[..., None] * lowest * per_m
         )
-        film = 1j * omega * (omega / omega[0]) ** -exponent * np.exp(-0.5j * np.pi * exponent)
+        film = 1j * omega * (omega / lowest) ** -exponent * np.exp(-0.5j * np.pi * exponent)
         loose = leak + (film + sensor.tan_delta * omega) * per_m
         pressed = leak + (film + sensor.tan_delta * omega) * per_m * lifted[..., None]
 

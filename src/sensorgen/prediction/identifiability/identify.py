@@ -121,8 +121,15 @@ def _on_a_bench(setup: Setup) -> tuple[StandardErrors, StandardErrors] | tuple[N
     found = outlook(setup.sensor, np.array(setup.frequency_hz), setup.noise, setup.force_n, setup.position_m)
     if found is None:
         return None, None
-    with_, without = (StandardErrors(sigma_force_n=float(f), sigma_position_m=float(x)) for f, x in found)
+    with_, without = (
+        StandardErrors(sigma_force_n=_told(f), sigma_position_m=_told(x)) for f, x in (ends.tolist() for ends in found)
+    )
     return with_, without
+
+
+def _told(error: float) -> float | None:
+    """A standard error to four digits, the same on every machine; None of an infinite one."""
+    return float(f"{error:.4g}") if np.isfinite(error) else None
 
 
 def _setup(
