@@ -198,19 +198,36 @@ def test_the_latest_reading_at_rest_counts():
     assert [*age, *later] == [0, 0, 1, 2, 0, 5]
 
 
+def test_old_readings_at_rest_and_those_of_before_do_not_count():
+    """A specimen that wanders is what it was in the last seconds; a file of rests gives way to those of the stream."""
+    z = np.array([[100.0], [200.0], [202.0], [50.0]], complex)
+    at_rest = np.array([True, True, True, False])
+    ratio, _ = Rest().ratios(z, at_rest, np.array([0.0, 100.0, 101.0, 102.0]))
+    assert np.exp(ratio[3, 0]) == pytest.approx(50 / 201)
+    given = Rest(np.full((9, 1), 400 + 0j))
+    first, _ = given.ratios(z[3:], at_rest[3:], np.full(1, np.nan))
+    later, age = given.ratios(z[1:], at_rest[1:], np.array([100.0, 101.0, 130.0]))
+    assert np.exp([first[0, 0], later[2, 0]]) == pytest.approx([50 / 400, 50 / 201])
+    assert age[2] == 29
+
+
 def test_noise_is_told_by_readings_at_rest():
     rng = np.random.default_rng(1)
     z = 1e5 * (1 + np.linspace(0, 0.05, 400)[:, None] + rng.normal(0, [1e-3, 4e-3], (400, 2)) * (1 + 0j))
     z = z + 1j * 1e5 * rng.normal(0, [1e-3, 4e-3], (400, 2))
     rest = Rest()
     rest.ratios(z, np.ones(400, bool), np.arange(400.0))
-    assert rest.noise() == pytest.approx(np.array([1e-3, 4e-3]) * np.sqrt(1.1), rel=0.12)
-    assert Rest(z[:5]).noise() == pytest.approx(1e-3 * np.sqrt(1.1))
+    assert rest.noise() == pytest.approx(np.array([1e-3, 4e-3]), rel=0.12)
+    assert Rest(z[:5]).noise() == 1e-3
+    one_by_one = Rest()
+    for row in z:
+        one_by_one.ratios(row[None], np.ones(1, bool), np.zeros(1))
+    assert one_by_one.noise() == pytest.approx(rest.noise())
 
 
 def test_other_tones_are_refused():
     assert checked(TONES_HZ[::-1], TONES_HZ).tolist() == [6, 5, 4, 3, 2, 1, 0]
-    with pytest.raises(BadInput, match=r"readings at 1\.1, 2\.3 kHz; the specimen was calibrated at"):
+    with pytest.raises(BadInput, match=r"readings at 1\.1, 2\.3 kHz; expected 1\.1, 2\.3, 5\.3"):
         checked(TONES_HZ[:2], TONES_HZ)
 
 

@@ -57,7 +57,7 @@ def test_a_film_of_one_layer_that_prints_as_two_is_refused_all_the_same(monkeypa
     """A print with the nearest gap that can be had, and the capacitance asked for, is not what was asked for."""
     asked = small(parameters={"dielectric_mm": 0.1})
     two = replace(found(drawn(asked)), gap_mm=0.2)
-    monkeypatch.setattr(compensation, "_estimate", lambda design, walls: replace(two, design=design))
+    monkeypatch.setattr(compensation, "_estimate", lambda design, walls, **_: replace(two, design=design))
     with pytest.raises(OutOfRange, match=r"2 layers at least.*nearest: a gap of 0\.2 mm and"):
         compensated(asked)
 

@@ -123,7 +123,7 @@ def test_a_recheck_with_another_tip_alarms_and_mends(after, tmp_path):
     for words in ((), ("calibrate", "S1", "--recheck")):
         if words:
             said = after(*words)
-            assert said.code == 0, said.err
+            assert said.code == 1, said.err
             assert "ALARM: the calibration no longer held" in said.words
         assert after("invert", "S1", "m.csv", "-o", "o.csv").code == 0
         shares.append(covered(rows(tmp_path / "o.csv")[1::2], "force", "n"))
@@ -177,7 +177,7 @@ def test_stale_readings_at_rest_are_named(after, tmp_path):
         (["nobody"], "no design is known of 'nobody'"), (["S2"], "the log has no recording of S2"),
         (["S1", "S1"], "stands twice"), (["S1", "--recheck"], "was never calibrated"),
         (["S1", "S2", "--recheck"], "expected one"), (["S1", "--force-offset", "1"], "as 0.9+-0.1"),
-        (["S1", "--force-offset", "x+-1"], "not a force"), (["S1", "--recording", "4"], "has no recording of S1"),
+        (["S1", "--force-offset", "x+-1"], "not a force"), (["S1", "--recording", "4"], "no recording 4 of S1; expected one of its own: 1"),
         ([], "SPECIMEN"),
     ],
 )  # fmt: skip

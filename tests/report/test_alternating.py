@@ -57,7 +57,7 @@ def test_a_reading_stands_beside_the_stored_prediction(logged, design):
     assert row.phase_deg == pytest.approx(-90 + math.degrees(math.atan(0.02)))
     limit = 0.05e-2 + 1.2e-3 / row.z_ohm + row.z_ohm * 1.07e-9
     assert row.c_error_pf == pytest.approx(60 * limit / math.sqrt(3) * math.hypot(1, 0.02), rel=1e-6)
-    assert "1 of 1 predictions were stored before anything was measured" in " ".join(made.findings)
+    assert "1 of 1 prediction was stored before anything was measured" in " ".join(made.findings)
     assert any(text.startswith("Capacitance of S1 at 10.1kHz: measured 60 ± 0.") for text in made.headline)
 
 
