@@ -177,8 +177,8 @@ def test_stale_readings_at_rest_are_named(after, tmp_path):
         (["nobody"], "no design is known of 'nobody'"), (["S2"], "the log has no recording of S2"),
         (["S1", "S1"], "stands twice"), (["S1", "--recheck"], "was never calibrated"),
         (["S1", "S2", "--recheck"], "expected one"), (["S1", "--force-offset", "1"], "as 0.9+-0.1"),
-        (["S1", "--force-offset", "x+-1"], "not a force"), (["S1", "--recording", "4"], "no recording 4 of S1; expected"),
-        ([], "SPECIMEN"),
+        (["S1", "--force-offset", "x+-1"], "not a force"), ([], "SPECIMEN"),
+        (["S1", "--recording", "4"], "no recording 4 of S1; expected one of its own: 1"),
     ],
 )  # fmt: skip
 def test_what_is_missing_is_one_line(bench, words, said):
