@@ -199,7 +199,7 @@ def test_the_latest_reading_at_rest_counts():
 
 
 def test_old_readings_at_rest_and_those_of_before_do_not_count():
-    """A specimen that wanders is what it was in the last seconds; a file of rests gives way to those of the stream."""
+    """Of a drifting specimen, only rest readings of the last 15 s are averaged; the stream's replace a given file."""
     z = np.array([[100.0], [200.0], [202.0], [50.0]], complex)
     at_rest = np.array([True, True, True, False])
     ratio, _ = Rest().ratios(z, at_rest, np.array([0.0, 100.0, 101.0, 102.0]))

@@ -1,7 +1,7 @@
 """Virtual specimens: printed strips with every error that a real one may have, written apart from the package.
 
 The strip is a product of ABCD matrices of short pieces, its capacitance and how that rises under pressure are those of
-independent solvers (tests/reference), and the elastomer remembers: it creeps, and is softer on the way back.
+independent solvers (tests/reference), and the elastomer has creep and hysteresis.
 """
 
 import json
@@ -120,7 +120,7 @@ class Session:
 
 
 def session(truth, count, seed, force_n=(0.1, 6.0)):
-    """Presses at random places and forces, half of them on the way back from a higher one, held for .3 to 30 s.
+    """Presses at random places and forces, half of them during unloading, held for 0.3 to 30 s.
 
     Force and position are those that the rig says; the sensor feels them with their offsets.
     """

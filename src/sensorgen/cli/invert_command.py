@@ -140,6 +140,7 @@ def _by_ratio(
     """Ratios to the latest reading at rest, row by row; the inverter is made when the first of them is there."""
     from sensorgen.measure.readings import readings
     from sensorgen.prediction.calibration import answers
+    from sensorgen.prediction.calibration.inversion import nothing
     from sensorgen.prediction.calibration.rest import Rest, checked
 
     limit_n = one("--force-limit", force_limit_n) if force_limit_n else None
@@ -165,7 +166,7 @@ def _by_ratio(
             if rest and not at_rest.all() and (made is None or (rest.tells_noise and not told and noise is None)):
                 told, single = rest.tells_noise, np.sqrt(1 + 1 / rest.mean()[1]) * (noise or rest.noise())
                 made = inverter(rest, source.frequency_hz, np.broadcast_to(single, order.shape)[order], limit_n)
-            found = made[0].batch(ratio[:, order], age_s) if made else answers.nothing(len(ratio))
+            found = made[0].batch(ratio[:, order], age_s) if made else nothing(len(ratio))
             summary.add(found, at_rest)
             step(f"{summary.samples} samples")
             own = [[repr(t) if np.isfinite(t) else ""] if _TIME in source.numbers else [] for t in time_s.tolist()]

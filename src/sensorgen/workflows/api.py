@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sensorgen.analysis import calibration as calibrations
-from sensorgen.analysis.calibration import Bench, Calibration
+from sensorgen.analysis.calibration import Bench
 from sensorgen.analysis.comparison import Comparison, of_iteration
 from sensorgen.analysis.fit import Fit
 from sensorgen.analysis.fit import fit as fit_values
@@ -19,6 +19,7 @@ from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.measure.log import Log
 from sensorgen.prediction import bodies, compression, evaluate
+from sensorgen.prediction.calibration.calibration import Calibration
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
 from sensorgen.prediction.loaded import Loaded, loaded
 from sensorgen.prediction.planning import sensor_model

@@ -18,19 +18,20 @@ from sensorgen.measure.log import BenchRun, Log, batches, notes
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log.entries import Specimen
 from sensorgen.prediction import bodies
-from sensorgen.prediction.calibration.calibration import Calibration, from_json
+from sensorgen.prediction.calibration.calibration import BEYOND, Calibration, from_json
 from sensorgen.prediction.calibration.coverage import coverage_of, held_out
-from sensorgen.prediction.calibration.fitting import Data, Posterior, calibrated, gain, shared, widened
+from sensorgen.prediction.calibration.fitting import Data, calibrated, gain, shared, widened
 from sensorgen.prediction.calibration.inversion import Found
 from sensorgen.prediction.calibration.rest import checked
-from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, Spread
+from sensorgen.prediction.calibration.specimen import SpecimenModel, Spread
+from sensorgen.prediction.inverse.verdict import NORMAL_90
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import Query, Tip
 from sensorgen.prediction.sensor_model import SensorModel
 
 FEWEST_RECHECK = 3  # presses from which on a change can be told
 _ALARM = 2.5758293035489004  # normal deviate of 0.5 %
-_SURE = 2 * 1.6448536269514722  # widths of a 90 % interval, in standard deviations
+_SURE = 2 * NORMAL_90  # widths of a 90 % interval, in standard deviations
 _INSTRUMENT = ("lead", "stray", "force offset", "position offset")  # shared by specimens that are measured in one go
 
 
@@ -210,7 +211,7 @@ def calibrate(
     made = []
     for (name, design, model, data, rows, left_out), posterior in zip(fitted, posteriors, strict=True):
         most = float(data.presses.force_n.max(initial=0.0)) or 6.0
-        held = held_out(model, data, 1.25 * most, step)
+        held = held_out(model, data, BEYOND * most, step)
         if len(fitted) > 1:
             left_out.append(f"lead, stray and offsets shared with {', '.join(f[0] for f in fitted if f[0] != name)}")
         calibration = Calibration(
@@ -314,7 +315,7 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
             f"{name}: {count} new known presses; expected {FEWEST_RECHECK} to 5, spread over force and place"
         )
     most = max(old.force_n, float(data.presses.force_n.max()))
-    at = old.inverter(np.median(data.noise, axis=0), limit_n=1.25 * most).batch(data.ratio)
+    at = old.inverter(np.median(data.noise, axis=0), limit_n=BEYOND * most).batch(data.ratio)
     sd = np.ptp(at.force_90_n, axis=1) / _SURE
     z = float(np.mean((data.presses.force_n - at.force_n) / sd) * np.sqrt(count))
     posterior = calibrated(old.model, data, widened(old.model, old.posterior))
@@ -336,9 +337,3 @@ def rows(log: Log, calibrations: Sequence[Calibration]) -> list[Row]:
             source="sensorgen calibrate", version=__version__, data=made.to_json(),
         ))  # fmt: skip
     return found
-
-
-__all__ = [
-    "Bench", "Calibration", "Posterior", "Presses", "Recheck", "calibrate", "design_of", "model_of", "recheck", "rows",
-    "stored",
-]  # fmt: skip

@@ -10,9 +10,9 @@ from sensorgen.analysis.plots.figure import BLUE, COLOURS, GREY, ORANGE, Axis, C
 from sensorgen.core import document
 from sensorgen.core.units import M_PER_MM
 from sensorgen.prediction.calibration.calibration import Calibration
+from sensorgen.prediction.calibration.coverage import inside
 from sensorgen.prediction.calibration.inversion import LEVEL
-
-_NORMAL_90 = 1.6448536269514722  # normal deviate of 5 %
+from sensorgen.prediction.inverse.verdict import NORMAL_90
 
 
 def html(made: Sequence[Made | Recheck]) -> str:
@@ -33,14 +33,15 @@ def _presses(made: Made, number: int) -> list[Figure]:
         return []
     known, found = made.data.presses, made.held
     panels = []
-    for truth, middle, ends, words in (
-        (known.force_n, found.force_n, found.force_90_n, "force [N]"),
-        (known.position_m / M_PER_MM, found.position_m / M_PER_MM, found.position_90_m / M_PER_MM, "position [mm]"),
-    ):
-        inside = (ends[:, 0] <= truth) & (truth <= ends[:, 1])
+    force, place = inside(found, known)
+    for truth, middle, ends, held, words in (
+        (known.force_n, found.force_n, found.force_90_n, force, "force [N]"),
+        (known.position_m / M_PER_MM, found.position_m / M_PER_MM, found.position_90_m / M_PER_MM, place,
+         "position [mm]"),
+    ):  # fmt: skip
         most = float(max(truth.max(), ends.max()))
         content = [Curve("line", "true", [0, most], [0, most], colour=GREY, dash="dash")]
-        for name, rows, colour in ((f"in the {LEVEL:.0%} interval", inside, BLUE), ("outside", ~inside, ORANGE)):
+        for name, rows, colour in ((f"in the {LEVEL:.0%} interval", held, BLUE), ("outside", ~held, ORANGE)):
             if rows.any():
                 content.append(Curve(
                     "points", name, middle[rows], truth[rows], low=ends[rows, 0], high=ends[rows, 1], colour=colour
@@ -89,10 +90,10 @@ def _parameters(calibration: Calibration, number: int) -> Figure:
     """Posterior of every parameter beside its prior, in standard deviations of the prior."""
     p, names = calibration.posterior, calibration.model.names
     sd = np.sqrt(np.diag(p.covariance))
-    before = np.full(len(names), _NORMAL_90)
+    before = np.full(len(names), NORMAL_90)
     content = (
         Curve("ranges", "before", np.zeros(len(names)), names, low=-before, high=before, colour=GREY),
-        Curve("ranges", "after", p.at, names, low=p.at - _NORMAL_90 * sd, high=p.at + _NORMAL_90 * sd, colour=BLUE),
+        Curve("ranges", "after", p.at, names, low=p.at - NORMAL_90 * sd, high=p.at + NORMAL_90 * sd, colour=BLUE),
     )
     alt = "Ranges of 90 % of each parameter before and after calibration, in standard deviations before."
     panel = Panel(content, Axis("standard deviations of what was known before"), Axis(names=tuple(names)))

@@ -9,7 +9,7 @@ import numpy as np
 from sensorgen.core.arrays import Mask
 from sensorgen.core.document import Part
 from sensorgen.core.units import M_PER_MM
-from sensorgen.prediction.calibration.inversion import Found, Verdict, nothing
+from sensorgen.prediction.calibration.inversion import Found, Verdict
 from sensorgen.prediction.calibration.rest import STALE_S
 from sensorgen.prediction.inverse.answers import csv_cell, csv_row, number
 
@@ -139,6 +139,3 @@ class Summary:
         return CalibratedInversion(
             of, by, self.samples, self.at_rest, statuses, limit_n, widths[0], widths[1], noise, tuple(notes)
         )
-
-
-__all__ = ["CalibratedInversion", "Summary", "header", "nothing", "rows"]

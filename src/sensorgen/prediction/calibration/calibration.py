@@ -19,10 +19,11 @@ from sensorgen.prediction.calibration.fitting import Posterior
 from sensorgen.prediction.calibration.inversion import Inverter
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread
 from sensorgen.prediction.inverse.prior import Prior
+from sensorgen.prediction.inverse.verdict import NORMAL_90
 
 SCHEMA = 1
 _TOLD = 0.8  # of the prior's standard deviation: a parameter that keeps more was not identified
-_NORMAL_90 = 1.6448536269514722  # normal deviate of 5 %
+BEYOND = 1.25  # times the largest known force: up to which a press is looked for
 _LAWS = {"plate": Plate, "curve": Curve}
 
 
@@ -78,7 +79,7 @@ class Calibration:
     @property
     def limit_n(self) -> float:
         """Largest force that an inversion looks for [N]."""
-        return 1.25 * self.force_n
+        return BEYOND * self.force_n
 
     def inverter(self, noise: ArrayLike | None = None, prior: Prior | None = None, limit_n: float = 0.0) -> Inverter:
         """What finds force and position behind readings of this specimen.
@@ -118,7 +119,7 @@ class Calibration:
         straight |= {n: ("", 0.0, spread.profile / int(n[-1])) for n in m.names if n.startswith("profile")}
         for k, name in enumerate(m.names):
             at, sd = float(self.posterior.at[k]), sqrt(self.posterior.covariance[k, k])
-            ends = np.array([at, at - _NORMAL_90 * sd, at + _NORMAL_90 * sd, -_NORMAL_90, _NORMAL_90])
+            ends = np.array([at, at - NORMAL_90 * sd, at + NORMAL_90 * sd, -NORMAL_90, NORMAL_90])
             if name in scales:
                 unit, scale, of = scales[name]
                 values = scale * np.exp(of * ends)
@@ -138,7 +139,7 @@ class Calibration:
         weights = self.model.law_weights()[knot]
         at, sd = float(weights @ self.posterior.at), sqrt(weights @ self.posterior.covariance @ weights)
         before = sqrt(weights @ weights)
-        return np.array([at, at - _NORMAL_90 * sd, at + _NORMAL_90 * sd, -_NORMAL_90 * before, _NORMAL_90 * before])
+        return np.array([at, at - NORMAL_90 * sd, at + NORMAL_90 * sd, -NORMAL_90 * before, NORMAL_90 * before])
 
     @property
     def unidentified(self) -> tuple[str, ...]:

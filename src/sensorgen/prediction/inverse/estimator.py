@@ -14,12 +14,11 @@ from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Forward, Real
 from sensorgen.prediction.inverse.prior import Posterior, Prior, posterior
 from sensorgen.prediction.inverse.single import Press, Single
 from sensorgen.prediction.inverse.table import Index, Local, Table, parts
-from sensorgen.prediction.inverse.verdict import PAIR, Status, covariance, statuses
+from sensorgen.prediction.inverse.verdict import NORMAL_90, PAIR, Status, covariance, statuses
 
 NOISE = 1e-3
 _DIAGONAL = np.arange(2)
 _BLOCK = 1 << 13  # samples at a time
-_NORMAL_90 = 1.6448536269514722  # normal deviate of 5 %
 _MOST_NOISE = 1.0
 _RIVAL = 2 * PAIR**0.5  # distance of two presses up to which noise may exchange them [standard deviations]
 
@@ -186,7 +185,7 @@ class Estimator:
         if self.prior is not None:
             return posterior(target, self._table, fit)
         spread = covariance(fit.fisher)
-        reach = _NORMAL_90 * np.sqrt(spread[:, _DIAGONAL, _DIAGONAL])
+        reach = NORMAL_90 * np.sqrt(spread[:, _DIAGONAL, _DIAGONAL])
         return Posterior(fit.press, spread, fit.press - reach, fit.press + reach)
 
     def _least_squares(self, target: Target) -> _Pair:
