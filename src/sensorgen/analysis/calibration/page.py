@@ -66,15 +66,14 @@ def _left_over(made: Made, number: int) -> Figure:
                 for k, f in enumerate(model.frequency_hz.tolist())
             )
             unit = "%" if part == "magnitude" else "0.01 rad"
-            panels.append(
-                Panel(content, Axis("force [N]"), Axis(f"measured less fitted {part} of pressed/rest [{unit}]"))
-            )
+            title = f"{part} of pressed over rest: measured less fitted"
+            panels.append(Panel(content, Axis("force [N]"), Axis(f"residual [{unit}]"), title=title))
     rest = 100 * (data.rest - model.rest(made.calibration.posterior.at))
     khz = model.frequency_hz / 1e3
     panels.append(Panel(
         (Curve("points", "magnitude [%]", khz, rest.real, colour=BLUE),
          Curve("points", "phase [0.01 rad]", khz, rest.imag, colour=ORANGE)),
-        Axis("frequency [kHz]", log=True), Axis("at rest: measured less fitted"),
+        Axis("frequency [kHz]", log=True), Axis("residual"), title="at rest: measured less fitted",
     ))  # fmt: skip
     alt = "Residuals of the calibration: of presses over force, of the reading at rest over frequency."
     return Figure(
