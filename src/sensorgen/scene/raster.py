@@ -11,6 +11,7 @@ from sensorgen.scene.scene import Body, Scene
 from sensorgen.scene.sections import ROUNDING_MM
 from sensorgen.scene.unit_cell import Band, Slice, mirrored
 
+LARGER = 2  # slices of a cell that the sensor's end does not cut, over those of one that it cuts
 
 @dataclass(frozen=True)
 class Raster:
@@ -47,7 +48,8 @@ def raster(
     outer_mm : three sequences of float
         Planes on x, y and z beside those of the boxes [mm].
     evenly : bool
-        As of :func:`sensorgen.scene.unit_cell.cell`.
+        Whether a piece that occurs a whole number of times is preferred to one that the end cuts, where it has at most
+        ``LARGER`` times as many slices along an axis: half a sensor may be a hundred periods.
 
     Raises
     ------
@@ -76,7 +78,10 @@ def raster(
         names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in np.moveaxis(fill, k, 0)]
         bands = [(Band(name, "", (0.0, 0.0), (1.0, 1.0)),) for name in names]
         walk = [Slice(a, b, band) for (a, b), band in zip(pairwise(planes[k].tolist()), bands, strict=True)]
-        cell = mirrored(walk, evenly)
+        cell = mirrored(walk, evenly=False)
+        even = mirrored(walk) if evenly else cell
+        if len(even.slices) <= LARGER * len(cell.slices):
+            cell = even
         middles = [(s.left_mm + s.right_mm) / 2 for s in cell.slices]
         fill = fill.take(np.searchsorted(planes[k], middles) - 1, k)
         planes[k] = np.array([cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)])

@@ -61,11 +61,16 @@ def bricks_of(scene: Scene) -> Bricks:
         raise BadInput("pressing in 3D needs a scene of boxes: not all of its prisms are")
     regions = [Region(AIR, ""), *dict.fromkeys(Region(body.material, body.terminal) for body, _ in prisms)]
     try:
-        found = raster(scene, lambda body: regions.index(Region(body.material, body.terminal)), 0, ((), (), ()))
+        found = raster(scene, lambda body: regions.index(Region(body.material, body.terminal)), 0, ((), (), ()), False)
     except ValueError as error:
         raise BadInput(str(error)) from None
-    x, y, z = (p * M_PER_MM for p in found.planes_mm)
-    return Bricks((x, y, z), found.fill, tuple(regions))
+    planes, fill = [p * M_PER_MM for p in found.planes_mm], found.fill
+    for axis in (0, 1):  # planes at which only the sensor ends
+        differs = np.diff(fill, axis=axis).any(tuple(a for a in range(3) if a != axis))
+        planes[axis] = planes[axis][[True, *differs, True]]
+        fill = fill.compress([True, *differs], axis)
+    x, y, z = planes
+    return Bricks((x, y, z), fill, tuple(regions))
 
 
 def _cut(planes: Real, pieces: int, shrink: float) -> tuple[Real, Whole]:

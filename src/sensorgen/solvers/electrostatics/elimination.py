@@ -125,22 +125,19 @@ def least(blocks: Sequence[Block], count: int, *, leaf: int = _LEAF, keep: bool 
     def joined(which: Whole) -> _Joined:
         """Some blocks without the unknowns that no other block shares."""
         if len(which) > leaf:
-            both = _sum([joined(half) for half in _halves(which, places[which])])
+            parts = [joined(half) for half in _halves(which, places[which])]
         else:
             leaves = [(b.ids, b.matrix() if callable(b.matrix) else b.matrix) for b in map(blocks.__getitem__, which)]
-            both = _sum([_Joined(ids, matrix, np.ones_like(ids)) for ids, matrix in leaves])
-        done = both.seen == total[both.ids]
-        if not done.any():
+            parts = [_Joined(ids, matrix, np.ones_like(ids)) for ids, matrix in leaves]
+        both, kept = _sum(parts, total)
+        if kept == len(both.ids):
             return both
-        turn = np.argsort(done, kind="stable")
-        kept, ids = len(done) - int(done.sum()), both.ids[turn]
-        matrix = both.matrix[turn[:, None], turn]
         if keep:
-            matrix, others = eliminated(matrix, kept)
-            found.steps.append((ids[kept:], ids[:kept], others))
+            matrix, others = eliminated(both.matrix, kept)
+            found.steps.append((both.ids[kept:], both.ids[:kept], others))
         else:
-            matrix = _condensed(matrix, kept)
-        return _Joined(ids[:kept], matrix, both.seen[turn[:kept]])
+            matrix = _condensed(both.matrix, kept)
+        return _Joined(both.ids[:kept], matrix, both.seen[:kept])
 
     left = joined(np.arange(len(blocks)))
     if (left.ids >= HELD).any():
@@ -160,13 +157,20 @@ def _halves(which: Whole, places: NDArray[Any]) -> tuple[Whole, Whole]:
     return which[order[:cut]], which[order[cut:]]
 
 
-def _sum(parts: list[_Joined]) -> _Joined:
+def _sum(parts: list[_Joined], total: Whole) -> tuple[_Joined, int]:
+    """Parts in one, and how many of its unknowns other blocks share; these come first."""
     ids, at = np.unique(np.concatenate([p.ids for p in parts]), return_inverse=True)
-    places = np.split(at, np.cumsum([len(p.ids) for p in parts])[:-1])
     seen = np.bincount(at, np.concatenate([p.seen for p in parts])).astype(np.int64)
+    done = seen == total[ids]
+    order = np.argsort(done, kind="stable")
+    turned = np.empty_like(order)
+    turned[order] = np.arange(len(order))
+    places = np.split(turned[at], np.cumsum([len(p.ids) for p in parts])[:-1])
+    ids, seen, kept = ids[order], seen[order], len(ids) - int(done.sum())
     if len(parts) > 2 or len(np.unique(places[0])) < len(places[0]):
-        return _Joined(ids, added(len(ids), zip(places, (p.matrix for p in parts), strict=True)), seen)
-    matrix = np.zeros((len(ids),) * 2, np.result_type(*(p.matrix.dtype for p in parts)))
-    for place, part in zip(places, parts, strict=True):  # large, and each unknown once
-        matrix[place[:, None], place] += part.matrix
-    return _Joined(ids, matrix, seen)
+        matrix = added(len(ids), zip(places, (p.matrix for p in parts), strict=True))
+    else:  # large, and each unknown once
+        matrix = np.zeros((len(ids),) * 2, np.result_type(*(p.matrix.dtype for p in parts)))
+        for place, part in zip(places, parts, strict=True):
+            matrix[place[:, None], place] += part.matrix
+    return _Joined(ids, matrix, seen), kept
