@@ -172,6 +172,92 @@ def test_ends_of_rect_cost_as_little_as_whole_cells(rungs):
     assert found.lower < cut.interval.lower < cut.interval.upper < found.upper
 
 
+LONG = {"x60_width_mm": 0.9, "dielectric_mm": 0.2}  # of period 2.2 mm: neither 100 nor 10 mm is a multiple of it
+
+
+def test_a_cell_that_the_end_cuts_is_one_period_and_not_half_the_sensor():
+    from sensorgen.models import press3d
+
+    scene = rect.scene(rect.Params(length_mm=100.0, width_mm=10.0, **LONG), Fill())
+    cut, pressed = grid(scene), press3d.cell(scene)
+    for planes in (cut.planes_mm[0], cut.planes_mm[1], pressed.planes_m[0] / MM, pressed.planes_m[1] / MM):
+        assert np.ptp(planes) == close(1.1, 1e-9)
+    assert (cut.fill > 1).sum() < 40
+    assert [len(p) for p in pressed.planes_m[:2]] == [4, 4]  # the end of the sensor needs no plane
+    halves = rect.scene(rect.Params(length_mm=5.0, width_mm=2.0), Fill())  # a piece that fits at little cost is kept
+    assert np.ptp(grid(halves).shares) == 0
+
+
+def occurrences(at_mm: np.ndarray, end_mm: float, period_mm: float) -> np.ndarray:
+    """How often each place between the mirrors, or its image, lies within a sensor."""
+    images = [sign * at_mm + 0.7 * (sign < 0) + k * period_mm for sign in (1, -1) for k in range(-1, 60)]
+    return sum(((x > 0) & (x < end_mm)).astype(int) for x in images)
+
+
+def test_a_sensor_that_the_end_cuts_in_both_directions_as_voxels_have_it():
+    """A resistor network: its derivative by weights on the permittivity is the energy in the parts that they stand for.
+
+    The share of a whole cell's capacitance depends little on the size of the voxels.
+    """
+    import voxels
+
+    h, period, film, high = 0.05, 2.2, 0.2, 0.3
+    n = round(period / 2 / h)
+    at = 0.35 + (np.arange(n) + 0.5) * h
+    eps, metal = np.full((n, n, 18), EPS["air"]), np.full((n, n, 18), -1)
+    z = (np.arange(18) - 1 + 0.5) * h
+    foot, post = at < 0.7, at > 1.0
+    for strips, low in ((foot[:, None], film + high), (foot[None, :], film)):
+        metal[np.broadcast_to(strips, (n, n))[..., None] & (z > low) & (z < low + high)] = 1
+    for strips, low in ((post[:, None], film + high), (post[None, :], film)):
+        eps[np.broadcast_to(strips, (n, n))[..., None] & (z > low) & (z < low + high)] = EPS["x60"]
+    eps[..., (z > 0) & (z < film)] = EPS["x60"]
+    metal[..., 0], metal[..., -1] = 0, 1
+    along, across = (occurrences(at, end, period) for end in (100.0, 10.0))
+    weight = 0.01 * np.outer(across, along)[..., None] / np.outer(across, along).max()
+    more, less, cell = (voxels.upper(eps * (1 + s * weight), metal, h) for s in (1, -1, 0))
+    ratio = (more - less) / 0.02 * np.outer(across, along).max() / cell
+    scene = rect.scene(rect.Params(length_mm=100.0, width_mm=10.0, **LONG), Fill())
+    whole = rect.scene(rect.Params(length_mm=2.2, width_mm=2.2, **LONG), Fill())
+    all_of_it, one = (next(fem3d.steps(s, EPS)).interval.middle() for s in (scene, whole))
+    assert all_of_it / one * 4 == close(ratio, 1e-3)
+    assert all_of_it / one * 4 != close(1000 / 1.1**2, 3e-3)  # by area alone it would not be caught
+
+
+def test_meshes_grow_by_steps():
+    """No mesh couples more than three times the unknowns of the one before."""
+    coarse, values = grid(rect_cell(0.1)), [0, 0, 1.00059, 4.68]
+    unknowns = [
+        Pair.of(layered(coarse, values, m.layers), values, m.order, m.flux_order).unknowns() for m in fem3d.MESHES
+    ]
+    ratios = np.divide(unknowns[1:], unknowns[:-1])
+    assert (ratios > 1).all()
+    assert (ratios < 3).all()
+    assert [m.width for m in fem3d.MESHES] == sorted((m.width for m in fem3d.MESHES), reverse=True)
+
+
+@pytest.mark.parametrize(
+    ("first", "width", "meshes"),
+    [(1.0, 1.4e-3, [0, 1, 2]), (2.0, 1e-3, [0, 3, 4]), (2.0, 1e-9, [0, 8]), (0.1, 1e-3, [0])],
+)
+def test_meshes_that_are_not_expected_to_do_are_left_out(first, width, meshes, monkeypatch):
+    """Widths as on rect times some factor; every second mesh does 20 % worse than expected."""
+    used = []
+
+    def bounds(_) -> Interval:
+        mesh = fem3d.MESHES[meshes[len(used)]]
+        used.append(mesh)
+        reached = mesh.width * first * 1.2 ** ((len(used) - 1) % 2)
+        return Interval(1 - reached / 2, 1 + reached / 2)
+
+    coarse = grid(plates(Body("a", "a", (box(0, 2, 0, 1, 0.2, 1.2),))))
+    found = [m for m, *_ in fem3d.narrowed(bounds, coarse, [0.0, 0.0, 1.0], width)]
+    assert found == used == [fem3d.MESHES[k] for k in meshes]
+    used.clear()
+    monkeypatch.setattr(fem3d, "_MOST_UNKNOWNS", 1)
+    assert [m for m, *_ in fem3d.narrowed(bounds, coarse, [0.0, 0.0, 1.0], width)] == [fem3d.MESHES[0]]
+
+
 @pytest.mark.parametrize("least", [0.0, 1.0, 4.0])
 def test_a_part_lies_where_any_flux_so_near_has_it(least):
     """Fluxes of a few numbers, without a second pair of fields: the worst is met."""

@@ -189,7 +189,7 @@ def _conducting(band: Band) -> Band:
 
 def _in_space(alone: Scene, axis: str, width: float) -> Iterator[Interval]:
     """Of boxes: bounds that get narrower [1/mm]; none where their cell has too many."""
-    from sensorgen.models.fem3d import pairs, total
+    from sensorgen.models.fem3d import narrowed, total
     from sensorgen.solvers.electrostatics.bricks import insulated
 
     at = "xyz".index(axis)
@@ -205,8 +205,5 @@ def _in_space(alone: Scene, axis: str, width: float) -> Iterator[Interval]:
     coarse = replace(coarse, shares=np.moveaxis(np.repeat(beside, len(planes[at]) - 1, axis=0), 0, at))
     cells = sides[at] / (planes[at][-2] - planes[at][1])
     values = [0.0, 0.0, *(float(name == _METAL) for name in coarse.names[2:])]
-    for pair in pairs(coarse, values):
-        row = total(pair)
+    for *_, row in narrowed(total, coarse, values, width):
         yield Interval(float(cells / row.upper), float(cells / row.lower))
-        if row.width() <= width:
-            return

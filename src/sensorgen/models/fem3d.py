@@ -5,8 +5,9 @@ boxes all matrices are known in closed form, and elimination from the inside out
 docs/cells.md.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -23,8 +24,32 @@ COST = 3
 
 WIDTH = 1e-3  # of the interval unless given
 
-_RUNGS = ((1, 3, 2), (1, 5, 4), (2, 6, 5), (3, 7, 6))  # layers, order of the potential, order of the flux
-_MOST_BRICKS = 2500  # of one rung: more would take hours
+_MOST_BRICKS = 2500  # on the coarsest mesh: more would take hours
+_MOST_UNKNOWNS = 600_000  # of a finer mesh: 4 GB
+
+Bounded = TypeVar("Bounded", Interval, Disc)
+
+
+class MeshLevel(NamedTuple):
+    """Layers that shrink towards edges, orders of potential and flux, and width on rect with a film of 0.1 mm [-]."""
+
+    layers: int
+    order: int
+    flux_order: int
+    width: float
+
+
+MESHES = (  # each takes at most three times as long as the one before
+    MeshLevel(1, 3, 2, 3.4e-3),
+    MeshLevel(1, 4, 3, 1.3e-3),
+    MeshLevel(1, 5, 4, 7.2e-4),
+    MeshLevel(1, 6, 5, 4.6e-4),
+    MeshLevel(1, 7, 6, 3.3e-4),
+    MeshLevel(2, 5, 4, 1.4e-4),
+    MeshLevel(2, 6, 5, 6.6e-5),
+    MeshLevel(3, 6, 5, 2.2e-5),
+    MeshLevel(3, 7, 6, 9e-6),
+)
 
 
 def why_not_applicable(scene: Scene) -> str | None:
@@ -99,17 +124,45 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
     coarse = grid(scene)
     values = [0.0, 0.0, *(permittivity[name] for name in coarse.names[2:])]
-    for rung, pair in zip(_RUNGS, pairs(coarse, values), strict=True):
-        interval = total(pair).times(EPS0_F_PER_M * M_PER_MM)
-        yield Step(*rung, len(pair.flux.eps), pair.unknowns(), interval)
-        if interval.width() <= width:
+    for mesh, pair, cell in narrowed(total, coarse, values, width):
+        interval = cell.times(EPS0_F_PER_M * M_PER_MM)
+        yield Step(mesh.layers, mesh.order, mesh.flux_order, len(pair.flux.eps), pair.unknowns(), interval)
+
+
+def narrowed(
+    bounds: Callable[[Pair], Bounded], coarse: Grid, values: Sequence[complex], width: float
+) -> Iterator[tuple[MeshLevel, Pair, Bounded]]:
+    """Bounds on meshes of a grid from coarse to fine, until they are narrow enough.
+
+    Parameters
+    ----------
+    bounds : callable
+        From both kinds of elements on one mesh.
+    coarse : Grid
+        A cell.
+    values : sequence of float or complex
+        Permittivity of each of its names [-].
+    width : float
+        Relative width of the bounds that is wanted [-].
+
+    Notes
+    -----
+    Meshes are left out that miss the width if they narrow the bounds as they do on rect, and those too large for the
+    memory.
+    """
+    left = list(MESHES)
+    while left:
+        mesh = left.pop(0)
+        fine = layered(coarse, [abs(v) for v in values], mesh.layers)
+        pair = Pair.of(fine, values, mesh.order, mesh.flux_order)
+        if mesh != MESHES[0] and pair.unknowns() > _MOST_UNKNOWNS:
             return
-
-
-def pairs(coarse: Grid, values: Sequence[float]) -> Iterator[Pair]:
-    """Meshes of a grid of boxes from coarse to fine; ``values``: the permittivity of each of its names [-]."""
-    for layers, order, flux_order in _RUNGS:
-        yield Pair.of(layered(coarse, values, layers), values, order, flux_order)
+        found = bounds(pair)
+        yield mesh, pair, found
+        if found.width() <= width:
+            return
+        enough = [finer for finer in left if found.width() * finer.width <= width * mesh.width]
+        left = enough or left[-1:]
 
 
 def total(pair: Pair) -> Interval:
@@ -150,18 +203,16 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     coarse = grid(scene)
     values = [0j, 0j, *(complex(permittivity[name]) for name in coarse.names[2:])]
     turn = turned(values[2:])
-    found = []
-    for layers, order, flux_order in _RUNGS:
-        pair = Pair.of(layered(coarse, [abs(v) for v in values], layers), values, order, flux_order)
-        # The part, and how sure it is, by its flux.
+
+    def bounds(pair: Pair) -> Disc:
         u, level = pair.potential.solved(), pair.flux.solved()
         rho = np.array([turn.weight[eps] for eps in pair.flux.eps.tolist()])
         upper, lower = ((x * boxes.answers(x)).sum() for x, boxes in ((u, pair.potential), (level, pair.flux)))
-        part, unmet = pair.part(level, rho)
+        part, unmet = pair.part(level, rho)  # by the flux
         most = float(np.ptp(pair.flux.shares))
         size = unmet / most if most else 0.0
         fields = Fields(lower, upper, part, size, pair.apart(u, level, rho), pair.unknowns())
-        found.append(disc(fields, turn, pair.flux.shares.tolist()))
-        if found[-1].width() <= width:
-            break
-    return min(found, key=Disc.width).times(EPS0_F_PER_M * M_PER_MM)
+        return disc(fields, turn, pair.flux.shares.tolist())
+
+    found = min((cell for *_, cell in narrowed(bounds, coarse, values, width)), key=Disc.width)
+    return found.times(EPS0_F_PER_M * M_PER_MM)

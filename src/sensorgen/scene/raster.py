@@ -13,6 +13,7 @@ from sensorgen.scene.unit_cell import Band, Slice, mirrored
 
 LARGER = 2  # slices of a cell that the sensor's end does not cut, over those of one that it cuts
 
+
 @dataclass(frozen=True)
 class Raster:
     """Boxes between planes.
