@@ -459,6 +459,18 @@ def test_factors_are_those_of_the_whole_matrix():
     assert found == pytest.approx(np.linalg.solve(matrix.toarray(), right), rel=1e-8, abs=1e-10)
 
 
+def test_couplings_that_cancel_are_couplings():
+    """Of three neighbours in a row they add up to nothing: blocks that touch would be taken for apart."""
+    places = np.array(list(product(range(9), range(9), range(3))))
+    weight = np.array([1.0, 1.0, -2.0])[places[:, 1] % 3]
+    near = (abs(places[:, None] - places[None]).max(axis=2) <= 1) & ~np.eye(len(places), dtype=bool)
+    matrix = np.where(near, weight[:, None] * weight, 0.0) + 200 * np.eye(len(places))
+    order = factors.order_of(csr_matrix(matrix), places)
+    right = np.arange(len(places)) + 1.0
+    found = factors.factored(csr_matrix(matrix), order).solve(right)
+    assert found == pytest.approx(np.linalg.solve(matrix, right), rel=1e-9)
+
+
 def test_air_goes_along_evenly_with_what_is_stretched_evenly():
     """Walls, mirrors and a top that move by a linear map take all air along by the same, also where it ends a cell."""
     fill = [[[2, 1, 3]], [[2, 0, 3]], [[2, 1, 3]], [[2, 0, 3]]]

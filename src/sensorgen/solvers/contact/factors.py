@@ -86,7 +86,9 @@ def order_of(matrix: csr_matrix, places: Whole) -> Order:
         Of each unknown; blocks are cut at even places.
     """
     pieces: list[tuple[Whole, tuple[int, ...]]] = []
-    _dissected(matrix, places, np.arange(len(places)), pieces)
+    pattern = matrix.tocsr(copy=True)
+    pattern.data = np.ones_like(pattern.data)  # values may cancel
+    _dissected(pattern, places, np.arange(len(places)), pieces)
     turn = np.concatenate([own for own, _ in pieces])
     ends = np.cumsum([len(own) for own, _ in pieces])
     turned = matrix[turn][:, turn]
@@ -99,7 +101,7 @@ def order_of(matrix: csr_matrix, places: Whole) -> Order:
     return Order(turn, fronts)
 
 
-def _dissected(matrix: csr_matrix, places: Whole, block: Whole, pieces: list[tuple[Whole, tuple[int, ...]]]) -> int:
+def _dissected(pattern: csr_matrix, places: Whole, block: Whole, pieces: list[tuple[Whole, tuple[int, ...]]]) -> int:
     """Put a block's pieces into a list, what is eliminated first before the rest; the number of its last one."""
     cut = _cut(places[block]) if len(block) > _LEAST else None
     if cut is None:
@@ -108,8 +110,8 @@ def _dissected(matrix: csr_matrix, places: Whole, block: Whole, pieces: list[tup
     beyond = np.zeros(len(places), bool)
     beyond[block[~cut]] = True
     left = block[cut]
-    touches = matrix[left] @ beyond.astype(float) != 0
-    children = tuple(_dissected(matrix, places, half, pieces) for half in (left[~touches], block[~cut]) if len(half))
+    touches = pattern[left] @ beyond.astype(float) != 0
+    children = tuple(_dissected(pattern, places, half, pieces) for half in (left[~touches], block[~cut]) if len(half))
     pieces.append((left[touches], children))
     return len(pieces) - 1
 
