@@ -1,12 +1,15 @@
 """Boxes under pressure: closed forms, the plane-strain model, another field solver, and what must not change."""
 
+import json
 from itertools import pairwise, product
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.sparse import csr_matrix
 
+from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models import fem2d, fem3d, press2d, press3d, springs
@@ -457,6 +460,58 @@ def test_factors_are_those_of_the_whole_matrix():
     right = rng.normal(size=len(places))
     found = factors.factored(matrix, order).solve(right)
     assert found == pytest.approx(np.linalg.solve(matrix.toarray(), right), rel=1e-8, abs=1e-10)
+
+
+def mesh_of_order_two(pieces, stress, rise=2e-9, moved=1e-6, error=0.3):
+    """What a mesh would give whose error falls with the square of the pieces."""
+    share = (1 - error / pieces**2) * np.asarray(stress) / 1e5
+    field = 1e-10 / pieces * (1 + 0.01 * share)
+    bounds = tuple(Interval(2e-7 + rise * s - f, 2e-7 + rise * s + f) for s, f in zip(share, field, strict=True))
+    nothing = np.zeros(len(stress))
+    return press3d.Pressed(
+        np.array(stress), 1e-7 + moved * share, bounds, (), 1 + nothing, nothing, nothing, 1e-7, ()
+    )  # fmt: skip
+
+
+def test_two_meshes_lead_to_their_limit():
+    every, some = [0.0, 2e4, 5e4, 1e5, 1.2e5], [0.0, 5e4, 1e5]
+    fine = mesh_of_order_two(3, every)
+    found = press3d.limit(fine, mesh_of_order_two(2, some), 3)
+    assert found.rise_f_per_m2 == pytest.approx(2e-9 * np.array(every) / 1e5, rel=1e-6)
+    assert found.found.displacement_m - 1e-7 == pytest.approx(1e-6 * np.array(every) / 1e5, rel=1e-9)
+    beyond = 0.3 / 9 * found.rise_f_per_m2[:4]
+    assert found.rise_error_f_per_m2[:4] == pytest.approx(0.5 * beyond, rel=0.02)
+    assert found.displacement_error_m[:4] == pytest.approx(0.5 * 0.3 / 9 * 1e-6 * np.array(every[:4]) / 1e5, rel=1e-9)
+    assert np.isinf([found.rise_error_f_per_m2[4], found.displacement_error_m[4]]).all()
+    assert [c.upper - c.lower for c in found.found.capacitance_f_per_m2] == pytest.approx(
+        [c.upper - c.lower for c in fine.capacitance_f_per_m2], rel=1e-6
+    )
+    one = press3d.limit(fine, mesh_of_order_two(3, some), 3)  # too many boxes to be cut further
+    assert np.isinf(one.rise_error_f_per_m2[1:]).all()
+    assert (one.rise_error_f_per_m2[0], one.displacement_error_m[0]) == (0.0, 0.0)
+
+
+def test_the_stated_rise_holds_that_of_a_second_program():
+    """NGSolve, displacement of order 3 on graded bricks at small strain; a cell unlike the stored ones."""
+    reference = json.loads((Path(__file__).parents[1] / "reference" / "rect_rise.json").read_text("utf-8"))
+    case = reference["cells"][2]
+    exact = case["meshes"][-1]
+    sizes = {name: value for name, value in case.items() if name != "meshes"}
+    bricks = press3d.cell(make({"shape": "rect", "parameters": sizes}).in_use)
+    fine, coarse = (
+        press3d.press(bricks, solids(), [0.0, reference["pressure_pa"]], EPS, None, Pieces(n)) for n in (3, 2)
+    )
+    found = press3d.limit(fine, coarse, 3)
+    rest, apart = found.found.capacitance_f_per_m2[0], abs(exact["rise"] - case["meshes"][0]["rise"])
+    assert rest.lower * 4e-6 * 1.21 < exact["capacitance_f"] < rest.upper * 4e-6 * 1.21
+    rise, error = found.rise_f_per_m2[1] / rest.middle(), found.rise_error_f_per_m2[1] / rest.middle()
+    assert abs(rise - exact["rise"]) < error
+    assert error < 0.025 * rise
+    assert apart < 0.02 * rise
+    moved, off = found.found.displacement_m[1] * 1e6, found.displacement_error_m[1] * 1e6
+    assert abs(moved - exact["displacement_um"]) < off < 0.01 * moved
+    raw = fine.capacitance_f_per_m2[1].middle() / rest.middle() - 1
+    assert abs(raw - exact["rise"]) > error  # the finer mesh alone lies outside
 
 
 def test_couplings_that_cancel_are_couplings():

@@ -266,9 +266,26 @@ def estimated(
     last = len(found.stress_pa) - 1
     shared = sorted({0, min(1, last), *range(last, 0, -_APART)})
     some = [float(found.stress_pa[k]) for k in shared]
-    if last == 0 or _size(case.model, level - 1) == inf:
-        return _errors(case, found, found.first(1), level)
-    return _errors(case, found, pressed(case, some, level - 1, keep=keep).sound(), level)
+    alone = last == 0 or _size(case.model, level - 1) == inf
+    coarse = found.first(1) if alone else pressed(case, some, level - 1, keep=keep).sound()
+    return (_errors if case.model == "press2d" else _limit)(case, found, coarse, level)
+
+
+def _limit(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estimate:
+    """Where two meshes of boxes lead, with at least the error that this has on other cells."""
+    from sensorgen.models import press3d
+
+    ahead = press3d.limit(fine, coarse, press3d.Pieces().pieces + level)
+    least = max(_expected(case, level), VERIFIED)
+    down = ahead.found.displacement_m - fine.fall_m
+    moved = np.maximum(ahead.displacement_error_m, _OF_DISPLACEMENT * least * down)
+    rises = np.maximum(ahead.rise_error_f_per_m2, least * np.abs(ahead.rise_f_per_m2))
+    return Estimate(ahead.found, moved, ahead.rise_f_per_m2, rises)
+
+
+def _expected(case: Case, level: int) -> float:
+    """Error of the rise that a mesh has on other cells [-]."""
+    return next(mesh.rise_error for mesh in mesh_levels(case.piece, case.model, 1) if mesh.level == level)
 
 
 def _errors(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estimate:
@@ -276,9 +293,8 @@ def _errors(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estim
 
     Differences of two meshes scatter, and are small by chance at some loads: what was seen at a lower load counts on.
     """
-    n, plane = len(fine.stress_pa), case.model == "press2d"
-    rise, spread = _rise(fine, plane)
-    other, _ = _rise(coarse, plane)
+    n = len(fine.stress_pa)
+    (rise, spread), (other, _) = _rise(fine), _rise(coarse)
     at = np.searchsorted(fine.stress_pa, coarse.stress_pa)
     factor = _GRID / ((_size(case.model, level - 1) / _size(case.model, level)) ** _ORDER - 1)
     # Difference at each pressure: that of the next shared one
@@ -287,10 +303,9 @@ def _errors(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estim
     apart = (coarse.displacement_m - coarse.fall_m - down[at], other - rise[at])
     index = [np.append(factor * np.maximum.accumulate(np.abs(d)), np.inf)[following] for d in apart]
     # At least
-    expected = next(mesh.rise_error for mesh in mesh_levels(case.piece, case.model, 1) if mesh.level == level)
     apex = np.array(fine.apex_m) if fine.apex_m else np.zeros(n)
     small = _AT_APEX * (apex / np.where(down > 0, down, np.inf)) ** _AT_APEX_POWER
-    least = max(expected, VERIFIED) * (1 + small)
+    least = max(_expected(case, level), VERIFIED) * (1 + small)
     moved, rises = (
         np.maximum(index[0], _OF_DISPLACEMENT * least * down),
         np.maximum(index[1], least * np.abs(rise)) + spread,
@@ -299,18 +314,15 @@ def _errors(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estim
     return Estimate(fine, moved, rise, rises)
 
 
-def _rise(found: "Pressed", plane: bool) -> tuple[Real, Real]:
+def _rise(found: "Pressed") -> tuple[Real, Real]:
     """Rise of the capacitance, and by how much its field's bounds leave it open [F/m2].
 
-    In a cross-section the air is meshed anew at each pressure, and bounds are independent. In 3D one mesh is deformed.
+    The air is meshed anew at each pressure: bounds are independent.
     """
     bounds = [(c.lower, c.upper) if c else (np.nan, np.nan) for c in found.capacitance_f_per_m2]
     lower, upper = np.array(bounds).reshape(-1, 2).T
     middle = (lower + upper) / 2
-    from_rest = middle - middle[:1]
-    if plane:
-        return from_rest, (upper - lower + (upper - lower)[:1]) / 2
-    return from_rest, np.abs((upper - upper[:1]) - (lower - lower[:1])) / 2
+    return middle - middle[:1], (upper - lower + (upper - lower)[:1]) / 2
 
 
 def _press(case: Case) -> "tuple[Callable[..., Pressed], str]":
