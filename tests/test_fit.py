@@ -9,9 +9,10 @@ import yaml
 from drawn_sensor import sensor_of
 from scipy import stats
 
+from sensorgen.analysis.comparison.allowed import Allowed
 from sensorgen.analysis.fit import Fit, Fitted, Untold, fit, text
 from sensorgen.analysis.fit.fitting import held_back
-from sensorgen.analysis.fit.resistance import Allowed, leak, resistivity
+from sensorgen.analysis.fit.resistance import leak, resistivity
 from sensorgen.analysis.fit.tones import _together
 from sensorgen.cli import cli
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
@@ -197,7 +198,10 @@ def test_words_in_a_source_are_text():
 
 
 def test_recordings_give_back_what_they_were_made_with(tmp_path):
-    """Factors to the prediction: resistivity 0.5, capacitance 1.3, modulus 0.5; a leak of 2 nS on 10 cm2."""
+    """Factors to the prediction: resistivity 0.5, capacitance 1.3, modulus 0.5; a leak of 2 nS on 10 cm2.
+
+    Values are as sure as a bench is that may have a lead, a stray capacitance and gains of its own.
+    """
     names = [f"30 triX .1mm {k}" for k in (1, 2)]
     design = design_of(parse(names[0]))
     sensor = bench_files.truth(design, **bench_files.TRUTH)
@@ -207,9 +211,10 @@ def test_recordings_give_back_what_they_were_made_with(tmp_path):
         made = fit(log, 30)
     top, bottom = (r.value for r in electrode_resistance(default_body(design)).values())
     both = (top + bottom) / (top / 0.07 + bottom / 0.2)  # one resistivity for both, one of them with cogs
-    assert value(made, "resistivity_ohm_m").value == pytest.approx(0.5 * both, rel=3e-3)
+    assert value(made, "resistivity_ohm_m").value == pytest.approx(0.5 * both, rel=0.02)
     assert value(made, "youngs_modulus_pa").value == pytest.approx(0.5 * 6e6, rel=5e-3)
-    assert value(made, "leak_s_per_m2").value == pytest.approx(2e-9 / 1e-3, rel=0.1)
+    leak_ = next(u.why for u in made.untold if u.parameter == "leak")  # 0.3 % of what C takes: a phase of 0.2 degrees
+    assert 2e-9 / 1e-3 < float(leak_.partition("no more than ")[2].split()[0]) < 3 * 2e-9 / 1e-3
     eps = value(made, "relative_permittivity")
     known = materials.load("x60").value("relative_permittivity").value
 
@@ -218,7 +223,7 @@ def test_recordings_give_back_what_they_were_made_with(tmp_path):
         own_value = {"x60": {"relative_permittivity": permittivity}}
         return rest_state(default_body(make(data | {"material_values": own_value}))).capacitance.value
 
-    assert capacitance(eps.value) / capacitance(known) == pytest.approx(1.3, rel=1e-2)
+    assert capacitance(eps.value) / capacitance(known) == pytest.approx(1.3, rel=1.5e-2)
     assert eps.high / eps.low > 1.5  # the bounds of the cell's model are in it
     for v in made.values:
         assert v.low < v.value < v.high
@@ -239,11 +244,11 @@ def test_a_leak_comes_back_in_the_next_prediction(tmp_path):
     found, unfitted = (evaluate(default_body(d), plain) for d in (fitted, design))
     truth = [complex(sensor.impedance(z.frequency_hz, 0.0, 0.05)) for z in found.impedance]
     for z, now in zip(truth, found.impedance, strict=True):
-        assert (now.re.value, now.im.value) == (pytest.approx(z.real, rel=0.02), pytest.approx(z.imag, rel=0.02))
+        assert (now.re.value, now.im.value) == (pytest.approx(z.real, rel=0.03), pytest.approx(z.imag, rel=0.03))
     assert unfitted.impedance[0].re.value < truth[0].real / 20
     assert {"leak_s_per_m2": "fit-30"}.items() <= {v.quantity: v.source for v in found.values}.items()
     line_of = sensor_of(make({"shape": "tri", "materials": taken})).sensor
-    assert line_of.leak_s_per_m * line_of.length_m == pytest.approx(4e-7, rel=0.02)
+    assert line_of.leak_s_per_m * line_of.length_m == pytest.approx(4e-7, rel=0.03)
 
 
 def test_a_leak_that_the_design_sets_itself():

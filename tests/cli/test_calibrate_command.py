@@ -29,7 +29,7 @@ def made(tmp_path_factory):
         log_recording(log, "S1", folder / "run-lcr.csv", folder / "run-rig.csv")
     shutil.copytree(folder, folder / "calibrated")
     with Log(folder / "calibrated" / "log.db") as log:
-        one = calibration.calibrate(log, ["S1"], body_of=drawn_body)
+        one = calibration.calibrate(log, ["S1"], calibration.Bench(tip_m=5e-3), body_of=drawn_body)
         log.add(calibration.rows(log, [one[0].calibration]))
     return folder
 
@@ -74,7 +74,7 @@ def covered(found, name, unit):
 
 
 def test_from_files_of_the_bench_to_force_and_place(bench, tmp_path):
-    said = bench("calibrate", "S1", "--drawn", "--page", "cal.html")
+    said = bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--page", "cal.html")
     assert (said.code, said.err) == (0, "")
     assert "S1, design mine: calibrated by 24 known presses" in said.words
     assert "of 24 forces and" in said.words
@@ -95,8 +95,8 @@ def test_from_files_of_the_bench_to_force_and_place(bench, tmp_path):
 
 
 def test_the_record_of_the_log_says_it_all(bench):
-    found = json.loads(bench("calibrate", "S1", "--drawn", "--dry-run", "--json").out)
-    assert found["schema"] == 1
+    found = json.loads(bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json").out)
+    assert found["schema"] == 2
     assert len(found["posterior"]["at"]) == len(found["values"]) == len(found["parameters"])
     assert found["held_out"]["presses"] == 24
     assert "was never calibrated" in bench("invert", "S1", "none.csv").line

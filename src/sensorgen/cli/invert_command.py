@@ -82,14 +82,17 @@ def _work(
         if rest_file:
             raise BadInput("--perfect needs no reading at rest; expected one of --perfect and --rest")
         return _perfect(body, query, measured, output, **how)
-    from sensorgen.analysis.calibration import Bench, model_of
+    from sensorgen.analysis.calibration import Bench, spread_of
     from sensorgen.prediction.calibration import fitting
+    from sensorgen.prediction.calibration.specimen import SpecimenModel
+    from sensorgen.prediction.planning import sensor_model
 
     def inverter(rest: "Rest", tones_hz: Any, noise: Any, limit_n: float | None) -> "tuple[Inverter, float, int, Any]":
         from sensorgen.prediction.calibration.inversion import Inverter
         from sensorgen.prediction.inverse import FORCE_LIMIT_N
 
-        model, found = model_of(body, tones_hz, Bench(tip_mm * units.M_PER_MM))
+        found, _ = sensor_model(body, query)
+        model = SpecimenModel(found.sensor, tones_hz, spread_of(found, Bench(query.tip.length_m)))
         limit, (mean, count) = limit_n or FORCE_LIMIT_N, rest.mean()
         if not np.isfinite(mean).all():
             raise BadInput(f"{measured}: a frequency without a reading at rest; expected one at each")
