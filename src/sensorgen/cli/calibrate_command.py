@@ -17,10 +17,10 @@ def _work(
     specimens: tuple[str, ...], tip_mm: float, force_offset: str, recordings: tuple[int, ...], page: str | None,
     file: str | None, *, again: bool, dry_run: bool,
 ) -> int:  # fmt: skip
-    """Calibrate specimens by recordings with known presses that the log has of them.
+    """Calibrate specimens by recordings with known presses, and by readings of meters, that the log has of them.
 
     Several specimens share the bench. Some 30 presses, half of them after a higher one and held for 0.3 to 30 s, are
-    enough; with none, R, C and leak are calibrated by the readings at rest. 'sensorgen invert SPECIMEN' then uses the
+    enough; with none, R, C and leak are calibrated by what was read at rest. 'sensorgen invert SPECIMEN' then uses the
     result, which the log keeps.
     """
     from sensorgen.analysis import calibration

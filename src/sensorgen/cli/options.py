@@ -56,8 +56,8 @@ def bench() -> list[click.Parameter]:
     return [
         option("--tip tip_mm", Length(), "Length of the tip.", default="10mm"),
         option(
-            "--force-offset", None, "Force on the sensor above what the rig says, as the weight of its piston: 0.9+-0.1 "
-            "for the thesis's.", default="0+-0.1", metavar="N+-N",
+            "--force-offset", None, "Force above what the rig says, as its piston's weight: 0.9+-0.1 for the thesis's.",
+            default="0+-0.1", metavar="N+-N",
         ),
     ]  # fmt: skip
 

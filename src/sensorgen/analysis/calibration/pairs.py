@@ -21,7 +21,7 @@ from sensorgen.prediction.calibration.specimen import Presses
 from sensorgen.prediction.query import TONES_HZ
 
 _LEAST_ERROR = 3e-4  # of a mean at rest: from one recording to the next it differs by more than its noise
-_UNTOLD = 1e3  # standard deviation of what was never measured [-]
+_UNKNOWN = 1e3  # standard deviation of what was never measured [-]
 _SHORTEST_S = 0.1  # of a hold: its logarithm counts
 
 
@@ -73,11 +73,11 @@ def known_presses(log: Log, name: str, rows: Sequence[BenchRun]) -> tuple[Data, 
 
 
 def nothing_recorded() -> Data:
-    """Of a specimen that was never on the bench: no press, and nothing told of the tones of the thesis's multi-sine."""
+    """Of a specimen that was never on the bench: no press, nothing known at the tones of the thesis's multi-sine."""
     m, none = len(TONES_HZ), np.empty(0)
     nothing = np.empty((0, m))
     return Data(
-        Presses(none, none, none, none), nothing.astype(complex), nothing, np.zeros(m, complex), np.full(m, _UNTOLD)
+        Presses(none, none, none, none), nothing.astype(complex), nothing, np.zeros(m, complex), np.full(m, _UNKNOWN)
     )
 
 

@@ -3,6 +3,7 @@
 Each parameter is a standard normal number before calibration; its unit is the standard deviation of the prior.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import pairwise
@@ -213,8 +214,8 @@ class SpecimenModel:
         self, at: Real, presses: Presses, changes: Real | None = None, *, loaded: bool = True,
         frequency_hz: Real | None = None,
     ) -> Complex:  # fmt: skip
-        sensor, spread, of = self.sensor, self.spread, self._at
-        value = {name: at[..., k, None] for name, k in of.items()}
+        sensor, spread = self.sensor, self.spread
+        value = {name: at[..., k, None] for name, k in self._at.items()}
         rise, c, r = np.moveaxis(np.zeros(3) if changes is None else changes, -1, 0)[..., None]
         position = np.clip(presses.position_m + spread.position_m * value["position offset"], 0, sensor.length_m)
         force = np.zeros(position.shape)
@@ -226,7 +227,7 @@ class SpecimenModel:
         length = np.broadcast_to(patch.length_m, position.shape)
         stress = force / (sensor.width_m * length)
         share, _ = sensor.compression.capacitive_strain(np.minimum(stress, self.most_pa))
-        first = of[f"rise at {FORCES_N[0]:g} N"]
+        first = self._at[f"rise at {FORCES_N[0]:g} N"]
         knots = spread.law_shape * (at[..., first : first + len(FORCES_N)] @ self._shapes.T)
         ln_rise = rise + spread.law * value["rise"] + _interpolated(np.log(np.maximum(force, _NOTHING_N)), knots)
         for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
@@ -234,16 +235,8 @@ class SpecimenModel:
         lifted = 1 + share / (1 - share) * np.maximum(stress / self.most_pa, 1.0) * np.exp(ln_rise)
 
         omega = 2 * np.pi * (self.frequency_hz if frequency_hz is None else frequency_hz)
-        lowest = 2 * np.pi * self.frequency_hz.min()
-        per_m = (sensor.capacitance_f_per_m * np.exp(spread.capacitance * value["capacitance"] + c))[..., None]
-        exponent = spread.dispersion * np.exp(value["dispersion"] - 0.5)[..., None]
-        leak = (
-            sensor.leak_s_per_m + spread.leak * np.exp(spread.leak_spread * value["leak"])[..., None] * lowest * per_m
-        )
-        film = 1j * omega * (omega / lowest) ** -exponent * np.exp(-0.5j * np.pi * exponent)
-        loose = leak + (film + sensor.tan_delta * omega) * per_m
-        pressed = leak + (film + sensor.tan_delta * omega) * per_m * lifted[..., None]
-
+        leak, stored = self._film(value, c, omega)
+        loose, pressed = leak + stored, leak + stored * lifted[..., None]
         track, by_pressure = sensor.track_ohm_per_m()
         whole = track * np.exp(spread.resistance * value["resistance"] + r)
         left, right = patch.left_m, np.maximum(sensor.length_m - patch.left_m - length, 0.0)
@@ -257,6 +250,15 @@ class SpecimenModel:
         )
         stray, lead = (np.exp(value[name] - 0.5)[..., None] for name in ("stray", "lead"))
         return np.asarray(np.log(spread.lead_ohm * lead + 1 / (1 / z + 1j * omega * spread.stray_f * stray)))
+
+    def _film(self, value: Mapping[str, Real], c: Real, omega: Real) -> tuple[Complex, Complex]:
+        """Admittance of the film with nothing on it [S/m]: of its leak, and of what rises with C."""
+        sensor, spread, lowest = self.sensor, self.spread, 2 * np.pi * self.frequency_hz.min()
+        per_m = (sensor.capacitance_f_per_m * np.exp(spread.capacitance * value["capacitance"] + c))[..., None]
+        leak = spread.leak * np.exp(spread.leak_spread * value["leak"])[..., None] * lowest * per_m
+        exponent = spread.dispersion * np.exp(value["dispersion"] - 0.5)[..., None]
+        stored = 1j * omega * (omega / lowest) ** -exponent * np.exp(-0.5j * np.pi * exponent)
+        return sensor.leak_s_per_m + leak, (stored + sensor.tan_delta * omega) * per_m
 
     def _bent(self, at: Real, start_m: Real, end_m: Real) -> Real:
         """Mean of ln resistivity over parts of the strip, less that of the whole."""
