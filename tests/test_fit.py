@@ -190,7 +190,7 @@ def test_a_source_cannot_have_the_name_of_one_that_ships():
 def test_words_in_a_source_are_text():
     bad = 'a": }\n# b: [&x]'
     made = Fit(
-        1, 1, (Fitted("etpu", "resistivity_ohm_m", 1.0, 0.5, 2.0, bad),), (Untold("E", bad),), (), 1, (), (), bad
+        1, (), 1, (Fitted("etpu", "resistivity_ohm_m", 1.0, 0.5, 2.0, bad),), (Untold("E", bad),), (), 1, (), (), bad
     )
     data = yaml.safe_load(text(made))
     assert data["materials"]["etpu"]["resistivity_ohm_m"]["note"] == bad
@@ -293,3 +293,29 @@ def test_the_command(tmp_path, capsys):
     assert own.names() == ["fit-60"]
     with pytest.raises(SensorgenError):
         cli.main(["fit", "--iteration", "61", "--log", place], standalone_mode=False)
+
+
+def test_specimens_of_any_name(tmp_path, capsys):
+    """Three plates of an own design, bound by their names: an LCR meter's C 20 % above the prediction, and R_Y."""
+    place, file = str(tmp_path / "log.db"), tmp_path / "mine.yaml"
+    file.write_text("shape: tri\nname: mine\nparameters:\n  dielectric_mm: 0.2\n")
+    design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}})
+    c_pf = rest_state(drawn(design)).capacitance.value * 1e12
+    resistance = max(r.value for r in rest_state(drawn(design)).resistance.values())
+    for k, name in enumerate(("S1", "S2", "S3")):
+        words = ["--design", str(file), "--y", f"{resistance * (0.97 + 0.03 * k):.6g}"]
+        words += ["--C", f"{1.2 * c_pf * (0.99 + 0.01 * k):.6g}pF@1kHz", "--instrument", "HP 4284A"]
+        assert not cli.main(["log", "add", name, *words, "--log", place], standalone_mode=False)
+    cli.main(["fit", "S1", "S2", "S3", "--drawn", "--log", place], standalone_mode=False)
+    said = " ".join(capsys.readouterr().out.split())
+    assert "S1, S2, S3: 3 specimens fitted to" in said
+    assert own.names() == ["fit-s1-and-2"]
+    fitted = yaml.safe_load(own.path("fit-s1-and-2").read_text("utf-8"))["materials"]
+    eps = fitted["x60"]["relative_permittivity"]
+    data = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}, "materials": {"dielectric": "x60@fit-s1-and-2"}}
+    assert rest_state(drawn(make(data))).capacitance.value * 1e12 == pytest.approx(1.2 * c_pf, rel=0.02)
+    assert eps["low"] < eps["value"] < eps["high"]
+    with pytest.raises(BadInput, match="expected either specimens"):
+        cli.main(["fit", "S1", "--iteration", "3", "--log", place], standalone_mode=False)
+    with pytest.raises(BadInput, match="nobody"):
+        cli.main(["fit", "nobody", "--log", place], standalone_mode=False)

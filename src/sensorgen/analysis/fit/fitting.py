@@ -19,6 +19,7 @@ from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
 from sensorgen.measure.log import BenchRun, Log, Reading
+from sensorgen.measure.log.notes import specimen as named
 from sensorgen.prediction import bodies
 
 HELD_BACK = 0.25  # of the specimens
@@ -27,18 +28,21 @@ STEPS = ("readings", "recordings", "values", "errors")
 _ACROSS = Untold("resistivity_ohm_m across", "nothing was measured across the electrodes: R_Y and Re Z run along them")
 
 
+_Which = tuple[int | None, Sequence[str]]  # iteration, or specimens
+
+
 def fit(
-    log: Log, iteration: int, seed: int = SEED, body_of: BodyOf = bodies.default_body,
-    step: Callable[[str], None] = lambda _: None, bench: Bench | None = None,
+    log: Log, iteration: int | None, seed: int = SEED, body_of: BodyOf = bodies.default_body,
+    step: Callable[[str], None] = lambda _: None, bench: Bench | None = None, *, specimens: Sequence[str] = (),
 ) -> Fit:  # fmt: skip
-    """Fit material values to the readings and recordings of an iteration.
+    """Fit material values to the readings and recordings of an iteration or of specimens.
 
     Parameters
     ----------
     log : Log
         An open one.
-    iteration : int
-        Of the design.
+    iteration : int or None
+        Of the design; None where specimens are given.
     seed : int
         Of the split between specimens that are fitted to and specimens that are held back.
     body_of : callable
@@ -47,22 +51,26 @@ def fit(
         Called with each of ``STEPS``, and with the name of each design to predict, before it is done.
     bench : Bench, optional
         Its tip and force.
+    specimens : sequence of str
+        Specimens as written, in place of an iteration.
 
     Raises
     ------
     BadInput
-        Nothing of that iteration in the log that a fit could use.
+        Nothing of them in the log that a fit could use; no such specimen.
     """
     step("readings")
-    found = of_iteration(log, iteration, step, body_of)
+    specimens = tuple(dict.fromkeys(named(name, log).specimen for name in specimens))
+    found = of_iteration(log, iteration, step, body_of, specimens=specimens)
     left_out = list(found.left_out)
     step("recordings")
-    measured = list(_measured(log, iteration, found, bench or Bench(), body_of, left_out))
+    measured = list(_measured(log, (iteration, specimens), found, bench or Bench(), body_of, left_out))
     readings = list(_usable(found))
     names = sorted({specimen for specimen, _ in readings} | {one.specimen for one, _ in measured})
     if not names:
+        of = ", ".join(specimens) or f"iteration {iteration}"
         raise BadInput(
-            f"no readings of sound electrodes and no recordings of iteration {iteration} in {str(log.path)!r}; "
+            f"no readings of sound electrodes and no recordings of {of} in {str(log.path)!r}; "
             "expected some to fit to: sensorgen log list shows what there is"
         )
     kept_back = held_back(names, seed)
@@ -81,17 +89,17 @@ def fit(
         *_rest_errors([one for one, _ in measured if one.specimen in kept_back], found, values),
     ]
     return Fit(
-        iteration, seed, tuple(values), tuple(untold), tuple(errors), len(names) - len(kept_back),
-        tuple(sorted(kept_back)), tuple(left_out), _fingerprint(log, iteration),
+        iteration, specimens, seed, tuple(values), tuple(untold), tuple(errors), len(names) - len(kept_back),
+        tuple(sorted(kept_back)), tuple(left_out), _fingerprint(log, (iteration, specimens)),
     )  # fmt: skip
 
 
 def _measured(
-    log: Log, iteration: int, found: Comparison, bench: Bench, body_of: BodyOf, left_out: list[tuple[str, str]]
+    log: Log, which: _Which, found: Comparison, bench: Bench, body_of: BodyOf, left_out: list[tuple[str, str]]
 ) -> Iterator[tuple[Known, str]]:
     """Specimens that the bench or an LCR meter has measured, each with the name of its print."""
     prints: dict[str, str] = {}
-    for row in (*log.about(BenchRun, iteration), *found.alternating):
+    for row in (*log.about(BenchRun, *which), *found.alternating):
         prints[row.specimen] = row.batch or prints.get(row.specimen, "")
     for specimen, print_ in prints.items():
         try:
@@ -184,14 +192,11 @@ def _rest_errors(specimens: Sequence[Known], found: Comparison, values: Sequence
     return [Error("Z at rest", len(before), _rms(before), _rms(after))] if before else []
 
 
-def _fingerprint(log: Log, iteration: int) -> str:
+def _fingerprint(log: Log, which: _Which) -> str:
     """SHA-256 of what was fitted to."""
     digest, mark = sha256(), ""
-    readings = (
-        f"{r.uid} {r.specimen} {r.y_ohm} {r.z_ohm} {r.quantity} {r.value}"
-        for r in log.entries(Reading, iteration=iteration)
-    )
-    recordings = (f"{run.uid} {run.file} {run.rig_file}" for run in log.about(BenchRun, iteration))
+    readings = (f"{r.uid} {r.specimen} {r.y_ohm} {r.z_ohm} {r.quantity} {r.value}" for r in log.about(Reading, *which))
+    recordings = (f"{run.uid} {run.file} {run.rig_file}" for run in log.about(BenchRun, *which))
     for line in chain(readings, recordings):
         digest.update(f"{mark}{line}".encode())
         mark = "\n"
