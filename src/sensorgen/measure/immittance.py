@@ -16,7 +16,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from types import MappingProxyType
+from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.units import PREFIXES, frequency_hz, si
 
@@ -195,6 +200,38 @@ def impedance(values: Mapping[str, float], frequency_hz: float) -> complex | Non
                 return None
             return z if cmath.isfinite(z) else None
     return None
+
+
+_OF: Mapping[str, Callable[[Any, Any], Any]] = MappingProxyType({  # impedance and angular frequency to a quantity
+    "R": lambda z, _w: z.real, "X": lambda z, _w: z.imag, "Z": lambda z, _w: np.abs(z),
+    "phase": lambda z, _w: np.angle(z), "G": lambda z, _w: (1 / z).real, "B": lambda z, _w: (1 / z).imag,
+    "Y": lambda z, _w: 1 / np.abs(z), "Cp": lambda z, w: (1 / z).imag / w, "Cs": lambda z, w: -1 / (w * z.imag),
+    "Lp": lambda z, w: -1 / (w * (1 / z).imag), "Ls": lambda z, w: z.imag / w, "Rp": lambda z, _w: 1 / (1 / z).real,
+    "D": lambda z, _w: z.real / np.abs(z.imag), "Q": lambda z, _w: np.abs(z.imag) / z.real,
+})  # fmt: skip
+
+
+def quantity_of(quantity: str, z_ohm: ArrayLike, frequency_hz: ArrayLike) -> Real:
+    """A quantity of impedances.
+
+    Parameters
+    ----------
+    quantity : str
+        One of ``QUANTITIES``.
+    z_ohm, frequency_hz : (...) array
+        Impedances [ohm] and their frequencies [Hz].
+
+    Returns
+    -------
+    (...) array
+        In SI units.
+
+    Examples
+    --------
+    >>> round(float(quantity_of("Cp", 318183 - 15909131j, 1e3)) * 1e12, 4)
+    10.0
+    """
+    return np.asarray(_OF[quantity](np.asarray(z_ohm, complex), 2 * math.pi * np.asarray(frequency_hz)), float)
 
 
 def shown_value(quantity: str, value: float) -> str:

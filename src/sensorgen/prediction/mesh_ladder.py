@@ -239,7 +239,9 @@ class Estimate:
         """Largest relative errors of displacement and rise under load; infinite where one is unknown [-]."""
         down = np.where(self.found.displacement_m > 0, self.found.displacement_m, np.nan)[1:]
         pairs = (self.displacement_error_m[1:], down), (self.rise_error_f_per_m2[1:], self.rise_f_per_m2[1:])
-        off, rise = (float(np.nan_to_num(abs(error / value), nan=np.inf).max(initial=0.0)) for error, value in pairs)
+        off, rise = (
+            float(np.nan_to_num(abs(error / value), nan=inf, posinf=inf).max(initial=0.0)) for error, value in pairs
+        )
         return off, rise
 
 
@@ -297,19 +299,22 @@ def _errors(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estim
     (rise, spread), (other, _) = _rise(fine), _rise(coarse)
     at = np.searchsorted(fine.stress_pa, coarse.stress_pa)
     factor = _GRID / ((_size(case.model, level - 1) / _size(case.model, level)) ** _ORDER - 1)
-    # Difference at each pressure: that of the next shared one
-    following = np.searchsorted(at, np.arange(n))
     down = fine.displacement_m - fine.fall_m
-    apart = (coarse.displacement_m - coarse.fall_m - down[at], other - rise[at])
-    index = [np.append(factor * np.maximum.accumulate(np.abs(d)), np.inf)[following] for d in apart]
+    # Between two shared pressures the larger share of both
+    following = np.searchsorted(at, np.arange(n))
+    preceding = np.searchsorted(at, np.arange(n), side="right") - 1
+    index = []
+    for value, apart in ((down, coarse.displacement_m - coarse.fall_m - down[at]), (rise, other - rise[at])):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.append(factor * np.maximum.accumulate(np.abs(apart)) / np.abs(value[at]), inf)
+            share[0] = 0.0
+            index.append(np.maximum(share[preceding], share[following]) * np.abs(value))
     # At least
     apex = np.array(fine.apex_m) if fine.apex_m else np.zeros(n)
     small = _AT_APEX * (apex / np.where(down > 0, down, np.inf)) ** _AT_APEX_POWER
     least = max(_expected(case, level), VERIFIED) * (1 + small)
-    moved, rises = (
-        np.maximum(index[0], _OF_DISPLACEMENT * least * down),
-        np.maximum(index[1], least * np.abs(rise)) + spread,
-    )
+    moved = np.maximum(index[0], _OF_DISPLACEMENT * least * down)
+    rises = np.maximum(index[1], least * np.abs(rise)) + spread
     moved[0] = rises[0] = 0.0
     return Estimate(fine, moved, rise, rises)
 

@@ -133,7 +133,7 @@ def compress(
     pressure_kpa : sequence of float
         Rising [kPa].
     accuracy : float, optional
-        Relative width of the bounds of the capacitance, the error of the mesh in them [-].
+        Largest relative error of the rise of the capacitance at any pressure [-].
 
     Raises
     ------
@@ -255,9 +255,9 @@ def compare(log: Log, iteration: int) -> Comparison:
     return of_iteration(log, iteration)
 
 
-def fit(log: Log, iteration: int) -> Fit:
-    """Material values from the readings and recordings of an iteration; as :func:`sensorgen.analysis.fit.fit`."""
-    return fit_values(log, iteration)
+def fit(log: Log, *specimens: str, iteration: int | None = None) -> Fit:
+    """Material values by what was measured of specimens or of an iteration; as :func:`sensorgen.analysis.fit.fit`."""
+    return fit_values(log, iteration, specimens=specimens)
 
 
 def _named(design: Design) -> Design:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
@@ -176,6 +176,7 @@ def solve(
     from sensorgen.solvers.contact.factors import Solver
     from sensorgen.solvers.contact.load import Problem, curve
 
+    ramp: list[float] = []
     moduli, ratios = np.array([[s.youngs_modulus_pa, s.poisson_ratio] for s in solids]).T
     softest, elements = float(moduli.min()), Elements(mesh, law(moduli, ratios))
     load, penalty, stick = top_load(mesh.points_m, *mesh.top()), penalty_pa(softest), boundary.contact == "stick"
@@ -187,16 +188,16 @@ def solve(
 
         free = free_of(mesh.points_m, boundary)
         problem = Problem(elements, faces, free, load, penalty, stick, sound=sound, settled=_SETTLED, updates=_UPDATES)
-        first = [k * longest * softest for k in _FIRST]
+        ramp = [k * longest * softest for k in _FIRST]
     else:
         used = np.isin(np.arange(len(mesh.points_m)), mesh.outer)
         free = free_of(mesh.points_m, boundary, mesh.bricks.spans_m(), used)
         one = free.tocsc().indices[free.tocsc().indptr[:-1]]
         solver = Solver(mesh.lattice[one // 3])
-        problem, first = Problem(elements, brick_faces_of(mesh), free, load, penalty, stick, solver), []
-    first = [p for p in first if p < stress_pa[-1] and np.abs(np.divide(stress_pa, p) - 1).min() > _NEAR]
+        problem = Problem(elements, brick_faces_of(mesh), free, load, penalty, stick, solver)
+    ramp = [p for p in ramp if p < stress_pa[-1] and np.abs(np.divide(stress_pa, p) - 1).min() > _NEAR]
     every = []
-    for state in curve(problem, sorted({*stress_pa, *first}), longest * softest):
+    for state in curve(problem, sorted({*stress_pa, *ramp}), longest * softest):
         every.append(state)
         if state.pressure_pa in stress_pa:
             step(state.pressure_pa)
@@ -272,7 +273,7 @@ def joined(parts: Sequence[Pressed], last_pa: float) -> Pressed:
     arrays = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
     lists = ("capacitance_f_per_m2", "outlines", "apex_m")
     tails = [part if part is kept[0] else replace(part, **{k: getattr(part, k)[1:] for k in _BY_LOAD}) for part in kept]
-    whole = {k: np.concatenate([getattr(part, k) for part in tails]) for k in arrays}
+    whole: dict[str, Any] = {k: np.concatenate([getattr(part, k) for part in tails]) for k in arrays}
     whole |= {k: tuple(each for part in tails for each in getattr(part, k)) for k in lists}
     reached = whole["stress_pa"][-1]
     short = (
