@@ -18,6 +18,7 @@ _FEWEST_COURSES = 10  # presses from which on their usual course is known
 _FLOOR = 1e-5  # of ln Z: no bench is right to more
 _USUAL = (0.25, 0.25), (0.5, 0.6)  # mean and standard deviation of how presses come about: unloading, decades
 _LN_SPREAD = 1.5  # of ln of each variance component's standard deviation, before calibration
+_LN_LOOSE = 3.0  # the same where presses tell: tighter, a specimen that never wanders gets the interval of one that may
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,7 +325,7 @@ def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, 
         gradient = pull + np.einsum("nia,ni->a", by, white)
         logs = -2 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum() + np.linalg.slogdet(information)[1]
         return float(
-            logs + (white**2).sum() - gradient @ np.linalg.solve(information, gradient) + ln @ ln / _LN_SPREAD**2
+            logs + (white**2).sum() - gradient @ np.linalg.solve(information, gradient) + ln @ ln / _LN_LOOSE**2
         )
 
     count = len(usual)
