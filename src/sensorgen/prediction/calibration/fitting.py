@@ -31,8 +31,10 @@ class Meter:
         Of each reading [Hz].
     observed : callable
         From impedances at the contacts (..., k) [ohm] to what was read (..., k).
-    value, error : (k,) array
-        What was read, and its standard deviation, in one unit.
+    value : (k,) array
+        What was read.
+    root : (k, k) array
+        Inverse of the root of its covariance: turns differences to independent ones of standard deviation 1.
     ln_resistance : (float, float) or None
         Ln of both electrodes' resistance over the predicted one, and its standard deviation [-].
     """
@@ -40,7 +42,7 @@ class Meter:
     frequency_hz: Real
     observed: Callable[[Complex], Real]
     value: Real
-    error: Real
+    root: Real
     ln_resistance: tuple[float, float] | None = None
 
     def off(self, model: SpecimenModel, at: Real) -> Real:
@@ -48,7 +50,7 @@ class Meter:
         said = self.observed(np.exp(model.rest(at, self.frequency_hz)))
         ln_r, sd = self.ln_resistance or (0.0, np.inf)
         resistance = (ln_r - model.spread.resistance * at[..., model.names.index("resistance")]) / sd
-        return np.concatenate([(self.value - said) / self.error, resistance[..., None]], -1)
+        return np.concatenate([(self.value - said) @ self.root.T, resistance[..., None]], -1)
 
     def slopes(self, model: SpecimenModel, at: Real) -> Real:
         """Derivatives of what is made of them by the parameters, (k + 1, p)."""
