@@ -212,7 +212,7 @@ def test_recordings_give_back_what_they_were_made_with(tmp_path):
     top, bottom = (r.value for r in electrode_resistance(default_body(design)).values())
     both = (top + bottom) / (top / 0.07 + bottom / 0.2)  # one resistivity for both, one of them with cogs
     assert value(made, "resistivity_ohm_m").value == pytest.approx(0.5 * both, rel=0.02)
-    assert value(made, "youngs_modulus_pa").value == pytest.approx(0.5 * 6e6, rel=5e-3)
+    assert value(made, "youngs_modulus_pa").value == pytest.approx(0.5 * 6e6, rel=0.015)
     leak_ = next(u.why for u in made.untold if u.parameter == "leak")  # 0.3 % of what C takes: a phase of 0.2 degrees
     assert 2e-9 / 1e-3 < float(leak_.partition("no more than ")[2].split()[0]) < 3 * 2e-9 / 1e-3
     eps = value(made, "relative_permittivity")
@@ -308,7 +308,7 @@ def test_specimens_of_any_name(tmp_path, capsys):
         assert not cli.main(["log", "add", name, *words, "--log", place], standalone_mode=False)
     cli.main(["fit", "S1", "S2", "S3", "--drawn", "--log", place], standalone_mode=False)
     said = " ".join(capsys.readouterr().out.split())
-    assert "S1, S2, S3: 3 specimens fitted to" in said
+    assert "S1, S2, S3: fitted to 3, 0 held back" in said
     assert own.names() == ["fit-s1-and-2"]
     fitted = yaml.safe_load(own.path("fit-s1-and-2").read_text("utf-8"))["materials"]
     eps = fitted["x60"]["relative_permittivity"]

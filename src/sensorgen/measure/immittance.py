@@ -12,7 +12,7 @@ Series and parallel values differ by :math:`C_s = (1 + D^2) C_p`.
 import cmath
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from types import MappingProxyType
@@ -192,14 +192,24 @@ def impedance(values: Mapping[str, float], frequency_hz: float) -> complex | Non
     >>> round(z.real), round(z.imag)
     (318183, -15909131)
     """
-    for (one, other), closed in _PAIRS.items():
-        if one in values and other in values:
-            try:
-                z = closed(values[one], values[other], 2 * math.pi * frequency_hz)
-            except (ZeroDivisionError, OverflowError):
-                return None
-            return z if cmath.isfinite(z) else None
-    return None
+    found = pair(values)
+    if found is None:
+        return None
+    one, other = found
+    try:
+        z = _PAIRS[found](values[one], values[other], 2 * math.pi * frequency_hz)
+    except (ZeroDivisionError, OverflowError):
+        return None
+    return z if cmath.isfinite(z) else None
+
+
+def pair(quantities: Collection[str]) -> tuple[str, str] | None:
+    """The first pair among quantities that determines an impedance; None without one.
+
+    >>> pair(["D", "Z", "Cp"])
+    ('Cp', 'D')
+    """
+    return next((both for both in _PAIRS if both[0] in quantities and both[1] in quantities), None)
 
 
 _OF: Mapping[str, Callable[[Any, Any], Any]] = MappingProxyType({  # impedance and angular frequency to a quantity

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from math import hypot, isfinite
 from math import log as ln
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,12 +12,12 @@ from sensorgen.analysis.comparison.allowed import allowed
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.design.body import BodyOf
 from sensorgen.measure import accuracy
-from sensorgen.measure.immittance import NEVER_NEGATIVE, quantity_of
+from sensorgen.measure.immittance import NEVER_NEGATIVE, pair, quantity_of
 from sensorgen.measure.log import Log, Reading
 from sensorgen.prediction.calibration.fitting import Meter
 from sensorgen.prediction.inverse.verdict import NORMAL_90
 
-_R, _X = 0.05, 0.02  # of resistance and reactance: a specimen differs by as much from one session to another
+_R, _X = 0.05, 0.02  # a specimen's resistance and reactance differ by as much from session to session [-]
 _UNKNOWN = 0.01  # of abs(Z): standard uncertainty of a meter that nothing is known of
 _LN = 0.3  # relative uncertainty up to which a value's logarithm is taken
 
@@ -53,40 +54,50 @@ def readings_of(log: Log, name: str, body_of: BodyOf, resistivity_ohm_m: float) 
     return _meter([said for one in counted for said in _alternating(one)], ln_resistance), counted
 
 
-_Said = tuple[str, float, float, float]  # quantity, frequency [Hz], value, standard deviation
+class _Said(NamedTuple):
+    """A quantity at one frequency, and what is uncertain of it."""
+
+    quantity: str
+    frequency_hz: float
+    value: float
+    error: float  # standard uncertainty of the measurement
+    by_r: float  # change with the resistance's from session to session
+    by_x: float  # with the reactance's
 
 
 def _alternating(reading: Reading) -> Iterator[_Said]:
-    """AC quantities that a passive specimen can have."""
+    """AC quantities that a passive specimen can have: of a pair and more, the pair."""
     for f in sorted(set(reading.frequency_hz)):
         at = accuracy.at_frequency(reading, f)
         z = at.z_ohm
-        for quantity in at.values:
-            found = at.value(quantity)
-            value, error = found.value, found.error
+        for quantity in pair(at.values) or at.values:
+            value, error = vars(at.value(quantity)).values()
             if value == 0 or (value < 0 and quantity in NEVER_NEGATIVE):
                 continue
             if z is None:
-                error, other = (error if isfinite(error) else abs(value) * _UNKNOWN), abs(value) * _R
+                by_r, by_x = abs(value) * _R, 0.0
+                error = error if isfinite(error) else abs(value) * _UNKNOWN
             else:
-                error = error if isfinite(error) else accuracy.uncertainty(_UNKNOWN, quantity, value, z)
                 ends = quantity_of(quantity, [z, z + _R * z.real, z + 1j * _X * z.imag], f)
-                other = hypot(ends[1] - ends[0], ends[2] - ends[0])
-            yield quantity, f, value, hypot(error, other)
+                by_r, by_x = (ends[1:] - ends[0]).tolist()
+                error = error if isfinite(error) else accuracy.uncertainty(_UNKNOWN, quantity, value, z)
+            yield _Said(quantity, f, value, error, by_r, by_x)
 
 
 def _meter(said: Sequence[_Said], ln_resistance: tuple[float, float] | None) -> Meter | None:
     if not said and not ln_resistance:
         return None
-    value, error = (np.array([one[k] for one in said], float) for k in (2, 3))
-    as_ln = (value > 0) & (error < _LN * value)
+    value, error, by_r, by_x = (np.array([one[k] for one in said], float) for k in range(2, 6))
+    as_ln = (value > 0) & (np.hypot(error, np.hypot(by_r, by_x)) < _LN * value)
+    unit = np.where(as_ln, np.abs(value), 1.0)
 
     def scaled(values: Real) -> Real:
         return np.where(as_ln, np.log(np.where(as_ln, np.maximum(values, 1e-300), 1.0)), values)
 
     def observed(z: Complex) -> Real:
-        columns = [quantity_of(quantity, z[..., k], f) for k, (quantity, f, _, _) in enumerate(said)]
+        columns = [quantity_of(one.quantity, z[..., k], one.frequency_hz) for k, one in enumerate(said)]
         return scaled(np.stack(columns, -1)) if columns else np.empty((*z.shape[:-1], 0))
 
-    error = np.where(as_ln, error / np.abs(value), error)
-    return Meter(np.array([one[1] for one in said], float), observed, scaled(value), error, ln_resistance)
+    covariance = np.diag((error / unit) ** 2) + sum(np.outer(by, by) for by in (by_r / unit, by_x / unit))
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    return Meter(np.array([one.frequency_hz for one in said]), observed, scaled(value), root, ln_resistance)

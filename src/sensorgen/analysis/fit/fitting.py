@@ -150,7 +150,7 @@ def _fitted(
     known = {quantity for _, quantity in best}
     open_ = [u for u in found if isinstance(u, Untold)]
     untold = [u for u in open_ if not any(quantity.startswith(u.parameter.split()[0]) for quantity in known)]
-    return list(best.values()), [_ACROSS, *untold]
+    return list(best.values()), [_ACROSS, *{u.parameter: u for u in reversed(untold)}.values()]
 
 
 def with_values(body: Body, values: Sequence[Fitted]) -> Body:

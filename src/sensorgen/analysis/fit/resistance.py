@@ -51,7 +51,7 @@ def leak(readings: Sequence[Allowed], material: str, seed: int) -> Fitted | Unto
     """Leak per area, where it scatters little enough to be anything of the material's."""
     known = np.array([r.leak for r in readings if isfinite(r.leak)])
     if len(known) < LEAST:
-        return Untold("leak", f"{len(known)} specimens that leak; expected {LEAST} or more")
+        return Untold("leak", f"{len(known)} readings of films that leak; expected {LEAST} or more")
     middle, spread = float(np.median(known)), float(np.exp(np.median(np.abs(known - np.median(known)))))
     if spread > _PROPERTY:
         least, most = np.exp(known.min()), np.exp(known.max())

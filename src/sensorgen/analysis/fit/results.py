@@ -118,7 +118,7 @@ class Fit:
 
     def document(self) -> Iterator[Part]:
         """Values, what stays open, errors, and where the source is."""
-        yield f"{self.of}: {self.specimens} specimens fitted to, {len(self.held_back)} held back"
+        yield f"{self.of}: fitted to {self.specimens}, {len(self.held_back)} held back"
         if self.values:
             yield Table.of("values", "", self.values)
             yield Facts(tuple((f"{v.quantity}:", v.note) for v in self.values))

@@ -117,13 +117,13 @@ def values(fits: Sequence[OfSpecimen]) -> list[Fitted | Untold]:
         (fit, (fit.stiffness[0] + log(t.value), fit.stiffness[1])) for fit in fits if fit.stiffness
         for t in fit.of.model.values if t.material == film and t.quantity == MODULUS
     ]  # fmt: skip
-    rho = f"Re Z of {len(fits)} specimens: one value for both electrodes, along them"
+    rho = f"Re Z of {_specimens(len(fits))}: one value for both electrodes, along them"
     law = f"by the law of compression {sensor.compression.name}; all moduli move together"
     modulus: Fitted | Untold = Untold(MODULUS, "no recording with presses whose force and position are known")
     if pressed:
         moduli = [pair for _, pair in pressed]
         together = _together(moduli, _prints([fit for fit, _ in pressed]))
-        modulus = _value(film, MODULUS, together, f"presses of {len(moduli)} specimens, {law}", len(moduli))
+        modulus = _value(film, MODULUS, together, f"presses of {_specimens(len(moduli))}, {law}", len(moduli))
     return [
         _value(electrode, "resistivity_ohm_m", _together(along, _prints(fits)), rho, len(fits)),
         _permittivity(fits, film), modulus, _leak(fits, film),
@@ -134,8 +134,12 @@ def _value(material: str, quantity: str, ln: tuple[float, float], note: str, cou
     """A value by the logarithm and its standard error, unless that leaves it open."""
     at, error = ln
     if error > _UNSURE:
-        return Untold(quantity, f"{count} specimens leave a factor of {exp(error):.3g} open")
+        return Untold(quantity, f"{_specimens(count)} leave a factor of {exp(error):.3g} open")
     return Fitted(material, quantity, exp(at), exp(at - _SURE * error), exp(at + _SURE * error), note)
+
+
+def _specimens(count: int) -> str:
+    return f"{count} specimen{'s' * (count != 1)}"
 
 
 def _prints(fits: Sequence[OfSpecimen]) -> list[str]:
@@ -180,7 +184,7 @@ def _permittivity(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
         found.append((log(fit.of.permittivity) + at, sqrt(fit.capacitance[1] ** 2 + open_**2) / slope))
     at, between = _together(found, _prints(fits))
     error = max(between, max(e for _, e in found))  # bounds of a model do not average out
-    note = f"Im Z of {len(fits)} specimens; the interval holds the bounds of the cell's model"
+    note = f"Im Z of {_specimens(len(fits))}; the interval holds the bounds of the cell's model"
     return _value(film, PERMITTIVITY, (at, error), note, len(fits))
 
 
@@ -190,10 +194,10 @@ def _leak(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
     found = [(fit.leak_s[0] / a, fit.leak_s[1] / a) for fit, a in zip(fits, areas, strict=True)]
     if any(at < _SURE * error for at, error in found):
         most = max(at + _SURE * error for at, error in found)
-        return Untold("leak", f"in {len(found)} specimens no more than {most:.2g} S/m2, and none of it certain")
+        return Untold("leak", f"in {_specimens(len(found))} no more than {most:.2g} S/m2, and none of it certain")
     typical = sum(at for at, _ in found) / len(found)
     at, error = _together(found, _prints(fits), _BETWEEN * typical)
     if at <= _SURE * error:
-        return Untold("leak", f"{len(found)} specimens differ too much: {at:.2g} S/m2, give or take {error:.2g}")
+        return Untold("leak", f"{_specimens(len(found))} differ too much: {at:.2g} S/m2, give or take {error:.2g}")
     return Fitted(film, FILM_LEAK, at, at - _SURE * error, at + _SURE * error,
-                  f"Z of {len(found)} specimens at their lowest tones")  # fmt: skip
+                  f"Z of {_specimens(len(found))} at their lowest tones")  # fmt: skip

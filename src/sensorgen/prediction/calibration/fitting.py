@@ -18,6 +18,7 @@ _FEWEST_COURSES = 10  # presses from which on their usual course is known
 _FLOOR = 1e-5  # of ln Z: no bench is right to more
 _USUAL = (0.25, 0.25), (0.5, 0.6)  # mean and standard deviation of how presses come about: unloading, decades
 _LN_SPREAD = 1.5  # of ln of each variance component's standard deviation, before calibration
+_LN_LOOSE = 3.0  # the same where presses tell: tighter, a specimen that never wanders gets the interval of one that may
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +31,10 @@ class Meter:
         Of each reading [Hz].
     observed : callable
         From impedances at the contacts (..., k) [ohm] to what was read (..., k).
-    value, error : (k,) array
-        What was read, and its standard deviation, in one unit.
+    value : (k,) array
+        What was read.
+    root : (k, k) array
+        Inverse of the root of its covariance: turns differences to independent ones of standard deviation 1.
     ln_resistance : (float, float) or None
         Ln of both electrodes' resistance over the predicted one, and its standard deviation [-].
     """
@@ -39,7 +42,7 @@ class Meter:
     frequency_hz: Real
     observed: Callable[[Complex], Real]
     value: Real
-    error: Real
+    root: Real
     ln_resistance: tuple[float, float] | None = None
 
     def off(self, model: SpecimenModel, at: Real) -> Real:
@@ -47,7 +50,7 @@ class Meter:
         said = self.observed(np.exp(model.rest(at, self.frequency_hz)))
         ln_r, sd = self.ln_resistance or (0.0, np.inf)
         resistance = (ln_r - model.spread.resistance * at[..., model.names.index("resistance")]) / sd
-        return np.concatenate([(self.value - said) / self.error, resistance[..., None]], -1)
+        return np.concatenate([(self.value - said) @ self.root.T, resistance[..., None]], -1)
 
     def slopes(self, model: SpecimenModel, at: Real) -> Real:
         """Derivatives of what is made of them by the parameters, (k + 1, p)."""
@@ -324,7 +327,7 @@ def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, 
         gradient = pull + np.einsum("nia,ni->a", by, white)
         logs = -2 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum() + np.linalg.slogdet(information)[1]
         return float(
-            logs + (white**2).sum() - gradient @ np.linalg.solve(information, gradient) + ln @ ln / _LN_SPREAD**2
+            logs + (white**2).sum() - gradient @ np.linalg.solve(information, gradient) + ln @ ln / _LN_LOOSE**2
         )
 
     count = len(usual)
