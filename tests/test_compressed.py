@@ -23,9 +23,9 @@ def _own_cache(monkeypatch, tmp_path):
     monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / "cache"))
 
 
-def pressed(film, accuracy):
+def pressed(film, accuracy, loads=LOADS):
     design = make({"shape": "tri", "parameters": {"dielectric_mm": film}})
-    stress = tuple(KNOWN[f"tri_d{film}"]["p_kPa"][k] for k in LOADS)
+    stress = tuple(KNOWN[f"tri_d{film}"]["p_kPa"][k] for k in loads)
     return compressed.answer(drawn(design), Asked(stress, BoundaryConditions(), accuracy=accuracy))
 
 
@@ -48,7 +48,7 @@ def test_the_bounds_hold_the_reference_at_every_load(film, accuracy):
 
 @needs_mesher
 def test_what_is_below_the_reach_of_all_meshes_is_told_with_the_best():
-    found = pressed(0.2, 1e-5)
+    found = pressed(0.2, 1e-5, loads=(0, 2))
     assert not found.reached
     assert mesh_ladder.VERIFIED < found.largest_rise_error < 1.2e-2
     asked = [c.model for c in found.plan.levels[0].candidates if c.seconds is not None]

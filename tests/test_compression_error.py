@@ -97,7 +97,7 @@ def test_a_plate_between_fixed_sides_as_the_closed_form_has_it():
 
 
 def test_few_loads_are_as_good_as_many():
-    few, many = (estimated(0, loads) for loads in ([0.0, 1e4, 1e5], [0.0, *np.linspace(5e3, 1e5, 20)[1::3]]))
+    few, many = (estimated(0, loads) for loads in ([0.0, 1e4, 1e5], [0.0, 1e3, 3e3, 6e3, 1e4, 1e5]))
     for found in (few, many):
         assert found.found.faults == ()
     at = np.searchsorted(many.found.stress_pa, few.found.stress_pa)
