@@ -66,9 +66,10 @@ def bricks_of(scene: Scene) -> Bricks:
         raise BadInput(str(error)) from None
     planes, fill = [p * M_PER_MM for p in found.planes_mm], found.fill
     for axis in (0, 1):  # planes at which only the sensor ends
-        differs = np.diff(fill, axis=axis).any(tuple(a for a in range(3) if a != axis))
-        planes[axis] = planes[axis][[True, *differs, True]]
-        fill = fill.compress([True, *differs], axis)
+        apart = np.diff(fill, axis=axis) != 0
+        begins = np.append(True, np.moveaxis(apart, axis, 0).any(axis=(1, 2)))
+        planes[axis] = planes[axis][np.append(begins, True)]
+        fill = fill.compress(begins, axis)
     x, y, z = planes
     return Bricks((x, y, z), fill, tuple(regions))
 
