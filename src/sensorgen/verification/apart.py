@@ -74,7 +74,7 @@ Runner = Callable[[Work], Run]
 
 def here(work: Work) -> Run:
     """Run a piece of work in this process; raises what it raises."""
-    return _measured(work, _used_s(), time.time())
+    return _measured(work, used_s(), time.time())
 
 
 def apart(work: Work) -> Run:
@@ -94,7 +94,7 @@ def apart(work: Work) -> Run:
         environment = {**os.environ, cache.PLACE: folder, "PYTHONSAFEPATH": "1"}
         environment.setdefault("OPENBLAS_NUM_THREADS", "1")
         started = time.time()
-        done = subprocess.run(  # noqa: S603 - this very program
+        done = subprocess.run(
             [sys.executable, "-W", "ignore", "-m", "sensorgen.verification.apart"],
             input=pickle.dumps((started, pickle.dumps(work))), capture_output=True, env=environment, check=False,
         )  # fmt: skip
@@ -107,19 +107,23 @@ def apart(work: Work) -> Run:
     return found
 
 
-def _measured(work: Work, used_s: float, started: float) -> Run:
-    """An answer with its costs; the first one from when ``used_s`` were used and the clock stood at ``started``."""
+def _measured(work: Work, before_s: float, started: float) -> Run:
+    """An answer with its costs; the first one from when ``before_s`` were used and the clock stood at ``started``."""
     answer = work()
-    cold = Cost(_used_s() - used_s, time.time() - started)
-    used_s, started = _used_s(), time.time()
+    cold = Cost(used_s() - before_s, time.time() - started)
+    before_s, started = used_s(), time.time()
     work()
-    return Run(answer, cold, Cost(_used_s() - used_s, time.time() - started), _peak_mb())
+    return Run(answer, cold, Cost(used_s() - before_s, time.time() - started), _peak_mb())
 
 
-def _used_s() -> float:
+def used_s() -> float:
     """Processor time of this process and of those that it has started [s]."""
-    times = os.times()
-    return time.process_time() + times.children_user + times.children_system
+    try:
+        from resource import RUSAGE_CHILDREN, getrusage
+    except ImportError:  # Windows does not tell of others
+        return time.process_time()
+    of_others = getrusage(RUSAGE_CHILDREN)
+    return time.process_time() + of_others.ru_utime + of_others.ru_stime
 
 
 def _peak_mb() -> float | None:

@@ -73,8 +73,13 @@ def _tip(line: PressedLine, pieces: int = 1, profile: str = "uniform") -> Comple
         p["top_resistivity_ohm_m"] / p["top_thickness_m"] + p["bottom_resistivity_ohm_m"] / p["bottom_thickness_m"]
     ) / p["width_m"]
     track = line_tip.Track(
-        p["length_m"], r, 0.0, EPS0_F_PER_M * p["eps_r"] * p["width_m"] / p["film_m"],
-        p["tan_delta"], p["leak_s_per_m"], "open",
+        p["length_m"],
+        r,
+        0.0,
+        EPS0_F_PER_M * p["eps_r"] * p["width_m"] / p["film_m"],
+        p["tan_delta"],
+        p["leak_s_per_m"],
+        "open",
     )
     middle, contact = p["left_m"] + p["tip_m"] / 2, (np.asarray(p["tip_m"]), np.zeros(()))
     tip = line_tip.resting(

@@ -121,9 +121,13 @@ def points(name: str, budget_s: float) -> list[Point]:
         *((name, [("", of(line_models.impedance, name))]) for name in line_models.AT_ONCE),
         ("line_ladder", [(f"{n} cells, ", of(line_models.impedance, "line_ladder", cells=n)) for n in _LADDERS]),
         ("sheet", [(f"{n} cells, ", of(line_models.impedance, "sheet", cells=n)) for n in _GRIDS]),
-        ("line_tip", [
-            (f"{n} pieces, ", of(line_models.impedance, "line_tip", pieces=n, profile=standard.profile)) for n in pieces
-        ]),
+        (
+            "line_tip",
+            [
+                (f"{n} pieces, ", of(line_models.impedance, "line_tip", pieces=n, profile=standard.profile))
+                for n in pieces
+            ],
+        ),
         *((peer, levels) for peer, levels in theirs.items() if not peers.missing(peer)),
     ]
     return list(climbed(name, ladders, judge, budget_s))

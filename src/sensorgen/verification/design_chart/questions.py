@@ -27,12 +27,13 @@ from sensorgen.verification.apart import Work
 from sensorgen.verification.design_chart import works
 
 OWN = "sensorgen"
-LEVELS_OF_C = (1e-1, 1e-2, 1e-3, 1e-5, 1e-7)
+WIDTHS, WIDTHS_IN_3D = (1e-3, 1e-5, 1e-7), (1e-1, 1e-2, 1e-3, 1e-4)  # of the bounds of C, wanted
 ACCURACIES = (1e-1, 1e-2, 1e-3)
 LADDERS = (1, 10, 100, 1000)
 CIRCUITS = (1, 10, 100)  # cells of a ladder in ngspice
 GRIDS = (20, 40)
 DIGITS = 2.0**-52
+_SPATIAL = 3  # cost of a field solve in space
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ def _capacitance(body: Body) -> Question:
         if why := module.why_not_applicable(scene):
             silent.append((name, why))
             continue
-        widths = (None,) if inf == module.WIDTH else LEVELS_OF_C
+        widths = (None,) if inf == module.WIDTH else WIDTHS if module.COST < _SPATIAL else WIDTHS_IN_3D
         levels = tuple(
             (f"width {w:g}" if w else "", partial(works.capacitance, name, scene, eps, w, count),
              (expected(name, scene, w)[1] or 0.0) if w else 0.0)
@@ -150,9 +151,7 @@ def _capacitance(body: Body) -> Question:
             for k, (said, _) in enumerate(found)
         )
         series.append(Series(name, name, levels))
-    return Question(
-        "capacitance", "capacitance at rest", "C at rest", tuple(series), tuple(silent), (), largest
-    )
+    return Question("capacitance", "capacitance at rest", "C at rest", tuple(series), tuple(silent), (), largest)
 
 
 def _compression(body: Body, stress_pa: float) -> Question:
@@ -281,7 +280,9 @@ def _prediction(body: Body, query: Query) -> Question:
             work = partial(works.predicted, body, asked, rough=rough)
             levels.append((said, work, 0.0 if rough else _seconds(body, asked)))
         series.append(Series(f"predict: {name}", OWN, tuple(levels)))
-    return Question("prediction", "whole prediction", "|Z| under the load", tuple(series), tuple(silent), (), of_modulus)
+    return Question(
+        "prediction", "whole prediction", "|Z| under the load", tuple(series), tuple(silent), (), of_modulus
+    )
 
 
 def _seconds(body: Body, query: Query) -> float:

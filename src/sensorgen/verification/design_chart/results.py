@@ -27,7 +27,7 @@ from sensorgen.verification.design_chart.questions import (
 )
 
 KEYS = ("capacitance", "compression", "line", "prediction")
-_DEARER = 10.0  # how many times longer the next level may take than the last one
+_DEARER = 5.0  # how many times longer the next level should take than the last one
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,9 @@ class Point:
     stated : float or None
         Relative error that the model states itself [-].
     certified : bool
-        Whether that is a bound.
+        Whether that is a bound; the error is then of the end that is further off.
+    contradicted : bool
+        Whether it is further off than it states, by more than the reference is in doubt.
     cold_cpu_s, cold_wall_s, warm_cpu_s, warm_wall_s : float
         Time of the processor and by the clock: in a new process with nothing stored, from its start; and once more in
         the same process [s].
@@ -74,10 +76,7 @@ class Point:
     against: Annotated[str, Column("against", hidden=True)]
     independent: Annotated[bool, Column("independent", hidden=True)]
     certified: bool
-
-    def contradicts(self) -> bool:
-        """Whether it is further off than it states, by more than the reference is in doubt."""
-        return self.stated is not None and self.error > self.stated + self.doubt
+    contradicted: bool
 
 
 @dataclass(frozen=True)
@@ -131,8 +130,8 @@ class DesignChart(Displayed):
             own = "" if of[0].independent else ", which is not independent"
             yield f"against {words}{own}, known to {of[0].doubt:.2g}: {', '.join(dict.fromkeys(p.model for p in of))}"
         yield from (
-            f"beyond its own bounds: {p.model} {p.level}, {p.error:.2g} off, {p.stated:.2g} stated"
-            for p in here if p.contradicts()
+            f"error larger than stated: {p.model} {p.level}".rstrip()
+            for p in here if p.contradicted
         )  # fmt: skip
         if silent := [s for s in self.silent if s.question == key]:
             yield Facts(tuple((s.model, s.why) for s in silent))
@@ -184,8 +183,12 @@ def chart(
             silent += [Silent(question.key, series.model, why)] if why else []
         known = list(question.references)
         if question.key == "prediction":
-            known += _composed(body, query, best)
+            known += composed(body, query, best)
         best[question.key] = known + list(_from(runs)) if question.key != "prediction" else known
+        if not best[question.key]:
+            why = f"nothing to hold it against within --budget {budget_s:g}"
+            silent += [Silent(question.key, series.model, why) for series in dict.fromkeys(run[0] for run in runs)]
+            continue
         points += [_point(question, *run, best[question.key]) for run in runs]
     load = query.load(body.design)
     return DesignChart(
@@ -226,52 +229,55 @@ def _from(runs: Sequence[tuple[Series, str, Run]]) -> Iterator[Reference]:
         yield Reference(f"the bounds of {series.model}", OWN, run.answer.value, max(stated, DIGITS))
     for series in dict.fromkeys(series for series, _, _ in runs):
         levels = [run.answer for of, _, run in runs if of is series]
-        if len(levels) > 1 and not levels[-1].certified and series.model not in peers.SLOW_TO_CONVERGE:
-            change = abs(levels[-1].value[0] / levels[-2].value[0] - 1)
-            doubt = max(change, levels[-1].stated or 0.0, DIGITS)
-            yield Reference(f"the finest {series.model}", series.program, levels[-1].value, doubt)
+        stated = levels[-1].stated
+        if levels[-1].certified or series.model in peers.SLOW_TO_CONVERGE or (len(levels) < 2 and stated is None):
+            continue
+        change = max((abs(levels[-1].value[0] / before.value[0] - 1) for before in levels[-2:-1]), default=0.0)
+        yield Reference(
+            f"the finest {series.model}", series.program, levels[-1].value, max(change, stated or 0.0, DIGITS)
+        )
 
 
-def _composed(body: Body, query: Query, best: dict[str, list[Reference]]) -> Iterator[Reference]:
+def composed(body: Body, query: Query, best: dict[str, list[Reference]]) -> Iterator[Reference]:
     """Impedance of a line in many digits, with the best capacitance and the best rise of the others."""
     model = rough_sensor(body, "", query.tip)
     load = query.load(body.design)
     query = replace(query, position_m=load.position_m)
-    for of in dict.fromkeys(r.program == OWN for key in KEYS[:2] for r in best[key]):
-        picked = [_best(best[key], "" if of else OWN) for key in KEYS[:2]]
-        if None in picked:
-            continue
-        c, rise = (p for p in picked if p)
-        farad, rises = c.value[0].real, rise.value[0].real
+    if not all(best[key] for key in KEYS[:2]):
+        return
+    c, rise = (_best(best[key], OWN) for key in KEYS[:2])
+    farad, rises = c.value[0].real, rise.value[0].real
 
-        def z(farad: float, rises: float) -> tuple[complex, ...]:
-            law = Plate("given", "", float(model.sensor.stress_pa(load.force_n, load.position_m)) * (1 + rises) / rises)
-            sensor = replace(model.sensor, capacitance_f_per_m=farad / model.sensor.length_m, compression=law)
-            return exact(pressed_line(sensor, query, load.position_m))
+    def z(farad: float, rises: float) -> tuple[complex, ...]:
+        law = Plate("given", "", float(model.sensor.stress_pa(load.force_n, load.position_m)) * (1 + rises) / rises)
+        sensor = replace(model.sensor, capacitance_f_per_m=farad / model.sensor.length_m, compression=law)
+        return exact(pressed_line(sensor, query, load.position_m))
 
-        value = z(farad, rises)
-        doubt = of_modulus(z(farad * (1 + c.doubt), rises), value) + of_modulus(z(farad, rises * (1 + rise.doubt)), value)
-        program = OWN if OWN in (c.program, rise.program) else "others"
-        yield Reference(f"C by {c.name}, rise by {rise.name}, line in 220 digits", program, value, doubt)
+    value = z(farad, rises)
+    doubt = of_modulus(z(farad * (1 + c.doubt), rises), value) + of_modulus(z(farad, rises * (1 + rise.doubt)), value)
+    program = OWN if OWN in (c.program, rise.program) else "others"
+    yield Reference(f"C by {c.name}, rise by {rise.name}, line in 220 digits", program, value, doubt)
 
 
-def _best(references: Sequence[Reference], program: str) -> Reference | None:
+def _best(references: Sequence[Reference], program: str) -> Reference:
     """The least doubtful one that is not of a program; where there is none, the least doubtful one of all."""
     others = [r for r in references if r.program != program]
-    return min(others or references, key=lambda r: r.doubt, default=None)
+    return min(others or references, key=lambda r: r.doubt)
 
 
 def _point(question: Question, series: Series, said: str, run: Run, references: Sequence[Reference]) -> Point:
     """A run held against the best answer of somebody else; against one of its own program where nobody else has one."""
     reference = _best(references, series.program)
-    if reference is None:
-        raise SensorgenError(f"{question.title}: there is nothing to hold {series.model} against")
     answer = run.answer
     off = question.measure(answer.value, reference.value)
+    contradicted = answer.stated is not None and off > answer.stated + reference.doubt
     if answer.certified and answer.stated is not None:  # the bound that is further off
-        off = max(question.measure((answer.value[0] * end,), reference.value) for end in (1 - answer.stated, 1 + answer.stated))
+        off = max(
+            question.measure((answer.value[0] * end,), reference.value)
+            for end in (1 - answer.stated, 1 + answer.stated)
+        )
     return Point(
         question.key, series.model, said, series.program, max(off, reference.doubt), reference.doubt, answer.stated,
         run.cold.cpu_s, run.warm.cpu_s, run.cold.wall_s, run.warm.wall_s, run.memory_mb, reference.name,
-        reference.program != series.program, answer.certified,
+        reference.program != series.program, answer.certified, contradicted,
     )  # fmt: skip

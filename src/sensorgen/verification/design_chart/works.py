@@ -44,8 +44,9 @@ def rise_by_law(body: "Body", law: str, stress_pa: float) -> Answer:
 
     from sensorgen.prediction.planning import rough_sensor
 
-    strain = float(rough_sensor(body, law).law.compression.capacitive_strain(np.asarray(stress_pa))[0])
-    return Answer((strain / (1 - strain),))
+    found = rough_sensor(body, law).law.compression
+    strain = float(found.capacitive_strain(np.asarray(stress_pa))[0])
+    return Answer((strain / (1 - strain),), getattr(found, "within", None))
 
 
 def rise_by_mesh(case: "Case", level: int, stress_pa: float, stated: float) -> Answer:

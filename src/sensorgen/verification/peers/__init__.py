@@ -60,10 +60,11 @@ def levels(peer: str, scene: Scene, permittivity: Mapping[str, float]) -> Levels
             (f"{n} panels along the height, ", partial(module.capacitance, scene, permittivity, n)) for n in _PANELS
         ]
     if isinstance(geometry, cells.Plane):
-        return [
-            (f"{n} unknowns, ", partial(module.plane, scene, permittivity, n)) for n in _UNKNOWNS[peer]
-        ]
+        return [(f"{n} unknowns, ", partial(module.plane, scene, permittivity, n)) for n in _UNKNOWNS[peer]]
     return [
-        (f"{how[0]} layers{''.join(f' of order {p}' for p in how[1:])}, ", partial(module.boxes, scene, permittivity, *how))
+        (
+            f"{how[0]} layers{''.join(f' of order {p}' for p in how[1:])}, ",
+            partial(module.boxes, scene, permittivity, *how),
+        )
         for how in _BRICKS[peer]
     ]

@@ -96,7 +96,9 @@ def geometry(scene: Scene) -> Plane | Grid:
                 shares.append(share)
                 if len(outline) == 3:
                     break
-    return Plane(np.array(list(points)), np.array(triangles), tuple(materials), np.array(shares), faces, section.depth_mm)
+    return Plane(
+        np.array(list(points)), np.array(triangles), tuple(materials), np.array(shares), faces, section.depth_mm
+    )
 
 
 def _polygons(part: Slice, heights: dict[float, set[float]]) -> Iterator[tuple[str, list[Vertex]]]:

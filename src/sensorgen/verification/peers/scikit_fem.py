@@ -32,7 +32,7 @@ def plane(scene: Scene, permittivity: Mapping[str, float], unknowns: int) -> flo
         matrix = skfem.BilinearForm(lambda u, v, w: w.eps * dot(grad(u), grad(v))).assemble(basis, eps=weight)
         x, fixed = _held(basis.doflocs, held)
         x = skfem.solve(*skfem.condense(matrix, x=x, D=fixed))
-        if basis.N >= unknowns:
+        if unknowns <= basis.N:
             return float(x @ matrix @ x) * EPS0_F_PER_M * M_PER_MM * found.depth_mm
         error = _jumps(skfem, mesh, x, eps)
         mesh = mesh.refined(skfem.adaptive_theta(error, theta=_HALF))
