@@ -59,7 +59,7 @@ class Run:
     cold, warm : Cost
         From the start of the process, nothing stored; once more in the same process, with what it has stored.
     memory_mb : float or None
-        Peak of the process, libraries included [MB]; None where the system does not tell.
+        Peak of the process, libraries included [MB]; None on a system without such a record.
     """
 
     answer: Answer
@@ -120,7 +120,7 @@ def used_s() -> float:
     """Processor time of this process and of those that it has started [s]."""
     try:
         from resource import RUSAGE_CHILDREN, getrusage
-    except ImportError:  # Windows does not tell of others
+    except ImportError:  # Windows has no record of others
         return time.process_time()
     of_others = getrusage(RUSAGE_CHILDREN)
     return time.process_time() + of_others.ru_utime + of_others.ru_stime

@@ -51,7 +51,7 @@ OWN: list[click.Parameter] = [
 ]  # fmt: skip
 
 
-def _of_design(design: "Design", *, quantity: tuple[str, ...], force_n: float, budget: float, output: str) -> None:
+def _of_design(design: "Design", *, quantity: tuple[str, ...], force_n: float, budget: float, output: str) -> int:
     from sensorgen.analysis.plots.libraries import needed
     from sensorgen.core import files as store
     from sensorgen.core.document import to_json
@@ -78,6 +78,7 @@ def _of_design(design: "Design", *, quantity: tuple[str, ...], force_n: float, b
     render.deliver(found)
     if not render.form():
         render.say("\n".join(str(Path(output) / name) for name in contents))
+    return render.verdict(*found.problems())
 
 
 def _of_scenes(scene: tuple[str, ...], budget: float | None, output: str, as_json: bool) -> None:

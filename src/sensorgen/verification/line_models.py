@@ -1,5 +1,6 @@
 """Models of the pressed line by name, all with the same inputs."""
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -28,7 +29,7 @@ def impedance(name: str, line: PressedLine, **fineness: Any) -> Complex:
         How fine it is.
     """
     variants: dict[str, Any] = {"B.48 as printed": {"as_printed": "B.48"}}
-    own = {"stack": _stack, "sheet": _sheet, "line_tip": _tip}
+    own: dict[str, Callable[..., Complex]] = {"stack": _stack, "sheet": _sheet, "line_tip": _tip}
     model, _, variant = name.partition(": ")
     if model in own:
         return own[model](line, **fineness)

@@ -1,6 +1,6 @@
-r"""Impedance of sections of a line in many decimal digits: chain matrices by Taylor series in Python's decimal numbers.
+r"""Impedance of sections of a line in many digits: chain matrices by Taylor series in decimal numbers.
 
-.. math:: \begin{pmatrix} \cosh z & r l \, \sinh z / z \\ y l \, \sinh z / z & \cosh z \end{pmatrix}, \quad z^2 = r y l^2
+.. math:: \begin{pmatrix} \cosh z & rl \, \sinh z / z \\ y l \, \sinh z / z & \cosh z \end{pmatrix}, \quad z^2 = r y l^2
 
 Independent of all models of lines, and exact to the last digit of what it is rounded to.
 """

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from functools import partial
 
 from sensorgen.core import cache
+from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.prediction import bodies
 from sensorgen.prediction.query import Query
@@ -36,7 +37,7 @@ def points(name: str, budget_s: float) -> list[Point]:
     design = designs.make({"shape": "tri", "parameters": {"dielectric_mm": float(_FILM.removesuffix(" mm"))}})
     body, query = bodies.drawn(design), Query(force_n=_FORCE_N)
     cell, known = cells.STANDARD[STANDARD[name]](), presses.CELLS[_FILM]
-    area_m2 = design.params.length_mm * design.params.width_mm * cells.M_PER_MM**2
+    area_m2 = design.params.length_mm * design.params.width_mm * M_PER_MM**2
     rise = known.rise_pf_per_m[known.stress_kpa.index(50)] / known.rest_pf_per_m
     best = {
         "capacitance": [Reference("another program", "", (cell.capacitance_f_per_m2 * area_m2,), cell.known_to)],

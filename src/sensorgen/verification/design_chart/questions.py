@@ -1,4 +1,4 @@
-"""What is asked of a design: models, peers, and what they are held against."""
+"""What is asked of a design: models, other programs, and their references."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -55,7 +55,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Reference:
-    """What answers are held against.
+    """What answers are compared with.
 
     Attributes
     ----------
@@ -194,16 +194,14 @@ def _published(body: Body, case: mesh_ladder.Case, stress_pa: float) -> tuple[Re
     from sensorgen.verification.chart import presses
 
     for known in presses.CELLS.values():
-        same = {k: v for k, v in vars(known.params()).items() if k not in ("length_mm", "width_mm")}
-        fits = body.is_drawn and body.design.shape == "tri" and all(
-            getattr(body.design.params, k) == v for k, v in same.items()
-        )  # fmt: skip
-        moduli = all(
-            np.isclose(case.solids[n].youngs_modulus_pa, s.youngs_modulus_pa, rtol=1e-3) for n, s in presses.SOLIDS.items()
-            if n in case.solids
-        )  # fmt: skip
+        drawn = {k: v for k, v in vars(known.params()).items() if k not in ("length_mm", "width_mm")}
+        same = body.design.shape == "tri" and drawn.items() <= vars(body.design.params).items()
+        soft = all(
+            name in presses.SOLIDS and np.isclose(solid.youngs_modulus_pa, presses.SOLIDS[name].youngs_modulus_pa)
+            for name, solid in case.solids.items()
+        )
         at = [k for k, kpa in enumerate(known.stress_kpa) if np.isclose(kpa * 1e3, stress_pa)]
-        if fits and moduli and at and set(case.solids) == set(presses.SOLIDS):
+        if body.is_drawn and same and soft and at:
             rise = known.rise_pf_per_m[at[0]] / known.rest_pf_per_m
             return (Reference("two other programs", "published", (rise,), known.known_to[1]),)
     return ()
@@ -268,7 +266,7 @@ def _line(sensor: Sensor, query: Query, body: Body) -> Question:
 
 
 def _prediction(body: Body, query: Query) -> Question:
-    series, silent = [], []
+    series: list[Series] = []
     ways: list[tuple[str, str, Query, bool]] = [
         ("closed forms", "", query, True), ("plate, free", "", replace(query, law="unconfined"), False),
         ("default", "", query, False),
@@ -280,9 +278,7 @@ def _prediction(body: Body, query: Query) -> Question:
             work = partial(works.predicted, body, asked, rough=rough)
             levels.append((said, work, 0.0 if rough else _seconds(body, asked)))
         series.append(Series(f"predict: {name}", OWN, tuple(levels)))
-    return Question(
-        "prediction", "whole prediction", "|Z| under the load", tuple(series), tuple(silent), (), of_modulus
-    )
+    return Question("prediction", "whole prediction", "|Z| under the load", tuple(series), (), (), of_modulus)
 
 
 def _seconds(body: Body, query: Query) -> float:

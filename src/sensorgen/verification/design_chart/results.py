@@ -1,4 +1,4 @@
-"""Measured points of a chart of one design, each held against the best answer of somebody else."""
+"""Measured points of a chart of one design, each compared with the best answer of another program."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +27,7 @@ from sensorgen.verification.design_chart.questions import (
 )
 
 KEYS = ("capacitance", "compression", "line", "prediction")
+_LEAST = 2  # levels of another program, whose difference is its doubt: without it there is no reference
 _DEARER = 5.0  # how many times longer the next level should take than the last one
 
 
@@ -115,7 +116,7 @@ class DesignChart(Displayed):
     silent: tuple[Silent, ...]
 
     def document(self) -> Iterator[Part]:
-        """A table for each question, with what it is held against and who gave nothing."""
+        """A table for each question, with its references and who gave nothing."""
         yield f"{self.design}, {self.body}: {self.force_n:g} N at {self.position_m * 1e3:g} mm"
         for key in self.titles:
             yield ""
@@ -135,6 +136,11 @@ class DesignChart(Displayed):
         )  # fmt: skip
         if silent := [s for s in self.silent if s.question == key]:
             yield Facts(tuple((s.model, s.why) for s in silent))
+
+    def problems(self) -> Sequence[str]:
+        """Models whose error is larger than they state."""
+        wrong = [p for p in self.points if p.contradicted]
+        return [f"{p.model} {p.level}".rstrip() + f": error {p.error:.2g}, {p.stated:.2g} stated" for p in wrong]
 
     def csv(self) -> Iterator[str]:
         """All points in one table."""
@@ -156,7 +162,7 @@ def chart(
     query : Query
         Frequencies and reference load.
     keys : sequence of str
-        Of ``KEYS``; a prediction is held against the best of capacitance and compression, which run for it too.
+        Of ``KEYS``; a prediction is compared with the best of capacitance and compression, which run for it too.
     budget_s : float
         A level is not run that should take longer [s].
     step : callable
@@ -186,7 +192,7 @@ def chart(
             known += composed(body, query, best)
         best[question.key] = known + list(_from(runs)) if question.key != "prediction" else known
         if not best[question.key]:
-            why = f"nothing to hold it against within --budget {budget_s:g}"
+            why = f"no reference within --budget {budget_s:g}"
             silent += [Silent(question.key, series.model, why) for series in dict.fromkeys(run[0] for run in runs)]
             continue
         points += [_point(question, *run, best[question.key]) for run in runs]
@@ -206,7 +212,9 @@ def _climbed(
     for said, work, expected_s in series.levels:
         last_s = max((run.cold.cpu_s - _started_s(found) for _, _, run in found[-1:]), default=0.0)
         likely_s = max(expected_s, _DEARER * last_s if not expected_s else 0.0)
-        if likely_s > budget_s:
+        if likely_s > budget_s and (
+            series.program == OWN or len(found) >= _LEAST or series.model in peers.SLOW_TO_CONVERGE
+        ):
             return found, f"{said}: some {likely_s:.2g} s, more than --budget {budget_s:g}".removeprefix(": ")
         step()
         try:
@@ -217,16 +225,16 @@ def _climbed(
 
 
 def _started_s(found: Sequence[tuple[Series, str, Run]]) -> float:
-    """Of a run, what starting the process and loading libraries took, at most: the least of what is known [s]."""
+    """Of a run, what starting the process and loading libraries took, at most: the least difference of cold and warm [s]."""
     return min((run.cold.cpu_s - run.warm.cpu_s for _, _, run in found), default=0.0)
 
 
 def _from(runs: Sequence[tuple[Series, str, Run]]) -> Iterator[Reference]:
-    """Answers that others can be held against: bounds, and the finest of a program with its last change as its doubt."""
+    """References: bounds, and the finest answer of a program with its last change as its doubt."""
     bounds = [(run.answer.stated or 0.0, series, run) for series, _, run in runs if run.answer.certified]
     if bounds:
-        stated, series, run = min(bounds, key=lambda each: each[0])
-        yield Reference(f"the bounds of {series.model}", OWN, run.answer.value, max(stated, DIGITS))
+        width, series, run = min(bounds, key=lambda each: each[0])
+        yield Reference(f"the bounds of {series.model}", OWN, run.answer.value, max(width, DIGITS))
     for series in dict.fromkeys(series for series, _, _ in runs):
         levels = [run.answer for of, _, run in runs if of is series]
         stated = levels[-1].stated
@@ -266,7 +274,7 @@ def _best(references: Sequence[Reference], program: str) -> Reference:
 
 
 def _point(question: Question, series: Series, said: str, run: Run, references: Sequence[Reference]) -> Point:
-    """A run held against the best answer of somebody else; against one of its own program where nobody else has one."""
+    """A run beside the best answer of another program; beside one of its own program where there is no other."""
     reference = _best(references, series.program)
     answer = run.answer
     off = question.measure(answer.value, reference.value)

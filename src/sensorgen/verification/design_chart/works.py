@@ -1,6 +1,6 @@
 """Pieces of work of a chart; each imports what it needs when it runs, so that a new process loads nothing else."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def capacitance(
     model: str, scene: "Scene", permittivity: Mapping[str, float], width: float | None, count: float
 ) -> Answer:  # fmt: skip
-    """Of the whole sensor [F], by one of our models; ``width`` is the relative width of the bounds, if it can be asked."""
+    """Of the whole sensor [F], by one of our models; ``width`` of the bounds is relative [-], or None."""
     module = import_module(f"sensorgen.models.{model}")
     found = module.capacitance(scene, permittivity, *([] if width is None else [width]))
     middle = (found.lower + found.upper) / 2
@@ -72,8 +72,8 @@ def circuit(name: str, line: "PressedLine", fineness: Mapping[str, int]) -> Answ
     """Impedance at every frequency [ohm] by another program."""
     from sensorgen.verification.peers import line as programs
 
-    work: Callable[..., Any] = {"scikit-rf": programs.scikit_rf, "ngspice": programs.ngspice}[name]
-    return Answer(tuple(work(line, **fineness).ravel().tolist()))
+    found = programs.ngspice(line, **fineness) if name == "ngspice" else programs.scikit_rf(line)
+    return Answer(tuple(found.ravel().tolist()))
 
 
 def predicted(body: "Body", query: "Query", *, rough: bool = False) -> Answer:

@@ -19,7 +19,7 @@ _UNKNOWNS = {"scikit-fem": (200, 1000, 5000, 20_000), "NGSolve": (200, 1000, 500
 _BRICKS: dict[str, tuple[tuple[int, ...], ...]] = {  # layers; and order, where it can be chosen
     "scikit-fem": ((0,), (1,), (2,)), "NGSolve": ((0, 2), (0, 4), (1, 3), (1, 5), (2, 6)),
 }  # fmt: skip
-SLOW_TO_CONVERGE = ("FastCap",)  # off by more than its last step: nothing to hold others against
+SLOW_TO_CONVERGE = ("FastCap",)  # off by more than its last step: no reference
 _PANELS = (2, 3, 4, 7)  # along the height of the cell
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.scene.scene import Scene
-from sensorgen.scene.sections import ROUNDING_MM, sections
+from sensorgen.scene.sections import ROUNDING_MM, Section, sections
 from sensorgen.scene.unit_cell import Slice, cell
 from sensorgen.solvers.electrostatics.bounds import unmirrored
 from sensorgen.solvers.electrostatics.bricks import Grid, grid
@@ -71,9 +71,13 @@ def geometry(scene: Scene) -> Plane | Grid:
     found = sections(scene)
     if len(found) > 1:
         return grid(scene)
-    section = found[0]
-    piece = cell(section, scene.size_mm[2])
-    heights = defaultdict(set)  # of corners on each vertical line
+    return _plane(found[0], scene.size_mm[2])
+
+
+def _plane(section: Section, height_mm: float) -> Plane:
+    """The cell of a cross-section, its bands cut into triangles around their middles."""
+    piece = cell(section, height_mm)
+    heights: dict[float, set[float]] = defaultdict(set)  # of corners on each vertical line
     for part in piece.slices:
         for band in part.bands:
             for at, k in ((part.left_mm, 0), (part.right_mm, 1)):
@@ -81,21 +85,16 @@ def geometry(scene: Scene) -> Plane | Grid:
     points: dict[Vertex, int] = {}
     triangles, materials, shares = [], [], []
     faces: dict[Edge, tuple[str, str]] = {}
-    for part, share in zip(piece.slices, piece.shares, strict=True):
+    for part, often in zip(piece.slices, piece.shares, strict=True):
         for name, outline in _polygons(part, heights):
+            middle = (sum(u for u, _ in outline) / len(outline), sum(v for _, v in outline) / len(outline))
             for a, b in pairwise([*outline, outline[0]]):
                 left, right = faces.get((a, b) if a < b else (b, a), ("", ""))
                 faces[(a, b) if a < b else (b, a)] = (name, right) if a < b else (left, name)
-            if name in ENDS:
-                continue
-            middle = (sum(u for u, _ in outline) / len(outline), sum(v for _, v in outline) / len(outline))
-            for a, b in pairwise([*outline, outline[0]]):
-                corners = (middle, a, b) if len(outline) > 3 else tuple(outline)
-                triangles.append([points.setdefault(p, len(points)) for p in corners])
-                materials.append(name)
-                shares.append(share)
-                if len(outline) == 3:
-                    break
+                if name not in ENDS:
+                    triangles.append([points.setdefault(p, len(points)) for p in (middle, a, b)])
+                    materials.append(name)
+                    shares.append(often)
     return Plane(
         np.array(list(points)), np.array(triangles), tuple(materials), np.array(shares), faces, section.depth_mm
     )

@@ -4,7 +4,9 @@ The cell's own part of the top electrode is a conductor of its own; the images o
 over each electrode keeps field from its back.
 """
 
+import os
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,9 +90,23 @@ def _charge(surfaces: "Mapping[tuple[str, str], object]", permittivity: Mapping[
                 surface, kind=fastcap2.Problem.DIELEC, inside_perm=permittivity[first],
                 outside_perm=permittivity[second], scale=M_PER_MM,
             )  # fmt: skip
-    matrix = np.array(problem.solve())
+    with _mute():
+        matrix = np.array(problem.solve())
     names = [name.partition("%")[0] for name in problem.conductors()]
     return float(-matrix[names.index("own"), names.index("bottom")])
+
+
+@contextmanager
+def _mute() -> Iterator[None]:
+    """Keep off the standard output what the program writes there past Python."""
+    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def _image(place: Real, i: int, j: int, low: Real, size: Real) -> Real:
